@@ -1,0 +1,27 @@
+"""The one door to numba: a typed decorator for kernels that are compiled once and cached on disk.
+
+Kernels work on plain arrays and scalars, never on Python objects, so that the same source can also be
+compiled for other targets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def compiled(function: Function) -> Function:
+    """Compile a scalar kernel to machine code on first use; later processes read it from the cache.
+
+    Division follows IEEE (1/0 is inf), so that a singular point is data and not an exception.
+    """
+    return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
+
+
+def compiled_parallel(function: Function) -> Function:
+    """Like `compiled`, with `numba.prange` loops spread over the cores."""
+    return cast(Function, numba.njit(cache=True, parallel=True, error_model="numpy")(function))

@@ -1,0 +1,107 @@
+"""A mechanism as arrays: rigid links in a tree, loops closed by points, drives on some joints.
+
+Every number may carry leading batch axes (a set of designs that share one topology); the topology itself
+(parents, joint types, which joints are driven, what closes on what) is the same for the whole batch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+FIXED: Final = 0
+REVOLUTE: Final = 1
+
+
+@dataclass(frozen=True)
+class Links:
+    """The n links, parents before children.
+
+    names      (n,)         unique
+    parent     (n,)         index of the parent link, -1 for the base
+    joint      (n,)         FIXED or REVOLUTE: how the link moves against its parent
+    origin     (..., n, 3)  joint origin in the parent's frame [m]
+    rotation   (..., n, 3, 3)  link axes in the parent's frame at joint angle 0
+    axis       (..., n, 3)  unit joint axis in the link's frame
+    mass       (..., n)     [kg]
+    center_of_mass (..., n, 3)  in the link's frame [m]
+    inertia    (..., n, 3, 3)  about the centre of mass, link axes [kg m^2]
+    tip        (..., n, 3)  the link's tip in its own frame, (length, 0, 0) [m]; drawn, and default for points
+    """
+
+    names: tuple[str, ...]
+    parent: Ints
+    joint: Ints
+    origin: Floats
+    rotation: Floats
+    axis: Floats
+    mass: Floats
+    center_of_mass: Floats
+    inertia: Floats
+    tip: Floats
+
+
+@dataclass(frozen=True)
+class Closures:
+    """The k loop closures: a point of link a stays on a point of link b (both in link frames) [m].
+
+    a, b       (k,)         link indices, -1 for the base
+    point_a, point_b  (..., k, 3)
+    """
+
+    names: tuple[str, ...]
+    a: Ints
+    b: Ints
+    point_a: Floats
+    point_b: Floats
+
+
+@dataclass(frozen=True)
+class Drives:
+    """The d drives, each on one revolute joint; their order is the order of the driven coordinates.
+
+    joint            (d,)      index of the driven link (its joint)
+    motor_inertia    (..., d)  rotor [kg m^2], at the motor
+    transmission     (..., d)  motor turns per joint turn
+    stiffness        (..., d)  at the motor shaft [N m/rad]; inf: rigid
+    damping          (..., d)  parallel to that stiffness, at the motor shaft [N m s/rad]
+    torque_constant  (..., d)  [N m/A], nan if not known
+    torque_limit     (..., d)  at the motor [N m], inf if none
+    encoder_counts   (..., d)  per motor revolution after quadrature, nan if not known
+    """
+
+    names: tuple[str, ...]
+    joint: Ints
+    motor_inertia: Floats
+    transmission: Floats
+    stiffness: Floats
+    damping: Floats
+    torque_constant: Floats
+    torque_limit: Floats
+    encoder_counts: Floats
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Links, closures and drives, with the handle and the named ways of assembling it.
+
+    handle_link, handle_point  the handle: a point (..., 3) of that link [m]
+    assemblies    name -> approximate joint angles (n,) near the reference posture (0 for fixed joints) [rad]
+    reference_position (3,)    handle position the assemblies are given at [m]
+    workspace     (3, 2)       bounds of the handle's position, nan where not given [m]
+    """
+
+    links: Links
+    closures: Closures
+    drives: Drives
+    handle_link: int
+    handle_point: Floats
+    assemblies: dict[str, Floats]
+    reference_position: Floats
+    workspace: Floats
