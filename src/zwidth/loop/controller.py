@@ -1,0 +1,38 @@
+"""What the computer does between reading the encoder and setting the force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Discretisation = Literal["tustin", "tustin-prewarped"]
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """First-order low pass by backward Euler: y_j = a y_{j-1} + (1 - a) x_j, a = tau / (tau + T)."""
+
+    time_constant: float  # tau [s]
+
+
+@dataclass(frozen=True)
+class Butterworth:
+    """Butterworth low pass of any order by the bilinear (Tustin) rule, plain or prewarped at the cutoff."""
+
+    order: int
+    cutoff_Hz: float
+    discretisation: Discretisation = "tustin"
+
+
+@dataclass(frozen=True)
+class Controller:
+    """The sampled wall law: f = -(K y + B v), v by backward difference of the (filtered) position.
+
+    sampling_period  T [s]
+    delay            from reading to force, in samples, any real >= 0
+    velocity_filter  acts on the velocity only; None: none
+    """
+
+    sampling_period: float
+    delay: float = 0.0
+    velocity_filter: FirstOrder | Butterworth | None = None
