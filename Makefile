@@ -1,0 +1,88 @@
+# On a fresh machine with Python 3.11 or newer and make:
+#     make report     sets up .venv, then writes the report on the bundled five-bar to out/
+#     make test       sets up .venv with what the tests want, then runs them
+# The set-up happens once, and again only when pyproject.toml or constraints.txt change.
+
+DEVICE  ?= five-bar
+PYTHON  ?= python3 python3.13 python3.12 python3.11 python
+
+VENV    := .venv
+BIN     := $(VENV)/bin
+OUTPUT   = out/$(basename $(notdir $(DEVICE))).html
+DROP_KERNELS = find src -name '*.nbi' -delete -o -name '*.nbc' -delete
+
+# Relative on purpose: pip splits this variable at blanks, and a folder's name may hold one.
+# Newer releases of pip read the second for the build backend, older ones the first.
+export PIP_CONSTRAINT := constraints.txt
+export PIP_BUILD_CONSTRAINT := constraints.txt
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help report test slow lint bench docs clean
+
+help:
+	@echo 'make report   the report on a device (DEVICE=$(DEVICE)), into $(OUTPUT)'
+	@echo 'make test     the test suite'
+	@echo 'make slow     the longer studies: thousands of random loops'
+	@echo 'make lint     style and types'
+	@echo 'make bench    how fast, beside what a competent user would write otherwise'
+	@echo 'make docs     write the generated pages and pictures of docs/ again'
+	@echo 'make clean    remove what was made, all but $(VENV)'
+
+report: $(VENV)/.installed
+	@mkdir -p $(dir $(OUTPUT))
+	$(BIN)/zwidth report $(DEVICE) --output $(OUTPUT)
+
+# A cached kernel does not notice an edit in a function that it calls from another file.
+test: $(VENV)/.installed-test
+	@$(DROP_KERNELS)
+	$(BIN)/python -m pytest -n auto
+
+slow: $(VENV)/.installed-test
+	@$(DROP_KERNELS)
+	$(BIN)/python -m pytest -n auto -m slow
+
+lint: $(VENV)/.installed-test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: $(VENV)/.installed-test
+	@$(DROP_KERNELS)
+	@set -e; for script in benchmarks/[!_]*.py; do echo "== $$script"; $(BIN)/python "$$script"; done
+
+docs: $(VENV)/.installed
+	@set -e; for script in docs/[!_]*.py; do echo "== $$script"; $(BIN)/python "$$script"; done
+
+clean:
+	rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find src tests benchmarks gallery docs -name __pycache__ -prune -exec rm -rf {} +
+
+$(VENV)/.installed: $(VENV)/bin/python pyproject.toml constraints.txt
+	@echo 'Installing zwidth into $(VENV); the first time takes a few minutes.'
+	$(BIN)/python -m pip install --quiet --editable .
+	@touch $@
+
+$(VENV)/.installed-test: $(VENV)/bin/python pyproject.toml constraints.txt
+	@echo 'Installing zwidth and its tests into $(VENV); the first time takes a few minutes.'
+	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	@touch $(VENV)/.installed $@
+
+# The first interpreter of PYTHON that is new enough; venv, else virtualenv, else one sentence.
+$(VENV)/bin/python:
+	@found=''; \
+	for python in $(PYTHON); do \
+	  if $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then \
+	    found=$$python; break; \
+	  fi; \
+	done; \
+	if [ -z "$$found" ]; then \
+	  echo 'zwidth needs Python 3.11 or newer, and none of these is: $(PYTHON); install one, or name it: make PYTHON=/path/to/python3.' >&2; \
+	  exit 1; \
+	fi; \
+	for maker in "$$found -m venv" "$$found -m virtualenv" "virtualenv --python $$found"; do \
+	  rm -rf $(VENV); \
+	  if $$maker $(VENV) >/dev/null 2>&1; then exit 0; fi; \
+	done; \
+	rm -rf $(VENV); \
+	echo "$$found can make no virtual environment: install its venv module (python3-venv on Debian and Ubuntu) or virtualenv, then run make again." >&2; \
+	exit 1

@@ -1,0 +1,40 @@
+"""What holds for every test: no display, no deadline on a first compilation, and where asked no skips."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from hypothesis import settings
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+# The first example of a test may compile a kernel. `settings()` keeps what hypothesis chose for this
+# machine: on continuous integration the examples are the same in every run.
+settings.register_profile("zwidth", parent=settings(), deadline=None)
+settings.load_profile("zwidth")
+
+NO_SKIPS = "ZWIDTH_NO_SKIPS"
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail a run with skipped tests where ZWIDTH_NO_SKIPS is set: there every tool is installed."""
+    skipped = skipped_tests(session.config)
+    if skipped and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Say why the run failed."""
+    skipped = skipped_tests(config)
+    if skipped:
+        terminalreporter.section(
+            f"{NO_SKIPS} is set: {len(skipped)} skipped, each counts as a failure", red=True
+        )
+
+
+def skipped_tests(config: pytest.Config) -> list[object]:
+    """The skips that count as failures; none in a worker process, whose controller counts them."""
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    return list(reporter.stats.get("skipped", [])) if reporter and os.environ.get(NO_SKIPS) else []

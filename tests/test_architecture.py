@@ -1,0 +1,118 @@
+"""The shape of the code: which package may import which, and what no file may do."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "src" / "zwidth"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+DEVICES = sorted(path.stem for path in (PACKAGE / "device" / "zoo").glob("*.toml"))
+
+# Numbers flow from left to right: a package imports itself and what stands before it.
+FLOW = ("model", "loop", "chart", "conditions", "contact", "measures", "study", "show")
+# Device files become models and loops; what computes knows nothing of files.
+MAY_IMPORT = {package: {*FLOW[: place + 1], "compiled"} for place, package in enumerate(FLOW)}
+MAY_IMPORT["compiled"] = set()
+MAY_IMPORT["device"] = {"device", "model", "loop", "compiled"}
+MAY_IMPORT["study"].add("device")
+MAY_IMPORT["show"].add("device")
+
+FOR_PEOPLE = {"matplotlib", "click", "rich", "jinja2"}
+HEAVY = {"numba", "scipy", "matplotlib"}
+LONGEST_MODULE = 400
+
+
+def imports(source: str, module: str, *, is_package: bool = False) -> Iterator[str]:
+    """Full dotted names of all that `source` imports, inside functions too; `module` resolves the dots."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            up = node.level - is_package
+            base = module.split(".")[: -up or None] if node.level else []
+            origin = ".".join([*base, *filter(None, [node.module])])
+            yield from (f"{origin}.{alias.name}" for alias in node.names)
+
+
+def imports_of(path: Path) -> set[str]:
+    module = ".".join(("zwidth", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
+    return set(imports(path.read_text(encoding="utf-8"), module, is_package=path.name == "__init__.py"))
+
+
+def part(path: Path) -> str:
+    """The package (or single module) directly under zwidth that holds the file."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def short(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def test_every_way_of_importing_is_seen():
+    source = """
+import zwidth.chart.region as r, numpy
+from zwidth import show
+from ..loop import hold
+from . import closure
+def lazily():
+    from ..study.sweep import run
+"""
+    assert set(imports(source, "zwidth.model.posture")) == {
+        "zwidth.chart.region",
+        "numpy",
+        "zwidth.show",
+        "zwidth.loop.hold",
+        "zwidth.model.closure",
+        "zwidth.study.sweep.run",
+    }
+    assert set(imports("from .tree import f\nfrom .. import chart", "zwidth.model", is_package=True)) == {
+        "zwidth.model.tree.f",
+        "zwidth.chart",
+    }
+
+
+@pytest.mark.parametrize("path", [path for path in MODULES if part(path) != "__init__"], ids=short)
+def test_imports_follow_the_flow_of_numbers(path):
+    assert part(path) in MAY_IMPORT, f"say in FLOW where {part(path)} stands"
+    inner = {name.split(".")[1] for name in imports_of(path) if name.startswith("zwidth.")}
+    # `from zwidth import __version__` and the like name attributes, not packages.
+    packages = {name for name in inner if (PACKAGE / name).is_dir() or (PACKAGE / f"{name}.py").is_file()}
+    assert packages <= MAY_IMPORT[part(path)]
+
+
+@pytest.mark.parametrize("path", [path for path in MODULES if part(path) != "show"], ids=short)
+def test_only_show_draws_and_talks(path):
+    assert not {name.split(".")[0] for name in imports_of(path)} & FOR_PEOPLE
+
+
+@pytest.mark.parametrize("module", ["zwidth", "zwidth.show.cli.main"])
+def test_importing_stays_light(module):
+    program = f"import sys, {module}; print(*sys.modules)"
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert module in found.split()
+    assert not HEAVY & set(found.split())
+
+
+def test_modules_stay_short():
+    folders = [ROOT / name for name in ("src", "tests", "benchmarks", "gallery", "docs")]
+    lengths = {
+        path: len(path.read_bytes().splitlines()) for folder in folders for path in folder.rglob("*.py")
+    }
+    assert {short(path): n for path, n in lengths.items() if n > LONGEST_MODULE} == {}
+
+
+def test_no_device_is_known_outside_the_zoo():
+    assert DEVICES, "the zoo is empty"
+    known = re.compile("|".join(name.replace("-", "[-_]") for name in DEVICES), re.IGNORECASE)
+    sources = [path for path in PACKAGE.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
+    outside = [path for path in sources if PACKAGE / "device" / "zoo" not in path.parents]
+    named = {short(path): known.findall(path.read_text(encoding="utf-8")) for path in outside}
+    assert {path: names for path, names in named.items() if names} == {}
