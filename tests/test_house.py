@@ -20,11 +20,16 @@ from packaging.utils import canonicalize_name
 import zwidth
 
 ROOT = Path(__file__).parent.parent
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-BUILD = tomllib.loads((ROOT / "pyproject.toml").read_text())["build-system"]["requires"]
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PROJECT = SETTINGS["project"]
+WANTED = [
+    *PROJECT["dependencies"],
+    *PROJECT["optional-dependencies"]["test"],
+    *SETTINGS["build-system"]["requires"],
+]
 FOLDERS = ("src", "tests", "docs", "gallery", "benchmarks")
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
-MAKE = shutil.which("make")
+needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
 
 
 def short(path: Path) -> str:
@@ -75,11 +80,10 @@ def test_every_pin_is_one_exact_version_and_no_address():
 
 
 def test_everything_that_is_installed_for_zwidth_is_pinned():
-    wanted = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["test"], *BUILD]
-    assert needed(wanted) - set(pins()) == set()
+    assert needed(WANTED) - set(pins()) == set()
 
 
-@pytest.mark.parametrize("requirement", [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["test"]])
+@pytest.mark.parametrize("requirement", WANTED)
 def test_a_pin_meets_its_requirement(requirement):
     wanted = Requirement(requirement)
     (pinned,) = pins()[canonicalize_name(wanted.name)].specifier
@@ -122,29 +126,39 @@ def test_every_link_leads_to_a_file(page):
     assert missing == []
 
 
-def commands(page: str) -> list[list[str]]:
-    """The lines of a page's console blocks, split as a shell would."""
-    blocks = re.findall(r"^```(?:sh|console|bash)\n(.*?)^```", text(page), re.MULTILINE | re.DOTALL)
-    lines = "".join(blocks).replace("\\\n", " ").splitlines()
-    return [shlex.split(line.removeprefix("$ "), comments=True) for line in lines if line.strip()]
+def typed(first: str) -> list[str]:
+    """The README's shell lines that begin with the word `first`, without their comments."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", text("README.md"), re.MULTILINE | re.DOTALL)
+    lines = [line.partition(" #")[0].strip() for line in "".join(blocks).splitlines()]
+    return [line for line in lines if line.split()[:1] == [first]]
 
 
-def test_what_the_readme_says_to_type_exists():
-    typed = [words for words in commands("README.md") if words]
-    zwidth_commands = {words[1] for words in typed if words[0] == "zwidth"}
-    targets = {words[1] for words in typed if words[0] == "make" and len(words) > 1}
-    assert zwidth_commands
-    assert {"report", "test"} <= targets
-    listing = subprocess.run(
-        [sys.executable, "-c", "from zwidth.show.cli.main import main; main()", "--help"],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
-    assert {
-        name for name in zwidth_commands if not re.search(rf"^\W*{name}\b", listing, re.MULTILINE)
-    } == set()
-    assert {name for name in targets if not re.search(rf"^{name}:", text("Makefile"), re.MULTILINE)} == set()
+@pytest.mark.parametrize("line", typed("zwidth"))
+def test_a_command_of_the_readme_runs(line, tmp_path):
+    (device,) = re.findall(r"^```toml\n(.*?)^```", text("README.md"), re.MULTILINE | re.DOTALL)
+    (tmp_path / "my-paddle.toml").write_text(device)
+    zwidth_here = Path(sys.executable).with_name("zwidth")
+    done = subprocess.run([zwidth_here, *shlex.split(line)[1:]], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+    outputs = re.findall(r"--output (\S+)", line)
+    assert all((tmp_path / name).stat().st_size > 1000 for name in outputs)
+
+
+@needs_make
+@pytest.mark.parametrize(
+    "line", [*typed("make"), "make help", "make slow", "make lint", "make bench", "make docs"]
+)
+def test_make_knows_the_target(line):
+    done = subprocess.run(
+        ["make", "--dry-run", *line.split()[1:]], cwd=ROOT, env=own_environment(), capture_output=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_readme_has_its_two_commands():
+    assert {"make report", "make test"} <= set(typed("make"))
+    assert typed("zwidth")
 
 
 def test_the_text_knows_no_machine_and_leaves_no_note_behind():
@@ -162,59 +176,57 @@ def test_the_text_knows_no_machine_and_leaves_no_note_behind():
 # --- make, and the rule that nothing is skipped -----------------------------------------------------
 
 
-@pytest.mark.skipif(MAKE is None, reason="make is not installed")
+def own_environment(**more: str) -> dict[str, str]:
+    """This process's environment without what make and pytest hand down to their children."""
+    return {
+        key: value for key, value in os.environ.items() if not key.startswith(("MAKE", "MFLAGS", "PYTEST"))
+    } | more
+
+
+def make(folder: Path, target: str, python: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a target in a folder that holds what a fresh clone holds, as far as the set-up reads it."""
+    for name in ("Makefile", "pyproject.toml", "constraints.txt"):
+        shutil.copy(ROOT / name, folder)
+    command = ["make", "--silent", target, f"PYTHON={python}"]
+    return subprocess.run(
+        command, cwd=folder, env=own_environment(**environment), capture_output=True, text=True
+    )
+
+
+@needs_make
 @pytest.mark.parametrize("python", ["/no/such/python", "false"])
 def test_make_says_in_one_sentence_that_python_is_missing(tmp_path, python):
-    for name in ("Makefile", "pyproject.toml", "constraints.txt"):
-        shutil.copy(ROOT / name, tmp_path)
-    done = subprocess.run(
-        [MAKE, "--silent", "report", f"PYTHON={python}"], cwd=tmp_path, capture_output=True, text=True
-    )
+    done = make(tmp_path, "report", python)
+    sentence, *rest = done.stderr.splitlines()
     assert done.returncode != 0
-    sentence = done.stderr.splitlines()[0]
     assert "needs Python 3.11 or newer" in sentence
     assert python in sentence
+    assert all(line.startswith("make") for line in rest)
     assert not (tmp_path / ".venv").exists()
 
 
-@pytest.mark.skipif(MAKE is None, reason="make is not installed")
+@needs_make
 def test_make_says_in_one_sentence_that_no_environment_can_be_made(tmp_path):
-    for name in ("Makefile", "pyproject.toml", "constraints.txt"):
-        shutil.copy(ROOT / name, tmp_path)
     python = tmp_path / "python"
     python.write_text('#!/bin/sh\n[ "$1" = -c ]\n')  # new enough, but with no module to run
     python.chmod(0o755)
-    path = os.pathsep.join(["/usr/bin", "/bin"])
-    done = subprocess.run(
-        [MAKE, "--silent", "test", f"PYTHON={python}"],
-        cwd=tmp_path,
-        env={"PATH": path},
-        capture_output=True,
-        text=True,
-    )
+    done = make(tmp_path, "test", str(python))
+    sentence, *rest = done.stderr.splitlines()
     assert done.returncode != 0
-    assert "can make no virtual environment" in done.stderr.splitlines()[0]
+    assert "can make no virtual environment" in sentence
+    assert all(line.startswith("make") for line in rest)
     assert not (tmp_path / ".venv").exists()
 
 
+@pytest.mark.parametrize("workers", ["0", "1"])
 @pytest.mark.parametrize(("value", "code"), [("1", 1), ("", 0)])
-def test_a_skip_is_a_failure_where_asked(tmp_path, value, code):
+def test_a_skip_is_a_failure_where_asked(tmp_path, value, code, workers):
     shutil.copy(ROOT / "tests" / "conftest.py", tmp_path)
     (tmp_path / "test_one.py").write_text(
         "import pytest\n\ndef test_runs(): pass\n\ndef test_skips(): pytest.skip('no tool')\n"
     )
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "--rootdir",
-        str(tmp_path),
-        str(tmp_path),
-    ]
-    environment = {**os.environ, "ZWIDTH_NO_SKIPS": value}
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-n", workers, "--rootdir", "."]
+    environment = own_environment(ZWIDTH_NO_SKIPS=value)
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == code, done.stdout
     assert "1 passed, 1 skipped" in done.stdout
