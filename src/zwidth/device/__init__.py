@@ -1,0 +1,7 @@
+"""The device file: reading it, checking it, and addressing its numbers.
+
+load       `load(name_or_path, settings)`, `bundled()`, `schema()`
+device     `Device`, with `posture()` and `plant()`
+faults     `DeviceError` and its `Fault`s
+address    dotted paths: get, assign, unset, numeric_addresses
+"""

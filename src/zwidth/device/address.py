@@ -1,0 +1,266 @@
+"""Dotted paths to the values of a device file: `mechanism.links.upper.length_m`, `plant.mass_kg.0.1`.
+
+A step is a key of a table, the name of a list's element, or else its index (from 0). A path whose first step
+is no key of the file is looked up inside [mechanism]: `links.upper.length_m`. Keys that the file leaves out
+can be set where the schema has them.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
+from typing import Any, Final
+
+from zwidth.device import unsupported
+from zwidth.device.faults import DeviceError, Fault, Path, dotted, fail, listed, nearest, quote
+from zwidth.device.read import within_depth
+from zwidth.device.schema import file as schema
+
+UNSET: Final = object()
+OPTION: Final = "--set"
+
+EXCLUSIVE: Final[dict[tuple[str, ...], tuple[frozenset[str], ...]]] = {
+    ("loop",): (frozenset({"delay_s"}), frozenset({"delay_samples"})),
+    ("loop", "velocity", "filter"): (
+        frozenset({"time_constant_s"}),
+        frozenset({"order", "cutoff_Hz", "discretisation"}),
+    ),
+    ("mechanism", "damping"): (
+        frozenset({"mode_ratio"}),
+        frozenset({"mass_coefficient_1_per_s", "stiffness_coefficient_s"}),
+        frozenset({"given"}),
+    ),
+}
+"""Table -> groups of keys of which one may be used: setting a key drops those of the other groups."""
+
+
+def get(document: dict[str, Any], path: str) -> Any:
+    """The value at a path. Raises DeviceError, naming the nearest right path, if there is none."""
+    steps = resolve(document, path)
+    found = _value(document, steps)
+    if found is UNSET:
+        raise fail(OPTION, path, "is not given in this file, although it may be; give it a value first")
+    return found
+
+
+def exists(document: dict[str, Any], path: str) -> bool:
+    """Whether a path, with * for any step, leads to something in the document."""
+    places = [document]
+    for part in _split(document, path):
+        places = [inner for outer in places for inner in _children(outer, part)]
+    return bool(places)
+
+
+def allowed(path: str) -> bool:
+    """Whether a path of keys, with * for list elements, leads to a key the schema has, given or not."""
+    steps: Path = ()
+    for part in path.split("."):
+        steps = (*steps, part) if schema.at((*steps, part)) else (*steps, 0)
+        if not schema.at(steps) or (steps[-1] == 0 and part != "*"):
+            return False
+    return True
+
+
+def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """A copy of the document with one value set (`UNSET`: removed); exclusive keys are dropped.
+
+    Raises DeviceError  if the schema has no such path, or a list no such element
+    """
+    *outer, last = resolve(document, path)
+    document = deepcopy(document)
+    table: Any = document
+    for step in outer:
+        if isinstance(table, dict) and step not in table:
+            if value is UNSET:
+                return document
+            table[step] = {}
+        table = table[step]
+    if value is UNSET:
+        if isinstance(table, list):
+            table.pop(int(last))
+        else:
+            table.pop(last, None)
+        return document
+    table[last] = value
+    for key in _rivals(tuple(outer), last):
+        table.pop(key, None)
+    return document
+
+
+def unset(document: dict[str, Any], path: str) -> dict[str, Any]:
+    """A copy of the document without the value at a path; removing what is not there changes nothing."""
+    return assign(document, path, UNSET)
+
+
+def apply(document: dict[str, Any], settings: Sequence[str | tuple[str, Any]]) -> dict[str, Any]:
+    """The document with all settings applied in turn; what they amount to is checked afterwards.
+
+    settings  "PATH=VALUE" texts or (path, value) pairs; a text value is read as TOML or else taken as it is,
+              and the bare word unset removes the key
+    Raises DeviceError  with a fault for every setting that leads nowhere
+    """
+    faults: list[Fault] = []
+    for setting in settings:
+        try:
+            path, value = parse(setting)
+            document = assign(document, path, value)
+        except DeviceError as error:
+            faults += error.faults
+    if faults:
+        raise DeviceError(faults)
+    return document
+
+
+def parse(setting: str | tuple[str, Any]) -> tuple[str, Any]:
+    """Path and value of one setting; `UNSET` for the bare word unset."""
+    if isinstance(setting, str):
+        path, equals, text = setting.partition("=")
+        if not equals or not path.strip():
+            raise fail(OPTION, "", f"must be PATH=VALUE, got {quote(setting)}; such as loop.delay_samples=1")
+        return path.strip(), _parsed(text.strip(), path.strip())
+    path, value = setting
+    return path, _parsed(value, path) if isinstance(value, str) else value
+
+
+def numbers(document: Any, path: Path = ()) -> Iterator[tuple[Path, float]]:
+    """Path and value of every number in the document, in its order; `dotted` writes a path as users do."""
+    if isinstance(document, dict):
+        for key, inner in document.items():
+            yield from numbers(inner, (*path, key))
+    elif isinstance(document, list):
+        for index, inner in enumerate(document):
+            yield from numbers(inner, (*path, index))
+    elif isinstance(document, int | float) and not isinstance(document, bool):
+        yield path, document
+
+
+def numeric_addresses(document: dict[str, Any]) -> dict[str, float]:
+    """Dotted path -> value of every number in the document: what sweeps and sensitivities can vary."""
+    return {dotted(path, document): value for path, value in numbers(document)}
+
+
+def resolve(document: dict[str, Any], path: str) -> Path:
+    """The steps of a dotted path as keys and indices, whether or not the last ones are given in the file.
+
+    Raises DeviceError  if neither the document nor the schema knows the path
+    """
+    parts = _split(document, path)
+    steps: list[str | int] = []
+    place: Any = document
+    for depth, part in enumerate(parts):
+        index = _element(place, part) if isinstance(place, list) else None
+        if isinstance(place, dict) and (part in place or part in schema.keys(tuple(steps)) or _free(steps)):
+            step: str | int = part
+        elif index is not None:
+            step = index
+        else:
+            raise _unknown(document, path, steps, parts, depth, place)
+        steps.append(step)
+        place = _value(place, (step,))
+        if place is UNSET:
+            place = {}
+        elif depth + 1 < len(parts) and not isinstance(place, dict | list):
+            raise fail(
+                OPTION, path, f"{dotted(tuple(steps), document)} holds {quote(place)}, nothing is inside it"
+            )
+    return tuple(steps)
+
+
+def _split(document: dict[str, Any], path: str) -> list[str]:
+    """The path's steps, with `mechanism` before them where the first is no key of the file."""
+    parts = path.split(".")
+    if parts[0] not in schema.keys(()) and not unsupported.sentence(tuple(parts)) and "mechanism" in document:
+        return ["mechanism", *parts]
+    return parts
+
+
+def _unknown(
+    document: dict[str, Any], path: str, steps: list[str | int], parts: list[str], depth: int, place: Any
+) -> DeviceError:
+    refused = unsupported.sentence((*steps, *parts[depth:]))
+    if refused:
+        return fail(OPTION, path, f"{refused}; leave it out")
+    here = dotted(tuple(steps), document)
+    choices = _choices(place, tuple(steps))
+    near = nearest(parts[depth], choices)
+    if near:
+        right = ".".join([*([here] if here else []), near, *parts[depth + 1 :]])
+        return fail(OPTION, path, f"is no key of a device file; did you mean '{right}'?")
+    for section in schema.keys(()) if not steps or parts[depth] == path else ():
+        if (near := nearest(path.split(".")[0], schema.keys((section,)))) is not None:
+            right = ".".join([section, near, *path.split(".")[1:]])
+            return fail(OPTION, path, f"is no key of a device file; did you mean '{right}'?")
+    where = f"{here} has" if here else "a device file has"
+    return fail(OPTION, path, f"is no key of a device file; {where}: {listed(choices) or 'nothing inside'}")
+
+
+def _choices(place: Any, steps: Path) -> list[str]:
+    """The keys or elements there are at a place, sorted."""
+    if isinstance(place, list):
+        names = [e.get("name") if isinstance(e, dict) else None for e in place]
+        return [n if isinstance(n, str) else str(i) for i, n in enumerate(names)]
+    return sorted({*schema.keys(steps), *(place if isinstance(place, dict) else ())})
+
+
+def _free(steps: list[str | int]) -> bool:
+    """Whether the table here takes keys of any name, as assemblies do."""
+    return any(isinstance(found.get("additionalProperties"), dict) for found in schema.at(tuple(steps)))
+
+
+def _element(elements: list[Any], part: str) -> int | None:
+    """Index of the list's element of that name or else of that number, None if there is none."""
+    for index, element in enumerate(elements):
+        if isinstance(element, dict) and element.get("name") == part:
+            return index
+    if part.isascii() and part.isdigit() and len(part) < 10 and int(part) < len(elements):
+        return int(part)
+    return None
+
+
+def _value(place: Any, steps: Path) -> Any:
+    for step in steps:
+        if isinstance(place, dict) and step not in place:
+            return UNSET
+        place = place[step]
+    return place
+
+
+def _children(place: Any, part: str) -> list[Any]:
+    if part == "*":
+        return (
+            list(place.values())
+            if isinstance(place, dict)
+            else list(place)
+            if isinstance(place, list)
+            else []
+        )
+    if isinstance(place, dict):
+        return [place[part]] if part in place else []
+    index = _element(place, part) if isinstance(place, list) else None
+    return [] if index is None else [place[index]]
+
+
+def _rivals(table: Path, key: str | int) -> list[str]:
+    groups = EXCLUSIVE.get(tuple(str(step) for step in table), ())
+    if not any(key in group for group in groups):
+        return []
+    return [rival for group in groups if key not in group for rival in sorted(group)]
+
+
+def _parsed(text: str, path: str) -> Any:
+    """The text as a TOML value, `UNSET` for the bare word unset, the text itself if it is no TOML."""
+    if text == "unset":
+        return UNSET
+    try:
+        document = tomllib.loads(f"value = {text}")
+    except RecursionError:
+        raise fail(OPTION, path, "is nested too deeply") from None
+    except ValueError:
+        return text
+    value = document["value"]
+    if len(document) > 1:
+        return text
+    if not within_depth([value]):
+        raise fail(OPTION, path, "is nested too deeply")
+    return value

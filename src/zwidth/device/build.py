@@ -1,0 +1,179 @@
+"""From the checked file to what the rest of zwidth computes with: arrays in SI units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from zwidth.device.schema.loop import FirstOrderFilter, LoopSection
+from zwidth.device.schema.mechanism import (
+    DampingSection,
+    DriveSection,
+    LinkSection,
+    LoopClosure,
+    MechanismSection,
+)
+from zwidth.device.schema.plant import PlantSection
+from zwidth.loop.controller import Butterworth, Controller, FirstOrder
+from zwidth.model.mechanism import FIXED, REVOLUTE, Closures, Drives, Floats, Links, Mechanism
+from zwidth.model.plant import Plant
+
+if TYPE_CHECKING:
+    from zwidth.model.damping import Damping
+
+
+def controller(loop: LoopSection) -> Controller:
+    """The sampled wall law; a delay in seconds becomes samples, a filter of no time constant none."""
+    period = loop.sampling_period_s
+    delay = loop.delay_s / period if loop.delay_s is not None else loop.delay_samples or 0.0
+    given = loop.velocity.filter
+    velocity_filter: FirstOrder | Butterworth | None = None
+    if isinstance(given, FirstOrderFilter):
+        velocity_filter = FirstOrder(given.time_constant_s) if given.time_constant_s > 0 else None
+    elif given is not None:
+        velocity_filter = Butterworth(given.order, given.cutoff_Hz, given.discretisation)
+    return Controller(period, delay, velocity_filter)
+
+
+def plant(section: PlantSection) -> Plant:
+    """The plant; matrices are made symmetric to the last bit, and one coordinate is driven, read and held."""
+    M = np.array(section.mass_kg)
+    n = len(M)
+    one = (1.0,) if n == 1 else None
+    handle = section.handle or one
+    return Plant(
+        mass=_even(M),
+        damping=_even(np.array(section.damping_Ns_per_m or np.zeros((n, n)))),
+        stiffness=_even(np.array(section.stiffness_N_per_m or np.zeros((n, n)))),
+        actuator=np.array(section.actuator or one, dtype=np.float64),
+        sensor=np.array(section.sensor or one, dtype=np.float64),
+        handle=None if handle is None else np.array(handle),
+        names=tuple(f"coordinate {i}" for i in range(n)),
+    )
+
+
+def damping(section: DampingSection | None) -> Damping:
+    """The way of damping; a plant brings its own."""
+    from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
+
+    if section is None or section.given:
+        return GivenDamping()
+    if section.mode_ratio is not None:
+        return ModalDamping(section.mode_ratio)
+    return ProportionalDamping(
+        section.mass_coefficient_1_per_s or 0.0, section.stiffness_coefficient_s or 0.0
+    )
+
+
+def mechanism(section: MechanismSection) -> Mechanism:
+    """The mechanism, its links sorted so that parents stand before children."""
+    links = _parents_first(section.links)
+    index = {"base": -1} | {link.name: i for i, link in enumerate(links)}
+    tips = {"base": np.zeros(3)} | {link.name: np.array([link.length_m, 0.0, 0.0]) for link in links}
+    handle = section.handle
+    workspace = section.workspace
+    bounds = [(workspace and getattr(workspace, f"{axis}_m")) or (math.nan, math.nan) for axis in "xyz"]
+    return Mechanism(
+        links=_links(links, index, tips),
+        closures=_closures(section.loops, index, tips),
+        drives=_drives(section.drives, index),
+        handle_link=index[handle.link],
+        handle_point=tips[handle.link] if handle.point_m is None else np.array(handle.point_m),
+        assemblies={
+            name: np.array([assembly.joints_rad.get(link.name, 0.0) for link in links])
+            for name, assembly in section.assemblies.items()
+        },
+        reference_position=in_space(section.reference.position_m),
+        workspace=np.array(bounds),
+    )
+
+
+def in_space(vector: Sequence[float]) -> Floats:
+    """A vector of up to three components, (3,): those left out are 0."""
+    return np.array([*vector, 0.0, 0.0, 0.0][:3], dtype=np.float64)
+
+
+def roll_pitch_yaw(angles: Sequence[float]) -> Floats:
+    """Rotation Rz(yaw) Ry(pitch) Rx(roll): about the parent's fixed x, y, z axes in turn, (3, 3)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(angles), np.sin(angles)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _links(links: Sequence[LinkSection], index: dict[str, int], tips: dict[str, Floats]) -> Links:
+    axes = np.array([link.axis for link in links])
+    axes = axes / np.abs(axes).max(axis=-1, keepdims=True)  # lengths of 1e-300 have a direction, too
+    axes = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
+    return Links(
+        names=tuple(link.name for link in links),
+        parent=np.array([index[link.parent] for link in links], dtype=np.int64),
+        joint=np.array([FIXED if link.joint == "fixed" else REVOLUTE for link in links], dtype=np.int64),
+        origin=np.array([tips[link.parent] if link.origin_m is None else link.origin_m for link in links]),
+        rotation=np.array([roll_pitch_yaw(link.orientation_rad) for link in links]),
+        axis=axes,
+        mass=np.array([link.mass_kg for link in links]),
+        center_of_mass=np.array([in_space(link.center_of_mass_m) for link in links]),
+        inertia=np.array([_inertia(link, axis) for link, axis in zip(links, axes, strict=True)]),
+        tip=np.array([tips[link.name] for link in links]),
+    )
+
+
+def _inertia(link: LinkSection, axis: Floats) -> Floats:
+    """(3, 3); one number is the moment about the joint axis and leaves the others open: I a a^T."""
+    rows = np.array(link.inertia_kg_m2)
+    return rows[0, 0] * np.outer(axis, axis) if rows.shape == (1, 1) else _even(rows)
+
+
+def _closures(loops: Sequence[LoopClosure], index: dict[str, int], tips: dict[str, Floats]) -> Closures:
+    ends = [loop.points_m or [tips[name] for name in loop.links] for loop in loops]
+    points = np.array(ends, dtype=np.float64).reshape(len(loops), 2, 3)
+    return Closures(
+        names=tuple(loop.name for loop in loops),
+        a=np.array([index[loop.links[0]] for loop in loops], dtype=np.int64),
+        b=np.array([index[loop.links[1]] for loop in loops], dtype=np.int64),
+        point_a=points[:, 0],
+        point_b=points[:, 1],
+    )
+
+
+def _drives(drives: Sequence[DriveSection], index: dict[str, int]) -> Drives:
+    def column(key: str, omitted: float) -> Floats:
+        values = [getattr(drive, key) for drive in drives]
+        return np.array([omitted if value is None else value for value in values], dtype=np.float64)
+
+    return Drives(
+        names=tuple(drive.name for drive in drives),
+        joint=np.array([index[drive.joint] for drive in drives], dtype=np.int64),
+        motor_inertia=column("motor_inertia_kg_m2", math.nan),
+        transmission=column("transmission_ratio", math.nan),
+        stiffness=column("stiffness_Nm_per_rad", math.inf),
+        damping=column("damping_Nms_per_rad", 0.0),
+        torque_constant=column("torque_constant_Nm_per_A", math.nan),
+        torque_limit=column("torque_limit_Nm", math.inf),
+        encoder_counts=column("encoder_counts_per_rev", math.nan),
+    )
+
+
+def _parents_first(links: Sequence[LinkSection]) -> list[LinkSection]:
+    """Sorted so that every parent stands before its children; otherwise in the file's order."""
+    ordered: list[LinkSection] = []
+    placed, waiting = {"base"}, list(links)
+    while waiting:
+        for link in waiting:
+            if link.parent in placed:
+                ordered.append(link)
+                placed.add(link.name)
+        waiting = [link for link in waiting if link.name not in placed]
+    return ordered
+
+
+def _even(matrix: Floats) -> Floats:
+    return 0.5 * matrix + 0.5 * matrix.T

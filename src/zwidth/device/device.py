@@ -1,0 +1,154 @@
+"""A device as loaded: what was given, and the way from a posture to the rendered direction's plant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from zwidth.device.build import in_space
+from zwidth.device.faults import DeviceError, fail, quote, suggestion
+from zwidth.loop.controller import Controller
+from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.plant import Plant
+
+if TYPE_CHECKING:
+    from zwidth.model.damping import Damping
+    from zwidth.model.posture import Posture
+
+MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
+
+
+@dataclass(frozen=True)
+class Device:
+    """A haptic device: a mechanism or a given plant, and the computer that closes the loop.
+
+    name, description, source   as in the file
+    sources             dotted path -> where that group of numbers comes from
+    label               the file or bundled name, for messages
+    mechanism           None for a device given by its plant
+    given_plant         None for a device given by its mechanism
+    controller          sampling, delay, velocity filter
+    damping             how the mechanism's flexible modes are damped
+    reference_position  (3,) handle position meant where none is given [m]; None for a plant
+    reference_direction (3,) rendered direction meant where none is given, any length; None for a plant
+    reference_assembly  assembly meant where none is given; None for a plant
+    document            the file's tables after settings: for saving, and for addressing its numbers
+    """
+
+    name: str
+    description: str
+    source: str
+    sources: dict[str, str]
+    label: str
+    mechanism: Mechanism | None
+    given_plant: Plant | None
+    controller: Controller
+    damping: Damping
+    reference_position: Floats | None
+    reference_direction: Floats | None
+    reference_assembly: str | None
+    document: dict[str, Any]
+
+    def posture(self, at: Sequence[float] | None = None, assembly: str | None = None) -> Posture:
+        """The mechanism with its handle at a position, in a named assembly (left out: those of the file).
+
+        at      x, y or x, y, z [m]
+        Raises  DeviceError    if the device has no mechanism, the arguments cannot be meant, or the mechanism
+                               cannot be assembled or driven as the file says
+                PostureError   (model.posture) where there is no answer: out of reach, or singular
+        """
+        from zwidth.model.posture import LoopOpen, PostureError, solve_posture
+
+        mechanism = self._mechanism(at=at, assembly=assembly)
+        if assembly is not None and assembly not in mechanism.assemblies:
+            message = (
+                f"names no assembly, got '{assembly}'; {suggestion(assembly, set(mechanism.assemblies))}"
+            )
+            raise fail(self.label, "assembly", message)
+        position = self.reference_position if at is None else self._vector("at", at)
+        assert position is not None
+        name = assembly or self.reference_assembly
+        try:
+            return solve_posture(mechanism, position, name)
+        except LoopOpen as error:
+            raise fail(self.label, f"mechanism.assemblies.{name}", str(error)) from None
+        except PostureError:
+            raise
+        except ValueError as error:  # drives that do not fit the mechanism
+            raise fail(self.label, "mechanism", str(error)) from None
+
+    def plant(
+        self,
+        at: Sequence[float] | None = None,
+        direction: Sequence[float] | None = None,
+        assembly: str | None = None,
+        model: str | None = None,
+    ) -> Plant:
+        """The rendered direction's dynamics at a posture, in one of the models.
+
+        at, direction   x, y or x, y, z [m], [1]; a direction may have any length but zero
+        model           "full", "two-mass", "motor-mass" or "rigid"; left out: full for a mechanism, and a
+                        given plant as it is
+        Raises  DeviceError  if the arguments cannot be meant for this device
+                ValueError   where the posture does not exist (PostureError), or the model
+        """
+        if model is not None and model not in MODELS:
+            raise fail(self.label, "model", f"must be one of {', '.join(MODELS)}, got {quote(model)}")
+        if self.given_plant is not None:
+            self._mechanism_only(at=at, direction=direction, assembly=assembly)
+            return self._given(self.given_plant, model)
+        from zwidth.model.reduction import reduce_mechanism
+
+        along = self.direction(direction)
+        posture = self.posture(at, assembly)
+        return reduce_mechanism(self._mechanism(), posture, along, model or "full", self.damping)
+
+    def direction(self, direction: Sequence[float] | None = None) -> Floats:
+        """The rendered direction as a unit vector, (3,); left out: that of the file."""
+        self._mechanism(direction=direction)
+        vector = self.reference_direction if direction is None else self._vector("direction", direction)
+        assert vector is not None
+        largest = float(np.abs(vector).max())
+        if largest == 0:
+            raise fail(self.label, "direction", "has zero length; give any vector along it, such as 0,1")
+        vector = vector / largest  # so that the squares neither overflow nor vanish
+        return np.asarray(vector / np.linalg.norm(vector))
+
+    def _given(self, plant: Plant, model: str | None) -> Plant:
+        if model in (None, "full"):
+            return plant
+        from zwidth.model.reduction import reduce_plant
+
+        assert model is not None
+        return reduce_plant(plant, model)
+
+    def _mechanism(self, **given: object) -> Mechanism:
+        """The mechanism, or the reason why these arguments do not apply to a given plant."""
+        if self.mechanism is None:
+            self._mechanism_only(**given)
+            raise fail(self.label, "", "has a [plant] and no [mechanism]; it has no postures or directions")
+        return self.mechanism
+
+    def _mechanism_only(self, **given: object) -> None:
+        named = [name for name, value in given.items() if value is not None]
+        if named:
+            raise DeviceError(
+                fail(
+                    self.label, name, "does not apply to a device given by its [plant]; leave it out"
+                ).faults[0]
+                for name in named
+            )
+
+    def _vector(self, name: str, value: Sequence[float]) -> Floats:
+        try:
+            components = [float(component) for component in value]
+        except (TypeError, ValueError):
+            raise fail(self.label, name, f"must be 2 or 3 numbers, got {quote(value)}") from None
+        if len(components) not in (2, 3):
+            raise fail(self.label, name, f"must be 2 or 3 numbers x, y or x, y, z, got {len(components)}")
+        if not np.all(np.isfinite(components)):
+            raise fail(self.label, name, f"must be finite, got {quote(components)}")
+        return in_space(components)

@@ -1,0 +1,127 @@
+"""What is wrong with a device file, as data: every fault is reported, each on one line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any, Final
+
+Path = tuple[str | int, ...]
+
+LONGEST_QUOTE: Final = 60
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing that is wrong.
+
+    file     the file (or bundled name, or option) it stands in
+    key      dotted path of the key, "" if the whole file is meant
+    message  what is wrong, the value, what is allowed, what to do
+    """
+
+    file: str
+    key: str
+    message: str
+
+    def __str__(self) -> str:
+        return ": ".join(one_line(part) for part in (self.file, self.key, self.message) if part)
+
+
+class DeviceError(ValueError):
+    """A device cannot be made from what was given; `faults` says everything that is wrong with it."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults: list[Fault] = list(dict.fromkeys(faults))
+        super().__init__("\n".join(map(str, self.faults)))
+
+    def __reduce__(self) -> tuple[type[DeviceError], tuple[list[Fault]]]:
+        return type(self), (self.faults,)
+
+
+def fail(file: str, key: str, message: str) -> DeviceError:
+    """The error for a single fault, to be raised by the caller."""
+    return DeviceError([Fault(file, key, message)])
+
+
+def one_line(text: str) -> str:
+    """The text with line breaks and control characters made visible, so that a fault stays on its line."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def quote(value: Any) -> str:
+    """A value as it would stand in the file, shortened: 'text', 0.3, true, [1, 2], a table."""
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return f"the text {_shortened(value)!r}"
+        case int() if abs(value) >= 10**15:
+            return f"a whole number above 10^{int(abs(value).bit_length() * math.log10(2))}"
+        case float():
+            return f"{value:.10g}"
+        case dict():
+            return "a table"
+        case list() | tuple():
+            return f"the list {_shortened('[' + ', '.join(_item(v) for v in value[:20]) + ']')}"
+        case _:
+            return _shortened(str(value))
+
+
+def nearest(word: str, allowed: Collection[str]) -> str | None:
+    """The allowed word that looks most like this one, None if none does; case and -/_ do not count.
+
+    A word that the right one begins with counts as near: "mass" for "mass_kg".
+    """
+    plain = {_plain(candidate): candidate for candidate in allowed}
+    close = get_close_matches(_plain(word), plain, n=1, cutoff=0.6)
+    close = close or [p for p in plain if len(_plain(word)) > 2 and p.startswith(_plain(word) + "_")][:1]
+    return plain[close[0]] if close else None
+
+
+def suggestion(word: str, allowed: Collection[str], noun: str = "allowed") -> str:
+    """'did you mean "x"?' or else the list of what is allowed."""
+    near = nearest(word, allowed)
+    if near is not None:
+        return f"did you mean '{near}'?"
+    return f"{noun}: {listed(sorted(allowed))}" if allowed else "nothing is allowed here"
+
+
+def listed(words: Sequence[str], most: int = 30) -> str:
+    """The words separated by commas, shortened."""
+    return ", ".join(words[:most]) + (", ..." if len(words) > most else "")
+
+
+def dotted(path: Path, document: Any = None) -> str:
+    """The path as users write it; list elements go by their name where the document gives one."""
+    parts = []
+    for part in path:
+        inside = _step(document, part)
+        name = inside.get("name") if isinstance(part, int) and isinstance(inside, dict) else None
+        parts.append(name if isinstance(name, str) and name else str(part))
+        document = inside
+    return ".".join(parts)
+
+
+def _step(document: Any, part: str | int) -> Any:
+    if isinstance(document, dict):
+        return document.get(part)
+    if isinstance(document, list) and isinstance(part, int) and 0 <= part < len(document):
+        return document[part]
+    return None
+
+
+def _plain(word: str) -> str:
+    return word.lower().replace("-", "_")
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_QUOTE else text[: LONGEST_QUOTE - 3] + "..."
+
+
+def _item(value: Any) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(_item(v) for v in value[:20]) + "]"
+    return repr(value) if isinstance(value, str) else quote(value)

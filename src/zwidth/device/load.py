@@ -1,0 +1,98 @@
+"""From a device file to a `Device`, or to the list of everything that is wrong with it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+
+from zwidth.device import address, build, geometry, unsupported
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError, Fault, Path, dotted
+from zwidth.device.read import bundled, read
+from zwidth.device.relations import relations
+from zwidth.device.schema.file import DeviceFile, schema
+from zwidth.device.translate import sentences
+
+__all__ = ["bundled", "from_document", "load", "schema"]
+
+
+def load(name_or_path: str | os.PathLike[str], settings: Sequence[str | tuple[str, Any]] = ()) -> Device:
+    """The device of a bundled name or a file, with settings applied before it is checked.
+
+        load("my-device.toml", ["loop.delay_samples=1", ("links.upper.length_m", 0.15)])
+
+    settings  "PATH=VALUE" texts or (path, value) pairs, see `address.apply`
+    Raises DeviceError  with all the faults of the file, or else of the settings
+    """
+    document, label = read(name_or_path)
+    return from_document(address.apply(document, settings), label)
+
+
+def from_document(document: dict[str, Any], label: str = "device") -> Device:
+    """The device that a document describes; `label` is what messages call it.
+
+    Single keys and what they say about each other are checked together; whether the mechanism can be put
+    together is asked once all of that is right.
+    Raises DeviceError  with all faults found
+    """
+    cleaned, found = unsupported.refuse(document)
+    checked: DeviceFile | None = None
+    try:
+        checked = DeviceFile.model_validate(cleaned)
+    except ValidationError as error:
+        found += sentences(error, cleaned)
+    found += relations(cleaned, document)
+    if found or checked is None:
+        raise DeviceError(_faults(found, document, label))
+    device = _device(checked, document, label)
+    if device.mechanism is not None and checked.mechanism is not None:
+        found += geometry.disagreements(device.mechanism, checked.mechanism)
+    if found:
+        raise DeviceError(_faults(found, document, label))
+    return device
+
+
+def _device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device:
+    section = checked.mechanism
+    reference = section.reference if section else None
+    return Device(
+        name=checked.name,
+        description=checked.description,
+        source=checked.source,
+        sources=dict(checked.sources),
+        label=label,
+        mechanism=build.mechanism(section) if section else None,
+        given_plant=build.plant(checked.plant) if checked.plant else None,
+        controller=build.controller(checked.loop),
+        damping=build.damping(section.damping if section else None),
+        reference_position=build.in_space(reference.position_m) if reference else None,
+        reference_direction=build.in_space(reference.direction) if reference else None,
+        reference_assembly=(reference.assembly or next(iter(section.assemblies)))
+        if reference and section
+        else None,
+        document=document,
+    )
+
+
+def _faults(found: Iterable[tuple[Path, str]], document: dict[str, Any], label: str) -> list[Fault]:
+    """The faults in the order of the file's keys; of several about one key, each is kept."""
+    order = {path: place for place, path in enumerate(_paths(document))}
+    ranked = sorted(found, key=lambda item: _rank(item[0], order))
+    return [Fault(label, dotted(path, document), message) for path, message in ranked]
+
+
+def _rank(path: Path, order: dict[Path, int]) -> int:
+    """Place of the path in the file, or of the table it is missing from."""
+    while path and path not in order:
+        path = path[:-1]
+    return order.get(path, -1)
+
+
+def _paths(value: Any, path: Path = ()) -> Iterable[Path]:
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        yield (*path, key)
+        yield from _paths(inner, (*path, key))

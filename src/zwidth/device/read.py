@@ -1,0 +1,128 @@
+"""From a name or a path to the document: the plain tables and lists that the file holds."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final
+
+from zwidth.device.faults import fail, listed, nearest
+
+LARGEST_FILE: Final = 10_000_000  # bytes; the bundled ones have a few thousand
+DEEPEST: Final = 20  # tables and lists within each other; a mechanism needs 5
+
+
+def bundled_names() -> list[str]:
+    """Names of the bundled devices, sorted."""
+    return sorted(
+        entry.name.removesuffix(".toml") for entry in _zoo().iterdir() if entry.name.endswith(".toml")
+    )
+
+
+def bundled() -> list[tuple[str, str, str]]:
+    """(name, description, source) of every bundled device; their numbers are not checked here."""
+    listing = []
+    for name in bundled_names():
+        document = parse(_bundled_text(name), name)
+        listing.append((name, str(document.get("description", "")), str(document.get("source", ""))))
+    return listing
+
+
+def read(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
+    """The document of a bundled device or of a file, and what to call it in messages.
+
+    A bundled name wins over a file of the same name; write ./name for the file.
+    Raises DeviceError  if there is no such file, it cannot be read, or it is not TOML
+    """
+    label = os.fspath(name_or_path)
+    if label in bundled_names():
+        return parse(_bundled_text(label), label), label
+    return parse(decode(_bytes(label), label), label), label
+
+
+def decode(data: bytes, label: str) -> str:
+    """The text of a file: UTF-8, with or without a byte order mark."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise fail(label, "", "is UTF-16 text; save it as UTF-8")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise fail(
+            label,
+            "",
+            f"is not UTF-8 text (byte {error.start} is 0x{data[error.start]:02x}); give a TOML text file",
+        ) from None
+    if "\x00" in text:
+        raise fail(label, "", f"is a binary file (byte {data.index(0)} is zero); give a TOML text file")
+    return text
+
+
+def parse(text: str, label: str) -> dict[str, Any]:
+    """The document a TOML text holds; never empty, never nested beyond reason."""
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise fail(label, "", f"is not TOML: {_lower_first(str(error))}") from None
+    except RecursionError:
+        raise fail(label, "", f"is nested too deeply; at most {DEEPEST} levels are allowed") from None
+    except ValueError as error:  # a whole number of thousands of digits
+        raise fail(label, "", f"holds a number that cannot be read: {_lower_first(str(error))}") from None
+    if not document:
+        raise fail(label, "", "is empty; a device needs a name, [loop], and [mechanism] or [plant]")
+    if not within_depth(document):
+        raise fail(label, "", f"is nested too deeply; at most {DEEPEST} levels are allowed")
+    return document
+
+
+def within_depth(value: Any, deepest: int = DEEPEST) -> bool:
+    """Whether tables and lists are nested no deeper than this; level by level, where recursion might fail."""
+    level = [value]
+    for _ in range(deepest + 1):
+        level = [
+            inner
+            for outer in level
+            for inner in (outer.values() if isinstance(outer, dict) else outer)
+            if isinstance(inner, dict | list)
+        ]
+        if not level:
+            return True
+    return False
+
+
+def _bytes(label: str) -> bytes:
+    try:
+        with open(label, "rb") as stream:
+            data = stream.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise fail(label, "", _not_found(label)) from None
+    except IsADirectoryError:
+        raise fail(label, "", "is a directory; give a device file or a bundled name") from None
+    except PermissionError:
+        raise fail(label, "", "cannot be read: permission denied; change its permissions") from None
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise fail(label, "", f"cannot be read: {_lower_first(reason)}") from None
+    if len(data) > LARGEST_FILE:
+        raise fail(label, "", f"is larger than {LARGEST_FILE // 1_000_000} MB; this is no device file")
+    return data
+
+
+def _not_found(label: str) -> str:
+    names = bundled_names()
+    near = nearest(Path(label).name.removesuffix(".toml"), names)
+    hint = f"did you mean '{near}'? " if near else ""
+    return f"is neither a file nor a bundled device; {hint}bundled: {listed(names)}"
+
+
+def _bundled_text(name: str) -> str:
+    return str((_zoo() / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def _zoo() -> Any:
+    return files("zwidth.device") / "zoo"
+
+
+def _lower_first(text: str) -> str:
+    return text[:1].lower() + text[1:]

@@ -1,0 +1,277 @@
+"""What two keys must agree on: either-or, sizes, names that refer to names.
+
+These checks read the plain document and pass over whatever is not as it should be by itself, so that they run
+beside the checks of single keys and no fault hides another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final, TypeGuard
+
+from zwidth.device.address import allowed, exists
+from zwidth.device.faults import Path, listed, quote, suggestion
+from zwidth.device.schema.file import flat_sources
+from zwidth.device.schema.loop import LONGEST_DELAY
+
+Found = Iterator[tuple[Path, str]]
+
+KINDS: Final = ("mechanism", "plant", "response")
+
+
+def relations(document: dict[str, Any], original: dict[str, Any]) -> Found:
+    """Path and sentence of every disagreement; `original` still has the sections not supported yet."""
+    yield from _one_kind(original)
+    yield from _sources(document)
+    yield from _plant(_table(document, "plant"))
+    yield from _loop(_table(document, "loop"))
+    mechanism = _table(document, "mechanism")
+    if mechanism:
+        yield from _tree(mechanism)
+        yield from _references(mechanism)
+        yield from _assemblies(mechanism)
+        yield from _workspace(mechanism)
+        yield from _damping(mechanism)
+
+
+def _one_kind(document: dict[str, Any]) -> Found:
+    given = [f"[{kind}]" for kind in KINDS if kind in document]
+    if not given:
+        yield (), "has neither [mechanism] nor [plant]; give one of them"
+    elif len(given) > 1:
+        yield (), f"has {' and '.join(given)}; only one of them is allowed: remove the other"
+
+
+def _sources(document: dict[str, Any]) -> Found:
+    sources = flat_sources(_table(document, "sources"))
+    for key in sources:
+        if not exists(document, key) and not allowed(key):
+            yield ("sources", key), "names no key of this file; give a dotted path, with * for any step"
+
+
+def _plant(plant: dict[str, Any]) -> Found:
+    size = _rows(plant.get("mass_kg"))
+    if size is None:
+        return
+    for key in ("damping_Ns_per_m", "stiffness_N_per_m"):
+        rows = _rows(plant.get(key))
+        if rows is not None and rows != size:
+            yield ("plant", key), f"has {rows} rows, but mass_kg has {size}; give a {size} x {size} matrix"
+    for key in ("actuator", "sensor", "handle"):
+        value = plant.get(key)
+        length = 1 if _number(value) else len(value) if isinstance(value, list) else None
+        if length is not None and length != size:
+            yield ("plant", key), f"has {length} numbers, but mass_kg has {size} rows; give {size} numbers"
+        elif value is None and size > 1 and key != "handle":
+            yield ("plant", key), f"is missing; with {size} coordinates give {size} numbers"
+
+
+def _loop(loop: dict[str, Any]) -> Found:
+    period = loop.get("sampling_period_s")
+    T = period if _number(period) and 0 < period <= 1 else math.nan  # every comparison with nan is false
+    if "delay_samples" in loop and "delay_s" in loop:
+        yield (
+            ("loop", "delay_s"),
+            "stands beside delay_samples; only one of them is allowed: remove the other",
+        )
+    for key, unit in (("delay_samples", 1.0), ("delay_s", T)):
+        delay = loop.get(key)
+        if _number(delay) and delay / unit > LONGEST_DELAY and math.isfinite(delay):
+            yield (
+                ("loop", key),
+                f"is {delay:.10g}, a delay of more than {LONGEST_DELAY} samples, which is not supported; "
+                "give a shorter one (is the unit right?)",
+            )
+    filter_ = _table(_table(loop, "velocity"), "filter")
+    cutoff = filter_.get("cutoff_Hz")
+    if _number(cutoff) and math.isfinite(cutoff) and cutoff * T >= 0.5:
+        yield (
+            ("loop", "velocity", "filter", "cutoff_Hz"),
+            f"must be below half the sampling frequency, {0.5 / T:.10g} Hz, got {cutoff:.10g}; "
+            "lower it or sample faster",
+        )
+
+
+def _tree(mechanism: dict[str, Any]) -> Found:
+    """Links: unique names, parents that exist, no link its own ancestor."""
+    parents: dict[str, Any] = {}
+    for index, link in _tables(mechanism, "links"):
+        name = link.get("name")
+        if name == "base":
+            yield (
+                ("mechanism", "links", index, "name"),
+                "is 'base', which stands for the ground; choose another",
+            )
+        elif isinstance(name, str):
+            parents.setdefault(name, link.get("parent", "base"))
+    for index, link in _tables(mechanism, "links"):
+        parent = link.get("parent")
+        if isinstance(parent, str) and parent not in parents and parent != "base":
+            yield (
+                ("mechanism", "links", index, "parent"),
+                f"names no link, got '{parent}'; {suggestion(parent, {*parents, 'base'}, 'links')}",
+            )
+    reported: set[str] = set()
+    for index, link in _tables(mechanism, "links"):
+        circle = _circle(link.get("name"), parents)
+        if circle and not reported & set(circle):
+            reported |= set(circle)
+            yield (
+                ("mechanism", "links", index, "parent"),
+                f"goes round in a circle, {listed([*circle, circle[0]])}; one of them must start at 'base' "
+                "(close loops by [[mechanism.loops]])",
+            )
+    for group in ("links", "loops", "drives"):
+        yield from _twice(mechanism, group)
+
+
+def _circle(name: Any, parents: dict[str, Any]) -> list[str]:
+    """The links from this one back to itself, [] if it leads to the base."""
+    if not isinstance(name, str):
+        return []
+    way, parent = [name], parents.get(name)
+    while isinstance(parent, str) and parent in parents and parent not in way:
+        way.append(parent)
+        parent = parents[parent]
+    return way if parent == name else []
+
+
+def _twice(mechanism: dict[str, Any], group: str) -> Found:
+    seen: set[str] = set()
+    for index, entry in _tables(mechanism, group):
+        name = entry.get("name")
+        if isinstance(name, str) and name in seen:
+            yield ("mechanism", group, index, "name"), f"'{name}' is given twice; names must differ"
+        elif isinstance(name, str):
+            seen.add(name)
+
+
+def _references(mechanism: dict[str, Any]) -> Found:
+    """Loops, handle and drives speak of links that exist; drives of revolute joints, one each."""
+    links = _joints(mechanism)
+    for index, loop in _tables(mechanism, "loops"):
+        names = loop.get("links")
+        names = names if isinstance(names, list) else []
+        for place, name in enumerate(names):
+            if isinstance(name, str) and name not in links and name != "base":
+                yield (
+                    ("mechanism", "loops", index, "links", place),
+                    f"names no link, got '{name}'; {suggestion(name, {*links, 'base'}, 'links')}",
+                )
+        if len(names) == 2 and names[0] == names[1]:
+            yield (
+                ("mechanism", "loops", index, "links"),
+                f"joins '{names[0]}' to itself; name two different links",
+            )
+    link = _table(mechanism, "handle").get("link")
+    if isinstance(link, str) and link not in links:
+        yield (
+            ("mechanism", "handle", "link"),
+            f"names no link, got '{link}'; {suggestion(link, links, 'links')}",
+        )
+    driven: set[str] = set()
+    for index, drive in _tables(mechanism, "drives"):
+        joint, path = drive.get("joint"), ("mechanism", "drives", index, "joint")
+        if not isinstance(joint, str):
+            continue
+        if joint not in links:
+            yield path, f"names no link, got '{joint}'; {suggestion(joint, links, 'links')}"
+        elif links[joint] == "fixed":
+            yield path, f"'{joint}' is fixed to its parent; a drive needs a revolute joint"
+        elif joint in driven:
+            yield path, f"'{joint}' has a drive already; one joint takes one drive"
+        driven.add(joint)
+
+
+def _assemblies(mechanism: dict[str, Any]) -> Found:
+    turning = {name for name, joint in _joints(mechanism).items() if joint != "fixed"}
+    assemblies = _table(mechanism, "assemblies")
+    for name, assembly in assemblies.items():
+        angles = assembly.get("joints_rad") if isinstance(assembly, dict) else None
+        if not isinstance(angles, dict):
+            continue
+        path = ("mechanism", "assemblies", name, "joints_rad")
+        for joint in angles:
+            if joint not in turning:
+                yield (*path, joint), f"names no revolute joint; {suggestion(joint, turning, 'joints')}"
+        for joint in sorted(turning - set(angles)):
+            yield (*path, joint), "is missing; give an approximate angle for every revolute joint"
+    reference = _table(mechanism, "reference")
+    wanted, place = reference.get("assembly"), ("mechanism", "reference", "assembly")
+    if isinstance(wanted, str) and assemblies and wanted not in assemblies:
+        yield place, f"names no assembly, got '{wanted}'; {suggestion(wanted, set(assemblies), 'assemblies')}"
+    elif wanted is None and reference and len(assemblies) > 1:
+        yield place, f"is missing; choose one of {listed(sorted(assemblies))}"
+
+
+def _workspace(mechanism: dict[str, Any]) -> Found:
+    position = _table(mechanism, "reference").get("position_m")
+    workspace = _table(mechanism, "workspace")
+    for axis, value in zip("xyz", position if isinstance(position, list) else [], strict=False):
+        bounds = workspace.get(f"{axis}_m")
+        if (
+            isinstance(bounds, list)
+            and len(bounds) == 2
+            and all(map(_number, [value, *bounds]))
+            and not bounds[0] <= value <= bounds[1]
+        ):
+            yield (
+                ("mechanism", "workspace", f"{axis}_m"),
+                f"{quote(bounds)} leaves out the reference position, {axis} = {value:.10g}; widen it",
+            )
+
+
+def _damping(mechanism: dict[str, Any]) -> Found:
+    damping, path = mechanism.get("damping"), ("mechanism", "damping")
+    if isinstance(damping, dict):
+        proportional = {"mass_coefficient_1_per_s", "stiffness_coefficient_s"} & damping.keys()
+        ways = ["mode_ratio"] * ("mode_ratio" in damping)
+        ways += [" and ".join(sorted(proportional))] * bool(proportional) + ["given"] * ("given" in damping)
+        choice = "mode_ratio, or mass_coefficient_1_per_s and stiffness_coefficient_s, or given = true"
+        if not ways:
+            yield path, f"says nothing; give {choice}"
+        elif len(ways) > 1:
+            yield path, f"has {', '.join(ways)}; exactly one way is allowed: {choice}"
+    given = isinstance(damping, dict) and "given" in damping
+    for index, drive in _tables(mechanism, "drives"):
+        if "damping_Nms_per_rad" in drive and not given:
+            yield (
+                ("mechanism", "drives", index, "damping_Nms_per_rad"),
+                "is used only with mechanism.damping.given = true; set that or remove this",
+            )
+        stiffness, inertia = drive.get("stiffness_Nm_per_rad", math.inf), drive.get("motor_inertia_kg_m2")
+        if _number(inertia) and inertia == 0 and _number(stiffness) and math.isfinite(stiffness):
+            yield (
+                ("mechanism", "drives", index, "motor_inertia_kg_m2"),
+                "must be greater than 0 behind a flexible transmission, got 0; "
+                "give the rotor's inertia, or leave stiffness_Nm_per_rad out",
+            )
+
+
+def _joints(mechanism: dict[str, Any]) -> dict[str, Any]:
+    return {
+        link["name"]: link.get("joint")
+        for _, link in _tables(mechanism, "links")
+        if isinstance(link.get("name"), str)
+    }
+
+
+def _table(document: dict[str, Any], key: str) -> dict[str, Any]:
+    value = document.get(key)
+    return value if isinstance(value, dict) else {}
+
+
+def _tables(document: dict[str, Any], key: str) -> list[tuple[int, dict[str, Any]]]:
+    value = document.get(key)
+    return [(i, v) for i, v in enumerate(value if isinstance(value, list) else []) if isinstance(v, dict)]
+
+
+def _number(value: Any) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _rows(value: Any) -> int | None:
+    if _number(value):
+        return 1
+    return len(value) if isinstance(value, list) and value else None

@@ -1,0 +1,11 @@
+"""The device file's shape: which keys there are, with their units and what each may hold.
+
+    numbers    the kinds of values: numbers, vectors, matrices that are right by themselves
+    plant      [plant]
+    loop       [loop]
+    mechanism  [mechanism]
+    file       the whole file, and its JSON Schema
+
+What needs two keys to be judged (sizes, names that refer to names, either-or) is checked in `relations`,
+so that a fault in one key hides none in another.
+"""

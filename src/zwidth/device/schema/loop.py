@@ -1,0 +1,70 @@
+"""[loop]: what the computer does between reading the encoder and setting the force."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BeforeValidator, Field
+
+from zwidth.device.schema.numbers import Number, Section, WholeNumber, quantity
+
+LONGEST_DELAY: Final = 100  # samples; each adds a state to the loop
+HIGHEST_ORDER: Final = 20  # of a Butterworth filter; each adds a state to the loop
+
+
+def _not_a_frequency(value: Any) -> Any:
+    if isinstance(value, int | float) and not isinstance(value, bool) and 1 < value < float("inf"):
+        raise ValueError(
+            f"must be 0 < T <= 1 s, got {value:.10g}; is {value:.10g} a frequency in Hz? "
+            f"then T = {1 / value:.6g}"
+        )
+    return value
+
+
+class FirstOrderFilter(Section):
+    """First-order low pass by backward Euler, a = tau / (tau + T)."""
+
+    type: Literal["first-order"] = quantity('kind of filter: "first-order" or "butterworth"')
+    time_constant_s: Number = quantity("time constant tau; 0: no filter", "s", ge=0)
+
+
+class ButterworthFilter(Section):
+    """Butterworth low pass by the bilinear (Tustin) rule."""
+
+    type: Literal["butterworth"] = quantity('kind of filter: "first-order" or "butterworth"')
+    order: WholeNumber = quantity("order, a whole number from 1 to 20", ge=1, le=HIGHEST_ORDER)
+    cutoff_Hz: Number = quantity("cutoff frequency, below half the sampling frequency", "Hz", gt=0)
+    discretisation: Literal["tustin", "tustin-prewarped"] = quantity(
+        "bilinear rule, plain or prewarped at the cutoff", default="tustin"
+    )
+
+
+class VelocitySection(Section):
+    """How the velocity is estimated from the encoder."""
+
+    method: Literal["backward-difference"] = quantity(
+        "estimator of the velocity; (x_j - x_{j-1}) / T", default="backward-difference"
+    )
+    filter: Annotated[FirstOrderFilter | ButterworthFilter, Field(discriminator="type")] | None = quantity(
+        "low pass on the velocity; omitted: none", default=None
+    )
+
+
+class LoopSection(Section):
+    """The sampled wall law, f = -(K y + B v)."""
+
+    sampling_period_s: Annotated[Number, BeforeValidator(_not_a_frequency)] = quantity(
+        "sampling period T, 0 < T <= 1", "s", gt=0, le=1
+    )
+    delay_samples: Number | None = quantity(
+        "time from reading the encoder to setting the force, in samples, whole or not; or delay_s",
+        "1",
+        ge=0,
+        default=None,
+    )
+    delay_s: Number | None = quantity(
+        "time from reading the encoder to setting the force; or delay_samples", "s", ge=0, default=None
+    )
+    velocity: VelocitySection = quantity(
+        "how the velocity is estimated", default=VelocitySection(method="backward-difference", filter=None)
+    )

@@ -1,0 +1,121 @@
+"""From what pydantic found to sentences for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from zwidth.device.faults import Path, nearest, quote, suggestion
+from zwidth.device.schema import file as schema
+
+
+def sentences(error: ValidationError, document: dict[str, Any]) -> Iterator[tuple[Path, str]]:
+    """Path and sentence of each fault; a key missing only because it is misspelt is told once."""
+    details = error.errors(include_url=False)
+    located = [(_where(detail, document), detail) for detail in details]
+    missing = {path for path, detail in located if detail["type"] == "missing"}
+    meant = {
+        (*path[:-1], near)
+        for path, detail in located
+        if detail["type"] == "extra_forbidden"
+        and (near := nearest(str(path[-1]), [str(p[-1]) for p in missing if p[:-1] == path[:-1]]))
+    }
+    for path, detail in located:
+        if not (detail["type"] == "missing" and path in meant):
+            yield path, _sentence(detail, path, document)
+
+
+def _where(detail: ErrorDetails, document: Any) -> Path:
+    """The location as a path of the document: steps that pydantic adds (tags, lifted numbers) left out."""
+    path: list[str | int] = []
+    *outer, last = detail["loc"] or ("",)
+    for part in (*outer, last) if detail["type"] != "missing" else outer:
+        if part == "[key]":
+            continue
+        if isinstance(document, dict) and part in document:
+            document = document[str(part)]
+        elif isinstance(document, list) and isinstance(part, int) and part < len(document):
+            document = document[part]
+        else:
+            continue
+        path.append(part)
+    if detail["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        return (*path, "type")
+    return (*path, last) if detail["type"] == "missing" else tuple(path)
+
+
+def _sentence(detail: ErrorDetails, path: Path, document: dict[str, Any]) -> str:
+    kind, got = detail["type"], detail["input"]
+    limits: Mapping[str, Any] = detail.get("ctx", {})
+    meaning = schema.description(path) if path else ""
+    about = f" ({meaning})" if meaning else ""
+    match kind:
+        case "missing":
+            return f"is missing; add it{about}"
+        case "extra_forbidden":
+            return _unknown(path)
+        case "float_type" if isinstance(got, int) and not isinstance(got, bool):
+            return f"must be a finite number, got {quote(got)}{about}"
+        case "float_type":
+            return f"must be a number, got {quote(got)}{about}"
+        case "int_type" | "int_from_float":
+            return f"must be a whole number, got {quote(got)}{about}"
+        case "finite_number":
+            return f"must be finite, got {quote(got)}{about}"
+        case "greater_than":
+            return f"must be greater than {limits['gt']:.10g}, got {quote(got)}{about}"
+        case "greater_than_equal":
+            return f"must be at least {limits['ge']:.10g}, got {quote(got)}{about}"
+        case "less_than":
+            return f"must be less than {limits['lt']:.10g}, got {quote(got)}{about}"
+        case "less_than_equal":
+            return f"must be at most {limits['le']:.10g}, got {quote(got)}{about}"
+        case "too_short" | "too_long":
+            return _length(limits, got, about)
+        case "string_type":
+            return f"must be text, got {quote(got)}{about}"
+        case "string_too_short":
+            return f"must not be empty{about}"
+        case "string_too_long":
+            return f"must have at most {limits['max_length']} characters, got {quote(got)}"
+        case "string_pattern_mismatch":
+            return f"must be a name of letters, digits, - and _ that begins with a letter, got {quote(got)}"
+        case "literal_error":
+            return _literal(limits["expected"], got, about)
+        case "union_tag_invalid":
+            return f"must be {limits['expected_tags'].replace(', ', ' or ')}, got {limits['tag']!r}"
+        case "union_tag_not_found":
+            return "is missing or no text; give 'butterworth' or 'first-order'"
+        case "tuple_type" | "list_type":
+            return f"must be a list, got {quote(got)}{about}"
+        case "model_type" | "model_attributes_type" | "dict_type":
+            return f"must be a table, got {quote(got)}{about}"
+        case _:
+            return detail["msg"].removeprefix("Value error, ")
+
+
+def _unknown(path: Path) -> str:
+    key, table = str(path[-1]), path[:-1]
+    allowed = schema.keys(table)
+    if nearest(key, allowed) is None:
+        elsewhere = [section for section in ("loop", "plant", "mechanism") if key in schema.keys((section,))]
+        if elsewhere and table != (elsewhere[0],):
+            return f"is not a key here; it belongs into [{elsewhere[0]}]"
+    return f"is not a key of a device file; {suggestion(key, allowed)}"
+
+
+def _length(limits: Mapping[str, Any], got: Any, about: str) -> str:
+    if "max_length" in limits:
+        return f"must have at most {limits['max_length']} elements, got {limits['actual_length']}{about}"
+    least = limits["min_length"]
+    return f"must have at least {least} element{'s' * (least != 1)}, got {limits['actual_length']}{about}"
+
+
+def _literal(expected: str, got: Any, about: str) -> str:
+    words = [word.strip("'") for word in expected.replace(" or ", ", ").split(", ")]
+    if isinstance(got, str) and (near := nearest(got, words)):
+        return f"must be {expected}, got {quote(got)}; did you mean '{near}'?"
+    return f"must be {expected.replace('True', 'true')}, got {quote(got)}{about}"

@@ -1,0 +1,88 @@
+"""Keys and values that device files may hold one day, refused until then: never ignored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import deepcopy
+from typing import Any, Final
+
+from zwidth.device.faults import Path
+
+KEYS: Final[dict[tuple[str, ...], str]] = {
+    ("response",): "a measured [response]",
+    ("operator",): "an [operator]",
+    ("friction",): "[friction]",
+    ("loop", "actuator"): "a lag of the force, [loop.actuator],",
+    ("loop", "encoder"): "the encoder's resolution, [loop.encoder],",
+    ("loop", "saturation"): "a limit of the force, [loop.saturation],",
+    ("loop", "velocity", "samples"): "a windowed velocity (samples)",
+    ("mechanism", "drives", "*", "coulomb_Nm"): "friction of the drives (coulomb_Nm)",
+    ("mechanism", "drives", "*", "coulomb"): "friction of the drives (coulomb)",
+    ("mechanism", "friction"): "friction in a mechanism, [mechanism.friction],",
+}
+"""Key -> how a sentence calls it; * stands for any list element."""
+
+VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str]]] = {
+    ("loop", "velocity", "method"): (
+        frozenset({"windowed-difference", "windowed", "foaw", "kalman", "least-squares", "measured"}),
+        "backward-difference",
+    ),
+    ("mechanism", "links", "*", "joint"): (
+        frozenset(
+            {
+                "prismatic",
+                "spherical",
+                "universal",
+                "cylindrical",
+                "planar",
+                "screw",
+                "helical",
+                "free",
+                "ball",
+            }
+        ),
+        "revolute",
+    ),
+}
+"""Key -> the values to refuse so, and the supported one that stands for them while the rest is checked."""
+
+
+def refuse(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[Path, str]]]:
+    """The document without what is not supported yet, and a sentence for each thing taken out."""
+    document = deepcopy(document)
+    refused: list[tuple[Path, str]] = []
+    for pattern, what in KEYS.items():
+        for path, table in list(_places(document, pattern)):
+            del table[pattern[-1]]
+            refused.append((path, f"{what} is not supported yet; remove it"))
+    for pattern, (names, stand_in) in VALUES.items():
+        for path, table in _places(document, pattern):
+            value = table[pattern[-1]]
+            if isinstance(value, str) and value.lower() in names:
+                table[pattern[-1]] = stand_in
+                refused.append((path, f"{pattern[-1]} '{value}' is not supported yet; use '{stand_in}'"))
+    return document, refused
+
+
+def sentence(path: Path) -> str | None:
+    """Why a key at or below this path is refused, None if it is not one of those."""
+    for pattern, what in KEYS.items():
+        head = path[: len(pattern)]
+        if len(head) == len(pattern) and all(p in ("*", h) for p, h in zip(pattern, head, strict=True)):
+            return f"{what} is not supported yet"
+    return None
+
+
+def _places(
+    document: Any, pattern: tuple[str, ...], path: Path = ()
+) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Where the last key of the pattern stands: its path and the table that holds it."""
+    first, rest = pattern[0], pattern[1:]
+    if first == "*":
+        for index, inner in enumerate(document if isinstance(document, list) else []):
+            yield from _places(inner, rest, (*path, index))
+    elif isinstance(document, dict) and first in document:
+        if not rest:
+            yield (*path, first), document
+        else:
+            yield from _places(document[first], rest, (*path, first))
