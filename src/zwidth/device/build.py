@@ -22,7 +22,9 @@ from zwidth.model.mechanism import FIXED, REVOLUTE, Closures, Drives, Floats, Li
 from zwidth.model.plant import Plant
 
 if TYPE_CHECKING:
-    from zwidth.model.damping import Damping
+    from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
+
+    Damping = ModalDamping | ProportionalDamping | GivenDamping
 
 
 def controller(loop: LoopSection) -> Controller:

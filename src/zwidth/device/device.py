@@ -15,7 +15,7 @@ from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.plant import Plant
 
 if TYPE_CHECKING:
-    from zwidth.model.damping import Damping
+    from zwidth.device.build import Damping
     from zwidth.model.posture import Posture
 
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")

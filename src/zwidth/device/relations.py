@@ -29,8 +29,9 @@ def relations(document: dict[str, Any], original: dict[str, Any]) -> Found:
     mechanism = _table(document, "mechanism")
     if mechanism:
         yield from _tree(mechanism)
-        yield from _references(mechanism)
-        yield from _assemblies(mechanism)
+        if _joints(mechanism):
+            yield from _references(mechanism)
+            yield from _assemblies(mechanism)
         yield from _workspace(mechanism)
         yield from _damping(mechanism)
 
@@ -214,6 +215,7 @@ def _workspace(mechanism: dict[str, Any]) -> Found:
             isinstance(bounds, list)
             and len(bounds) == 2
             and all(map(_number, [value, *bounds]))
+            and bounds[0] < bounds[1]
             and not bounds[0] <= value <= bounds[1]
         ):
             yield (

@@ -24,8 +24,15 @@ def sentences(error: ValidationError, document: dict[str, Any]) -> Iterator[tupl
         and (near := nearest(str(path[-1]), [str(p[-1]) for p in missing if p[:-1] == path[:-1]]))
     }
     for path, detail in located:
-        if not (detail["type"] == "missing" and path in meant):
+        told = detail["type"] == "missing" and path in meant
+        if not told and not _long_enough(detail):
             yield path, _sentence(detail, path, document)
+
+
+def _long_enough(detail: ErrorDetails) -> bool:
+    """Whether a list is called too short only because elements at fault, told themselves, are not counted."""
+    limits = detail.get("ctx", {})
+    return detail["type"] == "too_short" and len(detail["input"]) >= limits["min_length"]
 
 
 def _where(detail: ErrorDetails, document: Any) -> Path:

@@ -25,6 +25,8 @@ from zwidth.device.faults import quote
 SYMMETRY_TOLERANCE: Final = 1e-9  # relative to the largest element
 NAME_PATTERN: Final = r"^[^\W\d][\w-]*$"  # no dots and no leading digit: names are steps of dotted paths
 
+INERTIA_FORMS: Final = "one number, three moments [Ixx, Iyy, Izz] or 3 rows of 3 numbers"
+
 Rows = tuple[tuple[float, ...], ...]
 
 
@@ -75,6 +77,8 @@ def _as_vector(value: Any) -> Any:
 
 
 def _as_matrix(value: Any) -> Any:
+    if isinstance(value, list) and value and all(map(_is_number, value)):
+        raise ValueError(f"must be a list of rows, got {quote(value)}; write [[...], [...]]")
     return [[value]] if _is_number(value) else value
 
 
@@ -82,6 +86,8 @@ def _as_inertia(value: Any) -> Any:
     """Three moments become the rows of a diagonal matrix; one number stays apart, as a matrix of one."""
     if isinstance(value, list) and len(value) == 3 and not any(isinstance(v, list | dict) for v in value):
         return [[v if i == j else 0.0 for j in range(3)] for i, v in enumerate(value)]
+    if isinstance(value, list) and value and all(map(_is_number, value)):
+        raise ValueError(f"must be {INERTIA_FORMS}, got {quote(value)}")
     return _as_matrix(value)
 
 
@@ -127,9 +133,7 @@ def _possible_body(rows: Rows) -> Rows:
             raise ValueError(f"must be at least 0, got {rows[0][0]:.10g}")
         return rows
     if len(rows) != 3:
-        raise ValueError(
-            f"must be one number, three moments [Ixx, Iyy, Izz] or 3 rows of 3 numbers, got {len(rows)} rows"
-        )
+        raise ValueError(f"must be {INERTIA_FORMS}, got {len(rows)} rows")
     moments = np.linalg.eigvalsh(np.array(rows))
     slack = SYMMETRY_TOLERANCE * float(np.abs(moments).max())
     said = ", ".join(f"{moment:.6g}" for moment in moments)

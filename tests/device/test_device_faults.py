@@ -1,0 +1,191 @@
+"""Every way a device file's [plant] and [loop] can be wrong: the right key, the value, what is allowed."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+
+from tests.device.device_cases import ARM, GONE, PLANT, changed, faults
+from zwidth.device.device import Device
+from zwidth.device.load import from_document
+
+NAN, INF = float("nan"), float("inf")
+
+CASES = [
+    # the file, what is changed in it, the key found at fault, words of the message
+    (PLANT, {"name": GONE}, "name", "is missing"),
+    (PLANT, {"name": 3}, "name", "must be text, got 3"),
+    (PLANT, {"name": ""}, "name", "must not be empty"),
+    (PLANT, {"loop": GONE}, "loop", "is missing"),
+    (PLANT, {"plant": GONE}, "", "neither [mechanism] nor [plant]"),
+    (PLANT, {"plant": 3}, "plant", "must be a table, got 3"),
+    (PLANT, {"sampling_period_s": 0.001}, "sampling_period_s", "belongs into [loop]"),
+    (PLANT, {"colour": "red"}, "colour", "is not a key of a device file; allowed: "),
+    (PLANT, {"lop": {}}, "lop", "did you mean 'loop'?"),
+    # not supported yet
+    (PLANT, {"operator": {"arm_mass_kg": 0.8}}, "operator", "is not supported yet"),
+    (PLANT, {"friction": {"coulomb_N": [0, 1]}}, "friction", "is not supported yet"),
+    (PLANT, {"plant": GONE, "response": {"file": "a.csv"}}, "response", "is not supported yet"),
+    (PLANT, {"loop__actuator": {"time_constant_s": 0.0}}, "loop.actuator", "is not supported yet"),
+    (PLANT, {"loop__encoder__resolution_m": 1e-6}, "loop.encoder", "is not supported yet"),
+    (PLANT, {"loop__saturation__force_N": INF}, "loop.saturation", "is not supported yet"),
+    (
+        PLANT,
+        {"loop__velocity__method": "windowed-difference"},
+        "loop.velocity.method",
+        "is not supported yet",
+    ),
+    (PLANT, {"loop__velocity__method": "backward"}, "loop.velocity.method", "must be 'backward-difference'"),
+    (
+        ARM,
+        {"mechanism__links__0__joint": "prismatic"},
+        "mechanism.links.upper.joint",
+        "'prismatic' is not sup",
+    ),
+    (ARM, {"mechanism__drives__0__coulomb_Nm": 0.1}, "mechanism.drives.shoulder.coulomb_Nm", "not supported"),
+    # the plant
+    (PLANT, {"plant__mass_kg": GONE}, "plant.mass_kg", "is missing"),
+    (PLANT, {"plant__mass_kg": GONE, "plant__mas_kg": 1.0}, "plant.mas_kg", "did you mean 'mass_kg'?"),
+    (PLANT, {"plant__mass_kg__0__0": "0.3"}, "plant.mass_kg.0.0", "must be a number, got the text '0.3'"),
+    (PLANT, {"plant__mass_kg__0__0": True}, "plant.mass_kg.0.0", "must be a number, got true"),
+    (PLANT, {"plant__mass_kg__0__0": NAN}, "plant.mass_kg.0.0", "must be finite, got nan"),
+    (PLANT, {"plant__mass_kg__0__0": INF}, "plant.mass_kg.0.0", "must be finite, got inf"),
+    (PLANT, {"plant__mass_kg__0__0": 10**400}, "plant.mass_kg.0.0", "must be a finite number, got a whole"),
+    (PLANT, {"plant__mass_kg__0__1": 0.01}, "plant.mass_kg", "symmetric, but row 0 column 1 holds 0.01"),
+    (PLANT, {"plant__mass_kg__1__1": 0.0}, "plant.mass_kg", "must be positive definite"),
+    (PLANT, {"plant__mass_kg": [[1.0, 2.0], [2.0, 1.0]]}, "plant.mass_kg", "least eigenvalue is -1"),
+    (PLANT, {"plant__mass_kg": [[1.0, 0.0], [0.0]]}, "plant.mass_kg", "must be a square matrix"),
+    (PLANT, {"plant__mass_kg": []}, "plant.mass_kg", "must be a square matrix, got an empty list"),
+    (
+        PLANT,
+        {"plant__mass_kg": [0.3, 0.02]},
+        "plant.mass_kg",
+        "must be a list of rows, got the list [0.3, 0.02]",
+    ),
+    (PLANT, {"plant__mass_kg": {"a": 1}}, "plant.mass_kg", "must be a list, got a table"),
+    (PLANT, {"plant__stiffness_N_per_m__0__1": 1.0}, "plant.stiffness_N_per_m", "must be symmetric"),
+    (PLANT, {"plant__damping_Ns_per_m__0__1": 1.0}, "plant.damping_Ns_per_m", "must be symmetric"),
+    (PLANT, {"plant__stiffness_N_per_m": 5.0}, "plant.stiffness_N_per_m", "has 1 rows, but mass_kg has 2"),
+    (PLANT, {"plant__actuator": [1.0]}, "plant.actuator", "has 1 numbers, but mass_kg has 2 rows"),
+    (PLANT, {"plant__sensor": [0.0, 1.0, 0.0]}, "plant.sensor", "has 3 numbers, but mass_kg has 2 rows"),
+    (PLANT, {"plant__handle": 1.0}, "plant.handle", "has 1 numbers, but mass_kg has 2 rows"),
+    (PLANT, {"plant__actuator": GONE}, "plant.actuator", "is missing; with 2 coordinates"),
+    (PLANT, {"plant__sensor": GONE}, "plant.sensor", "is missing; with 2 coordinates"),
+    (PLANT, {"plant__actuator": [0.0, 0.0]}, "plant.actuator", "must not be all zeros"),
+    # the loop
+    (PLANT, {"loop__sampling_period_s": GONE}, "loop.sampling_period_s", "is missing"),
+    (
+        PLANT,
+        {"loop__sampling_period_s": 1000},
+        "loop.sampling_period_s",
+        "is 1000 a frequency in Hz? then T = 0.001",
+    ),
+    (PLANT, {"loop__sampling_period_s": 0}, "loop.sampling_period_s", "must be greater than 0, got 0"),
+    (
+        PLANT,
+        {"loop__sampling_period_s": -0.001},
+        "loop.sampling_period_s",
+        "must be greater than 0, got -0.001",
+    ),
+    (PLANT, {"loop__sampling_period_s": NAN}, "loop.sampling_period_s", "must be finite, got nan"),
+    (PLANT, {"loop__sampling_period_s": INF}, "loop.sampling_period_s", "must be finite, got inf"),
+    (PLANT, {"loop__sampling_period_s": "1 ms"}, "loop.sampling_period_s", "got the text '1 ms'"),
+    (PLANT, {"loop__sampling_period_s": [0.001]}, "loop.sampling_period_s", "must be a number, got the list"),
+    (PLANT, {"loop__delay_samples": -1}, "loop.delay_samples", "must be at least 0, got -1"),
+    (
+        PLANT,
+        {"loop__delay_samples": 101},
+        "loop.delay_samples",
+        "more than 100 samples, which is not supported",
+    ),
+    (PLANT, {"loop__delay_samples": GONE, "loop__delay_s": -1e-3}, "loop.delay_s", "must be at least 0"),
+    (PLANT, {"loop__delay_samples": GONE, "loop__delay_s": 0.2}, "loop.delay_s", "more than 100 samples"),
+    (PLANT, {"loop__delay_s": 0.001}, "loop.delay_s", "stands beside delay_samples"),
+    (
+        PLANT,
+        {"loop__velocity__filter__cutoff_Hz": 500},
+        "loop.velocity.filter.cutoff_Hz",
+        "frequency, 500 Hz, got 500",
+    ),
+    (
+        PLANT,
+        {"loop__velocity__filter__cutoff_Hz": 0},
+        "loop.velocity.filter.cutoff_Hz",
+        "greater than 0, got 0",
+    ),
+    (PLANT, {"loop__velocity__filter__order": 0}, "loop.velocity.filter.order", "must be at least 1, got 0"),
+    (
+        PLANT,
+        {"loop__velocity__filter__order": 21},
+        "loop.velocity.filter.order",
+        "must be at most 20, got 21",
+    ),
+    (
+        PLANT,
+        {"loop__velocity__filter__order": 2.0},
+        "loop.velocity.filter.order",
+        "must be a whole number, got 2",
+    ),
+    (PLANT, {"loop__velocity__filter__order": True}, "loop.velocity.filter.order", "whole number, got true"),
+    (
+        PLANT,
+        {"loop__velocity__filter__type": "bessel"},
+        "loop.velocity.filter.type",
+        "or 'butterworth', got 'bessel'",
+    ),
+    (PLANT, {"loop__velocity__filter__type": GONE}, "loop.velocity.filter.type", "is missing"),
+    (PLANT, {"loop__velocity__filter": 20.0}, "loop.velocity.filter", "must be a table, got 20"),
+    (
+        PLANT,
+        {"loop__velocity__filter__cutof_Hz": 2.0},
+        "loop.velocity.filter.cutof_Hz",
+        "did you mean 'cutoff_Hz'?",
+    ),
+    (
+        PLANT,
+        {"loop__velocity__filter": {"type": "first-order", "time_constant_s": -1}},
+        "loop.velocity.filter.time_constant_s",
+        "must be at least 0",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "changes", "key", "words"), CASES, ids=[f"{i}-{case[2]}" for i, case in enumerate(CASES)]
+)
+def test_a_fault_names_its_key_and_says_what_is_wrong(text, changes, key, words):
+    (fault,) = faults(changed(text, **changes))
+    assert fault.file == "my.toml"
+    assert fault.key == key
+    assert words in fault.message
+    assert "\n" not in str(fault)
+
+
+@pytest.mark.parametrize("text", [PLANT, ARM], ids=["plant", "mechanism"])
+def test_the_unchanged_files_are_right(text):
+    assert isinstance(from_document(tomllib.loads(text)), Device)
+
+
+def test_all_faults_are_reported_together_in_the_order_of_the_file():
+    document = changed(
+        PLANT,
+        colour="red",
+        plant__mass_kg__0__1=0.01,
+        plant__stifness_N_per_m=1.0,
+        plant__actuator=[1.0, 2.0, 3.0],
+        loop__sampling_period_s=800,
+        loop__delay_samples=-1,
+        loop__saturation={"force_N": 3.0},
+        loop__velocity__filter__order="two",
+    )
+    assert [fault.key for fault in faults(document)] == [
+        "plant.mass_kg",
+        "plant.actuator",
+        "plant.stifness_N_per_m",
+        "loop.sampling_period_s",
+        "loop.delay_samples",
+        "loop.velocity.filter.order",
+        "loop.saturation",
+        "colour",
+    ]
