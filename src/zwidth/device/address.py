@@ -181,18 +181,31 @@ def _unknown(
     refused = unsupported.sentence((*steps, *parts[depth:]))
     if refused:
         return fail(OPTION, path, f"{refused}; leave it out")
-    here = dotted(tuple(steps), document)
-    choices = _choices(place, tuple(steps))
+    first, *rest = path.split(".")
+    if steps in ([], ["mechanism"]) and parts[depth:] == [first, *rest]:
+        return fail(OPTION, path, f"is no key of a device file; {_from_the_top(document, first, rest)}")
+    here, choices = dotted(tuple(steps), document), _choices(place, tuple(steps))
     near = nearest(parts[depth], choices)
     if near:
-        right = ".".join([*([here] if here else []), near, *parts[depth + 1 :]])
+        right = ".".join([here, near, *parts[depth + 1 :]])
         return fail(OPTION, path, f"is no key of a device file; did you mean '{right}'?")
-    for section in schema.keys(()) if not steps or parts[depth] == path else ():
-        if (near := nearest(path.split(".")[0], schema.keys((section,)))) is not None:
-            right = ".".join([section, near, *path.split(".")[1:]])
-            return fail(OPTION, path, f"is no key of a device file; did you mean '{right}'?")
-    where = f"{here} has" if here else "a device file has"
-    return fail(OPTION, path, f"is no key of a device file; {where}: {listed(choices) or 'nothing inside'}")
+    return fail(
+        OPTION, path, f"is no key of a device file; {here} has: {listed(choices) or 'nothing inside'}"
+    )
+
+
+def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
+    """A hint for a path whose first step is nowhere: a root key, one of [mechanism], or one further in."""
+    inside = schema.keys(("mechanism",)) if "mechanism" in document else set()
+    near = nearest(first, schema.keys(()) | inside)
+    if near:
+        right = [near] if near in schema.keys(()) else ["mechanism", near]
+        return f"did you mean '{'.'.join([*right, *rest])}'?"
+    for section in ("loop", "plant", "mechanism"):
+        near = nearest(first, schema.keys((section,))) if section in document else None
+        if near:
+            return f"did you mean '{'.'.join([section, near, *rest])}'?"
+    return f"a device file has: {listed(sorted(schema.keys(())))}"
 
 
 def _choices(place: Any, steps: Path) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from zwidth.model.plant import Plant
 if TYPE_CHECKING:
     from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
 
-    Damping = ModalDamping | ProportionalDamping | GivenDamping
+    Damping: TypeAlias = ModalDamping | ProportionalDamping | GivenDamping
 
 
 def controller(loop: LoopSection) -> Controller:

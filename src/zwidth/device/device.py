@@ -60,8 +60,6 @@ class Device:
                                cannot be assembled or driven as the file says
                 PostureError   (model.posture) where there is no answer: out of reach, or singular
         """
-        from zwidth.model.posture import LoopOpen, PostureError, solve_posture
-
         mechanism = self._mechanism(at=at, assembly=assembly)
         if assembly is not None and assembly not in mechanism.assemblies:
             message = (
@@ -71,6 +69,8 @@ class Device:
         position = self.reference_position if at is None else self._vector("at", at)
         assert position is not None
         name = assembly or self.reference_assembly
+        from zwidth.model.posture import LoopOpen, PostureError, solve_posture
+
         try:
             return solve_posture(mechanism, position, name)
         except LoopOpen as error:
@@ -100,10 +100,10 @@ class Device:
         if self.given_plant is not None:
             self._mechanism_only(at=at, direction=direction, assembly=assembly)
             return self._given(self.given_plant, model)
-        from zwidth.model.reduction import reduce_mechanism
-
         along = self.direction(direction)
         posture = self.posture(at, assembly)
+        from zwidth.model.reduction import reduce_mechanism
+
         return reduce_mechanism(self._mechanism(), posture, along, model or "full", self.damping)
 
     def direction(self, direction: Sequence[float] | None = None) -> Floats:

@@ -18,6 +18,7 @@ CLOSED: Final = 1e-9  # gap of a closed loop, relative to the mechanism's size
 RANK_TOLERANCE: Final = 1e-7  # of singular values, relative to the largest
 RESTARTS: Final = 30  # random postures tried before a loop is said not to close
 NEARBY: Final = 0.05  # how far joints turn to a posture that is not special [rad]
+SLOW: Final = 1e-6  # part of the squared gap won by a step, below which it is as small as it gets
 PARALLEL: Final = 1e-9  # sine of the angle below which two axes are parallel
 
 Found = Iterator[tuple[Path, str]]
@@ -89,7 +90,8 @@ def _moments_left_open(mechanism: Mechanism, section: MechanismSection) -> Found
         if len(given.inertia_kg_m2) != 1 or given.inertia_kg_m2[0][0] == 0:
             continue
         for j in _ancestors(mechanism, i):
-            if links.joint[j] == REVOLUTE and np.linalg.norm(np.cross(axis[j], own)) > PARALLEL:
+            if links.joint[j] == REVOLUTE and np.linalg.norm(np.cross(axis[j], own)) > SLOW: Final = 1e-6  # part of the squared gap won by a step, below which it is as small as it gets
+PARALLEL:
                 yield (
                     ("mechanism", "links", index, "inertia_kg_m2"),
                     f"is one number, the moment about the link's axis, but '{links.names[j]}' turns the link "
@@ -119,17 +121,18 @@ def _least_gap(mechanism: Mechanism, angles: Floats, most: int = 100) -> Floats:
     turning = mechanism.links.joint == REVOLUTE
     angles, caution = angles.copy(), 1e-3
     gap, J = _loops(mechanism, angles)
-    for _ in range(most):
+    for _ in range(most if gap.any() else 0):
         size = float(np.sum(J**2)) or 1.0
         step = np.zeros_like(angles)
         A = J[:, turning]
         step[turning] = np.linalg.solve(A.T @ A + caution * size * np.eye(A.shape[1]), -A.T @ gap)
         new_gap, new_J = _loops(mechanism, angles + step)
-        if new_gap @ new_gap < gap @ gap:
+        gain = 1 - new_gap @ new_gap / (gap @ gap)
+        if gain > 0:
             angles, gap, J, caution = angles + step, new_gap, new_J, max(caution / 10, 1e-13)
         else:
             caution *= 10
-        if gap @ gap == 0 or caution > 1e6:
+        if gap @ gap == 0 or caution > 1e6 or 0 < gain < SLOW:
             break
     return angles
 

@@ -270,7 +270,10 @@ def _tables(document: dict[str, Any], key: str) -> list[tuple[int, dict[str, Any
 
 
 def _number(value: Any) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Whether the value is a number that a float can hold (TOML's whole numbers have no end)."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return isinstance(value, float) or abs(value) < 10**300
 
 
 def _rows(value: Any) -> int | None:

@@ -23,6 +23,7 @@ from pydantic import (
 from zwidth.device.faults import quote
 
 SYMMETRY_TOLERANCE: Final = 1e-9  # relative to the largest element
+LARGEST: Final = 1e30  # SI units; the squares of such numbers can still be multiplied
 NAME_PATTERN: Final = r"^[^\W\d][\w-]*$"  # no dots and no leading digit: names are steps of dotted paths
 
 INERTIA_FORMS: Final = "one number, three moments [Ixx, Iyy, Izz] or 3 rows of 3 numbers"
@@ -44,6 +45,12 @@ def quantity(description: str, unit: str | None = None, **limits: Any) -> Any:
 def _not_nan(value: float) -> float:
     if np.isnan(value):
         raise ValueError("must be a number or inf, got nan")
+    return value
+
+
+def _thinkable(value: float) -> float:
+    if LARGEST < abs(value) < np.inf:
+        raise ValueError(f"must be between -{LARGEST:g} and {LARGEST:g}, got {value:.6g}; is the unit right?")
     return value
 
 
@@ -153,8 +160,8 @@ _MATRIX: Final[dict[str, Any]] = {"type": "array", "items": _LIST, "minItems": 1
 _THREE: Final[dict[str, Any]] = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
 _THREE_BY_THREE: Final[dict[str, Any]] = {"type": "array", "items": _THREE, "minItems": 3, "maxItems": 3}
 
-Number = Annotated[float, Strict(), AllowInfNan(False)]
-NumberOrInfinity = Annotated[float, Strict(), AfterValidator(_not_nan)]
+Number = Annotated[float, Strict(), AllowInfNan(False), AfterValidator(_thinkable)]
+NumberOrInfinity = Annotated[float, Strict(), AfterValidator(_not_nan), AfterValidator(_thinkable)]
 WholeNumber = Annotated[int, Strict()]
 Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=NAME_PATTERN)]

@@ -1,0 +1,239 @@
+"""The bundled devices, and what a loaded device gives: arrays, postures, plants."""
+
+from __future__ import annotations
+
+import importlib
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.device.device_cases import ARM, PLANT, changed
+from zwidth.device import address, build, geometry
+from zwidth.device.faults import DeviceError
+from zwidth.device.load import bundled, from_document, load
+from zwidth.device.read import bundled_names, read
+
+
+@pytest.mark.parametrize("name", bundled_names())
+def test_every_group_of_numbers_has_its_source(name):
+    """A number's source stands at its own path or at one that it lies in, * being any step."""
+    document, _ = read(name)
+    sources = load(name).sources
+    covered = {path for source in sources for path in _under(document, source)}
+    bare = [path for path in address.numeric_addresses(document) if path not in covered]
+    assert bare == []
+
+
+def _under(document, source):
+    """Dotted paths of the numbers that a source speaks of."""
+    wanted = source.split(".")
+    for path in address.numeric_addresses(document):
+        parts = path.split(".")
+        if len(parts) >= len(wanted) and all(w in ("*", p) for w, p in zip(wanted, parts, strict=False)):
+            yield path
+
+
+@pytest.mark.parametrize(("name", "description", "source"), bundled())
+def test_the_listing_is_what_loading_says(name, description, source):
+    device = load(name)
+    assert (device.description, device.source) == (description, source)
+    assert description
+    assert source
+    assert "\n" not in description + source
+
+
+def test_the_published_plant():
+    device = load("published-two-mass")
+    plant = device.plant()
+    assert plant is device.given_plant
+    assert plant.mass.tolist() == [[0.2616, 0.0], [0.0, 0.0254]]
+    assert plant.damping == pytest.approx(0.00012 * plant.stiffness)
+    assert math.sqrt(15620 * (1 / 0.2616 + 1 / 0.0254)) / (2 * math.pi) == pytest.approx(131, abs=0.5)
+    assert plant.actuator.tolist() == plant.sensor.tolist() == [0.0, 1.0]
+    assert device.controller.sampling_period == 0.00125
+
+
+def test_one_coordinate_is_driven_read_and_held():
+    plant = load("hapkit-course").plant()
+    assert (plant.mass.item(), plant.damping.item(), plant.stiffness.item()) == (0.03, 1.0, 0.0)
+    assert plant.actuator.tolist() == plant.sensor.tolist() == plant.handle.tolist() == [1.0]
+
+
+def test_no_handle_is_made_up_for_several_coordinates():
+    assert from_document(changed(PLANT)).plant().handle is None
+
+
+def test_effective_masses_of_the_device_of_the_thesis():
+    """Link side 0.261599 kg, motor side 0.025367 kg, both 0.286967 kg at (0, 0.25) m along y.
+
+    m = 1/(u^T J M^-1 J^T u) with M of the links, of the rotors, of both (thesis eq. 2.18-2.20, 2.28).
+    """
+    device = load("five-bar")
+    posture = device.posture()
+    u, J = device.direction(), posture.jacobian
+    drives = device.mechanism.drives
+    rotors = np.diag(drives.motor_inertia * drives.transmission**2)
+
+    def felt(M):
+        return 1 / (u @ J @ np.linalg.solve(M, J.T @ u))
+
+    assert felt(posture.mass_matrix) == pytest.approx(0.261599, abs=5e-7)
+    assert felt(rotors) == pytest.approx(0.025367, abs=5e-7)
+    assert felt(posture.mass_matrix + rotors) == pytest.approx(0.286967, abs=5e-7)
+    # the printed 101 and 131 Hz, from the largest stiffnesses
+    K = np.diag(drives.stiffness * drives.transmission**2)
+    flexible = np.linalg.eigvals(np.linalg.solve(posture.mass_matrix, K) + np.linalg.solve(rotors, K))
+    assert np.sort(np.sqrt(flexible)) / (2 * np.pi) == pytest.approx([101.31, 130.80], abs=0.005)
+
+
+@pytest.mark.parametrize("assembly", ["elbows-out", "elbows-in", "elbows-right", "elbows-left"])
+def test_the_elbows_are_where_the_assembly_says(assembly):
+    """With the base joints apart every assembly exists; a right elbow lies right of its arm's chord."""
+    apart = ["links.upper-right.origin_m=[0.02, 0, 0]", "links.upper-left.origin_m=[-0.02, 0, 0]"]
+    device = load("five-bar", apart)
+    posture = device.posture(assembly=assembly)
+    passive = dict(zip(device.mechanism.links.names, posture.angles, strict=True))
+    right, left = passive["distal-right"] > 0, passive["distal-left"] > 0  # turning left: the elbow is right
+    wanted = {"elbows-out": (True, False), "elbows-in": (False, True)}
+    wanted |= {"elbows-right": (True, True), "elbows-left": (False, False)}
+    assert (right, left) == wanted[assembly]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_a_file_is_checked_by_agrees_with_the_solver(seed):
+    """The loops close at the solver's posture, and both routes give the same mass matrix there."""
+    rng = np.random.default_rng(seed)
+    device = load("five-bar")
+    mechanism = device.mechanism
+    posture = device.posture(at=[rng.uniform(-0.1, 0.1), rng.uniform(0.15, 0.3)])
+    gap, closing = geometry._loops(mechanism, posture.angles)
+    assert gap == pytest.approx(np.zeros(3), abs=1e-12)
+    motions = geometry._null_space(closing)
+    motions = motions @ np.linalg.inv(motions[mechanism.drives.joint])  # unit rates of the drives
+    M = geometry._mass_matrix(mechanism, posture.angles, motions)
+    assert pytest.approx(posture.mass_matrix, rel=1e-9) == M
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_gaps_derivative_is_their_derivative(seed):
+    rng = np.random.default_rng(seed)
+    mechanism = load("five-bar").mechanism
+    angles, step = rng.uniform(-3, 3, 4), rng.uniform(-1, 1, 4)
+    ahead, behind = (geometry._loops(mechanism, angles + s * step)[0] for s in (1e-6, -1e-6))
+    assert (ahead - behind) / 2e-6 == pytest.approx(geometry._loops(mechanism, angles)[1] @ step, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_orientation_is_roll_then_pitch_then_yaw_about_fixed_axes(seed):
+    angles = np.random.default_rng(seed).uniform(-3, 3, 3)
+    assert build.roll_pitch_yaw(angles) == pytest.approx(
+        Rotation.from_euler("xyz", angles).as_matrix(), abs=1e-12
+    )
+
+
+def test_defaults_of_a_mechanism():
+    mechanism = from_document(changed(ARM)).mechanism
+    links, drives = mechanism.links, mechanism.drives
+    assert links.origin.tolist() == [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]  # the parent's tip
+    assert mechanism.handle_point.tolist() == [0.2, 0.0, 0.0]
+    assert links.inertia[0].tolist() == np.diag([0.0, 0.0, 0.0004]).tolist()
+    assert drives.stiffness.tolist() == [0.5, math.inf]
+    assert np.isnan(drives.torque_constant).all()
+    assert np.isnan(mechanism.workspace).all()
+    assert mechanism.closures.point_a.shape == (0, 3)
+
+
+def test_links_may_stand_in_any_order():
+    document = changed(ARM)
+    document["mechanism"]["links"].reverse()
+    assert from_document(document).mechanism.links.names == ("upper", "lower")
+
+
+def test_an_axis_of_any_length_is_made_a_unit_vector():
+    axis = from_document(changed(ARM, mechanism__links__0__axis=[0, 0, -1e-300])).mechanism.links.axis[0]
+    assert axis.tolist() == [0.0, 0.0, -1.0]
+
+
+@pytest.mark.parametrize(
+    ("section", "kind", "numbers"),
+    [
+        ({"mode_ratio": 0.05}, "ModalDamping", (0.05,)),
+        ({"stiffness_coefficient_s": 1e-4}, "ProportionalDamping", (0.0, 1e-4)),
+        ({"given": True}, "GivenDamping", ()),
+    ],
+)
+def test_ways_of_damping(section, kind, numbers):
+    damping = importlib.import_module("zwidth.model.damping")
+    device = from_document(changed(ARM, mechanism__damping=section))
+    assert device.damping == getattr(damping, kind)(*numbers)
+
+
+# --- postures and directions asked for ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"direction": [0, 0]}, "direction: has zero length"),
+        ({"direction": [0, 0, 0]}, "direction: has zero length"),
+        ({"direction": [1]}, "direction: must be 2 or 3 numbers x, y or x, y, z, got 1"),
+        ({"direction": [1, 2, 3, 4]}, "direction: must be 2 or 3 numbers"),
+        ({"direction": [math.nan, 1]}, "direction: must be finite, got the list [nan, 1]"),
+        ({"direction": [math.inf, 1]}, "direction: must be finite"),
+        ({"direction": "up"}, "direction: must be 2 or 3 numbers, got the text 'up'"),
+        ({"at": 3}, "at: must be 2 or 3 numbers, got 3"),
+        ({"at": [0.1, math.nan]}, "at: must be finite"),
+        (
+            {"assembly": "elbows-outt"},
+            "assembly: names no assembly, got 'elbows-outt'; did you mean 'elbows-out'?",
+        ),
+        ({"model": "stiff"}, "model: must be one of full, two-mass, motor-mass, rigid, got the text 'stiff'"),
+    ],
+)
+def test_what_cannot_be_meant_is_told(asked, words):
+    with pytest.raises(DeviceError) as caught:
+        load("five-bar").plant(**asked)
+    assert str(caught.value) == f"five-bar: {words}" or words in str(caught.value)
+
+
+def test_a_given_plant_has_no_posture_or_direction():
+    device = load("published-two-mass")
+    with pytest.raises(DeviceError) as caught:
+        device.plant(at=[0, 1], direction=[0, 1], assembly="a")
+    assert [fault.key for fault in caught.value.faults] == ["at", "direction", "assembly"]
+    with pytest.raises(DeviceError, match="has a \\[plant\\] and no \\[mechanism\\]"):
+        device.posture()
+
+
+@pytest.mark.parametrize(
+    ("direction", "unit"), [([0, 3], [0, 1, 0]), ([1e-200, 1e-200, 0], [0.5**0.5] * 2 + [0])]
+)
+def test_a_direction_may_have_any_length(direction, unit):
+    assert load("five-bar").direction(direction) == pytest.approx(np.array(unit, dtype=float))
+
+
+@pytest.mark.parametrize("settings", [["reference.position_m=[0.34, 0.34]", "workspace=unset"], []])
+def test_a_posture_out_of_reach_is_no_fault_of_the_file(settings):
+    """It loads: other postures may be asked for. The posture asked for has no answer."""
+    from zwidth.model.posture import OutOfReach
+
+    device = load("five-bar", settings)
+    with pytest.raises(OutOfReach):
+        device.posture(at=None if settings else [0.5, 0.5])
+
+
+def test_arms_that_lie_on_each_other_are_not_driven():
+    """With the base joints in one place and both elbows on one side the drives turn the arms as one."""
+    with pytest.raises(DeviceError, match="do not determine the other joints"):
+        load("five-bar").posture(assembly="elbows-left")
+
+
+@pytest.mark.parametrize("model", [None, "full", "two-mass", "motor-mass", "rigid"])
+def test_every_model_of_the_bundled_devices(model):
+    for name in ("five-bar", "published-two-mass"):
+        plant = load(name).plant(model=model)
+        n = plant.size
+        assert plant.mass.shape == plant.damping.shape == plant.stiffness.shape == (n, n)
+        assert n == {None: n, "full": n, "two-mass": 2}.get(model, 1)
