@@ -90,8 +90,7 @@ def _moments_left_open(mechanism: Mechanism, section: MechanismSection) -> Found
         if len(given.inertia_kg_m2) != 1 or given.inertia_kg_m2[0][0] == 0:
             continue
         for j in _ancestors(mechanism, i):
-            if links.joint[j] == REVOLUTE and np.linalg.norm(np.cross(axis[j], own)) > SLOW: Final = 1e-6  # part of the squared gap won by a step, below which it is as small as it gets
-PARALLEL:
+            if links.joint[j] == REVOLUTE and np.linalg.norm(np.cross(axis[j], own)) > PARALLEL:
                 yield (
                     ("mechanism", "links", index, "inertia_kg_m2"),
                     f"is one number, the moment about the link's axis, but '{links.names[j]}' turns the link "
