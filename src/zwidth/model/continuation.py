@@ -1,0 +1,168 @@
+"""From one posture to another without leaving the assembly: Newton with continuation, compiled.
+
+Two postures are in the same assembly when a path free of singularities joins them. Newton's method alone does
+not respect that: far from the solution it may land on another branch. So a step is taken only where Newton's
+corrections contract from the first (the natural monotonicity test, Deuflhard 2011, *Newton Methods for
+Nonlinear Problems*, sec. 5.1), where no joint turns far, and where neither the drives nor the handle passed
+a singularity; otherwise the step is halved.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.model.arrays import Arrays
+from zwidth.model.closure import equations, least_squares, newton_step, orientation, passive_rates
+from zwidth.model.mechanism import Floats
+from zwidth.model.tree import Work, place, point
+
+OK: Final = 0
+OUT_OF_REACH: Final = 1
+SINGULAR: Final = 2
+
+CONTRACTION: Final = (
+    0.55  # of one correction by the next; on the edge of the workspace Newton gains a half each
+)
+LARGEST_TURN: Final = 0.5  # of one joint in one step [rad]
+SMALLEST_STEP: Final = 2.0**-7  # of the straight way to the goal
+SINGULAR_CONDITION: Final = 1e-6  # below it the numbers of a posture lose their last ten digits
+CLOSED: Final = 1e-11  # a gap is closed below this part of the mechanism's size
+ROUNDING: Final = 1e-15
+
+
+@compiled_lean
+def largest(values: Floats, count: int) -> float:
+    """max |values[:count]|"""
+    most = 0.0
+    for i in range(count):
+        most = max(most, abs(values[i]))
+    return most
+
+
+@compiled_lean
+def turn(mech: Arrays, angles: Floats, work: Work) -> None:
+    """Add the step in `work.solution[0]` to the joint angles."""
+    joint, solution = mech.joint, work.solution
+    for u in range(joint.size):
+        angles[joint[u]] += solution[0, u]
+
+
+@compiled_lean
+def correct(mech: Arrays, design: int, goal: Floats, angles: Floats, tolerance: float, work: Work) -> float:
+    """Newton from `angles` (in place) to the goal; the last reciprocal condition, or -1 where it left the
+    branch.
+
+    tolerance  the error of the angles left [rad]: the next correction is judged from the last two
+    """
+    start, rows, gaps, solution = work.start, work.rows, work.gaps, work.solution
+    m, count = rows.shape[0], gaps.size
+    rounding = ROUNDING * mech.size[design]
+    last, moved, condition = 0.0, 0.0, 0.0
+    for iteration in range(60):
+        place(mech, design, angles, work)
+        equations(mech, design, goal, work)
+        if iteration == 0:
+            for u in range(m):
+                for r in range(count):
+                    start[u, r] = rows[u, r]
+        condition = newton_step(mech, work)
+        size = largest(solution[0], m)
+        moved += size
+        settled = largest(gaps, count) < rounding
+        if not settled and (not moved < LARGEST_TURN or (iteration > 0 and size > CONTRACTION * last)):
+            return -1.0
+        if not settled or size < last:
+            turn(mech, angles, work)
+        ratio = size / last if last > 0.0 else 1.0
+        if settled or size * ratio * ratio < tolerance:
+            break
+        last = size
+    place(mech, design, angles, work)
+    equations(mech, design, goal, work)
+    if orientation(start, rows, work.triangle, m, count) < 0.0:
+        return -1.0
+    if orientation(start, rows, work.triangle, m - mech.driven, count - 3) < 0.0:
+        return -1.0
+    return condition
+
+
+@compiled_lean
+def follow(mech: Arrays, design: int, target: Floats, angles: Floats, work: Work) -> int:
+    """Take the mechanism from its posture `angles` (in place) straight to the target; OK, OUT_OF_REACH or
+    SINGULAR.
+
+    Where all goes well this is one call of `correct`, as from a neighbouring posture. The links stand at the
+    target afterwards and `rows`, `gaps` and `rates` belong to it.
+    """
+    goal, trial = work.goal, work.trial
+    n = trial.size
+    place(mech, design, angles, work)
+    begin = point(work.rotation, work.origin, mech.handle_link, mech.handle, design, 0)
+    done, step, condition = 0.0, 1.0, 1.0
+    while done < 1.0:
+        step = min(step, 1.0 - done)
+        final = done + step >= 1.0
+        for x in range(3):
+            goal[x] = target[x] if final else begin[x] + (done + step) * (target[x] - begin[x])
+        for i in range(n):
+            trial[i] = angles[i]
+        condition = correct(mech, design, goal, trial, 1e-13 if final else 1e-6, work)
+        if condition < 0.0:
+            step *= 0.5
+            if step < SMALLEST_STEP:
+                return OUT_OF_REACH
+            continue
+        for i in range(n):
+            angles[i] = trial[i]
+        done = 1.0 if final else done + step
+        step *= 2.0
+    if largest(work.gaps, work.gaps.size) > CLOSED * mech.size[design]:
+        return OUT_OF_REACH
+    condition = min(condition, passive_rates(mech, work))
+    return SINGULAR if condition < SINGULAR_CONDITION else OK
+
+
+@compiled
+def assemble(mech: Arrays, design: int, goal: Floats, hold: bool, angles: Floats, work: Work) -> None:
+    """Close the loops from roughly given angles (in place), with the handle at the goal if `hold`.
+
+    Levenberg-Marquardt: the damping rows keep the step small while the start is rough and let the handle go
+    where it must when only the loops count.
+    """
+    m, loops = mech.joint.size, 3 * mech.a.size
+    rows = loops + 3 if hold else loops
+    damping = 1e-3
+    place(mech, design, angles, work)
+    equations(mech, design, goal, work)
+    error = np.sum(work.gaps[:rows] ** 2)
+    for _ in range(300):
+        weight = np.sqrt(damping) * mech.size[design]
+        work.basis[:] = 0.0
+        work.sides[:] = 0.0
+        for u in range(m):
+            work.basis[u, :rows] = work.rows[u, :rows]
+            work.basis[u, rows + u] = weight
+        work.sides[0, :rows] = work.gaps[:rows]
+        least_squares(work.basis, work.triangle, work.sides, work.solution, m, rows + m, 1)
+        if largest(work.solution[0], m) < 1e-15:
+            break
+        work.trial[:] = angles
+        turn(mech, work.trial, work)
+        place(mech, design, work.trial, work)
+        equations(mech, design, goal, work)
+        trial_error = np.sum(work.gaps[:rows] ** 2)
+        if trial_error < error:
+            angles[:] = work.trial
+            error = trial_error
+            damping = max(0.1 * damping, 1e-16)
+        else:
+            damping = min(10.0 * damping, 1e3)
+            place(mech, design, angles, work)
+            equations(mech, design, goal, work)
+            if damping >= 1e3:
+                break
+    place(mech, design, angles, work)
+    equations(mech, design, goal, work)

@@ -1,0 +1,237 @@
+"""The posture of a mechanism from the position of its handle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.compiled import compiled
+from zwidth.model.arrays import Arrays, design_shape, pack, per_design
+from zwidth.model.batch import ASSEMBLED, assemble_batch, solve
+from zwidth.model.continuation import OK, OUT_OF_REACH, SINGULAR
+from zwidth.model.inertia import nonlinear_batch
+from zwidth.model.mechanism import Floats, Ints, Mechanism
+from zwidth.model.mobility import check_mobility
+from zwidth.model.tree import place, workspace
+
+__all__ = [
+    "OK",
+    "OUT_OF_REACH",
+    "SINGULAR",
+    "LinkPoints",
+    "LoopOpen",
+    "OutOfReach",
+    "Posture",
+    "PostureError",
+    "Singular",
+    "inertia_terms",
+    "link_points",
+    "solve_posture",
+]
+
+
+class PostureError(ValueError):
+    """The mechanism has no posture that answers the question."""
+
+
+class OutOfReach(PostureError):
+    """The handle cannot get there in this assembly without passing a singularity."""
+
+
+class Singular(PostureError):
+    """At this position the drives lose, or do not have, control of the handle."""
+
+
+class LoopOpen(PostureError):
+    """A loop of the mechanism cannot be closed near the assembly's joint angles."""
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A mechanism at rest with its handle somewhere; all arrays carry the batch's leading axes.
+
+    assembly          name of the assembly
+    position          (..., 3)     handle, as asked for [m]
+    status            (...)        OK, OUT_OF_REACH or SINGULAR; where not OK the numbers below are nan
+    angles            (..., n)     joint angles, 0 for fixed joints [rad]
+    mass_matrix       (..., d, d)  M of the links in the driven coordinates [kg m^2]
+    jacobian          (..., 3, d)  J: handle velocity = J p' with the driven joints' rates p' [m/rad]
+    closure_residual  (...)        largest gap left in any loop [m]
+    """
+
+    assembly: str
+    position: Floats
+    status: NDArray[np.uint8]
+    angles: Floats
+    mass_matrix: Floats
+    jacobian: Floats
+    closure_residual: Floats
+
+
+@dataclass(frozen=True)
+class LinkPoints:
+    """Where the links are in the base frame, for drawing.
+
+    origin    (..., n, 3)     joint origins [m]
+    tip       (..., n, 3)     tips [m]
+    rotation  (..., n, 3, 3)  link axes, as columns
+    """
+
+    origin: Floats
+    tip: Floats
+    rotation: Floats
+
+    def of(self, link: int, local: ArrayLike) -> Floats:
+        """A point (..., 3) of a link's frame, in the base frame [m]."""
+        point = np.asarray(local, dtype=np.float64)
+        R = self.rotation[..., link, :, :]
+        return np.asarray(self.origin[..., link, :] + (R @ point[..., None])[..., 0])
+
+
+def solve_posture(mechanism: Mechanism, position: ArrayLike, assembly: str | None = None) -> Posture:
+    """The posture with the handle at a position, in a named assembly (None: the first).
+
+    The assembly's approximate joint angles are closed onto the reference position; from there Newton is
+    continued to the position without passing a singularity (`continuation`), along the straight line or by
+    the roadmap of all postures of the assembly (`roadmap`).
+
+    position  (..., 3), or (..., 2) in the plane of the reference position [m]; it broadcasts with the leading
+              axes of the mechanism's numbers
+    Returns   Posture; in a batch a position that cannot be had is marked by its status
+    Raises    OutOfReach, Singular  where a single posture is asked for and cannot be had
+              LoopOpen    if the loops of a single mechanism do not close near the assembly's angles
+              ValueError  for an unknown assembly, or drives that do not fit the mechanism's freedom
+    """
+    name = _assembly_name(mechanism, assembly)
+    mech, designs = pack(mechanism), design_shape(mechanism)
+    target = _in_space(mechanism, position)
+    shape = np.broadcast_shapes(designs, target.shape[:-1])
+    goals = np.ascontiguousarray(np.broadcast_to(target, (*shape, 3)).reshape(-1, 3), dtype=np.float64)
+    count = int(np.prod(designs))
+    design = np.broadcast_to(np.arange(count).reshape(designs), shape).ravel().astype(np.int64)
+
+    reference, gaps = _references(mechanism, mech, name)
+    if not designs:
+        _check_loops(mechanism, mech, name, gaps[0])
+    closed = np.flatnonzero(gaps.max(axis=1, initial=0.0) <= ASSEMBLED * mech.size)
+    if len(closed):
+        check_mobility(mechanism, mech, int(closed[0]), reference[closed[0]])
+    solved = solve(mech, design, reference, goals)
+    n, d = mech.parent.size, mech.driven
+    posture = Posture(
+        assembly=name,
+        position=goals.reshape(*shape, 3),
+        status=solved.status.reshape(shape),
+        angles=solved.angles.reshape(*shape, n),
+        mass_matrix=solved.mass.reshape(*shape, d, d),
+        jacobian=solved.jacobian.reshape(*shape, 3, d),
+        closure_residual=solved.residual.reshape(shape),
+    )
+    if not shape:
+        _check_single(posture)
+    return posture
+
+
+def inertia_terms(mechanism: Mechanism, posture: Posture, driven_rates: ArrayLike) -> Floats:
+    """Velocity-dependent generalised forces of the links, in the driven coordinates [N m].
+
+        M p'' + c(p, p') = Q,    c = B^T (c_q + M_q B' p')             (thesis eq. B.19)
+
+    driven_rates  (..., d)  p' [rad/s], broadcasting with the posture
+    Returns       (..., d); nan where the posture is not OK
+    """
+    mech, designs = pack(mechanism), design_shape(mechanism)
+    rates = np.asarray(driven_rates, dtype=np.float64)
+    shape = np.broadcast_shapes(designs, posture.status.shape, rates.shape[:-1])
+    angles = np.broadcast_to(posture.angles, (*shape, mech.parent.size)).reshape(-1, mech.parent.size)
+    flat = np.broadcast_to(rates, (*shape, mech.driven)).reshape(-1, mech.driven)
+    design = (
+        np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
+    )
+    out = np.empty(flat.shape)
+    nonlinear_batch(mech, design, np.ascontiguousarray(angles), np.ascontiguousarray(flat), out)
+    return out.reshape(*shape, mech.driven)
+
+
+def link_points(mechanism: Mechanism, posture: Posture) -> LinkPoints:
+    """Origin, tip and axes of every link in the base frame; nan where the posture is not OK."""
+    mech, designs = pack(mechanism), design_shape(mechanism)
+    shape = np.broadcast_shapes(designs, posture.status.shape)
+    n = mech.parent.size
+    angles = np.ascontiguousarray(np.broadcast_to(posture.angles, (*shape, n)).reshape(-1, n))
+    design = (
+        np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
+    )
+    rotation, origin = np.empty((len(design), n, 3, 3)), np.empty((len(design), n, 3))
+    _place_batch(mech, design, angles, rotation, origin)
+    tip = origin + np.einsum("knij,knj->kni", rotation, per_design(mechanism, mechanism.links.tip, 2)[design])
+    return LinkPoints(
+        origin.reshape(*shape, n, 3), tip.reshape(*shape, n, 3), rotation.reshape(*shape, n, 3, 3)
+    )
+
+
+@compiled
+def _place_batch(mech: Arrays, design: Ints, angles: Floats, rotation: Floats, origin: Floats) -> None:
+    work = workspace(mech)
+    for i in range(design.size):
+        place(mech, design[i], angles[i], work)
+        rotation[i] = work.rotation
+        origin[i] = work.origin
+
+
+def _references(mechanism: Mechanism, mech: Arrays, name: str) -> tuple[Floats, Floats]:
+    """Reference posture (P, n) of each design, and the gaps (P, k) left in its loops [m]."""
+    angles = per_design(mechanism, np.asarray(mechanism.assemblies[name], dtype=np.float64), 1).copy()
+    goals = per_design(mechanism, mechanism.reference_position, 1)
+    gaps = np.zeros((len(angles), mech.a.size))
+    assemble_batch(mech, goals, angles, gaps)
+    return angles, gaps
+
+
+def _assembly_name(mechanism: Mechanism, assembly: str | None) -> str:
+    names = list(mechanism.assemblies)
+    name = names[0] if assembly is None else assembly
+    if name not in mechanism.assemblies:
+        raise ValueError(f"the mechanism has no assembly {name!r}; it has {', '.join(map(repr, names))}")
+    return name
+
+
+def _in_space(mechanism: Mechanism, position: ArrayLike) -> Floats:
+    """Positions (..., 3); two coordinates are completed with the reference position's third."""
+    given = np.asarray(position, dtype=np.float64)
+    if given.ndim == 0 or given.shape[-1] not in (2, 3):
+        raise ValueError(
+            f"a handle position has two or three coordinates in metres, got an array of {given.shape}"
+        )
+    if given.shape[-1] == 3:
+        return given
+    height = mechanism.reference_position[..., 2]
+    shape = np.broadcast_shapes(given.shape[:-1], height.shape)
+    return np.concatenate(
+        [np.broadcast_to(given, (*shape, 2)), np.broadcast_to(height, shape)[..., None]], axis=-1
+    )
+
+
+def _check_loops(mechanism: Mechanism, mech: Arrays, name: str, gaps: Floats) -> None:
+    if gaps.size and gaps.max() > ASSEMBLED * mech.size[0]:
+        worst = int(gaps.argmax())
+        raise LoopOpen(
+            f"loop {mechanism.closures.names[worst]!r} does not close near the joint angles of assembly "
+            f"{name!r}: a gap of {gaps[worst]:.3g} m remains; check the lengths of its links and these angles"
+        )
+
+
+def _check_single(posture: Posture) -> None:
+    where = "(" + ", ".join(f"{x:.6g}" for x in posture.position) + ") m"
+    if posture.status == OUT_OF_REACH:
+        raise OutOfReach(
+            f"the handle cannot reach {where} in assembly {posture.assembly!r} without passing a "
+            "singularity; ask for a position nearer to the reference"
+        )
+    if posture.status == SINGULAR:
+        raise Singular(
+            f"the mechanism is singular with its handle at {where} in assembly {posture.assembly!r}: "
+            "the drives do not control it there; move the position off the edge of the workspace"
+        )

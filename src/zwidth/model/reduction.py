@@ -1,0 +1,276 @@
+"""From a mechanism, or a plant, to the model of its rendered direction.
+
+Coordinates and signs. The driven joints' coordinates are phi for the links and theta for the motors, both at
+the joint; with h = J^T u the handle moves by h . phi along the direction u, and a force f along u at the
+handle is the joint torques h f. The wall's force acts through the motors, which take h f, and the encoders
+read the motors, whose reading of the handle is h . theta: actuator = sensor = [0; h], handle = [h; 0] on
+[phi; theta].
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from typing import Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
+from zwidth.model.effective import EffectiveParameters, effective_parameters, unit_direction
+from zwidth.model.mechanism import Drives, Floats, Mechanism
+from zwidth.model.modes import undamped_modes
+from zwidth.model.plant import Plant
+from zwidth.model.posture import OK, Posture
+
+Model = Literal["full", "two-mass", "motor-mass", "rigid"]
+MODELS: Final = get_args(Model)
+TOGETHER: Final = 1e-6  # relative difference of two readings of a rigid motion that still counts as none
+
+
+class ModelError(ValueError):
+    """The model asked for does not apply to this device or this direction."""
+
+
+def reduce_mechanism(
+    mechanism: Mechanism, posture: Posture, direction: ArrayLike, model: Model, damping: Damping
+) -> Plant:
+    """The plant that a direction renders in one posture.
+
+    full        [phi; theta], the joint torques through n^2 k between them           (thesis eq. 2.21)
+    two-mass    link side, spring, motor side                                        (thesis eq. 2.35, 2.43)
+    motor-mass  motor side on the spring, the link side held fixed                   (thesis eq. 2.44)
+    rigid       links and rotors as one mass                                         (thesis eq. 2.42)
+
+    posture    a single one, OK
+    direction  (3,)  unit vector in the base frame
+    Returns    Plant; a drive of infinite stiffness has no theta of its own, its rotor moves with its link
+    Raises     ModelError  where the model does not apply: no flexible drive in this direction, or a
+    direction in
+                           which the handle cannot move
+               ValueError  for a batch of postures, a posture that is not OK, a direction not of unit length
+    """
+    if posture.status.shape:
+        raise ValueError(f"one posture is reduced at a time, got a batch of shape {posture.status.shape}")
+    if posture.status != OK:
+        raise ValueError("the posture is out of reach or singular and has no model; ask for another position")
+    _check_model(model)
+    u = unit_direction(direction)
+    h = posture.jacobian.T @ u
+    if not np.linalg.norm(h) > 1e-12 * np.linalg.norm(posture.jacobian):
+        raise ModelError(
+            f"the handle cannot move along the direction {u.tolist()}; choose one it can move along"
+        )
+    if model == "full":
+        return _full(mechanism, posture.mass_matrix, h, damping)
+    numbers = effective_parameters(mechanism, posture, u)
+    if model == "rigid":
+        slip = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0
+        return _rigid(float(numbers.rigid_mass), slip * float(numbers.rigid_mass))
+    if not np.isfinite(numbers.stiffness):
+        raise ModelError(
+            f"model {model!r} needs a flexible drive in this direction and all are rigid; use 'rigid'"
+        )
+    return _two_mass(mechanism.drives, numbers, h, damping, held=model == "motor-mass")
+
+
+def reduce_plant(plant: Plant, model: Model) -> Plant:
+    """A simpler model of a plant given by its matrices: the same numbers as `reduce_mechanism`'s, read off
+    them.
+
+    With a the actuator, h the handle and Z the rigid modes of K:
+
+    two-mass    1/(h^T M^-1 h), 1/(a^T M^-1 a), spring 1/((a-h)^T K^+ (a-h)), damper x^T B x of the static
+                deflection x that one metre between actuator and handle makes
+    motor-mass  the same, the link side held fixed
+    rigid       1/(a^T Z (Z^T M Z)^-1 Z^T a), damper x^T B x of the rigid motion x of one metre at the
+    actuator
+
+    Returns  Plant; `full` gives the plant itself, and so does the model it already is
+    Raises   ModelError  where the model does not apply, with the reason
+    """
+    _check_model(model)
+    if model == "full" or (model == "two-mass" and _is_two_mass(plant)):
+        return plant
+    if model == "rigid":
+        mass, motion = _rigid_motion(plant)
+        drag = float(motion @ plant.damping @ motion)
+        # dampers inside the plant leave rounding on a rigid motion, no drag
+        inside = float(np.abs(motion) @ np.abs(plant.damping) @ np.abs(motion))
+        return plant if plant.size == 1 else _rigid(mass, drag if drag > 1e-12 * inside else 0.0)
+    stiffness, deflection = _spring(plant)
+    assert plant.handle is not None  # _spring has checked
+    link, motor = _mass_at(plant, plant.handle), _mass_at(plant, plant.actuator)
+    damping = float(deflection @ plant.damping @ deflection)
+    if model == "motor-mass":
+        return _motor_mass(motor, damping, stiffness)
+    return _pair(link, motor, damping, stiffness)
+
+
+def plant_effective_parameters(plant: Plant) -> EffectiveParameters:
+    """Effective masses and stiffness of a plant given by its matrices (see `reduce_plant`).
+
+    nan where inapplicable: with one coordinate there are no sides and no spring, without a handle no link side
+    and no spring, tied to the ground no rigid mass.
+    """
+    link = motor = rigid = stiffness = float("nan")
+    with suppress(ModelError):
+        rigid = _rigid_motion(plant)[0]
+    if plant.size > 1:
+        motor = _mass_at(plant, plant.actuator)
+        if plant.handle is not None:
+            link = _mass_at(plant, plant.handle)
+        with suppress(ModelError):
+            stiffness = _spring(plant)[0]
+    return EffectiveParameters(*(np.array(value) for value in (link, motor, rigid, stiffness)))
+
+
+def _mass_at(plant: Plant, v: Floats) -> float:
+    """1 / (v^T M^-1 v) [kg]"""
+    return 1.0 / float(v @ np.linalg.solve(plant.mass, v))
+
+
+def _check_model(model: str) -> None:
+    if model not in MODELS:
+        raise ValueError(f"there is no model {model!r}; choose one of {', '.join(MODELS)}")
+
+
+def _at_joint(drives: Drives) -> tuple[Floats, Floats, Floats]:
+    """Rotor inertia, stiffness and damping (d,) of one design's drives, n^2 times those at the motor."""
+    n2 = drives.transmission**2
+    return n2 * drives.motor_inertia, n2 * drives.stiffness, n2 * drives.damping
+
+
+def _full(mechanism: Mechanism, link_mass: Floats, h: Floats, damping: Damping) -> Plant:
+    """M = [M_phi, 0; 0, M_theta], K = [k, -k; -k, k] on the links and the motors of the flexible drives."""
+    drives = mechanism.drives
+    rotor, spring, damper = _at_joint(drives)
+    flexible = np.flatnonzero(np.isfinite(spring))
+    d, f = len(h), len(flexible)
+    M = np.zeros((d + f, d + f))
+    M[:d, :d] = link_mass + np.diag(np.where(np.isfinite(spring), 0.0, rotor))
+    M[d:, d:] = np.diag(rotor[flexible])
+    # deflection of each flexible drive: phi - theta
+    D = np.concatenate([np.eye(d)[flexible], -np.eye(f)], axis=1)
+    K = D.T @ (spring[flexible, None] * D)
+    actuator = np.concatenate([np.where(np.isfinite(spring), 0.0, h), h[flexible]])
+    B = _full_damping(M, K, D, damper[flexible], damping)
+    names = [f"{name} link" for name in drives.names] + [f"{drives.names[i]} motor" for i in flexible]
+    return Plant(M, B, K, actuator, actuator.copy(), np.concatenate([h, np.zeros(f)]), tuple(names))
+
+
+def _full_damping(M: Floats, K: Floats, D: Floats, damper: Floats, damping: Damping) -> Floats:
+    if isinstance(damping, ModalDamping):
+        return modal_matrix(M, K, damping.ratio)
+    if isinstance(damping, ProportionalDamping):
+        return damping.mass_coefficient_1_per_s * M + damping.stiffness_coefficient_s * K
+    return np.asarray(D.T @ (damper[:, None] * D))
+
+
+def _two_mass(
+    drives: Drives, numbers: EffectiveParameters, h: Floats, damping: Damping, *, held: bool
+) -> Plant:
+    """Two masses and their spring; with the link side held fixed only the motor side, with the same damper.
+
+    modal         b = 2 zeta sqrt(k mu),  mu = m1 m2 / (m1 + m2), so that the mode of the pair has the ratio
+    proportional  b = r_k k, and r_m on each mass
+    given         b = x^T B x, the dampers moved as the drives deflect under one metre: x_i = k h_i / k_i
+    """
+    m1, m2, k = float(numbers.link_side_mass), float(numbers.motor_side_mass), float(numbers.stiffness)
+    slip = 0.0
+    if isinstance(damping, ModalDamping):
+        b = 2.0 * damping.ratio * float(np.sqrt(k * m1 * m2 / (m1 + m2)))
+    elif isinstance(damping, ProportionalDamping):
+        b, slip = damping.stiffness_coefficient_s * k, damping.mass_coefficient_1_per_s
+    else:
+        _, spring, damper = _at_joint(drives)
+        b = float(np.sum(damper * (k * h / spring) ** 2))
+    plant = _motor_mass(m2, b, k) if held else _pair(m1, m2, b, k)
+    return replace(plant, damping=plant.damping + slip * plant.mass)
+
+
+def _pair(link: float, motor: float, damping: float, stiffness: float) -> Plant:
+    between = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    at_link, at_motor = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+    return Plant(
+        mass=np.diag([link, motor]),
+        damping=damping * between,
+        stiffness=stiffness * between,
+        actuator=at_motor,
+        sensor=at_motor.copy(),
+        handle=at_link,
+        names=("link side", "motor side"),
+    )
+
+
+def _single(mass: float, damping: float, stiffness: float, name: str) -> Plant:
+    one = np.ones(1)
+    return Plant(
+        np.array([[mass]]), np.array([[damping]]), np.array([[stiffness]]), one, one.copy(), None, (name,)
+    )
+
+
+def _motor_mass(mass: float, damping: float, stiffness: float) -> Plant:
+    return _single(mass, damping, stiffness, "motor side")
+
+
+def _rigid(mass: float, damping: float) -> Plant:
+    return replace(_single(mass, damping, 0.0, "device"), handle=np.ones(1))
+
+
+def _is_two_mass(plant: Plant) -> bool:
+    """Is the plant a link side and a motor side joined by a spring, in this order?"""
+    if plant.size != 2 or plant.handle is None:
+        return False
+    k = plant.stiffness[0, 0]
+    return (
+        plant.mass[0, 1] == 0.0
+        and k > 0.0
+        and np.array_equal(plant.stiffness, k * np.array([[1.0, -1.0], [-1.0, 1.0]]))
+        and np.array_equal(plant.handle, [1.0, 0.0])
+        and np.array_equal(plant.actuator, [0.0, 1.0])
+        and np.array_equal(plant.sensor, [0.0, 1.0])
+    )
+
+
+def _rigid_motion(plant: Plant) -> tuple[float, Floats]:
+    """Mass 1/(a^T Z (Z^T M Z)^-1 Z^T a), and the motion x that a force at the actuator makes, a . x = 1."""
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    Z = shapes[:, squared == 0.0]
+    participation = Z.T @ plant.actuator
+    mobility = float(participation @ participation)
+    whole = float(plant.actuator @ np.linalg.solve(plant.mass, plant.actuator))
+    if not mobility > TOGETHER**2 * whole:
+        raise ModelError(
+            "the plant has no rigid mode that the actuator moves: a spring ties it to the ground; use 'full'"
+        )
+    return 1.0 / mobility, Z @ participation / mobility
+
+
+def _spring(plant: Plant) -> tuple[float, Floats]:
+    """Stiffness between actuator and handle, and the static deflection x that one metre between them makes.
+
+    x = k K^+ (a - h), by the flexible modes; it exists only where a - h does no work on a rigid motion.
+    """
+    if plant.handle is None:
+        raise ModelError(
+            "the plant has no handle, so that it has no link side; give `handle`, or use 'rigid'"
+        )
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    between = shapes.T @ (plant.actuator - plant.handle)
+    scale = np.linalg.norm(shapes.T @ plant.actuator)
+    rigid = squared == 0.0
+    if np.linalg.norm(between[rigid]) > TOGETHER * scale:
+        raise ModelError(
+            "actuator and handle do not move together when the plant moves without deflection, "
+            "so that no spring joins them; check `actuator` and `handle`, or use 'full'"
+        )
+    if not np.linalg.norm(between[~rigid]) > TOGETHER * scale:
+        raise ModelError("nothing flexible lies between actuator and handle of the plant; use 'rigid'")
+    flexible = between[~rigid] / squared[~rigid]
+    compliance = float(between[~rigid] @ flexible)
+    if not compliance > 0.0:
+        raise ModelError(
+            "the stiffness between actuator and handle is negative: no two masses have it; use 'full'"
+        )
+    return 1.0 / compliance, shapes[:, ~rigid] @ flexible / compliance

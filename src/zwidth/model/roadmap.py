@@ -1,0 +1,196 @@
+"""All postures of an assembly, coarsely: a flood from the reference posture through the driven coordinates.
+
+A straight way from the reference to a goal may be blocked although the goal can be reached: a five-bar with
+coincident base axes has a hole in the middle of its workspace. The flood goes round, because every node is
+reached from a neighbour one small turn of one drive away, closing the loops again and never passing a
+singularity. Newton then starts from the node nearest to the goal, which is also what makes batches fast.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.model.arrays import Arrays
+from zwidth.model.closure import equations, orientation, passive_rates
+from zwidth.model.continuation import CONTRACTION, LARGEST_TURN, SINGULAR_CONDITION, largest
+from zwidth.model.mechanism import Floats, Ints
+from zwidth.model.tree import Work, place, point, workspace
+
+TURNS: Final = {1: 256, 2: 96, 3: 32}  # nodes per turn of a drive, by number of drives
+CELLS: Final = 40_000  # of the grid that finds the nearest node
+
+
+@dataclass(frozen=True)
+class Roadmap:
+    """Postures joined with the reference by paths free of singularities.
+
+    angles    (K, n)  joint angles; the reference is node 0
+    position  (K, 3)  handle [m]
+    nearest   (cells,)  node nearest to the centre of each cell of a grid over the handle's positions
+    low, pitch, counts  (3,)  that grid: lower corner [m], cell size [m], cells per axis
+    """
+
+    angles: Floats
+    position: Floats
+    nearest: Ints
+    low: Floats
+    pitch: Floats
+    counts: Ints
+    search: cKDTree
+
+    def start(self, target: Floats) -> Ints:
+        """Node near each target (N, 3): that of its cell, in constant time."""
+        finite = np.nan_to_num((target - self.low) / self.pitch, nan=0.0, posinf=0.0, neginf=0.0)
+        cell = np.clip(finite, 0, self.counts - 1).astype(np.int64)
+        found: Ints = self.nearest[(cell[:, 0] * self.counts[1] + cell[:, 1]) * self.counts[2] + cell[:, 2]]
+        return found
+
+    def others(self, target: Floats, count: int) -> Ints:
+        """The nodes truly nearest to each target, (N, count), for targets that the first node missed."""
+        near = np.nan_to_num(target, nan=0.0, posinf=0.0, neginf=0.0)
+        count = min(count, len(self.angles))
+        return np.asarray(self.search.query(near, k=count)[1], dtype=np.int64).reshape(len(target), count)
+
+
+def roadmap(mech: Arrays, design: int, reference: Floats) -> Roadmap:
+    """The roadmap of one design from its reference posture (n,); kept, since many questions share it."""
+    geometry = (mech.origin, mech.turning, mech.axis, mech.point_a, mech.point_b, mech.handle, mech.size)
+    topology = (mech.parent, mech.column, mech.joint, mech.a, mech.b)
+    return _build(
+        tuple((a.shape, a.tobytes()) for a in topology),
+        tuple((a.shape[1:], a[design].tobytes()) for a in geometry),
+        mech.driven,
+        mech.handle_link,
+        reference.tobytes(),
+    )
+
+
+_Stored = tuple[tuple[tuple[int, ...], bytes], ...]
+
+
+@lru_cache(maxsize=16)
+def _build(topology: _Stored, geometry: _Stored, driven: int, handle_link: int, reference: bytes) -> Roadmap:
+    """Flood, from contents alone: the same geometry finds its roadmap again, a changed one makes its own."""
+    parent, column, joint, a, b = (np.frombuffer(d, dtype=np.int64).reshape(s).copy() for s, d in topology)
+    numbers = [np.frombuffer(d).reshape((1, *s)).copy() for s, d in geometry]
+    origin, turning, axis, point_a, point_b, handle, size = numbers
+    n = parent.size
+    mech = Arrays(
+        parent, column, joint, driven, a, b, handle_link, origin, turning, axis, point_a, point_b, handle,
+        np.zeros((1, n)), np.zeros((1, n, 3)), np.zeros((1, n, 3, 3)), size,
+    )  # fmt: skip
+    angles, position = flood(mech, np.frombuffer(reference).copy(), TURNS.get(driven, 8))
+    low, high = position.min(axis=0), position.max(axis=0)
+    extent = np.maximum(high - low, 1e-9 * float(size[0]))
+    long = extent > 1e-6 * float(size[0])
+    pitch = (np.prod(extent[long]) / CELLS) ** (1 / max(1, long.sum())) if long.any() else 1.0
+    counts = np.where(long, np.clip(np.ceil(extent / pitch), 1, CELLS), 1).astype(np.int64)
+    centres = [low[x] + (np.arange(counts[x]) + 0.5) * extent[x] / counts[x] for x in range(3)]
+    grid = np.stack(np.meshgrid(*centres, indexing="ij"), axis=-1).reshape(-1, 3)
+    search = cKDTree(position)
+    nearest = np.asarray(search.query(grid)[1], dtype=np.int64)
+    return Roadmap(angles, position, nearest, low, extent / counts, counts, search)
+
+
+@compiled_lean
+def close(mech: Arrays, angles: Floats, work: Work) -> bool:
+    """Close the loops with the drives held (in place); False where Newton leaves the branch."""
+    passive, loops = mech.joint.size - mech.driven, 3 * mech.a.size
+    last, moved = 0.0, 0.0
+    for iteration in range(12):
+        place(mech, 0, angles, work)
+        equations(mech, 0, work.goal, work)
+        condition = passive_rates(mech, work)
+        if condition < 10.0 * SINGULAR_CONDITION:
+            return False
+        # the step -A_p^+ gap, with the drives at rest: the same solve with the gaps as right-hand side
+        size = _loop_step(mech, work)
+        moved += size
+        if not moved < LARGEST_TURN or (iteration > 0 and size > CONTRACTION * last):
+            return bool(largest(work.gaps, loops) < 1e-13 * mech.size[0])
+        for u in range(passive):
+            angles[mech.joint[u]] += work.solution[0, u]
+        if size < 1e-7:
+            return True
+        last = size
+    return False
+
+
+@compiled_lean
+def _loop_step(mech: Arrays, work: Work) -> float:
+    """Step of the passive joints alone that closes the loops, from the basis `passive_rates` left; its
+    largest turn.
+
+    The orthogonal basis and the triangle still stand, so that only the new right-hand side is worked through.
+    """
+    passive, rows = mech.joint.size - mech.driven, 3 * mech.a.size
+    Q, R, x = work.basis, work.triangle, work.solution
+    for j in range(passive):
+        x[0, j] = 0.0
+        for r in range(rows):
+            x[0, j] += Q[j, r] * work.gaps[r] / R[j, j]
+    most = 0.0
+    for j in range(passive - 1, -1, -1):
+        for i in range(j + 1, passive):
+            x[0, j] -= R[j, i] * x[0, i]
+        most = max(most, abs(x[0, j]))
+    return most
+
+
+@compiled
+def flood(mech: Arrays, reference: Floats, turns: int) -> tuple[Floats, Floats]:
+    """Breadth first over a grid of `turns` per revolution on each drive: joint angles (K, n) and positions
+    (K, 3).
+
+    A cell of the grid keeps the first posture that reaches it, the one with the shortest way to the
+    reference.
+    """
+    n, m, d = mech.parent.size, mech.joint.size, mech.driven
+    passive, loops = m - d, 3 * mech.a.size
+    work = workspace(mech)
+    cells = turns**d
+    pitch = 2.0 * np.pi / turns
+    seen = np.zeros(cells, dtype=np.bool_)
+    cell_of = np.zeros(cells, dtype=np.int64)
+    angles, position = np.zeros((cells, n)), np.zeros((cells, 3))
+    angles[0] = reference
+    seen[0] = True
+    count, head = 1, 0
+    while head < count:
+        place(mech, 0, angles[head], work)
+        equations(mech, 0, work.goal, work)
+        passive_rates(mech, work)
+        h = point(work.rotation, work.origin, mech.handle_link, mech.handle, 0, 0)
+        position[head, 0], position[head, 1], position[head, 2] = h[0], h[1], h[2]
+        start, rates = work.rows.copy(), work.rates.copy()
+        place_value = 1
+        for s in range(d):
+            digit = (cell_of[head] // place_value) % turns
+            for sign in (-1, 1):
+                cell = cell_of[head] + ((digit + sign) % turns - digit) * place_value
+                if seen[cell]:
+                    continue
+                work.trial[:] = angles[head]
+                for u in range(m):
+                    work.trial[mech.joint[u]] += sign * pitch * rates[s, u]
+                if not close(mech, work.trial, work):
+                    continue
+                place(mech, 0, work.trial, work)
+                equations(mech, 0, work.goal, work)
+                if orientation(start, work.rows, work.triangle, m, loops + 3) <= 0.0:
+                    continue
+                if orientation(start, work.rows, work.triangle, passive, loops) <= 0.0:
+                    continue
+                seen[cell] = True
+                cell_of[count] = cell
+                angles[count] = work.trial
+                count += 1
+            place_value *= turns
+        head += 1
+    return angles[:count].copy(), position[:count].copy()
