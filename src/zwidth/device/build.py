@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,9 +22,7 @@ from zwidth.model.mechanism import FIXED, REVOLUTE, Closures, Drives, Floats, Li
 from zwidth.model.plant import Plant
 
 if TYPE_CHECKING:
-    from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
-
-    Damping: TypeAlias = ModalDamping | ProportionalDamping | GivenDamping
+    from zwidth.model.damping import Damping
 
 
 def controller(loop: LoopSection) -> Controller:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
@@ -15,8 +15,9 @@ from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.plant import Plant
 
 if TYPE_CHECKING:
-    from zwidth.device.build import Damping
+    from zwidth.model.damping import Damping
     from zwidth.model.posture import Posture
+    from zwidth.model.reduction import Model
 
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
 
@@ -104,7 +105,9 @@ class Device:
         posture = self.posture(at, assembly)
         from zwidth.model.reduction import reduce_mechanism
 
-        return reduce_mechanism(self._mechanism(), posture, along, model or "full", self.damping)
+        return reduce_mechanism(
+            self._mechanism(), posture, along, cast("Model", model or "full"), self.damping
+        )
 
     def direction(self, direction: Sequence[float] | None = None) -> Floats:
         """The rendered direction as a unit vector, (3,); left out: that of the file."""
@@ -122,8 +125,7 @@ class Device:
             return plant
         from zwidth.model.reduction import reduce_plant
 
-        assert model is not None
-        return reduce_plant(plant, model)
+        return reduce_plant(plant, cast("Model", model))
 
     def _mechanism(self, **given: object) -> Mechanism:
         """The mechanism, or the reason why these arguments do not apply to a given plant."""

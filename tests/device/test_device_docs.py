@@ -1,0 +1,93 @@
+"""The page on device files: its examples load, and its tables say what the schema says."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from zwidth.device import unsupported
+from zwidth.device.load import from_document
+from zwidth.device.schema import file as schema
+
+PAGE = (Path(__file__).parents[2] / "docs" / "device-files.md").read_text(encoding="utf-8")
+
+TABLES = {
+    "The file": (),
+    "`[plant]`": ("plant",),
+    "`[loop]`": ("loop",),
+    "`[loop.velocity]`": ("loop", "velocity"),
+    "`[loop.velocity.filter]`": ("loop", "velocity", "filter"),
+    "`[[mechanism.links]]`": ("mechanism", "links", 0),
+    "`[[mechanism.loops]]`": ("mechanism", "loops", 0),
+    "`[mechanism.handle]`": ("mechanism", "handle"),
+    "`[mechanism.assemblies.NAME]`": ("mechanism", "assemblies", "any"),
+    "`[mechanism.reference]`": ("mechanism", "reference"),
+    "`[mechanism.workspace]`": ("mechanism", "workspace"),
+    "`[[mechanism.drives]]`": ("mechanism", "drives", 0),
+    "`[mechanism.damping]`": ("mechanism", "damping"),
+}
+
+
+def rows(path: tuple[str | int, ...]) -> list[str]:
+    """The table of the keys at a path, as the page has it: key, unit, meaning, default."""
+    lines: dict[str, str] = {}
+    for found in schema.at(path):
+        for key, value in found.get("properties", {}).items():
+            default = value.get("default")
+            needed = "required" if key in found.get("required", ()) else ""
+            shown = f"`{json.dumps(default)}`" if default not in (None, {}, [], "") else ""
+            meaning = value["description"]
+            lines.setdefault(key, f"| `{key}` | {value.get('unit', '')} | {meaning} | {needed or shown} |")
+    return list(lines.values())
+
+
+def page_tables() -> dict[str, list[str]]:
+    sections = re.split(r"^#+ (.+)$", PAGE, flags=re.MULTILINE)
+    bodies = dict(zip(sections[1::2], sections[2::2], strict=True))
+    return {
+        title: [line for line in bodies[title].splitlines() if line.startswith("| `")] for title in TABLES
+    }
+
+
+@pytest.mark.parametrize("title", TABLES)
+def test_the_tables_say_what_the_schema_says(title):
+    path = TABLES[title]
+    shown = [row for row in rows(path) if not re.match(r"\| `(mechanism|plant|loop|velocity|filter)`", row)]
+    assert page_tables()[title] == shown
+
+
+@pytest.mark.parametrize("example", re.findall(r"^```toml\n(name.*?)^```", PAGE, re.MULTILINE | re.DOTALL))
+def test_an_example_of_the_page_loads(example):
+    from_document(tomllib.loads(example))
+
+
+def test_the_page_has_an_example_of_either_kind():
+    examples = [
+        tomllib.loads(text) for text in re.findall(r"^```toml\n(name.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    ]
+    assert {"plant", "mechanism"} <= {key for example in examples for key in example}
+
+
+@pytest.mark.parametrize("pattern", unsupported.KEYS, ids=".".join)
+def test_the_page_says_what_is_not_supported_yet(pattern):
+    assert f"`{'.'.join(pattern)}`" in PAGE
+
+
+def test_every_key_has_a_meaning_and_every_physical_one_a_unit():
+    """A key that ends in a unit carries it in the schema, too."""
+    for path in TABLES.values():
+        for found in schema.at(path):
+            for key, value in found.get("properties", {}).items():
+                assert value.get("description"), key
+                if re.search(r"_(kg|m|s|rad|Hz|kg_m2|per_m|per_rad|per_A|Nm|samples)$", key):
+                    assert value.get("unit"), key
+
+
+def test_the_schema_is_strict_json():
+    text = json.dumps(schema.schema(), allow_nan=False)
+    assert json.loads(text)["title"] == "zwidth device file"
+    assert json.loads(text)["$schema"] == "https://json-schema.org/draft/2020-12/schema"
