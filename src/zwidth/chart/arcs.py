@@ -1,0 +1,126 @@
+"""The arcs that edge the stable set, between exact corners.
+
+A corner is a wall with more than one pair (or real root) on the circle: there an arc stops being an edge. The
+flag of the trace changes at corners, so samples bracket them; the two straight lines of real roots are cut where
+the curve crosses or ends on them, and each piece is tested at its middle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.corner import cross_line, refine_corner
+from zwidth.chart.tracer import RealRoot, Tracer, Wall
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A piece of edge; from first to last the stable side is on the left (K to the right, B up).
+
+    kind         "pair": a pair at rho exp(+-i theta); "plus", "minus": a real root at +rho, -rho
+    first, last  its corner walls (K, B)
+    start, end   their angles theta, falling where the estimate runs backwards; 0 or pi for a real root
+    thetas       angles of the samples that found it, strictly between and in order; empty for a line
+    """
+
+    kind: Literal["pair", "plus", "minus"]
+    first: Wall
+    last: Wall
+    start: float
+    end: float
+    thetas: Floats
+
+
+# Closed walks of arcs: each cell's outline counter-clockwise, each hole's clockwise.
+Rings = tuple[tuple[Arc, ...], ...]
+
+
+@dataclass(frozen=True)
+class Edges:
+    """All arcs found, and the angles of every branch that meets another in a corner.
+
+    size  extent of the edge in K T and B [N s/m]
+    """
+
+    arcs: tuple[Arc, ...]
+    partners: tuple[float, ...]
+    size: float
+
+
+def find_edges(tracer: Tracer, thetas: Floats) -> Edges:
+    """Every arc of the stable set's edge that the samples at these angles reveal."""
+    K, B, edge = tracer.trace(thetas)
+    arcs, partners = _pair_arcs(tracer, thetas, edge)
+    for root in ("plus", "minus"):
+        arcs += _line_arcs(tracer, root, thetas, K, B)  # type: ignore[arg-type]
+    reach = np.array([[arc.first, arc.last] for arc in arcs]).reshape(-1, 2)
+    reach = np.abs(np.vstack([reach, np.column_stack([K[edge], B[edge]])])) * (tracer.period, 1.0)
+    return Edges(tuple(arcs), tuple(partners), float(np.max(reach, initial=0.0)))
+
+
+def _pair_arcs(tracer: Tracer, thetas: Floats, edge: NDArray[np.bool_]) -> tuple[list[Arc], list[float]]:
+    """Arcs of complex pairs: runs of flagged samples, refined at both ends."""
+    arcs, partners = [], []
+    padded = np.concatenate([[False], edge, [False]])
+    changes = np.flatnonzero(padded[1:] != padded[:-1])
+    for i, j in zip(changes[::2], changes[1::2], strict=True):  # samples i .. j - 1
+        ends: list[tuple[float, Wall]] = []
+        for inner, outer, root in ((i, i - 1, "plus"), (j - 1, j, "minus")):
+            if 0 <= outer < len(thetas):
+                theta, wall, partner = refine_corner(tracer, thetas[inner], thetas[outer])
+                partners.append(partner)
+            else:
+                end = tracer.curve_end(root)  # type: ignore[arg-type]
+                theta = thetas[inner] if end is None else (0.0 if root == "plus" else np.pi)
+                wall = tracer.wall(thetas[inner])[:2] if end is None else end
+            ends.append((theta, wall))
+        (start, first), (end_, last) = ends
+        inside = thetas[i:j][(thetas[i:j] > start) & (thetas[i:j] < end_)]
+        if tracer.stable_on_left(thetas[(i + j - 1) // 2]):
+            arcs.append(Arc("pair", first, last, start, end_, inside))
+        else:
+            arcs.append(Arc("pair", last, first, end_, start, inside[::-1]))
+    return arcs, partners
+
+
+def _line_arcs(tracer: Tracer, root: RealRoot, thetas: Floats, K: Floats, B: Floats) -> list[Arc]:
+    """Edges on the line of a real root: its pieces between the places where another root meets the circle."""
+    a, s, v = tracer.line(root)
+    T = tracer.period
+    length = np.hypot(s / T, v)
+    if not length > 0.0:
+        return []
+    # direction with the stable side (gradient) on its left, in the units of (K T, B)
+    along = np.array([v, -s / T]) / length
+    nodes = [wall for wall in (tracer.curve_end("plus"), tracer.curve_end("minus")) if wall is not None]
+    crossing = tracer.line_crossing()
+    nodes = [wall for wall in [*nodes, crossing] if wall is not None and _is_on(tracer, root, wall)]
+    with np.errstate(invalid="ignore"):
+        value = a + s * K + v * B
+        noise = 1e-13 * (abs(a) + np.abs(s * K) + np.abs(v * B))
+        sure = np.flatnonzero(np.abs(value) > noise)
+    turns = np.flatnonzero(np.sign(value[sure[1:]]) != np.sign(value[sure[:-1]]))
+    for i in turns:
+        low, high = thetas[sure[i]], thetas[sure[i + 1]]
+        nodes.append(tracer.wall(cross_line(tracer, root, low, high))[:2])
+    nodes = [wall for wall in nodes if np.isfinite(wall).all()]
+    nodes.sort(key=lambda wall: float(along @ (wall[0] * T, wall[1])))
+    angle = 0.0 if root == "plus" else np.pi
+    return [
+        Arc(root, one, two, angle, angle, np.empty(0))
+        for one, two in zip(nodes[:-1], nodes[1:], strict=True)
+        if one != two and tracer.edge_on_line(root, (one[0] + two[0]) / 2, (one[1] + two[1]) / 2)
+    ]
+
+
+def _is_on(tracer: Tracer, root: RealRoot, wall: Wall) -> bool:
+    """Whether a wall lies on the line of a real root, to rounding."""
+    a, s, v = tracer.line(root)
+    terms = (a, s * wall[0], v * wall[1])
+    return abs(sum(terms)) <= 1e-10 * sum(map(abs, terms)) or not any(terms)

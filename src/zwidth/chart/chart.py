@@ -1,0 +1,177 @@
+"""The stability chart: every virtual wall that a loop renders stably, and the numbers read off it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.chart.decay import FastestDecay, fastest_decay
+from zwidth.chart.outline import quadrant_area, sample_arc
+from zwidth.chart.peak import Peak, largest_damping, stiffest
+from zwidth.chart.region import closed_rings
+from zwidth.chart.tracer import Tracer
+from zwidth.chart.verdict import Verdicts, judge, spectral_radius
+from zwidth.loop.loop import Loop
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BoundaryArc:
+    """A piece of the stable set's edge, its walls and the frequency of the vibration at which each fails.
+
+    stiffness, damping, frequency  (k,)  [N/m], [N s/m], [Hz]; 0 or 1/(2T) for a real root
+    """
+
+    stiffness: Floats
+    damping: Floats
+    frequency: Floats
+
+
+@dataclass(frozen=True)
+class StabilityChart:
+    """The stable walls of a loop, both signs of K and B, never clipped.
+
+    loop, radius    what was asked: walls whose roots all have |z| < radius (1: stable)
+    regions         closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set
+    boundary        arcs of its edge, with frequency
+    stiffness_max   supremum of K over stable walls with K > 0, B >= 0 [N/m]; nan if there is none
+    damping_at_stiffness_max     [N s/m]; nan if there is none
+    frequencies_at_stiffness_max [Hz] one, or two at a corner, ascending; () if there is none
+    damping_max     supremum of B >= 0 stable for all sufficiently small K > 0 [N s/m]; 0 if there is none
+    stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
+    fastest_decay   the wall of smallest spectral radius over the whole set; None if nothing is stable
+    """
+
+    loop: Loop
+    radius: float
+    regions: tuple[Floats, ...]
+    boundary: tuple[BoundaryArc, ...]
+    stiffness_max: float
+    damping_at_stiffness_max: float
+    frequencies_at_stiffness_max: tuple[float, ...]
+    damping_max: float
+    stable_area: float
+    fastest_decay: FastestDecay | None
+
+    @property
+    def unobserved_modes(self) -> tuple[str, ...]:
+        """Motions that no wall moves, by name; they were cancelled and do not count."""
+        return self.loop.unobserved_modes
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
+        if not self.regions:
+            return 0.0, 1.0, 0.0, 1.0
+        walls = np.vstack(self.regions)
+        low, high = walls.min(axis=0), walls.max(axis=0)
+        margin = 0.05 * (high - low)
+        (K0, B0), (K1, B1) = low - margin, high + margin
+        return float(K0), float(K1), float(B0), float(B1)
+
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
+        """Verdicts on single walls by eigenvalues, whatever the regions say."""
+        return judge(self.loop, wall_stiffness, wall_damping)
+
+
+def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> StabilityChart:
+    """The exact chart by D-decomposition on |z| = radius (see `chart.curve` for the derivation).
+
+    loop    plant, sampling, delay and filter
+    radius  1 for stability; less for the walls whose slowest motion shrinks at least by that factor per sample
+    decay   False skips the search for the fastest-decaying wall, half of the time
+    Raises  ChartError if the edge cannot be closed (a sliver finer than double precision resolves)
+
+    >>> chart = stability_chart(loop)                               # doctest: +SKIP
+    >>> chart.stiffness_max, chart.frequencies_at_stiffness_max      # doctest: +SKIP
+    """
+    tracer = Tracer.of(loop, radius)
+    rings = closed_rings(tracer)
+    samples = [[sample_arc(tracer, arc) for arc in ring] for ring in rings]
+    outlines = [_outline(arcs) for arcs in samples]
+    width = max((float(np.max(np.abs(outline[:, 0]))) for outline in outlines), default=0.0)
+    peak = stiffest(tracer, rings, width)
+    in_hertz = 1.0 / (2.0 * np.pi * loop.period)
+    return StabilityChart(
+        loop=loop,
+        radius=radius,
+        regions=_cells(outlines),
+        boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for arcs in samples for thetas, K, B in arcs),
+        stiffness_max=peak.stiffness if peak else float("nan"),
+        damping_at_stiffness_max=peak.damping if peak else float("nan"),
+        frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
+        damping_max=largest_damping(tracer, rings, width),
+        stable_area=max(quadrant_area(tracer, rings), 0.0),
+        fastest_decay=_confirmed(loop, fastest_decay(tracer, outlines)) if decay else None,
+    )
+
+
+def largest_stiffness(loop: Loop) -> Peak | None:
+    """Only the stiffest stable wall with K > 0, B >= 0; None if there is none."""
+    tracer = Tracer.of(loop)
+    rings = closed_rings(tracer)
+    width = max(
+        (float(np.max(np.abs(tracer.trace(arc.thetas)[0]), initial=0.0)) for ring in rings for arc in ring),
+        default=0.0,
+    )
+    return stiffest(tracer, rings, width)
+
+
+def boundary_points(
+    loop: Loop, count: int = 1000, radius: float = 1.0
+) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+    """K, B, frequency [Hz] and stable-edge flag at `count` angles spread over (0, pi), denser at low frequency."""
+    thetas = np.pi * np.linspace(0.0, 1.0, count + 2)[1:-1] ** 2
+    K, B, edge = Tracer.of(loop, radius).trace(thetas)
+    return K, B, thetas / (2.0 * np.pi * loop.period), edge
+
+
+def _confirmed(loop: Loop, found: FastestDecay | None) -> FastestDecay | None:
+    """The wall found, with the spectral radius that the eigenvalues of its transition matrix give."""
+    if found is None:
+        return None
+    radius = spectral_radius(loop, found.stiffness, found.damping)
+    return FastestDecay(found.stiffness, found.damping, float(radius))
+
+
+def _outline(arcs: list[tuple[Floats, Floats, Floats]]) -> Floats:
+    """A ring's arcs as one closed walk of points (k, 2)."""
+    points = np.vstack([np.column_stack([K[:-1], B[:-1]]) for _, K, B in arcs])
+    return np.vstack([points, points[:1]])
+
+
+def _signed_area(ring: Floats) -> float:
+    """Positive where a closed ring runs counter-clockwise."""
+    x, y = ring[:, 0] - ring[0, 0], ring[:, 1] - ring[0, 1]
+    return float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) / 2.0)
+
+
+def _cells(outlines: list[Floats]) -> tuple[Floats, ...]:
+    """Outlines as simple rings; a cell with holes is cut through each of them."""
+    areas = [_signed_area(outline) for outline in outlines]
+    holes = [outline for outline, area in zip(outlines, areas, strict=True) if area < 0.0]
+    solid = [outline for outline, area in zip(outlines, areas, strict=True) if area > 0.0]
+    if not holes:
+        return tuple(solid)
+    cells: list[Floats] = []
+    for outline in solid:
+        inside = [hole for hole in holes if shapely.contains_xy(shapely.Polygon(outline), *hole[0])]
+        for piece in _cut(shapely.Polygon(outline, inside)):
+            ring = np.array(shapely.geometry.polygon.orient(piece).exterior.coords)
+            cells.append(ring)
+    return tuple(cells)
+
+
+def _cut(cell: shapely.Polygon) -> list[shapely.Polygon]:
+    """A polygon with holes as polygons without, cut upright through each hole's middle."""
+    if not cell.interiors:
+        return [cell]
+    left, low, right, high = cell.bounds
+    middle = shapely.Polygon(cell.interiors[0]).centroid.x
+    halves = (shapely.box(left, low, middle, high), shapely.box(middle, low, right, high))
+    parts = [part for half in halves for part in shapely.get_parts(shapely.intersection(cell, half))]
+    return [piece for part in parts if isinstance(part, shapely.Polygon) for piece in _cut(part)]

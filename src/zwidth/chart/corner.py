@@ -1,0 +1,134 @@
+"""Corners of the stable set to rounding, from a sample on either side."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.curve import edges_stable_set, wall_at
+from zwidth.chart.tracer import RealRoot, Tracer, Wall
+from zwidth.compiled import compiled
+
+Floats = NDArray[np.float64]
+
+
+@compiled
+def _bisect_flag(
+    rows: Floats,
+    whole: int,
+    split: int,
+    numerator: Floats,
+    denominator: Floats,
+    polynomials: Floats,
+    radius: float,
+    on: float,
+    off: float,
+) -> float:
+    """The last angle from `on` towards `off` that is an edge."""
+    room = np.zeros((8, polynomials.shape[1] + 1))
+    for _ in range(60):
+        middle = 0.5 * (on + off)
+        if middle in (on, off):
+            break
+        K, B, _, _ = wall_at(rows, whole, split, numerator, denominator, radius, middle)
+        if edges_stable_set(polynomials, middle, K, B, room) > 0:
+            on = middle
+        else:
+            off = middle
+    return on
+
+
+@compiled
+def _bisect_line(
+    rows: Floats,
+    whole: int,
+    split: int,
+    numerator: Floats,
+    denominator: Floats,
+    radius: float,
+    line: Floats,
+    low: float,
+    high: float,
+) -> float:
+    """The angle between low and high where the curve crosses line[0] + K line[1] + B line[2] = 0."""
+    K, B, _, _ = wall_at(rows, whole, split, numerator, denominator, radius, low)
+    side = line[0] + K * line[1] + B * line[2] > 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        K, B, _, _ = wall_at(rows, whole, split, numerator, denominator, radius, middle)
+        if (line[0] + K * line[1] + B * line[2] > 0.0) == side:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@compiled
+def _meet(
+    rows: Floats,
+    whole: int,
+    split: int,
+    numerator: Floats,
+    denominator: Floats,
+    radius: float,
+    one: float,
+    other: float,
+) -> tuple[float, float, bool]:
+    """Newton for wall(one) = wall(other), from close by; False if it wanders off or does not settle."""
+    a, b = one, other
+    settled = False
+    for _ in range(30):
+        Ka, Ba, dKa, dBa = wall_at(rows, whole, split, numerator, denominator, radius, a)
+        Kb, Bb, dKb, dBb = wall_at(rows, whole, split, numerator, denominator, radius, b)
+        det = dKb * dBa - dKa * dBb
+        step_a = ((Ka - Kb) * dBb - (Ba - Bb) * dKb) / det
+        step_b = ((Ka - Kb) * dBa - (Ba - Bb) * dKa) / det
+        if not (abs(step_a) < 0.01 * a and abs(step_b) < 0.01 * b):
+            return one, other, False
+        a, b = a + step_a, b + step_b
+        settled = abs(step_a) <= 4e-15 * a and abs(step_b) <= 4e-15 * b
+        if settled:
+            break
+    return a, b, settled and a < np.pi and b < np.pi and abs(a - b) > 1e-6 * a
+
+
+def cross_line(tracer: Tracer, root: RealRoot, low: float, high: float) -> float:
+    """The angle in (low, high) where the curve crosses a line of real roots."""
+    return _bisect_line(*tracer.factors, tracer.radius, tracer.line(root), low, high)
+
+
+def _partner(tracer: Tracer, theta: float, wall: Wall) -> float:
+    """Angle of the root nearest the circle apart from the pair at theta, for a wall on the curve."""
+    A, S, V = tracer.polynomials
+    s = np.roots((A + wall[0] * S + wall[1] * V)[::-1])
+    z = tracer.radius * (1.0 + s) / (1.0 - s)
+    own = tracer.radius * np.exp(1j * theta)
+    for point in (own, own.conjugate()):
+        z = np.delete(z, int(np.argmin(np.abs(z - point))))
+    return float(abs(np.angle(z[np.argmin(np.abs(np.abs(z) - tracer.radius))]))) if len(z) else 0.0
+
+
+def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, float]:
+    """Angle and wall of the corner between an edge sample and one that is none, and the partner's angle.
+
+    The partner is 0 or pi where a real root reaches the circle. Where two branches touch without crossing the
+    bisection's angle stands.
+    """
+    theta = _bisect_flag(*tracer.factors, tracer.polynomials, tracer.radius, on, off)
+    low, high = min(on, off), max(on, off)
+    for root, partner in (("plus", 0.0), ("minus", np.pi)):
+        a, s, v = tracer.line(root)  # type: ignore[arg-type]
+        ends = [a + s * K + v * B for K, B, *_ in (tracer.wall(low), tracer.wall(high))]
+        if ends[0] * ends[1] < 0.0:
+            crossing = cross_line(tracer, root, low, high)  # type: ignore[arg-type]
+            if abs(crossing - theta) <= 1e-6 * theta:
+                return crossing, tracer.wall(crossing)[:2], partner
+    wall = tracer.wall(theta)[:2]
+    partner = _partner(tracer, theta, wall)
+    if 0.0 < partner < np.pi:
+        one, other, found = _meet(*tracer.factors, tracer.radius, theta, partner)
+        if found and abs(one - theta) <= 1e-5 * theta:
+            return one, tracer.wall(one)[:2], other
+    return theta, wall, partner

@@ -1,0 +1,168 @@
+"""The fastest-decaying wall: the smallest spectral radius over the stable set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.tracer import Tracer
+from zwidth.compiled import compiled
+from zwidth.loop.evaluate import divide
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Simplex sizes of successive searches, in shares of the cell: the spectral radius has edges and cusps in which a
+# single search stalls.
+RESTARTS = np.array([1e-1, 1e-2, 1e-4, 1e-7])
+
+
+@dataclass(frozen=True)
+class FastestDecay:
+    """The wall whose slowest motion decays fastest, and its spectral radius."""
+
+    stiffness: float
+    damping: float
+    spectral_radius: float
+
+
+@compiled
+def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
+    """Largest |z| over the roots of p(s), ascending coefficients, by Aberth's iteration.
+
+    roots  (N,) starting values in the s plane, replaced by the roots; warm starts take a few rounds
+    """
+    N = len(p) - 1
+    one = complex(1.0, 0.0)
+    for _ in range(60):
+        largest = 0.0
+        for i in range(N):
+            s = roots[i]
+            value, slope = complex(0.0, 0.0), complex(0.0, 0.0)
+            if abs(s.real) + abs(s.imag) <= 1.0:
+                for k in range(N, -1, -1):
+                    slope = slope * s + value
+                    value = value * s + p[k]
+                newton = divide(value, slope)
+            else:  # the reversed polynomial in 1/s, so that no power overflows
+                t = divide(one, s)
+                for k in range(N + 1):
+                    slope = slope * t + value
+                    value = value * t + p[k]
+                newton = s * divide(value, N * value - t * slope)
+            pull = complex(0.0, 0.0)
+            for j in range(N):
+                gap = s - roots[j]
+                if j != i and gap != 0.0:
+                    pull += divide(one, gap)
+            step = divide(newton, one - newton * pull)
+            if not (abs(step.real) + abs(step.imag) < 1e300):
+                step = complex(0.0, 0.0)
+            roots[i] = s - step
+            largest = max(largest, (abs(step.real) + abs(step.imag)) / (abs(s.real) + abs(s.imag) + 1e-300))
+        if largest < 1e-12:
+            break
+    out = 0.0
+    for i in range(N):
+        out = max(out, abs(divide(radius * (one + roots[i]), one - roots[i])))
+    return out if out == out else 1e300
+
+
+@compiled
+def _value(polynomials: Floats, radius: float, K: float, B: float, p: Floats, roots: Complexes) -> float:
+    for i in range(len(p)):
+        p[i] = polynomials[0, i] + K * polynomials[1, i] + B * polynomials[2, i]
+    return polynomial_radius(p, radius, roots)
+
+
+@compiled
+def scatter_values(polynomials: Floats, radius: float, K: Floats, B: Floats) -> Floats:
+    """Spectral radii at many walls."""
+    N = polynomials.shape[1] - 1
+    p, roots = np.empty(N + 1), np.empty(N, dtype=np.complex128)
+    out = np.empty(len(K))
+    for i in range(len(K)):
+        _scatter(roots)
+        out[i] = _value(polynomials, radius, K[i], B[i], p, roots)
+    return out
+
+
+@compiled
+def _scatter(roots: Complexes) -> None:
+    """Starting values spread over the disk |z| < 1, in the s plane."""
+    N = len(roots)
+    for k in range(N):
+        angle = 2.0 * np.pi * (k + 0.37) / N
+        z = 0.8 * complex(np.cos(angle), np.sin(angle))
+        roots[k] = (z - 1.0) / (z + 1.0)
+
+
+@compiled
+def descend(
+    polynomials: Floats, radius: float, start: Floats, extent: Floats, sizes: Floats
+) -> tuple[float, float, float]:
+    """Nelder and Mead's simplex (1965) from `start`, restarted at each size; K, B and the radius found."""
+    N = polynomials.shape[1] - 1
+    p, roots = np.empty(N + 1), np.empty(N, dtype=np.complex128)
+    _scatter(roots)
+    x, f = np.empty((3, 2)), np.empty(3)
+    best = start.copy()
+    value = _value(polynomials, radius, best[0], best[1], p, roots)
+    trial = np.empty((4, 2))
+    for size in sizes:
+        for i in range(3):
+            x[i] = best
+            if i:
+                x[i, i - 1] += size * extent[i - 1]
+            f[i] = value if i == 0 else _value(polynomials, radius, x[i, 0], x[i, 1], p, roots)
+        for _ in range(60):
+            order = np.argsort(f)
+            x, f = x[order], f[order]
+            spread = max(abs(x[2, 0] - x[0, 0]) / extent[0], abs(x[2, 1] - x[0, 1]) / extent[1])
+            if spread < 1e-12:
+                break
+            middle = 0.5 * (x[0] + x[1])
+            away = middle - x[2]
+            reflected = _value(polynomials, radius, middle[0] + away[0], middle[1] + away[1], p, roots)
+            if reflected < f[0]:
+                trial[0] = middle + 2.0 * away
+                farther = _value(polynomials, radius, trial[0, 0], trial[0, 1], p, roots)
+                if farther < reflected:
+                    x[2], f[2] = trial[0], farther
+                else:
+                    x[2], f[2] = middle + away, reflected
+            elif reflected < f[1]:
+                x[2], f[2] = middle + away, reflected
+            else:
+                trial[0] = middle + (0.5 if reflected < f[2] else -0.5) * away
+                inner = _value(polynomials, radius, trial[0, 0], trial[0, 1], p, roots)
+                if inner < min(reflected, f[2]):
+                    x[2], f[2] = trial[0], inner
+                else:
+                    for i in range(1, 3):
+                        x[i] = 0.5 * (x[0] + x[i])
+                        f[i] = _value(polynomials, radius, x[i, 0], x[i, 1], p, roots)
+        k = np.argmin(f)
+        best, value = x[k].copy(), f[k]
+    return best[0], best[1], value
+
+
+def fastest_decay(tracer: Tracer, outlines: list[Floats]) -> FastestDecay | None:
+    """Smallest spectral radius over the cells with these outlines (k, 2), both signs of K and B.
+
+    Each cell is scanned at the middles between points of its outline; the best of each starts a search.
+    """
+    best: FastestDecay | None = None
+    for outline in outlines:
+        picks = outline[np.linspace(0, len(outline) - 1, 15).astype(int)[:-1]]
+        i, j = np.triu_indices(len(picks), 2)
+        middles = 0.5 * (picks[i] + picks[j])
+        values = scatter_values(tracer.polynomials, tracer.radius, middles[:, 0].copy(), middles[:, 1].copy())
+        extent = np.maximum(np.ptp(outline, axis=0), 1e-300)
+        for k in np.argsort(values)[:1]:
+            K, B, value = descend(tracer.polynomials, tracer.radius, middles[k], extent, RESTARTS)
+            if value < tracer.radius and (best is None or value < best.spectral_radius):
+                best = FastestDecay(float(K), float(B), float(value))
+    return best

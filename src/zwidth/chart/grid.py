@@ -1,0 +1,113 @@
+"""Where to sample the curve: as densely as its nearest singularity is near.
+
+K(theta) and B(theta) are analytic except at zeros of P (where -1/P has a pole), poles of the velocity estimate
+and points where the estimate is in phase with the position. A function varies on the scale of its distance to
+the nearest singularity, so a step of a fixed fraction of that distance follows every loop, however lightly
+damped the mode that makes it. Poles of P are added: near them the curve passes the origin, where branches meet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.curve import wall_at
+from zwidth.compiled import compiled
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# A point on the circle itself would ask for infinitely many samples. Nearer than this share of its distance to
+# the next point the curve is at infinity or at the origin, and below this share of the lowest feature's angle it
+# is the smooth end at theta = 0.
+NEAREST = 1e-3
+FIRST = 1e-3
+LONGEST_STEP = 0.05
+
+
+def singular_points(rows: Floats, polynomials: Floats, radius: float) -> Complexes:
+    """Poles of P, and zeros of P and poles of w (the roots of S = N_P D_w), with Im z >= 0, in the z plane."""
+    mean = -rows[:, 0] / 2.0
+    root = np.sqrt((mean * mean - rows[:, 1]).astype(complex))
+    poles = np.concatenate([1.0 + mean + root, 1.0 + mean - root])
+    S = polynomials[1]
+    scale = np.max(np.abs(S))
+    used = np.flatnonzero(np.abs(S) > 1e-300 * scale)
+    if len(used) == 0:
+        return poles
+    s = np.roots(S[used[0] : used[-1] + 1][::-1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        zeros = radius * (1.0 + s) / (1.0 - s)
+    points = np.concatenate([poles, zeros[np.isfinite(zeros)]])
+    return points[points.imag >= -1e-12]
+
+
+@compiled
+def angles(points: Complexes, radius: float, share: float) -> Floats:
+    """Angles in (0, pi) whose steps are `share` of the distance to the nearest of the points."""
+    first, last = 1.0, 1.0
+    floors = np.empty(len(points))
+    for k in range(len(points)):
+        from_one, from_minus_one = abs(points[k] - radius), abs(points[k] + radius)
+        apart = from_one if from_one > 1e-12 else 1.0
+        for j in range(len(points)):
+            distance = abs(points[k] - points[j])
+            if distance > 1e-12:
+                apart = min(apart, distance)
+        floors[k] = NEAREST * apart
+        # a point at z = +-rho itself is no feature: the curve is even about its ends
+        if from_one > 1e-9:
+            first = min(first, from_one)
+        if from_minus_one > 1e-9:
+            last = min(last, from_minus_one)
+    out = np.empty(20000)
+    theta, n = FIRST * first, 0
+    while theta < np.pi - FIRST * last and n < len(out):
+        out[n] = theta
+        n += 1
+        z = radius * complex(np.cos(theta), np.sin(theta))
+        near = min(theta, np.pi - theta)
+        for k in range(len(points)):
+            near = min(near, max(abs(z - points[k]), floors[k]))
+        theta += min(share * max(near, 1e-11), LONGEST_STEP)
+    return out[:n].copy()
+
+
+@compiled
+def around_crossings(
+    rows: Floats,
+    whole: int,
+    split: int,
+    numerator: Floats,
+    denominator: Floats,
+    radius: float,
+    thetas: Floats,
+) -> Floats:
+    """Angles added where a branch crosses an axis (K = 0 or B = 0) between samples, geometrically about it.
+
+    Where the velocity estimate is all but blind (far above a filter's cutoff), B runs from one end of the plane to
+    the other within a sliver of angle. Every such branch crosses an axis.
+    """
+    out, n = np.empty(64 * 20), 0
+    before = wall_at(rows, whole, split, numerator, denominator, radius, thetas[0])
+    for i in range(len(thetas) - 1):
+        after = wall_at(rows, whole, split, numerator, denominator, radius, thetas[i + 1])
+        for axis in range(2):
+            if before[axis] * after[axis] < 0.0 and n + 20 <= len(out):
+                low, high = thetas[i], thetas[i + 1]
+                for _ in range(40):
+                    middle = 0.5 * (low + high)
+                    value = wall_at(rows, whole, split, numerator, denominator, radius, middle)
+                    if value[axis] * before[axis] > 0.0:
+                        low = middle
+                    else:
+                        high = middle
+                offset = thetas[i + 1] - thetas[i]
+                for _ in range(10):
+                    offset *= 0.1
+                    for theta in (low - offset, low + offset):
+                        if thetas[i] < theta < thetas[i + 1]:
+                            out[n] = theta
+                            n += 1
+        before = after
+    return out[:n].copy()

@@ -1,0 +1,104 @@
+"""Arcs joined into the stable set's cells.
+
+Every arc has the stable side on its left, so that a walk along arcs, turning at each corner into the stable
+sector, runs counter-clockwise round a cell and clockwise round a hole.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.arcs import Arc, Edges, Rings, find_edges
+from zwidth.chart.grid import angles, around_crossings, singular_points
+from zwidth.chart.tracer import Tracer
+
+Floats = NDArray[np.float64]
+
+# Corners closer than this share of the set's size are one.
+SAME_CORNER = 1e-7
+
+
+class ChartError(RuntimeError):
+    """The edge of the stable set could not be closed."""
+
+
+def closed_rings(tracer: Tracer) -> Rings:
+    """All closed walks round the stable set.
+
+    A sliver between two branches can fall between samples and leaves a walk open. Then the grid is made finer and
+    samples are added round every branch that takes part in a corner. Raises ChartError if that does not help.
+    """
+    points = singular_points(tracer.factors[0], tracer.polynomials, tracer.radius)
+    extra = np.empty(0)
+    for share in (0.2, 0.1, 0.05, 0.02):
+        thetas = angles(points, tracer.radius, share)
+        thetas = np.unique(
+            np.concatenate([thetas, around_crossings(*tracer.factors, tracer.radius, thetas), extra])
+        )
+        edges = find_edges(tracer, thetas)
+        rings = join(edges, tracer.period)
+        if rings is not None:
+            return rings
+        extra = np.union1d(extra, _around(edges))
+    raise ChartError("the edge of the stable set could not be closed; please report this loop")
+
+
+def _around(edges: Edges) -> Floats:
+    """Angles close to both sides of every branch in a corner."""
+    at = np.array([theta for arc in edges.arcs if arc.kind == "pair" for theta in (arc.start, arc.end)])
+    centres = np.concatenate([at, edges.partners])
+    steps = np.logspace(-8, -2, 13)
+    near = (centres[:, None] * (1.0 + np.concatenate([-steps, steps]))).ravel()
+    return near[(near > 1e-9) & (near < np.pi - 1e-9)]
+
+
+def join(edges: Edges, period: float) -> Rings | None:
+    """Walks along arcs, or None if one of them does not close."""
+    arcs = edges.arcs
+    if not arcs:
+        return ()
+    ends = np.array([[arc.first, arc.last] for arc in arcs]) * (period, 1.0)
+    nodes = _cluster(ends.reshape(-1, 2), edges.size).reshape(-1, 2)
+    # an arc shorter than a corner's size is part of that corner
+    alive = [k for k in range(len(arcs)) if nodes[k, 0] != nodes[k, 1] or len(arcs[k].thetas) > 0]
+    leaving: dict[int, list[int]] = {}
+    for k in alive:
+        leaving.setdefault(int(nodes[k, 0]), []).append(k)
+    rings, left = [], set(alive)
+    while left:
+        k = min(left)
+        ring: list[int] = []
+        while k in left:
+            left.discard(k)
+            ring.append(k)
+            choices = [n for n in leaving.get(int(nodes[k, 1]), []) if n in left or n == ring[0]]
+            if not choices:
+                return None
+            k = choices[0] if len(choices) == 1 else _turn(arcs, k, choices, period)
+        if k != ring[0]:
+            return None
+        rings.append(tuple(arcs[n] for n in ring))
+    return tuple(rings)
+
+
+def _cluster(points: Floats, size: float) -> NDArray[np.int64]:
+    """Numbers the distinct corners among points (k, 2)."""
+    labels = np.full(len(points), -1)
+    for i in range(len(points)):
+        if labels[i] < 0:
+            near = np.max(np.abs(points - points[i]), axis=1) <= SAME_CORNER * size
+            labels[near & (labels < 0)] = i
+    return labels
+
+
+def _direction(arc: Arc, leaving: bool, period: float) -> float:
+    """Angle at which an arc leaves its first corner, or at which it came into its last, looked at from there."""
+    corner, other = (arc.first, arc.last) if leaving else (arc.last, arc.first)
+    return float(np.arctan2(other[1] - corner[1], (other[0] - corner[0]) * period))
+
+
+def _turn(arcs: tuple[Arc, ...], k: int, choices: list[int], period: float) -> int:
+    """The arc that bounds the stable sector to the left of arc k where several leave its last corner."""
+    back = _direction(arcs[k], False, period)
+    return min(choices, key=lambda n: (back - _direction(arcs[n], True, period)) % (2.0 * np.pi))

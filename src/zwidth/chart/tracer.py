@@ -1,0 +1,100 @@
+"""A loop on one circle |z| = rho: its curve of walls and the two straight lines of real roots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.curve import combine, hurwitz, is_stable, trace, wall_at
+from zwidth.loop.evaluate import characteristic, factor_arrays, velocity_response
+from zwidth.loop.loop import Loop
+
+Floats = NDArray[np.float64]
+Wall = tuple[float, float]
+RealRoot = Literal["plus", "minus"]
+
+
+@dataclass(frozen=True)
+class Tracer:
+    """What the kernels take, with the questions that are asked of it.
+
+    factors      `factor_arrays(loop)`
+    polynomials  (3, N + 1) A, S, V in the bilinear variable of the circle
+    radius       rho
+    period       T; K T and B have one unit, in which distances between walls are taken
+    """
+
+    factors: tuple[Floats, int, int, Floats, Floats]
+    polynomials: Floats
+    radius: float
+    period: float
+
+    @classmethod
+    def of(cls, loop: Loop, radius: float = 1.0) -> Tracer:
+        """The loop's factors, and its polynomials for the circle."""
+        factors = factor_arrays(loop)
+        return cls(factors, characteristic(*factors, radius), radius, loop.period)
+
+    @property
+    def degree(self) -> int:
+        """Number N of roots."""
+        return self.polynomials.shape[1] - 1
+
+    def wall(self, theta: float) -> tuple[float, float, float, float]:
+        """K, B, dK/dtheta, dB/dtheta at one angle in (0, pi)."""
+        return wall_at(*self.factors, self.radius, theta)
+
+    def trace(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        """K, B and stable-edge flag at angles in (0, pi)."""
+        return trace(*self.factors, self.polynomials, self.radius, thetas)
+
+    def stable(self, K: float, B: float) -> bool:
+        """Whether all roots of a wall lie inside the circle; False too where rounding hides it."""
+        return is_stable(self.polynomials, K, B, np.zeros((8, self.degree + 2))) > 0
+
+    def stable_on_left(self, theta: float) -> bool:
+        """Whether the stable side is on the left for growing theta: Im w > 0.
+
+        Moving a root by dz = -(S dK + V dB)/p'(z) along the left normal changes |z| by an amount of the sign of
+        -Im(V conj S) = -|S|^2 Im w (Neimark's rule).
+        """
+        d = self.radius * np.exp(1j * theta) - 1.0
+        return velocity_response(*self.factors[3:], complex(d))[0].imag > 0.0
+
+    def line(self, root: RealRoot) -> Floats:
+        """Coefficients a, s, v of  a + s K + v B = 0, the walls with a root at +rho or -rho; stable side > 0.
+
+        These are the lowest and the highest coefficient of p, which a Hurwitz polynomial has positive.
+        """
+        return self.polynomials[:, 0 if root == "plus" else -1].copy()
+
+    def edge_on_line(self, root: RealRoot, K: float, B: float) -> bool:
+        """Whether a wall on that line has all its other roots inside."""
+        room = np.zeros((8, self.degree + 2))
+        inner = slice(1, None) if root == "plus" else slice(None, -1)
+        combine(self.polynomials, K, B, room[0], room[1])
+        p, size = room[0, : self.degree + 1][inner].copy(), room[1, : self.degree + 1][inner].copy()
+        return hurwitz(p, size, self.degree - 1, room[4:]) > 0
+
+    def curve_end(self, root: RealRoot) -> Wall | None:
+        """The wall with a double root at +rho (theta = 0) or -rho (theta = pi); None if it is at infinity.
+
+        There the two outermost coefficients of p vanish together: two linear equations.
+        """
+        A, S, V = self.polynomials
+        i, j = (0, 1) if root == "plus" else (self.degree, self.degree - 1)
+        det = S[i] * V[j] - S[j] * V[i]
+        if abs(det) <= 1e-13 * (abs(S[i] * V[j]) + abs(S[j] * V[i])) or det == 0.0:
+            return None
+        return float((A[j] * V[i] - A[i] * V[j]) / det), float((A[i] * S[j] - A[j] * S[i]) / det)
+
+    def line_crossing(self) -> Wall | None:
+        """The wall with roots at +rho and -rho at once; None if the lines are parallel."""
+        (a, s, v), (b, t, w) = self.line("plus"), self.line("minus")
+        det = s * w - t * v
+        if abs(det) <= 1e-13 * (abs(s * w) + abs(t * v)) or det == 0.0:
+            return None
+        return float((b * v - a * w) / det), float((a * t - b * s) / det)

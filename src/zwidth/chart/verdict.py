@@ -1,0 +1,108 @@
+"""Is this wall stable? Eigenvalues of the transition matrix, and a verdict that admits what it cannot tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.loop.loop import Loop
+
+Floats = NDArray[np.float64]
+
+# Half-width of the band round the unit circle in which stability is left undecided.
+BAND = 1e-9
+# Rounding of an eigenvalue in units of its own condition number.
+ROUNDING = 1e-15
+UNSTABLE, UNDECIDED, STABLE = -1, 0, 1
+NAMES = {STABLE: "stable", UNDECIDED: "undecided", UNSTABLE: "unstable"}
+
+
+@dataclass(frozen=True)
+class Verdicts:
+    """What eigenvalues say of walls (...).
+
+    verdict          STABLE, UNSTABLE or UNDECIDED
+    spectral_radius  largest |z|
+    frequency        of that root, |arg z| / (2 pi T) [Hz]
+    uncertainty      half-width of the undecided band: 1e-9, more where the root is ill-conditioned
+    """
+
+    verdict: NDArray[np.int8]
+    spectral_radius: Floats
+    frequency: Floats
+    uncertainty: Floats
+
+    @property
+    def names(self) -> list[str]:
+        """The verdicts in words, flattened."""
+        return [NAMES[int(v)] for v in self.verdict.ravel()]
+
+
+def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.complex128]:
+    """All eigenvalues z (..., N) of the transition matrix (thesis eq. 2.41), unobserved motions left out."""
+    return np.asarray(np.linalg.eigvals(loop.transition_matrix(wall_stiffness, wall_damping)), dtype=complex)
+
+
+def spectral_radius(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
+    """Largest |z| (...) of walls K, B (...) that broadcast; nan for a wall that is not finite."""
+    return judge(loop, wall_stiffness, wall_damping).spectral_radius
+
+
+def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
+    """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast.
+
+    stable: |z| < 1 - u for all roots; unstable: |z| > 1 + u for one; undecided between, where u is 1e-9 or the
+    rounding error of the dominant eigenvalue (from its condition number), whichever is larger. A wall that is not
+    finite is undecided, with nan.
+    """
+    K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
+    finite = np.isfinite(K) & np.isfinite(B)
+    L = loop.transition_matrix(np.where(finite, K, 0.0), np.where(finite, B, 0.0))
+    z = np.linalg.eigvals(L)
+    dominant = np.argmax(np.abs(z), axis=-1)
+    top = np.take_along_axis(z, dominant[..., None], axis=-1)[..., 0]
+    radius = np.where(finite, np.abs(top), np.nan)
+    frequency = np.where(finite, np.abs(np.angle(top)) / (2.0 * np.pi * loop.period), np.nan)
+    width = np.full(radius.shape, BAND)
+    # Only near the circle can an eigenvalue's own error decide
+    for index in np.argwhere(np.abs(radius - 1.0) < 1e-4):
+        at = tuple(index)
+        width[at] = max(BAND, _rounding(L[at]))
+    verdict = np.where(radius < 1.0 - width, STABLE, np.where(radius > 1.0 + width, UNSTABLE, UNDECIDED))
+    return Verdicts(verdict.astype(np.int8), radius, frequency, width)
+
+
+def _rounding(L: Floats) -> float:
+    """Error of the eigenvalues nearest the circle: unit rounding times norm times condition (1 / |y^H x|).
+
+    The matrix is balanced first as the eigenvalue solver does it, so that units do not enter.
+    """
+    balanced = _balance(L)
+    z, right = np.linalg.eig(balanced)
+    left = np.linalg.pinv(right)
+    condition = np.linalg.norm(left, axis=1) * np.linalg.norm(right, axis=0)
+    near = np.abs(np.abs(z) - np.max(np.abs(z))) < 1e-6
+    error = ROUNDING * float(np.linalg.norm(balanced)) * float(np.max(condition[near]))
+    # a pair that coalesces moves with the square root of the rounding, which bounds what 1/0 cannot
+    return float(min(error, 1e-6))
+
+
+def _balance(L: Floats) -> Floats:
+    """Diagonal similarity by powers of two that evens out rows and columns (Parlett and Reinsch 1969)."""
+    A = L.copy()
+    for _ in range(30):
+        settled = True
+        for i in range(len(A)):
+            column = np.sum(np.abs(A[:, i])) - abs(A[i, i])
+            row = np.sum(np.abs(A[i])) - abs(A[i, i])
+            if column > 0.0 and row > 0.0:
+                scale = 2.0 ** np.round(0.5 * np.log2(row / column))
+                if scale != 1.0:
+                    A[:, i] *= scale
+                    A[i] /= scale
+                    settled = False
+        if settled:
+            break
+    return A

@@ -1,0 +1,76 @@
+"""The sampled loop of a plant and a wall:  1 + P(z) (K + B w(z)) = 0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import floor
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.loop.controller import Controller
+from zwidth.loop.estimator import Estimator, velocity_estimator
+from zwidth.loop.hold import Sections, sampled_sections
+from zwidth.loop.realisation import StateSpace, realise
+from zwidth.model.plant import Plant
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A plant under a sampled wall law. Everything that a chart needs is derived once and kept.
+
+    >>> loop = Loop(plant, Controller(sampling_period=0.001))        # doctest: +SKIP
+    """
+
+    plant: Plant
+    controller: Controller
+
+    @property
+    def period(self) -> float:
+        """Sampling period T [s]."""
+        return self.controller.sampling_period
+
+    @cached_property
+    def _delay(self) -> tuple[int, float]:
+        whole = floor(self.controller.delay + 1e-12)
+        return whole, max(self.controller.delay - whole, 0.0)
+
+    @property
+    def whole_delay(self) -> int:
+        """Whole samples l of the delay."""
+        return self._delay[0]
+
+    @property
+    def fractional_delay(self) -> float:
+        """Remaining part f of the delay, 0 <= f < 1 [samples]."""
+        return self._delay[1]
+
+    @cached_property
+    def sections(self) -> Sections:
+        """The plant between samples, one row per observed pair of poles."""
+        return sampled_sections(self.plant, self.period, self.fractional_delay)
+
+    @cached_property
+    def estimator(self) -> Estimator:
+        """The velocity estimate w(z)."""
+        return velocity_estimator(self.controller)
+
+    @property
+    def unobserved_modes(self) -> tuple[str, ...]:
+        """Motions that no wall moves, by name; they are cancelled and do not count for stability."""
+        return self.sections.unobserved
+
+    @cached_property
+    def state_space(self) -> StateSpace:
+        """The loop's transition matrix as L0 + K LK + B LB."""
+        return realise(self.sections.rows, self.whole_delay, self.fractional_delay > 0.0, self.estimator)
+
+    def transition_matrix(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
+        """The map Z_{j+1} = L Z_j (thesis eq. 2.38) for walls K, B of any shape (...): (..., N, N).
+
+        N = 2 (observed pole pairs) + delayed forces + estimator states. Unobserved motions are left out.
+        """
+        return self.state_space.transition_matrix(np.asarray(wall_stiffness), np.asarray(wall_damping))
