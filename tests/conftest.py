@@ -29,9 +29,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     """Say why the run failed."""
     skipped = skipped_tests(config)
     if skipped:
-        terminalreporter.section(
-            f"{NO_SKIPS} is set: {len(skipped)} skipped, each counts as a failure", red=True
-        )
+        terminalreporter.section(f"{NO_SKIPS} is set: {len(skipped)} skipped, each counts as a failure", red=True)
 
 
 def skipped_tests(config: pytest.Config) -> list[object]:

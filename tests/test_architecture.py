@@ -103,9 +103,7 @@ def test_importing_stays_light(module):
 
 def test_modules_stay_short():
     folders = [ROOT / name for name in ("src", "tests", "benchmarks", "gallery", "docs")]
-    lengths = {
-        path: len(path.read_bytes().splitlines()) for folder in folders for path in folder.rglob("*.py")
-    }
+    lengths = {path: len(path.read_bytes().splitlines()) for folder in folders for path in folder.rglob("*.py")}
     assert {short(path): n for path, n in lengths.items() if n > LONGEST_MODULE} == {}
 
 

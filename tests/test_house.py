@@ -107,9 +107,7 @@ def test_one_version_everywhere():
 
 def test_the_citation_says_when_and_who():
     released = re.search(r'^date-released: "?(\d{4}-\d\d-\d\d)"?$', text("CITATION.cff"), re.MULTILINE)
-    logged = re.search(
-        rf"^## \[?{re.escape(PROJECT['version'])}\]? - (\S+)$", text("CHANGELOG.md"), re.MULTILINE
-    )
+    logged = re.search(rf"^## \[?{re.escape(PROJECT['version'])}\]? - (\S+)$", text("CHANGELOG.md"), re.MULTILINE)
     assert released
     assert logged
     assert datetime.date.fromisoformat(released[1]) == datetime.date.fromisoformat(logged[1])
@@ -163,9 +161,7 @@ def test_the_readme_has_its_two_commands():
 
 def test_the_text_knows_no_machine_and_leaves_no_note_behind():
     """No file names a folder of one person's machine or holds a note of work left to do."""
-    forbidden = re.compile(
-        r"(?<![\w.}])/(?:home|root|Users|wor[k])/|\b(?:TOD[O]|FIXM[E]|XX[X])\b|\bissue #?\d"
-    )
+    forbidden = re.compile(r"(?<![\w.}])/(?:home|root|Users|wor[k])/|\b(?:TOD[O]|FIXM[E]|XX[X])\b|\bissue #?\d")
     kinds = {".py", ".toml", ".md", ".html", ".css", ".js", ".cff"}
     files = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if path.suffix in kinds]
     files += [path for path in ROOT.iterdir() if path.is_file()]
@@ -188,9 +184,7 @@ def make(folder: Path, target: str, python: str, **environment: str) -> subproce
     for name in ("Makefile", "pyproject.toml", "constraints.txt"):
         shutil.copy(ROOT / name, folder)
     command = ["make", "--silent", target, f"PYTHON={python}"]
-    return subprocess.run(
-        command, cwd=folder, env=own_environment(**environment), capture_output=True, text=True
-    )
+    return subprocess.run(command, cwd=folder, env=own_environment(**environment), capture_output=True, text=True)
 
 
 @needs_make

@@ -62,9 +62,7 @@ def test_set(setting, value):
 
 
 def test_an_element_of_a_matrix():
-    device = from_document(
-        address.apply(changed(PLANT), ["plant.mass_kg.0.0=0.5", ("plant.mass_kg.1.1", 0.01)])
-    )
+    device = from_document(address.apply(changed(PLANT), ["plant.mass_kg.0.0=0.5", ("plant.mass_kg.1.1", 0.01)]))
     assert device.given_plant.mass.tolist() == [[0.5, 0.0], [0.0, 0.01]]
 
 

@@ -48,9 +48,7 @@ def rows(path: tuple[str | int, ...]) -> list[str]:
 def page_tables() -> dict[str, list[str]]:
     sections = re.split(r"^#+ (.+)$", PAGE, flags=re.MULTILINE)
     bodies = dict(zip(sections[1::2], sections[2::2], strict=True))
-    return {
-        title: [line for line in bodies[title].splitlines() if line.startswith("| `")] for title in TABLES
-    }
+    return {title: [line for line in bodies[title].splitlines() if line.startswith("| `")] for title in TABLES}
 
 
 @pytest.mark.parametrize("title", TABLES)

@@ -192,9 +192,7 @@ def test_one_moment_of_inertia_is_not_enough_out_of_the_plane():
 
 def test_no_link_may_be_called_base():
     document = changed(ARM)
-    document["mechanism"]["links"].append(
-        {"name": "base", "joint": "fixed", "mass_kg": 0.1, "inertia_kg_m2": 0.0}
-    )
+    document["mechanism"]["links"].append({"name": "base", "joint": "fixed", "mass_kg": 0.1, "inertia_kg_m2": 0.0})
     (fault,) = faults(document)
     assert fault.key == "mechanism.links.base.name"
     assert "stands for the ground" in fault.message

@@ -128,9 +128,7 @@ def test_the_gaps_derivative_is_their_derivative(seed):
 @pytest.mark.parametrize("seed", range(5))
 def test_orientation_is_roll_then_pitch_then_yaw_about_fixed_axes(seed):
     angles = np.random.default_rng(seed).uniform(-3, 3, 3)
-    assert build.roll_pitch_yaw(angles) == pytest.approx(
-        Rotation.from_euler("xyz", angles).as_matrix(), abs=1e-12
-    )
+    assert build.roll_pitch_yaw(angles) == pytest.approx(Rotation.from_euler("xyz", angles).as_matrix(), abs=1e-12)
 
 
 def test_defaults_of_a_mechanism():
@@ -207,9 +205,7 @@ def test_a_given_plant_has_no_posture_or_direction():
         device.posture()
 
 
-@pytest.mark.parametrize(
-    ("direction", "unit"), [([0, 3], [0, 1, 0]), ([1e-200, 1e-200, 0], [0.5**0.5] * 2 + [0])]
-)
+@pytest.mark.parametrize(("direction", "unit"), [([0, 3], [0, 1, 0]), ([1e-200, 1e-200, 0], [0.5**0.5] * 2 + [0])])
 def test_a_direction_may_have_any_length(direction, unit):
     assert load("five-bar").direction(direction) == pytest.approx(np.array(unit, dtype=float))
 

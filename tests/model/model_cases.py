@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from zwidth.model.mechanism import REVOLUTE, Closures, Drives, Links, Mechanism
+from zwidth.model.posture import solve_posture
 
 X, Y, Z = np.eye(3)
 
@@ -210,3 +213,51 @@ def spatial_loop(rng):
         one.reference_position,
         np.full((3, 2), np.nan),
     )
+
+
+def with_fixed_foot(mechanism):
+    """The same mechanism with every root link on one fixed link, tilted and carrying mass of its own."""
+    links = mechanism.links
+    tilt, shift = rotation_about(np.array([1.0, 2.0, -0.5]), 0.8), np.array([0.02, -0.1, 0.05])
+    front = {
+        "joint": np.array([0]),
+        "origin": shift[None],
+        "rotation": tilt[None],
+        "axis": Z[None],
+        "mass": np.array([1.5]),
+        "center_of_mass": np.array([[0.1, 0.0, 0.02]]),
+        "inertia": planar_inertia(0.01)[None],
+        "tip": np.zeros((1, 3)),
+    }
+    closures = mechanism.closures
+    return Mechanism(
+        links=Links(
+            names=("foot", *links.names),
+            parent=np.concatenate([[-1], links.parent + 1]),
+            **{name: np.concatenate([value, getattr(links, name)]) for name, value in front.items()},
+        ),
+        closures=Closures(closures.names, closures.a + 1, closures.b + 1, closures.point_a, closures.point_b),
+        drives=replace(mechanism.drives, joint=mechanism.drives.joint + 1),
+        handle_link=mechanism.handle_link + 1,
+        handle_point=mechanism.handle_point,
+        assemblies={name: np.concatenate([[0.0], q]) for name, q in mechanism.assemblies.items()},
+        reference_position=shift + tilt @ mechanism.reference_position,
+        workspace=mechanism.workspace,
+    )
+
+
+KINDS = {
+    "five-bar": random_five_bar,
+    "spatial arm": spatial_arm,
+    "spatial loop": spatial_loop,
+    "five-bar on a tilted foot": lambda rng: with_fixed_foot(random_five_bar(rng)),
+    "spatial loop on a tilted foot": lambda rng: with_fixed_foot(spatial_loop(rng)),
+}
+
+
+def some_postures(mechanism, rng, count=4, spread=0.02):
+    """Postures near the reference, found by moving the handle along directions it can move in."""
+    here = solve_posture(mechanism, mechanism.reference_position)
+    moves = rng.uniform(-1, 1, (count, here.jacobian.shape[1])) @ here.jacobian.T
+    moves *= spread / np.maximum(np.linalg.norm(moves, axis=1, keepdims=True), 1e-12)
+    return solve_posture(mechanism, mechanism.reference_position + moves)

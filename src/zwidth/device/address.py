@@ -189,9 +189,7 @@ def _unknown(
     if near:
         right = ".".join([here, near, *parts[depth + 1 :]])
         return fail(OPTION, path, f"is no key of a device file; did you mean '{right}'?")
-    return fail(
-        OPTION, path, f"is no key of a device file; {here} has: {listed(choices) or 'nothing inside'}"
-    )
+    return fail(OPTION, path, f"is no key of a device file; {here} has: {listed(choices) or 'nothing inside'}")
 
 
 def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
@@ -241,13 +239,7 @@ def _value(place: Any, steps: Path) -> Any:
 
 def _children(place: Any, part: str) -> list[Any]:
     if part == "*":
-        return (
-            list(place.values())
-            if isinstance(place, dict)
-            else list(place)
-            if isinstance(place, list)
-            else []
-        )
+        return list(place.values()) if isinstance(place, dict) else list(place) if isinstance(place, list) else []
     if isinstance(place, dict):
         return [place[part]] if part in place else []
     index = _element(place, part) if isinstance(place, list) else None

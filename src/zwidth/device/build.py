@@ -63,9 +63,7 @@ def damping(section: DampingSection | None) -> Damping:
         return GivenDamping()
     if section.mode_ratio is not None:
         return ModalDamping(section.mode_ratio)
-    return ProportionalDamping(
-        section.mass_coefficient_1_per_s or 0.0, section.stiffness_coefficient_s or 0.0
-    )
+    return ProportionalDamping(section.mass_coefficient_1_per_s or 0.0, section.stiffness_coefficient_s or 0.0)
 
 
 def mechanism(section: MechanismSection) -> Mechanism:

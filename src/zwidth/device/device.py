@@ -63,9 +63,7 @@ class Device:
         """
         mechanism = self._mechanism(at=at, assembly=assembly)
         if assembly is not None and assembly not in mechanism.assemblies:
-            message = (
-                f"names no assembly, got '{assembly}'; {suggestion(assembly, set(mechanism.assemblies))}"
-            )
+            message = f"names no assembly, got '{assembly}'; {suggestion(assembly, set(mechanism.assemblies))}"
             raise fail(self.label, "assembly", message)
         position = self.reference_position if at is None else self._vector("at", at)
         assert position is not None
@@ -105,9 +103,7 @@ class Device:
         posture = self.posture(at, assembly)
         from zwidth.model.reduction import reduce_mechanism
 
-        return reduce_mechanism(
-            self._mechanism(), posture, along, cast("Model", model or "full"), self.damping
-        )
+        return reduce_mechanism(self._mechanism(), posture, along, cast("Model", model or "full"), self.damping)
 
     def direction(self, direction: Sequence[float] | None = None) -> Floats:
         """The rendered direction as a unit vector, (3,); left out: that of the file."""
@@ -138,9 +134,7 @@ class Device:
         named = [name for name, value in given.items() if value is not None]
         if named:
             raise DeviceError(
-                fail(
-                    self.label, name, "does not apply to a device given by its [plant]; leave it out"
-                ).faults[0]
+                fail(self.label, name, "does not apply to a device given by its [plant]; leave it out").faults[0]
                 for name in named
             )
 

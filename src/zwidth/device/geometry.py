@@ -34,8 +34,7 @@ def disagreements(mechanism: Mechanism, section: MechanismSection) -> Found:
         index = [loop.name for loop in section.loops].index(mechanism.closures.names[k])
         yield (
             ("mechanism", "loops", index),
-            f"cannot close: its two points stay at least {gaps[k]:.3g} m apart; "
-            "check lengths, origins and axes",
+            f"cannot close: its two points stay at least {gaps[k]:.3g} m apart; check lengths, origins and axes",
         )
     if not open_loops:
         yield from _freedom(mechanism, angles)

@@ -16,9 +16,7 @@ DEEPEST: Final = 20  # tables and lists within each other; a mechanism needs 5
 
 def bundled_names() -> list[str]:
     """Names of the bundled devices, sorted."""
-    return sorted(
-        entry.name.removesuffix(".toml") for entry in _zoo().iterdir() if entry.name.endswith(".toml")
-    )
+    return sorted(entry.name.removesuffix(".toml") for entry in _zoo().iterdir() if entry.name.endswith(".toml"))
 
 
 def bundled() -> list[tuple[str, str, str]]:

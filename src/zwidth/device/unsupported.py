@@ -73,9 +73,7 @@ def sentence(path: Path) -> str | None:
     return None
 
 
-def _places(
-    document: Any, pattern: tuple[str, ...], path: Path = ()
-) -> Iterator[tuple[Path, dict[str, Any]]]:
+def _places(document: Any, pattern: tuple[str, ...], path: Path = ()) -> Iterator[tuple[Path, dict[str, Any]]]:
     """Where the last key of the pattern stands: its path and the table that holds it."""
     first, rest = pattern[0], pattern[1:]
     if first == "*":

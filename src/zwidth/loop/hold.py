@@ -56,9 +56,7 @@ def step_response(decay: float, squared: float, time: float) -> tuple[float, flo
         root = sqrt(-gap)
         # exp(mean) sinh(root) would overflow for strong damping
         velocity = (
-            (exp(mean + root) - exp(mean - root)) / (2.0 * root)
-            if root > 1.0
-            else (exp(mean) * sinh(root) / root)
+            (exp(mean + root) - exp(mean - root)) / (2.0 * root) if root > 1.0 else (exp(mean) * sinh(root) / root)
         )
     else:
         velocity = exp(mean)

@@ -69,7 +69,8 @@ def per_design(mechanism: Mechanism, array: Floats, trailing: int) -> Floats:
     shape = design_shape(mechanism)
     tail = array.shape[array.ndim - trailing :]
     full = np.broadcast_to(np.asarray(array, dtype=np.float64), shape + tail)
-    return np.ascontiguousarray(full.reshape((int(np.prod(shape)), *tail)))
+    # always a copy: kernels are compiled once for writable arrays and once more for read-only ones
+    return np.array(full.reshape((int(np.prod(shape)), *tail)), order="C")
 
 
 def pack(mechanism: Mechanism) -> Arrays:
@@ -87,16 +88,14 @@ def pack(mechanism: Mechanism) -> Arrays:
     point_a, point_b = (per_design(mechanism, p, 2) for p in (closures.point_a, closures.point_b))
     handle = per_design(mechanism, mechanism.handle_point, 1)
     tip = per_design(mechanism, links.tip, 2)
-    size = sum(
-        np.linalg.norm(p, axis=-1).sum(axis=-1) for p in (origin, tip, point_a, point_b, handle[:, None])
-    )
+    size = sum(np.linalg.norm(p, axis=-1).sum(axis=-1) for p in (origin, tip, point_a, point_b, handle[:, None]))
     return Arrays(
-        parent=np.ascontiguousarray(links.parent, dtype=np.int64),
+        parent=np.array(links.parent, dtype=np.int64),
         column=column,
         joint=joint,
         driven=len(driven),
-        a=np.ascontiguousarray(closures.a, dtype=np.int64),
-        b=np.ascontiguousarray(closures.b, dtype=np.int64),
+        a=np.array(closures.a, dtype=np.int64),
+        b=np.array(closures.b, dtype=np.int64),
         handle_link=int(mechanism.handle_link),
         origin=origin,
         turning=_turning(rotation, axis),

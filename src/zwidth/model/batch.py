@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from zwidth.compiled import compiled, compiled_parallel
 from zwidth.model.arrays import Arrays
-from zwidth.model.continuation import OK, OUT_OF_REACH, SINGULAR, assemble, follow, largest
+from zwidth.model.continuation import OK, OUT_OF_REACH, SINGULAR, follow, largest
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
 from zwidth.model.mechanism import Floats, Ints
 from zwidth.model.roadmap import roadmap
 from zwidth.model.tree import workspace
 
 MANY: Final = 64  # postures of one design, from which on a roadmap pays
-ASSEMBLED: Final = 1e-9  # a loop is closed below this part of the mechanism's size
 
 
 @dataclass(frozen=True)
@@ -73,9 +72,7 @@ def by_roadmap(mech: Arrays, design: int, reference: Floats, goals: Floats) -> S
     if len(missed):
         for nodes in road.others(goals[missed], 4).T:
             retry = run(mech, designs[missed], road.angles, nodes, goals[missed])
-            better = (retry.status == OK) | (
-                (retry.status == SINGULAR) & (solved.status[missed] == OUT_OF_REACH)
-            )
+            better = (retry.status == OK) | ((retry.status == SINGULAR) & (solved.status[missed] == OUT_OF_REACH))
             solved.put(missed[better], Solved(*(values[better] for values in vars(retry).values())))
     return solved
 
@@ -158,18 +155,3 @@ def _postures(
         handle_jacobian(work, jacobian, i)
         unit_motions(mech, work)
         mass_matrix(mech, design[i], work, mass, i)
-
-
-@compiled
-def assemble_batch(mech: Arrays, goals: Floats, angles: Floats, gaps: Floats) -> None:
-    """Close every design's loops with its handle at its goal, or else anywhere; gaps (P, k) that remain."""
-    work = workspace(mech)
-    for p in range(goals.shape[0]):
-        work.angles[:] = angles[p]
-        assemble(mech, p, goals[p], True, work.angles, work)
-        if largest(work.gaps, work.gaps.size) > ASSEMBLED * mech.size[p]:
-            work.angles[:] = angles[p]
-            assemble(mech, p, goals[p], False, work.angles, work)
-        angles[p] = work.angles
-        for c in range(mech.a.size):
-            gaps[p, c] = np.sqrt(np.sum(work.gaps[3 * c : 3 * c + 3] ** 2))

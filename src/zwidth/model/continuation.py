@@ -16,20 +16,19 @@ import numpy as np
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.arrays import Arrays
 from zwidth.model.closure import equations, least_squares, newton_step, orientation, passive_rates
-from zwidth.model.mechanism import Floats
-from zwidth.model.tree import Work, place, point
+from zwidth.model.mechanism import Floats, Ints
+from zwidth.model.tree import Work, place, point, workspace
 
 OK: Final = 0
 OUT_OF_REACH: Final = 1
 SINGULAR: Final = 2
 
-CONTRACTION: Final = (
-    0.55  # of one correction by the next; on the edge of the workspace Newton gains a half each
-)
+CONTRACTION: Final = 0.55  # of one correction by the next; on the edge of the workspace Newton gains a half each
 LARGEST_TURN: Final = 0.5  # of one joint in one step [rad]
 SMALLEST_STEP: Final = 2.0**-7  # of the straight way to the goal
 SINGULAR_CONDITION: Final = 1e-6  # below it the numbers of a posture lose their last ten digits
 CLOSED: Final = 1e-11  # a gap is closed below this part of the mechanism's size
+ASSEMBLED: Final = 1e-9  # the same, for postures to start from
 ROUNDING: Final = 1e-15
 
 
@@ -126,43 +125,67 @@ def follow(mech: Arrays, design: int, target: Floats, angles: Floats, work: Work
 
 
 @compiled
-def assemble(mech: Arrays, design: int, goal: Floats, hold: bool, angles: Floats, work: Work) -> None:
-    """Close the loops from roughly given angles (in place), with the handle at the goal if `hold`.
+def assemble_batch(mech: Arrays, design: Ints, goals: Floats, hold: bool, angles: Floats, gaps: Floats) -> None:
+    """Close the loops of design[i] from rough angles[i] (in place), with the handle at goals[i] if `hold`.
 
-    Levenberg-Marquardt: the damping rows keep the step small while the start is rough and let the handle go
-    where it must when only the loops count.
+    gaps  (N, k)  filled: what remains open of each loop [m]; all inf where the handle cannot be held there
     """
-    m, loops = mech.joint.size, 3 * mech.a.size
-    rows = loops + 3 if hold else loops
-    damping = 1e-3
-    place(mech, design, angles, work)
-    equations(mech, design, goal, work)
-    error = np.sum(work.gaps[:rows] ** 2)
+    work = workspace(mech)
+    present, left = work.angles, work.gaps
+    for i in range(design.size):
+        for j in range(present.size):
+            present[j] = angles[i, j]
+        assemble(mech, design[i], goals[i], hold, present, work)
+        for j in range(present.size):
+            angles[i, j] = present[j]
+        missed = hold and largest(left, left.size) > ASSEMBLED * mech.size[design[i]]
+        for c in range(gaps.shape[1]):
+            x, y, z = left[3 * c], left[3 * c + 1], left[3 * c + 2]
+            gaps[i, c] = np.inf if missed else np.sqrt(x * x + y * y + z * z)
+
+
+@compiled_lean
+def assemble(mech: Arrays, design: int, goal: Floats, hold: bool, angles: Floats, work: Work) -> None:
+    """Close one design's loops, by Levenberg-Marquardt.
+
+    The damping rows keep the step small while the start is rough, and let the handle go where it must when
+    only the loops count.
+    """
+    rows, gaps, basis, sides, trial = work.rows, work.gaps, work.basis, work.sides, work.trial
+    m = rows.shape[0]
+    count = gaps.size if hold else gaps.size - 3
+    damping, error = 1e-3, np.inf
+    for j in range(trial.size):
+        trial[j] = angles[j]
     for _ in range(300):
-        weight = np.sqrt(damping) * mech.size[design]
-        work.basis[:] = 0.0
-        work.sides[:] = 0.0
-        for u in range(m):
-            work.basis[u, :rows] = work.rows[u, :rows]
-            work.basis[u, rows + u] = weight
-        work.sides[0, :rows] = work.gaps[:rows]
-        least_squares(work.basis, work.triangle, work.sides, work.solution, m, rows + m, 1)
-        if largest(work.solution[0], m) < 1e-15:
-            break
-        work.trial[:] = angles
-        turn(mech, work.trial, work)
-        place(mech, design, work.trial, work)
+        place(mech, design, trial, work)
         equations(mech, design, goal, work)
-        trial_error = np.sum(work.gaps[:rows] ** 2)
+        trial_error = 0.0
+        for r in range(count):
+            trial_error += gaps[r] * gaps[r]
         if trial_error < error:
-            angles[:] = work.trial
             error = trial_error
             damping = max(0.1 * damping, 1e-16)
+            for j in range(trial.size):
+                angles[j] = trial[j]
         else:
-            damping = min(10.0 * damping, 1e3)
+            damping *= 10.0
+            if damping > 1e3:
+                break
             place(mech, design, angles, work)
             equations(mech, design, goal, work)
-            if damping >= 1e3:
-                break
+        for u in range(m):
+            for r in range(count):
+                basis[u, r] = rows[u, r]
+            for r in range(m):
+                basis[u, count + r] = np.sqrt(damping) * mech.size[design] if r == u else 0.0
+        for r in range(count + m):
+            sides[0, r] = gaps[r] if r < count else 0.0
+        least_squares(basis, work.triangle, sides, work.solution, m, count + m, 1)
+        if largest(work.solution[0], m) < 1e-15:
+            break
+        for j in range(trial.size):
+            trial[j] = angles[j]
+        turn(mech, trial, work)
     place(mech, design, angles, work)
     equations(mech, design, goal, work)

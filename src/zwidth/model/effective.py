@@ -44,9 +44,7 @@ def effective_parameters(mechanism: Mechanism, posture: Posture, direction: Arra
     spring = ratio**2 * per_design(mechanism, drives.stiffness, 1)
     shape = posture.status.shape
     design = (
-        np.broadcast_to(np.arange(len(rotor)).reshape(design_shape(mechanism)), shape)
-        .ravel()
-        .astype(np.int64)
+        np.broadcast_to(np.arange(len(rotor)).reshape(design_shape(mechanism)), shape).ravel().astype(np.int64)
     )
     d = rotor.shape[1]
     M, J = posture.mass_matrix.reshape(-1, d, d), posture.jacobian.reshape(-1, 3, d)
@@ -64,9 +62,7 @@ def unit_direction(direction: ArrayLike) -> Floats:
     if not length > 0.0:
         raise ValueError(f"the rendered direction {u.tolist()} has no length; give it at least one component")
     if abs(length - 1.0) > 1e-9:
-        raise ValueError(
-            f"the rendered direction {u.tolist()} has length {length:.6g}; divide it by its length"
-        )
+        raise ValueError(f"the rendered direction {u.tolist()} has length {length:.6g}; divide it by its length")
     return u
 
 

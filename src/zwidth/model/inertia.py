@@ -121,9 +121,7 @@ def accelerate(
 @compiled
 def cross(a: Floats, b: Floats) -> Floats:
     """a x b"""
-    product: Floats = np.array(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
+    product: Floats = np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
     return product
 
 

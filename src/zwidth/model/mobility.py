@@ -9,7 +9,7 @@ import numpy as np
 from zwidth.compiled import compiled
 from zwidth.model.arrays import Arrays
 from zwidth.model.closure import equations
-from zwidth.model.continuation import assemble
+from zwidth.model.continuation import assemble_batch
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.tree import place, workspace
 
@@ -50,15 +50,9 @@ def nearby(mech: Arrays, design: int, reference: Floats, rng: np.random.Generato
     """A closed configuration a little way from the reference, in a random direction."""
     angles = reference.copy()
     angles[mech.joint] += NEARBY * rng.uniform(-1.0, 1.0, mech.joint.size)
-    close_loops(mech, design, angles)
+    gaps = np.zeros((1, mech.a.size))
+    assemble_batch(mech, np.array([design]), np.zeros((1, 3)), False, angles[None], gaps)
     return angles
-
-
-@compiled
-def close_loops(mech: Arrays, design: int, angles: Floats) -> None:
-    """Close the loops from roughly given angles (in place), the handle wherever it goes."""
-    work = workspace(mech)
-    assemble(mech, design, work.goal, False, angles, work)
 
 
 @compiled

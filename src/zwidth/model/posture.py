@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.compiled import compiled
 from zwidth.model.arrays import Arrays, design_shape, pack, per_design
-from zwidth.model.batch import ASSEMBLED, assemble_batch, solve
-from zwidth.model.continuation import OK, OUT_OF_REACH, SINGULAR
+from zwidth.model.batch import solve
+from zwidth.model.continuation import ASSEMBLED, OK, OUT_OF_REACH, SINGULAR, assemble_batch
 from zwidth.model.inertia import nonlinear_batch
 from zwidth.model.mechanism import Floats, Ints, Mechanism
 from zwidth.model.mobility import check_mobility
@@ -147,9 +147,7 @@ def inertia_terms(mechanism: Mechanism, posture: Posture, driven_rates: ArrayLik
     shape = np.broadcast_shapes(designs, posture.status.shape, rates.shape[:-1])
     angles = np.broadcast_to(posture.angles, (*shape, mech.parent.size)).reshape(-1, mech.parent.size)
     flat = np.broadcast_to(rates, (*shape, mech.driven)).reshape(-1, mech.driven)
-    design = (
-        np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
-    )
+    design = np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
     out = np.empty(flat.shape)
     nonlinear_batch(mech, design, np.ascontiguousarray(angles), np.ascontiguousarray(flat), out)
     return out.reshape(*shape, mech.driven)
@@ -161,15 +159,11 @@ def link_points(mechanism: Mechanism, posture: Posture) -> LinkPoints:
     shape = np.broadcast_shapes(designs, posture.status.shape)
     n = mech.parent.size
     angles = np.ascontiguousarray(np.broadcast_to(posture.angles, (*shape, n)).reshape(-1, n))
-    design = (
-        np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
-    )
+    design = np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
     rotation, origin = np.empty((len(design), n, 3, 3)), np.empty((len(design), n, 3))
     _place_batch(mech, design, angles, rotation, origin)
     tip = origin + np.einsum("knij,knj->kni", rotation, per_design(mechanism, mechanism.links.tip, 2)[design])
-    return LinkPoints(
-        origin.reshape(*shape, n, 3), tip.reshape(*shape, n, 3), rotation.reshape(*shape, n, 3, 3)
-    )
+    return LinkPoints(origin.reshape(*shape, n, 3), tip.reshape(*shape, n, 3), rotation.reshape(*shape, n, 3, 3))
 
 
 @compiled
@@ -186,8 +180,15 @@ def _references(mechanism: Mechanism, mech: Arrays, name: str) -> tuple[Floats, 
     angles = per_design(mechanism, np.asarray(mechanism.assemblies[name], dtype=np.float64), 1).copy()
     goals = per_design(mechanism, mechanism.reference_position, 1)
     gaps = np.zeros((len(angles), mech.a.size))
-    assemble_batch(mech, goals, angles, gaps)
-    return angles, gaps
+    reference = angles.copy()
+    assemble_batch(mech, np.arange(len(angles)), goals, True, reference, gaps)
+    # where the handle cannot be held at the reference position, the loops may still close with it elsewhere
+    missed = np.flatnonzero(np.isinf(gaps).any(axis=1))
+    if len(missed):
+        freed, left = angles[missed], np.zeros((len(missed), mech.a.size))
+        assemble_batch(mech, missed, goals[missed], False, freed, left)
+        reference[missed], gaps[missed] = freed, left
+    return reference, gaps
 
 
 def _assembly_name(mechanism: Mechanism, assembly: str | None) -> str:

@@ -58,9 +58,7 @@ def reduce_mechanism(
     u = unit_direction(direction)
     h = posture.jacobian.T @ u
     if not np.linalg.norm(h) > 1e-12 * np.linalg.norm(posture.jacobian):
-        raise ModelError(
-            f"the handle cannot move along the direction {u.tolist()}; choose one it can move along"
-        )
+        raise ModelError(f"the handle cannot move along the direction {u.tolist()}; choose one it can move along")
     if model == "full":
         return _full(mechanism, posture.mass_matrix, h, damping)
     numbers = effective_parameters(mechanism, posture, u)
@@ -110,8 +108,8 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
 def plant_effective_parameters(plant: Plant) -> EffectiveParameters:
     """Effective masses and stiffness of a plant given by its matrices (see `reduce_plant`).
 
-    nan where inapplicable: with one coordinate there are no sides and no spring, without a handle no link side
-    and no spring, tied to the ground no rigid mass.
+    nan where inapplicable: with one coordinate there are no sides and no spring, without a handle neither
+    link side nor spring, tied to the ground no rigid mass.
     """
     link = motor = rigid = stiffness = float("nan")
     with suppress(ModelError):
@@ -167,9 +165,7 @@ def _full_damping(M: Floats, K: Floats, D: Floats, damper: Floats, damping: Damp
     return np.asarray(D.T @ (damper[:, None] * D))
 
 
-def _two_mass(
-    drives: Drives, numbers: EffectiveParameters, h: Floats, damping: Damping, *, held: bool
-) -> Plant:
+def _two_mass(drives: Drives, numbers: EffectiveParameters, h: Floats, damping: Damping, *, held: bool) -> Plant:
     """Two masses and their spring; with the link side held fixed only the motor side, with the same damper.
 
     modal         b = 2 zeta sqrt(k mu),  mu = m1 m2 / (m1 + m2), so that the mode of the pair has the ratio
@@ -253,9 +249,7 @@ def _spring(plant: Plant) -> tuple[float, Floats]:
     x = k K^+ (a - h), by the flexible modes; it exists only where a - h does no work on a rigid motion.
     """
     if plant.handle is None:
-        raise ModelError(
-            "the plant has no handle, so that it has no link side; give `handle`, or use 'rigid'"
-        )
+        raise ModelError("the plant has no handle, so that it has no link side; give `handle`, or use 'rigid'")
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     between = shapes.T @ (plant.actuator - plant.handle)
     scale = np.linalg.norm(shapes.T @ plant.actuator)

@@ -15,8 +15,7 @@ HIGHEST_ORDER: Final = 20  # of a Butterworth filter; each adds a state to the l
 def _not_a_frequency(value: Any) -> Any:
     if isinstance(value, int | float) and not isinstance(value, bool) and 1 < value < 1e9:
         raise ValueError(
-            f"must be 0 < T <= 1 s, got {value:.10g}; is {value:.10g} a frequency in Hz? "
-            f"then T = {1 / value:.6g}"
+            f"must be 0 < T <= 1 s, got {value:.10g}; is {value:.10g} a frequency in Hz? then T = {1 / value:.6g}"
         )
     return value
 

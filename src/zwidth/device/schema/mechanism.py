@@ -56,9 +56,7 @@ class LoopClosure(Section):
     """A closed loop: a point of one link stays on a point of another."""
 
     name: Name = quantity("the loop's name: letters, digits, - and _")
-    links: tuple[Name, ...] = quantity(
-        'the two links that meet, or a link and "base"', min_length=2, max_length=2
-    )
+    links: tuple[Name, ...] = quantity('the two links that meet, or a link and "base"', min_length=2, max_length=2)
     points_m: tuple[Triple, ...] | None = quantity(
         "the meeting point in the frame of each of the two; omitted: their tips (of the base: its origin)",
         "m",
@@ -88,9 +86,7 @@ class ReferenceSection(Section):
 
     position_m: Position = quantity("position of the handle, x, y or x, y, z", "m")
     direction: Direction = quantity("rendered direction, any length", "1")
-    assembly: Name | None = quantity(
-        "the assembly that is meant; omitted only where one is named", default=None
-    )
+    assembly: Name | None = quantity("the assembly that is meant; omitted only where one is named", default=None)
 
 
 class WorkspaceSection(Section):
@@ -158,10 +154,6 @@ class MechanismSection(Section):
     handle: HandleSection = quantity("where the operator holds the device")
     assemblies: dict[Name, AssemblySection] = quantity("named ways of assembling it", min_length=1)
     reference: ReferenceSection = quantity("the posture and direction meant where none is given")
-    workspace: WorkspaceSection | None = quantity(
-        "bounds of the handle's position; omitted: none", default=None
-    )
-    drives: tuple[DriveSection, ...] = quantity(
-        "the drives, in the order of the driven coordinates", min_length=1
-    )
+    workspace: WorkspaceSection | None = quantity("bounds of the handle's position; omitted: none", default=None)
+    drives: tuple[DriveSection, ...] = quantity("the drives, in the order of the driven coordinates", min_length=1)
     damping: DampingSection = quantity("structural damping, one of the three ways")
