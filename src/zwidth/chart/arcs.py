@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.corner import cross_line, refine_corner
+from zwidth.chart.curve import walls
 from zwidth.chart.tracer import RealRoot, Tracer, Wall
 
 Floats = NDArray[np.float64]
@@ -45,11 +46,13 @@ Rings = tuple[tuple[Arc, ...], ...]
 class Edges:
     """All arcs found, and the angles of every branch that meets another in a corner.
 
-    size  extent of the edge in K T and B [N s/m]
+    extents  largest distance of each arc's points from its first corner, in K T and B [N s/m]
+    size     that of the whole edge
     """
 
     arcs: tuple[Arc, ...]
     partners: tuple[float, ...]
+    extents: tuple[float, ...]
     size: float
 
 
@@ -59,9 +62,17 @@ def find_edges(tracer: Tracer, thetas: Floats) -> Edges:
     arcs, partners = _pair_arcs(tracer, thetas, edge)
     for root in ("plus", "minus"):
         arcs += _line_arcs(tracer, root, thetas, K, B)  # type: ignore[arg-type]
-    reach = np.array([[arc.first, arc.last] for arc in arcs]).reshape(-1, 2)
-    reach = np.abs(np.vstack([reach, np.column_stack([K[edge], B[edge]])])) * (tracer.period, 1.0)
-    return Edges(tuple(arcs), tuple(partners), float(np.max(reach, initial=0.0)))
+    units = np.array([tracer.period, 1.0])
+    points = [_points(tracer, arc) * units for arc in arcs]
+    extents = tuple(float(np.max(np.abs(walls - walls[0]))) for walls in points)
+    size = max((float(np.max(np.abs(walls))) for walls in points), default=0.0)
+    return Edges(tuple(arcs), tuple(partners), extents, size)
+
+
+def _points(tracer: Tracer, arc: Arc) -> Floats:
+    """An arc's corners and the samples that found it, (k, 2)."""
+    K, B = walls(*tracer.factors, tracer.radius, arc.thetas)
+    return np.vstack([arc.first, np.column_stack([K, B]), arc.last])
 
 
 def _pair_arcs(tracer: Tracer, thetas: Floats, edge: NDArray[np.bool_]) -> tuple[list[Arc], list[float]]:

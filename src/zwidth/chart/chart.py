@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
+from shapely.geometry.polygon import orient
 
 from zwidth.chart.decay import FastestDecay, fastest_decay
 from zwidth.chart.outline import quadrant_area, sample_arc
@@ -151,18 +152,20 @@ def _signed_area(ring: Floats) -> float:
 
 
 def _cells(outlines: list[Floats]) -> tuple[Floats, ...]:
-    """Outlines as simple rings; a cell with holes is cut through each of them."""
-    areas = [_signed_area(outline) for outline in outlines]
-    holes = [outline for outline, area in zip(outlines, areas, strict=True) if area < 0.0]
-    solid = [outline for outline, area in zip(outlines, areas, strict=True) if area > 0.0]
-    if not holes:
-        return tuple(solid)
+    """Outlines as simple counter-clockwise rings; a cell with holes is cut through each of them."""
+    holes = [outline for outline in outlines if _signed_area(outline) < 0.0]
+    solid = [outline for outline in outlines if _signed_area(outline) > 0.0]
     cells: list[Floats] = []
     for outline in solid:
         inside = [hole for hole in holes if shapely.contains_xy(shapely.Polygon(outline), *hole[0])]
-        for piece in _cut(shapely.Polygon(outline, inside)):
-            ring = np.array(shapely.geometry.polygon.orient(piece).exterior.coords)
-            cells.append(ring)
+        cell = shapely.Polygon(outline, inside)
+        if not inside and cell.is_valid:
+            cells.append(outline)
+            continue
+        # Rounding can cross two chords in a corner of many branches: loops of no area, which are dropped
+        parts = shapely.get_parts(shapely.make_valid(cell))
+        real = [part for part in parts if isinstance(part, shapely.Polygon) and part.area > 1e-12 * cell.area]
+        cells += [np.array(orient(piece).exterior.coords) for part in real for piece in _cut(part)]
     return tuple(cells)
 
 

@@ -55,6 +55,23 @@ def wall_at(
 
 
 @compiled
+def walls(
+    rows: Floats,
+    whole: int,
+    split: int,
+    numerator: Floats,
+    denominator: Floats,
+    radius: float,
+    thetas: Floats,
+) -> tuple[Floats, Floats]:
+    """K and B at angles in (0, pi)."""
+    K, B = np.empty(len(thetas)), np.empty(len(thetas))
+    for i in range(len(thetas)):
+        K[i], B[i], _, _ = wall_at(rows, whole, split, numerator, denominator, radius, thetas[i])
+    return K, B
+
+
+@compiled
 def deflate(p: Floats, size: Floats, degree: int, square: float, out: Floats, out_size: Floats) -> None:
     """Divide p(s) (ascending, of given degree) by s^2 + square, whose roots it has; out has degree - 1 entries.
 

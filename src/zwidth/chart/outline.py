@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import Arc, Rings
-from zwidth.chart.curve import wall_at
+from zwidth.chart.curve import wall_at, walls
 from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled
 
@@ -38,23 +38,6 @@ def sample_arc(tracer: Tracer, arc: Arc) -> tuple[Floats, Floats, Floats]:
         np.concatenate([[arc.first[0]], K, [arc.last[0]]]),
         np.concatenate([[arc.first[1]], B, [arc.last[1]]]),
     )
-
-
-@compiled
-def walls(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
-    radius: float,
-    thetas: Floats,
-) -> tuple[Floats, Floats]:
-    """K and B at angles in (0, pi)."""
-    K, B = np.empty(len(thetas)), np.empty(len(thetas))
-    for i in range(len(thetas)):
-        K[i], B[i], _, _ = wall_at(rows, whole, split, numerator, denominator, radius, thetas[i])
-    return K, B
 
 
 @compiled

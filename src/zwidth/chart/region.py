@@ -6,6 +6,8 @@ sector, runs counter-clockwise round a cell and clockwise round a hole.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,8 +62,13 @@ def join(edges: Edges, period: float) -> Rings | None:
         return ()
     ends = np.array([[arc.first, arc.last] for arc in arcs]) * (period, 1.0)
     nodes = _cluster(ends.reshape(-1, 2), edges.size).reshape(-1, 2)
-    # an arc shorter than a corner's size is part of that corner
-    alive = [k for k in range(len(arcs)) if nodes[k, 0] != nodes[k, 1] or len(arcs[k].thetas) > 0]
+    # an arc no larger than a corner is part of it
+    alive = [k for k in range(len(arcs)) if edges.extents[k] > SAME_CORNER * edges.size]
+    corners = ends.reshape(-1, 2)[nodes] / (period, 1.0)
+    arcs = tuple(
+        replace(arc, first=tuple(first), last=tuple(last))
+        for arc, (first, last) in zip(arcs, corners.tolist(), strict=True)
+    )
     leaving: dict[int, list[int]] = {}
     for k in alive:
         leaving.setdefault(int(nodes[k, 0]), []).append(k)
@@ -88,7 +95,7 @@ def _cluster(points: Floats, size: float) -> NDArray[np.int64]:
     for i in range(len(points)):
         if labels[i] < 0:
             near = np.max(np.abs(points - points[i]), axis=1) <= SAME_CORNER * size
-            labels[near & (labels < 0)] = i
+            labels[near & (labels < 0)] = i  # the first point stands for all
     return labels
 
 

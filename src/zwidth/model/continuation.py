@@ -34,10 +34,12 @@ ROUNDING: Final = 1e-15
 
 @compiled_lean
 def largest(values: Floats, count: int) -> float:
-    """max |values[:count]|"""
+    """max |values[:count]|, nan if any is nan."""
     most = 0.0
     for i in range(count):
-        most = max(most, abs(values[i]))
+        value = abs(values[i])
+        if value > most or value != value:
+            most = value
     return most
 
 
@@ -118,7 +120,7 @@ def follow(mech: Arrays, design: int, target: Floats, angles: Floats, work: Work
             angles[i] = trial[i]
         done = 1.0 if final else done + step
         step *= 2.0
-    if largest(work.gaps, work.gaps.size) > CLOSED * mech.size[design]:
+    if not largest(work.gaps, work.gaps.size) <= CLOSED * mech.size[design]:
         return OUT_OF_REACH
     condition = min(condition, passive_rates(mech, work))
     return SINGULAR if condition < SINGULAR_CONDITION else OK
