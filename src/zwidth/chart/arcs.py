@@ -8,6 +8,7 @@ the curve crosses or ends on them, and each piece is tested at its middle.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -47,7 +48,7 @@ class Edges:
     """All arcs found, and the angles of every branch that meets another in a corner.
 
     extents  largest distance of each arc's points from its first corner, in K T and B [N s/m]
-    size     that of the whole edge
+    size     largest |K T|, |B| of the whole edge
     """
 
     arcs: tuple[Arc, ...]
@@ -65,7 +66,11 @@ def find_edges(tracer: Tracer, thetas: Floats) -> Edges:
     units = np.array([tracer.period, 1.0])
     points = [_points(tracer, arc) * units for arc in arcs]
     extents = tuple(float(np.max(np.abs(walls - walls[0]))) for walls in points)
+    # nothing smaller than rounding of the whole curve is an edge
+    reach = np.maximum(np.abs(K) * tracer.period, np.abs(B))
+    least = 1e-9 * float(np.median(reach[np.isfinite(reach)]))
     size = max((float(np.max(np.abs(walls))) for walls in points), default=0.0)
+    size = max(size, least)
     return Edges(tuple(arcs), tuple(partners), extents, size)
 
 
@@ -125,7 +130,7 @@ def _line_arcs(tracer: Tracer, root: RealRoot, thetas: Floats, K: Floats, B: Flo
     angle = 0.0 if root == "plus" else np.pi
     return [
         Arc(root, one, two, angle, angle, np.empty(0))
-        for one, two in zip(nodes[:-1], nodes[1:], strict=True)
+        for one, two in pairwise(nodes)
         if one != two and tracer.edge_on_line(root, (one[0] + two[0]) / 2, (one[1] + two[1]) / 2)
     ]
 

@@ -45,6 +45,8 @@ class StabilityChart:
     damping_max     supremum of B >= 0 stable for all sufficiently small K > 0 [N s/m]; 0 if there is none
     stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
     fastest_decay   the wall of smallest spectral radius over the whole set; None if nothing is stable
+    corner_blur     share of the set's size to which its corners are known: 1e-7, more where a mode that the wall
+                    hardly moves hides one in rounding
     """
 
     loop: Loop
@@ -57,6 +59,7 @@ class StabilityChart:
     damping_max: float
     stable_area: float
     fastest_decay: FastestDecay | None
+    corner_blur: float
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
@@ -91,7 +94,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     >>> chart.stiffness_max, chart.frequencies_at_stiffness_max      # doctest: +SKIP
     """
     tracer = Tracer.of(loop, radius)
-    rings = closed_rings(tracer)
+    rings, blur = closed_rings(tracer)
     samples = [[sample_arc(tracer, arc) for arc in ring] for ring in rings]
     outlines = [_outline(arcs) for arcs in samples]
     width = max((float(np.max(np.abs(outline[:, 0]))) for outline in outlines), default=0.0)
@@ -108,13 +111,14 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
         damping_max=largest_damping(tracer, rings, width),
         stable_area=max(quadrant_area(tracer, rings), 0.0),
         fastest_decay=_confirmed(loop, fastest_decay(tracer, outlines)) if decay else None,
+        corner_blur=blur,
     )
 
 
 def largest_stiffness(loop: Loop) -> Peak | None:
     """Only the stiffest stable wall with K > 0, B >= 0; None if there is none."""
     tracer = Tracer.of(loop)
-    rings = closed_rings(tracer)
+    rings, _ = closed_rings(tracer)
     width = max(
         (float(np.max(np.abs(tracer.trace(arc.thetas)[0]), initial=0.0)) for ring in rings for arc in ring),
         default=0.0,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -137,7 +139,7 @@ def segment_integral(first: tuple[float, float], last: tuple[float, float]) -> f
             stops.append(a / (a - b))
     stops.sort()
     total = 0.0
-    for s, t in zip(stops[:-1], stops[1:], strict=True):
+    for s, t in pairwise(stops):
         middle = 0.5 * (s + t)
         K, B = K0 + middle * (K1 - K0), B0 + middle * (B1 - B0)
         if K > 0.0 and B > 0.0:

@@ -19,17 +19,21 @@ Floats = NDArray[np.float64]
 
 # Corners closer than this share of the set's size are one.
 SAME_CORNER = 1e-7
+# How far a corner may be blurred where a mode so weakly coupled that rounding hides it touches the edge.
+BLURRED = (1e-6, 1e-5, 1e-4, 1e-3)
 
 
 class ChartError(RuntimeError):
     """The edge of the stable set could not be closed."""
 
 
-def closed_rings(tracer: Tracer) -> Rings:
-    """All closed walks round the stable set.
+def closed_rings(tracer: Tracer) -> tuple[Rings, float]:
+    """All closed walks round the stable set, and the share of its size to which corners are known.
 
     A sliver between two branches can fall between samples and leaves a walk open. Then the grid is made finer and
-    samples are added round every branch that takes part in a corner. Raises ChartError if that does not help.
+    samples are added round every branch that takes part in a corner. What stays open then are corners where a
+    branch moves by less than rounding can tell (an undamped mode that the wall hardly moves): their arcs are
+    joined with as much blur as it takes. Raises ChartError if none of BLURRED is enough.
     """
     points = singular_points(tracer.factors[0], tracer.polynomials, tracer.radius)
     extra = np.empty(0)
@@ -39,11 +43,18 @@ def closed_rings(tracer: Tracer) -> Rings:
             np.concatenate([thetas, around_crossings(*tracer.factors, tracer.radius, thetas), extra])
         )
         edges = find_edges(tracer, thetas)
-        rings = join(edges, tracer.period)
+        rings = join(edges, tracer.period, SAME_CORNER)
         if rings is not None:
-            return rings
+            return rings, SAME_CORNER
         extra = np.union1d(extra, _around(edges))
-    raise ChartError("the edge of the stable set could not be closed; please report this loop")
+    for blur in BLURRED:
+        rings = join(edges, tracer.period, blur)
+        if rings is not None:
+            return rings, blur
+    raise ChartError(
+        "the edge of the stable set could not be closed: a mode that the wall hardly moves hides it in rounding; "
+        "give that mode some damping, or leave it out"
+    )
 
 
 def _around(edges: Edges) -> Floats:
@@ -55,15 +66,15 @@ def _around(edges: Edges) -> Floats:
     return near[(near > 1e-9) & (near < np.pi - 1e-9)]
 
 
-def join(edges: Edges, period: float) -> Rings | None:
-    """Walks along arcs, or None if one of them does not close."""
+def join(edges: Edges, period: float, blur: float) -> Rings | None:
+    """Walks along arcs, or None if one of them does not close; corners within `blur` of the size are one."""
     arcs = edges.arcs
     if not arcs:
         return ()
     ends = np.array([[arc.first, arc.last] for arc in arcs]) * (period, 1.0)
-    nodes = _cluster(ends.reshape(-1, 2), edges.size).reshape(-1, 2)
+    nodes = _cluster(ends.reshape(-1, 2), blur * edges.size).reshape(-1, 2)
     # an arc no larger than a corner is part of it
-    alive = [k for k in range(len(arcs)) if edges.extents[k] > SAME_CORNER * edges.size]
+    alive = [k for k in range(len(arcs)) if edges.extents[k] > blur * edges.size]
     corners = ends.reshape(-1, 2)[nodes] / (period, 1.0)
     arcs = tuple(
         replace(arc, first=tuple(first), last=tuple(last))
@@ -89,12 +100,12 @@ def join(edges: Edges, period: float) -> Rings | None:
     return tuple(rings)
 
 
-def _cluster(points: Floats, size: float) -> NDArray[np.int64]:
+def _cluster(points: Floats, reach: float) -> NDArray[np.int64]:
     """Numbers the distinct corners among points (k, 2)."""
     labels = np.full(len(points), -1)
     for i in range(len(points)):
         if labels[i] < 0:
-            near = np.max(np.abs(points - points[i]), axis=1) <= SAME_CORNER * size
+            near = np.max(np.abs(points - points[i]), axis=1) <= reach
             labels[near & (labels < 0)] = i  # the first point stands for all
     return labels
 

@@ -150,7 +150,7 @@ def _postures(
             continue
         for j in range(n):
             # one turn more or less is the same posture
-            angles[i, j] = present[j] - 2.0 * np.pi * np.round(present[j] / (2.0 * np.pi))
+            angles[i, j] = present[j] - 2.0 * np.pi * np.floor(present[j] / (2.0 * np.pi) + 0.5)
         residual[i] = largest(gaps, loops)
         handle_jacobian(work, jacobian, i)
         unit_motions(mech, work)

@@ -118,9 +118,9 @@ def damped_modes(plant: Plant) -> DampedModes:
     kept = np.hstack([rigid @ axes[:, np.abs(drag) > level], elastic])
     k = kept.shape[1]
     K, B = kept.T @ plant.stiffness @ kept, kept.T @ plant.damping @ kept
-    # Time in units of the fastest mode: position and velocity entries of one size.
-    rate = max(float(np.sqrt(np.max(np.abs(K)))), float(np.max(np.abs(B))), np.finfo(float).tiny)
-    A = np.block([[np.zeros((k, k)), rate * np.eye(k)], [-K / rate, -B]])
+    # Each velocity in units of its own mode's rate: a slow mode's conjugate pair stays well apart
+    rate = np.maximum(np.sqrt(np.abs(np.diag(K))), np.abs(np.diag(B)))
+    A = np.block([[np.zeros((k, k)), np.diag(rate)], [-K / rate[:, None], -B * (rate / rate[:, None])]])
     poles, right = np.linalg.eig(A)
     if np.linalg.cond(right) > 1e7:
         raise ModesError(
