@@ -1,0 +1,1 @@
+"""Figures: functions that draw on the axes they are given."""

@@ -1,0 +1,102 @@
+"""A plant as masses, springs and dampers in a row, where it is such a row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from zwidth.model.plant import Plant
+from zwidth.show.figures.style import BLACK, GREY, VERMILION
+from zwidth.show.figures.units import quantity
+
+Floats = NDArray[np.float64]
+WIDTH, GAP, HALF = 1.2, 1.6, 0.55  # of a mass, between masses, half the height of a mass
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Masses in a row.
+
+    mass       (n,)     [kg]
+    stiffness  (n + 1,)  springs: ground to first, between neighbours, last to ground [N/m]
+    damping    (n + 1,)  dampers in the same places [N s/m]
+    """
+
+    mass: Floats
+    stiffness: Floats
+    damping: Floats
+
+
+def as_chain(plant: Plant) -> Chain | None:
+    """The plant as a row of masses joined to their neighbours and to the ground at the ends; None if it is not."""
+    n = plant.size
+    links = []
+    if np.any(plant.mass != np.diag(np.diag(plant.mass))):
+        return None
+    for matrix in (plant.stiffness, plant.damping):
+        scale = float(np.max(np.abs(matrix))) or 1.0
+        between = -np.diag(matrix, 1)
+        far = matrix - np.diag(np.diag(matrix)) + np.diag(between, 1) + np.diag(between, -1)
+        to_ground = matrix.sum(axis=1)
+        if np.any(far != 0.0) or np.any(between < 0.0) or np.any(np.abs(to_ground[1:-1]) > 1e-12 * scale):
+            return None
+        to_ground = np.where(np.abs(to_ground) > 1e-12 * scale, to_ground, 0.0)
+        last = to_ground[-1] if n > 1 else 0.0
+        if to_ground[0] < 0.0 or last < 0.0:
+            return None
+        links.append(np.concatenate([[to_ground[0]], between, [last]]))
+    return Chain(np.diag(plant.mass), links[0], links[1])
+
+
+def draw_chain(ax: Axes, plant: Plant, chain: Chain) -> None:
+    """Masses as boxes with their numbers, springs over dampers, and where the wall acts, reads and is held."""
+    n = len(chain.mass)
+    left = GAP * (np.arange(n) + 1.0) + WIDTH * np.arange(n)
+    for i, x in enumerate(left):
+        ax.add_patch(Rectangle((x, -HALF), WIDTH, 2 * HALF, facecolor="#EEEEEE", edgecolor=BLACK))
+        ax.text(x + WIDTH / 2, 0.0, quantity(float(chain.mass[i]), "kg"), ha="center", va="center", fontsize=8.0)
+        ax.text(x + WIDTH / 2, -HALF - 0.12, "\n".join(_roles(plant, i)), ha="center", va="top", fontsize=8.0)
+    for i in range(n + 1):
+        start = left[i] - GAP if i < n else left[-1] + WIDTH
+        if chain.stiffness[i] > 0.0 or chain.damping[i] > 0.0:
+            _joined(ax, start, start + GAP, float(chain.stiffness[i]), float(chain.damping[i]))
+            if i in (0, n):
+                _ground(ax, start if i == 0 else start + GAP)
+    ax.set_xlim(-0.3, left[-1] + WIDTH + GAP + 0.3)
+    ax.set_ylim(-HALF - 1.0, HALF + 0.7)
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+
+
+def _roles(plant: Plant, i: int) -> list[str]:
+    handle = plant.handle if plant.handle is not None else np.zeros(plant.size)
+    names = (("wall acts", plant.actuator), ("encoder", plant.sensor), ("handle", handle))
+    return [name for name, vector in names if vector[i] != 0.0]
+
+
+def _joined(ax: Axes, start: float, end: float, stiffness: float, damping: float) -> None:
+    both = stiffness > 0.0 and damping > 0.0
+    if stiffness > 0.0:
+        y = 0.3 if both else 0.0
+        x = start + (end - start) * np.array([0.0, 0.2, *np.linspace(0.235, 0.765, 9), 0.8, 1.0])
+        zigzag = [0.0, 0.0, *(0.13 * (-1.0) ** k for k in range(9)), 0.0, 0.0]
+        ax.plot(x, y + np.array(zigzag), color=VERMILION, linewidth=1.2)
+        ax.text((start + end) / 2, y + 0.18, quantity(stiffness, "N/m"), ha="center", va="bottom", fontsize=8.0)
+    if damping > 0.0:
+        y = -0.3 if both else 0.0
+        middle = (start + end) / 2
+        ax.plot([start, middle], [y, y], color=GREY, linewidth=1.2)
+        ax.plot([middle] * 2, [y - 0.13, y + 0.13], color=GREY, linewidth=1.2)
+        x = [middle - 0.22, middle + 0.22, middle + 0.22, middle - 0.22]
+        cup = [y + 0.18, y + 0.18, y - 0.18, y - 0.18]
+        ax.plot(x, cup, color=GREY, linewidth=1.2)
+        ax.plot([middle + 0.22, end], [y, y], color=GREY, linewidth=1.2)
+        ax.text(middle, y - 0.27, quantity(damping, "Ns/m"), ha="center", va="top", fontsize=8.0)
+
+
+def _ground(ax: Axes, x: float) -> None:
+    ax.plot([x, x], [-HALF, HALF], color=BLACK, linewidth=2.0)

@@ -1,0 +1,188 @@
+"""How figures look and how they are saved: the same bytes from the same numbers, and no global state.
+
+Colours are those of Okabe and Ito (2008), told apart with any colour vision; lines that share a figure also
+differ in their dashes and in lightness, so that a grey print can be read.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, suppress
+from html import escape
+from io import StringIO
+from pathlib import Path
+from typing import Any, Final
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import Formatter
+
+from zwidth.show.figures.units import MINUS, PREFIXES, exponent_of
+
+BLACK: Final = "#000000"
+BLUE: Final = "#0072B2"
+VERMILION: Final = "#D55E00"
+GREEN: Final = "#009E73"
+PURPLE: Final = "#CC79A7"
+ORANGE: Final = "#E69F00"
+GREY: Final = "#767676"
+STABLE: Final = "#C9E3F3"  # light enough that every line stands out on it
+
+# Colour and dashes of the n-th line of a figure.
+LINES: Final[tuple[tuple[str, Any], ...]] = (
+    (BLACK, "-"),
+    (BLUE, (0, (5, 1.5))),
+    (VERMILION, (0, (1.2, 1.2))),
+    (GREEN, (0, (6, 1.5, 1.2, 1.5))),
+    (PURPLE, (0, (6, 1.2, 1.2, 1.2, 1.2, 1.2))),
+    (ORANGE, (0, (10, 3))),
+)
+
+FORMATS: Final = (".png", ".svg", ".pdf")
+_STYLE: Final = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib: the same glyphs on every machine
+    "font.size": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "lines.linewidth": 1.4,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "figure.dpi": 100.0,
+    "savefig.dpi": 200.0,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "zwidth",
+    "pdf.fonttype": 42,
+}
+
+
+def context() -> AbstractContextManager[None]:
+    """The house's settings, for figures made inside; `figure` and `save` use it already."""
+    return mpl.rc_context({**mpl.rcParamsDefault, **_STYLE})
+
+
+def figure(width: float = 5.6, height: float = 3.9) -> tuple[Figure, Axes]:
+    """A figure of this size [inches] with one pair of axes, apart from pyplot."""
+    with context():
+        made = Figure(figsize=(width, height), layout="constrained")
+        FigureCanvasAgg(made)
+        return made, made.add_subplot()
+
+
+def save(made: Figure, path: str | os.PathLike[str]) -> Path:
+    """Write a figure as .png, .svg or .pdf, whole or not at all, without dates.
+
+    Raises  ValueError  for another extension
+            OSError     where the file cannot be written; what stood there before still stands
+    """
+    target = Path(path)
+    kind = target.suffix.lower()
+    if kind not in FORMATS:
+        raise ValueError(f"a figure is written as {', '.join(FORMATS)}, got '{target.name}'; change the extension")
+    undated: dict[str, Any] = {
+        ".png": {"Software": "zwidth"},
+        ".svg": {"Date": None, "Creator": "zwidth"},
+        ".pdf": {"CreationDate": None, "ModDate": None, "Creator": "zwidth", "Producer": None},
+    }[kind]
+    handle, name = tempfile.mkstemp(suffix=kind, prefix=".zwidth-", dir=target.parent)
+    os.close(handle)
+    try:
+        with context():
+            made.savefig(name, format=kind[1:], metadata=undated)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)
+        os.replace(name, target)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(name)
+        raise
+    return target
+
+
+def inline_svg(made: Figure, name: str, description: str) -> str:
+    """A figure as an <svg> element to stand in a page beside others.
+
+    name         prefix of all its ids, unlike that of any other figure in the page
+    description  read out to those who cannot see it
+    """
+    text = StringIO()
+    with context():
+        made.savefig(text, format="svg", metadata={"Date": None, "Creator": "zwidth"})
+    body = text.getvalue()
+    body = body[body.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = re.sub(r'\bid="', f'id="{name}-', body)
+    body = re.sub(r'(href="|url\()#', rf"\g<1>#{name}-", body)
+    opening, rest = body.split(">", 1)
+    opening = re.sub(r'\s(width|height|version|xmlns:xlink|xmlns)="[^"]*"', "", opening)
+    # an HTML page knows the namespaces; plain href needs none
+    rest = rest.replace("xlink:href=", "href=")
+    return f'{opening} role="img"><title>{escape(description)}</title>{rest.rstrip()}'
+
+
+class Prefixed(Formatter):
+    """Tick labels under an SI prefix common to the axis, which the axis's label names.
+
+        Virtual stiffness [kN/m]   0  2  4  6  8
+
+    The prefix follows the view: it is chosen anew whenever the figure is drawn.
+    """
+
+    def __init__(self, axis: Axis, name: str, unit: str) -> None:
+        self.of, self.name, self.unit = axis, name, unit
+        self.exponent, self.decimals = 0, 0
+
+    def set_locs(self, locs: Sequence[float]) -> None:
+        low, high = sorted(self.of.get_view_interval())
+        self.exponent = exponent_of(max(abs(low), abs(high)))
+        inside = sorted({round(x / 10.0**self.exponent, 9) for x in locs if low <= x <= high})
+        self.decimals = next((d for d in range(7) if all(abs(x - round(x, d)) < 1e-7 for x in inside)), 6)
+        self.of.set_label_text(f"{self.name} [{PREFIXES[self.exponent]}{self.unit}]")
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x / 10.0**self.exponent + 0.0:.{self.decimals}f}".replace("-", MINUS)
+
+
+def label(axis: Axis, name: str, unit: str) -> None:
+    """Name an axis in SI units; its ticks get the prefix that suits the view."""
+    formatter = Prefixed(axis, name, unit)
+    axis.set_major_formatter(formatter)
+    formatter.set_locs([])
+
+
+def legend_above(ax: Axes, columns: int = 1, title: str | None = None) -> None:
+    """The legend over the axes, where it hides nothing; texts must fit into so many columns."""
+    _legend(ax, loc="lower left", bbox_to_anchor=(0.0, 1.01), ncols=columns, title=title)
+
+
+def legend_beside(ax: Axes) -> None:
+    """The legend to the right of the axes, for drawings that are higher than wide."""
+    _legend(ax, loc="center left", bbox_to_anchor=(1.02, 0.5))
+
+
+def _legend(ax: Axes, **place: Any) -> None:
+    handles, labels = ax.get_legend_handles_labels()
+    if not handles:
+        return
+    made = ax.legend(
+        handles,
+        labels,
+        borderaxespad=0.0,
+        handlelength=2.6,
+        columnspacing=1.6,
+        fontsize=8.0,
+        title_fontsize=8.0,
+        frameon=False,
+        alignment="left",
+        **place,
+    )
+    made.set_zorder(6.0)

@@ -1,0 +1,71 @@
+"""Numbers with units for people: sensible digits, SI prefixes, a real minus sign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import floor, isfinite, isnan, log10
+from typing import Final
+
+PREFIXES: Final = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+# Units that take no prefix: kg has one, and a prefix before a square would be squared with it.
+PLAIN: Final = ("kg", "N²s/m²", "")
+SPACE: Final = "\u00a0"
+MINUS: Final = "\u2212"
+UNKNOWN: Final = "\u2013"
+_RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def exponent_of(value: float) -> int:
+    """Power of ten, a multiple of 3 that has a prefix, under which |value| reads as 1 to 999; 0 for 0."""
+    if value == 0.0 or not isfinite(value):
+        return 0
+    return min(max(3 * floor(log10(abs(value)) / 3.0 + 1e-12), -9), 9)
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number to so many significant digits, as a power of ten where it is very large or small.
+
+    >>> number(0.0253667), number(-12.0), number(164944.5)
+    ('0.0254', '−12.0', '1.65\u2009×\u200910⁵')
+    """
+    if isnan(value):
+        return UNKNOWN
+    if not isfinite(value):
+        return "∞" if value > 0 else f"{MINUS}∞"
+    if value == 0.0:
+        return "0"
+    mantissa, power = f"{value:.{digits - 1}e}".split("e")
+    magnitude = int(power)
+    if -4 <= magnitude < max(digits, 4):
+        text = f"{float(f'{mantissa}e{power}'):.{max(digits - 1 - magnitude, 0)}f}"
+    else:
+        text = f"{mantissa}\u2009×\u200910{str(magnitude).translate(_RAISED)}"
+    return text.replace("-", MINUS)
+
+
+def quantity(value: float, unit: str, digits: int = 3) -> str:
+    """A value with its unit and the prefix that suits it; a dash where the value is not known (nan).
+
+    >>> quantity(7849.44, "N/m", 2), quantity(0.02, "Ns/m"), quantity(0.2616, "kg")
+    ('7.8\\xa0kN/m', '20.0\\xa0mNs/m', '0.262\\xa0kg')
+    """
+    if isnan(value):
+        return UNKNOWN
+    if unit in PLAIN or not isfinite(value):
+        return f"{number(value, digits)}{SPACE}{unit}".strip()
+    rounded = float(f"{value:.{digits - 1}e}")  # so that 999.96 becomes 1.00 k, not 1000
+    exponent = exponent_of(rounded)
+    return f"{number(rounded / 10.0**exponent, digits)}{SPACE}{PREFIXES[exponent]}{unit}"
+
+
+def point(coordinates: Iterable[float], unit: str = "m") -> str:
+    """A point or vector as (x, y) where it lies in the plane z = 0, else (x, y, z); no unit for "".
+
+    >>> point([0.0, 0.25, 0.0])
+    '(0, 0.25)\\xa0m'
+    """
+    values = [float(c) for c in coordinates]
+    if len(values) == 3 and values[2] == 0.0:
+        values.pop()
+    inside = ", ".join(f"{round(v, 12) + 0.0:.4g}".replace("-", MINUS) for v in values)
+    return f"({inside}){SPACE}{unit}".rstrip(SPACE)

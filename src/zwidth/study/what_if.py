@@ -1,0 +1,213 @@
+"""What limits the walls of a device: one change at a time, and the largest stiffness it leads to.
+
+Each change is computed, none is a rule of thumb: the plant is reduced or the loop is sampled anew, and its chart
+drawn exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import isnan, nan
+from typing import Final
+
+from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.region import ChartError
+from zwidth.device.device import Device
+from zwidth.loop.controller import Butterworth, Controller
+from zwidth.loop.loop import Loop
+from zwidth.model.modes import ModesError
+from zwidth.model.plant import Plant
+from zwidth.model.reduction import ModelError
+
+BASE: Final = "as-described"
+# The changes a designer may hope for, of which the one that gains most names what limits the device.
+REMEDIES: Final = ("rigid-drives", "half-period", "no-delay", "no-filter", "twice-damping")
+MODELS: Final = ("full", "two-mass", "motor-mass", "motor-mass-undamped", "rigid-undamped")
+WORTH: Final = 1.01  # a change that gains less than 1 % does not count as one that helps
+THESIS_CUTOFF_HZ: Final = 20.0
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A device with one thing changed.
+
+    key     one of BASE, REMEDIES, "one-sample", "with-filter", or "model-" and one of MODELS
+    label   for people
+    loop    None where the change does not apply
+    chart   its stability chart; None where the change does not apply or the chart cannot be drawn
+    reason  why there is no chart, "" where there is one
+    """
+
+    key: str
+    label: str
+    loop: Loop | None
+    chart: StabilityChart | None
+    reason: str = ""
+
+    @property
+    def stiffness_max(self) -> float:
+        """Largest stiffness of stable walls with K > 0, B >= 0 [N/m]; 0 if none is stable, nan if left out."""
+        if self.chart is None:
+            return nan
+        return 0.0 if isnan(self.chart.stiffness_max) else self.chart.stiffness_max
+
+    @property
+    def damping(self) -> float:
+        """Damping of that wall [N s/m]; nan if there is none."""
+        return nan if self.chart is None else self.chart.damping_at_stiffness_max
+
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """At which it vibrates [Hz]: one, two at a corner, none if there is no such wall."""
+        return () if self.chart is None else self.chart.frequencies_at_stiffness_max
+
+    @property
+    def area(self) -> float:
+        """Stable area within K >= 0, B >= 0 [N^2 s/m^2]; 0 if no wall is stable, nan if left out."""
+        if self.chart is None:
+            return nan
+        # without a stable wall what is left is rounding
+        return 0.0 if isnan(self.chart.stiffness_max) else self.chart.stable_area
+
+
+class NotApplicable(Exception):
+    """A change that this device cannot undergo, with the reason."""
+
+
+def what_if(
+    device: Device,
+    at: Sequence[float] | None = None,
+    direction: Sequence[float] | None = None,
+    assembly: str | None = None,
+    model: str | None = None,
+) -> list[Variant]:
+    """The device as described, with each change, and in each of the models of thesis Fig. 4.4.
+
+    Arguments are those of `Device.plant`. A change that does not apply has no chart and says why; the device as
+    described comes first and always has one.
+    Raises  what `Device.plant` raises, and ChartError or ModesError if the device itself cannot be charted
+    """
+
+    def reduce(to: str | None) -> Plant:
+        return device.plant(at, direction, assembly, to)
+
+    plant = reduce(model)
+    here = Loop(plant, device.controller)
+    variants = [Variant(BASE, "as described", here, stability_chart(here))]
+    steps = [*_changes(device, plant, reduce), *_models(device, plant, reduce)]
+    return variants + [_charted(key, label, make) for key, label, make in steps]
+
+
+def limiting_change(variants: Sequence[Variant]) -> Variant | None:
+    """The remedy that gains most stiffness; None where none gains at least 1 %."""
+    base = find(variants, BASE)
+    best = max(
+        (v for v in variants if v.key in REMEDIES and v.chart is not None),
+        key=lambda variant: variant.stiffness_max,
+        default=None,
+    )
+    return best if best is not None and best.stiffness_max > WORTH * base.stiffness_max else None
+
+
+def find(variants: Sequence[Variant], key: str) -> Variant:
+    """The variant of that key. Raises KeyError if there is none."""
+    for variant in variants:
+        if variant.key == key:
+            return variant
+    raise KeyError(key)
+
+
+Step = tuple[str, str, Callable[[], Loop]]
+Reduce = Callable[[str | None], Plant]
+
+
+def _charted(key: str, label: str, make: Callable[[], Loop]) -> Variant:
+    try:
+        loop = make()
+        return Variant(key, label, loop, stability_chart(loop, decay=False))
+    except (NotApplicable, ModelError, ModesError, ChartError) as error:
+        return Variant(key, label, None, None, str(error))
+
+
+def _changes(device: Device, plant: Plant, reduce: Reduce) -> Iterator[Step]:
+    controller = device.controller
+
+    def computed(**changes: object) -> Loop:
+        return Loop(plant, replace(controller, **changes))  # type: ignore[arg-type]
+
+    yield "rigid-drives", "rigid drives", lambda: Loop(_rigid(plant, reduce), controller)
+    yield "half-period", "half the sampling period", lambda: Loop(plant, half_period(device))
+    yield "no-delay", "no delay", lambda: _unless(controller.delay == 0.0, "has no delay") or computed(delay=0.0)
+    yield (
+        "one-sample",
+        "one sample of delay",
+        lambda: _unless(controller.delay == 1.0, "has one sample of delay") or computed(delay=1.0),
+    )
+    bare = controller.velocity_filter is None
+    yield (
+        "no-filter",
+        "without the velocity filter",
+        lambda: _unless(bare, "has no velocity filter") or computed(velocity_filter=None),
+    )
+    usual = usual_filter(controller.sampling_period)
+    yield (
+        "with-filter",
+        f"with a second-order Butterworth filter of the velocity at {usual.cutoff_Hz:.4g} Hz",
+        lambda: _unless(not bare, "has a velocity filter") or computed(velocity_filter=usual),
+    )
+    own = "structural damping" if plant.stiffness.any() else "friction of its own"
+    yield (
+        "twice-damping",
+        f"twice the {own}",
+        lambda: _unless(not plant.damping.any(), f"has no {own}")
+        or Loop(replace(plant, damping=2.0 * plant.damping), controller),
+    )
+
+
+def _models(device: Device, plant: Plant, reduce: Reduce) -> Iterator[Step]:
+    """The models of Fig. 4.4: the full one, and what is left of it by and by."""
+
+    def of(name: str, *, damped: bool = True) -> Callable[[], Loop]:
+        def make() -> Loop:
+            reduced = reduce(name)
+            leave_out = not damped and bool(reduced.damping.any())
+            if name != "full" and reduced is reduce("full") and not leave_out:
+                raise NotApplicable("the device as described is this model")
+            if name == "motor-mass" and not damped and not leave_out:
+                raise NotApplicable("there is no damping to leave out")
+            kept = replace(reduced, damping=0.0 * reduced.damping) if leave_out else reduced
+            return Loop(kept, device.controller)
+
+        return make
+
+    full = "full model, all flexible coordinates" if device.mechanism is not None else "plant as given"
+    yield "model-full", full, of("full")
+    yield "model-two-mass", "two masses with damping", of("two-mass")
+    yield "model-motor-mass", "motor mass with damping", of("motor-mass")
+    yield "model-motor-mass-undamped", "motor mass without damping", of("motor-mass", damped=False)
+    yield "model-rigid-undamped", "rigid without damping", of("rigid", damped=False)
+
+
+def half_period(device: Device) -> Controller:
+    """The device's computer at twice the rate: a delay given in seconds stays, one given in samples shrinks."""
+    controller = device.controller
+    in_seconds = "delay_s" in device.document.get("loop", {})
+    delay = controller.delay * (2.0 if in_seconds else 1.0)
+    return replace(controller, sampling_period=controller.sampling_period / 2.0, delay=delay)
+
+
+def usual_filter(sampling_period: float) -> Butterworth:
+    """The filter tried where there is none: 20 Hz as in thesis 3.2.4, at most a tenth of Nyquist."""
+    return Butterworth(2, min(THESIS_CUTOFF_HZ, 0.05 / sampling_period))
+
+
+def _rigid(plant: Plant, reduce: Reduce) -> Plant:
+    if not plant.stiffness.any():
+        raise NotApplicable("its drives are rigid already")
+    return reduce("rigid")
+
+
+def _unless(condition: bool, reason: str) -> None:
+    if condition:
+        raise NotApplicable(f"the device {reason}")
