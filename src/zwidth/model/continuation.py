@@ -24,6 +24,7 @@ OUT_OF_REACH: Final = 1
 SINGULAR: Final = 2
 
 CONTRACTION: Final = 0.55  # of one correction by the next; on the edge of the workspace Newton gains a half each
+BRISK: Final = 0.1  # the same, far from any edge
 LARGEST_TURN: Final = 0.5  # of one joint in one step [rad]
 SMALLEST_STEP: Final = 2.0**-7  # of the straight way to the goal
 SINGULAR_CONDITION: Final = 1e-6  # below it the numbers of a posture lose their last ten digits
@@ -61,7 +62,7 @@ def correct(mech: Arrays, design: int, goal: Floats, angles: Floats, tolerance: 
     start, rows, gaps, solution = work.start, work.rows, work.gaps, work.solution
     m, count = rows.shape[0], gaps.size
     rounding = ROUNDING * mech.size[design]
-    last, moved, condition = 0.0, 0.0, 0.0
+    last, moved, slowest, condition = 0.0, 0.0, 0.0, 0.0
     for iteration in range(60):
         place(mech, design, angles, work)
         equations(mech, design, goal, work)
@@ -78,14 +79,18 @@ def correct(mech: Arrays, design: int, goal: Floats, angles: Floats, tolerance: 
         if not settled or size < last:
             turn(mech, angles, work)
         ratio = size / last if last > 0.0 else 1.0
+        if iteration > 0 and not settled:
+            slowest = max(slowest, ratio)
         if settled or size * ratio * ratio < tolerance:
             break
         last = size
     place(mech, design, angles, work)
     equations(mech, design, goal, work)
-    if orientation(start, rows, work.triangle, m, count) < 0.0:
-        return -1.0
+    # Newton knows nothing of the drives, and passes where they lose the handle without noticing
     if orientation(start, rows, work.triangle, m - mech.driven, count - 3) < 0.0:
+        return -1.0
+    # near a fold of its own equations it slows down; where it did not there was none
+    if slowest > BRISK and orientation(start, rows, work.triangle, m, count) < 0.0:
         return -1.0
     return condition
 
@@ -100,8 +105,7 @@ def follow(mech: Arrays, design: int, target: Floats, angles: Floats, work: Work
     """
     goal, trial = work.goal, work.trial
     n = trial.size
-    place(mech, design, angles, work)
-    begin = point(work.rotation, work.origin, mech.handle_link, mech.handle, design, 0)
+    begin = (0.0, 0.0, 0.0)
     done, step, condition = 0.0, 1.0, 1.0
     while done < 1.0:
         step = min(step, 1.0 - done)
@@ -112,6 +116,9 @@ def follow(mech: Arrays, design: int, target: Floats, angles: Floats, work: Work
             trial[i] = angles[i]
         condition = correct(mech, design, goal, trial, 1e-13 if final else 1e-6, work)
         if condition < 0.0:
+            if done == 0.0 and step == 1.0:
+                place(mech, design, angles, work)
+                begin = point(work.rotation, work.origin, mech.handle_link, mech.handle, design, 0)
             step *= 0.5
             if step < SMALLEST_STEP:
                 return OUT_OF_REACH

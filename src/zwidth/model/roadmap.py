@@ -1,6 +1,6 @@
 """All postures of an assembly, coarsely: a flood from the reference posture through the driven coordinates.
 
-A straight way from the reference to a goal may be blocked although the goal can be reached: a five-bar with
+A straight way from the reference to a goal may be blocked although the goal can be reached: a device with
 coincident base axes has a hole in the middle of its workspace. The flood goes round, because every node is
 reached from a neighbour one small turn of one drive away, closing the loops again and never passing a
 singularity. Newton then starts from the node nearest to the goal, which is also what makes batches fast.

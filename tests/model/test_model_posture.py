@@ -1,0 +1,369 @@
+"""Postures: reached or not, on which side of the singularities, alone and in batches."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from model_cases import (
+    KINDS,
+    NO_CLOSURES,
+    Z,
+    closures_of,
+    drives_on,
+    five_bar,
+    links_of,
+    planar_inertia,
+    random_five_bar,
+    random_rotation,
+    some_postures,
+    spatial_arm,
+    two_bar_angles,
+)
+from scipy import ndimage
+
+from zwidth.model.mechanism import Mechanism
+from zwidth.model.posture import (
+    OK,
+    OUT_OF_REACH,
+    SINGULAR,
+    LoopOpen,
+    OutOfReach,
+    Singular,
+    inertia_terms,
+    link_points,
+    solve_posture,
+)
+
+
+def same_angles(a, b, tolerance=1e-9):
+    return np.max(np.abs(np.exp(1j * a) - np.exp(1j * b))) < tolerance
+
+
+def paddle(length=0.1):
+    """One driven link that turns about z."""
+    return Mechanism(
+        links_of(["paddle"], [-1], [[0, 0, 0]], [Z], [0.1], [[0.05, 0, 0]], [planar_inertia(1e-4)], [length]),
+        NO_CLOSURES,
+        drives_on([0]),
+        0,
+        np.array([length, 0.0, 0.0]),
+        {"only": np.zeros(1)},
+        np.array([length, 0.0, 0.0]),
+        np.full((3, 2), np.nan),
+    )
+
+
+def four_bar():
+    """A crank that turns fully, its coupler carrying the handle: the handle moves on a closed curve."""
+    ground, crank, coupler, rocker = 0.12, 0.04, 0.11, 0.09
+    return Mechanism(
+        links_of(
+            ["crank", "coupler", "rocker"],
+            [-1, 0, -1],
+            [[0, 0, 0], [crank, 0, 0], [ground, 0, 0]],
+            [Z] * 3,
+            [0.1, 0.2, 0.15],
+            [[0.02, 0.001, 0], [0.05, 0.01, 0], [0.04, 0, 0]],
+            [planar_inertia(i) for i in (1e-4, 3e-4, 2e-4)],
+            [crank, coupler, rocker],
+        ),
+        closures_of(("rocker", 1, [coupler, 0, 0], 2, [rocker, 0, 0])),
+        drives_on([0]),
+        1,
+        np.array([0.05, 0.04, 0.0]),
+        {"open": np.array([1.0, -0.5, 1.9])},
+        np.array([0.0, 0.0, 0.0]),
+        np.full((3, 2), np.nan),
+    )
+
+
+# --- what can be reached ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_reachable_in_the_assembly_is_connected_with_the_reference(seed):
+    """Over a grid: a five-bar has closed-form postures, and an assembly is one connected piece of the plane.
+
+    The elbows' sides never change in it, and neither does the sign of the distal links' crossing angle.
+    """
+    rng = np.random.default_rng(seed)
+    mechanism = five_bar() if seed == 0 else random_five_bar(rng)
+    L1, L2, L3, L4 = mechanism.links.tip[:, 0]
+    half = mechanism.links.origin[0, 0]
+    axis = np.linspace(-0.42, 0.4202, 85)  # misses the base joints
+    x, y = np.meshgrid(axis, axis)
+    with np.errstate(invalid="ignore"):
+        one, two = two_bar_angles(L1, L2, half, (x, y), 1), two_bar_angles(L3, L4, -half, (x, y), -1)
+        q = np.concatenate([one, two])
+        crossing = np.sin(q[2] + q[3] - q[0] - q[1])
+    side = np.sign(np.sin(np.dot([-1, -1, 1, 1], mechanism.assemblies["outward"])))
+    allowed = crossing * side > 0
+    seed_cell = (np.argmin(np.abs(axis - 0.25)), np.argmin(np.abs(axis)))
+    # cells are joined more finely than the grid shows only near an edge: those are left out below
+    pieces = ndimage.label(allowed)[0]
+    inside = pieces == pieces[seed_cell]
+    clear = ndimage.binary_erosion(inside, iterations=2)
+    outside = ~ndimage.binary_dilation(inside, np.ones((3, 3)), iterations=2)
+
+    posture = solve_posture(mechanism, np.stack([x, y], axis=-1))
+    assert posture.status.shape == x.shape
+    assert clear.sum() > 500
+    assert (posture.status[clear] == OK).all()
+    assert (posture.status[outside] == OUT_OF_REACH).all()
+    reached = posture.status == OK
+    assert same_angles(posture.angles[reached], np.moveaxis(q, 0, -1)[reached], 1e-7)
+    assert np.isnan(posture.mass_matrix[~reached]).all()
+    assert np.isnan(posture.angles[~reached]).all()
+
+    # alone, a posture starts from the reference and not from a roadmap: it must end in the same place
+    for i, j in rng.choice(np.argwhere(clear | outside), 60):
+        if posture.status[i, j] == OK:
+            alone = solve_posture(mechanism, (x[i, j], y[i, j]))
+            assert same_angles(alone.angles, posture.angles[i, j])
+        else:
+            with pytest.raises(OutOfReach):
+                solve_posture(mechanism, (x[i, j], y[i, j]))
+
+
+def test_a_hole_in_the_workspace_is_gone_round():
+    """With both base axes in one place the handle cannot pass the middle; behind it it gets by going round."""
+    there = solve_posture(five_bar(), (0.0, -0.25))
+    here = solve_posture(five_bar(), (0.0, 0.25))
+    assert same_angles(there.angles[[0, 2]], here.angles[[0, 2]] + np.pi)
+    assert there.angles[[1, 3]] == pytest.approx(here.angles[[1, 3]], abs=1e-12)
+
+
+@pytest.mark.parametrize(("edge", "beyond"), [(0.147 + 0.199, 1), (0.199 - 0.147, -1)])
+@pytest.mark.parametrize("angle", [0.3, np.pi / 2, -2.0])
+def test_the_edge_of_the_workspace_is_singular_and_beyond_it_out_of_reach(edge, beyond, angle):
+    u = np.array([np.cos(angle), np.sin(angle)])
+    mechanism = five_bar()
+    with pytest.raises(Singular, match="singular with its handle at"):
+        solve_posture(mechanism, edge * u)
+    with pytest.raises(OutOfReach, match="cannot reach"):
+        solve_posture(mechanism, (edge + beyond * 1e-9) * u)
+    assert solve_posture(mechanism, (edge - beyond * 1e-9) * u).status == OK
+    batch = solve_posture(mechanism, np.array([edge + beyond * s for s in (-1e-6, 0, 1e-6)])[:, None] * u)
+    assert batch.status.tolist() == [OK, SINGULAR, OUT_OF_REACH]
+
+
+def test_where_the_drives_lose_the_handle_is_singular():
+    """Distal links in one line: the handle can move with the drives at rest."""
+    base, L1, L2 = 0.3, 0.1, 0.2
+    mechanism = replace(
+        five_bar(lengths=(L1, L2, L1, L2), base=base), reference_position=np.array([0.0, 0.15, 0.0])
+    )
+    # both elbows at height h above the base axes, a span of 2 L2 apart: distal links in line at height h
+    spread = (2 * L2 - base) / 2
+    height = np.sqrt(L1**2 - spread**2)
+    angles = {
+        "outward": np.concatenate(
+            [two_bar_angles(L1, L2, base / 2, (0, 0.15), 1), two_bar_angles(L1, L2, -base / 2, (0, 0.15), -1)]
+        )
+    }
+    mechanism = replace(mechanism, assemblies=angles)
+    with pytest.raises(Singular):
+        solve_posture(mechanism, (0.0, height))
+    assert solve_posture(mechanism, (0.0, height + 1e-4)).status == OK
+    with pytest.raises(OutOfReach):
+        solve_posture(mechanism, (0.0, height - 0.01))
+
+
+def test_a_goal_off_the_plane_is_out_of_reach():
+    assert solve_posture(five_bar(), np.array([[0, 0.25, 0], [0, 0.25, 1e-6]])).status.tolist() == [
+        OK,
+        OUT_OF_REACH,
+    ]
+
+
+def test_a_paddle_goes_all_the_way_round_and_nowhere_else():
+    angles = np.linspace(-np.pi, np.pi, 200, endpoint=False)
+    circle = 0.1 * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    posture = solve_posture(paddle(), circle)
+    assert (posture.status == OK).all()
+    assert same_angles(posture.angles[:, 0], angles)
+    assert solve_posture(paddle(), circle[20]).angles == pytest.approx(angles[20])
+    assert (solve_posture(paddle(), 1.001 * circle).status == OUT_OF_REACH).all()
+    assert posture.mass_matrix.ravel() == pytest.approx(1e-4 + 0.1 * 0.05**2)
+
+
+def test_a_four_bar_follows_its_coupler_curve():
+    """The reference position is not on the curve: the loops close with the handle where it must be."""
+    mechanism = four_bar()
+    with pytest.raises(OutOfReach):
+        solve_posture(mechanism, mechanism.reference_position)
+    curve, angles = [], []
+    for turn in np.linspace(0, 2 * np.pi, 60):
+        crank = 0.04 * np.exp(1j * turn)
+        to_base = 0.12 - crank
+        cosine = (abs(to_base) ** 2 + 0.11**2 - 0.09**2) / (2 * abs(to_base) * 0.11)
+        open_angle = np.angle(to_base) + np.arccos(cosine)
+        handle = crank + (0.05 + 0.04j) * np.exp(1j * open_angle)
+        curve.append([handle.real, handle.imag])
+        angles.append([turn, open_angle - turn])
+    posture = solve_posture(mechanism, curve)
+    assert (posture.status == OK).all()
+    assert same_angles(posture.angles[:, :2], np.array(angles))
+    alone = solve_posture(mechanism, curve[25])
+    assert same_angles(alone.angles, posture.angles[25])
+
+
+# --- batches ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_batch_equals_its_members(kind):
+    rng = np.random.default_rng(7)
+    mechanism = KINDS[kind](rng)
+    batch = some_postures(mechanism, rng, 70)
+    for k in (0, 33, 69):
+        alone = solve_posture(mechanism, batch.position[k])
+        assert alone.angles == pytest.approx(batch.angles[k], abs=1e-11)
+        assert alone.mass_matrix == pytest.approx(batch.mass_matrix[k], rel=1e-9)
+
+
+def test_parameter_sets_broadcast_with_positions():
+    """Five lengths of the driven arms times three positions, one set of positions behind the hole."""
+    lengths = np.linspace(0.13, 0.16, 5)
+    one = five_bar()
+    tip = np.broadcast_to(one.links.tip, (5, 1, 4, 3)).copy()
+    tip[:, 0, 0, 0] = tip[:, 0, 2, 0] = lengths
+    origin = np.broadcast_to(one.links.origin, (5, 1, 4, 3)).copy()
+    origin[:, 0, 1, 0] = origin[:, 0, 3, 0] = lengths
+    many = replace(one, links=replace(one.links, tip=tip, origin=origin))
+    positions = np.array([[0.02, 0.25], [0.05, -0.2], [0.5, 0.0]])
+    posture = solve_posture(many, positions)
+    assert posture.status.tolist() == [[OK, OK, OUT_OF_REACH]] * 5
+    terms = inertia_terms(many, posture, [1.0, -2.0])
+    places = link_points(many, posture)
+    for i, length in enumerate(lengths):
+        member = replace(
+            one,
+            links=five_bar(lengths=(length, 0.199, length, 0.199)).links,
+        )
+        for k in range(2):
+            alone = solve_posture(member, positions[k])
+            assert same_angles(posture.angles[i, k], alone.angles)
+            assert posture.mass_matrix[i, k] == pytest.approx(alone.mass_matrix, rel=1e-9)
+            assert terms[i, k] == pytest.approx(inertia_terms(member, alone, [1.0, -2.0]), rel=1e-9)
+            assert places.tip[i, k] == pytest.approx(link_points(member, alone).tip, abs=1e-12)
+    assert np.isnan(terms[:, 2]).all()
+
+
+def test_thousands_of_designs_at_one_position():
+    rng = np.random.default_rng(3)
+    designs = [random_five_bar(rng) for _ in range(40)]
+    links = {
+        name: np.stack([getattr(d.links, name) for d in designs])
+        for name in ("origin", "tip", "mass", "center_of_mass", "inertia")
+    }
+    many = replace(
+        designs[0],
+        links=replace(designs[0].links, **links),
+        closures=replace(
+            designs[0].closures,
+            point_a=np.stack([d.closures.point_a for d in designs]),
+            point_b=np.stack([d.closures.point_b for d in designs]),
+        ),
+        handle_point=np.stack([d.handle_point for d in designs]),
+        assemblies={"outward": np.stack([d.assemblies["outward"] for d in designs])},
+    )
+    posture = solve_posture(many, (0.01, 0.24))
+    assert posture.status.shape == (40,)
+    for p, design in enumerate(designs):
+        assert posture.mass_matrix[p] == pytest.approx(solve_posture(design, (0.01, 0.24)).mass_matrix, rel=1e-9)
+
+
+def test_link_points_close_the_loop():
+    mechanism = five_bar()
+    places = link_points(mechanism, solve_posture(mechanism, [(0.0, 0.25), (0.05, 0.2)]))
+    assert places.tip[:, 1] == pytest.approx(np.array([[0, 0.25, 0], [0.05, 0.2, 0]]), abs=1e-14)
+    assert places.tip[:, 3] == pytest.approx(places.tip[:, 1], abs=1e-14)
+    assert places.of(1, [0.199, 0, 0]) == pytest.approx(places.tip[:, 1])
+    assert places.origin[:, 1] == pytest.approx(places.tip[:, 0])
+
+
+# --- physics that needs no judge ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(2))
+def test_nonlinear_terms_are_lagranges(kind, seed):
+    """c_k = sum_ij (dM_ki/dp_j - dM_ij/dp_k / 2) p_i' p_j', with differences along the handle's motion.
+
+    Contracted with p' it is the power identity d/dt (p'^T M p' / 2) = p'^T c at p'' = 0.
+    """
+    rng = np.random.default_rng(seed)
+    mechanism = KINDS[kind](rng)
+    here = some_postures(mechanism, rng, 1)
+    d = here.jacobian.shape[-1]
+    rates = rng.uniform(-2, 2, d)
+    J, step = here.jacobian[0], 2e-4
+    plane = np.linalg.svd(J)[0][:, :d]  # an orthonormal basis of the handle's motions
+    ahead = np.array([-2, -1, 1, 2])
+    near = solve_posture(mechanism, here.position[0] + step * ahead[:, None, None] * plane.T)
+    along = np.tensordot(np.array([1, -8, 8, -1]) / (12 * step), near.mass_matrix, axes=1)  # dM/d(plane)
+    slope = np.einsum("eij,ek->kij", along, plane.T @ J)  # dM/dp_k
+    expected = np.einsum("jki,i,j->k", slope, rates, rates) - 0.5 * np.einsum("kij,i,j->k", slope, rates, rates)
+    terms = inertia_terms(mechanism, here, rates)[0]
+    assert terms == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_turning_the_base_turns_the_jacobian_and_nothing_else(kind):
+    rng = np.random.default_rng(11)
+    mechanism = KINDS[kind](rng)
+    R, shift = random_rotation(rng), rng.uniform(-0.2, 0.2, 3)
+    links = mechanism.links
+    roots = links.parent < 0
+    turned = replace(
+        mechanism,
+        links=replace(
+            links,
+            origin=np.where(roots[:, None], links.origin @ R.T + shift, links.origin),
+            rotation=np.where(roots[:, None, None], R @ links.rotation, links.rotation),
+        ),
+        reference_position=R @ mechanism.reference_position + shift,
+    )
+    postures = some_postures(mechanism, rng)
+    others = solve_posture(turned, postures.position @ R.T + shift)
+    assert others.angles == pytest.approx(postures.angles, abs=1e-11)
+    assert others.mass_matrix == pytest.approx(postures.mass_matrix, rel=1e-9, abs=1e-12)
+    assert others.jacobian == pytest.approx(R @ postures.jacobian, rel=1e-9, abs=1e-11)
+
+
+# --- questions without an answer ----------------------------------------------------------------------
+
+
+def test_a_loop_that_cannot_close_is_named_with_its_gap():
+    short = five_bar()
+    origin = short.links.origin.copy()
+    origin[2, 0] = -0.9  # 0.9 m between base joints, 0.692 m of links
+    with pytest.raises(LoopOpen, match=r"loop 'handle' does not close .*'outward': a gap of 0\.208 m"):
+        solve_posture(replace(short, links=replace(short.links, origin=origin)), (0.0, 0.25))
+
+
+def test_an_unknown_assembly_is_named():
+    with pytest.raises(ValueError, match="no assembly 'crossed'; it has 'outward'"):
+        solve_posture(five_bar(), (0, 0.25), "crossed")
+
+
+def test_drives_must_fit_the_freedom():
+    mechanism = five_bar()
+    with pytest.raises(ValueError, match="2 degrees of freedom but 1 drives"):
+        solve_posture(replace(mechanism, drives=drives_on([0])), (0, 0.25))
+    with pytest.raises(ValueError, match="do not determine the other joints"):
+        solve_posture(mechanism, (0, 0.25), "right")
+    arm = spatial_arm(np.random.default_rng(0))
+    with pytest.raises(ValueError, match="can rest while the drives move"):
+        solve_posture(replace(arm, handle_link=1, handle_point=np.zeros(3)), (0, 0, 0.1))
+
+
+@pytest.mark.parametrize("position", [0.25, [0.25], [0.0, 0.25, 0.0, 0.0]])
+def test_a_position_has_two_or_three_coordinates(position):
+    with pytest.raises(ValueError, match="two or three coordinates"):
+        solve_posture(five_bar(), position)
+
+
+def test_nan_is_out_of_reach_in_a_batch():
+    assert solve_posture(five_bar(), [[np.nan, 0.25], [0.0, 0.25]]).status.tolist() == [OUT_OF_REACH, OK]
