@@ -1,0 +1,174 @@
+"""`zwidth chart`: which walls are stable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from zwidth.show.cli.amount import amount, number
+from zwidth.show.cli.answer import Answer, deliver, sheet
+from zwidth.show.cli.options import Numbers, Question, about_a_device, as_json, example, output_option
+from zwidth.show.cli.place import heading
+from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
+
+if TYPE_CHECKING:
+    from zwidth.chart.chart import StabilityChart
+    from zwidth.device.device import Device
+
+KEYS: Final = (
+    "regions",
+    "boundary",
+    "stiffness_max_N_per_m",
+    "damping_at_stiffness_max_Ns_per_m",
+    "frequency_at_stiffness_max_Hz",
+    "frequencies_at_stiffness_max_Hz",
+    "damping_max_Ns_per_m",
+    "stable_area_N2s_per_m2",
+    "fastest_decay",
+    "unobserved_modes",
+)
+NO_WALL: Final = "no wall with positive stiffness and no negative damping is stable"
+
+Window = tuple[float, float, float, float]
+
+
+def _ordered(ctx: click.Context, param: click.Parameter, window: Window | None) -> Window | None:
+    if window and not (window[0] < window[1] and window[2] < window[3]):
+        raise click.BadParameter("needs KMIN < KMAX and BMIN < BMAX, such as 0,8000,0,30")
+    return window
+
+
+@click.command(
+    short_help="Find the walls that DEVICE renders stably.",
+    epilog=example(
+        "zwidth chart my-device.toml --at 0.1,0.2 --direction 0,1",
+        "zwidth chart my-device.toml --set loop.delay_samples=1 --output chart.svg",
+    ),
+)
+@about_a_device
+@click.option(
+    "--window",
+    type=Numbers("KMIN,KMAX,BMIN,BMAX", (4,), "0,8000,0,30"),
+    callback=_ordered,
+    help="Part of the chart that a figure shows; results are never clipped.",
+)
+@output_option("Write a figure (.png .svg .pdf) or the data (.csv: the boundary, .json).")
+@as_json
+def chart(question: Question, window: Window | None, output: str | None, as_json: bool) -> int:
+    """Find the walls that DEVICE renders stably: the exact chart of stiffness and damping."""
+    path = None if output is None else destination(output, FIGURES + DATA)
+    from zwidth.model.posture import PostureError
+
+    device = question.device()
+    try:
+        plant = question.plant(device)
+    except PostureError as error:
+        return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(error)), as_json)
+
+    from zwidth.chart.chart import stability_chart
+    from zwidth.chart.region import ChartError
+    from zwidth.loop.loop import Loop
+    from zwidth.model.modes import ModesError
+
+    try:
+        found = stability_chart(Loop(plant, device.controller))
+    except (ChartError, ModesError) as error:
+        nulls = question.facts(device) | dict.fromkeys(KEYS)
+        return deliver(Answer(nulls, reason=f"the chart is undecided: {error}"), as_json)
+    answer = _answer(question, device, found, path)
+    if path is not None:
+        _write(path, found, answer, window)
+    return deliver(answer, as_json)
+
+
+def numbers(chart: StabilityChart) -> dict[str, Any]:
+    """The chart under the keys of --json."""
+    frequencies = chart.frequencies_at_stiffness_max
+    return {
+        "regions": list(chart.regions),
+        "boundary": [
+            {"stiffness_N_per_m": arc.stiffness, "damping_Ns_per_m": arc.damping, "frequency_Hz": arc.frequency}
+            for arc in chart.boundary
+        ],
+        "stiffness_max_N_per_m": chart.stiffness_max,
+        "damping_at_stiffness_max_Ns_per_m": chart.damping_at_stiffness_max,
+        "frequency_at_stiffness_max_Hz": min(frequencies, default=None),
+        "frequencies_at_stiffness_max_Hz": frequencies or None,
+        "damping_max_Ns_per_m": chart.damping_max,
+        "stable_area_N2s_per_m2": chart.stable_area,
+        "fastest_decay": chart.fastest_decay
+        and {
+            "stiffness_N_per_m": chart.fastest_decay.stiffness,
+            "damping_Ns_per_m": chart.fastest_decay.damping,
+            "spectral_radius": chart.fastest_decay.spectral_radius,
+        },
+        "unobserved_modes": chart.unobserved_modes,
+    }
+
+
+def boundary_table(chart: StabilityChart) -> dict[str, list[Any]]:
+    """The stable set's edge as columns, its arcs one after another and counted from 0."""
+    arcs = chart.boundary
+    return {
+        "arc": [index for index, arc in enumerate(arcs) for _ in arc.stiffness],
+        "stiffness_N_per_m": list(chain.from_iterable(arc.stiffness.tolist() for arc in arcs)),
+        "damping_Ns_per_m": list(chain.from_iterable(arc.damping.tolist() for arc in arcs)),
+        "frequency_Hz": list(chain.from_iterable(arc.frequency.tolist() for arc in arcs)),
+    }
+
+
+def _answer(question: Question, device: Device, chart: StabilityChart, path: Path | None) -> Answer:
+    document = question.facts(device) | numbers(chart)
+    if path is not None:
+        document["file"] = str(path)
+
+    def pages() -> Iterator[Any]:
+        yield heading(question, device)
+        yield sheet(list(_rows(chart)))
+        if path is not None:
+            yield f"written: {path}"
+
+    reason = None if chart.stiffness_max == chart.stiffness_max else NO_WALL
+    return Answer(document, lambda: list(pages()), reason)
+
+
+def _rows(chart: StabilityChart) -> Iterator[tuple[str, str]]:
+    yield "largest stiffness", _stiffest(chart)
+    yield "largest damping", amount(chart.damping_max, "Ns/m")
+    yield "stable area", amount(chart.stable_area, "N²s/m²")
+    if chart.fastest_decay:
+        fastest = chart.fastest_decay
+        wall = f"{amount(fastest.stiffness, 'N/m')} and {amount(fastest.damping, 'Ns/m')}"
+        yield "fastest decay", f"at {wall}: spectral radius {number(fastest.spectral_radius)}"
+    if len(chart.regions) != 1:
+        yield "stable regions", f"{len(chart.regions)}"
+    if chart.unobserved_modes:
+        yield "moved by no wall", ", ".join(chart.unobserved_modes)
+
+
+def _stiffest(chart: StabilityChart) -> str:
+    if chart.stiffness_max != chart.stiffness_max:
+        return "none"
+    frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
+    return (
+        f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "
+        f"there it vibrates at {frequencies}"
+    )
+
+
+def _write(path: Path, chart: StabilityChart, answer: Answer, window: Window | None) -> None:
+    if path.suffix.lower() in DATA:
+        reason = {} if answer.reason is None else {"reason": answer.reason}
+        write_data(path, answer.document | reason, boundary_table(chart))
+        return
+    from zwidth.show.figures.stability import draw_chart
+    from zwidth.show.figures.style import figure, save
+
+    drawing, ax = figure()
+    draw_chart(ax, chart, window=window)
+    with replacing(path) as draft:
+        save(drawing, draft)

@@ -1,0 +1,59 @@
+"""What users are told when a command fails: one line per fault, and an exit code."""
+
+from __future__ import annotations
+
+import os
+import traceback
+
+import click
+
+from zwidth.device.faults import DeviceError
+from zwidth.show.cli.main import BAD_INPUT, INTERNAL, INTERRUPTED
+from zwidth.show.output import OutputError, shown
+
+DEBUG = "ZWIDTH_DEBUG"
+
+
+class BadInput(Exception):
+    """What was asked for cannot be meant; each line is one fault."""
+
+    def __init__(self, *lines: str) -> None:
+        self.lines = lines
+        super().__init__("\n".join(lines))
+
+
+def explain(error: Exception) -> tuple[list[str], int]:
+    """The lines for standard error, and the exit code."""
+    match error:
+        case DeviceError():
+            return [str(fault) for fault in error.faults], BAD_INPUT
+        case BadInput():
+            return [shown(line) for line in error.lines], BAD_INPUT
+        case OutputError():
+            return [str(error)], BAD_INPUT
+        case click.Abort():
+            return ["zwidth: interrupted"], INTERRUPTED
+        case click.ClickException():
+            return [_usage(error)], BAD_INPUT
+        case OSError() if not os.environ.get(DEBUG) and error.filename is None:
+            return [f"zwidth: standard output cannot be written: {error.strerror or error}"], BAD_INPUT
+        case _:
+            return _internal(error), INTERNAL
+
+
+def _usage(error: click.ClickException) -> str:
+    """A usage error on one line, with the command it happened in and the way to its help."""
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "zwidth"
+    text = shown(" ".join(error.format_message().split())).rstrip(".")
+    return f"{command}: {text[:1].lower() + text[1:]}; `{command} --help` shows what is allowed"
+
+
+def _internal(error: Exception) -> list[str]:
+    if os.environ.get(DEBUG):
+        return traceback.format_exception(error)
+    text = shown(" ".join(str(error).split()))[:300]
+    return [
+        f"zwidth: an error in zwidth itself ({type(error).__name__}: {text}); please report it with the "
+        f"command and the device file ({DEBUG}=1 shows the traceback)"
+    ]

@@ -1,0 +1,56 @@
+"""The commands under one name."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from zwidth import __version__
+from zwidth.show.cli.chart import chart
+from zwidth.show.cli.check import check
+from zwidth.show.cli.devices import devices
+from zwidth.show.cli.report import report
+from zwidth.show.cli.schema import schema
+from zwidth.show.cli.show import show
+
+EPILOG = """\b
+Example:
+  zwidth devices
+  zwidth chart my-device.toml --set loop.delay_samples=1
+
+Exit codes: 0 done; 1 the question has no answer; 2 bad input; 70 an error in zwidth; 130 interrupted."""
+
+
+@click.group(
+    epilog=EPILOG,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(__version__, prog_name="zwidth", message="%(prog)s %(version)s")
+@click.pass_context
+def zwidth(context: click.Context) -> None:
+    """Which virtual walls a haptic device can render, what limits them, and what to change."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+for command in (devices, schema, show, chart, check, report):
+    zwidth.add_command(command)
+
+
+def invoke(arguments: Sequence[str]) -> int:
+    """Run one command line; returns the exit code that the command chose.
+
+    Raises whatever the command raises: click's own `main` would print, and take over the exit code.
+    """
+    if os.environ.get("_ZWIDTH_COMPLETE"):  # a shell asks what could follow
+        zwidth.main(list(arguments), prog_name="zwidth")
+    try:
+        with zwidth.make_context("zwidth", list(arguments)) as context:
+            code: Any = zwidth.invoke(context)
+    except click.exceptions.Exit as leaving:
+        return int(leaving.exit_code)
+    return int(code or 0)

@@ -1,0 +1,75 @@
+"""The command `zwidth`: what happens round every command, and the exit code.
+
+0 done; 1 the question has no answer; 2 bad input; 70 an error in zwidth; 130 interrupted.
+
+Nothing is imported here that could not be interrupted quietly: the commands come inside `run`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+
+DONE, NO_ANSWER, BAD_INPUT, INTERNAL, INTERRUPTED = 0, 1, 2, 70, 130
+
+
+def main() -> None:
+    """Run the command line of this process and leave with its exit code."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line; results go to standard output, messages to standard error. Returns the exit code."""
+    try:
+        with suppress(AttributeError, ValueError):  # replaced or closed streams
+            for stream in (sys.stdout, sys.stderr):
+                stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+        from zwidth.show.cli.errors import explain
+    except KeyboardInterrupt:
+        return interrupted()
+    try:
+        from zwidth.show.cli.group import invoke
+
+        code = invoke(arguments)
+        if sys.stdout:
+            sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return interrupted()
+    except BrokenPipeError:  # the reader has seen enough
+        _drop_output()
+        return DONE
+    except Exception as error:
+        lines, code = explain(error)
+        say(*lines)
+        _drop_output()
+        return code
+
+
+def interrupted() -> int:
+    """What an interruption comes to."""
+    say("zwidth: interrupted; nothing was left half-written")
+    return INTERRUPTED
+
+
+def say(*lines: str) -> None:
+    """Lines on standard error, if anybody listens."""
+    with suppress(OSError, ValueError):
+        for line in lines:
+            print(line, file=sys.stderr)
+
+
+def _drop_output() -> None:
+    """Send what standard output still holds to nowhere if it cannot be written, or Python complains at its end."""
+    try:
+        if sys.stdout:
+            sys.stdout.flush()
+    except (OSError, ValueError):
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+if __name__ == "__main__":
+    main()

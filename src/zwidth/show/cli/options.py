@@ -1,0 +1,177 @@
+"""What is asked on the command line: the device, its posture, the direction, the model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from zwidth.show.cli.errors import BadInput
+
+if TYPE_CHECKING:
+    from zwidth.device.device import Device
+    from zwidth.model.plant import Plant
+
+    ParamType = click.ParamType[Any]
+else:
+    ParamType = click.ParamType  # generic in newer releases only
+
+MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
+AS_GIVEN: Final = "as given"
+
+Command = Callable[..., int]
+
+
+@dataclass(frozen=True)
+class Question:
+    """A device and the circumstances it is asked about, as typed; None where left out."""
+
+    name: str
+    settings: tuple[str, ...] = ()
+    at: tuple[float, ...] | None = None
+    direction: tuple[float, ...] | None = None
+    assembly: str | None = None
+    model: str | None = None
+
+    def device(self) -> Device:
+        """The device, loaded and checked. Raises DeviceError."""
+        from zwidth.device.load import load
+
+        return load(self.name, self.settings)
+
+    def plant(self, device: Device) -> Plant:
+        """The rendered direction's dynamics.
+
+        Raises  DeviceError, BadInput  where device, posture, direction or model cannot be meant
+                PostureError           where the posture does not exist
+        """
+        from zwidth.model.reduction import ModelError
+
+        try:
+            return device.plant(self.at, self.direction, self.assembly, self.model)
+        except ModelError as error:
+            raise BadInput(f"{self.name}: model {self.model_of(device)}: {error}") from None
+
+    def model_of(self, device: Device) -> str:
+        """The model's name, also where none was asked for."""
+        return self.model or ("full" if device.mechanism else AS_GIVEN)
+
+    def facts(self, device: Device) -> dict[str, Any]:
+        """Name, place and sampling as a result states them; null where inapplicable."""
+        from zwidth.device.build import in_space
+
+        mechanism = device.mechanism is not None
+        return {
+            "name": device.name,
+            "device": self.name,
+            "position_m": in_space(self.at) if self.at else device.reference_position,
+            "direction": device.direction(self.direction) if mechanism else None,
+            "assembly": self.assembly or device.reference_assembly,
+            "model": self.model_of(device),
+            "sampling_period_s": device.controller.sampling_period,
+            "delay_samples": device.controller.delay,
+        }
+
+
+class Numbers(ParamType):
+    """Numbers with commas between them: 0.1,-0.25."""
+
+    name = "numbers"
+
+    def __init__(self, shape: str, lengths: tuple[int, ...], example: str) -> None:
+        self.shape, self.lengths, self.example = shape, lengths, example
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        return self.shape
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, tuple):
+            return value
+        try:
+            numbers = tuple(float(part) for part in value.split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) not in self.lengths or not all(map(math.isfinite, numbers)):
+            count = " or ".join(map(str, self.lengths))
+            self.fail(f"must be {count} finite numbers such as {self.example}, got {value!r}", param, ctx)
+        return numbers
+
+
+class Finite(ParamType):
+    """One finite number."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            self.fail(f"must be a finite number, got {value!r}", param, ctx)
+        return number
+
+
+def _operator(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
+    if value not in (None, "none"):
+        raise click.BadParameter(f"an operator is not supported yet; leave it out or use none, got {value!r}")
+
+
+def _axis(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
+    if value is not None:
+        raise click.BadParameter("moments about an axis are not supported yet; use --direction")
+
+
+def about_a_device(command: Command) -> Command:
+    """Give a command DEVICE and the options that say what of it is meant, as one `Question`."""
+    decorators = [
+        click.argument("device", metavar="DEVICE"),
+        click.option(
+            "--at", type=Numbers("X,Y[,Z]", (2, 3), "0.1,0.25"), help="Posture, by the handle's position [m]."
+        ),
+        click.option("--assembly", metavar="NAME", help="Way of assembling the mechanism."),
+        click.option(
+            "--direction",
+            type=Numbers("DX,DY[,DZ]", (2, 3), "0,1"),
+            help="Rendered direction, of any length.",
+        ),
+        click.option(
+            "--model",
+            type=click.Choice(MODELS),
+            help="How much of the device is modelled. Default: full; a [plant] as it is given.",
+        ),
+        click.option("--operator", metavar="none", callback=_operator, expose_value=False, help="No operator."),
+        click.option("--axis", hidden=True, callback=_axis, expose_value=False),
+        click.option(
+            "--set",
+            "settings",
+            metavar="PATH=VALUE",
+            multiple=True,
+            help="Change a number of the device file; repeatable. PATH=unset removes it.",
+        ),
+    ]
+
+    @wraps(command)
+    def asked(device: str, at: Any, assembly: Any, direction: Any, model: Any, settings: Any, **more: Any) -> int:
+        return command(Question(device, settings, at, direction, assembly, model), **more)
+
+    for decorate in reversed(decorators):
+        asked = decorate(asked)
+    return asked
+
+
+def output_option(what: str) -> Callable[[Command], Command]:
+    """`--output FILE`, with what its ending may be."""
+    return click.option("--output", metavar="FILE", help=what)
+
+
+as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+
+
+def example(*lines: str) -> str:
+    """An epilog with example command lines, kept as they are."""
+    return "\b\nExample:\n" + "\n".join(f"  {line}" for line in lines)

@@ -1,0 +1,63 @@
+"""`zwidth report`: everything a designer wants to know, in one file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from zwidth.show.cli.answer import Answer, deliver
+from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
+from zwidth.show.output import destination, replacing
+
+PAGE: Final = (".html", ".htm")
+
+
+@click.command(
+    short_help="Write a report on DEVICE as an HTML file.",
+    epilog=example("zwidth report my-device.toml", "zwidth report my-device.toml --at 0.1,0.2 --output here.html"),
+)
+@about_a_device
+@output_option("Where to write it (.html). Default: NAME-report.html in this folder.")
+@as_json
+def report(question: Question, output: str | None, as_json: bool) -> int:
+    """Write a report on DEVICE: its chart, what limits it, what to change; one HTML file that also prints."""
+    path = destination(output or default_name(question.name), PAGE)
+    from zwidth.chart.region import ChartError
+    from zwidth.model.modes import ModesError
+    from zwidth.model.posture import PostureError
+
+    device = question.device()
+    try:
+        question.plant(device)
+        found = _written(question, device, path)
+    except PostureError as error:
+        return deliver(Answer(question.facts(device) | {"file": None}, reason=str(error)), as_json)
+    except (ChartError, ModesError) as error:
+        nulls = question.facts(device) | {"file": None}
+        return deliver(Answer(nulls, reason=f"the chart is undecided: {error}"), as_json)
+    document = question.facts(device) | found | {"file": str(path)}
+    return deliver(Answer(document, lambda: [f"written: {path}"]), as_json)
+
+
+def default_name(device: str) -> str:
+    """The report's name from the device's name or file."""
+    return f"{Path(device).name.removesuffix('.toml')}-report.html"
+
+
+def _written(question: Question, device: Any, path: Path) -> dict[str, Any]:
+    """Write the report; the numbers in it."""
+    from zwidth.show.report.report import write_report
+
+    with replacing(path) as draft:
+        return dict(
+            write_report(
+                device,
+                draft,
+                at=question.at,
+                direction=question.direction,
+                assembly=question.assembly,
+                model=question.model,
+            )
+        )

@@ -1,0 +1,176 @@
+"""`zwidth show`: the device at a posture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from zwidth.show.cli.amount import amount, number
+from zwidth.show.cli.answer import Answer, deliver, sheet, table
+from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
+from zwidth.show.cli.place import heading
+from zwidth.show.output import DATA, destination, plain, write_data
+
+if TYPE_CHECKING:
+    from zwidth.device.device import Device
+    from zwidth.model.effective import EffectiveParameters
+    from zwidth.model.mechanism import Mechanism
+    from zwidth.model.plant import Plant
+    from zwidth.model.posture import Posture
+
+KEYS: Final = (
+    "link_side_mass_kg",
+    "motor_side_mass_kg",
+    "rigid_mass_kg",
+    "stiffness_N_per_m",
+    "natural_frequencies_Hz",
+    "damping_ratios",
+    "joints_rad",
+    "jacobian",
+    "mass_matrix",
+    "manipulability",
+    "dynamic_manipulability",
+    "isotropy",
+    "sources",
+)
+
+
+@click.command(
+    short_help="Show masses, stiffness, frequencies and dexterity of DEVICE.",
+    epilog=example("zwidth show my-device.toml", "zwidth show my-device.toml --at 0.1,0.2 --direction 1,0 --json"),
+)
+@about_a_device
+@output_option("Write the numbers (.csv .json).")
+@as_json
+def show(question: Question, output: str | None, as_json: bool) -> int:
+    """Show DEVICE at a posture: masses and stiffness felt along the direction, frequencies, dexterity."""
+    path = None if output is None else destination(output, DATA)
+    from zwidth.model.posture import PostureError
+
+    device = question.device()
+    try:
+        plant = question.plant(device)
+        posture = device.posture(question.at, question.assembly) if device.mechanism else None
+    except PostureError as error:
+        return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(error)), as_json)
+    document = question.facts(device) | _numbers(question, device, plant, posture)
+    if path is not None:
+        write_data(path, document, flat(document))
+        document["file"] = str(path)
+    return deliver(Answer(document, lambda: list(_pages(question, device, document))), as_json)
+
+
+def flat(document: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Every single value of a document with its dotted key, in the columns `key` and `value`."""
+    entries = list(_entries(plain(document), ""))
+    return {"key": [key for key, _ in entries], "value": [value for _, value in entries]}
+
+
+def _entries(value: Any, key: str) -> Iterator[tuple[str, Any]]:
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
+    if inner is None:
+        yield key, value
+        return
+    for step, part in inner:
+        yield from _entries(part, f"{key}.{step}" if key else str(step))
+
+
+def _numbers(question: Question, device: Device, plant: Plant, posture: Posture | None) -> dict[str, Any]:
+    """What --json shows beyond the facts; None where inapplicable."""
+    from zwidth.model.effective import effective_parameters
+    from zwidth.model.modes import natural_frequencies
+    from zwidth.model.reduction import plant_effective_parameters
+
+    mechanism = device.mechanism
+    if mechanism is not None and posture is not None:
+        felt = effective_parameters(mechanism, posture, device.direction(question.direction))
+        dexterity = _dexterity(mechanism, posture)
+    else:
+        assert device.given_plant is not None
+        felt = plant_effective_parameters(device.given_plant)
+        dexterity = {}
+    return (
+        dict.fromkeys(KEYS)
+        | _felt(felt)
+        | {"natural_frequencies_Hz": natural_frequencies(plant), "damping_ratios": _damping_ratios(plant)}
+        | dexterity
+        | {"sources": device.sources}
+    )
+
+
+def _felt(felt: EffectiveParameters) -> dict[str, Any]:
+    return {
+        "link_side_mass_kg": felt.link_side_mass,
+        "motor_side_mass_kg": felt.motor_side_mass,
+        "rigid_mass_kg": felt.rigid_mass,
+        "stiffness_N_per_m": felt.stiffness,
+    }
+
+
+def _dexterity(mechanism: Mechanism, posture: Posture) -> dict[str, Any]:
+    import numpy as np
+
+    from zwidth.measures.dexterity import dynamic_manipulability, isotropy, manipulability
+
+    drives = mechanism.drives
+    rotors = np.diag(drives.transmission**2 * drives.motor_inertia)
+    J, M = posture.jacobian, posture.mass_matrix
+    return {
+        "joints_rad": dict(zip(mechanism.links.names, posture.angles.tolist(), strict=True)),
+        "jacobian": J,
+        "mass_matrix": M,
+        "manipulability": manipulability(J),
+        "dynamic_manipulability": dynamic_manipulability(J, M + rotors),
+        "isotropy": isotropy(J),
+    }
+
+
+def _damping_ratios(plant: Plant) -> list[float | None] | None:
+    """Damping ratio a/w of each natural frequency, None for rigid ones; None where damping couples modes."""
+    from zwidth.model.modes import real_modes
+
+    modes = real_modes(plant)
+    if modes is None:
+        return None
+    pairs = zip(modes.decay.tolist(), modes.frequency_squared.tolist(), strict=True)
+    return [a / squared**0.5 if squared > 0.0 else None for a, squared in pairs]
+
+
+def _pages(question: Question, device: Device, document: Mapping[str, Any]) -> Iterator[Any]:
+    found = plain(document)
+    yield heading(question, device)
+    yield sheet(
+        [
+            ("link side", amount(found["link_side_mass_kg"], "kg")),
+            ("motor side", amount(found["motor_side_mass_kg"], "kg")),
+            ("both, rigid", amount(found["rigid_mass_kg"], "kg")),
+            ("stiffness between", amount(found["stiffness_N_per_m"], "N/m")),
+            ("natural frequencies", ", ".join(_modes(found))),
+        ]
+    )
+    if found["joints_rad"]:
+        yield sheet(
+            [
+                ("manipulability", number(found["manipulability"])),
+                ("dynamic manipulability", number(found["dynamic_manipulability"])),
+                ("isotropy (1 is best)", number(found["isotropy"])),
+            ]
+        )
+        yield table(
+            ["joint", "angle [rad]"], [(name, f"{angle:.4f}") for name, angle in found["joints_rad"].items()]
+        )
+    if found["sources"]:
+        yield table(["numbers", "source"], list(found["sources"].items()))
+    if "file" in found:
+        yield f"written: {found['file']}"
+
+
+def _modes(found: Mapping[str, Any]) -> Iterator[str]:
+    frequencies = found["natural_frequencies_Hz"]
+    for frequency, ratio in zip(frequencies, found["damping_ratios"] or [None] * len(frequencies), strict=True):
+        if frequency is None:
+            yield "unstable"
+        else:
+            yield amount(frequency, "Hz") + (f" ({100.0 * ratio:.3g} %)" if ratio is not None else "")

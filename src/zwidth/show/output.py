@@ -1,0 +1,135 @@
+"""Results as JSON and CSV, and files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import secrets
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final
+
+DATA: Final = (".csv", ".json")
+FIGURES: Final = (".png", ".svg", ".pdf")
+LATER: Final = (".nc", ".mat")
+
+
+class OutputError(Exception):
+    """A file, or standard output, cannot be written; the text says which, why, and what to do."""
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON's own types: arrays become lists, and what is not finite null.
+
+    >>> plain({"radius": float("nan"), "box": (0.0, 1.0)})
+    {'radius': None, 'box': [0.0, 1.0]}
+    """
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    if hasattr(value, "tolist"):  # a NumPy array or number, known without importing NumPy
+        return plain(value.tolist())
+    return value
+
+
+def json_text(document: Mapping[str, Any]) -> str:
+    """One strict JSON object, each of its keys on a line of its own."""
+    items = plain(document).items()
+    lines = [f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in items]
+    return "{\n" + ",\n".join(lines) + "\n}\n" if lines else "{}\n"
+
+
+def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
+    """A table with a header line; numbers with all their digits, what is not finite left empty.
+
+    columns  name -> values (k,), all of one length
+    """
+    rows = zip(*(plain(values) for values in columns.values()), strict=True)
+    return "".join(",".join(map(_cell, row)) + "\n" for row in [tuple(columns), *rows])
+
+
+def _cell(value: Any) -> str:
+    text = "" if value is None else value if isinstance(value, str) else repr(value)
+    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\r\n') else text
+
+
+def destination(file: str | os.PathLike[str], kinds: Collection[str]) -> Path:
+    """Where a result will be written, found writable before anything is computed.
+
+    kinds    endings that this result can be written as, in lower case with their dot
+    Returns  the path, links followed, so that the file a link points to is replaced and not the link
+    Raises   OutputError  for another ending, a missing folder, a directory, a device, a lack of permission
+    """
+    name = os.fspath(file)
+    ending = Path(name).suffix.lower()
+    if ending not in kinds:
+        later = f"{ending} is not supported yet: the name " if ending in LATER else ""
+        raise OutputError(f"{shown(name)}: {later}must end in {' or '.join(kinds)}")
+    try:
+        path = Path(os.path.realpath(name))
+        _check_place(path, name)
+        probe = _beside(path)
+        os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        probe.unlink()
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        raise _failed(name, error) from None
+    return path
+
+
+def _check_place(path: Path, name: str) -> None:
+    if path.is_dir():
+        raise OutputError(f"{shown(name)}: is a directory; name a file in it")
+    if not path.parent.is_dir():
+        raise OutputError(f"{shown(name)}: there is no folder {shown(str(path.parent))}; make it first")
+    if path.exists() and not path.is_file():
+        raise OutputError(f"{shown(name)}: is no ordinary file; name another")
+    if path.exists() and not os.access(path, os.W_OK):
+        raise OutputError(f"{shown(name)}: cannot be written: permission denied; name another file")
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A new file beside `path`, with the same ending, that takes its place if the block ends well.
+
+    Whatever interrupts the block, what stood at `path` before stays as it was and nothing else is left.
+    Raises OutputError  where the system refuses to write
+    """
+    draft = _beside(path)
+    try:
+        yield draft
+        os.replace(draft, path)
+    except OSError as error:
+        raise _failed(str(path), error) from None
+    finally:
+        with suppress(OSError):
+            draft.unlink()
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole or not at all."""
+    with replacing(path) as draft:
+        draft.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_data(path: Path, document: Mapping[str, Any], table: Mapping[str, Sequence[Any]]) -> None:
+    """The document as .json, or the table as .csv."""
+    write_text(path, json_text(document) if path.suffix.lower() == ".json" else csv_text(table))
+
+
+def shown(text: str) -> str:
+    """Text from outside with everything unprintable made visible, so that it stays on its line."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape", "replace").decode() for c in text)
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}")
+
+
+def _failed(name: str, error: Exception) -> OutputError:
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return OutputError(f"{shown(name)}: cannot be written: {reason[:1].lower() + reason[1:]}; name another file")
