@@ -1,0 +1,79 @@
+"""Passivity of any sampled wall by Colgate and Schenkel's theorem, over frequency.
+
+With a wall H = z^-l (K + B w(z)) and t = wT the theorem's right-hand side is linear in K and B,
+
+    b > K S(t) + B V(t)
+    S = (T/2) sin((l + 1/2) t) / sin(t/2)
+    V = T Re{ (1 - e^-jt) e^-jlt w(e^jt) } / (4 sin^2(t/2))
+
+so that the passive walls are a convex set, an intersection of half planes, one for each frequency.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.loop.loop import Loop
+
+Floats = NDArray[np.float64]
+
+# Frequencies tried: enough for a relative error below 1e-6 (see the tests); low ones for low cutoffs.
+ANGLES = np.unique(np.concatenate([np.geomspace(1e-6, np.pi, 1500), np.linspace(0.0, np.pi, 3001)[1:]]))
+
+
+@dataclass(frozen=True)
+class PassiveSet:
+    """The half planes b > K S + B V of a device damping b [N s/m]; spring S and damper V are (k,)."""
+
+    device_damping: float
+    spring: Floats
+    damper: Floats
+
+    def stiffness_limit(self, wall_damping: ArrayLike) -> Floats:
+        """Largest passive stiffness at dampings B (...) [N/m]; 0 where no K > 0 is passive."""
+        B = np.asarray(wall_damping, dtype=float)
+        room = self.device_damping - B[..., None] * self.damper
+        push, pull = self.spring > 0.0, self.spring < 0.0
+        low = np.max(room[..., pull] / self.spring[pull], axis=-1, initial=0.0)
+        high = np.min(room[..., push] / self.spring[push], axis=-1)
+        level = np.all(room[..., self.spring == 0.0] >= 0.0, axis=-1)
+        return np.asarray(np.where((high > low) & level, high, 0.0))
+
+    def largest(self) -> tuple[float, float]:
+        """Largest passive stiffness over B >= 0 and its damping, by ternary search: the limit is concave in B."""
+        if not self.device_damping > 0.0:
+            return 0.0, 0.0
+        low, high = 0.0, self.device_damping / float(np.max(self.damper))
+        for _ in range(80):
+            left, right = low + (high - low) / 3.0, high - (high - low) / 3.0
+            first, second = self.stiffness_limit(np.array([left, right]))
+            # on a level top the least damping is preferred, beyond the set (0) the way back
+            low, high = (left, high) if second > first else (low, right)
+        at = np.array([0.0, low, high])
+        limits = self.stiffness_limit(at)
+        best = int(np.argmax(limits))
+        return float(limits[best]), float(at[best])
+
+
+def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
+    """The passive walls of a loop's period, whole delay and velocity estimate on a mass with friction b.
+
+    Raises  ValueError  if the delay is not a whole number of samples: the theorem holds a sample for a whole
+                        period
+    """
+    if loop.fractional_delay > 0.0:
+        raise ValueError(
+            f"passivity is known for delays of whole samples, got delay {loop.controller.delay:g}; round it up"
+        )
+    t, l, T = ANGLES, loop.whole_delay, loop.period
+    sine = np.sin(t / 2.0)
+    d = 2.0 * sine * (1j * np.cos(t / 2.0) - sine)  # e^jt - 1 without cancellation
+    w = np.ones_like(d)
+    for numerator, denominator in zip(loop.estimator.numerator, loop.estimator.denominator, strict=True):
+        w = w * np.polyval(numerator, d) / np.polyval(denominator, d)
+    spring = T / 2.0 * np.sin((l + 0.5) * t) / sine
+    damper = np.real(d * np.exp(-1j * (l + 1) * t) * w) * T / (4.0 * sine**2)
+    return PassiveSet(device_damping, spring, damper)

@@ -1,0 +1,56 @@
+"""One rigid mass without friction under a wall that acts one sample late: the thesis's section 4.1.1."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+LARGEST_D = 2.0 * (np.sqrt(2.0) - 1.0)
+# At the tip of (4.32) dp/dd = 0 leaves the cubic d^3 - 22 d^2 + 28 d - 8 = 0; its middle root by
+# Viete's cosine. The largest p follows from the edge's own derivative, p d + 3 d^2 + 8 d - 4 = 0.
+TIP_D = (22.0 + 40.0 * np.cos((np.arccos(0.998) + 2.0 * np.pi) / 3.0)) / 3.0
+TIP_P = (4.0 - 8.0 * TIP_D - 3.0 * TIP_D**2) / TIP_D
+
+
+def stiffness_limit(wall_damping: ArrayLike, mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
+    """Supremum of the stable stiffnesses K > 0 at a damping B, the force one sample late.
+
+        0 < p < ( (2 + d) sqrt(36 - 20 d + d^2) - 12 - d^2 ) / 4                         (thesis eq. 4.32)
+              = 4 d (4 - 4 d - d^2) / ( (2 + d) sqrt(36 - 20 d + d^2) + 12 + d^2 )
+
+    with p = K T^2/m, d = B T/m; the second form keeps its digits for small d. Exact for one free mass without
+    physical damping or velocity filter, delayed by exactly one sample.
+
+    wall_damping     (...)  B [N s/m], any sign
+    mass             (...)  m [kg], positive
+    sampling_period  (...)  T [s], positive
+    Returns          (...)  [N/m], all broadcast; 0 where no K > 0 is stable: B <= 0, B >= 2 (sqrt 2 - 1) m/T
+    """
+    B, m, T = (np.asarray(value, dtype=float) for value in (wall_damping, mass, sampling_period))
+    d = B * T / m
+    inside = (d > 0.0) & (d < LARGEST_D)
+    safe = np.where(inside, d, 0.0)
+    root = (2.0 + safe) * np.sqrt(36.0 - 20.0 * safe + safe**2)
+    p = 4.0 * safe * (4.0 - 4.0 * safe - safe**2) / (root + 12.0 + safe**2)
+    # at the largest damping rounding leaves a trace of either sign
+    return np.asarray(np.maximum(p, 0.0) * m / T**2 + 0.0 * np.abs(d))
+
+
+def largest_stiffness(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
+    """Largest stiffness of (4.32): 0.144469 m/T^2 (thesis eq. 5.6) [N/m], (...).
+
+    Misprint: below (4.32) the thesis repeats the numbers without delay (0.686 at 0.828).
+    """
+    return np.asarray(TIP_P * np.asarray(mass) / np.asarray(sampling_period) ** 2)
+
+
+def damping_at_largest_stiffness(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
+    """Its damping: 0.424694 m/T [N s/m], (...); not in the thesis, which misprints it as 0.828."""
+    return np.asarray(TIP_D * np.asarray(mass) / np.asarray(sampling_period))
+
+
+def largest_damping(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
+    """Largest stable damping for K -> 0: 2 (sqrt 2 - 1) m/T = 0.828 m/T (thesis eq. 5.6) [N s/m], (...)."""
+    return np.asarray(LARGEST_D * np.asarray(mass) / np.asarray(sampling_period))
