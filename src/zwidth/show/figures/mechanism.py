@@ -45,7 +45,7 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
     ax.grid(color="#E4E4E4", linewidth=0.5)
     ax.set_axisbelow(True)
     for axis, k in zip((ax.xaxis, ax.yaxis), flat, strict=True):
-        label(axis, AXES[k], "m")
+        label(axis, AXES[k], "m", plain=True)
     legend_beside(ax)
 
 

@@ -66,7 +66,8 @@ def draw_chain(ax: Axes, plant: Plant, chain: Chain) -> None:
             _joined(ax, start, start + GAP, float(chain.stiffness[i]), float(chain.damping[i]))
             if i in (0, n):
                 _ground(ax, start if i == 0 else start + GAP)
-    ax.set_xlim(-0.3, left[-1] + WIDTH + GAP + 0.3)
+    ends = chain.stiffness[[0, n]] + chain.damping[[0, n]] > 0.0
+    ax.set_xlim(left[0] - GAP * ends[0] - 0.3, left[-1] + WIDTH + GAP * ends[1] + 0.3)
     ax.set_ylim(-HALF - 1.0, HALF + 0.7)
     ax.set_aspect("equal")
     ax.set_axis_off()

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from html import escape
 from io import StringIO
 from pathlib import Path
@@ -24,6 +23,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter
 
 from zwidth.show.figures.units import MINUS, PREFIXES, exponent_of
+from zwidth.show.output import replacing
 
 BLACK: Final = "#000000"
 BLUE: Final = "#0072B2"
@@ -80,8 +80,8 @@ def figure(width: float = 5.6, height: float = 3.9) -> tuple[Figure, Axes]:
 def save(made: Figure, path: str | os.PathLike[str]) -> Path:
     """Write a figure as .png, .svg or .pdf, whole or not at all, without dates.
 
-    Raises  ValueError  for another extension
-            OSError     where the file cannot be written; what stood there before still stands
+    Raises  ValueError   for another extension
+            OutputError  (show.output) where the file cannot be written; what stood there before still stands
     """
     target = Path(path)
     kind = target.suffix.lower()
@@ -92,19 +92,8 @@ def save(made: Figure, path: str | os.PathLike[str]) -> Path:
         ".svg": {"Date": None, "Creator": "zwidth"},
         ".pdf": {"CreationDate": None, "ModDate": None, "Creator": "zwidth", "Producer": None},
     }[kind]
-    handle, name = tempfile.mkstemp(suffix=kind, prefix=".zwidth-", dir=target.parent)
-    os.close(handle)
-    try:
-        with context():
-            made.savefig(name, format=kind[1:], metadata=undated)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)
-        os.replace(name, target)
-    except BaseException:
-        with suppress(OSError):
-            os.unlink(name)
-        raise
+    with replacing(target) as draft, context():
+        made.savefig(draft, format=kind[1:], metadata=undated)
     return target
 
 
@@ -137,13 +126,13 @@ class Prefixed(Formatter):
     The prefix follows the view: it is chosen anew whenever the figure is drawn.
     """
 
-    def __init__(self, axis: Axis, name: str, unit: str) -> None:
-        self.of, self.name, self.unit = axis, name, unit
+    def __init__(self, axis: Axis, name: str, unit: str, *, plain: bool = False) -> None:
+        self.of, self.name, self.unit, self.plain = axis, name, unit, plain
         self.exponent, self.decimals = 0, 0
 
     def set_locs(self, locs: Sequence[float]) -> None:
         low, high = sorted(self.of.get_view_interval())
-        self.exponent = exponent_of(max(abs(low), abs(high)))
+        self.exponent = 0 if self.plain else exponent_of(max(abs(low), abs(high)))
         inside = sorted({round(x / 10.0**self.exponent, 9) for x in locs if low <= x <= high})
         self.decimals = next((d for d in range(7) if all(abs(x - round(x, d)) < 1e-7 for x in inside)), 6)
         self.of.set_label_text(f"{self.name} [{PREFIXES[self.exponent]}{self.unit}]")
@@ -152,9 +141,9 @@ class Prefixed(Formatter):
         return f"{x / 10.0**self.exponent + 0.0:.{self.decimals}f}".replace("-", MINUS)
 
 
-def label(axis: Axis, name: str, unit: str) -> None:
-    """Name an axis in SI units; its ticks get the prefix that suits the view."""
-    formatter = Prefixed(axis, name, unit)
+def label(axis: Axis, name: str, unit: str, *, plain: bool = False) -> None:
+    """Name an axis in SI units; its ticks get the prefix that suits the view, or none at all (plain)."""
+    formatter = Prefixed(axis, name, unit, plain=plain)
     axis.set_major_formatter(formatter)
     formatter.set_locs([])
 

@@ -1,0 +1,93 @@
+"""Everything a report says, computed once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from zwidth.chart.chart import StabilityChart
+from zwidth.conditions import Bound, compare
+from zwidth.device.device import Device
+from zwidth.loop.loop import Loop
+from zwidth.model.effective import EffectiveParameters, effective_parameters
+from zwidth.model.mechanism import Floats
+from zwidth.model.modes import natural_frequencies
+from zwidth.model.posture import Posture
+from zwidth.model.reduction import plant_effective_parameters
+from zwidth.study.what_if import BASE, Variant, find, what_if
+
+
+@dataclass(frozen=True)
+class Facts:
+    """A device in one posture and direction, and all that was found about its walls.
+
+    posture, direction  None for a device given by its plant
+    model               "full", "two-mass", "motor-mass" or "rigid"
+    variants            the device as described first, then what_if's changes and models
+    effective           masses and stiffness felt along the direction
+    natural             undamped natural frequencies of the plant [Hz]; rigid modes 0
+    bounds              the published conditions on the loop
+    """
+
+    device: Device
+    posture: Posture | None
+    direction: Floats | None
+    model: str
+    variants: tuple[Variant, ...]
+    effective: EffectiveParameters
+    natural: Floats
+    bounds: tuple[Bound, ...]
+
+    @property
+    def base(self) -> Variant:
+        """The device as described."""
+        return find(self.variants, BASE)
+
+    @property
+    def loop(self) -> Loop:
+        """Its loop."""
+        loop = self.base.loop
+        assert loop is not None
+        return loop
+
+    @property
+    def chart(self) -> StabilityChart:
+        """Its chart."""
+        chart = self.base.chart
+        assert chart is not None
+        return chart
+
+    @property
+    def renders(self) -> bool:
+        """Is any wall with K > 0 and B >= 0 stable?"""
+        return self.base.stiffness_max > 0.0
+
+
+def gather(
+    device: Device,
+    at: Sequence[float] | None = None,
+    direction: Sequence[float] | None = None,
+    assembly: str | None = None,
+    model: str | None = None,
+) -> Facts:
+    """All facts of a report; arguments and errors are those of `study.what_if.what_if`."""
+    variants = what_if(device, at, direction, assembly, model)
+    loop = find(variants, BASE).loop
+    assert loop is not None
+    posture = along = None
+    if device.mechanism is not None:
+        posture, along = device.posture(at, assembly), device.direction(direction)
+        effective = effective_parameters(device.mechanism, posture, along)
+    else:
+        assert device.given_plant is not None
+        effective = plant_effective_parameters(device.given_plant)
+    return Facts(
+        device=device,
+        posture=posture,
+        direction=along,
+        model=model or "full",
+        variants=tuple(variants),
+        effective=effective,
+        natural=natural_frequencies(loop.plant),
+        bounds=tuple(compare(loop)),
+    )

@@ -1,0 +1,64 @@
+"""The report's figures, each as an <svg> element."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from matplotlib.axes import Axes
+
+from zwidth.chart.chart import StabilityChart
+from zwidth.show.figures.decay import draw_decay_contours
+from zwidth.show.figures.frequency import draw_frequency
+from zwidth.show.figures.mechanism import draw_mechanism
+from zwidth.show.figures.plant import as_chain, draw_chain
+from zwidth.show.figures.stability import draw_chart, draw_models
+from zwidth.show.figures.style import context, figure, inline_svg
+from zwidth.show.report.facts import Facts
+
+
+def pictures(facts: Facts) -> dict[str, str]:
+    """Name -> SVG; "" for a figure that does not apply to this device."""
+    device, chart, plant = facts.device, facts.chart, facts.loop.plant
+    drawn = {
+        "chart": _svg("chart", "Stability chart: stable walls", lambda ax: draw_chart(ax, chart)),
+        "models": _svg(
+            "models", "Stability charts of simpler models", lambda ax: draw_models(ax, _models(facts))
+        ),
+        "frequency": _svg(
+            "frequency", "Frequency along the edge of stability", lambda ax: draw_frequency(ax, chart), 3.2
+        )
+        if facts.renders
+        else "",
+        "decay": _svg(
+            "decay", "Contours of equal decay", lambda ax: draw_decay_contours(ax, facts.loop, chart=chart)
+        )
+        if chart.regions
+        else "",
+        "device": "",
+    }
+    if facts.posture is not None and facts.direction is not None:
+        posture, direction = facts.posture, facts.direction
+        drawn["device"] = _svg(
+            "device",
+            "The mechanism in its posture",
+            lambda ax: draw_mechanism(ax, device, posture, direction),
+            4.4,
+        )
+    elif (chain := as_chain(plant)) is not None:
+        drawn["device"] = _svg("device", "The plant", lambda ax: draw_chain(ax, plant, chain), 2.0)
+    return drawn
+
+
+def _models(facts: Facts) -> dict[str, StabilityChart]:
+    """The device as described, then its models."""
+    given = "as described" if facts.model == "full" else f"as described: {facts.model} model"
+    same = f"model-{facts.model}"
+    others = [v for v in facts.variants if v.key.startswith("model-") and v.key != same]
+    return {given: facts.chart, **{v.label: v.chart for v in others if v.chart is not None}}
+
+
+def _svg(name: str, description: str, draw: Callable[[Axes], None], height: float = 3.7) -> str:
+    with context():
+        made, ax = figure(6.2, height)
+        draw(ax)
+        return inline_svg(made, name, description)

@@ -1,0 +1,62 @@
+"""The report on one device: a single HTML file that asks for nothing outside itself."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from zwidth import __version__
+from zwidth.device.device import Device
+from zwidth.show.output import write_text
+from zwidth.show.report import sentences, tables
+from zwidth.show.report.facts import Facts, gather
+from zwidth.show.report.pictures import pictures
+
+
+def write_report(
+    device: Device,
+    path: str | os.PathLike[str],
+    *,
+    at: Sequence[float] | None = None,
+    direction: Sequence[float] | None = None,
+    assembly: str | None = None,
+    model: str | None = None,
+) -> dict[str, Any]:
+    """Write the report on a device, whole or not at all; the numbers in it.
+
+    at, direction, assembly, model   as for `Device.plant`
+    Returns  a dict under the names of the command line's --json, `file` and `summary` (its first sentences)
+             among them; with a `reason` where no wall is stable
+    Raises   what `Device.plant` raises; ChartError or ModesError if the device cannot be charted
+             OutputError (show.output)  where the file cannot be written
+
+    >>> write_report(device, "device.html")["stiffness_max_N_per_m"]        # doctest: +SKIP
+    """
+    facts = gather(device, at, direction, assembly, model)
+    target = Path(path)
+    write_text(target, page(facts))
+    return {"file": str(target), **tables.document(facts)}
+
+
+def page(facts: Facts) -> str:
+    """The page as HTML; the same text for the same device."""
+    environment = Environment(
+        loader=PackageLoader("zwidth.show.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("page.html.j2").render(
+        facts=facts,
+        device=facts.device,
+        say=sentences,
+        tables=tables,
+        picture={name: Markup(svg) for name, svg in pictures(facts).items()},
+        version=__version__,
+    )

@@ -1,0 +1,152 @@
+"""The report's tables: rows of text for people, and the same numbers under names for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from zwidth.conditions import Bound
+from zwidth.show.figures.units import UNKNOWN, number, quantity
+from zwidth.show.report import sentences
+from zwidth.show.report.facts import Facts
+from zwidth.study.what_if import Variant
+
+Row = tuple[str, ...]
+
+
+def parameters(facts: Facts) -> list[Row]:
+    """Name, symbol, value of what is felt along the direction."""
+    e = facts.effective
+    flexible = [sentences.hertz(f) for f in facts.natural if f > 0.0]
+    rigid = int((facts.natural == 0.0).sum())
+    modes = ", ".join([*(["0 Hz" if rigid == 1 else f"0 Hz ({rigid} rigid motions)"] if rigid else []), *flexible])
+    return [
+        ("link-side mass", "m₁", quantity(float(e.link_side_mass), "kg", 4)),
+        ("motor-side mass", "m₂", quantity(float(e.motor_side_mass), "kg", 4)),
+        ("mass with rigid drives", "m", quantity(float(e.rigid_mass), "kg", 4)),
+        ("stiffness between the two sides", "k", quantity(float(e.stiffness), "N/m", 4)),
+        ("natural frequencies", "f", modes or UNKNOWN),
+    ]
+
+
+def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:
+    """Label, largest stiffness, its ratio to that as described, damping, frequency, area of each variant."""
+    base = facts.base.stiffness_max
+    return [
+        (
+            v.label,
+            quantity(v.stiffness_max, "N/m") if v.stiffness_max > 0.0 else "none",
+            f"{number(v.stiffness_max / base, 2)}\u00a0×" if base > 0.0 else UNKNOWN,
+            quantity(v.damping, "Ns/m"),
+            ", ".join(sentences.hertz(f) for f in v.frequencies) or UNKNOWN,
+            quantity(v.area, "N²s/m²"),
+        )
+        for v in variants
+        if v.chart is not None
+    ]
+
+
+def left_out(variants: tuple[Variant, ...]) -> list[Row]:
+    """Label and reason of the variants without a chart."""
+    return [(v.label, v.reason) for v in variants if v.chart is None]
+
+
+def changes(facts: Facts) -> tuple[Variant, ...]:
+    """The device as described and its single changes."""
+    return tuple(v for v in facts.variants if not v.key.startswith("model-"))
+
+
+def simpler(facts: Facts) -> tuple[Variant, ...]:
+    """The device as described and its models."""
+    same = {f"model-{facts.model}"}
+    return (facts.base, *(v for v in facts.variants if v.key.startswith("model-") and v.key not in same))
+
+
+def bounds(facts: Facts) -> list[dict[str, Any]]:
+    """Each published condition with its largest stiffness beside the exact one."""
+    exact = facts.base.stiffness_max
+    return [
+        {
+            "name": bound.name,
+            "source": bound.source,
+            "kind": f"{bound.kind}, {bound.claim}",
+            "statement": bound.statement,
+            "stiffness": _told(bound),
+            "ratio": f"{number(bound.stiffness_max / exact, 3)}\u00a0×"
+            if exact > 0.0 and bound.stiffness_max > 0.0
+            else UNKNOWN,
+            "violated": bound.violated,
+        }
+        for bound in facts.bounds
+    ]
+
+
+def _told(bound: Bound) -> str:
+    if bound.stiffness_max == 0.0:
+        return "none"
+    if bound.damping_at_stiffness_max != bound.damping_at_stiffness_max:
+        return quantity(bound.stiffness_max, "N/m")
+    return f"{quantity(bound.stiffness_max, 'N/m')} at {quantity(bound.damping_at_stiffness_max, 'Ns/m')}"
+
+
+def document(facts: Facts) -> dict[str, Any]:
+    """All numbers of the report, under the names of the command line's --json; what is not known is None."""
+    chart, e = facts.chart, facts.effective
+    best = chart.fastest_decay
+    found = {
+        "device": facts.device.name,
+        "summary": sentences.summary(facts),
+        "position_m": None if facts.posture is None else facts.posture.position.tolist(),
+        "direction": None if facts.direction is None else facts.direction.tolist(),
+        "assembly": None if facts.posture is None else facts.posture.assembly,
+        "model": facts.model,
+        "link_side_mass_kg": float(e.link_side_mass),
+        "motor_side_mass_kg": float(e.motor_side_mass),
+        "rigid_mass_kg": float(e.rigid_mass),
+        "stiffness_N_per_m": float(e.stiffness),
+        "natural_frequencies_Hz": facts.natural.tolist(),
+        **_walls(facts.base),
+        "damping_max_Ns_per_m": chart.damping_max,
+        "fastest_decay": best
+        and {
+            "stiffness_N_per_m": best.stiffness,
+            "damping_Ns_per_m": best.damping,
+            "spectral_radius": best.spectral_radius,
+        },
+        "unobserved_modes": list(chart.unobserved_modes),
+        "what_if": [{"key": v.key, "label": v.label, **_walls(v)} for v in facts.variants],
+        "bounds": [
+            {
+                "name": bound.name,
+                "source": bound.source,
+                "kind": bound.kind,
+                "claim": bound.claim,
+                "stiffness_max_N_per_m": bound.stiffness_max,
+                "assumptions": list(bound.assumptions),
+                "violated": list(bound.violated),
+            }
+            for bound in facts.bounds
+        ],
+    }
+    return _known({**found, **({} if facts.renders else {"reason": sentences.NO_WALL})})
+
+
+def _walls(variant: Variant) -> dict[str, Any]:
+    frequencies = list(variant.frequencies)
+    return {
+        "stiffness_max_N_per_m": variant.stiffness_max or None,
+        "damping_at_stiffness_max_Ns_per_m": variant.damping,
+        "frequency_at_stiffness_max_Hz": min(frequencies, default=None),
+        "frequencies_at_stiffness_max_Hz": frequencies,
+        "stable_area_N2s_per_m2": variant.area,
+        **({"reason": variant.reason} if variant.reason else {}),
+    }
+
+
+def _known(value: Any) -> Any:
+    """nan as None, all the way down; an infinite stiffness stays infinite."""
+    if isinstance(value, Mapping):
+        return {key: _known(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_known(inner) for inner in value]
+    return None if isinstance(value, float) and value != value else value
