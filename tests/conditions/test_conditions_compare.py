@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -147,6 +148,16 @@ def test_what_no_wall_moves_does_not_count():
     )
 
 
+def test_a_little_friction_is_seen_beside_a_heavily_damped_mode_that_no_wall_moves():
+    plant = Plant(
+        np.eye(2), np.diag([0.1, 300.0]), np.diag([0.0, 1e4]), np.array([1.0, 0.0]), np.array([1.0, 0.0])
+    )
+    found = bounds(Loop(plant, Controller(0.001)))
+    assert found[RIGID].violated == (registry.UNDAMPED,)
+    assert found[PASSIVE].violated == ()
+    assert found[PASSIVE].stiffness_max == pytest.approx(200.0)
+
+
 def test_the_linear_condition_names_no_largest_stiffness():
     bound = bounds(one_mass(0.3, 0.001, b=0.1))[LINEAR]
     assert np.isnan(bound.stiffness_max)
@@ -172,3 +183,11 @@ def test_bundled_devices(name, model):
         assert bound.statement
         copy = pickle.loads(pickle.dumps(bound))
         np.testing.assert_equal(copy.stiffness_max_at(1.0), bound.stiffness_max_at(1.0))
+
+
+def test_the_page_has_a_row_for_every_condition():
+    page = (Path(__file__).parents[2] / "docs" / "conditions.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1].strip() for line in page.splitlines() if line.startswith("|")]
+    assert rows[2 : 2 + len(NAMES)] == NAMES
+    for bound in compare(one_mass(1.0, 0.001, k=10.0)):
+        assert all(f"`{name}`" in page for name in bound.taken if name.endswith(("_kg", "_per_m")))
