@@ -1,0 +1,69 @@
+"""(5.15): the motor's mass at which the fastest possible decay is reached, for a given wall.
+
+The motor's mass m on the drives' spring k_e, not damped, wall (K, B). The mass of smallest spectral radius is where
+two vibrations decay alike: with x = cos W the condition (5.13) is a parabola in x, and rho is least where its
+discriminant vanishes. With P = K/k_e and D = B/(k_e T),
+
+    rho^2 = 8 D (1 + P) / (4 D^2 + 4 D P + 8 D + P^2)
+
+In the scan the last term under the root reads k_p^2 T, which does not have the unit of the others; k_p^2 T^2 is
+right. The formula holds where B > K T/2 and the remaining real root is at most rho.
+Here the minimum is found by eigenvalues alone.
+
+Run `python -m gallery.optimal_mass` to see the numbers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from gallery.models import published
+from zwidth.chart.verdict import spectral_radius
+from zwidth.loop.controller import Controller
+from zwidth.loop.loop import Loop
+from zwidth.model.plant import Plant
+
+T = published().period
+K_E = float(published().plant.stiffness[0, 0])
+
+# K, B of the points of Fig. 5.11, and of the wall whose numbers are printed for D.
+WALLS = {"B": (3000.0, 15.0), "C": (4000.0, 20.0), "D": (5000.0, 25.0), "printed for D": (5000.0, 55.0)}
+
+
+def radius(mass: float, wall: tuple[float, float]) -> float:
+    """Spectral radius of the motor's mass on its spring."""
+    one = np.ones(1)
+    plant = Plant(mass * one[:, None], 0.0 * one[:, None], K_E * one[:, None], one, one.copy())
+    return float(spectral_radius(Loop(plant, Controller(T)), *wall))
+
+
+def fastest(wall: tuple[float, float]) -> tuple[float, float]:
+    """Mass [kg] and spectral radius: a scan, refined round its best."""
+    masses = np.geomspace(0.01, 0.5, 400)
+    best = int(np.argmin([radius(mass, wall) for mass in masses]))
+    bounds = masses[max(best - 1, 0)], masses[min(best + 1, 399)]
+    found = minimize_scalar(lambda m: radius(m, wall), bounds=bounds, method="bounded", options={"xatol": 1e-10})
+    return float(found.x), float(found.fun)
+
+
+def right_5_15(wall: tuple[float, float]) -> float:
+    """(5.15), right."""
+    P, D = wall[0] / K_E, wall[1] / (K_E * T)
+    return float(np.sqrt(8.0 * D * (1.0 + P) / (4.0 * D**2 + 4.0 * D * P + 8.0 * D + P**2)))
+
+
+def printed_5_15(wall: tuple[float, float]) -> float:
+    """(5.15), as far as the scan can be read: 2 sqrt 2 sqrt(k_e k_d T + k_d k_p T) over the printed root."""
+    (K, B), k = wall, K_E
+    below = 4.0 * B**2 + 8.0 * k * B * T + 4.0 * B * K * T + K**2 * T
+    return float(2.0 * np.sqrt(2.0) * np.sqrt(k * B * T + B * K * T) / np.sqrt(below))
+
+
+optimum = {name: fastest(wall) for name, wall in WALLS.items()}
+by_5_15 = {name: right_5_15(wall) for name, wall in WALLS.items()}
+
+
+if __name__ == "__main__":
+    for name, (mass, rho) in optimum.items():
+        print(f"{name}: {mass:.7f} kg, spectral radius {rho:.6f}; (5.15): {by_5_15[name]:.6f}")
