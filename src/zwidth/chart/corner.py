@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.curve import edges_stable_set, wall_at
+from zwidth.chart.curve import wall_at
+from zwidth.chart.hurwitz import edges_stable_set, working_room
 from zwidth.chart.tracer import RealRoot, Tracer, Wall
 from zwidth.compiled import compiled
 
@@ -25,7 +26,7 @@ def _bisect_flag(
     off: float,
 ) -> float:
     """The last angle from `on` towards `off` that is an edge."""
-    room = np.zeros((8, polynomials.shape[1] + 1))
+    room = working_room(polynomials.shape[1] - 1)
     for _ in range(60):
         middle = 0.5 * (on + off)
         if middle in (on, off):

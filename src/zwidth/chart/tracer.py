@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.curve import combine, hurwitz, is_stable, trace, wall_at
+from zwidth.chart.curve import trace, wall_at
+from zwidth.chart.hurwitz import edges_on_line, is_stable, working_room
 from zwidth.loop.evaluate import characteristic, factor_arrays, velocity_response
 from zwidth.loop.loop import Loop
 
@@ -53,7 +54,7 @@ class Tracer:
 
     def stable(self, K: float, B: float) -> bool:
         """Whether all roots of a wall lie inside the circle; False too where rounding hides it."""
-        return is_stable(self.polynomials, K, B, np.zeros((8, self.degree + 2))) > 0
+        return is_stable(self.polynomials, K, B, working_room(self.degree)) > 0
 
     def stable_on_left(self, theta: float) -> bool:
         """Whether the stable side is on the left for growing theta: Im w > 0.
@@ -73,11 +74,8 @@ class Tracer:
 
     def edge_on_line(self, root: RealRoot, K: float, B: float) -> bool:
         """Whether a wall on that line has all its other roots inside."""
-        room = np.zeros((8, self.degree + 2))
-        inner = slice(1, None) if root == "plus" else slice(None, -1)
-        combine(self.polynomials, K, B, room[0], room[1])
-        p, size = room[0, : self.degree + 1][inner].copy(), room[1, : self.degree + 1][inner].copy()
-        return hurwitz(p, size, self.degree - 1, room[4:]) > 0
+        low_end = int(root == "plus")
+        return edges_on_line(self.polynomials, low_end, K, B, working_room(self.degree)) > 0
 
     def curve_end(self, root: RealRoot) -> Wall | None:
         """The wall with a double root at +rho (theta = 0) or -rho (theta = pi); None if it is at infinity.

@@ -1,0 +1,117 @@
+"""One truth, two routes: the traced chart and eigenvalues of independently built transition matrices."""
+
+import numpy as np
+import pytest
+import shapely
+
+from tests.systems import random_loop, second_matrix
+from zwidth.chart.chart import boundary_points, stability_chart
+from zwidth.chart.region import ChartError
+
+# Damping of real structures; loops with undamped modes have a set of their own, since an undamped mode that the
+# wall hardly moves stays within rounding of the circle whatever the wall does.
+DAMPED = (0.01, 0.02, 0.05, 0.1, 0.3, 1.0, 1.5)
+
+
+def radii(loop, K, B):
+    return np.array([np.max(np.abs(np.linalg.eigvals(second_matrix(loop, k, b)))) for k, b in zip(K, B)])
+
+
+def sample_walls(rng, chart, loop, count):
+    """Walls in and about every cell, and walls scattered over the scales of the plant."""
+    inertia = 1.0 / (loop.plant.actuator @ np.linalg.solve(loop.plant.mass, loop.plant.actuator))
+    size = 10.0 ** rng.uniform(-4.0, 0.3, count)
+    K = [inertia / loop.period**2 * size * rng.choice([-0.2, 1.0], count)]
+    B = [inertia / loop.period * size * rng.uniform(-1.0, 3.0, count)]
+    for ring in chart.regions:
+        low, high = ring.min(axis=0), ring.max(axis=0)
+        k, b = (low - 0.2 * (high - low) + 1.4 * (high - low) * rng.random((count, 2))).T
+        K.append(k)
+        B.append(b)
+    return np.concatenate(K), np.concatenate(B)
+
+
+def disagreements(rng, loop, count=30):
+    """Walls on which the regions and eigenvalues differ outside the chords' tolerance."""
+    chart = stability_chart(loop, decay=False)
+    K, B = sample_walls(rng, chart, loop, count)
+    inside = np.zeros(len(K), dtype=bool)
+    for ring in chart.regions:
+        cell = shapely.Polygon(ring)
+        assert cell.is_valid
+        assert cell.exterior.is_ccw
+        inside |= shapely.contains_xy(cell, K, B)
+    radius = np.max(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))), axis=-1)
+    suspect = ((radius < 1.0) != inside) | (rng.random(len(K)) < 0.02)
+    if not suspect.any():
+        return 0
+    second = radii(loop, K[suspect], B[suspect])
+    clear = np.abs(second - 1.0) > 3e-6
+    return int(np.sum(((second < 1.0) != inside[suspect]) & clear))
+
+
+@pytest.mark.parametrize("kind", ["chain", "dense", "coupled", "apart"])
+def test_regions_agree_with_eigenvalues(kind):
+    rng = np.random.default_rng(10)
+    for _ in range(60):
+        assert disagreements(rng, random_loop(rng, DAMPED, kind)) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["chain", "dense", "coupled", "apart"])
+def test_regions_agree_with_eigenvalues_over_thousands_of_loops(kind):
+    rng = np.random.default_rng(11)
+    for _ in range(2000):
+        assert disagreements(rng, random_loop(rng, DAMPED, kind)) == 0
+
+
+def test_undamped_loops_agree_or_say_that_rounding_hides_the_edge():
+    rng = np.random.default_rng(12)
+    given_up = 0
+    for _ in range(150):
+        try:
+            assert disagreements(rng, random_loop(rng)) == 0
+        except ChartError as error:
+            assert "hardly moves" in str(error)
+            given_up += 1
+    assert given_up <= 3
+
+
+def on_edge(loop):
+    """Distances of boundary points to the nearest eigenvalue, for simple and for nearly double roots."""
+    K, B, frequency, edge = boundary_points(loop, 40)
+    z = np.exp(2j * np.pi * frequency * loop.period)
+    simple, double = [], []
+    for k, b, point in zip(K[edge], B[edge], z[edge]):
+        roots = np.linalg.eigvals(loop.transition_matrix(k, b))
+        distance = np.abs(roots - point)
+        nearest = np.argmin(distance)
+        gap = np.min(np.delete(np.abs(roots - roots[nearest]), nearest))
+        (simple if gap > 1e-3 else double).append(distance[nearest])
+    return simple, double
+
+
+@pytest.mark.parametrize("kind", ["chain", "dense", "coupled", "apart"])
+def test_boundary_points_lie_on_the_unit_circle(kind):
+    rng = np.random.default_rng(13)
+    simple, double = [], []
+    for _ in range(60):
+        some, others = on_edge(random_loop(rng, kind=kind))
+        simple += some
+        double += others
+    assert len(simple) > 200
+    assert max(simple) <= 1e-9
+    assert max(double, default=0.0) <= 1e-7
+
+
+def test_every_point_of_the_boundary_edges_the_stable_set():
+    # one root on the circle, the rest inside; the reported frequency is that root's
+    rng = np.random.default_rng(14)
+    for _ in range(40):
+        loop = random_loop(rng, DAMPED)
+        for arc in stability_chart(loop, decay=False).boundary:
+            pick = np.linspace(0, len(arc.stiffness) - 1, 7).astype(int)[1:-1]
+            for k, b, f in zip(arc.stiffness[pick], arc.damping[pick], arc.frequency[pick]):
+                roots = np.linalg.eigvals(loop.transition_matrix(k, b))
+                assert np.max(np.abs(roots)) <= 1.0 + 1e-6
+                assert np.min(np.abs(roots - np.exp(2j * np.pi * f * loop.period))) <= 1e-6

@@ -1,0 +1,107 @@
+"""The plant between samples: closed forms against the matrix exponential and high precision."""
+
+import mpmath
+import numpy as np
+import pytest
+
+from tests.systems import held_step, mass, random_plant, two_mass
+from zwidth.loop.hold import sampled_sections, step_response
+from zwidth.model.modes import ModesError, natural_frequencies
+from zwidth.model.plant import Plant
+
+
+def sampled_response(plant, period, delay_fraction, z):
+    """P(z) from states: (zI - F)^-1 of the split hold."""
+    n = plant.size
+    F, _ = held_step(plant, period)
+    Fr, new = held_step(plant, (1.0 - delay_fraction) * period)
+    old = Fr @ held_step(plant, delay_fraction * period)[1] if delay_fraction else 0.0 * new
+    return np.array([plant.sensor @ np.linalg.solve(p * np.eye(2 * n) - F, new + old / p)[:n] for p in z])
+
+
+def from_sections(rows, z):
+    d = z[:, None] - 1.0
+    d1, d0, n1, n0, o1, o0 = rows.T
+    return np.sum((n1 * d + n0 + (o1 * d + o0) / z[:, None]) / (d * d + d1 * d + d0), axis=1)
+
+
+def precise_step(a, squared, t):
+    """Position and velocity of xi'' + 2 a xi' + w^2 xi = 1 from rest with fifty digits."""
+    with mpmath.workdps(50):
+        a, squared, t = mpmath.mpf(a), mpmath.mpf(squared), mpmath.mpf(t)
+        A = mpmath.matrix([[0, 1, 0], [-squared, -2 * a, 1], [0, 0, 0]]) * t
+        E = mpmath.expm(A)
+        return float(E[0, 2]), float(E[1, 2])
+
+
+@pytest.mark.parametrize("ratio", [0.0, 1e-6, 0.05, 0.7, 1.0 - 1e-12, 1.0, 1.0 + 1e-9, 1.5, 30.0])
+@pytest.mark.parametrize("swing", [1e-8, 1e-3, 0.3, 1.0, 3.0, 20.0])
+def test_step_response_keeps_its_digits_from_rigid_to_overdamped(ratio, swing):
+    squared, a = swing**2, ratio * swing
+    got, want = step_response(a, squared, 1.0), precise_step(a, squared, 1.0)
+    # where the oscillation passes zero the error is that of the phase
+    assert got == pytest.approx(want, rel=1e-12, abs=3e-15 * max(1.0, 1.0 / swing))
+
+
+@pytest.mark.parametrize(("a", "squared"), [(0.0, 0.0), (2.0, 0.0), (1e-9, 0.0), (0.0, -1.0), (0.5, -4.0)])
+def test_step_response_of_free_damped_and_unstable_masses(a, squared):
+    assert step_response(a, squared, 1.0) == pytest.approx(precise_step(a, squared, 1.0), rel=1e-13)
+
+
+@pytest.mark.parametrize("kind", ["chain", "dense", "coupled", "apart"])
+def test_sections_are_the_exact_zero_order_hold(kind):
+    rng = np.random.default_rng(1)
+    for _ in range(60):
+        rate = 10.0 ** rng.uniform(2.3, 4.3)
+        plant = random_plant(rng, rate, kind=kind)
+        fraction = float(rng.choice([0.0, rng.random()]))
+        z = 1.3 * np.exp(1j * rng.uniform(0.05, np.pi, 5))
+        sections = sampled_sections(plant, 1.0 / rate, fraction)
+        got, want = from_sections(sections.rows, z), sampled_response(plant, 1.0 / rate, fraction, z)
+        # modes cancel where force and reading are apart: the accuracy is that of a mass alone
+        inertia = [v @ np.linalg.solve(plant.mass, v) for v in (plant.actuator, plant.sensor)]
+        alone = np.sqrt(np.prod(inertia)) / rate**2
+        assert np.max(np.abs(got - want)) <= 3e-9 * np.max(np.abs(want)) + 1e-10 * alone
+
+
+def test_a_free_mass_is_the_textbook_double_integrator():
+    T, m = 0.001, 0.2
+    (row,) = sampled_sections(mass(m), T, 0.0).rows
+    assert row == pytest.approx([0.0, 0.0, T**2 / (2 * m), T**2 / m, 0.0, 0.0], rel=1e-14, abs=1e-30)
+
+
+def test_motion_across_the_wall_is_cancelled_and_named():
+    plant = two_mass(0.3, 0.3, 1e4, 1.0)
+    sideways = Plant(
+        plant.mass, plant.damping, plant.stiffness, np.array([1.0, -1.0]), np.array([1.0, -1.0]), None
+    )
+    sections = sampled_sections(sideways, 0.001, 0.0)
+    assert len(sections.rows) == 1
+    assert sections.unobserved == ("rigid motion (0 Hz)",)
+
+
+def test_two_equal_modes_are_one_pair_of_poles_and_one_named_mode():
+    eye = np.eye(2)
+    plant = Plant(eye, 2.0 * eye, 1e4 * eye, np.array([0.6, 0.8]), np.array([0.6, 0.8]), None)
+    sections = sampled_sections(plant, 0.001, 0.0)
+    single = sampled_sections(mass(1.0, 2.0, 1e4), 0.001, 0.0)
+    assert sections.rows == pytest.approx(single.rows, rel=1e-12)
+    assert sections.unobserved == ("mode at 15.92 Hz (damping ratio 0.01)",)
+
+
+def test_rigid_frequencies_are_exactly_zero():
+    assert natural_frequencies(two_mass(0.3, 0.02, 1e4))[0] == 0.0
+
+
+def test_a_defective_pair_of_coupled_modes_is_refused_in_words():
+    # two modes whose coupled damping merges them: K = diag(1, 1 + e), gyration-free but defective at the merge
+    K = np.diag([1.0, 4.0])
+    B = np.array([[2.0, 0.0], [0.0, 4.0]]) + 1e-9 * np.array([[0.0, 1.0], [1.0, 0.0]])
+    plant = Plant(np.eye(2), B, K, np.ones(2), np.ones(2), None)
+    try:
+        rows = sampled_sections(plant, 0.1, 0.0).rows
+    except ModesError as error:
+        assert "damping" in str(error)
+    else:
+        z = np.array([1.3 + 0.2j])
+        assert from_sections(rows, z) == pytest.approx(sampled_response(plant, 0.1, 0.0, z), rel=1e-6)
