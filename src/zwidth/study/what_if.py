@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import isnan, nan
-from typing import Final
+from typing import Any, Final
 
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.region import ChartError
@@ -71,10 +71,6 @@ class Variant:
         return 0.0 if isnan(self.chart.stiffness_max) else self.chart.stable_area
 
 
-class NotApplicable(Exception):
-    """A change that this device cannot undergo, with the reason."""
-
-
 def what_if(
     device: Device,
     at: Sequence[float] | None = None,
@@ -95,8 +91,8 @@ def what_if(
     plant = reduce(model)
     here = Loop(plant, device.controller)
     variants = [Variant(BASE, "as described", here, stability_chart(here))]
-    steps = [*_changes(device, plant, reduce), *_models(device, plant, reduce)]
-    return variants + [_charted(key, label, make) for key, label, make in steps]
+    steps = [*_changes(device, plant, reduce), *_models(device, reduce)]
+    return variants + [_charted(*step) for step in steps]
 
 
 def limiting_change(variants: Sequence[Variant]) -> Variant | None:
@@ -118,75 +114,82 @@ def find(variants: Sequence[Variant], key: str) -> Variant:
     raise KeyError(key)
 
 
-Step = tuple[str, str, Callable[[], Loop]]
+# key, label, why it does not apply ("" if it may), how to make its loop
+Step = tuple[str, str, str, Callable[[], Loop]]
 Reduce = Callable[[str | None], Plant]
 
 
-def _charted(key: str, label: str, make: Callable[[], Loop]) -> Variant:
+def _charted(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> Variant:
+    if obstacle:
+        return Variant(key, label, None, None, obstacle)
     try:
         loop = make()
         return Variant(key, label, loop, stability_chart(loop, decay=False))
-    except (NotApplicable, ModelError, ModesError, ChartError) as error:
+    except (ModelError, ModesError, ChartError) as error:
         return Variant(key, label, None, None, str(error))
 
 
 def _changes(device: Device, plant: Plant, reduce: Reduce) -> Iterator[Step]:
     controller = device.controller
 
-    def computed(**changes: object) -> Loop:
-        return Loop(plant, replace(controller, **changes))  # type: ignore[arg-type]
+    def computed(**changes: Any) -> Callable[[], Loop]:
+        return lambda: Loop(plant, replace(controller, **changes))
 
-    yield "rigid-drives", "rigid drives", lambda: Loop(_rigid(plant, reduce), controller)
-    yield "half-period", "half the sampling period", lambda: Loop(plant, half_period(device))
-    yield "no-delay", "no delay", lambda: _unless(controller.delay == 0.0, "has no delay") or computed(delay=0.0)
-    yield (
-        "one-sample",
-        "one sample of delay",
-        lambda: _unless(controller.delay == 1.0, "has one sample of delay") or computed(delay=1.0),
-    )
-    bare = controller.velocity_filter is None
-    yield (
-        "no-filter",
-        "without the velocity filter",
-        lambda: _unless(bare, "has no velocity filter") or computed(velocity_filter=None),
-    )
+    def only(applies: object, obstacle: str) -> str:
+        return "" if applies else obstacle
+
+    flexible, damped = plant.stiffness.any(), plant.damping.any()
+    delay, low_pass = controller.delay, controller.velocity_filter
     usual = usual_filter(controller.sampling_period)
-    yield (
-        "with-filter",
-        f"with a second-order Butterworth filter of the velocity at {usual.cutoff_Hz:.4g} Hz",
-        lambda: _unless(not bare, "has a velocity filter") or computed(velocity_filter=usual),
-    )
-    own = "structural damping" if plant.stiffness.any() else "friction of its own"
-    yield (
-        "twice-damping",
-        f"twice the {own}",
-        lambda: _unless(not plant.damping.any(), f"has no {own}")
-        or Loop(replace(plant, damping=2.0 * plant.damping), controller),
-    )
+    own = "structural damping" if flexible else "friction"
+
+    rigid = only(flexible, "its drives are rigid already")
+    yield "rigid-drives", "rigid drives", rigid, lambda: Loop(reduce("rigid"), controller)
+    yield "half-period", "half the sampling period", "", lambda: Loop(plant, half_period(device))
+    yield "no-delay", "no delay", only(delay != 0.0, "the device has no delay"), computed(delay=0.0)
+    late = only(delay != 1.0, "the device has one sample of delay")
+    yield "one-sample", "one sample of delay", late, computed(delay=1.0)
+    bare = only(low_pass is not None, "the device has no velocity filter")
+    yield "no-filter", "without the velocity filter", bare, computed(velocity_filter=None)
+    filtered = only(low_pass is None, "the device has a velocity filter")
+    through = f"velocity through a Butterworth filter of order 2 at {usual.cutoff_Hz:.4g} Hz"
+    yield "with-filter", through, filtered, computed(velocity_filter=usual)
+    twice = replace(plant, damping=2.0 * plant.damping)
+    lossless = only(damped, f"the device has no {own}")
+    yield "twice-damping", f"twice the {own}", lossless, lambda: Loop(twice, controller)
 
 
-def _models(device: Device, plant: Plant, reduce: Reduce) -> Iterator[Step]:
+def _models(device: Device, reduce: Reduce) -> Iterator[Step]:
     """The models of Fig. 4.4: the full one, and what is left of it by and by."""
+    full = reduce("full")
+    damped = " with damping" if full.damping.any() else ""
+    undamped_only = "" if damped else "there is no damping to leave out"
 
-    def of(name: str, *, damped: bool = True) -> Callable[[], Loop]:
+    def same(name: str) -> str:
+        # a plant that is this model already is returned as it is
+        return "the device as described is this model" if reduces_to_itself(name) else ""
+
+    def reduces_to_itself(name: str) -> bool:
+        try:
+            return reduce(name) is full
+        except ModelError:
+            return False
+
+    def of(name: str, *, lossless: bool = False) -> Callable[[], Loop]:
         def make() -> Loop:
             reduced = reduce(name)
-            leave_out = not damped and bool(reduced.damping.any())
-            if name != "full" and reduced is reduce("full") and not leave_out:
-                raise NotApplicable("the device as described is this model")
-            if name == "motor-mass" and not damped and not leave_out:
-                raise NotApplicable("there is no damping to leave out")
-            kept = replace(reduced, damping=0.0 * reduced.damping) if leave_out else reduced
+            kept = replace(reduced, damping=0.0 * reduced.damping) if lossless else reduced
             return Loop(kept, device.controller)
 
         return make
 
-    full = "full model, all flexible coordinates" if device.mechanism is not None else "plant as given"
-    yield "model-full", full, of("full")
-    yield "model-two-mass", "two masses with damping", of("two-mass")
-    yield "model-motor-mass", "motor mass with damping", of("motor-mass")
-    yield "model-motor-mass-undamped", "motor mass without damping", of("motor-mass", damped=False)
-    yield "model-rigid-undamped", "rigid without damping", of("rigid", damped=False)
+    given = "full model, all flexible coordinates" if device.mechanism is not None else "plant as given"
+    yield "model-full", given, "", of("full")
+    yield "model-two-mass", f"two masses{damped}", same("two-mass"), of("two-mass")
+    yield "model-motor-mass", f"motor mass{damped}", "", of("motor-mass")
+    yield "model-motor-mass-undamped", "motor mass without damping", undamped_only, of("motor-mass", lossless=True)
+    rigid = "" if damped else same("rigid")
+    yield "model-rigid-undamped", "rigid without damping", rigid, of("rigid", lossless=True)
 
 
 def half_period(device: Device) -> Controller:
@@ -200,14 +203,3 @@ def half_period(device: Device) -> Controller:
 def usual_filter(sampling_period: float) -> Butterworth:
     """The filter tried where there is none: 20 Hz as in thesis 3.2.4, at most a tenth of Nyquist."""
     return Butterworth(2, min(THESIS_CUTOFF_HZ, 0.05 / sampling_period))
-
-
-def _rigid(plant: Plant, reduce: Reduce) -> Plant:
-    if not plant.stiffness.any():
-        raise NotApplicable("its drives are rigid already")
-    return reduce("rigid")
-
-
-def _unless(condition: bool, reason: str) -> None:
-    if condition:
-        raise NotApplicable(f"the device {reason}")

@@ -25,11 +25,11 @@ def draw_frequency(ax: Axes, chart: StabilityChart) -> None:
         inside = (arc.stiffness >= -SAME_WALL * width) & (arc.damping >= 0.0)
         K, f = np.where(inside, arc.stiffness, np.nan), np.where(inside, arc.frequency, np.nan)
         ax.plot(K, f, color=BLUE, label="" if n else "along the edge of stability")
-    for n, (K, _, low, high) in enumerate(corners(chart)):
+    for n, (at, _, low, high) in enumerate(corners(chart)):
         text = f"corner: {quantity(low, 'Hz')} and {quantity(high, 'Hz')}"
-        ax.plot([K, K], [low, high], color=VERMILION, linewidth=0.8, linestyle=":")
+        ax.plot([at, at], [low, high], color=VERMILION, linewidth=0.8, linestyle=":")
         ax.plot(
-            [K, K],
+            [at, at],
             [low, high],
             marker="o",
             markersize=6.0,
@@ -55,7 +55,9 @@ def corners(chart: StabilityChart) -> list[tuple[float, float, float, float]]:
     if not ends:
         return []
     K, B, f = np.array(ends).T
-    near = SAME_WALL * np.array([np.ptp(K) or 1.0, np.ptp(B) or 1.0])
+    near = SAME_WALL * np.max(
+        [np.ptp(np.vstack([arc.stiffness, arc.damping]), axis=1) for arc in chart.boundary], 0
+    )
     nyquist = 0.5 / chart.loop.period
     found = []
     for i in range(len(ends)):

@@ -91,7 +91,7 @@ def _joints(ax: Axes, mechanism: Mechanism, placed: LinkPoints, flat: list[int],
     base = np.vstack([base, np.array(grounded).reshape(-1, 3)[:, flat]])
     below = base - np.array([0.0, 0.035 * size])
     ax.plot(*below.T, marker="^", markersize=13.0, color="#B8B8B8", linestyle="none", zorder=1.5, label="base")
-    circle = {"marker": "o", "markersize": 7.0, "linestyle": "none", "markeredgecolor": BLACK}
+    circle: dict[str, Any] = {"marker": "o", "markersize": 7.0, "linestyle": "none", "markeredgecolor": BLACK}
     ax.plot(*pins.T, markerfacecolor="white", zorder=3.0, label="joint", **circle)
     driven = placed.origin[drives.joint][:, flat]
     if len(driven):
@@ -99,7 +99,7 @@ def _joints(ax: Axes, mechanism: Mechanism, placed: LinkPoints, flat: list[int],
     for place, names in _together(driven, drives.names, SAME_POINT * max(size, 1.0)):
         ax.annotate(
             "\n".join(names),
-            place,
+            (float(place[0]), float(place[1])),
             xytext=(9, -3),
             textcoords="offset points",
             va="top",
@@ -139,7 +139,13 @@ def _handle(ax: Axes, handle: Floats, direction: Floats, size: float) -> None:
         return
     tip = handle + 0.28 * size * direction / np.linalg.norm(direction)
     arrow = FancyArrowPatch(
-        handle, tip, arrowstyle="-|>", mutation_scale=14.0, color=VERMILION, linewidth=1.8, zorder=4.1
+        tuple(handle),
+        tuple(tip),
+        arrowstyle="-|>",
+        mutation_scale=14.0,
+        color=VERMILION,
+        linewidth=1.8,
+        zorder=4.1,
     )
     ax.add_patch(arrow)
     # patches of display size do not widen the view

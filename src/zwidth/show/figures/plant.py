@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from zwidth.model.plant import Plant
 from zwidth.show.figures.style import BLACK, GREY, VERMILION
-from zwidth.show.figures.units import quantity
+from zwidth.show.figures.units import given
 
 Floats = NDArray[np.float64]
 WIDTH, GAP, HALF = 1.2, 1.6, 0.55  # of a mass, between masses, half the height of a mass
@@ -58,7 +58,7 @@ def draw_chain(ax: Axes, plant: Plant, chain: Chain) -> None:
     left = GAP * (np.arange(n) + 1.0) + WIDTH * np.arange(n)
     for i, x in enumerate(left):
         ax.add_patch(Rectangle((x, -HALF), WIDTH, 2 * HALF, facecolor="#EEEEEE", edgecolor=BLACK))
-        ax.text(x + WIDTH / 2, 0.0, quantity(float(chain.mass[i]), "kg"), ha="center", va="center", fontsize=8.0)
+        ax.text(x + WIDTH / 2, 0.0, given(float(chain.mass[i]), "kg"), ha="center", va="center", fontsize=8.0)
         ax.text(x + WIDTH / 2, -HALF - 0.12, "\n".join(_roles(plant, i)), ha="center", va="top", fontsize=8.0)
     for i in range(n + 1):
         start = left[i] - GAP if i < n else left[-1] + WIDTH
@@ -86,17 +86,17 @@ def _joined(ax: Axes, start: float, end: float, stiffness: float, damping: float
         x = start + (end - start) * np.array([0.0, 0.2, *np.linspace(0.235, 0.765, 9), 0.8, 1.0])
         zigzag = [0.0, 0.0, *(0.13 * (-1.0) ** k for k in range(9)), 0.0, 0.0]
         ax.plot(x, y + np.array(zigzag), color=VERMILION, linewidth=1.2)
-        ax.text((start + end) / 2, y + 0.18, quantity(stiffness, "N/m"), ha="center", va="bottom", fontsize=8.0)
+        ax.text((start + end) / 2, y + 0.18, given(stiffness, "N/m"), ha="center", va="bottom", fontsize=8.0)
     if damping > 0.0:
         y = -0.3 if both else 0.0
         middle = (start + end) / 2
         ax.plot([start, middle], [y, y], color=GREY, linewidth=1.2)
         ax.plot([middle] * 2, [y - 0.13, y + 0.13], color=GREY, linewidth=1.2)
-        x = [middle - 0.22, middle + 0.22, middle + 0.22, middle - 0.22]
+        sides = [middle - 0.22, middle + 0.22, middle + 0.22, middle - 0.22]
         cup = [y + 0.18, y + 0.18, y - 0.18, y - 0.18]
-        ax.plot(x, cup, color=GREY, linewidth=1.2)
+        ax.plot(sides, cup, color=GREY, linewidth=1.2)
         ax.plot([middle + 0.22, end], [y, y], color=GREY, linewidth=1.2)
-        ax.text(middle, y - 0.27, quantity(damping, "Ns/m"), ha="center", va="top", fontsize=8.0)
+        ax.text(middle, y - 0.27, given(damping, "Ns/m"), ha="center", va="top", fontsize=8.0)
 
 
 def _ground(ax: Axes, x: float) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import isnan
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
@@ -35,19 +36,19 @@ def draw_models(ax: Axes, charts: Mapping[str, StabilityChart], window: Window |
     """The edges of several models' charts over each other (thesis Fig. 4.4).
 
     charts  label -> chart; the first is the one that the others approximate, and its region is filled
-    window  what to show; left out: the box of the first and 5 %
+    window  what to show; left out: the box of the first that has stable walls, and 5 %
     """
     first = next(iter(charts.values()))
+    seen = next((chart for chart in charts.values() if chart.regions), first)
     for ring in first.regions:
         ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none"))
     # the first on top: where models agree it is the one to be seen
     for n, (name, chart) in enumerate(charts.items()):
         colour, dashes = LINES[n % len(LINES)]
-        for k, ring in enumerate(chart.regions or ([[float("nan")] * 2],)):
-            K, B = zip(*ring, strict=True)
-            text = "" if k else name if chart.regions else f"{name}: nothing stable"
-            ax.plot(K, B, color=colour, linestyle=dashes, label=text, zorder=4.0 - 0.1 * n)
-    frame(ax, window or first.box, empty=not any(chart.regions for chart in charts.values()))
+        text = name if chart.regions else f"{name}: nothing stable"
+        for k, ring in enumerate(chart.regions or (np.full((1, 2), np.nan),)):
+            ax.plot(*ring.T, color=colour, linestyle=dashes, label="" if k else text, zorder=4.0 - 0.1 * n)
+    frame(ax, window or seen.box, empty=not seen.regions)
     legend_above(ax, columns=2)
 
 
@@ -80,4 +81,6 @@ def frame(ax: Axes, window: Window, *, empty: bool) -> None:
     label(ax.xaxis, "Virtual stiffness K", "N/m")
     label(ax.yaxis, "Virtual damping B", "Ns/m")
     if empty:
+        ax.set_xticks([])
+        ax.set_yticks([])
         ax.text(0.5, 0.5, "no wall is stable", transform=ax.transAxes, ha="center", va="center", color=GREY)

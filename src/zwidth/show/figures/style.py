@@ -45,7 +45,7 @@ LINES: Final[tuple[tuple[str, Any], ...]] = (
 )
 
 FORMATS: Final = (".png", ".svg", ".pdf")
-_STYLE: Final = {
+_STYLE: Final[dict[str, Any]] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same glyphs on every machine
     "font.size": 9.0,
     "axes.titlesize": 9.0,
@@ -66,7 +66,8 @@ _STYLE: Final = {
 
 def context() -> AbstractContextManager[None]:
     """The house's settings, for figures made inside; `figure` and `save` use it already."""
-    return mpl.rc_context({**mpl.rcParamsDefault, **_STYLE})
+    settings: Any = {**mpl.rcParamsDefault, **_STYLE}
+    return mpl.rc_context(settings)
 
 
 def figure(width: float = 5.6, height: float = 3.9) -> tuple[Figure, Axes]:
@@ -87,13 +88,13 @@ def save(made: Figure, path: str | os.PathLike[str]) -> Path:
     kind = target.suffix.lower()
     if kind not in FORMATS:
         raise ValueError(f"a figure is written as {', '.join(FORMATS)}, got '{target.name}'; change the extension")
-    undated: dict[str, Any] = {
+    undated: dict[str, dict[str, Any]] = {
         ".png": {"Software": "zwidth"},
         ".svg": {"Date": None, "Creator": "zwidth"},
         ".pdf": {"CreationDate": None, "ModDate": None, "Creator": "zwidth", "Producer": None},
-    }[kind]
+    }
     with replacing(target) as draft, context():
-        made.savefig(draft, format=kind[1:], metadata=undated)
+        made.savefig(draft, format=kind[1:], metadata=undated[kind])
     return target
 
 

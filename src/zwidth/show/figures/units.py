@@ -47,7 +47,7 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     """A value with its unit and the prefix that suits it; a dash where the value is not known (nan).
 
     >>> quantity(7849.44, "N/m", 2), quantity(0.02, "Ns/m"), quantity(0.2616, "kg")
-    ('7.8\\xa0kN/m', '20.0\\xa0mNs/m', '0.262\\xa0kg')
+    ('7.8\xa0kN/m', '20.0\xa0mNs/m', '0.262\xa0kg')
     """
     if isnan(value):
         return UNKNOWN
@@ -58,11 +58,22 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     return f"{number(rounded / 10.0**exponent, digits)}{SPACE}{PREFIXES[exponent]}{unit}"
 
 
+def given(value: float, unit: str) -> str:
+    """A number that somebody chose, as short as it was written: 1.25 ms, 0.03 kg.
+
+    >>> given(0.00125, "s"), given(0.03, "kg"), given(1000.0, "Hz")
+    ('1.25\xa0ms', '0.03\xa0kg', '1\xa0kHz')
+    """
+    exponent = 0 if unit in PLAIN else exponent_of(value)
+    shown = f"{value / 10.0**exponent:.6g}".replace("-", MINUS)
+    return f"{shown}{SPACE}{PREFIXES[exponent]}{unit}"
+
+
 def point(coordinates: Iterable[float], unit: str = "m") -> str:
     """A point or vector as (x, y) where it lies in the plane z = 0, else (x, y, z); no unit for "".
 
     >>> point([0.0, 0.25, 0.0])
-    '(0, 0.25)\\xa0m'
+    '(0, 0.25)\xa0m'
     """
     values = [float(c) for c in coordinates]
     if len(values) == 3 and values[2] == 0.0:

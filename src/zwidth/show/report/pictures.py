@@ -21,9 +21,7 @@ def pictures(facts: Facts) -> dict[str, str]:
     device, chart, plant = facts.device, facts.chart, facts.loop.plant
     drawn = {
         "chart": _svg("chart", "Stability chart: stable walls", lambda ax: draw_chart(ax, chart)),
-        "models": _svg(
-            "models", "Stability charts of simpler models", lambda ax: draw_models(ax, _models(facts))
-        ),
+        "models": _svg("models", "Stability charts of simpler models", lambda ax: draw_models(ax, _models(facts))),
         "frequency": _svg(
             "frequency", "Frequency along the edge of stability", lambda ax: draw_frequency(ax, chart), 3.2
         )

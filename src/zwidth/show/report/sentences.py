@@ -1,4 +1,4 @@
-"""The report's sentences, each computed from what was found, so that another device makes them say another thing."""
+"""The report's sentences, each computed from what was found: another device makes them say another thing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from zwidth.loop.controller import Controller, FirstOrder
 from zwidth.model.mechanism import Floats
 from zwidth.show.figures.decay import tenfold_time
-from zwidth.show.figures.units import MINUS, number, point, quantity
+from zwidth.show.figures.units import MINUS, given, number, point, quantity
 from zwidth.show.report.facts import Facts
 from zwidth.study.what_if import REMEDIES, WORTH, Variant, find, limiting_change
 
@@ -20,7 +20,7 @@ NO_WALL: Final = "no wall with positive stiffness and without negative damping i
 
 def summary(facts: Facts) -> list[str]:
     """What a reader in a hurry wants to know, in at most a handful of sentences."""
-    found = [renders(facts), vibration(facts), limit(facts), next_best(facts), regions(facts), unobserved(facts)]
+    found = [renders(facts), limit(facts), vibration(facts), next_best(facts), regions(facts), unobserved(facts)]
     return [sentence for sentence in found if sentence]
 
 
@@ -88,8 +88,8 @@ def limit(facts: Facts) -> str:
 
 def _cause(facts: Facts, best: Variant) -> str:
     controller = facts.loop.controller
+    flexible = [hertz(f) for f in facts.natural if f > 0.0]
     if best.key == "rigid-drives":
-        flexible = [hertz(f) for f in facts.natural if f > 0.0]
         what = "the flexibility of the drives" if facts.device.mechanism is not None else "its flexibility"
         return f"{what}, at {listed(flexible)}" if flexible else what
     if best.key == "no-delay":
@@ -98,9 +98,9 @@ def _cause(facts: Facts, best: Variant) -> str:
         return "the filter of the velocity"
     if best.key == "half-period":
         mass = float(facts.effective.rigid_mass)
-        moved = "its mass" if isnan(mass) else f"its mass of {quantity(mass, 'kg')}"
-        return f"{moved}, sampled at {hertz(1.0 / controller.sampling_period)}"
-    return "how little it damps its own vibrations"
+        moved = "its mass" if isnan(mass) else f"its mass of {quantity(mass, 'kg', 2)}"
+        return f"{moved}, sampled at {given(1.0 / controller.sampling_period, 'Hz')}"
+    return "how little it damps its own vibrations" if flexible else "how little friction it has"
 
 
 def _with(facts: Facts, best: Variant) -> str:
@@ -153,9 +153,7 @@ def unobserved(facts: Facts) -> str:
 def models(facts: Facts) -> str:
     """Which of the simpler models comes nearest to the device as described; "" where there is none."""
     simpler = [
-        v
-        for v in facts.variants
-        if v.key.startswith("model-") and v.key != "model-full" and v.chart is not None
+        v for v in facts.variants if v.key.startswith("model-") and v.key != "model-full" and v.chart is not None
     ]
     if not simpler or not facts.renders:
         return ""
@@ -200,18 +198,21 @@ def conditions(facts: Facts) -> str:
     return f"This device meets the assumptions of {len(holding)} of these {len(facts.bounds)} conditions: {names}."
 
 
-def computer(facts: Facts) -> str:
-    """How the loop is sampled, delayed and filtered."""
+def setting(facts: Facts) -> str:
+    """Assembly and model, and how the loop is sampled, delayed and filtered."""
+    model = f"{facts.model.capitalize()} model" if facts.model != "full" else "Plant as given"
+    if facts.posture is not None:
+        model = f"Assembly {facts.posture.assembly}, {facts.model} model"
     controller = facts.loop.controller
     late = f"a delay of {delay_name(controller)}" if controller.delay else "no delay"
-    period = quantity(controller.sampling_period, "s", 4)
-    return f"sampled every {period}, {late}, {filter_name(controller)}"
+    period = given(controller.sampling_period, "s")
+    return f"{model}; sampled every {period}, {late}, {filter_name(controller)}."
 
 
 def delay_name(controller: Controller) -> str:
     """1 sample (1.25 ms)"""
     count = f"{controller.delay:.4g} sample{'' if controller.delay == 1.0 else 's'}"
-    return f"{count} ({quantity(controller.delay * controller.sampling_period, 's')})"
+    return f"{count} ({given(controller.delay * controller.sampling_period, 's')})"
 
 
 def filter_name(controller: Controller) -> str:
@@ -220,10 +221,10 @@ def filter_name(controller: Controller) -> str:
     if low_pass is None:
         return "velocity not filtered"
     if isinstance(low_pass, FirstOrder):
-        return f"velocity through a first-order filter of {quantity(low_pass.time_constant, 's')}"
+        return f"velocity through a first-order filter of {given(low_pass.time_constant, 's')}"
     return (
         f"velocity through a Butterworth filter of order {low_pass.order} at "
-        f"{hertz(low_pass.cutoff_Hz)} ({low_pass.discretisation})"
+        f"{given(low_pass.cutoff_Hz, 'Hz')} ({low_pass.discretisation})"
     )
 
 

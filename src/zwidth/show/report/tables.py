@@ -36,7 +36,7 @@ def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:
         (
             v.label,
             quantity(v.stiffness_max, "N/m") if v.stiffness_max > 0.0 else "none",
-            f"{number(v.stiffness_max / base, 2)}\u00a0×" if base > 0.0 else UNKNOWN,
+            f"{number(v.stiffness_max / base)}\u00a0×" if base > 0.0 else UNKNOWN,
             quantity(v.damping, "Ns/m"),
             ", ".join(sentences.hertz(f) for f in v.frequencies) or UNKNOWN,
             quantity(v.area, "N²s/m²"),
@@ -47,8 +47,13 @@ def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:
 
 
 def left_out(variants: tuple[Variant, ...]) -> list[Row]:
-    """Label and reason of the variants without a chart."""
-    return [(v.label, v.reason) for v in variants if v.chart is None]
+    """Labels and reason of the variants without a chart, those of one reason together."""
+    reasons: dict[str, list[str]] = {}
+    for v in variants:
+        if v.chart is None:
+            # what follows a semicolon is advice on asking for this model
+            reasons.setdefault(v.reason.split("; ")[0], []).append(v.label)
+    return [(sentences.listed(labels), reason) for reason, labels in reasons.items()]
 
 
 def changes(facts: Facts) -> tuple[Variant, ...]:
@@ -128,7 +133,8 @@ def document(facts: Facts) -> dict[str, Any]:
             for bound in facts.bounds
         ],
     }
-    return _known({**found, **({} if facts.renders else {"reason": sentences.NO_WALL})})
+    reason = {} if facts.renders else {"reason": sentences.NO_WALL}
+    return {key: _known(value) for key, value in {**found, **reason}.items()}
 
 
 def _walls(variant: Variant) -> dict[str, Any]:
