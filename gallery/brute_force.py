@@ -7,8 +7,11 @@ computer's memory (old reading, filter, delayed forces) is appended, and the mat
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.linalg import expm
+from scipy.optimize import root
 
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
@@ -115,7 +118,7 @@ class Judge:
         x, weight = np.polynomial.legendre.leggauss(nodes)
         cuts = np.sqrt(1.0 - np.sort([0.0, *corners, K_max])[::-1] / K_max)
         total = 0.0
-        for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+        for a, b in pairwise(cuts):
             s = 0.5 * (a + b) + 0.5 * (b - a) * x
             lower, upper = self.edges(K_max * (1.0 - s**2), B_above)
             total += float(np.sum(0.5 * (b - a) * weight * (upper - lower) * 2.0 * K_max * s))
@@ -130,6 +133,26 @@ class Judge:
             rest = np.delete(roots, np.argmin(np.abs(roots - 1.0)))
             stable, unstable = (middle, unstable) if np.abs(rest).max() < 1.0 else (stable, middle)
         return stable
+
+    def triple_point(self, K, B):
+        """K, B and rho, near a guess, where a complex pair and a double real root have one radius rho.
+
+        Four equations p(rho) = p'(rho) = 0, p(rho e^{i theta}) = 0 on the characteristic polynomial: the fastest
+        decay of the two-mass plant is such a wall; eigenvalues know a double root to half their digits only.
+        """
+
+        def equations(unknown):
+            stiffness, damping, rho, theta = unknown * scale
+            p = np.poly(self.matrix(stiffness, damping))
+            pair = np.polyval(p, rho * np.exp(1j * theta))
+            return 1e3 * np.polyval(p, rho), 1e2 * np.polyval(np.polyder(p), rho), pair.real, pair.imag
+
+        roots = self.roots(K, B)
+        pair = roots[np.argmax(roots.imag * (np.abs(np.angle(roots)) > 0.1))]
+        scale = np.array([K, B, abs(pair), np.angle(pair)])
+        found = root(equations, np.ones(4), tol=1e-14)
+        stiffness, damping, rho, _ = found.x * scale
+        return float(stiffness), float(damping), float(rho)
 
 
 def butterworth(cutoff_Hz, period, prewarped=False):

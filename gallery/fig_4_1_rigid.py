@@ -7,8 +7,8 @@ Hurwitz's conditions are p > 0, mu0 > 0 and
     mu1 mu2 > mu0 mu3:   p < beta eps (d + beta) (beta - g d) / ((beta + (1 - eps) d) g),   g = eps + eps beta - 1
 
 The last is (4.9), its largest p (4.10) and (4.11). The second, p + 2 d < (4 beta - 2 beta^2 eps)/(2 - 2 eps -
-beta eps), is the real root z = -1, which (4.9) leaves out: it cuts into the region once beta exceeds 2.31, and cuts
-off its tip above 3.66. For beta -> 0 all of it becomes p < 2 d (2 - d)/(2 + d) (4.14).
+beta eps), is the real root z = -1, which (4.9) leaves out: it cuts into the region once beta exceeds 2.31, and
+cuts off its tip above 3.66. For beta -> 0 all of it becomes p < 2 d (2 - d)/(2 + d) (4.14).
 
 Run `python -m gallery.fig_4_1_rigid` to draw it.
 """

@@ -4,9 +4,9 @@ With W^2 = k_e T^2/m and c = cos W,
 
     -W^2 < p < (-2 d^2 (1 - c) + 2 d W^2 c)/(d (1 - c) + W^2)                            (thesis eq. 4.43)
 
-The largest p over d is (4.44), its d (4.45). (4.46), W^2/(1 - c), is where the region ends at p = -W^2: the largest
-damping of a wall with p > 0 is W^2 c/(1 - c), as (5.7) has it. All of it vanishes at W = pi/2, and returns beyond
-3 pi/2: there the samples see the vibration at 2 pi - W, slower than it is.
+The largest p over d is (4.44), its d (4.45). (4.46), W^2/(1 - c), is where the region ends at p = -W^2: the
+largest damping of a wall with p > 0 is W^2 c/(1 - c), as (5.7) has it. All of it vanishes at W = pi/2, and returns
+beyond 3 pi/2: there the samples see the vibration at 2 pi - W, slower than it is.
 
 Run `python -m gallery.fig_4_3_mass_spring` to draw it.
 """

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.model.posture import PostureError
 from zwidth.model.reduction import effective_parameters
@@ -28,10 +29,10 @@ def apart(distance: float) -> Device:
 
 
 def reaches(distance: float) -> bool:
-    """Whether the handle gets to (0, 0.25) m."""
+    """Whether the handle gets to (0, 0.25) m; farther apart the arms do not even meet (DeviceError)."""
     try:
         apart(distance).posture((0.0, Y))
-    except PostureError:
+    except (PostureError, DeviceError):
         return False
     return True
 

@@ -1,8 +1,8 @@
 """(5.15): the motor's mass at which the fastest possible decay is reached, for a given wall.
 
-The motor's mass m on the drives' spring k_e, not damped, wall (K, B). The mass of smallest spectral radius is where
-two vibrations decay alike: with x = cos W the condition (5.13) is a parabola in x, and rho is least where its
-discriminant vanishes. With P = K/k_e and D = B/(k_e T),
+The motor's mass m on the drives' spring k_e, not damped, wall (K, B). The mass of smallest spectral radius is
+where two vibrations decay alike: with x = cos W the condition (5.13) is a parabola in x, and rho is least where
+its discriminant vanishes. With P = K/k_e and D = B/(k_e T),
 
     rho^2 = 8 D (1 + P) / (4 D^2 + 4 D P + 8 D + P^2)
 

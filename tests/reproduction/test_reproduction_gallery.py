@@ -1,0 +1,156 @@
+"""The gallery's results against the numbers that an independent calculation gave for the thesis's plant."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gallery import fig_3_7_bilateral_wall as wall
+from gallery import fig_3_8_frequencies as vibration
+from gallery import fig_3_9_no_damping as undamped
+from gallery import fig_3_11_filter as low_pass
+from gallery import fig_4_1_rigid as rigid
+from gallery import fig_4_2_delay as delay
+from gallery import fig_4_3_mass_spring as spring
+from gallery import fig_4_4_models as models
+from gallery import fig_5_5_base_distance as base
+from gallery import optimal_mass, table_3_4
+from gallery.brute_force import Judge, butterworth
+
+# Transition matrix by matrix exponential, eigenvalues: largest stiffness, its damping and frequency, largest
+# damping for K -> 0. All digits given are right.
+BRUTE_FORCE = {
+    "undamped": (undamped.flexible, 4033.83825717, 10.7414444, 169.834082, 23.9047385),
+    "damped": (wall.chart, 7133.86929380, 9.97478812, 174.547436, 28.4474336),
+    "delayed": (vibration.delayed, 1101.30206608, 2.07670521, 9.62832, 4.17250259),
+    "rigid": (undamped.rigid, 126058.022906, 190.206868, 145.622666, 459.2),
+    "filtered": (low_pass.rigid, 2167.38666443, 8.14533155, 15.813584, 42.1176801),
+    "prewarped": (low_pass.rigid_prewarped, 2174.58486623, 8.16440765, 15.841482, 42.1900705),
+}
+# The same sources, and for the filter an adaptive quadrature of the edge in 30 digits.
+AREAS = {
+    "undamped": (undamped.flexible, 64089.3003),
+    "damped": (wall.chart, 138570.0695),
+    "delayed": (vibration.delayed, 2346.02122),
+    "rigid": (undamped.rigid, 38362397.77),
+    "filtered": (low_pass.rigid, 56700.891515661),
+    "prewarped": (low_pass.rigid_prewarped, 56990.791151366),
+}
+
+
+@pytest.mark.parametrize("case", BRUTE_FORCE)
+def test_a_chart_has_the_numbers_of_brute_force(case):
+    chart, K, B, frequency, largest_damping = BRUTE_FORCE[case]
+    assert chart.stiffness_max == pytest.approx(K, rel=1e-11)
+    assert chart.damping_at_stiffness_max == pytest.approx(B, rel=1e-8)
+    assert chart.frequencies_at_stiffness_max[0] == pytest.approx(frequency, rel=1e-6)
+    assert chart.damping_max == pytest.approx(largest_damping, rel=3e-9)
+
+
+@pytest.mark.parametrize("case", AREAS)
+def test_a_chart_has_the_area(case):
+    chart, area = AREAS[case]
+    assert chart.stable_area == pytest.approx(area, rel=2e-9)
+
+
+def test_without_damping_one_sample_of_delay_leaves_nothing():
+    assert undamped.flexible_delayed.regions == ()
+    assert np.isnan(undamped.flexible_delayed.stiffness_max)
+    assert undamped.flexible_delayed.stable_area == 0.0
+
+
+def test_table_3_4():
+    assert table_3_4.link_side_mass == pytest.approx(0.261599, abs=5e-7)
+    assert table_3_4.motor_side_mass == pytest.approx(0.025367, abs=5e-7)
+    assert table_3_4.rigid_mass == pytest.approx(0.286967, abs=5e-7)
+    assert table_3_4.stiffness == pytest.approx(11793, abs=0.5)
+    assert table_3_4.frequencies == pytest.approx([101.31, 130.80], abs=0.005)
+    assert table_3_4.frequencies_at_average_stiffness == pytest.approx([95.51, 121.77], abs=0.005)
+    assert table_3_4.motor_inertia_at_the_joint == pytest.approx(4.186e-4, abs=5e-8)
+    assert table_3_4.ratio_of_the_pulleys == pytest.approx(18.39, abs=0.005)
+    assert table_3_4.link_side_mass_without_offsets == pytest.approx(0.2656, abs=5e-5)
+
+
+def test_the_bilateral_wall():
+    assert wall.damping_ratio == pytest.approx(0.049, abs=5e-4)
+    assert wall.chart_as_printed.stiffness_max == pytest.approx(42e3, rel=0.01)
+    # the reading off the chart and the bisection of eigenvalues
+    assert wall.crossings_at_4000 == pytest.approx(wall.edges_at_4000, rel=1e-5)
+    # given as 2.42 and 21.66, rounded into the stable side
+    assert wall.edges_at_4000 == pytest.approx((2.415, 21.666), abs=1e-3)
+
+
+def test_the_fastest_decay():
+    best = wall.chart.fastest_decay
+    assert best.stiffness == pytest.approx(467.90, abs=0.05)
+    assert best.damping == pytest.approx(21.9465, abs=5e-4)
+    assert best.spectral_radius == pytest.approx(0.9454836, abs=1e-6)
+
+
+def test_frequencies_along_the_edge():
+    assert (vibration.corner_low_Hz, vibration.corner_high_Hz) == pytest.approx((19.8231, 154.4454), abs=1e-4)
+    assert vibration.highest_Hz == pytest.approx(212.15, abs=0.005)
+    assert vibration.delayed_corner_Hz == pytest.approx((9.628, 135.28), abs=5e-3)
+    # both roots are on the circle at the corner
+    corner = vibration.corner_stiffness, vibration.corner_damping
+    circle = np.abs(Judge(*plant_of(wall.chart)).roots(*corner))
+    assert (np.abs(circle - 1.0) < 1e-9).sum() == 4
+
+
+def plant_of(chart):
+    plant = chart.loop.plant
+    return plant.mass, plant.damping, plant.stiffness, plant.actuator, chart.loop.period
+
+
+def test_two_masses_with_a_filter():
+    judge = Judge(*plant_of(low_pass.two_mass), low_pass=butterworth(20.0, low_pass.two_mass.loop.period))
+    K, *_ = judge.largest_stiffness(4000.0, 60.0)
+    assert low_pass.two_mass.stiffness_max == pytest.approx(K, rel=1e-9)
+    assert low_pass.two_mass.stiffness_max == pytest.approx(2598.0368, abs=1e-4)
+    assert low_pass.two_mass_undamped.regions == ()
+
+
+def test_the_rigid_wall():
+    assert rigid.free.stiffness_max == pytest.approx(0.686292, abs=5e-7)
+    assert rigid.free.stable_area == pytest.approx(12 - 16 * np.log(2), rel=1e-9)
+    assert rigid.beta_where_incomplete == pytest.approx(2.311, abs=5e-4)
+    assert rigid.beta_where_tip_unstable == pytest.approx(3.659, abs=5e-4)
+    assert rigid.tip_of_4_10[0] == pytest.approx(rigid.damped.stiffness_max, rel=1e-12)
+    assert rigid.radius_inside_the_tip_below < 1.0 < rigid.radius_inside_the_tip_above
+    assert rigid.radius_of_optimistic_wall > 1.0
+
+
+@pytest.mark.parametrize(
+    ("samples", "p", "d"),
+    [
+        (0, 0.686292, 0.828427),
+        (1, 0.144469, 0.424694),
+        (2, 0.062430, 0.29139),
+        (3, 0.034782, 0.22238),
+        (5, 0.01535, 0.15116),
+    ],
+)
+def test_delays(samples, p, d):
+    assert delay.largest_p[samples] == pytest.approx(p, abs=5e-6)
+    assert delay.d_at_largest_p[samples] == pytest.approx(d, abs=1e-5)
+
+
+def test_the_mass_on_its_spring():
+    assert max(spring.error_of_4_44, spring.error_of_4_45, spring.error_of_5_7, spring.error_of_area) < 1e-10
+    assert spring.stable_beyond == (True, False, False, False, True, True)
+    assert spring.area_with_the_right_logarithm == pytest.approx(spring.area, rel=1e-10)
+
+
+def test_the_models_of_figure_4_4():
+    assert models.motor_mass_undamped.stiffness_max == pytest.approx(models.closed_form, rel=1e-11)
+    assert models.low_edge_rigid == pytest.approx(models.low_edge, rel=0.05)
+    assert models.high_edge_motor_mass == pytest.approx(models.high_edge, rel=0.01)
+
+
+def test_chapter_5():
+    assert base.ratio_of_stiffness == pytest.approx(3.10, abs=0.005)
+    assert base.farthest_apart == pytest.approx(0.4784, abs=2e-4)
+    given = {"B": (0.0510576, 0.895606), "C": (0.0602998, 0.872978), "D": (0.0698500, 0.853952)}
+    for name, (mass, rho) in given.items():
+        assert optimal_mass.optimum[name] == pytest.approx((mass, rho), abs=6e-7)
+        assert optimal_mass.by_5_15[name] == pytest.approx(rho, abs=6e-7)
