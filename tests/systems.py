@@ -37,8 +37,10 @@ def published(structural=0.00012, **controller):
 
 
 def random_plant(rng, rate, ratios=RATIOS, kind="chain"):
-    """One to four masses in a chain, free or grounded; kind "dense" couples their inertia, "coupled" their damping,
-    "apart" reads the first mass and drives the last."""
+    """One to four masses in a chain, free or grounded.
+
+    kind "dense" couples their inertia, "coupled" their damping; "apart" reads the first mass and drives the last.
+    """
     n = int(rng.integers(2 if kind == "apart" else 1, 5))
     m = 10.0 ** rng.uniform(-2.0, 0.5, n)
     f = 10.0 ** rng.uniform(0.0, np.log10(0.75 * rate), n)
@@ -124,7 +126,7 @@ def second_matrix(loop, wall_stiffness, wall_damping):
     T, n = controller.sampling_period, plant.size
     whole = int(np.floor(controller.delay + 1e-12))
     rest = controller.delay - whole
-    F, g = held_step(plant, T)
+    F, _ = held_step(plant, T)
     Fr, gr = held_step(plant, (1.0 - rest) * T)
     _, gf = held_step(plant, rest * T) if rest > 1e-12 else (None, np.zeros(2 * n))
     old = Fr @ gf

@@ -94,7 +94,7 @@ def test_damped_mass_without_virtual_damping(m, b, period, exact):
     E = np.exp(-b * period / m)
     K = b * (1.0 - E) / (m / b * (1.0 - E) - period * E)
     assert exact == pytest.approx(K, rel=3e-6)
-    inside, outside = chart.check([K * (1 - 1e-6), K * (1 + 1e-6)], 0.0).names
+    inside, outside = chart.check([K * (1 - 1e-4), K * (1 + 1e-4)], 0.0).names
     assert (inside, outside) == ("stable", "unstable")
 
 

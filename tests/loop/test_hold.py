@@ -93,15 +93,25 @@ def test_rigid_frequencies_are_exactly_zero():
     assert natural_frequencies(two_mass(0.3, 0.02, 1e4))[0] == 0.0
 
 
-def test_a_defective_pair_of_coupled_modes_is_refused_in_words():
-    # two modes whose coupled damping merges them: K = diag(1, 1 + e), gyration-free but defective at the merge
-    K = np.diag([1.0, 4.0])
-    B = np.array([[2.0, 0.0], [0.0, 4.0]]) + 1e-9 * np.array([[0.0, 1.0], [1.0, 0.0]])
-    plant = Plant(np.eye(2), B, K, np.ones(2), np.ones(2), None)
-    try:
-        rows = sampled_sections(plant, 0.1, 0.0).rows
-    except ModesError as error:
-        assert "damping" in str(error)
-    else:
-        z = np.array([1.3 + 0.2j])
-        assert from_sections(rows, z) == pytest.approx(sampled_response(plant, 0.1, 0.0, z), rel=1e-6)
+def coupled_critical_pair(detuning):
+    """M = I, K = diag(1, 4) and a coupled B for which (s^2 + b1 s + 1)(s^2 + b2 s + 4) - c^2 s^2 has the double
+    root -p and one mode only; the detuning moves b1."""
+    p, q = 1.5, 2.0
+    b1 = (p * p * q + 8.0 / p - 2.0 * p - q) / 3.0
+    b2 = 2.0 * p + q - b1
+    c = np.sqrt(5.0 + b1 * b2 - p * p - 2.0 * p * q - 4.0 / p**2)
+    B = np.array([[b1 * (1.0 + detuning), c], [c, b2]])
+    return Plant(np.eye(2), B, np.diag([1.0, 4.0]), np.ones(2), np.ones(2), None)
+
+
+def test_a_coupled_pair_at_critical_damping_is_refused_in_words():
+    with pytest.raises(ModesError, match="damping"):
+        sampled_sections(coupled_critical_pair(0.0), 0.1, 0.0)
+
+
+@pytest.mark.parametrize("detuning", [1e-5, -1e-5])
+def test_as_far_from_it_as_the_message_advises_all_is_well(detuning):
+    plant = coupled_critical_pair(detuning)
+    z = np.array([1.3 + 0.2j, 0.7j])
+    got = from_sections(sampled_sections(plant, 0.1, 0.4).rows, z)
+    assert got == pytest.approx(sampled_response(plant, 0.1, 0.4, z), rel=1e-9)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.corner import cross_line, refine_corner
 from zwidth.chart.curve import walls
-from zwidth.chart.tracer import RealRoot, Tracer, Wall
+from zwidth.chart.tracer import ROOTS, RealRoot, Tracer, Wall
 
 Floats = NDArray[np.float64]
 
@@ -61,10 +61,10 @@ def find_edges(tracer: Tracer, thetas: Floats) -> Edges:
     """Every arc of the stable set's edge that the samples at these angles reveal."""
     K, B, edge = tracer.trace(thetas)
     arcs, partners = _pair_arcs(tracer, thetas, edge)
-    for root in ("plus", "minus"):
-        arcs += _line_arcs(tracer, root, thetas, K, B)  # type: ignore[arg-type]
+    for root in ROOTS:
+        arcs += _line_arcs(tracer, root, thetas, K, B)
     units = np.array([tracer.period, 1.0])
-    points = [_points(tracer, arc) * units for arc in arcs]
+    points = [arc_walls(tracer, arc) * units for arc in arcs]
     extents = tuple(float(np.max(np.abs(walls - walls[0]))) for walls in points)
     # nothing smaller than rounding of the whole curve is an edge
     reach = np.maximum(np.abs(K) * tracer.period, np.abs(B))
@@ -74,7 +74,7 @@ def find_edges(tracer: Tracer, thetas: Floats) -> Edges:
     return Edges(tuple(arcs), tuple(partners), extents, size)
 
 
-def _points(tracer: Tracer, arc: Arc) -> Floats:
+def arc_walls(tracer: Tracer, arc: Arc) -> Floats:
     """An arc's corners and the samples that found it, (k, 2)."""
     K, B = walls(*tracer.factors, tracer.radius, arc.thetas)
     return np.vstack([arc.first, np.column_stack([K, B]), arc.last])
@@ -87,12 +87,12 @@ def _pair_arcs(tracer: Tracer, thetas: Floats, edge: NDArray[np.bool_]) -> tuple
     changes = np.flatnonzero(padded[1:] != padded[:-1])
     for i, j in zip(changes[::2], changes[1::2], strict=True):  # samples i .. j - 1
         ends: list[tuple[float, Wall]] = []
-        for inner, outer, root in ((i, i - 1, "plus"), (j - 1, j, "minus")):
+        for (inner, outer), root in zip(((i, i - 1), (j - 1, j)), ROOTS, strict=True):
             if 0 <= outer < len(thetas):
                 theta, wall, partner = refine_corner(tracer, thetas[inner], thetas[outer])
                 partners.append(partner)
             else:
-                end = tracer.curve_end(root)  # type: ignore[arg-type]
+                end = tracer.curve_end(root)
                 theta = thetas[inner] if end is None else (0.0 if root == "plus" else np.pi)
                 wall = tracer.wall(thetas[inner])[:2] if end is None else end
             ends.append((theta, wall))

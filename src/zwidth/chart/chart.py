@@ -110,7 +110,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
         frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
         damping_max=largest_damping(tracer, rings, width),
         stable_area=max(quadrant_area(tracer, rings), 0.0),
-        fastest_decay=_confirmed(loop, fastest_decay(tracer, outlines)) if decay else None,
+        fastest_decay=_confirmed(loop, fastest_decay(loop, tracer, outlines)) if decay else None,
         corner_blur=blur,
     )
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.curve import wall_at
 from zwidth.chart.hurwitz import edges_stable_set, working_room
-from zwidth.chart.tracer import RealRoot, Tracer, Wall
+from zwidth.chart.tracer import ROOTS, RealRoot, Tracer, Wall
 from zwidth.compiled import compiled
 
 Floats = NDArray[np.float64]
@@ -119,11 +119,11 @@ def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, f
     """
     theta = _bisect_flag(*tracer.factors, tracer.polynomials, tracer.radius, on, off)
     low, high = min(on, off), max(on, off)
-    for root, partner in (("plus", 0.0), ("minus", np.pi)):
-        a, s, v = tracer.line(root)  # type: ignore[arg-type]
+    for root, partner in zip(ROOTS, (0.0, np.pi), strict=True):
+        a, s, v = tracer.line(root)
         ends = [a + s * K + v * B for K, B, *_ in (tracer.wall(low), tracer.wall(high))]
         if ends[0] * ends[1] < 0.0:
-            crossing = cross_line(tracer, root, low, high)  # type: ignore[arg-type]
+            crossing = cross_line(tracer, root, low, high)
             if abs(crossing - theta) <= 1e-6 * theta:
                 return crossing, tracer.wall(crossing)[:2], partner
     wall = tracer.wall(theta)[:2]

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.chart.arcs import arc_walls, find_edges
+from zwidth.chart.grid import angles, singular_points
 from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled
 from zwidth.loop.evaluate import divide
+from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -17,6 +20,8 @@ Complexes = NDArray[np.complex128]
 # Simplex sizes of successive searches, in shares of the cell: the spectral radius has edges and cusps in which a
 # single search stalls.
 RESTARTS = np.array([1e-1, 1e-2, 1e-4, 1e-7])
+# How much faster than the best found (in shares of 1 - radius) the next wall is looked for.
+FASTER = (0.1, 0.003)
 
 
 @dataclass(frozen=True)
@@ -149,20 +154,43 @@ def descend(
     return best[0], best[1], value
 
 
-def fastest_decay(tracer: Tracer, outlines: list[Floats]) -> FastestDecay | None:
+def fastest_decay(loop: Loop, tracer: Tracer, outlines: list[Floats]) -> FastestDecay | None:
     """Smallest spectral radius over the cells with these outlines (k, 2), both signs of K and B.
 
-    Each cell is scanned at the middles between points of its outline; the best of each starts a search.
+    A simplex search can end in a narrow valley's wall. So the curve is traced on a smaller circle: whatever edge
+    it finds there encloses walls that decay faster, and the search goes on among them until none is left.
     """
     best: FastestDecay | None = None
     for outline in outlines:
-        picks = outline[np.linspace(0, len(outline) - 1, 15).astype(int)[:-1]]
-        i, j = np.triu_indices(len(picks), 2)
-        middles = 0.5 * (picks[i] + picks[j])
-        values = scatter_values(tracer.polynomials, tracer.radius, middles[:, 0].copy(), middles[:, 1].copy())
-        extent = np.maximum(np.ptp(outline, axis=0), 1e-300)
-        for k in np.argsort(values)[:1]:
-            K, B, value = descend(tracer.polynomials, tracer.radius, middles[k], extent, RESTARTS)
-            if value < tracer.radius and (best is None or value < best.spectral_radius):
-                best = FastestDecay(float(K), float(B), float(value))
+        best = _search(tracer, outline, best)
+    for faster in FASTER:
+        for _ in range(8):
+            radius = 1.0 - (1.0 - best.spectral_radius) * (1.0 + faster) if best else 0.0
+            if not 0.0 < radius < 1.0:
+                break
+            walls = _edge_walls(Tracer.of(loop, radius))
+            previous, best = best, _search(tracer, walls, best) if len(walls) > 2 else best
+            if best is previous:
+                break
     return best
+
+
+def _search(tracer: Tracer, outline: Floats, best: FastestDecay | None) -> FastestDecay | None:
+    """A search from the best of the middles between points of an outline; the better of its end and `best`."""
+    picks = outline[np.linspace(0, len(outline) - 1, 15).astype(int)[:-1]]
+    i, j = np.triu_indices(len(picks), 1)
+    middles = np.vstack([picks[i] + picks[j], 2.0 * picks.mean(axis=0)[None]]) / 2.0
+    values = scatter_values(tracer.polynomials, tracer.radius, middles[:, 0].copy(), middles[:, 1].copy())
+    extent = np.maximum(np.ptp(outline, axis=0), 1e-300)
+    K, B, value = descend(tracer.polynomials, tracer.radius, middles[np.argmin(values)], extent, RESTARTS)
+    if value < (best.spectral_radius if best else tracer.radius):
+        return FastestDecay(float(K), float(B), float(value))
+    return best
+
+
+def _edge_walls(tracer: Tracer) -> Floats:
+    """Walls (k, 2) on whatever edge the curve has on the tracer's circle."""
+    points = singular_points(tracer.factors[0], tracer.polynomials, tracer.radius)
+    edges = find_edges(tracer, angles(points, tracer.radius, 0.2))
+    walls = [arc_walls(tracer, arc) for arc in edges.arcs]
+    return np.vstack(walls) if walls else np.empty((0, 2))

@@ -16,6 +16,7 @@ from zwidth.loop.loop import Loop
 Floats = NDArray[np.float64]
 Wall = tuple[float, float]
 RealRoot = Literal["plus", "minus"]
+ROOTS: tuple[RealRoot, RealRoot] = ("plus", "minus")
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Tracer:
     @property
     def degree(self) -> int:
         """Number N of roots."""
-        return self.polynomials.shape[1] - 1
+        return int(self.polynomials.shape[1]) - 1
 
     def wall(self, theta: float) -> tuple[float, float, float, float]:
         """K, B, dK/dtheta, dB/dtheta at one angle in (0, pi)."""

@@ -107,7 +107,7 @@ def bilinear(c2: float, c1: float, c0: float, degree: int, radius: float, out: F
 @compiled
 def degree_of_loop(rows: Floats, whole: int, split: int, denominator: Floats) -> int:
     """Degree N of the characteristic polynomial."""
-    N = 2 * rows.shape[0] + whole + split
+    N: int = 2 * rows.shape[0] + whole + split
     for k in range(denominator.shape[0]):
         N += 2 if denominator[k, 0] != 0.0 else 1
     return N
