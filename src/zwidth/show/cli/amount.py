@@ -20,7 +20,7 @@ def amount(value: float | None, unit: str, digits: int = 4) -> str:
     """
     if value is None or not isfinite(value):
         return NONE
-    return units.quantity(value, unit, digits).translate(TYPED)
+    return typed(units.quantity(value, unit, digits))
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -30,4 +30,9 @@ def number(value: float | None, digits: int = 4) -> str:
 
 def vector(components: Iterable[float], unit: str = "") -> str:
     """(0, 0.25) m: without the third component where that is zero."""
-    return units.point(components, unit).translate(TYPED)
+    return typed(units.point(components, unit))
+
+
+def typed(text: str) -> str:
+    """The text with plain blanks and minus signs."""
+    return text.translate(TYPED)

@@ -31,7 +31,7 @@ KEYS: Final = (
     "fastest_decay",
     "unobserved_modes",
 )
-NO_WALL: Final = "no wall with positive stiffness and no negative damping is stable"
+NO_WALL: Final = "no stable wall has K > 0 and B >= 0"
 
 Window = tuple[float, float, float, float]
 

@@ -63,8 +63,8 @@ def check(
         return deliver(Answer(nulls, reason=f"the walls are undecided: {error}"), as_json)
     document = question.facts(device) | {"points": verdicts}
     if path is not None:
-        write_data(path, document, {key: [point[key] for point in verdicts] for key in verdicts[0]})
         document["file"] = str(path)
+        write_data(path, document, {key: [point[key] for point in verdicts] for key in verdicts[0]})
     return deliver(Answer(document, lambda: _pages(question, device, document)), as_json)
 
 

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import TextIO
 
 DONE, NO_ANSWER, BAD_INPUT, INTERNAL, INTERRUPTED = 0, 1, 2, 70, 130
 
 
 def main() -> None:
     """Run the command line of this process and leave with its exit code."""
+    warnings.showwarning = _warn
     sys.exit(run(sys.argv[1:]))
 
 
@@ -59,6 +62,19 @@ def say(*lines: str) -> None:
     with suppress(OSError, ValueError):
         for line in lines:
             print(line, file=sys.stderr)
+
+
+def _warn(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """A warning as users want it: what zwidth says, on a line; arithmetic's own is for those who debug."""
+    if issubclass(category, UserWarning) or os.environ.get("ZWIDTH_DEBUG"):
+        say(f"zwidth: warning: {message}")
 
 
 def _drop_output() -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.show.cli.amount import typed
 from zwidth.show.cli.answer import Answer, deliver
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
-from zwidth.show.output import destination, replacing
+from zwidth.show.output import destination
+
+if TYPE_CHECKING:
+    from zwidth.device.device import Device
 
 PAGE: Final = (".html", ".htm")
 
@@ -30,15 +34,17 @@ def report(question: Question, output: str | None, as_json: bool) -> int:
 
     device = question.device()
     try:
-        question.plant(device)
+        question.plant(device)  # whether it can be meant, before the heavy parts are imported
         found = _written(question, device, path)
     except PostureError as error:
         return deliver(Answer(question.facts(device) | {"file": None}, reason=str(error)), as_json)
     except (ChartError, ModesError) as error:
         nulls = question.facts(device) | {"file": None}
         return deliver(Answer(nulls, reason=f"the chart is undecided: {error}"), as_json)
-    document = question.facts(device) | found | {"file": str(path)}
-    return deliver(Answer(document, lambda: [f"written: {path}"]), as_json)
+    reason = found.pop("reason", None)
+    document = found | question.facts(device)
+    pages = [*(typed(sentence) for sentence in found["summary"]), f"written: {path}"]
+    return deliver(Answer(document, lambda: pages, reason), as_json)
 
 
 def default_name(device: str) -> str:
@@ -46,18 +52,15 @@ def default_name(device: str) -> str:
     return f"{Path(device).name.removesuffix('.toml')}-report.html"
 
 
-def _written(question: Question, device: Any, path: Path) -> dict[str, Any]:
+def _written(question: Question, device: Device, path: Path) -> dict[str, Any]:
     """Write the report; the numbers in it."""
     from zwidth.show.report.report import write_report
 
-    with replacing(path) as draft:
-        return dict(
-            write_report(
-                device,
-                draft,
-                at=question.at,
-                direction=question.direction,
-                assembly=question.assembly,
-                model=question.model,
-            )
-        )
+    return write_report(
+        device,
+        path,
+        at=question.at,
+        direction=question.direction,
+        assembly=question.assembly,
+        model=question.model,
+    )

@@ -57,8 +57,8 @@ def show(question: Question, output: str | None, as_json: bool) -> int:
         return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(error)), as_json)
     document = question.facts(device) | _numbers(question, device, plant, posture)
     if path is not None:
-        write_data(path, document, flat(document))
         document["file"] = str(path)
+        write_data(path, document, flat(document))
     return deliver(Answer(document, lambda: list(_pages(question, device, document))), as_json)
 
 

@@ -1,0 +1,226 @@
+"""Bad input through the command line: exit code 2, one line per fault, nothing on standard output."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from tests.cli.cli_run import MECHANISM, TWO_MASS, refused, zwidth
+
+PLANT = """
+name = "two masses"
+[plant]
+mass_kg = [[0.3, 0.0], [0.0, 0.02]]
+stiffness_N_per_m = [[9000.0, -9000.0], [-9000.0, 9000.0]]
+actuator = [0.0, 1.0]
+sensor = [0.0, 1.0]
+[loop]
+sampling_period_s = 0.001
+"""
+FILTER = '[loop.velocity.filter]\ntype = "butterworth"\n'
+BOTH = "[mechanism]\n[[mechanism.links]]\nname = 'a'\n"
+
+# what is replaced in PLANT (None: the whole of it), by what, and for each line its key and words of it
+FILES = {
+    "missing key": ("sampling_period_s = 0.001", "", [("loop.sampling_period_s", "is missing")]),
+    "unknown key": ("[loop]", "colour = 1\n[loop]", [("plant.colour", "is not a key")]),
+    "misspelt key": (
+        "sampling_period_s",
+        "sampling_periods",
+        [("loop.sampling_periods", "did you mean 'sampling_period_s'?")],
+    ),
+    "not supported yet": ("[loop]", "[friction]\ncoulomb_N = 0.1\n[loop]", [("friction", "not supported yet")]),
+    "text for a number": ("0.001", '"fast"', [("loop.sampling_period_s", "must be a number")]),
+    "nan": ("0.001", "nan", [("loop.sampling_period_s", "must be finite, got nan")]),
+    "infinite": ("0.02]]", "inf]]", [("plant.mass_kg.1.1", "must be finite, got inf")]),
+    "negative": ("0.001", "-0.001", [("loop.sampling_period_s", "got -0.001")]),
+    "zero": ("0.001", "0.0", [("loop.sampling_period_s", "got 0")]),
+    "not symmetric": ("[[0.3, 0.0]", "[[0.3, 0.1]", [("plant.mass_kg", "symmetric")]),
+    "not positive definite": ("0.02]]", "-0.02]]", [("plant.mass_kg", "positive definite")]),
+    "wrong size": ("[0.0, 1.0]\nsensor", "[1.0]\nsensor", [("plant.actuator", "2")]),
+    "a frequency": ("0.001", "1000", [("loop.sampling_period_s", "is 1000 a frequency in Hz?")]),
+    "negative delay": ("0.001", "0.001\ndelay_samples = -1", [("loop.delay_samples", "at least 0, got -1")]),
+    "both delays": ("0.001", "0.001\ndelay_samples = 1\ndelay_s = 0.001", [("loop", "delay_s")]),
+    "above Nyquist": (
+        "0.001",
+        f"0.001\n{FILTER}order = 2\ncutoff_Hz = 600.0",
+        [("loop.velocity.filter.cutoff_Hz", "500")],
+    ),
+    "order zero": (
+        "0.001",
+        f"0.001\n{FILTER}order = 0\ncutoff_Hz = 20.0",
+        [("loop.velocity.filter.order", "got 0")],
+    ),
+    "plant and mechanism": ("[loop]", f"{BOTH}[loop]", [("", "mechanism")]),
+    "empty": (None, "", [("", "is empty")]),
+    "not TOML": (None, "name = ", [("", "is not TOML")]),
+    "binary": (None, b"\x7fELF\x02\x01\x00\xff\xfe", [("", "UTF-8")]),
+    "zero bytes": (None, b"name = 1\x00", [("", "binary")]),
+    "nested": (None, "a = " + "[" * 10_000 + "]" * 10_000, [("", "nested too deeply")]),
+}
+
+
+@pytest.mark.parametrize("command", [("chart",), ("show", "--json"), ("check", "--stiffness=1", "--damping=1")])
+@pytest.mark.parametrize("fault", FILES)
+def test_a_wrong_file_is_refused_with_file_key_and_reason(tmp_path, fault, command):
+    old, new, expected = FILES[fault]
+    assert old is None or PLANT.count(old) == 1
+    file = tmp_path / "wrong.toml"
+    text = new if old is None else PLANT.replace(old, new)
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    lines = refused(command[0], file, *command[1:])
+    for key, words in expected:
+        assert any(line.startswith(f"{file}: {key}") and words in line for line in lines), lines
+    if fault != "plant and mechanism":
+        assert len(lines) == len(expected)
+    assert all(line.startswith(str(file)) for line in lines)
+
+
+def test_all_faults_of_a_file_are_reported_together(tmp_path):
+    file = tmp_path / "wrong.toml"
+    file.write_text(PLANT.replace("0.001", '"fast"').replace("0.02]]", "inf]]").replace("[loop]", "x = 1\n[loop]"))
+    assert len(refused("chart", file)) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("nowhere.toml", "is neither a file nor a bundled device"),
+        (".", "is a directory"),
+        ("five-bra", "five-bar"),
+    ],
+)
+def test_a_device_that_is_none(tmp_path, monkeypatch, name, words):
+    monkeypatch.chdir(tmp_path)
+    (line,) = refused("chart", name, "--json")
+    assert line.startswith(f"{name}: ")
+    assert words in line
+
+
+def test_a_loop_that_cannot_close():
+    (line,) = refused("chart", MECHANISM, "--set", "links.upper-left.origin_m=[9.0, 0.0, 0.0]")
+    assert line.startswith(f"{MECHANISM}: mechanism.")
+    assert "close" in line
+
+
+# a command line, and words of each of its lines
+LINES = [
+    (("chart", MECHANISM, "--direction", "0,0"), ["direction: has zero length"]),
+    (("chart", MECHANISM, "--direction", "0,0,1"), ["cannot move along the direction"]),
+    (("chart", MECHANISM, "--direction", "1"), ["'--direction': must be 2 or 3 finite numbers"]),
+    (("chart", MECHANISM, "--at", "a,b"), ["'--at': must be 2 or 3 finite numbers"]),
+    (("chart", MECHANISM, "--at", "nan,0.2"), ["'--at': must be 2 or 3 finite numbers"]),
+    (("chart", MECHANISM, "--at", "1,2,3,4"), ["'--at': must be 2 or 3 finite numbers"]),
+    (("chart", MECHANISM, "--at"), ["'--at' requires an argument"]),
+    (("chart", MECHANISM, "--assembly", "elbow-out"), ["did you mean 'elbows-out'?"]),
+    (("chart", MECHANISM, "--model", "soft"), ["'--model': 'soft' is not one of"]),
+    (("chart", "hapkit-course", "--model", "two-mass"), ["model two-mass: nothing flexible lies between"]),
+    (("chart", TWO_MASS, "--at", "0,0.2", "--assembly", "x"), ["at: does not apply", "assembly: does not apply"]),
+    (("chart", TWO_MASS, "--operator", "student"), ["an operator is not supported yet"]),
+    (("chart", TWO_MASS, "--axis", "0,0,1"), ["moments about an axis are not supported yet"]),
+    (("chart", TWO_MASS, "--set", "loop.delay"), ["must be PATH=VALUE"]),
+    (("chart", TWO_MASS, "--set", "loop.delay=1"), ["loop.delay: is no key"]),
+    (("chart", TWO_MASS, "--set", "a=1", "--set", "b=2"), ["--set: a: is no key", "--set: b: is no key"]),
+    (("chart", TWO_MASS, "--set", "plant.mass_kg.5.5=1"), ["plant.mass_kg.5.5"]),
+    (("chart", TWO_MASS, "--set", "loop.sampling_period_s=-1"), ["loop.sampling_period_s: must be"]),
+    (("chart", TWO_MASS, "--set", "friction.coulomb_N=[0, 1]"), ["not supported yet"]),
+    (("chart", TWO_MASS, "--window", "0,1,2"), ["'--window': must be 4 finite numbers"]),
+    (("chart", TWO_MASS, "--window", "1,0,0,1"), ["'--window': needs KMIN < KMAX"]),
+    (("chart",), ["missing argument 'DEVICE'"]),
+    (("chart", TWO_MASS, "extra"), ["unexpected extra argument"]),
+    (("chart", TWO_MASS, "--jason"), ["no such option '--jason'"]),
+    (("chrat", TWO_MASS), ["no such command 'chrat'"]),
+    (("devices", "five-bar"), ["unexpected extra argument"]),
+    (("check", TWO_MASS), ["--points FILE.csv, or both"]),
+    (("--jason",), ["no such option '--jason'"]),
+]
+
+
+@pytest.mark.parametrize(("words", "says"), LINES, ids=lambda value: " ".join(value))
+def test_a_wrong_command_line_is_refused_on_one_line_each(words, says):
+    lines = refused(*words)
+    assert len(lines) == len(says)
+    for line, text in zip(lines, says, strict=True):
+        assert text.lower() in line.lower()
+
+
+NO_OUTPUT = [
+    ("missing/chart.svg", "there is no folder"),
+    ("folder.svg", "is a directory"),
+    ("pipe.svg", "is no ordinary file"),
+    ("chart.txt", "must end in .png or .svg"),
+    ("chart", "must end in .png or .svg"),
+    ("", "must end in .png or .svg"),
+    ("chart.nc", ".nc is not supported yet"),
+    ("chart.mat", ".mat is not supported yet"),
+    ("file.csv/chart.csv", "cannot be written|there is no folder"),
+    ("a\0b.svg", "cannot be written"),
+    ("x" * 300 + ".svg", "cannot be written"),
+]
+
+
+@pytest.mark.parametrize(("name", "words"), NO_OUTPUT, ids=[words[:20] for _, words in NO_OUTPUT])
+def test_an_output_that_cannot_be_written_is_refused_before_anything_is_computed(
+    tmp_path, monkeypatch, name, words
+):
+    (tmp_path / "folder.svg").mkdir()
+    (tmp_path / "file.csv").write_text("kept")
+    os.mkfifo(tmp_path / "pipe.svg")
+    before = sorted(tmp_path.iterdir())
+    monkeypatch.setattr("zwidth.device.load.load", lambda *_: pytest.fail("the device was loaded"))
+    (line,) = refused("chart", TWO_MASS, "--output", f"{tmp_path}/{name}" if name else name)
+    assert any(choice in line for choice in words.split("|"))
+    assert sorted(tmp_path.iterdir()) == before
+    assert (tmp_path / "file.csv").read_text() == "kept"
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [(("report",), "x.pdf"), (("show",), "x.svg"), (("check", "--stiffness=1", "--damping=1"), "x.svg")],
+)
+def test_a_result_is_not_written_as_what_it_is_not(tmp_path, command, name):
+    (line,) = refused(command[0], TWO_MASS, *command[1:], "--output", tmp_path / name)
+    assert "must end in" in line
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_error_of_our_own_is_one_line_and_code_70(monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("first line\nsecond")
+
+    monkeypatch.setattr("zwidth.chart.chart.stability_chart", broken)
+    ran = zwidth("chart", TWO_MASS)
+    assert (ran.code, ran.out, len(ran.lines)) == (70, "", 1)
+    assert "ZeroDivisionError: first line second" in ran.err
+    assert "please report it" in ran.err
+    monkeypatch.setenv("ZWIDTH_DEBUG", "1")
+    assert "Traceback" in zwidth("chart", TWO_MASS).err
+
+
+def test_a_chart_that_cannot_be_closed_is_undecided(monkeypatch):
+    from zwidth.chart.region import ChartError
+
+    def open_edge(*_):
+        raise ChartError("the edge could not be closed")
+
+    monkeypatch.setattr("zwidth.chart.chart.stability_chart", open_edge)
+    ran = zwidth("chart", TWO_MASS, "--json")
+    assert ran.code == 1
+    assert ran.document["regions"] is None
+    assert ran.document["reason"] == "the chart is undecided: the edge could not be closed"
+
+
+@pytest.mark.parametrize("name", ["chart.svg", "chart.csv"])
+def test_an_interruption_is_one_line_and_leaves_nothing_half_written(tmp_path, monkeypatch, name):
+    file = tmp_path / name
+    file.write_text("from before")
+
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("zwidth.show.output.os.replace", stopped)
+    ran = zwidth("chart", TWO_MASS, "--output", file)
+    assert (ran.code, ran.out, len(ran.lines)) == (130, "", 1)
+    assert file.read_text() == "from before"
+    assert list(tmp_path.iterdir()) == [file]

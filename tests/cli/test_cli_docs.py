@@ -1,0 +1,94 @@
+"""The page on the commands: its examples run, its keys are those that come out."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from tests.cli.cli_run import MECHANISM, TWO_MASS, found, zwidth
+from zwidth.show.cli.group import zwidth as group
+
+PAGE = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
+DEVICE = """
+name = "my device"
+[plant]
+mass_kg = 0.05
+damping_Ns_per_m = 1.0
+[loop]
+sampling_period_s = 0.001
+[loop.velocity.filter]
+type = "butterworth"
+order = 2
+cutoff_Hz = 20.0
+"""
+
+
+def blocks(language: str) -> str:
+    return "".join(re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL))
+
+
+def keys(section: str) -> set[str]:
+    """The names in the first column of a section's table of keys."""
+    text = PAGE.partition(f"\n## {section}\n")[2].partition("\n## ")[0].partition("| Key |")[2]
+    return {
+        name for row in re.findall(r"^\| (`.*?) \|", text, re.MULTILINE) for name in re.findall(r"`(\w+)`", row)
+    }
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "my-device.toml").write_text(DEVICE)
+    (tmp_path / "walls.csv").write_text("stiffness_N_per_m,damping_Ns_per_m\n4000,10\n9000,10\n")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("line", blocks("sh").splitlines())
+def test_an_example_runs(folder, line):
+    before = set(folder.iterdir())
+    words = shlex.split(line)
+    assert words[0] == "zwidth"
+    ran = zwidth(*words[1:])
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out
+    written = {path.name for path in set(folder.iterdir()) - before}
+    expected = re.findall(r"--output (\S+)", line) or (["my-device-report.html"] if words[1] == "report" else [])
+    assert written == set(expected)
+
+
+def test_the_python_example_runs(capsys):
+    exec(compile(blocks("python"), "commands.md", "exec"), {})
+    number, verdict = capsys.readouterr().out.split()
+    assert float(number) > 0.0
+    assert verdict == "['stable']"
+
+
+def test_every_command_has_its_section_and_every_option_its_word():
+    for name, command in group.commands.items():
+        assert f"\n## {name}\n" in PAGE
+        for option in command.params:
+            if option.param_type_name == "option" and not option.hidden:
+                assert option.opts[0] in PAGE
+
+
+def test_the_keys_that_come_out_are_those_explained(folder):
+    asked = keys("What comes out")
+    for device in (MECHANISM, TWO_MASS):
+        assert set(found("show", device)) - asked == keys("show")
+        assert set(found("chart", device)) - asked == keys("chart")
+    document = found("check", TWO_MASS, "--points", "walls.csv")
+    assert set(document) - asked == {"points"}
+    assert set(document["points"][0]) | {"points"} >= keys("check")
+    assert set(found("devices")) == keys("devices")
+    report = found("report", TWO_MASS, "--output", "report.html")
+    assert set(report) >= {"file", "summary", "stiffness_max_N_per_m", *(asked - {"reason"})}
+
+
+def test_every_exit_code_is_explained():
+    from zwidth.show.cli import main
+
+    codes = {main.DONE, main.NO_ANSWER, main.BAD_INPUT, main.INTERNAL, main.INTERRUPTED}
+    assert {int(code) for code in re.findall(r"^\| (\d+) \|", PAGE, re.MULTILINE)} == codes

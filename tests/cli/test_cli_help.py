@@ -1,0 +1,61 @@
+"""Every command explains itself, with an example that is typed right."""
+
+from __future__ import annotations
+
+import re
+import shlex
+
+import click
+import pytest
+
+from tests.cli.cli_run import zwidth
+from zwidth import __version__
+from zwidth.device.device import MODELS as DEVICE_MODELS
+from zwidth.show.cli.group import zwidth as group
+from zwidth.show.cli.options import MODELS
+
+COMMANDS = sorted(group.commands)
+
+
+def test_the_commands_are_those_promised():
+    assert set(COMMANDS) == {"devices", "schema", "show", "chart", "check", "report"}
+
+
+@pytest.mark.parametrize("words", [(), ("--help",), ("-h",)])
+def test_the_first_help_lists_the_commands(words):
+    ran = zwidth(*words)
+    assert (ran.code, ran.err) == (0, "")
+    assert all(f"\n  {name} " in ran.out for name in COMMANDS)
+    assert "..." not in ran.out.partition("\n")[2], "a summary is cut"
+    assert "Example:" in ran.out
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_is_explained(name):
+    ran = zwidth(name, "--help")
+    assert (ran.code, ran.err) == (0, "")
+    options = [parameter for parameter in group.commands[name].params if isinstance(parameter, click.Option)]
+    for option in options:
+        assert option.help or option.hidden
+        assert option.hidden or option.opts[0] in ran.out
+
+
+@pytest.mark.parametrize("name", ["", *COMMANDS])
+def test_the_examples_of_the_help_are_typed_right(name):
+    text = zwidth(*filter(None, [name]), "--help").out
+    examples = re.findall(r"^ +(zwidth .+)$", text.partition("Example:")[2], re.MULTILINE)
+    assert examples
+    for line in examples:
+        words = shlex.split(line.partition(" >")[0])[1:]
+        assert words[0] == name or not name
+        with group.commands[words[0]].make_context(words[0], words[1:]) as context:
+            assert context.params is not None
+
+
+def test_the_version():
+    ran = zwidth("--version")
+    assert (ran.code, ran.out) == (0, f"zwidth {__version__}\n")
+
+
+def test_the_models_offered_are_the_models_there_are():
+    assert MODELS == DEVICE_MODELS

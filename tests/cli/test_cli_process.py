@@ -1,0 +1,135 @@
+"""The command as a process: how fast it starts, signals, closed and full streams."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.cli.cli_run import TWO_MASS, strict
+
+ZWIDTH = Path(sys.executable).with_name("zwidth")
+HELP_WITHIN = 0.3  # seconds
+HEAVY = {"numpy", "numba", "scipy", "matplotlib", "pydantic", "jinja2", "shapely"}
+
+
+def zwidth(*words: object, **options) -> subprocess.CompletedProcess[str]:
+    command = [ZWIDTH, *map(str, words)]
+    return subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, **options
+    )
+
+
+@pytest.mark.parametrize("words", [("--help",), ("devices",)])
+def test_the_command_starts_quickly(words):
+    times = []
+    for _ in range(5):
+        start = time.perf_counter()
+        assert zwidth(*words).returncode == 0
+        times.append(time.perf_counter() - start)
+    assert min(times) < HELP_WITHIN
+
+
+@pytest.mark.parametrize("words", [["--help"], ["chart", "--help"], ["devices", "--json"], ["chart"]])
+def test_nothing_heavy_is_imported_before_it_is_needed(words):
+    program = (
+        f"import sys; from zwidth.show.cli.main import run; run({words}); print(*sys.modules, file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert "click" in done.stderr.split()
+    assert not HEAVY & set(done.stderr.split())
+
+
+def test_a_chart_as_a_process():
+    done = zwidth("chart", TWO_MASS, "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert strict(done.stdout)["stiffness_max_N_per_m"] > 7000.0
+
+
+def test_ctrl_c_while_reading(tmp_path):
+    """The walls come through a pipe that stays open: the command waits, and is interrupted there."""
+    pipe = tmp_path / "walls.csv"
+    os.mkfifo(pipe)
+    command = [ZWIDTH, "check", TWO_MASS, "--points", pipe]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    with open(pipe, "w"):  # opens once the command reads
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate(timeout=20)
+    assert running.returncode == 130
+    assert (out, len(err.splitlines())) == ("", 1)
+    assert "interrupted" in err
+
+
+def test_ctrl_c_while_computing(tmp_path):
+    walls, verdicts = tmp_path / "walls.csv", tmp_path / "verdicts.csv"
+    os.mkfifo(walls)
+    verdicts.write_text("from before")
+    command = [ZWIDTH, "check", TWO_MASS, "--points", walls, "--output", verdicts]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    with open(walls, "w") as stream:
+        stream.write("stiffness_N_per_m,damping_Ns_per_m\n" + "4000,10\n" * 400_000)
+    time.sleep(0.5)
+    running.send_signal(signal.SIGINT)
+    out, err = running.communicate(timeout=20)
+    assert running.returncode == 130
+    assert (out, len(err.splitlines())) == ("", 1)
+    assert verdicts.read_text() == "from before"
+    assert sorted(tmp_path.iterdir()) == [verdicts, walls]
+
+
+def test_a_reader_that_has_seen_enough_is_no_error():
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        command = [ZWIDTH, "chart", TWO_MASS, "--json"]
+        done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+    finally:
+        os.close(write)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("stream", [1, 2])
+def test_a_closed_stream_changes_nothing_else(tmp_path, stream):
+    file = tmp_path / "chart.csv"
+    line = f'exec "{ZWIDTH}" chart {TWO_MASS} --output "{file}" {stream}>&-'
+    done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert file.stat().st_size > 1000
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("words", [("devices",), ("chart", TWO_MASS, "--json"), ("--help",)])
+def test_a_full_disk_is_said_on_one_line(words):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([ZWIDTH, *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "standard output cannot be written" in done.stderr
+
+
+def test_a_terminal_that_knows_only_ascii(tmp_path):
+    done = zwidth("chart", TWO_MASS, env=os.environ | {"PYTHONIOENCODING": "ascii"})
+    assert done.returncode == 0
+    assert "largest stiffness" in done.stdout
+
+
+def test_a_warning_is_one_line():
+    program = """
+import warnings
+from zwidth.show.cli import main
+
+def warn(arguments):
+    warnings.warn("odd", UserWarning)
+    warnings.warn("arithmetic", RuntimeWarning)
+    return 0
+
+main.run = warn
+main.main()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "zwidth: warning: odd\n")

@@ -1,0 +1,125 @@
+"""`zwidth show`, `devices` and `schema`."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, zwidth
+from zwidth.device.load import bundled, load
+from zwidth.device.load import schema as device_schema
+
+NUMBERS = ("link_side_mass_kg", "motor_side_mass_kg", "rigid_mass_kg", "stiffness_N_per_m")
+
+
+def test_the_mechanism_shows_the_check_values_of_the_thesis():
+    shown = found("show", MECHANISM)
+    assert_allclose([shown[key] for key in NUMBERS[:3]], [0.261599, 0.025367, 0.286967], atol=6e-7)
+    assert_allclose(shown["stiffness_N_per_m"], 11793.0, atol=0.5)
+    frequencies = shown["natural_frequencies_Hz"]
+    assert frequencies[:2] == [0.0, 0.0]
+    assert_allclose(frequencies[2:], [101.31, 130.80], atol=5e-3)
+    assert shown["damping_ratios"][:2] == [None, None]
+    assert_allclose(shown["damping_ratios"][2:], 0.05, rtol=1e-9)
+
+
+@pytest.mark.parametrize("where", [(), ("--at", "-0.1,0.2", "--direction", "-1,0.5")])
+def test_dexterity_follows_from_what_is_shown(where):
+    """(5.1)-(5.3) written out with the two rows of the plane."""
+    shown = found("show", MECHANISM, *where)
+    J, M = np.array(shown["jacobian"])[:2], np.array(shown["mass_matrix"])
+    assert_allclose(np.array(shown["jacobian"])[2], 0.0, atol=1e-15)
+    drives = load(MECHANISM).mechanism.drives
+    whole = M + np.diag(drives.transmission**2 * drives.motor_inertia)
+    assert_allclose(shown["manipulability"], np.sqrt(np.linalg.det(J @ J.T)))
+    inverse = np.linalg.inv(whole.T @ whole)
+    assert_allclose(shown["dynamic_manipulability"], np.sqrt(np.linalg.det(J @ inverse @ J.T)))
+    assert_allclose(shown["isotropy"], np.linalg.cond(J))
+    u = np.array(shown["direction"])[:2]
+    assert_allclose(np.linalg.norm(u), 1.0)
+    assert_allclose(shown["link_side_mass_kg"], 1.0 / (u @ J @ np.linalg.inv(M) @ J.T @ u))
+    assert_allclose(shown["rigid_mass_kg"], 1.0 / (u @ J @ np.linalg.inv(whole) @ J.T @ u))
+
+
+def test_a_plant_has_no_postures_and_shows_null_for_them():
+    shown = found("show", TWO_MASS)
+    assert_allclose([shown[key] for key in NUMBERS], [0.2616, 0.0254, 0.287, 15620.0], rtol=1e-9)
+    absent = ("jacobian", "mass_matrix", "manipulability", "dynamic_manipulability", "isotropy", "joints_rad")
+    assert all(shown[key] is None for key in (*absent, "position_m", "direction", "assembly"))
+    assert shown["natural_frequencies_Hz"][0] == 0.0
+    single = found("show", ONE_MASS)
+    assert [single[key] for key in NUMBERS if key != "rigid_mass_kg"] == [None, None, None]
+    assert_allclose(single["rigid_mass_kg"], 0.03)
+
+
+def test_rigid_drives_have_no_stiffness_to_show():
+    rigid = [f"--set=drives.motor-{side}.stiffness_Nm_per_rad=unset" for side in ("left", "right")]
+    shown = found("show", MECHANISM, *rigid)
+    assert shown["stiffness_N_per_m"] is None
+    assert shown["natural_frequencies_Hz"] == [0.0, 0.0]
+
+
+def test_the_model_decides_about_the_frequencies():
+    two = found("show", MECHANISM, "--model", "two-mass")["natural_frequencies_Hz"]
+    m1, m2, k = 0.261599, 0.025367, 11793.0
+    assert_allclose(two, [0.0, np.sqrt(k * (m1 + m2) / (m1 * m2)) / (2 * np.pi)], rtol=1e-4)
+
+
+def test_damping_that_couples_the_modes_has_no_ratios():
+    shown = found("show", TWO_MASS, "--set", "plant.damping_Ns_per_m=[[5.0, 0.0], [0.0, 0.0]]")
+    assert shown["damping_ratios"] is None
+    assert "Hz" in zwidth("show", TWO_MASS, "--set", "plant.damping_Ns_per_m=[[5.0, 0.0], [0.0, 0.0]]").out
+
+
+def test_people_see_every_number_and_every_source():
+    text = zwidth("show", MECHANISM).out
+    for words in ("0.2616 kg", "11.79 kN/m", "130.8 Hz (5 %)", "upper-left", "elbows-out", "(0, 0.25) m"):
+        assert words in text
+    for path in load(MECHANISM).sources:
+        assert path in text
+
+
+def test_the_numbers_are_written_as_data(tmp_path):
+    as_json, as_csv = tmp_path / "shown.json", tmp_path / "shown.csv"
+    shown = found("show", MECHANISM, "--output", as_json)
+    assert json.loads(as_json.read_text()) == shown
+    found("show", MECHANISM, "--output", as_csv)
+    values = {row["key"]: row["value"] for row in csv.DictReader(as_csv.read_text().splitlines())}
+    assert float(values["link_side_mass_kg"]) == shown["link_side_mass_kg"]
+    assert float(values["jacobian.1.0"]) == shown["jacobian"][1][0]
+    assert values["damping_ratios.0"] == ""
+
+
+def test_a_name_with_brackets_and_control_characters_is_printed_as_it_stands(tmp_path):
+    file = tmp_path / "odd.toml"
+    file.write_text(
+        'name = "[bold]x[/bold] \\u001b[31m"\n[plant]\nmass_kg = 0.1\n[loop]\nsampling_period_s = 0.001\n'
+    )
+    ran = zwidth("show", file)
+    assert ran.code == 0
+    assert "[bold]x[/bold] \\x1b[31m" in ran.out
+
+
+def test_devices_are_listed_with_what_they_are():
+    listed = found("devices")["devices"]
+    assert [tuple(device[key] for key in ("name", "description", "source")) for device in listed] == bundled()
+    assert all(all(device.values()) for device in listed)
+    text = zwidth("devices").out
+    assert all(device["name"] in text for device in listed)
+
+
+@pytest.mark.parametrize("name", [name for name, _, _ in bundled()])
+def test_every_listed_device_has_a_chart(name):
+    assert found("chart", name)["stiffness_max_N_per_m"] > 0.0
+    assert found("show", name)["rigid_mass_kg"] > 0.0
+
+
+@pytest.mark.parametrize("words", [(), ("--json",)])
+def test_the_schema_is_that_of_device_files(words):
+    ran = zwidth("schema", *words)
+    assert ran.code == 0
+    assert ran.document == device_schema()
