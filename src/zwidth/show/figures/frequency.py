@@ -38,7 +38,6 @@ def draw_frequency(ax: Axes, chart: StabilityChart) -> None:
             markeredgewidth=1.4,
             linestyle="none",
             zorder=4.0,
-            clip_on=False,
             label=text if n < 3 else "",
         )
     _natural_frequencies(ax, chart)

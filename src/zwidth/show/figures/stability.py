@@ -64,7 +64,6 @@ def _mark_stiffest(ax: Axes, chart: StabilityChart) -> None:
         markeredgecolor=VERMILION,
         markeredgewidth=1.6,
         linestyle="none",
-        clip_on=False,
         zorder=5.0,
         label=f"stiffest: {numbers}; vibrates at {vibration}",
     )

@@ -20,7 +20,9 @@ def pictures(facts: Facts) -> dict[str, str]:
     """Name -> SVG; "" for a figure that does not apply to this device."""
     device, chart, plant = facts.device, facts.chart, facts.loop.plant
     drawn = {
-        "chart": _svg("chart", "Stability chart: stable walls", lambda ax: draw_chart(ax, chart)),
+        "chart": _svg("chart", "Stability chart: stable walls", lambda ax: draw_chart(ax, chart))
+        if chart.regions
+        else "",
         "models": _svg("models", "Stability charts of simpler models", lambda ax: draw_models(ax, _models(facts))),
         "frequency": _svg(
             "frequency", "Frequency along the edge of stability", lambda ax: draw_frequency(ax, chart), 3.2

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from zwidth.conditions import Bound
-from zwidth.show.figures.units import UNKNOWN, number, quantity
+from zwidth.model.mechanism import Floats
+from zwidth.show.figures.units import UNKNOWN, given, number, quantity
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
 from zwidth.study.what_if import Variant
@@ -15,18 +18,24 @@ Row = tuple[str, ...]
 
 
 def parameters(facts: Facts) -> list[Row]:
-    """Name, symbol, value of what is felt along the direction."""
+    """Name, symbol, value of what is felt along the direction, as far as it applies."""
     e = facts.effective
     flexible = [sentences.hertz(f) for f in facts.natural if f > 0.0]
     rigid = int((facts.natural == 0.0).sum())
     modes = ", ".join([*(["0 Hz" if rigid == 1 else f"0 Hz ({rigid} rigid motions)"] if rigid else []), *flexible])
-    return [
-        ("link-side mass", "m₁", quantity(float(e.link_side_mass), "kg", 4)),
-        ("motor-side mass", "m₂", quantity(float(e.motor_side_mass), "kg", 4)),
-        ("mass with rigid drives", "m", quantity(float(e.rigid_mass), "kg", 4)),
-        ("stiffness between the two sides", "k", quantity(float(e.stiffness), "N/m", 4)),
+    rows = [
+        ("link-side mass", "m₁", _short(e.link_side_mass, "kg")),
+        ("motor-side mass", "m₂", _short(e.motor_side_mass, "kg")),
+        ("mass with rigid drives", "m", _short(e.rigid_mass, "kg")),
+        ("stiffness between the two sides", "k", _short(e.stiffness, "N/m")),
         ("natural frequencies", "f", modes or UNKNOWN),
     ]
+    return [row for row in rows if row[-1] != UNKNOWN]
+
+
+def _short(value: Floats, unit: str) -> str:
+    """Four digits, without zeros at the end."""
+    return quantity(float(value), unit, 4) if not np.isfinite(value) else given(float(f"{float(value):.4g}"), unit)
 
 
 def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:

@@ -1,0 +1,218 @@
+"""The report: one file, complete, harmless, and the same in a browser and on paper."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+
+import pytest
+
+from zwidth.chart.region import ChartError
+from zwidth.device.load import from_document, load
+from zwidth.model.posture import OutOfReach
+from zwidth.show.output import json_text
+from zwidth.show.report import facts as facts_module
+from zwidth.show.report.facts import gather
+from zwidth.show.report.report import page, write_report
+
+EMPTY = ["plant.damping_Ns_per_m=unset", "loop.delay_samples=1"]
+CASES = {
+    "five-bar": ("five-bar", []),
+    "late": ("five-bar", ["loop.delay_samples=1"]),
+    "two-mass": ("published-two-mass", []),
+    "nothing stable": ("published-two-mass", EMPTY),
+    "one mass": ("hapkit-course", []),
+}
+VOID = {"meta", "br", "link", "img", "wbr", "hr"}
+NAUGHTY = "<script>alert('x')</script> & \"quotes\" {{ 7*7 }} --> ü"
+
+
+class Page(HTMLParser):
+    """The tags, attributes and text of a page; fails where tags do not nest."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.attributes, self.texts = [], [], [], []
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += attrs
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += attrs
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+    @property
+    def text(self):
+        return re.sub(r"\s+", " ", " ".join(self.texts).replace("\u00a0", " "))
+
+
+@pytest.fixture(scope="module", params=CASES)
+def written(request, tmp_path_factory):
+    name, changes = CASES[request.param]
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    found = write_report(load(name, changes), path)
+    return path, found, path.read_text(encoding="utf-8")
+
+
+def test_the_page_stands_alone(written):
+    parsed = Page(written[2])
+    assert not {"script", "link", "img", "iframe", "object", "base"} & set(parsed.tags)
+    for name, value in parsed.attributes:
+        if name in ("src", "href", "xlink:href", "action", "data"):
+            assert value.startswith("#")
+        assert not name.startswith("on")
+        for target in re.findall(r"url\(([^)]*)\)", value or ""):
+            assert target.strip("'\"").startswith("#")
+    assert "@import" not in written[2]
+
+
+def test_every_id_is_given_once_and_every_reference_leads_somewhere(written):
+    parsed = Page(written[2])
+    ids = [value for name, value in parsed.attributes if name == "id"]
+    assert len(ids) == len(set(ids))
+    references = [value[1:] for name, value in parsed.attributes if name == "href"]
+    references += re.findall(r"url\(#([^)]*)\)", written[2])
+    assert set(references) <= set(ids)
+
+
+def test_what_it_says_is_what_it_returns(written):
+    path, found, text = written
+    shown = Page(text).text
+    assert found["file"] == str(path)
+    for sentence in found["summary"]:
+        assert sentence.replace("\u00a0", " ") in shown
+    json.loads(json_text(found))
+
+
+def test_all_sections_are_there(written):
+    _, found, text = written
+    headings = ["Which walls it renders", "What limits it", "What simpler models say", "The device",
+                "What published conditions say", "Where the numbers come from"]  # fmt: skip
+    if found["stiffness_max_N_per_m"] is not None:
+        headings += ["At which vibration it fails", "How fast it comes to rest"]
+    shown = Page(text).text
+    assert [heading for heading in headings if heading not in shown] == []
+    for entry in found["bounds"]:
+        assert entry["name"] in shown
+    for entry in found["what_if"]:
+        assert entry["label"] in shown or entry["key"] == f"model-{found['model']}"
+
+
+def test_the_numbers_of_the_published_plant(tmp_path):
+    found = write_report(load("published-two-mass"), tmp_path / "a.html")
+    assert found["stiffness_max_N_per_m"] == pytest.approx(7133.86929380, rel=1e-9)
+    assert found["damping_at_stiffness_max_Ns_per_m"] == pytest.approx(9.97478812, rel=1e-6)
+    assert found["frequencies_at_stiffness_max_Hz"] == pytest.approx([174.547436], rel=1e-6)
+    assert found["link_side_mass_kg"] == pytest.approx(0.2616)
+    gains = {entry["key"]: entry["stiffness_max_N_per_m"] for entry in found["what_if"]}
+    assert gains["one-sample"] == pytest.approx(1101.30206608, rel=1e-9)
+    assert gains["no-delay"] is None
+
+
+def test_nothing_stable_has_a_reason_and_nulls(tmp_path):
+    found = write_report(load("published-two-mass", EMPTY), tmp_path / "a.html")
+    assert found["stiffness_max_N_per_m"] is None
+    assert found["damping_at_stiffness_max_Ns_per_m"] is None
+    assert found["reason"]
+    assert found["stable_area_N2s_per_m2"] == 0.0
+
+
+def test_names_cannot_do_harm(tmp_path):
+    document = load("hapkit-course").document | {"name": NAUGHTY, "description": NAUGHTY, "source": NAUGHTY}
+    document["sources"] = {"plant.mass_kg": NAUGHTY}
+    text = page(gather(from_document(document)))
+    parsed = Page(text)
+    assert "script" not in parsed.tags
+    assert NAUGHTY in parsed.text.replace("  ", " ")
+    assert "{{ 7*7 }}" in text
+
+
+def test_the_same_device_makes_the_same_page():
+    assert page(gather(load("five-bar"))) == page(gather(load("five-bar")))
+
+
+def test_questions_reach_the_page(tmp_path):
+    device = load("five-bar")
+    found = write_report(device, tmp_path / "a.html", at=(0.02, 0.2), direction=(1.0, 0.0), model="two-mass")
+    assert found["position_m"] == pytest.approx([0.02, 0.2, 0.0])
+    assert found["model"] == "two-mass"
+    assert found["summary"][0].startswith("Along x at (0.02, 0.2)\u00a0m the two-mass model")
+
+
+def test_a_posture_out_of_reach_writes_nothing(tmp_path):
+    with pytest.raises(OutOfReach):
+        write_report(load("five-bar"), tmp_path / "a.html", at=(5.0, 5.0))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_chart_that_cannot_be_drawn_writes_nothing(tmp_path, monkeypatch):
+    def fail(*_):
+        raise ChartError("too fine")
+
+    monkeypatch.setattr(facts_module, "what_if", fail)
+    (tmp_path / "a.html").write_text("before")
+    with pytest.raises(ChartError):
+        write_report(load("hapkit-course"), tmp_path / "a.html")
+    assert (tmp_path / "a.html").read_text() == "before"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium here to render the page")
+
+
+def browse(folder, *options):
+    command = [
+        BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
+        "--disable-background-networking", "--disable-component-update", "--no-first-run",
+        f"--user-data-dir={folder / 'profile'}", *options,
+    ]  # fmt: skip
+    return subprocess.run(command, capture_output=True, timeout=120, check=True)
+
+
+@needs_browser
+def test_a_browser_has_nothing_to_complain_of(tmp_path):
+    target, log = tmp_path / "report.html", tmp_path / "net.json"
+    write_report(load("five-bar"), target)
+    shot = tmp_path / "page.png"
+    result = browse(
+        tmp_path, "--enable-logging=stderr", f"--log-net-log={log}", "--net-log-capture-mode=Default",
+        f"--screenshot={shot}", "--window-size=1000,3000", target.as_uri(),
+    )  # fmt: skip
+    assert shot.read_bytes().startswith(b"\x89PNG")
+    assert len(shot.read_bytes()) > 50_000
+    complaints = [line for line in result.stderr.decode(errors="replace").splitlines() if "CONSOLE" in line]
+    assert complaints == []
+    # The page's own requests: the browser itself may ask its maker for updates, never in the page's name.
+    asked = re.findall(r'"initiator":"([^"]*)"', log.read_text(errors="replace"))
+    assert [one for one in asked if one.startswith("file:")] == []
+
+
+@needs_browser
+@pytest.mark.parametrize("case", CASES)
+def test_it_prints_on_a4(tmp_path, case):
+    name, changes = CASES[case]
+    target, pdf = tmp_path / "report.html", tmp_path / "report.pdf"
+    write_report(load(name, changes), target)
+    browse(tmp_path, "--no-pdf-header-footer", f"--print-to-pdf={pdf}", target.as_uri())
+    written = pdf.read_bytes()
+    assert written.startswith(b"%PDF")
+    pages = len(re.findall(rb"/Type\s*/Page\b", written))
+    assert 2 <= pages <= 8
+    sizes = re.findall(rb"/MediaBox\s*\[\s*0 0 ([\d.]+) ([\d.]+)\s*\]", written)
+    assert {(round(float(w) / 72 * 25.4), round(float(h) / 72 * 25.4)) for w, h in sizes} == {(210, 297)}

@@ -1,0 +1,63 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+import doctest
+import math
+import re
+
+import pytest
+from hypothesis import given as over
+from hypothesis import strategies as st
+
+from zwidth.show.figures import units
+from zwidth.show.figures.units import PREFIXES, given, number, point, quantity
+
+
+def test_the_examples_in_the_docstrings():
+    failures, tried = doctest.testmod(units)
+    assert tried
+    assert not failures
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "digits", "text"),
+    [
+        (7849.44, "N/m", 2, "7.8 kN/m"),
+        (999.96, "N/m", 3, "1.00 kN/m"),
+        (0.9999, "Ns/m", 2, "1.0 Ns/m"),
+        (126043.4, "N/m", 3, "126 kN/m"),
+        (-9145.7, "N/m", 3, "−9.15 kN/m"),
+        (0.0253667, "kg", 4, "0.02537 kg"),
+        (164944.5, "N²s/m²", 3, "1.65\u2009×\u200910⁵ N²s/m²"),
+        (0.0, "Hz", 3, "0 Hz"),
+        (math.inf, "N/m", 3, "∞ N/m"),
+        (math.nan, "N/m", 3, "–"),
+    ],
+)
+def test_quantities(value, unit, digits, text):
+    assert quantity(value, unit, digits).replace("\u00a0", " ") == text
+
+
+@over(st.floats(1e-8, 1e11), st.integers(2, 5), st.sampled_from([1.0, -1.0]))
+def test_a_quantity_reads_back_as_the_rounded_value(value, digits, sign):
+    text = quantity(sign * value, "N/m", digits)
+    mantissa, prefix = re.fullmatch(r"(−?[\d.]+)\u00a0(\D?)N/m", text).groups()
+    powers = {mark: power for power, mark in PREFIXES.items()}
+    read = float(mantissa.replace("−", "-")) * 10.0 ** powers[prefix]
+    assert read == pytest.approx(sign * value, rel=0.5 * 10.0 ** (1 - digits) * 1.0001)
+
+
+@over(st.floats(-1e12, 1e12))
+def test_numbers_have_no_hyphen_for_a_minus(value):
+    assert "-" not in number(value)
+
+
+def test_what_somebody_chose_is_not_padded():
+    assert given(0.00125, "s") == "1.25\u00a0ms"
+    assert given(1000.0, "Hz") == "1\u00a0kHz"
+
+
+def test_points():
+    assert point([0.0, -0.25, 0.0]) == "(0, −0.25)\u00a0m"
+    assert point([0.1, 0.2, 0.3], "") == "(0.1, 0.2, 0.3)"
