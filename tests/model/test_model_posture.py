@@ -125,6 +125,37 @@ def test_reachable_in_the_assembly_is_connected_with_the_reference(seed):
                 solve_posture(mechanism, (x[i, j], y[i, j]))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_far_goals_never_land_on_another_branch(seed):
+    """Arm with axes z, y, y: two singularities passed at once (over the back, and the elbow turned inside out)
+    leave every determinant's sign as it was. Small batches start at the reference, large ones at a roadmap."""
+    rng = np.random.default_rng(seed)
+    mechanism = spatial_arm(rng)
+    _, upper, fore = mechanism.links.tip[:, 0]
+    shoulder = mechanism.links.origin[1]
+
+    def sides(angles):
+        radius = upper * np.cos(angles[..., 1]) + fore * np.cos(angles[..., 1] + angles[..., 2])
+        return np.sign(radius), np.sign(np.sin(angles[..., 2]))
+
+    goals = shoulder + rng.uniform(-1, 1, (400, 3)) * (upper + fore)
+    distance = np.linalg.norm(goals - shoulder, axis=1)
+    edges = np.array([abs(upper - fore), upper + fore])
+    inside = (distance > edges[0] + 0.01) & (distance < edges[1] - 0.01)
+    inside &= np.hypot(*goals[:, :2].T) > 0.02
+    outside = (distance < edges[0] - 1e-6) | (distance > edges[1] + 1e-6)
+    expected = sides(mechanism.assemblies["up"])
+    for size in (10, 400):
+        for goal, within, without in zip(
+            *(np.array_split(values, 400 // size) for values in (goals, inside, outside)), strict=True
+        ):
+            posture = solve_posture(mechanism, goal)
+            assert (posture.status[within] == OK).all()
+            assert (posture.status[without] == OUT_OF_REACH).all()
+            for side, wanted in zip(sides(posture.angles[posture.status == OK]), expected, strict=True):
+                assert (side == wanted).all()
+
+
 def test_a_hole_in_the_workspace_is_gone_round():
     """With both base axes in one place the handle cannot pass the middle; behind it it gets by going round."""
     there = solve_posture(five_bar(), (0.0, -0.25))

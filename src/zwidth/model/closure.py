@@ -74,17 +74,17 @@ def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, row
     Q  (m, ...)  the first `unknowns` lines hold the columns of the matrix; left orthogonal, not normalised
     R  (m, m)    filled: R_jj the squared length of line j, R_ji the part of column i along it
     b  (s, ...)  right-hand sides, overwritten;   x  (s, m)  solutions, filled
-    Returned is a reciprocal condition: the smallest part of a column, relative to its length, that the
-    columns before it do not span. 0 where the matrix is singular.
+    Returned is a reciprocal condition: the smallest part of a column that the columns before it do not span,
+    over the length of the longest column. 0 where the matrix is singular.
     """
-    condition = 1.0
+    shortest, longest = np.inf, 0.0
     for j in range(unknowns):
         left, taken = 0.0, 0.0
         for r in range(rows):
             left += Q[j, r] * Q[j, r]
         for i in range(j):
             taken += R[i, j] * R[i, j] * R[i, i]
-        condition = min(condition, left / (left + taken)) if left + taken > 0.0 else 0.0
+        shortest, longest = min(shortest, left), max(longest, left + taken)
         scale = 1.0 / left if left > 0.0 else 0.0
         R[j, j] = left
         for i in range(j + 1, unknowns):
@@ -107,7 +107,9 @@ def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, row
         for j in range(unknowns - 1, -1, -1):
             for i in range(j + 1, unknowns):
                 x[s, j] -= R[j, i] * x[s, i]
-    return float(np.sqrt(condition))
+    if unknowns == 0:
+        return 1.0
+    return float(np.sqrt(shortest / longest)) if longest > 0.0 else 0.0
 
 
 @compiled_lean

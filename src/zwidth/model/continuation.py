@@ -24,7 +24,6 @@ OUT_OF_REACH: Final = 1
 SINGULAR: Final = 2
 
 CONTRACTION: Final = 0.55  # of one correction by the next; on the edge of the workspace Newton gains a half each
-BRISK: Final = 0.1  # the same, far from any edge
 LARGEST_TURN: Final = 0.5  # of one joint in one step [rad]
 SMALLEST_STEP: Final = 2.0**-7  # of the straight way to the goal
 SINGULAR_CONDITION: Final = 1e-6  # below it the numbers of a posture lose their last ten digits
@@ -62,7 +61,7 @@ def correct(mech: Arrays, design: int, goal: Floats, angles: Floats, tolerance: 
     start, rows, gaps, solution = work.start, work.rows, work.gaps, work.solution
     m, count = rows.shape[0], gaps.size
     rounding = ROUNDING * mech.size[design]
-    last, moved, slowest, condition = 0.0, 0.0, 0.0, 0.0
+    last, moved, condition = 0.0, 0.0, 0.0
     for iteration in range(60):
         place(mech, design, angles, work)
         equations(mech, design, goal, work)
@@ -79,18 +78,16 @@ def correct(mech: Arrays, design: int, goal: Floats, angles: Floats, tolerance: 
         if not settled or size < last:
             turn(mech, angles, work)
         ratio = size / last if last > 0.0 else 1.0
-        if iteration > 0 and not settled:
-            slowest = max(slowest, ratio)
         if settled or size * ratio * ratio < tolerance:
             break
         last = size
     place(mech, design, angles, work)
     equations(mech, design, goal, work)
-    # Newton knows nothing of the drives, and passes where they lose the handle without noticing
+    # Newton may pass a singularity without slowing down: it knows nothing of the drives, and an arm that goes
+    # straight over its back does not feel the direction it has lost
     if orientation(start, rows, work.triangle, m - mech.driven, count - 3) < 0.0:
         return -1.0
-    # near a fold of its own equations it slows down; where it did not there was none
-    if slowest > BRISK and orientation(start, rows, work.triangle, m, count) < 0.0:
+    if orientation(start, rows, work.triangle, m, count) < 0.0:
         return -1.0
     return condition
 

@@ -17,12 +17,13 @@ from scipy.spatial import cKDTree
 
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.arrays import Arrays
-from zwidth.model.closure import equations, orientation, passive_rates
+from zwidth.model.closure import equations, newton_step, orientation, passive_rates
 from zwidth.model.continuation import CONTRACTION, LARGEST_TURN, SINGULAR_CONDITION, largest
 from zwidth.model.mechanism import Floats, Ints
 from zwidth.model.tree import Work, place, point, workspace
 
 TURNS: Final = {1: 256, 2: 96, 3: 32}  # nodes per turn of a drive, by number of drives
+MARGIN: Final = 1.0  # smallest reciprocal condition of a node, per radian of a step
 CELLS: Final = 40_000  # of the grid that finds the nearest node
 
 
@@ -107,7 +108,7 @@ def close(mech: Arrays, angles: Floats, work: Work) -> bool:
         place(mech, 0, angles, work)
         equations(mech, 0, work.goal, work)
         condition = passive_rates(mech, work)
-        if condition < 10.0 * SINGULAR_CONDITION:
+        if condition < SINGULAR_CONDITION:
             return False
         # the step -A_p^+ gap, with the drives at rest: the same solve with the gaps as right-hand side
         size = _loop_step(mech, work)
@@ -143,54 +144,72 @@ def _loop_step(mech: Arrays, work: Work) -> float:
     return most
 
 
+@compiled_lean
+def step(mech: Arrays, angles: Floats, drive: int, turn: float, margin: float, work: Work) -> bool:
+    """Turn one drive a little and close the loops (in place); False where that leads to or past a singularity."""
+    rows, start, rates, joint = work.rows, work.start, work.rates, mech.joint
+    m, loops = rows.shape[0], work.gaps.size - 3
+    place(mech, 0, angles, work)
+    equations(mech, 0, work.goal, work)
+    passive_rates(mech, work)
+    for u in range(m):
+        angles[joint[u]] += turn * rates[drive, u]
+        for r in range(loops + 3):
+            start[u, r] = rows[u, r]
+    if not close(mech, angles, work):
+        return False
+    place(mech, 0, angles, work)
+    equations(mech, 0, work.goal, work)
+    if orientation(start, rows, work.triangle, m, loops + 3) <= 0.0:
+        return False
+    if orientation(start, rows, work.triangle, m - mech.driven, loops) <= 0.0:
+        return False
+    return bool(min(passive_rates(mech, work), newton_step(mech, work)) >= margin)
+
+
 @compiled
 def flood(mech: Arrays, reference: Floats, turns: int) -> tuple[Floats, Floats]:
-    """Breadth first over a grid of `turns` per revolution on each drive: joint angles (K, n) and positions
-    (K, 3).
+    """Breadth first over a grid of `turns` per revolution on each drive: joint angles (K, n), positions (K, 3).
 
-    A cell of the grid keeps the first posture that reaches it, the one with the shortest way to the
-    reference.
+    A cell of the grid keeps the first posture that reaches it, the one with the shortest way to the reference.
+    Nodes keep away from singularities by more than one step may change: two singularities passed at once, where
+    they meet, leave the orientation as it was. Where the reference itself is nearer, steps are made shorter.
     """
-    n, m, d = mech.parent.size, mech.joint.size, mech.driven
-    passive, loops = m - d, 3 * mech.a.size
+    d, n = mech.driven, mech.parent.size
     work = workspace(mech)
-    cells = turns**d
-    pitch = 2.0 * np.pi / turns
+    cells, pitch = turns**d, 2.0 * np.pi / turns
+    place(mech, 0, reference, work)
+    equations(mech, 0, work.goal, work)
+    margin = 0.3 * min(passive_rates(mech, work), newton_step(mech, work))
+    parts = int(min(16.0, np.ceil(MARGIN * pitch / margin))) if margin > 0.0 else 16
+    margin = min(margin, MARGIN * pitch)
     seen = np.zeros(cells, dtype=np.bool_)
     cell_of = np.zeros(cells, dtype=np.int64)
     angles, position = np.zeros((cells, n)), np.zeros((cells, 3))
+    trial = np.zeros(n)
     angles[0] = reference
     seen[0] = True
     count, head = 1, 0
     while head < count:
         place(mech, 0, angles[head], work)
-        equations(mech, 0, work.goal, work)
-        passive_rates(mech, work)
         h = point(work.rotation, work.origin, mech.handle_link, mech.handle, 0, 0)
         position[head, 0], position[head, 1], position[head, 2] = h[0], h[1], h[2]
-        start, rates = work.rows.copy(), work.rates.copy()
         place_value = 1
-        for s in range(d):
+        for drive in range(d):
             digit = (cell_of[head] // place_value) % turns
             for sign in (-1, 1):
                 cell = cell_of[head] + ((digit + sign) % turns - digit) * place_value
                 if seen[cell]:
                     continue
-                work.trial[:] = angles[head]
-                for u in range(m):
-                    work.trial[mech.joint[u]] += sign * pitch * rates[s, u]
-                if not close(mech, work.trial, work):
-                    continue
-                place(mech, 0, work.trial, work)
-                equations(mech, 0, work.goal, work)
-                if orientation(start, work.rows, work.triangle, m, loops + 3) <= 0.0:
-                    continue
-                if orientation(start, work.rows, work.triangle, passive, loops) <= 0.0:
-                    continue
-                seen[cell] = True
-                cell_of[count] = cell
-                angles[count] = work.trial
-                count += 1
+                trial[:] = angles[head]
+                free = True
+                for _ in range(parts):
+                    free = free and step(mech, trial, drive, sign * pitch / parts, margin, work)
+                if free:
+                    seen[cell] = True
+                    cell_of[count] = cell
+                    angles[count] = trial
+                    count += 1
             place_value *= turns
         head += 1
     return angles[:count].copy(), position[:count].copy()
