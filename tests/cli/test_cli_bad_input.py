@@ -104,6 +104,11 @@ def test_a_loop_that_cannot_close():
     assert "close" in line
 
 
+# two masses with nothing between them, one driven, the other read
+APART = [
+    f"--set=plant.{key}" for key in ("stiffness_N_per_m=unset", "damping_Ns_per_m=unset", "sensor=[1.0, 0.0]")
+]
+
 # a command line, and words of each of its lines
 LINES = [
     (("chart", MECHANISM, "--direction", "0,0"), ["direction: has zero length"]),
@@ -132,6 +137,7 @@ LINES = [
     (("chart", TWO_MASS, "--jason"), ["no such option '--jason'"]),
     (("chrat", TWO_MASS), ["no such command 'chrat'"]),
     (("devices", "five-bar"), ["unexpected extra argument"]),
+    (("chart", TWO_MASS, *APART), [f"{TWO_MASS}: the wall force moves nothing that the sensor reads"]),
     (("check", TWO_MASS), ["--points FILE.csv, or both"]),
     (("--jason",), ["no such option '--jason'"]),
 ]
@@ -208,7 +214,7 @@ def test_a_chart_that_cannot_be_closed_is_undecided(monkeypatch):
     ran = zwidth("chart", TWO_MASS, "--json")
     assert ran.code == 1
     assert ran.document["regions"] is None
-    assert ran.document["reason"] == "the chart is undecided: the edge could not be closed"
+    assert ran.document["reason"] == "this is undecided: the edge could not be closed"
 
 
 @pytest.mark.parametrize("name", ["chart.svg", "chart.csv"])

@@ -11,6 +11,7 @@ import click
 
 from zwidth.show.cli.amount import amount, number
 from zwidth.show.cli.answer import Answer, deliver, sheet
+from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Numbers, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
@@ -61,28 +62,23 @@ def _ordered(ctx: click.Context, param: click.Parameter, window: Window | None) 
 def chart(question: Question, window: Window | None, output: str | None, as_json: bool) -> int:
     """Find the walls that DEVICE renders stably: the exact chart of stiffness and damping."""
     path = None if output is None else destination(output, FIGURES + DATA)
-    from zwidth.model.posture import PostureError
-
     device = question.device()
     try:
-        plant = question.plant(device)
-    except PostureError as error:
-        return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(error)), as_json)
-
-    from zwidth.chart.chart import stability_chart
-    from zwidth.chart.region import ChartError
-    from zwidth.loop.loop import Loop
-    from zwidth.model.modes import ModesError
-
-    try:
-        found = stability_chart(Loop(plant, device.controller))
-    except (ChartError, ModesError) as error:
-        nulls = question.facts(device) | dict.fromkeys(KEYS)
-        return deliver(Answer(nulls, reason=f"the chart is undecided: {error}"), as_json)
+        with computing(question):
+            found = _charted(question, device)
+    except NoAnswer as none:
+        return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(none)), as_json)
     answer = _answer(question, device, found, path)
     if path is not None:
         _write(path, found, answer, window)
     return deliver(answer, as_json)
+
+
+def _charted(question: Question, device: Device) -> StabilityChart:
+    from zwidth.chart.chart import stability_chart
+    from zwidth.loop.loop import Loop
+
+    return stability_chart(Loop(question.plant(device), device.controller))
 
 
 def numbers(chart: StabilityChart) -> dict[str, Any]:

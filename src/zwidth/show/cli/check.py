@@ -9,6 +9,7 @@ import click
 
 from zwidth.show.cli.amount import amount, number
 from zwidth.show.cli.answer import Answer, deliver, table
+from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.cli.points import Walls, read_walls
@@ -16,7 +17,6 @@ from zwidth.show.output import DATA, destination, write_data
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
-    from zwidth.loop.loop import Loop
 
 AT_ONCE: Final = 20_000  # walls judged in one batch of transition matrices
 SHOWN: Final = 200  # rows printed for people; --json and --output hold all
@@ -46,21 +46,12 @@ def check(
     """Say of each wall whether DEVICE renders it stably, by the eigenvalues of the loop."""
     path = None if output is None else destination(output, DATA)
     walls = _walls(points, stiffness, damping)
-    from zwidth.model.posture import PostureError
-
     device = question.device()
     try:
-        plant = question.plant(device)
-    except PostureError as error:
-        return deliver(Answer(question.facts(device) | {"points": None}, reason=str(error)), as_json)
-    from zwidth.loop.loop import Loop
-    from zwidth.model.modes import ModesError
-
-    try:
-        verdicts = judged(Loop(plant, device.controller), walls)
-    except ModesError as error:
-        nulls = question.facts(device) | {"points": None}
-        return deliver(Answer(nulls, reason=f"the walls are undecided: {error}"), as_json)
+        with computing(question):
+            verdicts = _judged(question, device, walls)
+    except NoAnswer as none:
+        return deliver(Answer(question.facts(device) | {"points": None}, reason=str(none)), as_json)
     document = question.facts(device) | {"points": verdicts}
     if path is not None:
         document["file"] = str(path)
@@ -68,10 +59,12 @@ def check(
     return deliver(Answer(document, lambda: _pages(question, device, document)), as_json)
 
 
-def judged(loop: Loop, walls: Walls) -> list[dict[str, Any]]:
+def _judged(question: Question, device: Device, walls: Walls) -> list[dict[str, Any]]:
     """One entry per wall: the wall, its verdict, spectral radius and frequency."""
     from zwidth.chart.verdict import judge
+    from zwidth.loop.loop import Loop
 
+    loop = Loop(question.plant(device), device.controller)
     entries = []
     for start in range(0, len(walls), AT_ONCE):
         batch = walls[start : start + AT_ONCE]

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.errors import BadInput
-
 if TYPE_CHECKING:
     from zwidth.device.device import Device
     from zwidth.model.plant import Plant
@@ -44,17 +42,8 @@ class Question:
         return load(self.name, self.settings)
 
     def plant(self, device: Device) -> Plant:
-        """The rendered direction's dynamics.
-
-        Raises  DeviceError, BadInput  where device, posture, direction or model cannot be meant
-                PostureError           where the posture does not exist
-        """
-        from zwidth.model.reduction import ModelError
-
-        try:
-            return device.plant(self.at, self.direction, self.assembly, self.model)
-        except ModelError as error:
-            raise BadInput(f"{self.name}: model {self.model_of(device)}: {error}") from None
+        """The rendered direction's dynamics. Raises what `Device.plant` raises."""
+        return device.plant(self.at, self.direction, self.assembly, self.model)
 
     def model_of(self, device: Device) -> str:
         """The model's name, also where none was asked for."""

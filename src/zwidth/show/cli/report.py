@@ -9,6 +9,7 @@ import click
 
 from zwidth.show.cli.amount import typed
 from zwidth.show.cli.answer import Answer, deliver
+from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.output import destination
 
@@ -28,19 +29,13 @@ PAGE: Final = (".html", ".htm")
 def report(question: Question, output: str | None, as_json: bool) -> int:
     """Write a report on DEVICE: its chart, what limits it, what to change; one HTML file that also prints."""
     path = destination(output or default_name(question.name), PAGE)
-    from zwidth.chart.region import ChartError
-    from zwidth.model.modes import ModesError
-    from zwidth.model.posture import PostureError
-
     device = question.device()
     try:
-        question.plant(device)  # whether it can be meant, before the heavy parts are imported
-        found = _written(question, device, path)
-    except PostureError as error:
-        return deliver(Answer(question.facts(device) | {"file": None}, reason=str(error)), as_json)
-    except (ChartError, ModesError) as error:
-        nulls = question.facts(device) | {"file": None}
-        return deliver(Answer(nulls, reason=f"the chart is undecided: {error}"), as_json)
+        with computing(question):
+            question.plant(device)  # whether it can be meant, before the heavy parts are imported
+            found = _written(question, device, path)
+    except NoAnswer as none:
+        return deliver(Answer(question.facts(device) | {"file": None}, reason=str(none)), as_json)
     reason = found.pop("reason", None)
     document = found | question.facts(device)
     pages = [*(typed(sentence) for sentence in found["summary"]), f"written: {path}"]

@@ -9,6 +9,7 @@ import click
 
 from zwidth.show.cli.amount import amount, number
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
+from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, destination, plain, write_data
@@ -47,14 +48,13 @@ KEYS: Final = (
 def show(question: Question, output: str | None, as_json: bool) -> int:
     """Show DEVICE at a posture: masses and stiffness felt along the direction, frequencies, dexterity."""
     path = None if output is None else destination(output, DATA)
-    from zwidth.model.posture import PostureError
-
     device = question.device()
     try:
-        plant = question.plant(device)
-        posture = device.posture(question.at, question.assembly) if device.mechanism else None
-    except PostureError as error:
-        return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(error)), as_json)
+        with computing(question):
+            plant = question.plant(device)
+            posture = device.posture(question.at, question.assembly) if device.mechanism else None
+    except NoAnswer as none:
+        return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(none)), as_json)
     document = question.facts(device) | _numbers(question, device, plant, posture)
     if path is not None:
         document["file"] = str(path)

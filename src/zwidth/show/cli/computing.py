@@ -1,0 +1,42 @@
+"""What the errors of a computation mean to those who asked: no answer, or bad input."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from zwidth.show.cli.errors import BadInput
+
+if TYPE_CHECKING:
+    from zwidth.show.cli.options import Question
+
+
+class NoAnswer(Exception):
+    """The question was understood and has no answer; the text says why."""
+
+
+@contextmanager
+def computing(question: Question) -> Iterator[None]:
+    """Compute inside this block.
+
+    Raises  NoAnswer  where the posture does not exist, or double precision cannot decide
+            BadInput  where the model, or the loop, does not fit the device
+    """
+    from zwidth.chart.region import ChartError
+    from zwidth.loop.hold import UnmovedError
+    from zwidth.model.modes import ModesError
+    from zwidth.model.posture import PostureError
+    from zwidth.model.reduction import ModelError
+
+    try:
+        yield
+    except PostureError as error:
+        raise NoAnswer(str(error)) from None
+    except (ChartError, ModesError) as error:
+        raise NoAnswer(f"this is undecided: {error}") from None
+    except ModelError as error:
+        model = f"model {question.model}: " if question.model else ""
+        raise BadInput(f"{question.name}: {model}{error}") from None
+    except UnmovedError as error:
+        raise BadInput(f"{question.name}: {error}") from None
