@@ -200,6 +200,14 @@ def test_where_the_drives_lose_the_handle_is_singular():
         solve_posture(mechanism, (0.0, height - 0.01))
 
 
+def test_over_its_own_axis_an_arm_is_singular():
+    mechanism = spatial_arm(np.random.default_rng(1))
+    over = mechanism.links.origin[1] + np.array([0, 0, 0.8 * mechanism.links.tip[1:, 0].sum()])
+    with pytest.raises(Singular):
+        solve_posture(mechanism, over)
+    assert solve_posture(mechanism, over + np.array([1e-3, 0, 0])).status == OK
+
+
 def test_a_goal_off_the_plane_is_out_of_reach():
     assert solve_posture(five_bar(), np.array([[0, 0.25, 0], [0, 0.25, 1e-6]])).status.tolist() == [
         OK,
