@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from decimal import Decimal
+from math import isfinite
 
 AGREES = "agrees to the digits printed"
 CONFIRMED = "not printed; agrees with brute force"
@@ -53,7 +54,8 @@ class Number:
         if self.printed is None:
             close = self.judge is not None and abs(self.ours - self.judge) <= self.within * abs(self.judge)
             return CONFIRMED if close else UNEXPLAINED
-        if abs(Decimal(repr(float(self.ours))) - Decimal(self.printed)) <= half_a_digit(self.printed):
+        apart = abs(Decimal(float(self.ours)) - Decimal(self.printed))
+        if isfinite(self.ours) and apart <= half_a_digit(self.printed):
             return AGREES if self.misprint is None else "agrees after all: the misprint's row is wrong"
         return explained(self.misprint)
 

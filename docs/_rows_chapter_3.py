@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from _row import Claim, Misprint, Number, Row, significant
 
+from docs._row import Claim, Misprint, Number, Row, significant
 from gallery import fig_3_7_bilateral_wall as wall
 from gallery import fig_3_8_frequencies as vibration
 from gallery import fig_3_9_no_damping as undamped

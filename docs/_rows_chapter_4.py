@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from _row import Claim, Misprint, Number, Row
 
+from docs._row import Claim, Misprint, Number, Row
 from gallery import fig_4_1_rigid as rigid
 from gallery import fig_4_2_delay as delay
 from gallery import fig_4_3_mass_spring as spring
@@ -57,8 +57,9 @@ def figure_4_1() -> list[Row]:
             False,
             Misprint(
                 f"it leaves out the real root z = −1, which cuts into it for "
-                f"β > {rigid.beta_where_incomplete:.3f} and cuts off the tip (4.10) for β > {rigid.beta_where_tip_unstable:.3f}: at "
-                f"β = {rigid.above:.2f} just inside the tip the spectral radius is {rigid.radius_inside_the_tip_above:.3f}",
+                f"β > {rigid.beta_where_incomplete:.3f} and cuts off the tip (4.10) for "
+                f"β > {rigid.beta_where_tip_unstable:.3f}: at β = {rigid.above:.2f} just inside the tip "
+                f"the spectral radius is {rigid.radius_inside_the_tip_above:.3f}",
                 stable_tip and 1.0 < rigid.beta_where_incomplete < rigid.beta_where_tip_unstable,
                 kind="incomplete",
             ),
@@ -110,8 +111,8 @@ def figure_4_2() -> list[Row]:
             "l = 1: edge in closed form",
             "p < (−12 − d² + (2 + d) √(36 − 20 d + d²))/4",
             f"largest p = {delay.closed_largest_p:.6f} at d = {delay.closed_d_at_largest_p:.6f}, largest "
-            f"d = 2 (√2 − 1) = {delay.closed_largest_d:.6f}; chart {delay.largest_p[1]:.6f}, {delay.d_at_largest_p[1]:.6f}, "
-            f"{delay.largest_d[1]:.6f}",
+            f"d = 2 (√2 − 1) = {delay.closed_largest_d:.6f}; chart {delay.largest_p[1]:.6f}, "
+            f"{delay.d_at_largest_p[1]:.6f}, {delay.largest_d[1]:.6f}",
             np.allclose(
                 (delay.closed_largest_p, delay.closed_d_at_largest_p, delay.closed_largest_d),
                 (delay.largest_p[1], delay.d_at_largest_p[1], delay.largest_d[1]),
@@ -148,8 +149,9 @@ def figure_4_3() -> list[Row]:
             f"{spring.largest_d:.4f} for p → 0",
             abs(spring.d_of_4_46 - spring.largest_d) < 1e-6,
             Misprint(
-                f"it is the value at p = −W² ({spring.highest_d_of_region:.4f} at p = {spring.p_at_highest_d:.2f}); "
-                f"on the axis p = 0 it is W² c/(1 − c) = {spring.d_of_5_7:.4f}, as (5.7) has it",
+                f"it is the value at p = −W² ({spring.highest_d_of_region:.4f} at "
+                f"p = {spring.p_at_highest_d:.2f}); on the axis p = 0 it is "
+                f"W² c/(1 − c) = {spring.d_of_5_7:.4f}, as (5.7) has it",
                 abs(spring.highest_d_of_region - spring.d_of_4_46) < 1e-6
                 and abs(spring.p_at_highest_d + W**2) < 1e-6
                 and abs(spring.d_of_5_7 - spring.largest_d) < 1e-9,

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from _row import Claim, Misprint, Row
-from _rows_chapter_4 import optimal_spectral_radius
-
+from docs._row import Claim, Misprint, Row
+from docs._rows_chapter_4 import optimal_spectral_radius
 from gallery import fig_5_5_base_distance as base
 
 

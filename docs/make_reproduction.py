@@ -9,14 +9,16 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from docs import _rows_chapter_3 as chapter_3
+from docs import _rows_chapter_4 as chapter_4
+from docs import _rows_chapter_5 as chapter_5
+from docs._row import Row
+
+Sections = list[tuple[str, list[Row]]]
+
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parent)]
-
-import _rows_chapter_3 as chapter_3  # noqa: E402
-import _rows_chapter_4 as chapter_4  # noqa: E402
-import _rows_chapter_5 as chapter_5  # noqa: E402
-from _row import Row  # noqa: E402
-
 PAGE = HERE / "reproducing-the-thesis.md"
 HEADER = ("Where", "What", "Printed", "Ours", "Difference", "Verdict")
 
@@ -55,7 +57,7 @@ NOT_COVERED = """## Not covered yet
 """
 
 
-def sections() -> list[tuple[str, list[Row]]]:
+def sections() -> Sections:
     """Headings and their rows."""
     return [(title, rows()) for title, rows in SECTIONS]
 
@@ -67,12 +69,12 @@ def table(rows: list[Row]) -> str:
     return "\n".join(lines)
 
 
-def page() -> str:
+def page(content: Sections) -> str:
     """The whole page."""
-    parts = [INTRODUCTION, *(f"## {title}\n\n{table(rows)}\n" for title, rows in sections()), NOT_COVERED]
+    parts = [INTRODUCTION, *(f"## {title}\n\n{table(rows)}\n" for title, rows in content), NOT_COVERED]
     return "\n".join(parts)
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+    PAGE.write_text(page(sections()), encoding="utf-8")
     print(PAGE.relative_to(HERE.parent))

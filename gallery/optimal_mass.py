@@ -40,9 +40,9 @@ def radius(mass: float, wall: tuple[float, float]) -> float:
 
 def fastest(wall: tuple[float, float]) -> tuple[float, float]:
     """Mass [kg] and spectral radius: a scan, refined round its best."""
-    masses = np.geomspace(0.01, 0.5, 400)
+    masses = np.geomspace(0.01, 0.5, 80)
     best = int(np.argmin([radius(mass, wall) for mass in masses]))
-    bounds = masses[max(best - 1, 0)], masses[min(best + 1, 399)]
+    bounds = masses[max(best - 1, 0)], masses[min(best + 1, 79)]
     found = minimize_scalar(lambda m: radius(m, wall), bounds=bounds, method="bounded", options={"xatol": 1e-10})
     return float(found.x), float(found.fun)
 
