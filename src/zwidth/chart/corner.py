@@ -100,14 +100,22 @@ def cross_line(tracer: Tracer, root: RealRoot, low: float, high: float) -> float
     return _bisect_line(*tracer.factors, tracer.radius, tracer.line(root), low, high)
 
 
+def _last_edge(tracer: Tracer, on: float, off: float) -> float:
+    """The last angle from `on` towards `off` that is an edge."""
+    if tracer.certain(on) and tracer.certain(off):
+        return _bisect_flag(*tracer.factors, tracer.polynomials, tracer.radius, on, off)
+    for _ in range(50):  # polynomials cannot tell: a long delay, or roots that stay close to the circle
+        middle = 0.5 * (on + off)
+        if tracer.edge_flag(middle) > 0:
+            on = middle
+        else:
+            off = middle
+    return on
+
+
 def _partner(tracer: Tracer, theta: float, wall: Wall) -> float:
     """Angle of the root nearest the circle apart from the pair at theta, for a wall on the curve."""
-    A, S, V = tracer.polynomials
-    s = np.roots((A + wall[0] * S + wall[1] * V)[::-1])
-    z = tracer.radius * (1.0 + s) / (1.0 - s)
-    own = tracer.radius * np.exp(1j * theta)
-    for point in (own, own.conjugate()):
-        z = np.delete(z, int(np.argmin(np.abs(z - point))))
+    z = tracer.roots_without_pair(np.array(theta), np.array(wall[0]), np.array(wall[1]))
     return float(abs(np.angle(z[np.argmin(np.abs(np.abs(z) - tracer.radius))]))) if len(z) else 0.0
 
 
@@ -117,7 +125,7 @@ def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, f
     The partner is 0 or pi where a real root reaches the circle. Where two branches touch without crossing the
     bisection's angle stands.
     """
-    theta = _bisect_flag(*tracer.factors, tracer.polynomials, tracer.radius, on, off)
+    theta = _last_edge(tracer, on, off)
     low, high = min(on, off), max(on, off)
     for root, partner in zip(ROOTS, (0.0, np.pi), strict=True):
         a, s, v = tracer.line(root)

@@ -79,23 +79,12 @@ def trace(
     polynomials: Floats,
     radius: float,
     thetas: Floats,
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """K, B and the stable-edge flag at ascending angles in (0, pi).
-
-    Where rounding hides the flag (near theta = 0, and where undamped modes leave several roots on the circle) it
-    is that of the nearest sure sample before, or after if there is none.
-    """
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """K, B and whether the wall edges the stable set (1 yes, -1 no, 0 lost in rounding) at angles in (0, pi)."""
     n = len(thetas)
-    K, B, edge = np.empty(n), np.empty(n), np.zeros(n, dtype=np.bool_)
+    K, B, edge = np.empty(n), np.empty(n), np.empty(n, dtype=np.int64)
     room = working_room(polynomials.shape[1] - 1)
-    sure = -1
     for i in range(n):
         K[i], B[i], _, _ = wall_at(rows, whole, split, numerator, denominator, radius, thetas[i])
-        flag = edges_stable_set(polynomials, thetas[i], K[i], B[i], room)
-        if flag != 0:
-            for j in range(0 if sure < 0 else i, i + 1):
-                edge[j] = flag > 0
-            sure = i
-        elif sure >= 0:
-            edge[i] = edge[i - 1]
+        edge[i] = edges_stable_set(polynomials, thetas[i], K[i], B[i], room)
     return K, B, edge

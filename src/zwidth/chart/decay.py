@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import arc_walls, find_edges
-from zwidth.chart.grid import angles, singular_points
+from zwidth.chart.grid import angles
 from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled
 from zwidth.loop.evaluate import divide
@@ -190,7 +190,7 @@ def _search(tracer: Tracer, outline: Floats, best: FastestDecay | None) -> Faste
 
 def _edge_walls(tracer: Tracer) -> Floats:
     """Walls (k, 2) on whatever edge the curve has on the tracer's circle."""
-    points = singular_points(tracer.factors[0], tracer.polynomials, tracer.radius)
+    points = tracer.features()
     edges = find_edges(tracer, angles(points, tracer.radius, 0.2))
     walls = [arc_walls(tracer, arc) for arc in edges.arcs]
     return np.vstack(walls) if walls else np.empty((0, 2))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.curve import wall_at
 from zwidth.compiled import compiled
+from zwidth.loop.evaluate import characteristic
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -25,21 +26,35 @@ FIRST = 1e-3
 LONGEST_STEP = 0.05
 
 
-def singular_points(rows: Floats, polynomials: Floats, radius: float) -> Complexes:
-    """Poles of P, and zeros of P and poles of w (the roots of S = N_P D_w), with Im z >= 0, in the z plane."""
-    mean = -rows[:, 0] / 2.0
-    root = np.sqrt((mean * mean - rows[:, 1]).astype(complex))
-    poles = np.concatenate([1.0 + mean + root, 1.0 + mean - root])
-    S = polynomials[1]
-    scale = np.max(np.abs(S))
-    used = np.flatnonzero(np.abs(S) > 1e-300 * scale)
-    if len(used) == 0:
-        return poles
-    s = np.roots(S[used[0] : used[-1] + 1][::-1])
+def singular_points(rows: Floats, split: int, denominator: Floats, radius: float) -> Complexes:
+    """Poles and zeros of P without its whole delay, and poles of w, with Im z >= 0, in the z plane."""
+    nothing = np.empty((0, 3))
+    s = _roots(characteristic(rows, 0, split, nothing, nothing, radius)[1])
     with np.errstate(divide="ignore", invalid="ignore"):
         zeros = radius * (1.0 + s) / (1.0 - s)
-    points = np.concatenate([poles, zeros[np.isfinite(zeros)]])
+    quadratic = denominator[denominator[:, 0] != 0.0]
+    points = np.concatenate(
+        [
+            1.0 + _pairs(rows[:, 0], rows[:, 1]),
+            zeros[np.isfinite(zeros)],
+            1.0 + _pairs(quadratic[:, 1], quadratic[:, 2]),
+            1.0 - denominator[denominator[:, 0] == 0.0, 2],
+        ]
+    )
     return points[points.imag >= -1e-12]
+
+
+def _pairs(d1: Floats, d0: Floats) -> Complexes:
+    """Roots of d^2 + d1 d + d0."""
+    mean = -d1 / 2.0
+    root = np.sqrt((mean * mean - d0).astype(complex))
+    return np.concatenate([mean + root, mean - root])
+
+
+def _roots(ascending: Floats) -> Complexes:
+    """Roots of a polynomial whose outermost coefficients may vanish."""
+    used = np.flatnonzero(np.abs(ascending) > 1e-300 * np.max(np.abs(ascending)))
+    return np.roots(ascending[used[0] : used[-1] + 1][::-1]).astype(complex)
 
 
 @compiled

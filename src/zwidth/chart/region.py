@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import Arc, Edges, Rings, find_edges
-from zwidth.chart.grid import angles, around_crossings, singular_points
+from zwidth.chart.grid import angles, around_crossings
 from zwidth.chart.tracer import Tracer
 
 Floats = NDArray[np.float64]
@@ -35,7 +35,7 @@ def closed_rings(tracer: Tracer) -> tuple[Rings, float]:
     branch moves by less than rounding can tell (an undamped mode that the wall hardly moves): their arcs are
     joined with as much blur as it takes. Raises ChartError if none of BLURRED is enough.
     """
-    points = singular_points(tracer.factors[0], tracer.polynomials, tracer.radius)
+    points = tracer.features()
     extra = np.empty(0)
     for share in (0.2, 0.1, 0.05, 0.02):
         thetas = angles(points, tracer.radius, share)

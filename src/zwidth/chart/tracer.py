@@ -9,11 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.curve import trace, wall_at
+from zwidth.chart.grid import singular_points
 from zwidth.chart.hurwitz import edges_on_line, is_stable, working_room
 from zwidth.loop.evaluate import characteristic, factor_arrays, velocity_response
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
+# A root this near the circle is on neither side of it.
+UNDECIDED = 1e-9
 Wall = tuple[float, float]
 RealRoot = Literal["plus", "minus"]
 ROOTS: tuple[RealRoot, RealRoot] = ("plus", "minus")
@@ -23,39 +26,87 @@ ROOTS: tuple[RealRoot, RealRoot] = ("plus", "minus")
 class Tracer:
     """What the kernels take, with the questions that are asked of it.
 
+    loop         the loop
     factors      `factor_arrays(loop)`
     polynomials  (3, N + 1) A, S, V in the bilinear variable of the circle
     radius       rho
-    period       T; K T and B have one unit, in which distances between walls are taken
     """
 
+    loop: Loop
     factors: tuple[Floats, int, int, Floats, Floats]
     polynomials: Floats
     radius: float
-    period: float
 
     @classmethod
     def of(cls, loop: Loop, radius: float = 1.0) -> Tracer:
         """The loop's factors, and its polynomials for the circle."""
         factors = factor_arrays(loop)
-        return cls(factors, characteristic(*factors, radius), radius, loop.period)
+        return cls(loop, factors, characteristic(*factors, radius), radius)
+
+    @property
+    def period(self) -> float:
+        """T; K T and B have one unit, in which distances between walls are taken."""
+        return self.loop.period
 
     @property
     def degree(self) -> int:
         """Number N of roots."""
         return int(self.polynomials.shape[1]) - 1
 
+    def features(self) -> NDArray[np.complex128]:
+        """Where the curve's shape comes from: see `grid.singular_points`."""
+        rows, _, split, _, denominator = self.factors
+        return singular_points(rows, split, denominator, self.radius)
+
     def wall(self, theta: float) -> tuple[float, float, float, float]:
         """K, B, dK/dtheta, dB/dtheta at one angle in (0, pi)."""
         return wall_at(*self.factors, self.radius, theta)
 
     def trace(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-        """K, B and stable-edge flag at angles in (0, pi)."""
-        return trace(*self.factors, self.polynomials, self.radius, thetas)
+        """K, B and stable-edge flag at ascending angles in (0, pi).
+
+        What polynomials leave open, eigenvalues are asked; what they leave open too (several roots on the circle
+        within 1e-9) is taken as at the nearest decided sample before, or after if there is none.
+        """
+        K, B, flags = trace(*self.factors, self.polynomials, self.radius, thetas)
+        unsure = np.flatnonzero(flags == 0)
+        if len(unsure):
+            flags[unsure] = self._edge_by_eigenvalues(thetas[unsure], K[unsure], B[unsure])
+            sure = np.flatnonzero(flags)
+            if len(sure):
+                flags = flags[sure[np.maximum(np.searchsorted(sure, np.arange(len(flags)), "right") - 1, 0)]]
+        return K, B, flags > 0
+
+    def certain(self, theta: float) -> bool:
+        """Whether polynomials alone can tell if the wall at one angle edges the stable set."""
+        return bool(trace(*self.factors, self.polynomials, self.radius, np.array([theta]))[2][0])
+
+    def edge_flag(self, theta: float) -> int:
+        """Whether the wall at one angle edges the stable set: 1, -1, or 0 where nothing can tell."""
+        one = np.array([theta])
+        K, B, flags = trace(*self.factors, self.polynomials, self.radius, one)
+        return int(flags[0] or self._edge_by_eigenvalues(one, K, B)[0])
+
+    def _edge_by_eigenvalues(self, thetas: Floats, K: Floats, B: Floats) -> NDArray[np.int64]:
+        """The flag from all eigenvalues but the pair at each angle."""
+        z = np.abs(self.roots_without_pair(thetas, K, B)).max(axis=-1) - self.radius
+        return np.where(z < -UNDECIDED, 1, np.where(z > UNDECIDED, -1, 0))
+
+    def roots_without_pair(self, thetas: Floats, K: Floats, B: Floats) -> NDArray[np.complex128]:
+        """Eigenvalues (..., N - 2) of walls on the curve, without the pair at rho exp(+-i theta)."""
+        z = np.linalg.eigvals(self.loop.transition_matrix(K, B))
+        for point in (self.radius * np.exp(1j * thetas), self.radius * np.exp(-1j * thetas)):
+            nearest = np.argmin(np.abs(z - point[..., None]), axis=-1)
+            keep = np.arange(z.shape[-1]) != nearest[..., None]
+            z = z[keep].reshape(*z.shape[:-1], z.shape[-1] - 1)
+        return np.asarray(z, dtype=complex)
 
     def stable(self, K: float, B: float) -> bool:
         """Whether all roots of a wall lie inside the circle; False too where rounding hides it."""
-        return is_stable(self.polynomials, K, B, working_room(self.degree)) > 0
+        flag = is_stable(self.polynomials, K, B, working_room(self.degree))
+        if flag == 0:
+            return bool(np.abs(np.linalg.eigvals(self.loop.transition_matrix(K, B))).max() < self.radius)
+        return bool(flag > 0)
 
     def stable_on_left(self, theta: float) -> bool:
         """Whether the stable side is on the left for growing theta: Im w > 0.
@@ -75,8 +126,12 @@ class Tracer:
 
     def edge_on_line(self, root: RealRoot, K: float, B: float) -> bool:
         """Whether a wall on that line has all its other roots inside."""
-        low_end = int(root == "plus")
-        return edges_on_line(self.polynomials, low_end, K, B, working_room(self.degree)) > 0
+        flag = edges_on_line(self.polynomials, int(root == "plus"), K, B, working_room(self.degree))
+        if flag == 0:
+            z = np.linalg.eigvals(self.loop.transition_matrix(K, B))
+            own = np.argmin(np.abs(z - (self.radius if root == "plus" else -self.radius)))
+            return bool(np.abs(np.delete(z, own)).max() < self.radius - UNDECIDED)
+        return bool(flag > 0)
 
     def curve_end(self, root: RealRoot) -> Wall | None:
         """The wall with a double root at +rho (theta = 0) or -rho (theta = pi); None if it is at infinity.

@@ -28,6 +28,10 @@ UNOBSERVED = 1e-11
 UNOBSERVED_UNDAMPED = 1e-9
 
 
+class UnmovedError(ValueError):
+    """A plant of which the wall moves nothing that the sensor reads."""
+
+
 @dataclass(frozen=True)
 class Sections:
     """The sampled plant, one row per observed pair of poles, and the names of what was cancelled.
@@ -141,11 +145,13 @@ def _real_sections(modes: RealModes, period: float, fraction: float) -> Sections
     for group in groups:
         decay, squared = float(modes.decay[group[0]]), float(modes.frequency_squared[group[0]])
         strength = float(np.sum(residue[group]))
-        observed = abs(strength) > total * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)
+        row = real_section(decay, squared, period, fraction)
+        row[2:] *= strength
+        # What counts is the sampled residue: a mode at a multiple of the sampling rate is not reached by a hold
+        level = total * period**2 * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)
+        observed = bool(np.max(np.abs(row[2:])) > level)
         unobserved += [_label(squared, decay)] * (len(group) - observed)
         if observed:
-            row = real_section(decay, squared, period, fraction)
-            row[2:] *= strength
             rows.append(row)
     return Sections(np.array(rows).reshape(-1, 6), tuple(unobserved))
 
@@ -213,8 +219,15 @@ def _integral(s: NDArray[np.complex128], time: float) -> NDArray[np.complex128]:
 
 
 def sampled_sections(plant: Plant, period: float, fraction: float) -> Sections:
-    """The plant's sections for a sampling period T [s] and the fractional part f of the delay [samples]."""
+    """The plant's sections for a sampling period T [s] and the fractional part f of the delay [samples].
+
+    Raises UnmovedError where no mode is both moved by the wall force and read by the sensor.
+    """
     modes = real_modes(plant)
     if modes is not None:
-        return _real_sections(modes, period, fraction)
-    return _damped_sections(damped_modes(plant), period, fraction)
+        sections = _real_sections(modes, period, fraction)
+    else:
+        sections = _damped_sections(damped_modes(plant), period, fraction)
+    if not len(sections.rows):
+        raise UnmovedError("the wall force moves nothing that the sensor reads; check actuator and sensor")
+    return sections
