@@ -31,9 +31,10 @@ def seconds(value: float) -> str:
 
 
 def machine(*packages: str) -> str:
-    """CPU count and versions, in one line."""
+    """CPU count, how busy they are, and versions, in one line."""
+    busy = f" (load {os.getloadavg()[0]:.1f})" if hasattr(os, "getloadavg") else ""
     found = ", ".join(f"{name} {version(name)}" for name in packages)
-    return f"{len(os.sched_getaffinity(0))} CPUs, Python {platform.python_version()}, {found}"
+    return f"{os.cpu_count()} CPUs{busy}, Python {platform.python_version()}, {found}"
 
 
 def print_table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:

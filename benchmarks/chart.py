@@ -53,14 +53,14 @@ def disagreements(chart: StabilityChart, K: np.ndarray, B: np.ndarray, stable: n
     return int((shapely.distance(regions.boundary, walls) > BAND).sum())
 
 
-def best_of_three(call) -> tuple[float, np.ndarray]:
-    """Seconds of the fastest of three calls, in a peer's favour, and its answer."""
+def median_of_three(call) -> tuple[float, np.ndarray]:
+    """Median seconds of three calls, and the answer."""
     times = []
     for _ in range(3):
         start = perf_counter()
         answer = call()
         times.append(perf_counter() - start)
-    return min(times), answer
+    return sorted(times)[1], answer
 
 
 def boundary_error(loop: Loop, count: int) -> float:
@@ -86,11 +86,11 @@ def main() -> None:
     fresh_points_time = median_time(lambda: boundary_points(Loop(plant, controller), 1000), 500)
 
     K, B = grid_axes(chart, GRID)
-    grid_time, grid = best_of_three(lambda: by_eigenvalues(plant, T, K[None, :], B[:, None]))
+    grid_time, grid = median_of_three(lambda: by_eigenvalues(plant, T, K[None, :], B[:, None]))
     by_jury(plant, T, K[:2], B[:2])
     jury_time, jury = median_time(lambda: by_jury(plant, T, K, B), 5, 1), by_jury(plant, T, K, B)
     coarse_K, coarse_B = grid_axes(chart, COARSE)
-    control_time, control = best_of_three(
+    control_time, control = median_of_three(
         lambda: by_python_control(plant, T, coarse_K[None, :], coarse_B[:, None])
     )
     control_time *= (GRID / COARSE) ** 2

@@ -168,6 +168,10 @@ def main() -> int:
     print()
     for name, value in seconds.items():
         print(f"{name:34s} {value * 1e6:8.2f} us a posture {value / mine:8.1f} x this engine")
+    start = time.process_time()
+    this_engine(at)
+    processor = (time.process_time() - start) / len(at)
+    print(f"\nprocessor time of this engine, all threads: {processor * 1e6:.2f} us a posture")
     met = mine * 1e6 <= TARGET_US
     print(f"\n{mine * 1e6:.2f} us a posture, at most {TARGET_US:g} wanted: {'met' if met else 'NOT MET'}")
     return 0 if met else 1

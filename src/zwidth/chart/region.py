@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import Arc, Edges, Rings, find_edges
+from zwidth.chart.arcs import Arc, Edges, Rings, arc_walls, find_edges
 from zwidth.chart.grid import angles, around_crossings
-from zwidth.chart.tracer import Tracer
+from zwidth.chart.tracer import UNDECIDED, Tracer
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def closed_rings(tracer: Tracer) -> tuple[Rings, float]:
     A sliver between two branches can fall between samples and leaves a walk open. Then the grid is made finer and
     samples are added round every branch that takes part in a corner. What stays open then are corners where a
     branch moves by less than rounding can tell (an undamped mode that the wall hardly moves): their arcs are
-    joined with as much blur as it takes. Raises ChartError if none of BLURRED is enough.
+    joined with as much blur as it takes and as eigenvalues confirm. Raises ChartError if none of BLURRED will do.
     """
     points = tracer.features()
     extra = np.empty(0)
@@ -49,12 +49,27 @@ def closed_rings(tracer: Tracer) -> tuple[Rings, float]:
         extra = np.union1d(extra, _around(edges))
     for blur in BLURRED:
         rings = join(edges, tracer.period, blur)
-        if rings is not None:
+        if rings is not None and _hold(tracer, rings, edges.size):
             return rings, blur
     raise ChartError(
         "the edge of the stable set could not be closed: a mode that the wall hardly moves hides it in rounding; "
         "give that mode some damping, or leave it out"
     )
+
+
+def _hold(tracer: Tracer, rings: Rings, size: float) -> bool:
+    """Whether walls just inside the middle of each arc are stable, by eigenvalues."""
+    inside = []
+    for ring in rings:
+        for arc in ring:
+            points = arc_walls(tracer, arc) * (tracer.period, 1.0)
+            middle = len(points) // 2
+            along = points[middle] - points[middle - 1]
+            left = np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-300)
+            inside.append((points[middle] + points[middle - 1]) / 2.0 + 1e-4 * size * left)
+    K, B = (np.array(inside).reshape(-1, 2) / (tracer.period, 1.0)).T
+    z = np.linalg.eigvals(tracer.loop.transition_matrix(K, B))
+    return bool(np.all(np.abs(z) < tracer.radius + UNDECIDED))
 
 
 def _around(edges: Edges) -> Floats:
