@@ -42,8 +42,12 @@ def by_eigenvalues(plant: Plant, period: float, K, B, chunk: int = 50_000):
     return stable.reshape(K.shape)
 
 
-def by_python_control(plant: Plant, period: float, K, B):
-    """Stable or not (...), wall by wall: the sampled plant once, then a feedback and its poles per wall."""
+def by_python_control(plant: Plant, period: float, K, B, tuned: bool = False):
+    """Stable or not (...), wall by wall: the sampled plant once, then a feedback and its poles per wall.
+
+    tuned  False: the wall as its transfer function, K + B (z - 1)/(T z), as one writes it down
+           True:  the wall in state space, worked out by hand, which spares python-control a conversion
+    """
     import control
 
     n = plant.size
@@ -55,8 +59,11 @@ def by_python_control(plant: Plant, period: float, K, B):
     K, B = np.broadcast_arrays(K, B)
     stable = np.empty(K.size, dtype=bool)
     for i, (k, d) in enumerate(zip(K.ravel(), B.ravel(), strict=True)):
-        # K + B (z - 1)/(T z) as [x_old]: y = (K + B/T) u - (B/T) x_old
-        wall = control.ss(0.0, 1.0, -d / period, k + d / period, period)
+        if tuned:
+            # the state is the reading before: y = (K + B/T) u - (B/T) u_old
+            wall = control.ss(0.0, 1.0, -d / period, k + d / period, period)
+        else:
+            wall = control.tf([k * period + d, -d], [period, 0.0], period)
         stable[i] = np.abs(control.feedback(sampled, wall).poles()).max() < 1.0
     return stable.reshape(K.shape)
 

@@ -20,10 +20,17 @@ def setting():
 
 
 @pytest.mark.filterwarnings("default")  # python-control warns of its own future
-@pytest.mark.parametrize("peer", [_peers.by_eigenvalues, _peers.by_python_control])
-def test_a_peer_agrees_with_the_chart(setting, peer):
+@pytest.mark.parametrize(
+    ("peer", "options"),
+    [
+        (_peers.by_eigenvalues, {}),
+        (_peers.by_python_control, {"tuned": False}),
+        (_peers.by_python_control, {"tuned": True}),
+    ],
+)
+def test_a_peer_agrees_with_the_chart(setting, peer, options):
     loop, chart, K, B = setting
-    stable = peer(loop.plant, loop.period, K[None, :], B[:, None])
+    stable = peer(loop.plant, loop.period, K[None, :], B[:, None], **options)
     assert 0 < stable.sum() < stable.size
     assert benchmark.disagreements(chart, K, B, stable) == 0
 
