@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 import shapely
 
-from tests.systems import random_loop, second_matrix
+from tests.systems import mass, random_loop, second_matrix
 from zwidth.chart.chart import boundary_points, stability_chart
 from zwidth.chart.region import ChartError
+from zwidth.loop.controller import Controller
+from zwidth.loop.loop import Loop
 
 # Damping of real structures; loops with undamped modes have a set of their own, since an undamped mode that the
 # wall hardly moves stays within rounding of the circle whatever the wall does.
@@ -119,3 +121,14 @@ def test_every_point_of_the_boundary_edges_the_stable_set():
                 roots = np.linalg.eigvals(loop.transition_matrix(k, b))
                 assert np.max(np.abs(roots)) <= 1.0 + 1e-6
                 assert np.min(np.abs(roots - np.exp(2j * np.pi * f * loop.period))) <= 1e-6
+
+
+def test_single_modes_up_to_several_times_the_sampling_rate():
+    # aliased modes near z = 1 and z = -1 leave slivers between branches
+    rng = np.random.default_rng(15)
+    for _ in range(150):
+        m, T, swing = 10.0 ** rng.uniform(-2.0, 0.0), 10.0 ** rng.uniform(-4.0, -2.3), rng.uniform(0.05, 25.0)
+        zeta, delay = rng.choice([0.005, 0.02, 0.05]), float(rng.choice([0.0, 1.0, 2.0, 3.0]))
+        k = m * (swing / T) ** 2
+        loop = Loop(mass(m, 2.0 * zeta * np.sqrt(k * m), k), Controller(T, delay))
+        assert disagreements(rng, loop) == 0

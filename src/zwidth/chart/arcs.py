@@ -62,7 +62,9 @@ def find_edges(tracer: Tracer, thetas: Floats) -> Edges:
     K, B, edge = tracer.trace(thetas)
     arcs, partners = _pair_arcs(tracer, thetas, edge)
     for root in ROOTS:
-        arcs += _line_arcs(tracer, root, thetas, K, B)
+        lines, crossings = _line_arcs(tracer, root, thetas, K, B)
+        arcs += lines
+        partners += crossings
     units = np.array([tracer.period, 1.0])
     points = [arc_walls(tracer, arc) * units for arc in arcs]
     extents = tuple(float(np.max(np.abs(walls - walls[0]))) for walls in points)
@@ -105,13 +107,16 @@ def _pair_arcs(tracer: Tracer, thetas: Floats, edge: NDArray[np.bool_]) -> tuple
     return arcs, partners
 
 
-def _line_arcs(tracer: Tracer, root: RealRoot, thetas: Floats, K: Floats, B: Floats) -> list[Arc]:
-    """Edges on the line of a real root: its pieces between the places where another root meets the circle."""
+def _line_arcs(
+    tracer: Tracer, root: RealRoot, thetas: Floats, K: Floats, B: Floats
+) -> tuple[list[Arc], list[float]]:
+    """Edges on the line of a real root, its pieces between the places where another root meets the circle; and
+    the angles at which the curve crosses it."""
     a, s, v = tracer.line(root)
     T = tracer.period
     length = np.hypot(s / T, v)
     if not length > 0.0:
-        return []
+        return [], []
     # direction with the stable side (gradient) on its left, in the units of (K T, B)
     along = np.array([v, -s / T]) / length
     nodes = [wall for wall in (tracer.curve_end("plus"), tracer.curve_end("minus")) if wall is not None]
@@ -122,17 +127,17 @@ def _line_arcs(tracer: Tracer, root: RealRoot, thetas: Floats, K: Floats, B: Flo
         noise = 1e-13 * (abs(a) + np.abs(s * K) + np.abs(v * B))
         sure = np.flatnonzero(np.abs(value) > noise)
     turns = np.flatnonzero(np.sign(value[sure[1:]]) != np.sign(value[sure[:-1]]))
-    for i in turns:
-        low, high = thetas[sure[i]], thetas[sure[i + 1]]
-        nodes.append(tracer.wall(cross_line(tracer, root, low, high))[:2])
+    crossings = [cross_line(tracer, root, thetas[sure[i]], thetas[sure[i + 1]]) for i in turns]
+    nodes += [tracer.wall(theta)[:2] for theta in crossings]
     nodes = [wall for wall in nodes if np.isfinite(wall).all()]
     nodes.sort(key=lambda wall: float(along @ (wall[0] * T, wall[1])))
     angle = 0.0 if root == "plus" else np.pi
-    return [
+    arcs = [
         Arc(root, one, two, angle, angle, np.empty(0))
         for one, two in pairwise(nodes)
         if one != two and tracer.edge_on_line(root, (one[0] + two[0]) / 2, (one[1] + two[1]) / 2)
     ]
+    return arcs, crossings
 
 
 def _is_on(tracer: Tracer, root: RealRoot, wall: Wall) -> bool:

@@ -109,7 +109,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
         damping_at_stiffness_max=peak.damping if peak else float("nan"),
         frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
         damping_max=largest_damping(tracer, rings, width),
-        stable_area=max(quadrant_area(tracer, rings), 0.0),
+        stable_area=max(quadrant_area(tracer, rings), 0.0) if peak else 0.0,
         fastest_decay=_confirmed(loop, fastest_decay(loop, tracer, outlines)) if decay else None,
         corner_blur=blur,
     )
