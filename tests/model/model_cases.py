@@ -261,3 +261,8 @@ def some_postures(mechanism, rng, count=4, spread=0.02):
     moves = rng.uniform(-1, 1, (count, here.jacobian.shape[1])) @ here.jacobian.T
     moves *= spread / np.maximum(np.linalg.norm(moves, axis=1, keepdims=True), 1e-12)
     return solve_posture(mechanism, mechanism.reference_position + moves)
+
+
+def same_angles(a, b, tolerance=1e-9):
+    """Equal joint angles, whole turns aside."""
+    return np.max(np.abs(np.exp(1j * a) - np.exp(1j * b))) < tolerance
