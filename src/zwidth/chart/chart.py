@@ -14,7 +14,7 @@ from zwidth.chart.outline import quadrant_area, sample_arc
 from zwidth.chart.peak import Peak, largest_damping, stiffest
 from zwidth.chart.region import closed_rings
 from zwidth.chart.tracer import Tracer
-from zwidth.chart.verdict import Verdicts, judge, spectral_radius
+from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
@@ -110,7 +110,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
         frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
         damping_max=largest_damping(tracer, rings, width),
         stable_area=max(quadrant_area(tracer, rings), 0.0) if peak else 0.0,
-        fastest_decay=_confirmed(loop, fastest_decay(loop, tracer, outlines)) if decay else None,
+        fastest_decay=fastest_decay(loop, tracer, outlines) if decay else None,
         corner_blur=blur,
     )
 
@@ -133,14 +133,6 @@ def boundary_points(
     thetas = np.pi * np.linspace(0.0, 1.0, count + 2)[1:-1] ** 2
     K, B, edge = Tracer.of(loop, radius).trace(thetas)
     return K, B, thetas / (2.0 * np.pi * loop.period), edge
-
-
-def _confirmed(loop: Loop, found: FastestDecay | None) -> FastestDecay | None:
-    """The wall found, with the spectral radius that the eigenvalues of its transition matrix give."""
-    if found is None:
-        return None
-    radius = spectral_radius(loop, found.stiffness, found.damping)
-    return FastestDecay(found.stiffness, found.damping, float(radius))
 
 
 def _outline(arcs: list[tuple[Floats, Floats, Floats]]) -> Floats:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import arc_walls, find_edges
 from zwidth.chart.grid import angles
 from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled
-from zwidth.loop.evaluate import divide
+from zwidth.loop.evaluate import characteristic, degree_of_loop, divide
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
@@ -19,9 +18,9 @@ Complexes = NDArray[np.complex128]
 
 # Simplex sizes of successive searches, in shares of the cell: the spectral radius has edges and cusps in which a
 # single search stalls.
-RESTARTS = np.array([1e-1, 1e-2, 1e-4, 1e-7])
+RESTARTS = np.array([1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8])
 # How much faster than the best found (in shares of 1 - radius) the next wall is looked for.
-FASTER = (0.1, 0.003)
+FASTER = 0.003
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
     """
     N = len(p) - 1
     one = complex(1.0, 0.0)
-    for _ in range(60):
+    for _ in range(30):
         largest = 0.0
         for i in range(N):
             s = roots[i]
@@ -67,7 +66,7 @@ def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
                 step = complex(0.0, 0.0)
             roots[i] = s - step
             largest = max(largest, (abs(step.real) + abs(step.imag)) / (abs(s.real) + abs(s.imag) + 1e-300))
-        if largest < 1e-12:
+        if largest < 1e-9:
             break
     out = 0.0
     for i in range(N):
@@ -126,7 +125,7 @@ def descend(
             order = np.argsort(f)
             x, f = x[order], f[order]
             spread = max(abs(x[2, 0] - x[0, 0]) / extent[0], abs(x[2, 1] - x[0, 1]) / extent[1])
-            if spread < 1e-12:
+            if spread < 0.01 * size:
                 break
             middle = 0.5 * (x[0] + x[1])
             away = middle - x[2]
@@ -154,24 +153,89 @@ def descend(
     return best[0], best[1], value
 
 
+@compiled
+def coalesced(
+    rows: Floats,
+    whole: int,
+    split: int,
+    numerator: Floats,
+    denominator: Floats,
+    positive: bool,
+    low: float,
+    high: float,
+) -> tuple[float, float, float]:
+    """K, B and radius of the wall with a double real root at +rho (or -rho) and another root of the same modulus.
+
+    A double root makes the two outermost coefficients of p vanish: K and B follow from rho. The modulus of the
+    largest other root less rho is brought to zero by the Illinois rule (Dowell and Jarratt 1971) between low and
+    high; the radius is inf if there is no sign change.
+    """
+    N = degree_of_loop(rows, whole, split, denominator)
+    rest, roots = np.empty(N - 1), np.empty(N - 2, dtype=np.complex128)
+    _scatter(roots)
+    ends, values = np.array([low, high]), np.empty(2)
+    K, B = 0.0, 0.0
+    for i in range(60):
+        if i < 2:
+            radius = ends[i]
+        else:
+            radius = (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0])
+        A, S, V = characteristic(rows, whole, split, numerator, denominator, radius)
+        m, n = (0, 1) if positive else (N, N - 1)
+        det = S[m] * V[n] - S[n] * V[m]
+        K, B = (A[n] * V[m] - A[m] * V[n]) / det, (A[m] * S[n] - A[n] * S[m]) / det
+        for k in range(N - 1):
+            at = k + 2 if positive else k
+            rest[k] = A[at] + K * S[at] + B * V[at]
+        value = polynomial_radius(rest, radius, roots) - radius
+        if i < 2:
+            values[i] = value
+            if i == 1 and not values[0] * values[1] < 0.0:
+                return K, B, np.inf
+            continue
+        if abs(value) < 1e-14 or abs(ends[1] - ends[0]) < 1e-15:
+            return K, B, radius
+        if value * values[1] < 0.0:
+            ends[0], values[0] = ends[1], values[1]
+        else:
+            values[0] *= 0.5
+        ends[1], values[1] = radius, value
+    return K, B, ends[1]
+
+
 def fastest_decay(loop: Loop, tracer: Tracer, outlines: list[Floats]) -> FastestDecay | None:
     """Smallest spectral radius over the cells with these outlines (k, 2), both signs of K and B.
 
     A simplex search can end in a narrow valley's wall. So the curve is traced on a smaller circle: whatever edge
-    it finds there encloses walls that decay faster, and the search goes on among them until none is left.
+    it finds there encloses walls that decay faster, and the search goes on among them until none is left. Where
+    the best wall has a double real root, as it mostly has, its place is then solved for.
     """
     best: FastestDecay | None = None
     for outline in outlines:
         best = _search(tracer, outline, best)
-    for faster in FASTER:
-        for _ in range(8):
-            radius = 1.0 - (1.0 - best.spectral_radius) * (1.0 + faster) if best else 0.0
-            if not 0.0 < radius < 1.0:
-                break
-            walls = _edge_walls(Tracer.of(loop, radius))
-            previous, best = best, _search(tracer, walls, best) if len(walls) > 2 else best
-            if best is previous:
-                break
+    for _ in range(20):
+        radius = 1.0 - (1.0 - best.spectral_radius) * (1.0 + FASTER) if best else 0.0
+        if not 0.0 < radius < 1.0:
+            break
+        walls = _edge_walls(Tracer.of(loop, radius))
+        previous, best = best, _search(tracer, walls, best) if len(walls) else best
+        if best is previous:
+            break
+    return _sharpened(tracer, best) if best else None
+
+
+def _sharpened(tracer: Tracer, best: FastestDecay) -> FastestDecay:
+    """The wall with a coalesced real root next to a found one if there is one no worse; else the found one, with
+    the radius that its eigenvalues give."""
+    z = np.linalg.eigvals(tracer.loop.transition_matrix(best.stiffness, best.damping))
+    best = replace(best, spectral_radius=float(np.abs(z).max()))
+    reach = 0.02 * (1.0 - best.spectral_radius)
+    low, high = max(best.spectral_radius - reach, 1e-6), min(best.spectral_radius + reach, 1.0)
+    for positive in (True, False):
+        if tracer.degree > 2 and low < high:
+            K, B, radius = coalesced(*tracer.factors, positive, low, high)
+            if radius <= best.spectral_radius + 1e-12:
+                best = FastestDecay(float(K), float(B), float(radius))
     return best
 
 
@@ -190,7 +254,5 @@ def _search(tracer: Tracer, outline: Floats, best: FastestDecay | None) -> Faste
 
 def _edge_walls(tracer: Tracer) -> Floats:
     """Walls (k, 2) on whatever edge the curve has on the tracer's circle."""
-    points = tracer.features()
-    edges = find_edges(tracer, angles(points, tracer.radius, 0.2))
-    walls = [arc_walls(tracer, arc) for arc in edges.arcs]
-    return np.vstack(walls) if walls else np.empty((0, 2))
+    K, B, edge = tracer.trace(angles(tracer.features(), tracer.radius, 0.2))
+    return np.column_stack([K[edge], B[edge]])

@@ -26,8 +26,8 @@ FIRST = 1e-3
 LONGEST_STEP = 0.05
 
 
-def singular_points(rows: Floats, split: int, denominator: Floats, radius: float) -> Complexes:
-    """Poles and zeros of P without its whole delay, and poles of w, with Im z >= 0, in the z plane."""
+def singular_points(rows: Floats, split: int, numerator: Floats, denominator: Floats, radius: float) -> Complexes:
+    """Poles and zeros of P without its whole delay, poles of w and real w on the circle; Im z >= 0, z plane."""
     nothing = np.empty((0, 3))
     s = _roots(characteristic(rows, 0, split, nothing, nothing, radius)[1])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -39,9 +39,22 @@ def singular_points(rows: Floats, split: int, denominator: Floats, radius: float
             zeros[np.isfinite(zeros)],
             1.0 + _pairs(quadratic[:, 1], quadratic[:, 2]),
             1.0 - denominator[denominator[:, 0] == 0.0, 2],
+            _in_phase(numerator, denominator, radius),
         ]
     )
     return points[points.imag >= -1e-12]
+
+
+def _in_phase(numerator: Floats, denominator: Floats, radius: float) -> Complexes:
+    """Where w is real on the circle, by linear interpolation: B is infinite there."""
+    thetas = np.linspace(0.0, np.pi, 200)[1:-1]
+    z = radius * np.exp(1j * thetas)
+    d = (z - 1.0)[:, None]
+    factors = [(f[:, 0] * d + f[:, 1]) * d + f[:, 2] for f in (numerator, denominator)]
+    imaginary = np.prod(factors[0] / factors[1], axis=1).imag
+    turns = np.flatnonzero(imaginary[1:] * imaginary[:-1] < 0.0)
+    share = imaginary[turns] / (imaginary[turns] - imaginary[turns + 1])
+    return radius * np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0])))
 
 
 def _pairs(d1: Floats, d0: Floats) -> Complexes:

@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 # Largest distance of a chord from its arc, in shares of the arc's own extent in K and in B.
 CHORD = 1e-6
 MOST_POINTS = 4000
+HALVINGS = 60
 
 
 def arc_angles(arc: Arc) -> Floats:
@@ -84,49 +85,58 @@ def refined_angles(
 
 
 @compiled
+def _gauss(
+    rows: Floats,
+    whole: int,
+    split: int,
+    numerator: Floats,
+    denominator: Floats,
+    radius: float,
+    low: float,
+    high: float,
+) -> float:
+    """Six-point Gauss rule for the integral of K dB over angles from low to high."""
+    x = (0.2386191860831969, 0.6612093864662645, 0.932469514203152)
+    weight = (0.467913934572691, 0.3607615730481386, 0.1713244923791704)
+    centre, half, total = 0.5 * (low + high), 0.5 * (high - low), 0.0
+    for g in range(3):
+        for side in (-1.0, 1.0):
+            theta = centre + side * x[g] * half
+            K, B, _, dB = wall_at(rows, whole, split, numerator, denominator, radius, theta)
+            if K > 0.0 and B > 0.0:
+                total += weight[g] * half * K * dB
+    return total
+
+
+@compiled
 def quadrant_integral(
     rows: Floats, whole: int, split: int, numerator: Floats, denominator: Floats, radius: float, nodes: Floats
 ) -> float:
     """Integral of max(K, 0) dB over the part with B > 0 of an arc of the curve, in the order of its angles.
 
     Round a region with the region on the left this sums to its area within K > 0, B > 0 (Green). Intervals are
-    cut where K or B changes sign; six Gauss points on steps that are a fifth of the distance to the nearest
-    singularity leave rounding only.
+    halved until the rule and its two halves agree to 1e-12 of the whole, or for HALVINGS times: one in which K or
+    B changes sign asks for rounding, and rounding itself asks for ever.
     """
-    x = np.array([0.2386191860831969, 0.6612093864662645, 0.932469514203152])
-    weight = np.array([0.467913934572691, 0.3607615730481386, 0.1713244923791704])
-    total = 0.0
-    cuts = np.empty(4)
+    total, size = 0.0, 0.0
+    low, high, value = np.empty(64), np.empty(64), np.empty(64)
     for i in range(len(nodes) - 1):
-        cuts[0], count = nodes[i], 1
-        low = nodes[i] + 1e-9 * (nodes[i + 1] - nodes[i])
-        high = nodes[i + 1] - 1e-9 * (nodes[i + 1] - nodes[i])
-        start = wall_at(rows, whole, split, numerator, denominator, radius, low)
-        end = wall_at(rows, whole, split, numerator, denominator, radius, high)
-        for axis in range(2):
-            if start[axis] * end[axis] < 0.0:
-                a, b = low, high
-                for _ in range(50):
-                    middle = 0.5 * (a + b)
-                    value = wall_at(rows, whole, split, numerator, denominator, radius, middle)
-                    if value[axis] * start[axis] > 0.0:
-                        a = middle
-                    else:
-                        b = middle
-                cuts[count] = 0.5 * (a + b)
-                count += 1
-        if count == 3 and (cuts[2] - cuts[1]) * (nodes[i + 1] - nodes[i]) < 0.0:
-            cuts[1], cuts[2] = cuts[2], cuts[1]
-        cuts[count] = nodes[i + 1]
-        for c in range(count):
-            centre, half = 0.5 * (cuts[c] + cuts[c + 1]), 0.5 * (cuts[c + 1] - cuts[c])
-            for g in range(3):
-                for side in (-1.0, 1.0):
-                    K, B, _, dB = wall_at(
-                        rows, whole, split, numerator, denominator, radius, centre + side * x[g] * half
-                    )
-                    if K > 0.0 and B > 0.0:
-                        total += weight[g] * half * K * dB
+        low[0], high[0] = nodes[i], nodes[i + 1]
+        value[0] = _gauss(rows, whole, split, numerator, denominator, radius, low[0], high[0])
+        depth, halvings = 0, 0
+        while depth >= 0:
+            halvings += 1
+            middle = 0.5 * (low[depth] + high[depth])
+            left = _gauss(rows, whole, split, numerator, denominator, radius, low[depth], middle)
+            right = _gauss(rows, whole, split, numerator, denominator, radius, middle, high[depth])
+            size = max(size, abs(total) + abs(left) + abs(right))
+            if abs(left + right - value[depth]) <= 1e-12 * size or halvings > HALVINGS:
+                total += left + right
+                depth -= 1
+            else:
+                low[depth + 1], high[depth + 1], value[depth + 1] = low[depth], middle, left
+                low[depth], value[depth] = middle, right
+                depth += 1
     return total
 
 

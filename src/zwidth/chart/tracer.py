@@ -55,8 +55,8 @@ class Tracer:
 
     def features(self) -> NDArray[np.complex128]:
         """Where the curve's shape comes from: see `grid.singular_points`."""
-        rows, _, split, _, denominator = self.factors
-        return singular_points(rows, split, denominator, self.radius)
+        rows, _, split, numerator, denominator = self.factors
+        return singular_points(rows, split, numerator, denominator, self.radius)
 
     def wall(self, theta: float) -> tuple[float, float, float, float]:
         """K, B, dK/dtheta, dB/dtheta at one angle in (0, pi)."""
