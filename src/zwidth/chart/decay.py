@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.grid import angles
+from zwidth.chart.roots import polynomial_radius, spread_roots
 from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled
-from zwidth.loop.evaluate import characteristic, degree_of_loop, divide
+from zwidth.loop.evaluate import characteristic, degree_of_loop
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
@@ -25,53 +26,15 @@ FASTER = 0.003
 
 @dataclass(frozen=True)
 class FastestDecay:
-    """The wall whose slowest motion decays fastest, and its spectral radius."""
+    """The wall whose slowest motion decays fastest, and its spectral radius.
+
+    Its slowest root is mostly a double one: the eigenvalues of the wall rounded to double precision then differ
+    from the radius by the square root of the rounding, about 1e-8 (a triple root: 1e-5).
+    """
 
     stiffness: float
     damping: float
     spectral_radius: float
-
-
-@compiled
-def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
-    """Largest |z| over the roots of p(s), ascending coefficients, by Aberth's iteration.
-
-    roots  (N,) starting values in the s plane, replaced by the roots; warm starts take a few rounds
-    """
-    N = len(p) - 1
-    one = complex(1.0, 0.0)
-    for _ in range(30):
-        largest = 0.0
-        for i in range(N):
-            s = roots[i]
-            value, slope = complex(0.0, 0.0), complex(0.0, 0.0)
-            if abs(s.real) + abs(s.imag) <= 1.0:
-                for k in range(N, -1, -1):
-                    slope = slope * s + value
-                    value = value * s + p[k]
-                newton = divide(value, slope)
-            else:  # the reversed polynomial in 1/s, so that no power overflows
-                t = divide(one, s)
-                for k in range(N + 1):
-                    slope = slope * t + value
-                    value = value * t + p[k]
-                newton = s * divide(value, N * value - t * slope)
-            pull = complex(0.0, 0.0)
-            for j in range(N):
-                gap = s - roots[j]
-                if j != i and gap != 0.0:
-                    pull += divide(one, gap)
-            step = divide(newton, one - newton * pull)
-            if not (abs(step.real) + abs(step.imag) < 1e300):
-                step = complex(0.0, 0.0)
-            roots[i] = s - step
-            largest = max(largest, (abs(step.real) + abs(step.imag)) / (abs(s.real) + abs(s.imag) + 1e-300))
-        if largest < 1e-9:
-            break
-    out = 0.0
-    for i in range(N):
-        out = max(out, abs(divide(radius * (one + roots[i]), one - roots[i])))
-    return out if out == out else 1e300
 
 
 @compiled
@@ -88,19 +51,9 @@ def scatter_values(polynomials: Floats, radius: float, K: Floats, B: Floats) -> 
     p, roots = np.empty(N + 1), np.empty(N, dtype=np.complex128)
     out = np.empty(len(K))
     for i in range(len(K)):
-        _scatter(roots)
+        spread_roots(roots)
         out[i] = _value(polynomials, radius, K[i], B[i], p, roots)
     return out
-
-
-@compiled
-def _scatter(roots: Complexes) -> None:
-    """Starting values spread over the disk |z| < 1, in the s plane."""
-    N = len(roots)
-    for k in range(N):
-        angle = 2.0 * np.pi * (k + 0.37) / N
-        z = 0.8 * complex(np.cos(angle), np.sin(angle))
-        roots[k] = (z - 1.0) / (z + 1.0)
 
 
 @compiled
@@ -110,7 +63,7 @@ def descend(
     """Nelder and Mead's simplex (1965) from `start`, restarted at each size; K, B and the radius found."""
     N = polynomials.shape[1] - 1
     p, roots = np.empty(N + 1), np.empty(N, dtype=np.complex128)
-    _scatter(roots)
+    spread_roots(roots)
     x, f = np.empty((3, 2)), np.empty(3)
     best = start.copy()
     value = _value(polynomials, radius, best[0], best[1], p, roots)
@@ -172,14 +125,11 @@ def coalesced(
     """
     N = degree_of_loop(rows, whole, split, denominator)
     rest, roots = np.empty(N - 1), np.empty(N - 2, dtype=np.complex128)
-    _scatter(roots)
+    spread_roots(roots)
     ends, values = np.array([low, high]), np.empty(2)
     K, B = 0.0, 0.0
     for i in range(60):
-        if i < 2:
-            radius = ends[i]
-        else:
-            radius = (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0])
+        radius = ends[i] if i < 2 else (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0])
         A, S, V = characteristic(rows, whole, split, numerator, denominator, radius)
         m, n = (0, 1) if positive else (N, N - 1)
         det = S[m] * V[n] - S[n] * V[m]

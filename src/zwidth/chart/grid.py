@@ -42,7 +42,7 @@ def singular_points(rows: Floats, split: int, numerator: Floats, denominator: Fl
             _in_phase(numerator, denominator, radius),
         ]
     )
-    return points[points.imag >= -1e-12]
+    return np.asarray(points[points.imag >= -1e-12], dtype=complex)
 
 
 def _in_phase(numerator: Floats, denominator: Floats, radius: float) -> Complexes:
@@ -54,7 +54,7 @@ def _in_phase(numerator: Floats, denominator: Floats, radius: float) -> Complexe
     imaginary = np.prod(factors[0] / factors[1], axis=1).imag
     turns = np.flatnonzero(imaginary[1:] * imaginary[:-1] < 0.0)
     share = imaginary[turns] / (imaginary[turns] - imaginary[turns + 1])
-    return radius * np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0])))
+    return np.asarray(radius * np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0]))), dtype=complex)
 
 
 def _pairs(d1: Floats, d0: Floats) -> Complexes:

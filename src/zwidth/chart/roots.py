@@ -1,0 +1,64 @@
+"""The roots of many neighbouring polynomials, each search starting from the last one's roots."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.compiled import compiled
+from zwidth.loop.evaluate import divide
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+@compiled
+def spread_roots(roots: Complexes) -> None:
+    """Starting values spread over the disk |z| < 1, in the s plane."""
+    N = len(roots)
+    for k in range(N):
+        angle = 2.0 * np.pi * (k + 0.37) / N
+        z = 0.8 * complex(np.cos(angle), np.sin(angle))
+        roots[k] = (z - 1.0) / (z + 1.0)
+
+
+@compiled
+def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
+    """Largest |z| over the roots of p(s), ascending coefficients, by Aberth's iteration.
+
+    roots  (N,) starting values in the s plane, replaced by the roots; warm starts take a few rounds
+    """
+    N = len(p) - 1
+    one = complex(1.0, 0.0)
+    for _ in range(30):
+        largest = 0.0
+        for i in range(N):
+            s = roots[i]
+            value, slope = complex(0.0, 0.0), complex(0.0, 0.0)
+            if abs(s.real) + abs(s.imag) <= 1.0:
+                for k in range(N, -1, -1):
+                    slope = slope * s + value
+                    value = value * s + p[k]
+                newton = divide(value, slope)
+            else:  # the reversed polynomial in 1/s, so that no power overflows
+                t = divide(one, s)
+                for k in range(N + 1):
+                    slope = slope * t + value
+                    value = value * t + p[k]
+                newton = s * divide(value, N * value - t * slope)
+            pull = complex(0.0, 0.0)
+            for j in range(N):
+                gap = s - roots[j]
+                if j != i and gap != 0.0:
+                    pull += divide(one, gap)
+            step = divide(newton, one - newton * pull)
+            if not (abs(step.real) + abs(step.imag) < 1e300):
+                step = complex(0.0, 0.0)
+            roots[i] = s - step
+            largest = max(largest, (abs(step.real) + abs(step.imag)) / (abs(s.real) + abs(s.imag) + 1e-300))
+        if largest < 1e-9:
+            break
+    out = 0.0
+    for i in range(N):
+        out = max(out, abs(divide(radius * (one + roots[i]), one - roots[i])))
+    return out if out == out else 1e300
