@@ -7,11 +7,12 @@ compiled for other targets.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 import numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+UNCOUNTED: Final[dict[str, Any]] = {"_nrt": False}  # numba takes this flag, its type stubs do not name it
 
 
 def compiled(function: Function) -> Function:
@@ -29,7 +30,7 @@ def compiled_lean(function: Function) -> Function:
     instructions; around the algebra of a few bodies that is three quarters of the time. Without the counting
     such a kernel cannot allocate: numba refuses to compile it, it never computes something else.
     """
-    return cast(Function, numba.njit(cache=True, error_model="numpy", _nrt=False)(function))
+    return cast(Function, numba.njit(cache=True, error_model="numpy", **UNCOUNTED)(function))
 
 
 def compiled_parallel(function: Function) -> Function:
