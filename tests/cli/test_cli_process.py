@@ -45,6 +45,26 @@ def test_nothing_heavy_is_imported_before_it_is_needed(words):
     assert not HEAVY & set(done.stderr.split())
 
 
+@pytest.mark.parametrize(("given", "used"), [(None, "1"), ("3", "3")])
+def test_linear_algebra_has_one_thread_before_numpy_is_loaded(given, used):
+    """The variable counts only if it is set when numpy comes; what the user has set stays."""
+    program = """
+import os, sys
+class Watch:
+    def find_spec(self, name, path=None, target=None):
+        if name == "numpy":
+            print("threads", os.environ.get("OPENBLAS_NUM_THREADS"), file=sys.stderr)
+sys.meta_path.insert(0, Watch())
+sys.argv = ["zwidth", "check", "published-two-mass", "--stiffness", "1000", "--damping", "10"]
+from zwidth.show.cli.main import main
+main()
+"""
+    environment = {key: value for key, value in os.environ.items() if key != "OPENBLAS_NUM_THREADS"}
+    environment |= {"OPENBLAS_NUM_THREADS": given} if given else {}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, f"threads {used}\n")
+
+
 def test_a_chart_as_a_process():
     done = zwidth("chart", TWO_MASS, "--json")
     assert (done.returncode, done.stderr) == (0, "")

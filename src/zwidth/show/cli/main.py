@@ -19,6 +19,9 @@ DONE, NO_ANSWER, BAD_INPUT, INTERNAL, INTERRUPTED = 0, 1, 2, 70, 130
 
 def main() -> None:
     """Run the command line of this process and leave with its exit code."""
+    # Read once, when numpy is loaded. The matrices are tiny: threads only cost time, and fight over the cores
+    # with whatever else runs there. Whoever sets it means it.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     warnings.showwarning = _warn
     sys.exit(run(sys.argv[1:]))
 
