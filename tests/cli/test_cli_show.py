@@ -45,6 +45,17 @@ def test_dexterity_follows_from_what_is_shown(where):
     assert_allclose(shown["rigid_mass_kg"], 1.0 / (u @ J @ np.linalg.inv(whole) @ J.T @ u))
 
 
+def test_two_coordinates_are_completed_with_the_height_of_the_reference():
+    """What is said to have been asked is what was computed: a plane at z = 0.3 m moves nothing else."""
+    raised = ("upper-left.origin_m=[0.0, 0.0, 0.3]", "upper-right.origin_m=[0.0, 0.0, 0.3]")
+    settings = [word for path in raised for word in ("--set", f"links.{path}")]
+    height = ("--set", "reference.position_m=[0.0, 0.25, 0.3]")
+    high = found("show", MECHANISM, *settings, *height, "--at", "0.05,0.2")
+    low = found("show", MECHANISM, "--at", "0.05,0.2")
+    assert (high["position_m"], low["position_m"]) == ([0.05, 0.2, 0.3], [0.05, 0.2, 0.0])
+    assert_allclose([high[key] for key in NUMBERS], [low[key] for key in NUMBERS], rtol=1e-9)
+
+
 def test_a_plant_has_no_postures_and_shows_null_for_them():
     shown = found("show", TWO_MASS)
     assert_allclose([shown[key] for key in NUMBERS], [0.2616, 0.0254, 0.287, 15620.0], rtol=1e-9)

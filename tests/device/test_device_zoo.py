@@ -205,6 +205,19 @@ def test_a_given_plant_has_no_posture_or_direction():
         device.posture()
 
 
+def test_two_coordinates_lie_at_the_height_of_the_reference():
+    """A device whose plane is z = 0.3 m is asked for by x and y as one whose plane is z = 0."""
+    raised = [f"links.upper-{side}.origin_m=[0.0, 0.0, 0.3]" for side in ("left", "right")]
+    low, high = load("five-bar"), load("five-bar", [*raised, "reference.position_m=[0.0, 0.25, 0.3]"])
+    assert high.position([0.05, 0.2]).tolist() == [0.05, 0.2, 0.3]
+    assert high.position([0.05, 0.2, 0.1]).tolist() == [0.05, 0.2, 0.1]
+    assert high.position().tolist() == [0.0, 0.25, 0.3]
+    posture = high.posture([0.05, 0.2])
+    assert posture.position.tolist() == [0.05, 0.2, 0.3]
+    assert posture.angles == pytest.approx(low.posture([0.05, 0.2]).angles, abs=1e-12)
+    assert high.direction([1, 0]).tolist() == [1.0, 0.0, 0.0]
+
+
 @pytest.mark.parametrize(("direction", "unit"), [([0, 3], [0, 1, 0]), ([1e-200, 1e-200, 0], [0.5**0.5] * 2 + [0])])
 def test_a_direction_may_have_any_length(direction, unit):
     assert load("five-bar").direction(direction) == pytest.approx(np.array(unit, dtype=float))

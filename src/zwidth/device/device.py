@@ -56,7 +56,7 @@ class Device:
     def posture(self, at: Sequence[float] | None = None, assembly: str | None = None) -> Posture:
         """The mechanism with its handle at a position, in a named assembly (left out: those of the file).
 
-        at      x, y or x, y, z [m]
+        at      x, y or x, y, z [m] (see `position`)
         Raises  DeviceError    if the device has no mechanism, the arguments cannot be meant, or the mechanism
                                cannot be assembled or driven as the file says
                 PostureError   (model.posture) where there is no answer: out of reach, or singular
@@ -65,8 +65,7 @@ class Device:
         if assembly is not None and assembly not in mechanism.assemblies:
             message = f"names no assembly, got '{assembly}'; {suggestion(assembly, set(mechanism.assemblies))}"
             raise fail(self.label, "assembly", message)
-        position = self.reference_position if at is None else self._vector("at", at)
-        assert position is not None
+        position = self.position(at)
         name = assembly or self.reference_assembly
         from zwidth.model.posture import LoopOpen, PostureError, solve_posture
 
@@ -104,6 +103,20 @@ class Device:
         from zwidth.model.reduction import reduce_mechanism
 
         return reduce_mechanism(self._mechanism(), posture, along, cast("Model", model or "full"), self.damping)
+
+    def position(self, at: Sequence[float] | None = None) -> Floats:
+        """The handle's position meant, (3,) [m]; left out: that of the file.
+
+        at  x, y or x, y, z [m]; x, y lies at the height of the file's reference, whose plane a planar device
+            does not leave
+        """
+        self._mechanism(at=at)
+        reference = self.reference_position
+        assert reference is not None
+        if at is None:
+            return reference
+        position = self._vector("at", at)
+        return np.array([*position[:2], reference[2]]) if len(at) == 2 else position
 
     def direction(self, direction: Sequence[float] | None = None) -> Floats:
         """The rendered direction as a unit vector, (3,); left out: that of the file."""

@@ -51,13 +51,11 @@ class Question:
 
     def facts(self, device: Device) -> dict[str, Any]:
         """Name, place and sampling as a result states them; null where inapplicable."""
-        from zwidth.device.build import in_space
-
         mechanism = device.mechanism is not None
         return {
             "name": device.name,
             "device": self.name,
-            "position_m": in_space(self.at) if self.at else device.reference_position,
+            "position_m": device.position(self.at) if mechanism else None,
             "direction": device.direction(self.direction) if mechanism else None,
             "assembly": self.assembly or device.reference_assembly,
             "model": self.model_of(device),
