@@ -39,6 +39,10 @@ def test_a_device_without_stable_walls_has_a_report_and_exit_code_1(tmp_path):
     unstable = ("--set", "plant.damping_Ns_per_m=unset", "--set", "loop.delay_samples=1")
     ran = zwidth("report", TWO_MASS, *unstable, "--output", file, "--json")
     assert ran.code == 1
-    assert ran.document["reason"]
+    assert ran.document["reason"] == "no wall with positive stiffness and without negative damping is stable"
     assert ran.document["stiffness_max_N_per_m"] is None
-    assert file.exists()
+    assert ran.document["file"] == str(file)
+    assert "</html>" in file.read_text(encoding="utf-8")
+    again = zwidth("report", TWO_MASS, *unstable, "--output", file)  # for people
+    assert (again.code, again.lines) == (1, [f"zwidth: {ran.document['reason']}"])
+    assert f"written: {file}" in again.out
