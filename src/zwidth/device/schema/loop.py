@@ -6,16 +6,26 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field
 
+from zwidth.device.faults import quote
 from zwidth.device.schema.numbers import Number, Section, WholeNumber, quantity
 
+SHORTEST_PERIOD: Final = 1e-7  # s; 10 MHz, far beyond any loop round a motor
+LONGEST_PERIOD: Final = 1.0  # s
 LONGEST_DELAY: Final = 100  # samples; each adds a state to the loop
 HIGHEST_ORDER: Final = 20  # of a Butterworth filter; each adds a state to the loop
 
 
-def _not_a_frequency(value: Any) -> Any:
-    if isinstance(value, int | float) and not isinstance(value, bool) and 1 < value < 1e9:
+def _a_period(value: Any) -> Any:
+    """Refuse a frequency, and a period so short that a sample changes the plant by less than rounding does."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return value
+    allowed = f"must be {SHORTEST_PERIOD:g} <= T <= {LONGEST_PERIOD:g} s, got {quote(value)}"
+    if LONGEST_PERIOD < value < 1e9:
+        raise ValueError(f"{allowed}; is {value:.10g} a frequency in Hz? then T = {1 / value:.6g}")
+    if 0 < value < SHORTEST_PERIOD:
         raise ValueError(
-            f"must be 0 < T <= 1 s, got {value:.10g}; is {value:.10g} a frequency in Hz? then T = {1 / value:.6g}"
+            f"{allowed}; no device is sampled faster than 10 MHz, and rounding would drown what happens in one "
+            "sample: is the unit right?"
         )
     return value
 
@@ -52,8 +62,8 @@ class VelocitySection(Section):
 class LoopSection(Section):
     """The sampled wall law, f = -(K y + B v)."""
 
-    sampling_period_s: Annotated[Number, BeforeValidator(_not_a_frequency)] = quantity(
-        "sampling period T, 0 < T <= 1", "s", gt=0, le=1
+    sampling_period_s: Annotated[Number, BeforeValidator(_a_period)] = quantity(
+        "sampling period T, 1e-7 <= T <= 1", "s", ge=SHORTEST_PERIOD, le=LONGEST_PERIOD
     )
     delay_samples: Number | None = quantity(
         "time from reading the encoder to setting the force, in samples, whole or not; or delay_s",
