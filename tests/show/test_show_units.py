@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given as over
 from hypothesis import strategies as st
 
-from zwidth.show.figures import units
-from zwidth.show.figures.units import PREFIXES, given, number, point, quantity
+from zwidth.show import units
+from zwidth.show.units import NONE, PREFIXES, amount, given, number, point, quantity, vector
 
 
 def test_the_examples_in_the_docstrings():
@@ -61,3 +61,25 @@ def test_what_somebody_chose_is_not_padded():
 def test_points():
     assert point([0.0, -0.25, 0.0]) == "(0, −0.25)\u00a0m"
     assert point([0.1, 0.2, 0.3], "") == "(0.1, 0.2, 0.3)"
+
+
+@over(st.floats(-1e12, 1e12), st.sampled_from(["N/m", "kg", ""]), st.integers(2, 5))
+def test_a_terminal_shows_what_a_figure_shows_in_signs_that_can_be_typed(value, unit, digits):
+    shown = amount(value, unit, digits)
+    figure = quantity(value, unit, digits)
+    assert len(shown) == len(figure)
+    assert all(
+        a == b or (a, b) in {(" ", "\u00a0"), (" ", "\u2009"), ("-", "−")}
+        for a, b in zip(shown, figure, strict=True)
+    )
+    assert not set(shown) & set("\u00a0\u2009−")
+
+
+@pytest.mark.parametrize("value", [None, math.nan, math.inf, -math.inf])
+def test_a_terminal_says_none_where_there_is_no_number(value):
+    assert amount(value, "N/m") == NONE
+
+
+def test_a_vector_on_a_terminal():
+    assert vector([0.0, -0.25, 0.0], "m") == "(0, -0.25) m"
+    assert vector([0.1, 0.2, -0.3]) == "(0.1, 0.2, -0.3)"

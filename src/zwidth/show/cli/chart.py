@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.amount import amount, number
 from zwidth.show.cli.answer import Answer, deliver, sheet
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Numbers, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
+from zwidth.show.units import amount
 
 if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
@@ -139,7 +139,7 @@ def _rows(chart: StabilityChart) -> Iterator[tuple[str, str]]:
     if chart.fastest_decay:
         fastest = chart.fastest_decay
         wall = f"{amount(fastest.stiffness, 'N/m')} and {amount(fastest.damping, 'Ns/m')}"
-        yield "fastest decay", f"at {wall}: spectral radius {number(fastest.spectral_radius)}"
+        yield "fastest decay", f"at {wall}: spectral radius {amount(fastest.spectral_radius)}"
     if len(chart.regions) != 1:
         yield "stable regions", f"{len(chart.regions)}"
     if chart.unobserved_modes:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.amount import amount, number
 from zwidth.show.cli.answer import Answer, deliver, table
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.cli.points import Walls, read_walls
 from zwidth.show.output import DATA, destination, write_data
+from zwidth.show.units import amount
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
@@ -105,7 +105,7 @@ def _pages(question: Question, device: Device, document: dict[str, Any]) -> Sequ
             amount(point["stiffness_N_per_m"], "N/m"),
             amount(point["damping_Ns_per_m"], "Ns/m"),
             point["verdict"],
-            number(point["spectral_radius"], 10),
+            amount(point["spectral_radius"], digits=10),
             amount(point["frequency_Hz"], "Hz"),
         )
         for point in points[:SHOWN]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from zwidth.show.cli.amount import vector
 from zwidth.show.output import shown
+from zwidth.show.units import vector
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device

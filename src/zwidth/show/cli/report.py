@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.amount import typed
 from zwidth.show.cli.answer import Answer, deliver
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.output import destination
+from zwidth.show.units import typed
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device

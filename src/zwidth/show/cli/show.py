@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.amount import amount, number
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, destination, plain, write_data
+from zwidth.show.units import amount
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
@@ -153,9 +153,9 @@ def _pages(question: Question, device: Device, document: Mapping[str, Any]) -> I
     if found["joints_rad"]:
         yield sheet(
             [
-                ("manipulability", number(found["manipulability"])),
-                ("dynamic manipulability", number(found["dynamic_manipulability"])),
-                ("isotropy (1 is best)", number(found["isotropy"])),
+                ("manipulability", amount(found["manipulability"])),
+                ("dynamic manipulability", amount(found["dynamic_manipulability"])),
+                ("isotropy (1 is best)", amount(found["isotropy"])),
             ]
         )
         yield table(

@@ -14,7 +14,7 @@ from zwidth.chart.region import ChartError
 from zwidth.loop.loop import Loop
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import BLACK, LINES, VERMILION, legend_above
-from zwidth.show.figures.units import quantity
+from zwidth.show.units import quantity
 
 
 def draw_decay_contours(

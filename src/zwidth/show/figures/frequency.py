@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from zwidth.chart.chart import BoundaryArc, StabilityChart
 from zwidth.model.modes import natural_frequencies
 from zwidth.show.figures.style import BLUE, GREY, VERMILION, label, legend_above
-from zwidth.show.figures.units import quantity
+from zwidth.show.units import quantity
 
 # Ends of arcs closer than this share of the edge's extent are one corner; it is far coarser than their rounding.
 SAME_WALL = 1e-6

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from zwidth.model.plant import Plant
 from zwidth.show.figures.style import BLACK, GREY, VERMILION
-from zwidth.show.figures.units import given
+from zwidth.show.units import given
 
 Floats = NDArray[np.float64]
 WIDTH, GAP, HALF = 1.2, 1.6, 0.55  # of a mass, between masses, half the height of a mass

@@ -11,7 +11,7 @@ from matplotlib.patches import Polygon
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above
-from zwidth.show.figures.units import quantity
+from zwidth.show.units import quantity
 
 # KMIN, KMAX [N/m], BMIN, BMAX [N s/m]
 Window = tuple[float, float, float, float]

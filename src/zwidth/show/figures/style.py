@@ -22,8 +22,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter
 
-from zwidth.show.figures.units import MINUS, PREFIXES, exponent_of
 from zwidth.show.output import replacing
+from zwidth.show.units import MINUS, PREFIXES, exponent_of
 
 BLACK: Final = "#000000"
 BLUE: Final = "#0072B2"

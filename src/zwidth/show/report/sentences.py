@@ -11,8 +11,8 @@ import numpy as np
 from zwidth.loop.controller import Controller, FirstOrder
 from zwidth.model.mechanism import Floats
 from zwidth.show.figures.decay import tenfold_time
-from zwidth.show.figures.units import MINUS, given, number, point, quantity
 from zwidth.show.report.facts import Facts
+from zwidth.show.units import MINUS, given, number, point, quantity
 from zwidth.study.what_if import REMEDIES, WORTH, Variant, find, limiting_change
 
 NO_WALL: Final = "no wall with positive stiffness and without negative damping is stable"

@@ -9,9 +9,9 @@ import numpy as np
 
 from zwidth.conditions import Bound
 from zwidth.model.mechanism import Floats
-from zwidth.show.figures.units import UNKNOWN, given, number, quantity
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
+from zwidth.show.units import UNKNOWN, given, number, quantity
 from zwidth.study.what_if import Variant
 
 Row = tuple[str, ...]

@@ -1,4 +1,8 @@
-"""Numbers with units for people: sensible digits, SI prefixes, a real minus sign."""
+"""Numbers with units for people: sensible digits, SI prefixes, a real minus sign.
+
+Figures and reports use `quantity`, `number` and `point`; terminals `amount` and `vector`, the same notation
+with blanks and signs that can be typed and searched.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +15,11 @@ PREFIXES: Final = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 PLAIN: Final = ("kg", "N²s/m²", "")
 SPACE: Final = "\u00a0"
 MINUS: Final = "\u2212"
+THIN: Final = "\u2009"
 UNKNOWN: Final = "\u2013"
+NONE: Final = "none"
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_TYPED: Final = {ord(SPACE): " ", ord(THIN): " ", ord(MINUS): "-"}
 
 
 def exponent_of(value: float) -> int:
@@ -39,7 +46,7 @@ def number(value: float, digits: int = 3) -> str:
     if -4 <= magnitude < max(digits, 4):
         text = f"{float(f'{mantissa}e{power}'):.{max(digits - 1 - magnitude, 0)}f}"
     else:
-        text = f"{mantissa}\u2009×\u200910{str(magnitude).translate(_RAISED)}"
+        text = f"{mantissa}{THIN}×{THIN}10{str(magnitude).translate(_RAISED)}"
     return text.replace("-", MINUS)
 
 
@@ -80,3 +87,28 @@ def point(coordinates: Iterable[float], unit: str = "m") -> str:
         values.pop()
     inside = ", ".join(f"{round(v, 12) + 0.0:.4g}".replace("-", MINUS) for v in values)
     return f"({inside}){SPACE}{unit}".rstrip(SPACE)
+
+
+def amount(value: float | None, unit: str = "", digits: int = 4) -> str:
+    """A quantity on a terminal; "none" where there is no finite one.
+
+    >>> amount(7849.44, "N/m"), amount(-0.2616, "kg"), amount(None, "N/m"), amount(0.25)
+    ('7.849 kN/m', '-0.2616 kg', 'none', '0.2500')
+    """
+    if value is None or not isfinite(value):
+        return NONE
+    return typed(quantity(value, unit, digits))
+
+
+def vector(components: Iterable[float], unit: str = "") -> str:
+    """A point on a terminal, such as (0, -0.25) m.
+
+    >>> vector([0.0, -0.25, 0.0], "m")
+    '(0, -0.25) m'
+    """
+    return typed(point(components, unit))
+
+
+def typed(text: str) -> str:
+    """The text with plain blanks and minus signs."""
+    return text.translate(_TYPED)
