@@ -5,21 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.curve import wall_at
+from zwidth.chart.curve import wall_at, zero_between
 from zwidth.chart.hurwitz import edges_stable_set, working_room
 from zwidth.chart.tracer import ROOTS, RealRoot, Tracer, Wall
 from zwidth.compiled import compiled
+from zwidth.loop.evaluate import Factors
 
 Floats = NDArray[np.float64]
 
 
 @compiled
 def _bisect_flag(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
+    factors: Factors,
     polynomials: Floats,
     radius: float,
     on: float,
@@ -31,7 +28,7 @@ def _bisect_flag(
         middle = 0.5 * (on + off)
         if middle in (on, off):
             break
-        K, B, _, _ = wall_at(rows, whole, split, numerator, denominator, radius, middle)
+        K, B, _, _ = wall_at(factors, radius, middle)
         if edges_stable_set(polynomials, middle, K, B, room) > 0:
             on = middle
         else:
@@ -40,39 +37,8 @@ def _bisect_flag(
 
 
 @compiled
-def _bisect_line(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
-    radius: float,
-    line: Floats,
-    low: float,
-    high: float,
-) -> float:
-    """The angle between low and high where the curve crosses line[0] + K line[1] + B line[2] = 0."""
-    K, B, _, _ = wall_at(rows, whole, split, numerator, denominator, radius, low)
-    side = line[0] + K * line[1] + B * line[2] > 0.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        K, B, _, _ = wall_at(rows, whole, split, numerator, denominator, radius, middle)
-        if (line[0] + K * line[1] + B * line[2] > 0.0) == side:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
-
-
-@compiled
 def _meet(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
+    factors: Factors,
     radius: float,
     one: float,
     other: float,
@@ -81,8 +47,8 @@ def _meet(
     a, b = one, other
     settled = False
     for _ in range(30):
-        Ka, Ba, dKa, dBa = wall_at(rows, whole, split, numerator, denominator, radius, a)
-        Kb, Bb, dKb, dBb = wall_at(rows, whole, split, numerator, denominator, radius, b)
+        Ka, Ba, dKa, dBa = wall_at(factors, radius, a)
+        Kb, Bb, dKb, dBb = wall_at(factors, radius, b)
         det = dKb * dBa - dKa * dBb
         step_a = ((Ka - Kb) * dBb - (Ba - Bb) * dKb) / det
         step_b = ((Ka - Kb) * dBa - (Ba - Bb) * dKa) / det
@@ -97,14 +63,17 @@ def _meet(
 
 def cross_line(tracer: Tracer, root: RealRoot, low: float, high: float) -> float:
     """The angle in (low, high) where the curve crosses a line of real roots."""
-    return _bisect_line(*tracer.factors, tracer.radius, tracer.line(root), low, high)
+    a, s, v = tracer.line(root).tolist()
+    return zero_between(tracer.factors, tracer.radius, (a, s, v, 0.0, 0.0), low, high)
 
 
 def _last_edge(tracer: Tracer, on: float, off: float) -> float:
     """The last angle from `on` towards `off` that is an edge."""
     if tracer.certain(on) and tracer.certain(off):
-        return _bisect_flag(*tracer.factors, tracer.polynomials, tracer.radius, on, off)
-    for _ in range(50):  # polynomials cannot tell: a long delay, or roots that stay close to the circle
+        return _bisect_flag(tracer.factors, tracer.polynomials, tracer.radius, on, off)
+    for _ in range(
+        50
+    ):  # polynomials cannot tell: a long delay, or roots that stay close to the circle
         middle = 0.5 * (on + off)
         if tracer.edge_flag(middle) > 0:
             on = middle
@@ -116,7 +85,11 @@ def _last_edge(tracer: Tracer, on: float, off: float) -> float:
 def _partner(tracer: Tracer, theta: float, wall: Wall) -> float:
     """Angle of the root nearest the circle apart from the pair at theta, for a wall on the curve."""
     z = tracer.roots_without_pair(np.array(theta), np.array(wall[0]), np.array(wall[1]))
-    return float(abs(np.angle(z[np.argmin(np.abs(np.abs(z) - tracer.radius))]))) if len(z) else 0.0
+    return (
+        float(abs(np.angle(z[np.argmin(np.abs(np.abs(z) - tracer.radius))])))
+        if len(z)
+        else 0.0
+    )
 
 
 def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, float]:
@@ -137,7 +110,7 @@ def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, f
     wall = tracer.wall(theta)[:2]
     partner = _partner(tracer, theta, wall)
     if 0.0 < partner < np.pi:
-        one, other, found = _meet(*tracer.factors, tracer.radius, theta, partner)
+        one, other, found = _meet(tracer.factors, tracer.radius, theta, partner)
         if found and abs(one - theta) <= 1e-5 * theta:
             return one, tracer.wall(one)[:2], other
     return theta, wall, partner

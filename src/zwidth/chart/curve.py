@@ -17,9 +17,16 @@ from numpy.typing import NDArray
 
 from zwidth.chart.hurwitz import edges_stable_set, working_room
 from zwidth.compiled import compiled
-from zwidth.loop.evaluate import divide, plant_response, velocity_response
+from zwidth.loop.evaluate import Factors, divide, plant_response, velocity_response
 
 Floats = NDArray[np.float64]
+
+# Weights of `zero_between` for single components
+OF_K, OF_B, OF_SLOPE = (
+    (0.0, 1.0, 0.0, 0.0, 0.0),
+    (0.0, 0.0, 1.0, 0.0, 0.0),
+    (0.0, 0.0, 0.0, 1.0, 0.0),
+)
 
 
 @compiled
@@ -27,17 +34,22 @@ def on_circle(theta: float, radius: float) -> tuple[complex, complex]:
     """z = rho exp(i theta) and d = z - 1, the latter without cancellation near theta = 0."""
     s, c = np.sin(0.5 * theta), np.cos(0.5 * theta)
     away = complex(-2.0 * s * s, 2.0 * s * c)
-    return complex(radius + radius * away.real, radius * away.imag), (radius - 1.0) + radius * away
+    return complex(radius + radius * away.real, radius * away.imag), (
+        radius - 1.0
+    ) + radius * away
 
 
 @compiled
 def wall_at(
-    rows: Floats, whole: int, split: int, numerator: Floats, denominator: Floats, radius: float, theta: float
+    factors: Factors, radius: float, theta: float
 ) -> tuple[float, float, float, float]:
     """K, B of the wall with a root at rho exp(i theta), and dK/dtheta, dB/dtheta."""
+    rows, whole, split, numerator, denominator = factors
     z, d = on_circle(theta, radius)
     P, dP = plant_response(rows, whole, split, z, d)
-    if not np.isfinite(P.real + P.imag):  # exactly on an undamped pole: step aside by a rounding
+    if not np.isfinite(
+        P.real + P.imag
+    ):  # exactly on an undamped pole: step aside by a rounding
         z, d = on_circle(theta * (1.0 + 4e-16), radius)
         P, dP = plant_response(rows, whole, split, z, d)
     w, dw = velocity_response(numerator, denominator, d)
@@ -53,29 +65,45 @@ def wall_at(
 
 
 @compiled
+def zero_between(
+    factors: Factors,
+    radius: float,
+    weights: tuple[float, float, float, float, float],
+    low: float,
+    high: float,
+) -> float:
+    """The angle at which w0 + w1 K + w2 B + w3 dK/dtheta + w4 dB/dtheta changes sign, by bisection to rounding."""
+    w0, w1, w2, w3, w4 = weights
+    K, B, dK, dB = wall_at(factors, radius, low)
+    side = w0 + w1 * K + w2 * B + w3 * dK + w4 * dB > 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        K, B, dK, dB = wall_at(factors, radius, middle)
+        if (w0 + w1 * K + w2 * B + w3 * dK + w4 * dB > 0.0) == side:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@compiled
 def walls(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
+    factors: Factors,
     radius: float,
     thetas: Floats,
 ) -> tuple[Floats, Floats]:
     """K and B at angles in (0, pi)."""
     K, B = np.empty(len(thetas)), np.empty(len(thetas))
     for i in range(len(thetas)):
-        K[i], B[i], _, _ = wall_at(rows, whole, split, numerator, denominator, radius, thetas[i])
+        K[i], B[i], _, _ = wall_at(factors, radius, thetas[i])
     return K, B
 
 
 @compiled
 def trace(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
+    factors: Factors,
     polynomials: Floats,
     radius: float,
     thetas: Floats,
@@ -85,6 +113,6 @@ def trace(
     K, B, edge = np.empty(n), np.empty(n), np.empty(n, dtype=np.int64)
     room = working_room(polynomials.shape[1] - 1)
     for i in range(n):
-        K[i], B[i], _, _ = wall_at(rows, whole, split, numerator, denominator, radius, thetas[i])
+        K[i], B[i], _, _ = wall_at(factors, radius, thetas[i])
         edge[i] = edges_stable_set(polynomials, thetas[i], K[i], B[i], room)
     return K, B, edge

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.curve import wall_at
+from zwidth.chart.curve import OF_B, OF_K, wall_at, zero_between
 from zwidth.compiled import compiled
-from zwidth.loop.evaluate import characteristic
+from zwidth.loop.evaluate import Factors, characteristic
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -26,10 +26,12 @@ FIRST = 1e-3
 LONGEST_STEP = 0.05
 
 
-def singular_points(rows: Floats, split: int, numerator: Floats, denominator: Floats, radius: float) -> Complexes:
+def singular_points(
+    rows: Floats, split: int, numerator: Floats, denominator: Floats, radius: float
+) -> Complexes:
     """Poles and zeros of P without its whole delay, poles of w and real w on the circle; Im z >= 0, z plane."""
     nothing = np.empty((0, 3))
-    s = _roots(characteristic(rows, 0, split, nothing, nothing, radius)[1])
+    s = _roots(characteristic((rows, 0, split, nothing, nothing), radius)[1])
     with np.errstate(divide="ignore", invalid="ignore"):
         zeros = radius * (1.0 + s) / (1.0 - s)
     quadratic = denominator[denominator[:, 0] != 0.0]
@@ -54,7 +56,10 @@ def _in_phase(numerator: Floats, denominator: Floats, radius: float) -> Complexe
     imaginary = np.prod(factors[0] / factors[1], axis=1).imag
     turns = np.flatnonzero(imaginary[1:] * imaginary[:-1] < 0.0)
     share = imaginary[turns] / (imaginary[turns] - imaginary[turns + 1])
-    return np.asarray(radius * np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0]))), dtype=complex)
+    return np.asarray(
+        radius * np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0]))),
+        dtype=complex,
+    )
 
 
 def _pairs(d1: Floats, d0: Floats) -> Complexes:
@@ -103,11 +108,7 @@ def angles(points: Complexes, radius: float, share: float) -> Floats:
 
 @compiled
 def around_crossings(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
+    factors: Factors,
     radius: float,
     thetas: Floats,
 ) -> Floats:
@@ -117,23 +118,19 @@ def around_crossings(
     the other within a sliver of angle. Every such branch crosses an axis.
     """
     out, n = np.empty(64 * 20), 0
-    before = wall_at(rows, whole, split, numerator, denominator, radius, thetas[0])
+    before = wall_at(factors, radius, thetas[0])
     for i in range(len(thetas) - 1):
-        after = wall_at(rows, whole, split, numerator, denominator, radius, thetas[i + 1])
+        after = wall_at(factors, radius, thetas[i + 1])
         for axis in range(2):
             if before[axis] * after[axis] < 0.0 and n + 20 <= len(out):
-                low, high = thetas[i], thetas[i + 1]
-                for _ in range(40):
-                    middle = 0.5 * (low + high)
-                    value = wall_at(rows, whole, split, numerator, denominator, radius, middle)
-                    if value[axis] * before[axis] > 0.0:
-                        low = middle
-                    else:
-                        high = middle
+                weights = OF_K if axis == 0 else OF_B
+                centre = zero_between(
+                    factors, radius, weights, thetas[i], thetas[i + 1]
+                )
                 offset = thetas[i + 1] - thetas[i]
                 for _ in range(10):
                     offset *= 0.1
-                    for theta in (low - offset, low + offset):
+                    for theta in (centre - offset, centre + offset):
                         if thetas[i] < theta < thetas[i + 1]:
                             out[n] = theta
                             n += 1

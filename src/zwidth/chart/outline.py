@@ -11,6 +11,7 @@ from zwidth.chart.arcs import Arc, Rings
 from zwidth.chart.curve import wall_at, walls
 from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled
+from zwidth.loop.evaluate import Factors
 
 Floats = NDArray[np.float64]
 
@@ -31,8 +32,8 @@ def sample_arc(tracer: Tracer, arc: Arc) -> tuple[Floats, Floats, Floats]:
         K, B = np.array([arc.first, arc.last]).T
         return np.array([arc.start, arc.end]), K, B
     nodes = np.sort(arc_angles(arc))
-    inner = refined_angles(*tracer.factors, tracer.radius, nodes, CHORD, MOST_POINTS)
-    K, B = walls(*tracer.factors, tracer.radius, inner)
+    inner = refined_angles(tracer.factors, tracer.radius, nodes, CHORD, MOST_POINTS)
+    K, B = walls(tracer.factors, tracer.radius, inner)
     thetas = np.concatenate([nodes[:1], inner, nodes[-1:]])
     if arc.start > arc.end:
         thetas, K, B = thetas[::-1], K[::-1], B[::-1]
@@ -45,11 +46,7 @@ def sample_arc(tracer: Tracer, arc: Arc) -> tuple[Floats, Floats, Floats]:
 
 @compiled
 def refined_angles(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
+    factors: Factors,
     radius: float,
     nodes: Floats,
     tolerance: float,
@@ -63,10 +60,12 @@ def refined_angles(
     n = len(nodes)
     K, B = np.empty(2 * n - 1), np.empty(2 * n - 1)
     for i in range(2 * n - 1):
-        theta = nodes[i // 2] if i % 2 == 0 else 0.5 * (nodes[i // 2] + nodes[i // 2 + 1])
+        theta = (
+            nodes[i // 2] if i % 2 == 0 else 0.5 * (nodes[i // 2] + nodes[i // 2 + 1])
+        )
         # the ends may be 0 or pi, where the curve is even: just inside is as good
         inside = min(max(theta, 1e-7 * nodes[1]), np.pi - 1e-7 * (np.pi - nodes[n - 2]))
-        K[i], B[i], _, _ = wall_at(rows, whole, split, numerator, denominator, radius, inside)
+        K[i], B[i], _, _ = wall_at(factors, radius, inside)
     width, height = K.max() - K.min(), B.max() - B.min()
     out, count = np.empty(most + 2 * n), 0
     for i in range(n - 1):
@@ -86,11 +85,7 @@ def refined_angles(
 
 @compiled
 def _gauss(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
+    factors: Factors,
     radius: float,
     low: float,
     high: float,
@@ -102,16 +97,14 @@ def _gauss(
     for g in range(3):
         for side in (-1.0, 1.0):
             theta = centre + side * x[g] * half
-            K, B, _, dB = wall_at(rows, whole, split, numerator, denominator, radius, theta)
+            K, B, _, dB = wall_at(factors, radius, theta)
             if K > 0.0 and B > 0.0:
                 total += weight[g] * half * K * dB
     return total
 
 
 @compiled
-def quadrant_integral(
-    rows: Floats, whole: int, split: int, numerator: Floats, denominator: Floats, radius: float, nodes: Floats
-) -> float:
+def quadrant_integral(factors: Factors, radius: float, nodes: Floats) -> float:
     """Integral of max(K, 0) dB over the part with B > 0 of an arc of the curve, in the order of its angles.
 
     Round a region with the region on the left this sums to its area within K > 0, B > 0 (Green). Intervals are
@@ -122,19 +115,23 @@ def quadrant_integral(
     low, high, value = np.empty(64), np.empty(64), np.empty(64)
     for i in range(len(nodes) - 1):
         low[0], high[0] = nodes[i], nodes[i + 1]
-        value[0] = _gauss(rows, whole, split, numerator, denominator, radius, low[0], high[0])
+        value[0] = _gauss(factors, radius, low[0], high[0])
         depth, halvings = 0, 0
         while depth >= 0:
             halvings += 1
             middle = 0.5 * (low[depth] + high[depth])
-            left = _gauss(rows, whole, split, numerator, denominator, radius, low[depth], middle)
-            right = _gauss(rows, whole, split, numerator, denominator, radius, middle, high[depth])
+            left = _gauss(factors, radius, low[depth], middle)
+            right = _gauss(factors, radius, middle, high[depth])
             size = max(size, abs(total) + abs(left) + abs(right))
             if abs(left + right - value[depth]) <= 1e-12 * size or halvings > HALVINGS:
                 total += left + right
                 depth -= 1
             else:
-                low[depth + 1], high[depth + 1], value[depth + 1] = low[depth], middle, left
+                low[depth + 1], high[depth + 1], value[depth + 1] = (
+                    low[depth],
+                    middle,
+                    left,
+                )
                 low[depth], value[depth] = middle, right
                 depth += 1
     return total
@@ -163,7 +160,9 @@ def quadrant_area(tracer: Tracer, rings: Rings) -> float:
     for ring in rings:
         for arc in ring:
             if arc.kind == "pair":
-                total += quadrant_integral(*tracer.factors, tracer.radius, arc_angles(arc))
+                total += quadrant_integral(
+                    tracer.factors, tracer.radius, arc_angles(arc)
+                )
             else:
                 total += segment_integral(arc.first, arc.last)
     return total

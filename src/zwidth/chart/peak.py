@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import Arc, Rings
-from zwidth.chart.curve import wall_at
+from zwidth.chart.curve import OF_B, OF_K, OF_SLOPE, wall_at, zero_between
 from zwidth.chart.outline import arc_angles
 from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled
+from zwidth.loop.evaluate import Factors
 
 Floats = NDArray[np.float64]
 
@@ -29,37 +30,8 @@ class Peak:
 
 
 @compiled
-def _root(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
-    radius: float,
-    which: int,
-    low: float,
-    high: float,
-) -> float:
-    """Bisection on one component of `wall_at`: 0 K, 1 B, 2 dK/dtheta."""
-    side = wall_at(rows, whole, split, numerator, denominator, radius, low)[which] > 0.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        if (wall_at(rows, whole, split, numerator, denominator, radius, middle)[which] > 0.0) == side:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
-
-
-@compiled
 def crossings(
-    rows: Floats,
-    whole: int,
-    split: int,
-    numerator: Floats,
-    denominator: Floats,
+    factors: Factors,
     radius: float,
     nodes: Floats,
     which: int,
@@ -67,13 +39,14 @@ def crossings(
     """Angles along an arc (ascending nodes) where one component of `wall_at` changes sign: 0 K, 1 B, 2 dK."""
     out, n = np.empty(len(nodes)), 0
     low = nodes[0] + 1e-6 * (nodes[1] - nodes[0])
-    before = wall_at(rows, whole, split, numerator, denominator, radius, low)[which]
+    before = wall_at(factors, radius, low)[which]
     for i in range(1, len(nodes)):
         last = i == len(nodes) - 1
         high = nodes[i] - (1e-6 * (nodes[i] - nodes[i - 1]) if last else 0.0)
-        after = wall_at(rows, whole, split, numerator, denominator, radius, high)[which]
+        after = wall_at(factors, radius, high)[which]
         if before * after < 0.0:
-            out[n] = _root(rows, whole, split, numerator, denominator, radius, which, low, high)
+            weights = OF_K if which == 0 else (OF_B if which == 1 else OF_SLOPE)
+            out[n] = zero_between(factors, radius, weights, low, high)
             n += 1
         low, before = high, after
     return out[:n].copy()
@@ -103,12 +76,14 @@ def _candidates(tracer: Tracer, arc: Arc, following: Arc) -> list[Peak]:
     if arc.kind == "pair":
         nodes = np.sort(arc_angles(arc))
         for which in (1, 2):
-            for theta in crossings(*tracer.factors, tracer.radius, nodes, which):
+            for theta in crossings(tracer.factors, tracer.radius, nodes, which):
                 K, B, *_ = tracer.wall(theta)
                 peaks.append(Peak(K, 0.0 if which == 1 else B, (float(theta),)))
     elif arc.first[1] * arc.last[1] < 0.0:
         share = arc.first[1] / (arc.first[1] - arc.last[1])
-        peaks.append(Peak(arc.first[0] + share * (arc.last[0] - arc.first[0]), 0.0, (arc.start,)))
+        peaks.append(
+            Peak(arc.first[0] + share * (arc.last[0] - arc.first[0]), 0.0, (arc.start,))
+        )
     return peaks
 
 
@@ -120,10 +95,12 @@ def largest_damping(tracer: Tracer, rings: Rings, width: float) -> float:
     """
     stops = {0.0}
     for arc in (arc for ring in rings for arc in ring):
-        stops.update(wall[1] for wall in (arc.first, arc.last) if abs(wall[0]) <= 1e-8 * width)
+        stops.update(
+            wall[1] for wall in (arc.first, arc.last) if abs(wall[0]) <= 1e-8 * width
+        )
         if arc.kind == "pair":
             nodes = np.sort(arc_angles(arc))
-            for theta in crossings(*tracer.factors, tracer.radius, nodes, 0):
+            for theta in crossings(tracer.factors, tracer.radius, nodes, 0):
                 stops.add(float(tracer.wall(theta)[1]))
         elif arc.first[0] * arc.last[0] < 0.0:
             share = arc.first[0] / (arc.first[0] - arc.last[0])
