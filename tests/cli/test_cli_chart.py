@@ -127,6 +127,18 @@ def test_a_posture_that_does_not_exist_is_no_answer(command, at, why, tmp_path, 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("assembly", ["elbows-right", "elbows-left"])
+@pytest.mark.parametrize("command", ["chart", "show", "check", "report"])
+def test_an_assembly_whose_arms_lie_on_each_other_is_no_answer(command, assembly, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    wall = ("--stiffness", "1000", "--damping", "5") if command == "check" else ()
+    ran = zwidth(command, MECHANISM, "--assembly", assembly, *wall, "--json")
+    assert ran.code == 1
+    assert f"assembly '{assembly}' of the mechanism is singular" in ran.document["reason"]
+    assert ran.document["assembly"] == assembly
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("ending", "begins"), [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF"), (".SVG", b"<?xml")]
 )

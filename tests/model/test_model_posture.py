@@ -73,6 +73,28 @@ def four_bar():
     )
 
 
+def arm_on_a_four_bar():
+    """An arm on the coupler that nothing drives: crank and rocker both drive the loop's one freedom."""
+    loop = four_bar()
+    links = links_of(
+        ["crank", "coupler", "rocker", "arm"],
+        [-1, 0, -1, 1],
+        [*loop.links.origin, [0.11, 0, 0]],
+        [Z] * 4,
+        [0.1, 0.2, 0.15, 0.05],
+        [*loop.links.center_of_mass, [0.02, 0, 0]],
+        [planar_inertia(i) for i in (1e-4, 3e-4, 2e-4, 1e-5)],
+        [0.04, 0.11, 0.09, 0.05],
+    )
+    return replace(
+        loop,
+        links=links,
+        drives=drives_on([0, 2]),
+        handle_link=3,
+        assemblies={"open": np.array([1.0, -0.5, 1.9, 0.3])},
+    )
+
+
 # --- what can be reached ------------------------------------------------------------------------------
 
 
@@ -312,11 +334,30 @@ def test_drives_must_fit_the_freedom():
     mechanism = five_bar()
     with pytest.raises(ValueError, match="2 degrees of freedom but 1 drives"):
         solve_posture(replace(mechanism, drives=drives_on([0])), (0, 0.25))
-    with pytest.raises(ValueError, match="do not determine the other joints"):
-        solve_posture(mechanism, (0, 0.25), "right")
+    with pytest.raises(ValueError, match="do not determine the other joints; drive other joints"):
+        solve_posture(arm_on_a_four_bar(), (0.1, 0.1))
     arm = spatial_arm(np.random.default_rng(0))
     with pytest.raises(ValueError, match="can rest while the drives move"):
         solve_posture(replace(arm, handle_link=1, handle_point=np.zeros(3)), (0, 0, 0.1))
+
+
+@pytest.mark.parametrize("assembly", ["right", "left"])
+def test_an_assembly_may_be_singular_throughout(assembly):
+    """Arms of equal lengths from one place lie on each other with both elbows on one side: one angle is lost.
+
+    The drives fit the mechanism, so that this is no fault of it, and with its base joints apart all is well.
+    """
+    assert solve_posture(five_bar(), (0.0, 0.25), "outward").status == OK
+    with pytest.raises(Singular, match=f"assembly '{assembly}' .* do not determine the other joints; choose"):
+        solve_posture(five_bar(), (0.0, 0.25), assembly)
+    only = replace(five_bar(), assemblies={assembly: five_bar().assemblies[assembly]})
+    with pytest.raises(Singular):  # known from the mechanism itself, not from the assemblies it names
+        solve_posture(only, (0.0, 0.25))
+    several = solve_posture(five_bar(), [[0.0, 0.25], [0.1, 0.2], [0.5, 0.5]], assembly)
+    assert several.status.tolist() == [SINGULAR] * 3
+    assert np.isnan(several.mass_matrix).all()
+    apart = five_bar(base=0.05)
+    assert solve_posture(apart, (0.0, 0.25), assembly).status == OK
 
 
 @pytest.mark.parametrize("position", [0.25, [0.25], [0.0, 0.25, 0.0, 0.0]])

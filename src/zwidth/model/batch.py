@@ -88,6 +88,14 @@ def empty(mech: Arrays, count: int) -> Solved:
     )
 
 
+def nowhere(mech: Arrays, count: int) -> Solved:
+    """The answer of an assembly that is singular throughout."""
+    solved = empty(mech, count)
+    for numbers in vars(solved).values():
+        numbers.fill(np.nan if numbers.dtype == np.float64 else SINGULAR)
+    return solved
+
+
 def run(mech: Arrays, design: Ints, starts: Floats, which: Ints, goals: Floats) -> Solved:
     solved = empty(mech, len(goals))
     posture_batch(mech, design, starts, which, goals, *vars(solved).values())

@@ -2,57 +2,82 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from zwidth.compiled import compiled
 from zwidth.model.arrays import Arrays
 from zwidth.model.closure import equations
-from zwidth.model.continuation import assemble_batch
+from zwidth.model.continuation import ASSEMBLED, assemble_batch
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.tree import place, workspace
 
 NEGLIGIBLE: Final = 1e-6  # singular values below this part of the mechanism's size count as zero
 NEARBY: Final = 0.05  # how far the joints turn to configurations that are not special [rad]
+ELSEWHERE: Final = 16  # configurations tried all over the joints' turns
 
 
-def check_mobility(mechanism: Mechanism, mech: Arrays, design: int, reference: Floats) -> None:
-    """Raise ValueError where the drives do not fit the mechanism.
+class Misfit(NamedTuple):
+    """Why the drives do not fit, and what to do about it where they fit nowhere."""
 
-    A rank is judged at closed configurations near the reference (n,) and the largest counts: the reference
-    may be special, and rows that are independent off the loops' manifold may not be on it.
+    reason: str
+    advice: str
+
+
+def check_mobility(mechanism: Mechanism, mech: Arrays, design: int, reference: Floats) -> str | None:
+    """Why the assembly of the reference (n,) is singular throughout; None where its drives control the handle.
+
+    A rank is judged at closed configurations near the reference and the largest counts: the reference may be
+    special, and rows that are independent off the loops' manifold may not be on it. Drives that do not fit
+    there may still fit the mechanism: arms that lie one on the other move as one in one assembly and apart
+    in another. That is a place without an answer, and no fault of the mechanism.
+
+    Raises  ValueError  where the drives fit the mechanism in no configuration
     """
     rng = np.random.default_rng(0)
-    closed = [reference, *(nearby(mech, design, reference, rng) for _ in range(2))]
-    rows = [constraint_rows(mech, design, angles) for angles in closed]
+    near = reference + NEARBY * rng.uniform(-1.0, 1.0, (2, reference.size))
+    found = _misfit(mechanism, mech, design, [reference, *closed(mech, design, near)])
+    if found is None:
+        return None
+    far = rng.uniform(-np.pi, np.pi, (ELSEWHERE, reference.size))
+    if all(_misfit(mechanism, mech, design, [angles]) for angles in closed(mech, design, far)):
+        raise ValueError(f"{found.reason}; {found.advice}")
+    return found.reason
+
+
+def closed(mech: Arrays, design: int, rough: Floats) -> Floats:
+    """Configurations (k, n) with closed loops from rough angles (N, n), k <= N; the handle goes where it must."""
+    angles = np.zeros_like(rough)
+    angles[:, mech.joint] = rough[:, mech.joint]
+    gaps = np.zeros((len(angles), mech.a.size))
+    goals = np.zeros((len(angles), 3))
+    assemble_batch(mech, np.full(len(angles), design), goals, False, angles, gaps)
+    found: Floats = angles[gaps.max(axis=1, initial=0.0) <= ASSEMBLED * mech.size[design]]
+    return found
+
+
+def _misfit(mechanism: Mechanism, mech: Arrays, design: int, configurations: Sequence[Floats]) -> Misfit | None:
+    rows = [constraint_rows(mech, design, angles) for angles in configurations]
     m, d, loops = mech.joint.size, mech.driven, 3 * mech.a.size
     size = float(mech.size[design])
     freedom = m - max(_rank(A[:, :loops], size) for A in rows)
     if freedom != d:
-        raise ValueError(
-            f"the mechanism has {freedom} degrees of freedom but {d} drives; give it as many drives, "
-            "or check its joints and loops"
+        return Misfit(
+            f"the mechanism has {freedom} degrees of freedom but {d} drives",
+            "give it as many drives, or check its joints and loops",
         )
     if max(_rank(A[: m - d, :loops], size) for A in rows) < m - d:
-        raise ValueError(
-            f"the driven joints {', '.join(mechanism.drives.names)} do not determine the other joints; "
-            "drive other joints"
-        )
+        driven = ", ".join(mechanism.drives.names)
+        return Misfit(f"the driven joints {driven} do not determine the other joints", "drive other joints")
     if max(_rank(A, size) for A in rows) < m:
-        raise ValueError(
+        return Misfit(
             f"the handle on link {mechanism.links.names[mech.handle_link]!r} can rest while the drives move: "
-            "its position does not determine the posture; place it on another link or take a drive away"
+            "its position does not determine the posture",
+            "place it on another link or take a drive away",
         )
-
-
-def nearby(mech: Arrays, design: int, reference: Floats, rng: np.random.Generator) -> Floats:
-    """A closed configuration a little way from the reference, in a random direction."""
-    angles = reference.copy()
-    angles[mech.joint] += NEARBY * rng.uniform(-1.0, 1.0, mech.joint.size)
-    gaps = np.zeros((1, mech.a.size))
-    assemble_batch(mech, np.array([design]), np.zeros((1, 3)), False, angles[None], gaps)
-    return angles
+    return None
 
 
 @compiled

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.compiled import compiled
 from zwidth.model.arrays import Arrays, design_shape, pack, per_design
-from zwidth.model.batch import solve
+from zwidth.model.batch import nowhere, solve
 from zwidth.model.continuation import ASSEMBLED, OK, OUT_OF_REACH, SINGULAR, assemble_batch
 from zwidth.model.inertia import nonlinear_batch
 from zwidth.model.mechanism import Floats, Ints, Mechanism
@@ -100,7 +100,8 @@ def solve_posture(mechanism: Mechanism, position: ArrayLike, assembly: str | Non
     position  (..., 3), or (..., 2) in the plane of the reference position [m]; it broadcasts with the leading
               axes of the mechanism's numbers
     Returns   Posture; in a batch a position that cannot be had is marked by its status
-    Raises    OutOfReach, Singular  where a single posture is asked for and cannot be had
+    Raises    OutOfReach, Singular  where a single posture is asked for and cannot be had; an assembly may be
+                          singular throughout
               LoopOpen    if the loops of a single mechanism do not close near the assembly's angles
               ValueError  for an unknown assembly, or drives that do not fit the mechanism's freedom
     """
@@ -116,9 +117,14 @@ def solve_posture(mechanism: Mechanism, position: ArrayLike, assembly: str | Non
     if not designs:
         _check_loops(mechanism, mech, name, gaps[0])
     closed = np.flatnonzero(gaps.max(axis=1, initial=0.0) <= ASSEMBLED * mech.size)
-    if len(closed):
-        check_mobility(mechanism, mech, int(closed[0]), reference[closed[0]])
-    solved = solve(mech, design, reference, goals)
+    uncontrolled = check_mobility(mechanism, mech, int(closed[0]), reference[closed[0]]) if len(closed) else None
+    if uncontrolled and not shape:
+        raise Singular(
+            f"assembly {name!r} of the mechanism is singular wherever its handle is: {uncontrolled}; choose "
+            "another assembly, or change the places of joints that make it so"
+        )
+    singular = uncontrolled and not designs  # of several designs another may be in control
+    solved = nowhere(mech, len(goals)) if singular else solve(mech, design, reference, goals)
     n, d = mech.parent.size, mech.driven
     posture = Posture(
         assembly=name,
