@@ -82,9 +82,7 @@ def arc_walls(tracer: Tracer, arc: Arc) -> Floats:
     return np.vstack([arc.first, np.column_stack([K, B]), arc.last])
 
 
-def _pair_arcs(
-    tracer: Tracer, thetas: Floats, edge: NDArray[np.bool_]
-) -> tuple[list[Arc], list[float]]:
+def _pair_arcs(tracer: Tracer, thetas: Floats, edge: NDArray[np.bool_]) -> tuple[list[Arc], list[float]]:
     """Arcs of complex pairs: runs of flagged samples, refined at both ends."""
     arcs, partners = [], []
     padded = np.concatenate([[False], edge, [False]])
@@ -93,15 +91,11 @@ def _pair_arcs(
         ends: list[tuple[float, Wall]] = []
         for (inner, outer), root in zip(((i, i - 1), (j - 1, j)), ROOTS, strict=True):
             if 0 <= outer < len(thetas):
-                theta, wall, partner = refine_corner(
-                    tracer, thetas[inner], thetas[outer]
-                )
+                theta, wall, partner = refine_corner(tracer, thetas[inner], thetas[outer])
                 partners.append(partner)
             else:
                 end = tracer.curve_end(root)
-                theta = (
-                    thetas[inner] if end is None else (0.0 if root == "plus" else np.pi)
-                )
+                theta = thetas[inner] if end is None else (0.0 if root == "plus" else np.pi)
                 wall = tracer.wall(thetas[inner])[:2] if end is None else end
             ends.append((theta, wall))
         (start, first), (end_, last) = ends
@@ -125,25 +119,15 @@ def _line_arcs(
         return [], []
     # direction with the stable side (gradient) on its left, in the units of (K T, B)
     along = np.array([v, -s / T]) / length
-    nodes = [
-        wall
-        for wall in (tracer.curve_end("plus"), tracer.curve_end("minus"))
-        if wall is not None
-    ]
+    nodes = [wall for wall in (tracer.curve_end("plus"), tracer.curve_end("minus")) if wall is not None]
     crossing = tracer.line_crossing()
-    nodes = [
-        wall
-        for wall in [*nodes, crossing]
-        if wall is not None and _is_on(tracer, root, wall)
-    ]
+    nodes = [wall for wall in [*nodes, crossing] if wall is not None and _is_on(tracer, root, wall)]
     with np.errstate(invalid="ignore"):
         value = a + s * K + v * B
         noise = 1e-13 * (abs(a) + np.abs(s * K) + np.abs(v * B))
         sure = np.flatnonzero(np.abs(value) > noise)
     turns = np.flatnonzero(np.sign(value[sure[1:]]) != np.sign(value[sure[:-1]]))
-    crossings = [
-        cross_line(tracer, root, thetas[sure[i]], thetas[sure[i + 1]]) for i in turns
-    ]
+    crossings = [cross_line(tracer, root, thetas[sure[i]], thetas[sure[i + 1]]) for i in turns]
     nodes += [tracer.wall(theta)[:2] for theta in crossings]
     nodes = [wall for wall in nodes if np.isfinite(wall).all()]
     nodes.sort(key=lambda wall: float(along @ (wall[0] * T, wall[1])))
@@ -151,8 +135,7 @@ def _line_arcs(
     arcs = [
         Arc(root, one, two, angle, angle, np.empty(0))
         for one, two in pairwise(nodes)
-        if one != two
-        and tracer.edge_on_line(root, (one[0] + two[0]) / 2, (one[1] + two[1]) / 2)
+        if one != two and tracer.edge_on_line(root, (one[0] + two[0]) / 2, (one[1] + two[1]) / 2)
     ]
     return arcs, crossings
 

@@ -82,9 +82,7 @@ class StabilityChart:
         return judge(self.loop, wall_stiffness, wall_damping)
 
 
-def stability_chart(
-    loop: Loop, radius: float = 1.0, decay: bool = True
-) -> StabilityChart:
+def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> StabilityChart:
     """The exact chart by D-decomposition on |z| = radius (see `chart.curve` for the derivation).
 
     loop    plant, sampling, delay and filter
@@ -99,25 +97,17 @@ def stability_chart(
     rings, blur = closed_rings(tracer)
     samples = [[sample_arc(tracer, arc) for arc in ring] for ring in rings]
     outlines = [_outline(arcs) for arcs in samples]
-    width = max(
-        (float(np.max(np.abs(outline[:, 0]))) for outline in outlines), default=0.0
-    )
+    width = max((float(np.max(np.abs(outline[:, 0]))) for outline in outlines), default=0.0)
     peak = stiffest(tracer, rings, width)
     in_hertz = 1.0 / (2.0 * np.pi * loop.period)
     return StabilityChart(
         loop=loop,
         radius=radius,
         regions=_cells(outlines),
-        boundary=tuple(
-            BoundaryArc(K, B, thetas * in_hertz)
-            for arcs in samples
-            for thetas, K, B in arcs
-        ),
+        boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for arcs in samples for thetas, K, B in arcs),
         stiffness_max=peak.stiffness if peak else float("nan"),
         damping_at_stiffness_max=peak.damping if peak else float("nan"),
-        frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles)
-        if peak
-        else (),
+        frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
         damping_max=largest_damping(tracer, rings, width),
         stable_area=max(quadrant_area(tracer, rings), 0.0) if peak else 0.0,
         fastest_decay=fastest_decay(loop, tracer, outlines) if decay else None,
@@ -130,11 +120,7 @@ def largest_stiffness(loop: Loop) -> Peak | None:
     tracer = Tracer.of(loop)
     rings, _ = closed_rings(tracer)
     width = max(
-        (
-            float(np.max(np.abs(tracer.trace(arc.thetas)[0]), initial=0.0))
-            for ring in rings
-            for arc in ring
-        ),
+        (float(np.max(np.abs(tracer.trace(arc.thetas)[0]), initial=0.0)) for ring in rings for arc in ring),
         default=0.0,
     )
     return stiffest(tracer, rings, width)
@@ -167,27 +153,15 @@ def _cells(outlines: list[Floats]) -> tuple[Floats, ...]:
     solid = [outline for outline in outlines if _signed_area(outline) > 0.0]
     cells: list[Floats] = []
     for outline in solid:
-        inside = [
-            hole
-            for hole in holes
-            if shapely.contains_xy(shapely.Polygon(outline), *hole[0])
-        ]
+        inside = [hole for hole in holes if shapely.contains_xy(shapely.Polygon(outline), *hole[0])]
         cell = shapely.Polygon(outline, inside)
         if not inside and cell.is_valid:
             cells.append(outline)
             continue
         # Rounding can cross two chords in a corner of many branches: loops of no area, which are dropped
         parts = shapely.get_parts(shapely.make_valid(cell))
-        real = [
-            part
-            for part in parts
-            if isinstance(part, shapely.Polygon) and part.area > 1e-12 * cell.area
-        ]
-        cells += [
-            np.array(orient(piece).exterior.coords)
-            for part in real
-            for piece in _cut(part)
-        ]
+        real = [part for part in parts if isinstance(part, shapely.Polygon) and part.area > 1e-12 * cell.area]
+        cells += [np.array(orient(piece).exterior.coords) for part in real for piece in _cut(part)]
     return tuple(cells)
 
 
@@ -197,18 +171,6 @@ def _cut(cell: shapely.Polygon) -> list[shapely.Polygon]:
         return [cell]
     left, low, right, high = cell.bounds
     middle = shapely.Polygon(cell.interiors[0]).centroid.x
-    halves = (
-        shapely.box(left, low, middle, high),
-        shapely.box(middle, low, right, high),
-    )
-    parts = [
-        part
-        for half in halves
-        for part in shapely.get_parts(shapely.intersection(cell, half))
-    ]
-    return [
-        piece
-        for part in parts
-        if isinstance(part, shapely.Polygon)
-        for piece in _cut(part)
-    ]
+    halves = (shapely.box(left, low, middle, high), shapely.box(middle, low, right, high))
+    parts = [part for half in halves for part in shapely.get_parts(shapely.intersection(cell, half))]
+    return [piece for part in parts if isinstance(part, shapely.Polygon) for piece in _cut(part)]

@@ -15,13 +15,7 @@ Floats = NDArray[np.float64]
 
 
 @compiled
-def _bisect_flag(
-    factors: Factors,
-    polynomials: Floats,
-    radius: float,
-    on: float,
-    off: float,
-) -> float:
+def _bisect_flag(factors: Factors, polynomials: Floats, radius: float, on: float, off: float) -> float:
     """The last angle from `on` towards `off` that is an edge."""
     room = working_room(polynomials.shape[1] - 1)
     for _ in range(60):
@@ -37,12 +31,7 @@ def _bisect_flag(
 
 
 @compiled
-def _meet(
-    factors: Factors,
-    radius: float,
-    one: float,
-    other: float,
-) -> tuple[float, float, bool]:
+def _meet(factors: Factors, radius: float, one: float, other: float) -> tuple[float, float, bool]:
     """Newton for wall(one) = wall(other), from close by; False if it wanders off or does not settle."""
     a, b = one, other
     settled = False
@@ -71,9 +60,7 @@ def _last_edge(tracer: Tracer, on: float, off: float) -> float:
     """The last angle from `on` towards `off` that is an edge."""
     if tracer.certain(on) and tracer.certain(off):
         return _bisect_flag(tracer.factors, tracer.polynomials, tracer.radius, on, off)
-    for _ in range(
-        50
-    ):  # polynomials cannot tell: a long delay, or roots that stay close to the circle
+    for _ in range(50):  # polynomials cannot tell: a long delay, or roots that stay close to the circle
         middle = 0.5 * (on + off)
         if tracer.edge_flag(middle) > 0:
             on = middle
@@ -85,11 +72,7 @@ def _last_edge(tracer: Tracer, on: float, off: float) -> float:
 def _partner(tracer: Tracer, theta: float, wall: Wall) -> float:
     """Angle of the root nearest the circle apart from the pair at theta, for a wall on the curve."""
     z = tracer.roots_without_pair(np.array(theta), np.array(wall[0]), np.array(wall[1]))
-    return (
-        float(abs(np.angle(z[np.argmin(np.abs(np.abs(z) - tracer.radius))])))
-        if len(z)
-        else 0.0
-    )
+    return float(abs(np.angle(z[np.argmin(np.abs(np.abs(z) - tracer.radius))]))) if len(z) else 0.0
 
 
 def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, float]:

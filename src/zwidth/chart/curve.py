@@ -22,11 +22,7 @@ from zwidth.loop.evaluate import Factors, divide, plant_response, velocity_respo
 Floats = NDArray[np.float64]
 
 # Weights of `zero_between` for single components
-OF_K, OF_B, OF_SLOPE = (
-    (0.0, 1.0, 0.0, 0.0, 0.0),
-    (0.0, 0.0, 1.0, 0.0, 0.0),
-    (0.0, 0.0, 0.0, 1.0, 0.0),
-)
+OF_K, OF_B, OF_SLOPE = ((0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0, 0.0))
 
 
 @compiled
@@ -34,24 +30,20 @@ def on_circle(theta: float, radius: float) -> tuple[complex, complex]:
     """z = rho exp(i theta) and d = z - 1, the latter without cancellation near theta = 0."""
     s, c = np.sin(0.5 * theta), np.cos(0.5 * theta)
     away = complex(-2.0 * s * s, 2.0 * s * c)
-    return complex(radius + radius * away.real, radius * away.imag), (
-        radius - 1.0
-    ) + radius * away
+    return complex(radius + radius * away.real, radius * away.imag), (radius - 1.0) + radius * away
 
 
 @compiled
-def wall_at(
-    factors: Factors, radius: float, theta: float
-) -> tuple[float, float, float, float]:
+def wall_at(factors: Factors, radius: float, theta: float) -> tuple[float, float, float, float]:
     """K, B of the wall with a root at rho exp(i theta), and dK/dtheta, dB/dtheta."""
     rows, whole, split, numerator, denominator = factors
     z, d = on_circle(theta, radius)
     P, dP = plant_response(rows, whole, split, z, d)
-    if not np.isfinite(
-        P.real + P.imag
-    ):  # exactly on an undamped pole: step aside by a rounding
-        z, d = on_circle(theta * (1.0 + 4e-16), radius)
+    aside = 4e-16
+    while not np.isfinite(P.real + P.imag) and aside < 1e-12:  # on an undamped pole: step aside by a rounding
+        z, d = on_circle(theta * (1.0 + aside), radius)
         P, dP = plant_response(rows, whole, split, z, d)
+        aside *= 10.0
     w, dw = velocity_response(numerator, denominator, d)
     turn = 1j * z
     h = divide(-1.0 + 0.0j, P)
@@ -66,11 +58,7 @@ def wall_at(
 
 @compiled
 def zero_between(
-    factors: Factors,
-    radius: float,
-    weights: tuple[float, float, float, float, float],
-    low: float,
-    high: float,
+    factors: Factors, radius: float, weights: tuple[float, float, float, float, float], low: float, high: float
 ) -> float:
     """The angle at which w0 + w1 K + w2 B + w3 dK/dtheta + w4 dB/dtheta changes sign, by bisection to rounding."""
     w0, w1, w2, w3, w4 = weights
@@ -89,11 +77,7 @@ def zero_between(
 
 
 @compiled
-def walls(
-    factors: Factors,
-    radius: float,
-    thetas: Floats,
-) -> tuple[Floats, Floats]:
+def walls(factors: Factors, radius: float, thetas: Floats) -> tuple[Floats, Floats]:
     """K and B at angles in (0, pi)."""
     K, B = np.empty(len(thetas)), np.empty(len(thetas))
     for i in range(len(thetas)):
@@ -103,10 +87,7 @@ def walls(
 
 @compiled
 def trace(
-    factors: Factors,
-    polynomials: Floats,
-    radius: float,
-    thetas: Floats,
+    factors: Factors, polynomials: Floats, radius: float, thetas: Floats
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """K, B and whether the wall edges the stable set (1 yes, -1 no, 0 lost in rounding) at angles in (0, pi)."""
     n = len(thetas)

@@ -38,9 +38,7 @@ class FastestDecay:
 
 
 @compiled
-def _value(
-    polynomials: Floats, radius: float, K: float, B: float, p: Floats, roots: Complexes
-) -> float:
+def _value(polynomials: Floats, radius: float, K: float, B: float, p: Floats, roots: Complexes) -> float:
     for i in range(len(p)):
         p[i] = polynomials[0, i] + K * polynomials[1, i] + B * polynomials[2, i]
     return polynomial_radius(p, radius, roots)
@@ -75,29 +73,19 @@ def descend(
             x[i] = best
             if i:
                 x[i, i - 1] += size * extent[i - 1]
-            f[i] = (
-                value
-                if i == 0
-                else _value(polynomials, radius, x[i, 0], x[i, 1], p, roots)
-            )
+            f[i] = value if i == 0 else _value(polynomials, radius, x[i, 0], x[i, 1], p, roots)
         for _ in range(60):
             order = np.argsort(f)
             x, f = x[order], f[order]
-            spread = max(
-                abs(x[2, 0] - x[0, 0]) / extent[0], abs(x[2, 1] - x[0, 1]) / extent[1]
-            )
+            spread = max(abs(x[2, 0] - x[0, 0]) / extent[0], abs(x[2, 1] - x[0, 1]) / extent[1])
             if spread < 0.01 * size:
                 break
             middle = 0.5 * (x[0] + x[1])
             away = middle - x[2]
-            reflected = _value(
-                polynomials, radius, middle[0] + away[0], middle[1] + away[1], p, roots
-            )
+            reflected = _value(polynomials, radius, middle[0] + away[0], middle[1] + away[1], p, roots)
             if reflected < f[0]:
                 trial[0] = middle + 2.0 * away
-                farther = _value(
-                    polynomials, radius, trial[0, 0], trial[0, 1], p, roots
-                )
+                farther = _value(polynomials, radius, trial[0, 0], trial[0, 1], p, roots)
                 if farther < reflected:
                     x[2], f[2] = trial[0], farther
                 else:
@@ -119,12 +107,7 @@ def descend(
 
 
 @compiled
-def coalesced(
-    factors: Factors,
-    positive: bool,
-    low: float,
-    high: float,
-) -> tuple[float, float, float]:
+def coalesced(factors: Factors, positive: bool, low: float, high: float) -> tuple[float, float, float]:
     """K, B and radius of the wall with a double real root at +rho (or -rho) and another root of the same modulus.
 
     A double root makes the two outermost coefficients of p vanish: K and B follow from rho. The modulus of the
@@ -137,11 +120,7 @@ def coalesced(
     ends, values = np.array([low, high]), np.empty(2)
     K, B = 0.0, 0.0
     for i in range(60):
-        radius = (
-            ends[i]
-            if i < 2
-            else (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0])
-        )
+        radius = ends[i] if i < 2 else (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0])
         A, S, V = characteristic(factors, radius)
         m, n = (0, 1) if positive else (N, N - 1)
         det = S[m] * V[n] - S[n] * V[m]
@@ -165,9 +144,7 @@ def coalesced(
     return K, B, ends[1]
 
 
-def fastest_decay(
-    loop: Loop, tracer: Tracer, outlines: list[Floats]
-) -> FastestDecay | None:
+def fastest_decay(loop: Loop, tracer: Tracer, outlines: list[Floats]) -> FastestDecay | None:
     """Smallest spectral radius over the cells with these outlines (k, 2), both signs of K and B.
 
     A simplex search can end in a narrow valley's wall. So the curve is traced on a smaller circle: whatever edge
@@ -194,10 +171,7 @@ def _sharpened(tracer: Tracer, best: FastestDecay) -> FastestDecay:
     z = np.linalg.eigvals(tracer.loop.transition_matrix(best.stiffness, best.damping))
     best = replace(best, spectral_radius=float(np.abs(z).max()))
     reach = 0.02 * (1.0 - best.spectral_radius)
-    low, high = (
-        max(best.spectral_radius - reach, 1e-6),
-        min(best.spectral_radius + reach, 1.0),
-    )
+    low, high = (max(best.spectral_radius - reach, 1e-6), min(best.spectral_radius + reach, 1.0))
     for positive in (True, False):
         if tracer.degree > 2 and low < high:
             K, B, radius = coalesced(tracer.factors, positive, low, high)
@@ -206,20 +180,14 @@ def _sharpened(tracer: Tracer, best: FastestDecay) -> FastestDecay:
     return best
 
 
-def _search(
-    tracer: Tracer, outline: Floats, best: FastestDecay | None
-) -> FastestDecay | None:
+def _search(tracer: Tracer, outline: Floats, best: FastestDecay | None) -> FastestDecay | None:
     """A search from the best of the middles between points of an outline; the better of its end and `best`."""
     picks = outline[np.linspace(0, len(outline) - 1, 15).astype(int)[:-1]]
     i, j = np.triu_indices(len(picks), 1)
     middles = np.vstack([picks[i] + picks[j], 2.0 * picks.mean(axis=0)[None]]) / 2.0
-    values = scatter_values(
-        tracer.polynomials, tracer.radius, middles[:, 0].copy(), middles[:, 1].copy()
-    )
+    values = scatter_values(tracer.polynomials, tracer.radius, middles[:, 0].copy(), middles[:, 1].copy())
     extent = np.maximum(np.ptp(outline, axis=0), 1e-300)
-    K, B, value = descend(
-        tracer.polynomials, tracer.radius, middles[np.argmin(values)], extent, RESTARTS
-    )
+    K, B, value = descend(tracer.polynomials, tracer.radius, middles[np.argmin(values)], extent, RESTARTS)
     if value < (best.spectral_radius if best else tracer.radius):
         return FastestDecay(float(K), float(B), float(value))
     return best

@@ -26,9 +26,7 @@ FIRST = 1e-3
 LONGEST_STEP = 0.05
 
 
-def singular_points(
-    rows: Floats, split: int, numerator: Floats, denominator: Floats, radius: float
-) -> Complexes:
+def singular_points(rows: Floats, split: int, numerator: Floats, denominator: Floats, radius: float) -> Complexes:
     """Poles and zeros of P without its whole delay, poles of w and real w on the circle; Im z >= 0, z plane."""
     nothing = np.empty((0, 3))
     s = _roots(characteristic((rows, 0, split, nothing, nothing), radius)[1])
@@ -56,10 +54,7 @@ def _in_phase(numerator: Floats, denominator: Floats, radius: float) -> Complexe
     imaginary = np.prod(factors[0] / factors[1], axis=1).imag
     turns = np.flatnonzero(imaginary[1:] * imaginary[:-1] < 0.0)
     share = imaginary[turns] / (imaginary[turns] - imaginary[turns + 1])
-    return np.asarray(
-        radius * np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0]))),
-        dtype=complex,
-    )
+    return np.asarray(radius * np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0]))), dtype=complex)
 
 
 def _pairs(d1: Floats, d0: Floats) -> Complexes:
@@ -107,11 +102,7 @@ def angles(points: Complexes, radius: float, share: float) -> Floats:
 
 
 @compiled
-def around_crossings(
-    factors: Factors,
-    radius: float,
-    thetas: Floats,
-) -> Floats:
+def around_crossings(factors: Factors, radius: float, thetas: Floats) -> Floats:
     """Angles added where a branch crosses an axis (K = 0 or B = 0) between samples, geometrically about it.
 
     Where the velocity estimate is all but blind (far above a filter's cutoff), B runs from one end of the plane to
@@ -124,9 +115,7 @@ def around_crossings(
         for axis in range(2):
             if before[axis] * after[axis] < 0.0 and n + 20 <= len(out):
                 weights = OF_K if axis == 0 else OF_B
-                centre = zero_between(
-                    factors, radius, weights, thetas[i], thetas[i + 1]
-                )
+                centre = zero_between(factors, radius, weights, thetas[i], thetas[i + 1])
                 offset = thetas[i + 1] - thetas[i]
                 for _ in range(10):
                     offset *= 0.1

@@ -132,11 +132,7 @@ def hurwitz(room: Floats, row: int, degree: int) -> int:
         ratio_error = (room[6, 0] + ratio * room[7, 0]) / room[5, 0]
         for i in range((degree - k) // 2 + 1):
             new = room[4, i + 1] - ratio * room[5, i + 1]
-            error = (
-                room[6, i + 1]
-                + ratio * room[7, i + 1]
-                + ratio_error * abs(room[5, i + 1])
-            )
+            error = room[6, i + 1] + ratio * room[7, i + 1] + ratio_error * abs(room[5, i + 1])
             room[4, i], room[5, i] = room[5, i], new
             room[6, i], room[7, i] = room[7, i], error
         if not (abs(room[5, 0]) > room[7, 0]):
@@ -147,9 +143,7 @@ def hurwitz(room: Floats, row: int, degree: int) -> int:
 
 
 @compiled
-def edges_stable_set(
-    polynomials: Floats, theta: float, K: float, B: float, room: Floats
-) -> int:
+def edges_stable_set(polynomials: Floats, theta: float, K: float, B: float, room: Floats) -> int:
     """Whether all roots but the pair at exp(+-i theta) lie inside the circle that `polynomials` were built for:
     1 yes, -1 no, 0 lost in rounding."""
     if not (np.isfinite(K) and np.isfinite(B)):
@@ -163,9 +157,7 @@ def edges_stable_set(
 
 
 @compiled
-def edges_on_line(
-    polynomials: Floats, low_end: int, K: float, B: float, room: Floats
-) -> int:
+def edges_on_line(polynomials: Floats, low_end: int, K: float, B: float, room: Floats) -> int:
     """The same for a real root: without the lowest coefficient (low_end 1, root at s = 0) or the highest (0)."""
     N = polynomials.shape[1] - 1
     combine(polynomials, K, B, room)

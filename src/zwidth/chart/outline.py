@@ -45,13 +45,7 @@ def sample_arc(tracer: Tracer, arc: Arc) -> tuple[Floats, Floats, Floats]:
 
 
 @compiled
-def refined_angles(
-    factors: Factors,
-    radius: float,
-    nodes: Floats,
-    tolerance: float,
-    most: int,
-) -> Floats:
+def refined_angles(factors: Factors, radius: float, nodes: Floats, tolerance: float, most: int) -> Floats:
     """Angles strictly between the first and last node, each interval cut so that chords stay within tolerance.
 
     The sag of a chord over a step h is h^2/8 times the second derivative; the middle of each interval measures it,
@@ -60,9 +54,7 @@ def refined_angles(
     n = len(nodes)
     K, B = np.empty(2 * n - 1), np.empty(2 * n - 1)
     for i in range(2 * n - 1):
-        theta = (
-            nodes[i // 2] if i % 2 == 0 else 0.5 * (nodes[i // 2] + nodes[i // 2 + 1])
-        )
+        theta = nodes[i // 2] if i % 2 == 0 else 0.5 * (nodes[i // 2] + nodes[i // 2 + 1])
         # the ends may be 0 or pi, where the curve is even: just inside is as good
         inside = min(max(theta, 1e-7 * nodes[1]), np.pi - 1e-7 * (np.pi - nodes[n - 2]))
         K[i], B[i], _, _ = wall_at(factors, radius, inside)
@@ -84,12 +76,7 @@ def refined_angles(
 
 
 @compiled
-def _gauss(
-    factors: Factors,
-    radius: float,
-    low: float,
-    high: float,
-) -> float:
+def _gauss(factors: Factors, radius: float, low: float, high: float) -> float:
     """Six-point Gauss rule for the integral of K dB over angles from low to high."""
     x = (0.2386191860831969, 0.6612093864662645, 0.932469514203152)
     weight = (0.467913934572691, 0.3607615730481386, 0.1713244923791704)
@@ -127,11 +114,7 @@ def quadrant_integral(factors: Factors, radius: float, nodes: Floats) -> float:
                 total += left + right
                 depth -= 1
             else:
-                low[depth + 1], high[depth + 1], value[depth + 1] = (
-                    low[depth],
-                    middle,
-                    left,
-                )
+                low[depth + 1], high[depth + 1], value[depth + 1] = (low[depth], middle, left)
                 low[depth], value[depth] = middle, right
                 depth += 1
     return total
@@ -160,9 +143,7 @@ def quadrant_area(tracer: Tracer, rings: Rings) -> float:
     for ring in rings:
         for arc in ring:
             if arc.kind == "pair":
-                total += quadrant_integral(
-                    tracer.factors, tracer.radius, arc_angles(arc)
-                )
+                total += quadrant_integral(tracer.factors, tracer.radius, arc_angles(arc))
             else:
                 total += segment_integral(arc.first, arc.last)
     return total

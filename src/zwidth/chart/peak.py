@@ -30,12 +30,7 @@ class Peak:
 
 
 @compiled
-def crossings(
-    factors: Factors,
-    radius: float,
-    nodes: Floats,
-    which: int,
-) -> Floats:
+def crossings(factors: Factors, radius: float, nodes: Floats, which: int) -> Floats:
     """Angles along an arc (ascending nodes) where one component of `wall_at` changes sign: 0 K, 1 B, 2 dK."""
     out, n = np.empty(len(nodes)), 0
     low = nodes[0] + 1e-6 * (nodes[1] - nodes[0])
@@ -81,9 +76,7 @@ def _candidates(tracer: Tracer, arc: Arc, following: Arc) -> list[Peak]:
                 peaks.append(Peak(K, 0.0 if which == 1 else B, (float(theta),)))
     elif arc.first[1] * arc.last[1] < 0.0:
         share = arc.first[1] / (arc.first[1] - arc.last[1])
-        peaks.append(
-            Peak(arc.first[0] + share * (arc.last[0] - arc.first[0]), 0.0, (arc.start,))
-        )
+        peaks.append(Peak(arc.first[0] + share * (arc.last[0] - arc.first[0]), 0.0, (arc.start,)))
     return peaks
 
 
@@ -95,9 +88,7 @@ def largest_damping(tracer: Tracer, rings: Rings, width: float) -> float:
     """
     stops = {0.0}
     for arc in (arc for ring in rings for arc in ring):
-        stops.update(
-            wall[1] for wall in (arc.first, arc.last) if abs(wall[0]) <= 1e-8 * width
-        )
+        stops.update(wall[1] for wall in (arc.first, arc.last) if abs(wall[0]) <= 1e-8 * width)
         if arc.kind == "pair":
             nodes = np.sort(arc_angles(arc))
             for theta in crossings(tracer.factors, tracer.radius, nodes, 0):

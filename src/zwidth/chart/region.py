@@ -40,9 +40,7 @@ def closed_rings(tracer: Tracer) -> tuple[Rings, float]:
     for share in (0.2, 0.1, 0.05, 0.02):
         thetas = angles(points, tracer.radius, share)
         thetas = np.unique(
-            np.concatenate(
-                [thetas, around_crossings(tracer.factors, tracer.radius, thetas), extra]
-            )
+            np.concatenate([thetas, around_crossings(tracer.factors, tracer.radius, thetas), extra])
         )
         edges = find_edges(tracer, thetas)
         rings = join(edges, tracer.period, SAME_CORNER)
@@ -67,12 +65,8 @@ def _hold(tracer: Tracer, rings: Rings, size: float) -> bool:
             points = arc_walls(tracer, arc) * (tracer.period, 1.0)
             middle = len(points) // 2
             along = points[middle] - points[middle - 1]
-            left = np.array([-along[1], along[0]]) / max(
-                float(np.hypot(*along)), 1e-300
-            )
-            inside.append(
-                (points[middle] + points[middle - 1]) / 2.0 + 1e-4 * size * left
-            )
+            left = np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-300)
+            inside.append((points[middle] + points[middle - 1]) / 2.0 + 1e-4 * size * left)
     K, B = (np.array(inside).reshape(-1, 2) / (tracer.period, 1.0)).T
     z = np.linalg.eigvals(tracer.loop.transition_matrix(K, B))
     return bool(np.all(np.abs(z) < tracer.radius + UNDECIDED))
@@ -80,14 +74,7 @@ def _hold(tracer: Tracer, rings: Rings, size: float) -> bool:
 
 def _around(edges: Edges) -> Floats:
     """Angles close to both sides of every branch in a corner."""
-    at = np.array(
-        [
-            theta
-            for arc in edges.arcs
-            if arc.kind == "pair"
-            for theta in (arc.start, arc.end)
-        ]
-    )
+    at = np.array([theta for arc in edges.arcs if arc.kind == "pair" for theta in (arc.start, arc.end)])
     centres = np.concatenate([at, edges.partners])
     steps = np.logspace(-8, -2, 13)
     near = (centres[:, None] * (1.0 + np.concatenate([-steps, steps]))).ravel()
@@ -118,11 +105,7 @@ def join(edges: Edges, period: float, blur: float) -> Rings | None:
         while k in left:
             left.discard(k)
             ring.append(k)
-            choices = [
-                n
-                for n in leaving.get(int(nodes[k, 1]), [])
-                if n in left or n == ring[0]
-            ]
+            choices = [n for n in leaving.get(int(nodes[k, 1]), []) if n in left or n == ring[0]]
             if not choices:
                 return None
             k = choices[0] if len(choices) == 1 else _turn(arcs, k, choices, period)
@@ -151,7 +134,4 @@ def _direction(arc: Arc, leaving: bool, period: float) -> float:
 def _turn(arcs: tuple[Arc, ...], k: int, choices: list[int], period: float) -> int:
     """The arc that bounds the stable sector to the left of arc k where several leave its last corner."""
     back = _direction(arcs[k], False, period)
-    return min(
-        choices,
-        key=lambda n: (back - _direction(arcs[n], True, period)) % (2.0 * np.pi),
-    )
+    return min(choices, key=lambda n: (back - _direction(arcs[n], True, period)) % (2.0 * np.pi))

@@ -55,11 +55,7 @@ def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
             if not (abs(step.real) + abs(step.imag) < 1e300):
                 step = complex(0.0, 0.0)
             roots[i] = s - step
-            largest = max(
-                largest,
-                (abs(step.real) + abs(step.imag))
-                / (abs(s.real) + abs(s.imag) + 1e-300),
-            )
+            largest = max(largest, (abs(step.real) + abs(step.imag)) / (abs(s.real) + abs(s.imag) + 1e-300))
         if largest < 1e-9:
             break
     out = 0.0

@@ -11,12 +11,7 @@ from numpy.typing import NDArray
 from zwidth.chart.curve import trace, wall_at
 from zwidth.chart.grid import singular_points
 from zwidth.chart.hurwitz import edges_on_line, is_stable, working_room
-from zwidth.loop.evaluate import (
-    Factors,
-    characteristic,
-    factor_arrays,
-    velocity_response,
-)
+from zwidth.loop.evaluate import Factors, characteristic, factor_arrays, velocity_response
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
@@ -76,25 +71,15 @@ class Tracer:
         K, B, flags = trace(self.factors, self.polynomials, self.radius, thetas)
         unsure = np.flatnonzero(flags == 0)
         if len(unsure):
-            flags[unsure] = self._edge_by_eigenvalues(
-                thetas[unsure], K[unsure], B[unsure]
-            )
+            flags[unsure] = self._edge_by_eigenvalues(thetas[unsure], K[unsure], B[unsure])
             sure = np.flatnonzero(flags)
             if len(sure):
-                flags = flags[
-                    sure[
-                        np.maximum(
-                            np.searchsorted(sure, np.arange(len(flags)), "right") - 1, 0
-                        )
-                    ]
-                ]
+                flags = flags[sure[np.maximum(np.searchsorted(sure, np.arange(len(flags)), "right") - 1, 0)]]
         return K, B, flags > 0
 
     def certain(self, theta: float) -> bool:
         """Whether polynomials alone can tell if the wall at one angle edges the stable set."""
-        return bool(
-            trace(self.factors, self.polynomials, self.radius, np.array([theta]))[2][0]
-        )
+        return bool(trace(self.factors, self.polynomials, self.radius, np.array([theta]))[2][0])
 
     def edge_flag(self, theta: float) -> int:
         """Whether the wall at one angle edges the stable set: 1, -1, or 0 where nothing can tell."""
@@ -102,22 +87,15 @@ class Tracer:
         K, B, flags = trace(self.factors, self.polynomials, self.radius, one)
         return int(flags[0] or self._edge_by_eigenvalues(one, K, B)[0])
 
-    def _edge_by_eigenvalues(
-        self, thetas: Floats, K: Floats, B: Floats
-    ) -> NDArray[np.int64]:
+    def _edge_by_eigenvalues(self, thetas: Floats, K: Floats, B: Floats) -> NDArray[np.int64]:
         """The flag from all eigenvalues but the pair at each angle."""
         z = np.abs(self.roots_without_pair(thetas, K, B)).max(axis=-1) - self.radius
         return np.where(z < -UNDECIDED, 1, np.where(z > UNDECIDED, -1, 0))
 
-    def roots_without_pair(
-        self, thetas: Floats, K: Floats, B: Floats
-    ) -> NDArray[np.complex128]:
+    def roots_without_pair(self, thetas: Floats, K: Floats, B: Floats) -> NDArray[np.complex128]:
         """Eigenvalues (..., N - 2) of walls on the curve, without the pair at rho exp(+-i theta)."""
         z = np.linalg.eigvals(self.loop.transition_matrix(K, B))
-        for point in (
-            self.radius * np.exp(1j * thetas),
-            self.radius * np.exp(-1j * thetas),
-        ):
+        for point in (self.radius * np.exp(1j * thetas), self.radius * np.exp(-1j * thetas)):
             nearest = np.argmin(np.abs(z - point[..., None]), axis=-1)
             keep = np.arange(z.shape[-1]) != nearest[..., None]
             z = z[keep].reshape(*z.shape[:-1], z.shape[-1] - 1)
@@ -127,10 +105,7 @@ class Tracer:
         """Whether all roots of a wall lie inside the circle; False too where rounding hides it."""
         flag = is_stable(self.polynomials, K, B, working_room(self.degree))
         if flag == 0:
-            return bool(
-                np.abs(np.linalg.eigvals(self.loop.transition_matrix(K, B))).max()
-                < self.radius
-            )
+            return bool(np.abs(np.linalg.eigvals(self.loop.transition_matrix(K, B))).max() < self.radius)
         return bool(flag > 0)
 
     def stable_on_left(self, theta: float) -> bool:
@@ -151,14 +126,10 @@ class Tracer:
 
     def edge_on_line(self, root: RealRoot, K: float, B: float) -> bool:
         """Whether a wall on that line has all its other roots inside."""
-        flag = edges_on_line(
-            self.polynomials, int(root == "plus"), K, B, working_room(self.degree)
-        )
+        flag = edges_on_line(self.polynomials, int(root == "plus"), K, B, working_room(self.degree))
         if flag == 0:
             z = np.linalg.eigvals(self.loop.transition_matrix(K, B))
-            own = np.argmin(
-                np.abs(z - (self.radius if root == "plus" else -self.radius))
-            )
+            own = np.argmin(np.abs(z - (self.radius if root == "plus" else -self.radius)))
             return bool(np.abs(np.delete(z, own)).max() < self.radius - UNDECIDED)
         return bool(flag > 0)
 
@@ -172,9 +143,7 @@ class Tracer:
         det = S[i] * V[j] - S[j] * V[i]
         if abs(det) <= 1e-13 * (abs(S[i] * V[j]) + abs(S[j] * V[i])) or det == 0.0:
             return None
-        return float((A[j] * V[i] - A[i] * V[j]) / det), float(
-            (A[i] * S[j] - A[j] * S[i]) / det
-        )
+        return float((A[j] * V[i] - A[i] * V[j]) / det), float((A[i] * S[j] - A[j] * S[i]) / det)
 
     def line_crossing(self) -> Wall | None:
         """The wall with roots at +rho and -rho at once; None if the lines are parallel."""

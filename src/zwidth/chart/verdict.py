@@ -40,19 +40,12 @@ class Verdicts:
         return [NAMES[int(v)] for v in self.verdict.ravel()]
 
 
-def eigenvalues(
-    loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike
-) -> NDArray[np.complex128]:
+def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.complex128]:
     """All eigenvalues z (..., N) of the transition matrix (thesis eq. 2.41), unobserved motions left out."""
-    return np.asarray(
-        np.linalg.eigvals(loop.transition_matrix(wall_stiffness, wall_damping)),
-        dtype=complex,
-    )
+    return np.asarray(np.linalg.eigvals(loop.transition_matrix(wall_stiffness, wall_damping)), dtype=complex)
 
 
-def spectral_radius(
-    loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike
-) -> Floats:
+def spectral_radius(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
     """Largest |z| (...) of walls K, B (...) that broadcast; nan for a wall that is not finite."""
     return judge(loop, wall_stiffness, wall_damping).spectral_radius
 
@@ -64,28 +57,20 @@ def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Ver
     rounding error of the dominant eigenvalue (from its condition number), whichever is larger. A wall that is not
     finite is undecided, with nan.
     """
-    K, B = np.broadcast_arrays(
-        np.asarray(wall_stiffness, float), np.asarray(wall_damping, float)
-    )
+    K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
     finite = np.isfinite(K) & np.isfinite(B)
     L = loop.transition_matrix(np.where(finite, K, 0.0), np.where(finite, B, 0.0))
     z = np.linalg.eigvals(L)
     dominant = np.argmax(np.abs(z), axis=-1)
     top = np.take_along_axis(z, dominant[..., None], axis=-1)[..., 0]
     radius = np.where(finite, np.abs(top), np.nan)
-    frequency = np.where(
-        finite, np.abs(np.angle(top)) / (2.0 * np.pi * loop.period), np.nan
-    )
+    frequency = np.where(finite, np.abs(np.angle(top)) / (2.0 * np.pi * loop.period), np.nan)
     width = np.full(radius.shape, BAND)
     # Only near the circle can an eigenvalue's own error decide
     for index in np.argwhere(np.abs(radius - 1.0) < 1e-4):
         at = tuple(index)
         width[at] = max(BAND, _rounding(L[at]))
-    verdict = np.where(
-        radius < 1.0 - width,
-        STABLE,
-        np.where(radius > 1.0 + width, UNSTABLE, UNDECIDED),
-    )
+    verdict = np.where(radius < 1.0 - width, STABLE, np.where(radius > 1.0 + width, UNSTABLE, UNDECIDED))
     return Verdicts(verdict.astype(np.int8), radius, frequency, width)
 
 

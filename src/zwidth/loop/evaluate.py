@@ -41,16 +41,11 @@ def factor_arrays(loop: Loop) -> Factors:
 def divide(a: complex, b: complex) -> complex:
     """a / b, inf or nan where b is 0: plain arithmetic, several times faster than guarded complex division."""
     scale = 1.0 / (b.real * b.real + b.imag * b.imag)
-    return complex(
-        (a.real * b.real + a.imag * b.imag) * scale,
-        (a.imag * b.real - a.real * b.imag) * scale,
-    )
+    return complex((a.real * b.real + a.imag * b.imag) * scale, (a.imag * b.real - a.real * b.imag) * scale)
 
 
 @compiled
-def plant_response(
-    rows: Floats, whole: int, split: int, z: complex, d: complex
-) -> tuple[complex, complex]:
+def plant_response(rows: Floats, whole: int, split: int, z: complex, d: complex) -> tuple[complex, complex]:
     """P(z) and dP/dz."""
     P = 0.0 + 0.0j
     slope = 0.0 + 0.0j
@@ -74,9 +69,7 @@ def plant_response(
 
 
 @compiled
-def velocity_response(
-    numerator: Floats, denominator: Floats, d: complex
-) -> tuple[complex, complex]:
+def velocity_response(numerator: Floats, denominator: Floats, d: complex) -> tuple[complex, complex]:
     """w(z) and dw/dz."""
     w = 1.0 + 0.0j
     slope = 0.0 + 0.0j
@@ -103,9 +96,7 @@ def multiply(a: Floats, n: int, b: Floats, m: int, out: Floats) -> None:
 
 
 @compiled
-def bilinear(
-    c2: float, c1: float, c0: float, degree: int, radius: float, out: Floats
-) -> None:
+def bilinear(c2: float, c1: float, c0: float, degree: int, radius: float, out: Floats) -> None:
     """(1 - s)^degree (c2 d^2 + c1 d + c0) in powers of s, degree 1 or 2."""
     a0, a1 = radius - 1.0, radius + 1.0
     if degree == 1:
@@ -129,9 +120,7 @@ def degree_of_loop(factors: Factors) -> int:
 
 
 @compiled
-def _times(
-    total: Floats, degree: int, factor: Floats, order: int, spare: Floats
-) -> int:
+def _times(total: Floats, degree: int, factor: Floats, order: int, spare: Floats) -> int:
     """total *= factor in place; returns the new degree."""
     multiply(total, degree, factor, order, spare)
     for i in range(degree + order + 1):
@@ -150,10 +139,7 @@ def characteristic(factors: Factors, radius: float) -> Floats:
     N = degree_of_loop(factors)
     coefficients = np.zeros((3, N + 1))
     spare, factor, part = np.zeros(N + 1), np.zeros(3), np.zeros(N + 1)
-    advance, retreat = (
-        np.array([radius, radius, 0.0]),
-        np.array([1.0, -1.0, 0.0]),
-    )  # z (1 - s) and (1 - s)
+    advance, retreat = (np.array([radius, radius, 0.0]), np.array([1.0, -1.0, 0.0]))  # z (1 - s) and (1 - s)
     plant_den, plant_num = np.zeros(N + 1), np.zeros(N + 1)
 
     plant_den[0] = 1.0
@@ -190,18 +176,9 @@ def characteristic(factors: Factors, radius: float) -> Floats:
     at, at_v = degree, degree
     for k in range(denominator.shape[0]):
         step = 2 if denominator[k, 0] != 0.0 else 1
-        bilinear(
-            denominator[k, 0],
-            denominator[k, 1],
-            denominator[k, 2],
-            step,
-            radius,
-            factor,
-        )
+        bilinear(denominator[k, 0], denominator[k, 1], denominator[k, 2], step, radius, factor)
         _times(coefficients[0], at, factor, step, spare)
         at = _times(coefficients[1], at, factor, step, spare)
-        bilinear(
-            numerator[k, 0], numerator[k, 1], numerator[k, 2], step, radius, factor
-        )
+        bilinear(numerator[k, 0], numerator[k, 1], numerator[k, 2], step, radius, factor)
         at_v = _times(coefficients[2], at_v, factor, step, spare)
     return coefficients
