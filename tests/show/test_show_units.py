@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import math
 import re
 
@@ -10,14 +9,7 @@ import pytest
 from hypothesis import given as over
 from hypothesis import strategies as st
 
-from zwidth.show import units
 from zwidth.show.units import NONE, PREFIXES, amount, given, number, point, quantity, vector
-
-
-def test_the_examples_in_the_docstrings():
-    failures, tried = doctest.testmod(units)
-    assert tried
-    assert not failures
 
 
 @pytest.mark.parametrize(

@@ -90,8 +90,13 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     decay   False skips the search for the fastest-decaying wall, half of the time
     Raises  ChartError if the edge cannot be closed (a sliver finer than double precision resolves)
 
-    >>> chart = stability_chart(loop)                               # doctest: +SKIP
-    >>> chart.stiffness_max, chart.frequencies_at_stiffness_max      # doctest: +SKIP
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> free_mass = Plant(np.array([[1.0]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
+    >>> chart = stability_chart(Loop(free_mass, Controller(sampling_period=1.0)))
+    >>> round(chart.stiffness_max, 6), round(chart.damping_max, 6)      # 12 - 8 sqrt 2 and 2 (thesis 4.14)
+    (0.686292, 2.0)
     """
     tracer = Tracer.of(loop, radius)
     rings, blur = closed_rings(tracer)

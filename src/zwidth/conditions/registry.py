@@ -41,7 +41,14 @@ def compare(loop: Loop) -> list[Bound]:
     Each takes from the plant the numbers named in its `taken`, whether or not the device meets its assumptions:
     what it then says is what somebody who applies it would be told. `violated` says where not to trust it.
 
-    >>> [bound.stiffness_max for bound in compare(loop) if bound.holds]      # doctest: +SKIP
+    >>> import numpy as np
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> free_mass = Plant(np.array([[1.0]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
+    >>> held = [bound for bound in compare(Loop(free_mass, Controller(1.0))) if bound.holds]
+    >>> "rigid mass" in [bound.name for bound in held]
+    True
     """
     found = traits(loop)
     unmet = _unmet(loop, found)

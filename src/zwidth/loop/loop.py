@@ -22,7 +22,10 @@ Floats = NDArray[np.float64]
 class Loop:
     """A plant under a sampled wall law. Everything that a chart needs is derived once and kept.
 
-    >>> loop = Loop(plant, Controller(sampling_period=0.001))        # doctest: +SKIP
+    >>> one = np.ones(1)
+    >>> free_mass = Plant(np.array([[0.3]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
+    >>> Loop(free_mass, Controller(sampling_period=0.001)).transition_matrix(1000.0, 1.0).shape
+    (3, 3)
     """
 
     plant: Plant

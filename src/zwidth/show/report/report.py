@@ -34,8 +34,6 @@ def write_report(
              among them; with a `reason` where no wall is stable
     Raises   what `Device.plant` raises; ChartError or ModesError if the device cannot be charted
              OutputError (show.output)  where the file cannot be written
-
-    >>> write_report(device, "device.html")["stiffness_max_N_per_m"]        # doctest: +SKIP
     """
     facts = gather(device, at, direction, assembly, model)
     target = Path(path)
