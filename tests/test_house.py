@@ -124,6 +124,11 @@ def test_every_link_leads_to_a_file(page):
     assert missing == []
 
 
+def test_the_index_leads_to_every_page():
+    linked = set(re.findall(r"\]\(([\w-]+\.md)\)", text("docs/index.md")))
+    assert linked == {page.name for page in (ROOT / "docs").glob("*.md")} - {"index.md"}
+
+
 def typed(first: str) -> list[str]:
     """The README's shell lines that begin with the word `first`, without their comments."""
     blocks = re.findall(r"^```sh\n(.*?)^```", text("README.md"), re.MULTILINE | re.DOTALL)
