@@ -136,6 +136,14 @@ def typed(first: str) -> list[str]:
     return [line for line in lines if line.split()[:1] == [first]]
 
 
+def said_of(line: str) -> list[str]:
+    """Numbers with units that the README's comment beside a command gives, or the paragraph below for the last."""
+    page = text("README.md")
+    beside = re.search(rf"^{re.escape(line)} +# (.*)$", page, re.MULTILINE)
+    about = beside[1] if beside else page.partition("The third line ")[2] if "motor-right" in line else ""
+    return re.findall(r"[\d.]+ k?(?:N/m|Hz)", about.partition("\n\n")[0])
+
+
 @pytest.mark.parametrize("line", typed("zwidth"))
 def test_a_command_of_the_readme_runs(line, tmp_path):
     (device,) = re.findall(r"^```toml\n(.*?)^```", text("README.md"), re.MULTILINE | re.DOTALL)
@@ -144,6 +152,8 @@ def test_a_command_of_the_readme_runs(line, tmp_path):
     done = subprocess.run([zwidth_here, *shlex.split(line)[1:]], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout
+    for number in said_of(line):
+        assert number in done.stdout
     outputs = re.findall(r"--output (\S+)", line)
     assert all((tmp_path / name).stat().st_size > 1000 for name in outputs)
 
