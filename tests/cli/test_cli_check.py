@@ -31,6 +31,12 @@ def test_one_wall_may_be_given_on_the_command_line_and_be_negative():
     assert "unstable" in zwidth("check", MECHANISM, "--stiffness", "-300", "--damping", "-0.5").out
 
 
+def test_people_read_the_radius_to_ten_digits():
+    (point,) = found("check", TWO_MASS, "--stiffness", "4000", "--damping", "10")["points"]
+    shown = zwidth("check", TWO_MASS, "--stiffness", "4000", "--damping", "10").out
+    assert all(word in shown.split() for word in ("4.000", "stable", f"{point['spectral_radius']:.10f}"))
+
+
 def test_many_walls_keep_their_order_whatever_is_judged_at_once(tmp_path, monkeypatch):
     rng = np.random.default_rng(7)
     walls = np.column_stack([rng.uniform(-500, 9000, 50), rng.uniform(-5, 35, 50)])
