@@ -158,6 +158,17 @@ def test_a_command_of_the_readme_runs(line, tmp_path):
     assert all((tmp_path / name).stat().st_size > 1000 for name in outputs)
 
 
+@pytest.mark.parametrize(("period", "helps"), [(None, False), ("0.0001", True)])
+def test_a_stiffer_drive_helps_where_the_readme_says(period, helps):
+    assert "every 0.1 ms it would help" in text("README.md")
+    sampled = [f"loop.sampling_period_s={period}"] if period else []
+    reached = []
+    for more in ([], ["drives.motor-right.stiffness_Nm_per_rad=0.9"]):
+        device = zwidth.load("five-bar", [*sampled, *more])
+        reached.append(zwidth.largest_stiffness(zwidth.Loop(device.plant(), device.controller)).stiffness)
+    assert (reached[1] > reached[0]) == helps
+
+
 @needs_make
 @pytest.mark.parametrize(
     "line", [*typed("make"), "make help", "make slow", "make lint", "make bench", "make docs"]
