@@ -9,6 +9,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.polygon import orient
 
+from zwidth.chart.arcs import Rings
 from zwidth.chart.decay import FastestDecay, fastest_decay
 from zwidth.chart.outline import quadrant_area, sample_arc
 from zwidth.chart.peak import Peak, largest_damping, stiffest
@@ -100,7 +101,12 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     """
     tracer = Tracer.of(loop, radius)
     rings, blur = closed_rings(tracer)
-    samples = [[sample_arc(tracer, arc) for arc in ring] for ring in rings]
+    samples = _sampled(tracer, rings)
+    if not all(shapely.Polygon(_outline(arcs)).is_valid for arcs in samples):
+        # An outline that crosses itself has passed a small loop of the curve between two samples: look closer
+        seen = np.concatenate([thetas[1:-1] for arcs in samples for thetas, _, _ in arcs])
+        rings, blur = closed_rings(tracer, seen)
+        samples = _sampled(tracer, rings)
     outlines = [_outline(arcs) for arcs in samples]
     width = max((float(np.max(np.abs(outline[:, 0]))) for outline in outlines), default=0.0)
     peak = stiffest(tracer, rings, width)
@@ -138,6 +144,11 @@ def boundary_points(
     thetas = np.pi * np.linspace(0.0, 1.0, count + 2)[1:-1] ** 2
     K, B, edge = Tracer.of(loop, radius).trace(thetas)
     return K, B, thetas / (2.0 * np.pi * loop.period), edge
+
+
+def _sampled(tracer: Tracer, rings: Rings) -> list[list[tuple[Floats, Floats, Floats]]]:
+    """Angles, K and B along every arc of every ring."""
+    return [[sample_arc(tracer, arc) for arc in ring] for ring in rings]
 
 
 def _outline(arcs: list[tuple[Floats, Floats, Floats]]) -> Floats:

@@ -27,8 +27,10 @@ class ChartError(RuntimeError):
     """The edge of the stable set could not be closed."""
 
 
-def closed_rings(tracer: Tracer) -> tuple[Rings, float]:
+def closed_rings(tracer: Tracer, seen: Floats | None = None) -> tuple[Rings, float]:
     """All closed walks round the stable set, and the share of its size to which corners are known.
+
+    seen  angles to sample besides the grid
 
     A sliver between two branches can fall between samples and leaves a walk open. Then the grid is made finer and
     samples are added round every branch that takes part in a corner. What stays open then are corners where a
@@ -36,7 +38,7 @@ def closed_rings(tracer: Tracer) -> tuple[Rings, float]:
     joined with as much blur as it takes and as eigenvalues confirm. Raises ChartError if none of BLURRED will do.
     """
     points = tracer.features()
-    extra = np.empty(0)
+    extra = np.empty(0) if seen is None else seen
     for share in (0.2, 0.1, 0.05, 0.02):
         thetas = angles(points, tracer.radius, share)
         thetas = np.unique(
