@@ -75,11 +75,13 @@ def _hold(tracer: Tracer, rings: Rings, size: float) -> bool:
 
 
 def _around(edges: Edges) -> Floats:
-    """Angles close to both sides of every branch in a corner."""
+    """Angles close to both sides of every branch in a corner, and between each two of them."""
     at = np.array([theta for arc in edges.arcs if arc.kind == "pair" for theta in (arc.start, arc.end)])
-    centres = np.concatenate([at, edges.partners])
-    steps = np.logspace(-8, -2, 13)
+    centres = np.unique(np.concatenate([at, edges.partners]))
+    steps = np.logspace(-13, -2, 23)
     near = (centres[:, None] * (1.0 + np.concatenate([-steps, steps]))).ravel()
+    # a branch on which the estimate is all but blind passes both its corners within rounding of one angle
+    near = np.concatenate([near, 0.5 * (centres[1:] + centres[:-1])])
     return near[(near > 1e-9) & (near < np.pi - 1e-9)]
 
 
