@@ -25,13 +25,14 @@ Floats = NDArray[np.float64]
 class Arc:
     """A piece of edge; from first to last the stable side is on the left (K to the right, B up).
 
-    kind         "pair": a pair at rho exp(+-i theta); "plus", "minus": a real root at +rho, -rho
+    kind         "pair": a pair at rho exp(+-i theta); "plus", "minus": a real root at +rho, -rho; "gap": a
+                 chord where rounding hides a pair
     first, last  its corner walls (K, B)
     start, end   their angles theta, falling where the estimate runs backwards; 0 or pi for a real root
     thetas       angles of the samples that found it, strictly between and in order; empty for a line
     """
 
-    kind: Literal["pair", "plus", "minus"]
+    kind: Literal["pair", "plus", "minus", "gap"]
     first: Wall
     last: Wall
     start: float

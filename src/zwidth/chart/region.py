@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import Arc, Edges, Rings, arc_walls, find_edges
+from zwidth.chart.gaps import bridged
 from zwidth.chart.grid import angles, around_crossings
 from zwidth.chart.tracer import UNDECIDED, Tracer
 
@@ -35,7 +36,8 @@ def closed_rings(tracer: Tracer, seen: Floats | None = None) -> tuple[Rings, flo
     A sliver between two branches can fall between samples and leaves a walk open. Then the grid is made finer and
     samples are added round every branch that takes part in a corner. What stays open then are corners where a
     branch moves by less than rounding can tell (an undamped mode that the wall hardly moves): their arcs are
-    joined with as much blur as it takes and as eigenvalues confirm. Raises ChartError if none of BLURRED will do.
+    joined with as much blur as it takes and as eigenvalues confirm, or bridged (`gaps`). Raises ChartError if
+    neither will do.
     """
     points = tracer.features()
     extra = np.empty(0) if seen is None else seen
@@ -51,24 +53,30 @@ def closed_rings(tracer: Tracer, seen: Floats | None = None) -> tuple[Rings, flo
         extra = np.union1d(extra, _around(edges))
     for blur in BLURRED:
         rings = join(edges, tracer.period, blur)
-        if rings is not None and _hold(tracer, rings, edges.size):
+        if rings is not None and _hold(tracer, rings):
             return rings, blur
+    _, nodes, alive = _corners(edges, tracer.period, SAME_CORNER)
+    closed = bridged(tracer, edges, nodes, alive)
+    rings = join(closed[0], tracer.period, SAME_CORNER) if closed else None
+    if closed and rings is not None and _hold(tracer, rings):
+        return rings, closed[1]
     raise ChartError(
         "the edge of the stable set could not be closed: a mode that the wall hardly moves hides it in rounding; "
         "give that mode some damping, or leave it out"
     )
 
 
-def _hold(tracer: Tracer, rings: Rings, size: float) -> bool:
+def _hold(tracer: Tracer, rings: Rings) -> bool:
     """Whether walls just inside the middle of each arc are stable, by eigenvalues."""
     inside = []
     for ring in rings:
-        for arc in ring:
-            points = arc_walls(tracer, arc) * (tracer.period, 1.0)
+        walks = [arc_walls(tracer, arc) * (tracer.period, 1.0) for arc in ring]
+        depth = 1e-3 * float(np.min(np.ptp(np.vstack(walks), axis=0)))
+        for points in walks:
             middle = len(points) // 2
             along = points[middle] - points[middle - 1]
             left = np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-300)
-            inside.append((points[middle] + points[middle - 1]) / 2.0 + 1e-4 * size * left)
+            inside.append((points[middle] + points[middle - 1]) / 2.0 + depth * left)
     K, B = (np.array(inside).reshape(-1, 2) / (tracer.period, 1.0)).T
     z = np.linalg.eigvals(tracer.loop.transition_matrix(K, B))
     return bool(np.all(np.abs(z) < tracer.radius + UNDECIDED))
@@ -85,20 +93,23 @@ def _around(edges: Edges) -> Floats:
     return near[(near > 1e-9) & (near < np.pi - 1e-9)]
 
 
-def join(edges: Edges, period: float, blur: float) -> Rings | None:
-    """Walks along arcs, or None if one of them does not close; corners within `blur` of the size are one."""
-    arcs = edges.arcs
-    if not arcs:
-        return ()
-    ends = np.array([[arc.first, arc.last] for arc in arcs]) * (period, 1.0)
+def _corners(edges: Edges, period: float, blur: float) -> tuple[tuple[Arc, ...], NDArray[np.int64], list[int]]:
+    """Arcs with one wall for each corner, the corners' numbers (k, 2), and which arcs are more than a corner."""
+    ends = np.array([[arc.first, arc.last] for arc in edges.arcs]) * (period, 1.0)
     nodes = _cluster(ends.reshape(-1, 2), blur * edges.size).reshape(-1, 2)
-    # an arc no larger than a corner is part of it
-    alive = [k for k in range(len(arcs)) if edges.extents[k] > blur * edges.size]
-    corners = ends.reshape(-1, 2)[nodes] / (period, 1.0)
+    walls = (ends.reshape(-1, 2)[nodes] / (period, 1.0)).tolist()
     arcs = tuple(
         replace(arc, first=tuple(first), last=tuple(last))
-        for arc, (first, last) in zip(arcs, corners.tolist(), strict=True)
+        for arc, (first, last) in zip(edges.arcs, walls, strict=True)
     )
+    return arcs, nodes, [k for k in range(len(arcs)) if edges.extents[k] > blur * edges.size]
+
+
+def join(edges: Edges, period: float, blur: float) -> Rings | None:
+    """Walks along arcs, or None if one of them does not close; corners within `blur` of the size are one."""
+    if not edges.arcs:
+        return ()
+    arcs, nodes, alive = _corners(edges, period, blur)
     leaving: dict[int, list[int]] = {}
     for k in alive:
         leaving.setdefault(int(nodes[k, 0]), []).append(k)
