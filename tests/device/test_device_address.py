@@ -102,6 +102,22 @@ def test_one_filter_can_be_set_for_the_other():
     assert from_document(address.apply(document, [f"{filters}=unset"])).controller.velocity_filter is None
 
 
+def test_a_key_of_the_other_filter_makes_it_that_filter():
+    filters = "loop.velocity.filter"
+    document = address.apply(changed(PLANT), [f"{filters}.time_constant_s=0.001"])
+    assert document["loop"]["velocity"]["filter"] == {"type": "first-order", "time_constant_s": 0.001}
+    assert from_document(document).controller.velocity_filter == FirstOrder(0.001)
+    back = address.apply(document, [f"{filters}.cutoff_Hz=30", f"{filters}.order=4"])
+    assert from_document(back).controller.velocity_filter == Butterworth(4, 30.0)
+
+
+def test_a_key_that_drops_nothing_leaves_the_type_alone():
+    filters = "loop.velocity.filter"
+    settings = [f"{filters}=unset", f"{filters}.type=first-order", f"{filters}.order=2"]
+    document = address.apply(changed(PLANT), settings)
+    assert document["loop"]["velocity"]["filter"] == {"type": "first-order", "order": 2}
+
+
 def test_unset_removes_and_what_is_not_there_is_no_fault():
     document = changed(ARM)
     assert (

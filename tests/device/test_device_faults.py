@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from datetime import date
 
 import pytest
 
@@ -63,7 +64,19 @@ CASES = [
         "plant.mass_kg",
         "must be a list of rows, got the list [0.3, 0.02]",
     ),
-    (PLANT, {"plant__mass_kg": {"a": 1}}, "plant.mass_kg", "must be a list, got a table"),
+    (PLANT, {"plant__mass_kg": {"a": 1}}, "plant.mass_kg", "a number or a matrix (a list of rows), got a table"),
+    (PLANT, {"plant__mass_kg": "0.1"}, "plant.mass_kg", "a matrix (a list of rows), got the text '0.1'"),
+    (PLANT, {"plant__mass_kg": True}, "plant.mass_kg", "a matrix (a list of rows), got true"),
+    (PLANT, {"plant__mass_kg": date(2024, 5, 1)}, "plant.mass_kg", "(a list of rows), got 2024-05-01"),
+    (PLANT, {"plant__stiffness_N_per_m": "5"}, "plant.stiffness_N_per_m", "a number or a matrix (a list"),
+    (PLANT, {"plant__sensor": "1"}, "plant.sensor", "must be a number or a list of numbers, got the text '1'"),
+    (PLANT, {"plant__handle": False}, "plant.handle", "must be a number or a list of numbers, got false"),
+    (
+        ARM,
+        {"mechanism__links__0__inertia_kg_m2": "small"},
+        "mechanism.links.upper.inertia_kg_m2",
+        "must be one number, three moments [Ixx, Iyy, Izz] or 3 rows of 3 numbers, got the text 'small'",
+    ),
     (PLANT, {"plant__stiffness_N_per_m__0__1": 1.0}, "plant.stiffness_N_per_m", "must be symmetric"),
     (PLANT, {"plant__damping_Ns_per_m__0__1": 1.0}, "plant.damping_Ns_per_m", "must be symmetric"),
     (PLANT, {"plant__stiffness_N_per_m": 5.0}, "plant.stiffness_N_per_m", "has 1 rows, but mass_kg has 2"),
@@ -148,6 +161,24 @@ CASES = [
         {"loop__velocity__filter__cutof_Hz": 2.0},
         "loop.velocity.filter.cutof_Hz",
         "did you mean 'cutoff_Hz'?",
+    ),
+    (
+        PLANT,
+        {"loop__velocity__filter__time_constant_s": 0.01},
+        "loop.velocity.filter.time_constant_s",
+        'is not read with type = "butterworth"; remove it, or set type = "first-order"',
+    ),
+    (
+        PLANT,
+        {"loop__velocity__filter": {"type": "first-order", "time_constant_s": 0.01, "order": 2}},
+        "loop.velocity.filter.order",
+        'is not read with type = "first-order"; remove it, or set type = "butterworth"',
+    ),
+    (
+        PLANT,
+        {"loop__velocity__filter": {"type": "first-order", "time_constant_s": 0.01, "cutof_Hz": 2}},
+        "loop.velocity.filter.cutof_Hz",
+        "is not a key of a device file; allowed: time_constant_s, type",
     ),
     (
         PLANT,

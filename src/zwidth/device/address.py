@@ -65,6 +65,8 @@ def allowed(path: str) -> bool:
 def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     """A copy of the document with one value set (`UNSET`: removed); exclusive keys are dropped.
 
+    A table of kinds whose keys of the other kind are dropped gets the `type` that the key belongs to.
+
     Raises DeviceError  if the schema has no such path, or a list no such element
     """
     *outer, last = resolve(document, path)
@@ -83,8 +85,9 @@ def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
             table.pop(last, None)
         return document
     table[last] = value
-    for key in _rivals(tuple(outer), last):
-        table.pop(key, None)
+    dropped = [key for key in _rivals(tuple(outer), last) if table.pop(key, UNSET) is not UNSET]
+    if dropped:  # the table may now be of another kind, as a filter is that gets the other filter's key
+        table.update({"type": kind for kind, keys in schema.kinds(tuple(outer)).items() if last in keys})
     return document
 
 

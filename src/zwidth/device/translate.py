@@ -63,7 +63,7 @@ def _sentence(detail: ErrorDetails, path: Path, document: dict[str, Any]) -> str
         case "missing":
             return f"is missing; add it{about}"
         case "extra_forbidden":
-            return _unknown(path)
+            return _unknown(path, document)
         case "float_type" if isinstance(got, int) and not isinstance(got, bool):
             return f"must be a finite number, got {quote(got)}{about}"
         case "float_type":
@@ -104,14 +104,26 @@ def _sentence(detail: ErrorDetails, path: Path, document: dict[str, Any]) -> str
             return detail["msg"].removeprefix("Value error, ")
 
 
-def _unknown(path: Path) -> str:
+def _unknown(path: Path, document: dict[str, Any]) -> str:
     key, table = str(path[-1]), path[:-1]
-    allowed = schema.keys(table)
+    kinds = schema.kinds(table)
+    kind = _value(document, (*table, "type")) if kinds else None
+    allowed = kinds[kind] if kind in kinds else schema.keys(table)
+    readers = [other for other, keys in kinds.items() if key in keys]
+    if readers:
+        return f'is not read with type = "{kind}"; remove it, or set type = "{readers[0]}"'
     if nearest(key, allowed) is None:
         elsewhere = [section for section in ("loop", "plant", "mechanism") if key in schema.keys((section,))]
         if elsewhere and table != (elsewhere[0],):
             return f"is not a key here; it belongs into [{elsewhere[0]}]"
     return f"is not a key of a device file; {suggestion(key, allowed)}"
+
+
+def _value(document: Any, path: Path) -> Any:
+    """The value at a path that leads through tables and lists there are."""
+    for step in path:
+        document = document[step]
+    return document
 
 
 def _length(limits: Mapping[str, Any], got: Any, about: str) -> str:

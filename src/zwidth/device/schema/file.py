@@ -68,6 +68,12 @@ def keys(path: tuple[str | int, ...]) -> set[str]:
     return {key for found in at(path) for key in found.get("properties", {})}
 
 
+def kinds(path: tuple[str | int, ...]) -> dict[str, set[str]]:
+    """For a table that comes in kinds, told apart by its `type`: the keys of each kind; {} for any other."""
+    tables = [found.get("properties", {}) for found in at(path)]
+    return {table["type"]["const"]: set(table) for table in tables if "const" in table.get("type", {})}
+
+
 def description(path: tuple[str | int, ...]) -> str:
     """What the key at a path means, with its unit; "" if the schema says nothing."""
     outer = [step for found in at(path[:-1]) for step in _step(found, path[-1])]

@@ -80,12 +80,16 @@ def _is_number(value: Any) -> bool:
 
 
 def _as_vector(value: Any) -> Any:
+    if not isinstance(value, list | tuple) and not _is_number(value):
+        raise ValueError(f"must be a number or a list of numbers, got {quote(value)}")
     return [value] if _is_number(value) else value
 
 
 def _as_matrix(value: Any) -> Any:
     if isinstance(value, list) and value and all(map(_is_number, value)):
         raise ValueError(f"must be a list of rows, got {quote(value)}; write [[...], [...]]")
+    if not isinstance(value, list | tuple) and not _is_number(value):
+        raise ValueError(f"must be a number or a matrix (a list of rows), got {quote(value)}")
     return [[value]] if _is_number(value) else value
 
 
@@ -93,7 +97,8 @@ def _as_inertia(value: Any) -> Any:
     """Three moments become the rows of a diagonal matrix; one number stays apart, as a matrix of one."""
     if isinstance(value, list) and len(value) == 3 and not any(isinstance(v, list | dict) for v in value):
         return [[v if i == j else 0.0 for j in range(3)] for i, v in enumerate(value)]
-    if isinstance(value, list) and value and all(map(_is_number, value)):
+    numbers = isinstance(value, list) and value and all(map(_is_number, value))
+    if numbers or (not isinstance(value, list | tuple) and not _is_number(value)):
         raise ValueError(f"must be {INERTIA_FORMS}, got {quote(value)}")
     return _as_matrix(value)
 
