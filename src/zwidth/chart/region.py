@@ -61,8 +61,8 @@ def closed_rings(tracer: Tracer, seen: Floats | None = None) -> tuple[Rings, flo
     if closed and rings is not None and _hold(tracer, rings):
         return rings, closed[1]
     raise ChartError(
-        "the edge of the stable set could not be closed: a mode that the wall hardly moves hides it in rounding; "
-        "give that mode some damping, or leave it out"
+        "the edge of the stable set could not be closed: rounding hides a part of it (undamped modes, or one that "
+        "the wall hardly moves); give these modes some damping, or leave them out"
     )
 
 
