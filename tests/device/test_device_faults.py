@@ -8,8 +8,11 @@ from datetime import date
 import pytest
 
 from tests.device.device_cases import ARM, GONE, PLANT, changed, faults
+from zwidth.chart.chart import largest_stiffness
 from zwidth.device.device import Device
 from zwidth.device.load import from_document
+from zwidth.device.schema.bounds import HEAVIEST, LIGHTEST
+from zwidth.loop.loop import Loop
 
 NAN, INF = float("nan"), float("inf")
 
@@ -86,6 +89,48 @@ CASES = [
     (PLANT, {"plant__actuator": GONE}, "plant.actuator", "is missing; with 2 coordinates"),
     (PLANT, {"plant__sensor": GONE}, "plant.sensor", "is missing; with 2 coordinates"),
     (PLANT, {"plant__actuator": [0.0, 0.0]}, "plant.actuator", "must not be all zeros"),
+    # beyond any device
+    (PLANT, {"plant__mass_kg__1__1": 1e-14}, "plant.mass_kg", "for every motion, got masses from 1e-14 to 0.3"),
+    (PLANT, {"plant__mass_kg": [[1e13, 0.0], [0.0, 1e13]]}, "plant.mass_kg", "between 1e-12 and 1e+12 kg"),
+    (PLANT, {"plant__stiffness_N_per_m": [[2e15, 0.0], [0.0, 0.0]]}, "plant.stiffness_N_per_m", "1e+15 N/m"),
+    (PLANT, {"plant__damping_Ns_per_m": [[-2e15, 0.0], [0.0, 0.0]]}, "plant.damping_Ns_per_m", "got -2e+15"),
+    (PLANT, {"plant__actuator": [0.0, 1e-200]}, "plant.actuator", "of size 1e-09 to 1e+09, got 1e-200"),
+    (
+        ARM,
+        {"mechanism__links__0__mass_kg": 1e-200},
+        "mechanism.links.upper.mass_kg",
+        "must be 0 (massless) or between 1e-12 and 1e+12 kg, got 1e-200; is the unit right?",
+    ),
+    (
+        ARM,
+        {"mechanism__links__0__inertia_kg_m2": 1e13},
+        "mechanism.links.upper.inertia_kg_m2",
+        "must be 0 (no inertia) or between 1e-18 and 1e+12 kg m^2, got 1e+13; is the unit right?",
+    ),
+    (
+        ARM,
+        {"mechanism__links__0__inertia_kg_m2": [1e-20, 1e-20, 1e-20]},
+        "mechanism.links.upper.inertia_kg_m2",
+        "between 1e-18 and 1e+12 kg m^2, got 1e-20",
+    ),
+    (
+        ARM,
+        {"mechanism__drives__0__motor_inertia_kg_m2": 1e-200},
+        "mechanism.drives.shoulder.motor_inertia_kg_m2",
+        "must be 0 (no inertia) or between 1e-18 and 1e+12 kg m^2, got 1e-200",
+    ),
+    (
+        ARM,
+        {"mechanism__drives__0__stiffness_Nm_per_rad": 1e16},
+        "mechanism.drives.shoulder.stiffness_Nm_per_rad",
+        "must be inf (rigid) or between 1e-12 and 1e+15 N m/rad, got 1e+16",
+    ),
+    (
+        ARM,
+        {"mechanism__drives__0__transmission_ratio": 1e-200},
+        "mechanism.drives.shoulder.transmission_ratio",
+        "must be between 1e-06 and 1e+06 motor turns per joint turn, got 1e-200",
+    ),
     # the loop
     (PLANT, {"loop__sampling_period_s": GONE}, "loop.sampling_period_s", "is missing"),
     (
@@ -203,6 +248,24 @@ def test_a_fault_names_its_key_and_says_what_is_wrong(text, changes, key, words)
 @pytest.mark.parametrize("text", [PLANT, ARM], ids=["plant", "mechanism"])
 def test_the_unchanged_files_are_right(text):
     assert isinstance(from_document(tomllib.loads(text)), Device)
+
+
+ONE_MASS = 'name = "one"\n[plant]\nmass_kg = 0.1\n[loop]\nsampling_period_s = 0.001'
+
+
+@pytest.mark.parametrize("mass", [1e-200, 1e-13, 1e13, 1e29])
+def test_a_mass_that_no_device_has_is_refused(mass):
+    (fault,) = faults(changed(ONE_MASS, plant__mass_kg=mass))
+    expected = f"must be between 1e-12 and 1e+12 kg, got {mass:.6g}; is the unit right?"
+    assert (fault.key, fault.message) == ("plant.mass_kg", expected)
+
+
+@pytest.mark.parametrize("mass", [LIGHTEST, 1e-6, 1e6, HEAVIEST])
+def test_at_the_bounds_the_chart_is_still_the_one_of_a_mass(mass):
+    """A mass scales the walls and nothing else: the largest stiffness is 0.686292 m / T^2 (thesis)."""
+    device = from_document(changed(ONE_MASS, plant__mass_kg=mass))
+    stiffest = largest_stiffness(Loop(device.plant(), device.controller)).stiffness
+    assert stiffest * 0.001**2 / mass == pytest.approx(0.686292, abs=5e-7)
 
 
 def test_all_faults_are_reported_together_in_the_order_of_the_file():

@@ -77,13 +77,19 @@ def test_a_directory_is_no_device(tmp_path):
         ("fivebar", "did you mean 'five-bar'?"),
         ("./five-bar.toml", "did you mean 'five-bar'?"),
         ("nothing/like/it.toml", "is neither a file nor a bundled device; bundled: five-bar, "),
-        ("", "is neither a file nor a bundled device"),
         ("a" * 5000, "cannot be read: file name too long"),
         ("five-bar/x\\y", "is neither"),
     ],
 )
 def test_a_missing_file_leads_to_the_bundled_ones(path, words):
     assert words in message(path)
+
+
+def test_an_empty_name_is_called_one():
+    with pytest.raises(
+        DeviceError, match=r"^device: the name is empty; give a device file, or a bundled name: five-bar"
+    ):
+        load("")
 
 
 def test_a_zero_byte_in_the_name_is_no_crash():

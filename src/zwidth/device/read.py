@@ -35,6 +35,10 @@ def read(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
     Raises DeviceError  if there is no such file, it cannot be read, or it is not TOML
     """
     label = os.fspath(name_or_path)
+    if not label:
+        raise fail(
+            "device", "", f"the name is empty; give a device file, or a bundled name: {listed(bundled_names())}"
+        )
     if label in bundled_names():
         return parse(_bundled_text(label), label), label
     return parse(decode(_bytes(label), label), label), label

@@ -7,14 +7,19 @@ from typing import Literal
 from zwidth.device.schema.numbers import (
     Axis,
     Bounds,
+    Damper,
     Direction,
     Inertia,
+    Mass,
     Name,
     Number,
     NumberOrInfinity,
     Offset,
     Position,
+    Ratio,
+    RotorInertia,
     Section,
+    Spring,
     Triple,
     quantity,
 )
@@ -41,7 +46,7 @@ class LinkSection(Section):
     length_m: Number = quantity(
         "length along the link's x axis; its tip is at (length, 0, 0)", "m", ge=0, default=0.0
     )
-    mass_kg: Number = quantity("mass; 0 for a massless link", "kg", ge=0)
+    mass_kg: Mass = quantity("mass; 0 for a massless link", "kg", ge=0)
     center_of_mass_m: Offset = quantity(
         "centre of mass in the link's frame, x or x, y or x, y, z", "m", default=(0.0, 0.0, 0.0)
     )
@@ -102,15 +107,15 @@ class DriveSection(Section):
 
     name: Name = quantity("the drive's name: letters, digits, - and _")
     joint: Name = quantity("the link whose joint it drives")
-    motor_inertia_kg_m2: Number = quantity("inertia of the rotor, at the motor", "kg m^2", ge=0)
-    transmission_ratio: Number = quantity("motor turns per joint turn", "1", gt=0)
-    stiffness_Nm_per_rad: NumberOrInfinity | None = quantity(
+    motor_inertia_kg_m2: RotorInertia = quantity("inertia of the rotor, at the motor", "kg m^2", ge=0)
+    transmission_ratio: Ratio = quantity("motor turns per joint turn", "1", gt=0)
+    stiffness_Nm_per_rad: Spring | None = quantity(
         "stiffness of the transmission at the motor shaft; omitted or inf: rigid",
         "N m/rad",
         gt=0,
         default=None,
     )
-    damping_Nms_per_rad: Number | None = quantity(
+    damping_Nms_per_rad: Damper | None = quantity(
         "damping parallel to that stiffness, at the motor shaft; with mechanism.damping.given = true",
         "N m s/rad",
         ge=0,

@@ -21,6 +21,7 @@ from pydantic import (
 )
 
 from zwidth.device.faults import quote
+from zwidth.device.schema import bounds
 
 SYMMETRY_TOLERANCE: Final = 1e-9  # relative to the largest element
 LARGEST: Final = 1e30  # SI units; the squares of such numbers can still be multiplied
@@ -28,7 +29,7 @@ NAME_PATTERN: Final = r"^[^\W\d][\w-]*$"  # no dots and no leading digit: names 
 
 INERTIA_FORMS: Final = "one number, three moments [Ixx, Iyy, Izz] or 3 rows of 3 numbers"
 
-Rows = tuple[tuple[float, ...], ...]
+Rows = bounds.Rows
 
 
 class Section(BaseModel):
@@ -166,7 +167,14 @@ _THREE: Final[dict[str, Any]] = {"type": "array", "items": _NUMBER, "minItems": 
 _THREE_BY_THREE: Final[dict[str, Any]] = {"type": "array", "items": _THREE, "minItems": 3, "maxItems": 3}
 
 Number = Annotated[float, Strict(), AllowInfNan(False), AfterValidator(_thinkable)]
+Mass = Annotated[Number, bounds.within(bounds.LIGHTEST, bounds.HEAVIEST, "kg", "0 (massless) or ")]
+RotorInertia = Annotated[
+    Number, bounds.within(bounds.LEAST_INERTIA, bounds.LARGEST_INERTIA, "kg m^2", "0 (no inertia) or ")
+]
+Ratio = Annotated[Number, bounds.within(bounds.LEAST_RATIO, bounds.LARGEST_RATIO, "motor turns per joint turn")]
+Damper = Annotated[Number, bounds.within(0.0, bounds.STRONGEST_DAMPING, "N m s/rad")]
 NumberOrInfinity = Annotated[float, Strict(), AfterValidator(_not_nan), AfterValidator(_thinkable)]
+Spring = Annotated[NumberOrInfinity, bounds.within(bounds.SOFTEST, bounds.STIFFEST, "N m/rad", "inf (rigid) or ")]
 WholeNumber = Annotated[int, Strict()]
 Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=NAME_PATTERN)]
@@ -182,6 +190,7 @@ Vector = Annotated[
     tuple[Number, ...],
     BeforeValidator(_as_vector),
     AfterValidator(_not_zero),
+    bounds.largest_share_within(bounds.LEAST_SHARE, bounds.LARGEST_SHARE),
     WithJsonSchema({"anyOf": [_NUMBER, _LIST]}),
 ]
 SymmetricMatrix = Annotated[
@@ -191,12 +200,19 @@ SymmetricMatrix = Annotated[
     AfterValidator(_symmetric),
     WithJsonSchema({"anyOf": [_NUMBER, _MATRIX]}),
 ]
-MassMatrix = Annotated[SymmetricMatrix, AfterValidator(_positive_definite)]
+MassMatrix = Annotated[
+    SymmetricMatrix,
+    AfterValidator(_positive_definite),
+    bounds.principal_within(bounds.LIGHTEST, bounds.HEAVIEST, "kg"),
+]
+DampingMatrix = Annotated[SymmetricMatrix, bounds.elements_up_to(bounds.STRONGEST_DAMPING, "N s/m")]
+StiffnessMatrix = Annotated[SymmetricMatrix, bounds.elements_up_to(bounds.STIFFEST, "N/m")]
 Inertia = Annotated[
     tuple[tuple[Number, ...], ...],
     BeforeValidator(_as_inertia),
     AfterValidator(_square),
     AfterValidator(_symmetric),
     AfterValidator(_possible_body),
+    bounds.largest_within(bounds.LEAST_INERTIA, bounds.LARGEST_INERTIA, "kg m^2", "0 (no inertia) or "),
     WithJsonSchema({"anyOf": [_NUMBER, _THREE, _THREE_BY_THREE]}),
 ]
