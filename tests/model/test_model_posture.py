@@ -368,3 +368,14 @@ def test_a_position_has_two_or_three_coordinates(position):
 
 def test_nan_is_out_of_reach_in_a_batch():
     assert solve_posture(five_bar(), [[np.nan, 0.25], [0.0, 0.25]]).status.tolist() == [OUT_OF_REACH, OK]
+
+
+def test_a_reference_position_out_of_reach_is_called_that():
+    """The advice to ask nearer to the reference is for other positions."""
+    mechanism = five_bar()
+    far = replace(mechanism, reference_position=np.array([0.0, 9.0, 0.0]))
+    with pytest.raises(OutOfReach, match="its own reference position") as caught:
+        solve_posture(far, [0.0, 9.0])
+    assert "nearer" not in str(caught.value)
+    with pytest.raises(OutOfReach, match="ask for a position nearer to the reference"):
+        solve_posture(mechanism, [0.0, 9.0])

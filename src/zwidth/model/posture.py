@@ -136,7 +136,7 @@ def solve_posture(mechanism: Mechanism, position: ArrayLike, assembly: str | Non
         closure_residual=solved.residual.reshape(shape),
     )
     if not shape:
-        _check_single(posture)
+        _check_single(posture, mechanism.reference_position)
     return posture
 
 
@@ -230,8 +230,13 @@ def _check_loops(mechanism: Mechanism, mech: Arrays, name: str, gaps: Floats) ->
         )
 
 
-def _check_single(posture: Posture) -> None:
+def _check_single(posture: Posture, reference: Floats) -> None:
     where = "(" + ", ".join(f"{x:.6g}" for x in posture.position) + ") m"
+    if posture.status == OUT_OF_REACH and np.array_equal(posture.position, reference):
+        raise OutOfReach(
+            f"the handle cannot reach its own reference position {where} in assembly {posture.assembly!r}; "
+            "check the lengths of the links, or ask for another position"
+        )
     if posture.status == OUT_OF_REACH:
         raise OutOfReach(
             f"the handle cannot reach {where} in assembly {posture.assembly!r} without passing a "

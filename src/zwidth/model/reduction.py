@@ -32,6 +32,10 @@ class ModelError(ValueError):
     """The model asked for does not apply to this device or this direction."""
 
 
+class DirectionError(ModelError):
+    """The handle cannot move along the direction, so that no model renders it."""
+
+
 def reduce_mechanism(
     mechanism: Mechanism, posture: Posture, direction: ArrayLike, model: Model, damping: Damping
 ) -> Plant:
@@ -45,9 +49,8 @@ def reduce_mechanism(
     posture    a single one, OK
     direction  (3,)  unit vector in the base frame
     Returns    Plant; a drive of infinite stiffness has no theta of its own, its rotor moves with its link
-    Raises     ModelError  where the model does not apply: no flexible drive in this direction, or a
-    direction in
-                           which the handle cannot move
+    Raises     ModelError  where the model does not apply: no flexible drive in this direction
+               DirectionError  (a ModelError) for a direction along which the handle cannot move
                ValueError  for a batch of postures, a posture that is not OK, a direction not of unit length
     """
     if posture.status.shape:
@@ -58,7 +61,8 @@ def reduce_mechanism(
     u = unit_direction(direction)
     h = posture.jacobian.T @ u
     if not np.linalg.norm(h) > 1e-12 * np.linalg.norm(posture.jacobian):
-        raise ModelError(f"the handle cannot move along the direction {u.tolist()}; choose one it can move along")
+        along = ", ".join(f"{component:.6g}" for component in u)
+        raise DirectionError(f"the handle cannot move along the direction ({along}); choose one it can move along")
     if model == "full":
         return _full(mechanism, posture.mass_matrix, h, damping)
     numbers = effective_parameters(mechanism, posture, u)

@@ -13,7 +13,14 @@ if TYPE_CHECKING:
 
 
 class NoAnswer(Exception):
-    """The question was understood and has no answer; the text says why."""
+    """The question was understood and has no answer; the text says why.
+
+    decided  False where there is an answer that double precision does not give
+    """
+
+    def __init__(self, reason: str, *, decided: bool = True) -> None:
+        super().__init__(reason)
+        self.decided = decided
 
 
 @contextmanager
@@ -27,14 +34,16 @@ def computing(question: Question) -> Iterator[None]:
     from zwidth.loop.hold import UnmovedError
     from zwidth.model.modes import ModesError
     from zwidth.model.posture import PostureError
-    from zwidth.model.reduction import ModelError
+    from zwidth.model.reduction import DirectionError, ModelError
 
     try:
         yield
     except PostureError as error:
         raise NoAnswer(str(error)) from None
     except (ChartError, ModesError) as error:
-        raise NoAnswer(f"this is undecided: {error}") from None
+        raise NoAnswer(f"this is undecided: {error}", decided=False) from None
+    except DirectionError as error:
+        raise BadInput(f"{question.name}: direction: {error}") from None
     except ModelError as error:
         model = f"model {question.model}: " if question.model else ""
         raise BadInput(f"{question.name}: {model}{error}") from None
