@@ -112,7 +112,10 @@ APART = [
 # a command line, and words of each of its lines
 LINES = [
     (("chart", MECHANISM, "--direction", "0,0"), ["direction: has zero length"]),
-    (("chart", MECHANISM, "--direction", "0,0,1"), ["cannot move along the direction"]),
+    (
+        ("chart", MECHANISM, "--direction", "0,0,1"),
+        ["direction: the handle cannot move along the direction (0, 0, 1); choose"],
+    ),
     (("chart", MECHANISM, "--direction", "1"), ["'--direction': must be 2 or 3 finite numbers"]),
     (("chart", MECHANISM, "--at", "a,b"), ["'--at': must be 2 or 3 finite numbers"]),
     (("chart", MECHANISM, "--at", "nan,0.2"), ["'--at': must be 2 or 3 finite numbers"]),
@@ -132,6 +135,14 @@ LINES = [
     (("chart", TWO_MASS, "--set", "friction.coulomb_N=[0, 1]"), ["not supported yet"]),
     (("chart", TWO_MASS, "--window", "0,1,2"), ["'--window': must be 4 finite numbers"]),
     (("chart", TWO_MASS, "--window", "1,0,0,1"), ["'--window': needs KMIN < KMAX"]),
+    (
+        ("show", MECHANISM, "--direction", "0,0,2", "--model", "rigid"),
+        [f"{MECHANISM}: direction: the handle cannot"],
+    ),
+    (("show", ""), ["zwidth show: invalid value for 'DEVICE': is empty; give a name"]),
+    (("show", MECHANISM, "--output", ""), ["'--output': is empty; give a name"]),
+    (("report", MECHANISM, "--output", ""), ["'--output': is empty; give a name"]),
+    (("check", MECHANISM, "--points", ""), ["'--points': is empty; give a name"]),
     (("chart",), ["missing argument 'DEVICE'"]),
     (("chart", TWO_MASS, "extra"), ["unexpected extra argument"]),
     (("chart", TWO_MASS, "--jason"), ["no such option '--jason'"]),
@@ -157,7 +168,7 @@ NO_OUTPUT = [
     ("pipe.svg", "is no ordinary file"),
     ("chart.txt", "must end in .png or .svg"),
     ("chart", "must end in .png or .svg"),
-    ("", "must end in .png or .svg"),
+    ("", "'--output': is empty; give a name"),
     ("chart.nc", ".nc is not supported yet"),
     ("chart.mat", ".mat is not supported yet"),
     ("file.csv/chart.csv", "cannot be written|there is no folder"),
@@ -204,16 +215,21 @@ def test_an_error_of_our_own_is_one_line_and_code_70(monkeypatch):
     assert "Traceback" in zwidth("chart", TWO_MASS).err
 
 
-def test_a_chart_that_cannot_be_closed_is_undecided(monkeypatch):
+@pytest.mark.parametrize("command", ["chart", "report"])
+def test_a_chart_that_cannot_be_closed_is_undecided(tmp_path, monkeypatch, command):
     from zwidth.chart.region import ChartError
 
     def open_edge(*_):
         raise ChartError("the edge could not be closed")
 
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("zwidth.study.what_if.stability_chart", open_edge)  # first, for it imports the next
     monkeypatch.setattr("zwidth.chart.chart.stability_chart", open_edge)
-    ran = zwidth("chart", TWO_MASS, "--json")
+    ran = zwidth(command, TWO_MASS, "--json")
     assert ran.code == 1
-    assert ran.document["regions"] is None
+    assert ran.document["decided"] is False
+    assert ran.document.get("regions") is None
+    assert not list(tmp_path.iterdir())
     assert ran.document["reason"] == "this is undecided: the edge could not be closed"
 
 

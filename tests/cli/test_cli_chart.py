@@ -105,6 +105,7 @@ def test_without_a_stable_wall_the_object_is_printed_with_nulls_and_the_reason(q
     assert ran.document["stiffness_max_N_per_m"] is None
     assert ran.document["frequency_at_stiffness_max_Hz"] is None
     assert ran.document["stable_area_N2s_per_m2"] == 0.0
+    assert ran.document["decided"] is True
     assert "no stable wall" in ran.document["reason"]
     for_people = zwidth("chart", *question)
     assert for_people.code == 1
@@ -122,6 +123,7 @@ def test_a_posture_that_does_not_exist_is_no_answer(command, at, why, tmp_path, 
     assert ran.document["position_m"][:2] == [float(x) for x in at.split(",")]
     computed = {"chart": "regions", "show": "jacobian", "report": "file"}[command]
     assert ran.document[computed] is None
+    assert ran.document.get("decided", True) is True
     for_people = zwidth(command, MECHANISM, "--at", at)
     assert (for_people.code, for_people.out, len(for_people.lines)) == (1, "", 1)
     assert not list(tmp_path.iterdir())

@@ -86,6 +86,8 @@ def test_verdicts_are_written_as_data(tmp_path):
         (HEAD + "1,soft\n", ["line 2: damping_Ns_per_m: must be a finite number, got 'soft'"]),
         (HEAD + "1,2\n\n3,\n", ["line 4: damping_Ns_per_m: must be a finite number, but it is missing"]),
         (HEAD + "1\n", ["line 2: damping_Ns_per_m: must be a finite number, but it is missing"]),
+        (HEAD + "1,2\n4000,5,10\n", ["line 3: has 3 cells, but the header names 2 columns"]),
+        (HEAD + "1,2,\n", ["line 2: has 3 cells, but the header names 2 columns"]),
         (HEAD + "nan,1\n1,inf\n", ["line 2: stiffness_N_per_m: must be", "line 3: damping_Ns_per_m: must be"]),
         (HEAD + "1e400,1\n", ["line 2: stiffness_N_per_m: must be a finite number, got '1e400'"]),
         (HEAD + '"1,2\n', ["is not CSV"]),

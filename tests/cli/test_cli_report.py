@@ -41,6 +41,7 @@ def test_a_device_without_stable_walls_has_a_report_and_exit_code_1(tmp_path):
     assert ran.code == 1
     assert ran.document["reason"] == "no wall with positive stiffness and without negative damping is stable"
     assert ran.document["stiffness_max_N_per_m"] is None
+    assert ran.document["decided"] is True
     assert ran.document["file"] == str(file)
     assert "</html>" in file.read_text(encoding="utf-8")
     again = zwidth("report", TWO_MASS, *unstable, "--output", file)  # for people

@@ -13,6 +13,7 @@ from zwidth.show.cli.answer import Answer, deliver, sheet
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Numbers, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
+from zwidth.show.motions import counted
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
 from zwidth.show.units import amount
 
@@ -67,7 +68,8 @@ def chart(question: Question, window: Window | None, output: str | None, as_json
         with computing(question):
             found = _charted(question, device)
     except NoAnswer as none:
-        return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(none)), as_json)
+        unanswered = question.facts(device) | dict.fromkeys(KEYS) | {"decided": none.decided}
+        return deliver(Answer(unanswered, reason=str(none)), as_json)
     answer = _answer(question, device, found, path)
     if path is not None:
         _write(path, found, answer, window)
@@ -118,7 +120,7 @@ def boundary_table(chart: StabilityChart) -> dict[str, list[Any]]:
 
 
 def _answer(question: Question, device: Device, chart: StabilityChart, path: Path | None) -> Answer:
-    document = question.facts(device) | numbers(chart)
+    document = question.facts(device) | numbers(chart) | {"decided": True}
     if path is not None:
         document["file"] = str(path)
 
@@ -134,7 +136,7 @@ def _answer(question: Question, device: Device, chart: StabilityChart, path: Pat
 
 def _rows(chart: StabilityChart) -> Iterator[tuple[str, str]]:
     yield "largest stiffness", _stiffest(chart)
-    yield "largest damping", amount(chart.damping_max, "Ns/m")
+    yield "largest damping", _most_damped(chart)
     yield "stable area", amount(chart.stable_area, "N²s/m²")
     if chart.fastest_decay:
         fastest = chart.fastest_decay
@@ -143,7 +145,18 @@ def _rows(chart: StabilityChart) -> Iterator[tuple[str, str]]:
     if len(chart.regions) != 1:
         yield "stable regions", f"{len(chart.regions)}"
     if chart.unobserved_modes:
-        yield "moved by no wall", ", ".join(chart.unobserved_modes)
+        from zwidth.study.hidden import hidden_instability
+
+        names = ", ".join(counted(chart.unobserved_modes))
+        warned = "; WARNING: so that the device runs away, whatever the wall"
+        yield "moved by no wall", names + (warned if hidden_instability(chart.loop) else "")
+
+
+def _most_damped(chart: StabilityChart) -> str:
+    damping = amount(chart.damping_max, "Ns/m")
+    if chart.damping_max > 0.0 or not chart.regions:
+        return damping
+    return f"{damping}, because walls of small stiffness are unstable at any damping"
 
 
 def _stiffest(chart: StabilityChart) -> str:

@@ -9,7 +9,7 @@ import click
 
 from zwidth.show.cli.answer import Answer, deliver, table
 from zwidth.show.cli.computing import NoAnswer, computing
-from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, output_option
+from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, named, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.cli.points import Walls, read_walls
 from zwidth.show.output import DATA, destination, write_data
@@ -30,7 +30,9 @@ SHOWN: Final = 200  # rows printed for people; --json and --output hold all
     ),
 )
 @about_a_device
-@click.option("--points", metavar="FILE.csv", help="Walls: columns stiffness_N_per_m, damping_Ns_per_m.")
+@click.option(
+    "--points", metavar="FILE.csv", callback=named, help="Walls: columns stiffness_N_per_m, damping_Ns_per_m."
+)
 @click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of one wall [N/m].")
 @click.option("--damping", metavar="B", type=Finite(), help="Damping of one wall [Ns/m].")
 @output_option("Write the verdicts (.csv .json).")

@@ -113,10 +113,17 @@ def _axis(ctx: click.Context, param: click.Parameter, value: str | None) -> None
         raise click.BadParameter("moments about an axis are not supported yet; use --direction")
 
 
+def named(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """A callback that refuses an empty name."""
+    if value == "":
+        raise click.BadParameter("is empty; give a name (is a variable of the shell not set?)")
+    return value
+
+
 def about_a_device(command: Command) -> Command:
     """Give a command DEVICE and the options that say what of it is meant, as one `Question`."""
     decorators = [
-        click.argument("device", metavar="DEVICE"),
+        click.argument("device", metavar="DEVICE", callback=named),
         click.option(
             "--at", type=Numbers("X,Y[,Z]", (2, 3), "0.1,0.25"), help="Posture, by the handle's position [m]."
         ),
@@ -153,7 +160,7 @@ def about_a_device(command: Command) -> Command:
 
 def output_option(what: str) -> Callable[[Command], Command]:
     """`--output FILE`, with what its ending may be."""
-    return click.option("--output", metavar="FILE", help=what)
+    return click.option("--output", metavar="FILE", callback=named, help=what)
 
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")

@@ -29,6 +29,12 @@ def read_walls(file: str) -> Walls:
         header = [name.strip() for name in next(_filled(rows), [])]
         places = _places(file, header)
         for row in _filled(rows):
+            if len(row) > len(header):
+                faults.append(
+                    f"{file}: line {rows.line_num}: has {len(row)} cells, but the header names {len(header)} "
+                    "columns; write a decimal point, not a comma, or name every column"
+                )
+                continue
             wall = []
             for name, place in zip(COLUMNS, places, strict=True):
                 value, fault = _number(row[place].strip() if place < len(row) else "")

@@ -35,9 +35,10 @@ def report(question: Question, output: str | None, as_json: bool) -> int:
             question.plant(device)  # whether it can be meant, before the heavy parts are imported
             found = _written(question, device, path)
     except NoAnswer as none:
-        return deliver(Answer(question.facts(device) | {"file": None}, reason=str(none)), as_json)
+        unanswered = question.facts(device) | {"file": None, "decided": none.decided}
+        return deliver(Answer(unanswered, reason=str(none)), as_json)
     reason = found.pop("reason", None)
-    document = found | question.facts(device)
+    document = found | question.facts(device) | {"decided": True}
     pages = [*(typed(sentence) for sentence in found["summary"]), f"written: {path}"]
     return deliver(Answer(document, lambda: pages, reason), as_json)
 
