@@ -317,6 +317,14 @@ def test_a_two_mass_plant_is_its_own_two_mass_model():
     assert [float(v) for v in vars(found).values()] == pytest.approx([0.2616, 0.0254, 0.287, 15620], rel=1e-12)
 
 
+def test_a_two_mass_plant_with_drag_and_its_link_side_held_fixed():
+    """Rows and columns of the motor side are what is left: b + c of the motor, whatever drags the link."""
+    dragged = replace(PUBLISHED, damping=PUBLISHED.damping + np.diag([0.7, 0.2]))
+    motor = reduce_plant(dragged, "motor-mass")
+    assert motor.damping.ravel() == pytest.approx([1.8744 + 0.2], rel=1e-12)
+    assert reduce_plant(dragged, "two-mass") is dragged
+
+
 def test_other_coordinates_of_the_same_plant_give_the_same_numbers():
     """x = T z with any regular T: handle and motor in mixed coordinates, drag to the ground included."""
     T = np.random.default_rng(4).normal(size=(2, 2))
@@ -332,6 +340,9 @@ def test_other_coordinates_of_the_same_plant_give_the_same_numbers():
     two = reduce_plant(mixed, "two-mass")
     assert two.mass == pytest.approx(PUBLISHED.mass, rel=1e-9)
     assert two.stiffness == pytest.approx(PUBLISHED.stiffness, rel=1e-9)
+    assert two.damping == pytest.approx(PUBLISHED.damping + drag, rel=1e-9)
+    motor = reduce_plant(mixed, "motor-mass")
+    assert motor.damping == pytest.approx(two.damping[1:, 1:], rel=1e-12)  # the link side held fixed
     assert reduce_plant(mixed, "rigid").damping[0, 0] == pytest.approx(0.5, rel=1e-9)
 
 

@@ -87,7 +87,7 @@ def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     table[last] = value
     dropped = [key for key in _rivals(tuple(outer), last) if table.pop(key, UNSET) is not UNSET]
     if dropped:  # the table may now be of another kind, as a filter is that gets the other filter's key
-        table.update({"type": kind for kind, keys in schema.kinds(tuple(outer)).items() if last in keys})
+        table.update(("type", kind) for kind, keys in schema.kinds(tuple(outer)).items() if last in keys)
     return document
 
 

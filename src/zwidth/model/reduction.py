@@ -82,11 +82,12 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
 
     With a the actuator, h the handle and Z the rigid modes of K:
 
-    two-mass    1/(h^T M^-1 h), 1/(a^T M^-1 a), spring 1/((a-h)^T K^+ (a-h)), damper x^T B x of the static
-                deflection x that one metre between actuator and handle makes
+    two-mass    1/(h^T M^-1 h), 1/(a^T M^-1 a), spring 1/((a-h)^T K^+ (a-h)), dampers W^T B W: the columns of W
+                are the motions of one side alone, made of the rigid motion and of the static deflection x by
+                one metre between actuator and handle; without drag that is x^T B x between the masses
     motor-mass  the same, the link side held fixed
-    rigid       1/(a^T Z (Z^T M Z)^-1 Z^T a), damper x^T B x of the rigid motion x of one metre at the
-    actuator
+    rigid       1/(a^T Z (Z^T M Z)^-1 Z^T a), damper x^T B x of the rigid motion x of one metre at
+                the actuator
 
     Returns  Plant; `full` gives the plant itself, and so does the model it already is
     Raises   ModelError  where the model does not apply, with the reason
@@ -96,17 +97,14 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
         return plant
     if model == "rigid":
         mass, motion = _rigid_motion(plant)
-        drag = float(motion @ plant.damping @ motion)
-        # dampers inside the plant leave rounding on a rigid motion, no drag
-        inside = float(np.abs(motion) @ np.abs(plant.damping) @ np.abs(motion))
-        return plant if plant.size == 1 else _rigid(mass, drag if drag > 1e-12 * inside else 0.0)
+        return plant if plant.size == 1 else _rigid(mass, _drag(plant, motion))
     stiffness, deflection = _spring(plant)
     assert plant.handle is not None  # _spring has checked
     link, motor = _mass_at(plant, plant.handle), _mass_at(plant, plant.actuator)
-    damping = float(deflection @ plant.damping @ deflection)
+    pair = replace(_pair(link, motor, 0.0, stiffness), damping=_side_damping(plant, deflection))
     if model == "motor-mass":
-        return _motor_mass(motor, damping, stiffness)
-    return _pair(link, motor, damping, stiffness)
+        return _motor_mass(motor, float(pair.damping[1, 1]), stiffness)
+    return pair
 
 
 def plant_effective_parameters(plant: Plant) -> EffectiveParameters:
@@ -245,6 +243,32 @@ def _rigid_motion(plant: Plant) -> tuple[float, Floats]:
             "the plant has no rigid mode that the actuator moves: a spring ties it to the ground; use 'full'"
         )
     return 1.0 / mobility, Z @ participation / mobility
+
+
+def _drag(plant: Plant, motion: Floats) -> float:
+    """x^T B x of a rigid motion x; dampers inside the plant leave rounding on it, no drag."""
+    drag = float(motion @ plant.damping @ motion)
+    inside = float(np.abs(motion) @ np.abs(plant.damping) @ np.abs(motion))
+    return drag if drag > 1e-12 * inside else 0.0
+
+
+def _side_damping(plant: Plant, deflection: Floats) -> Floats:
+    """Damping of the two sides, (2, 2) on [link side, motor side]: W^T B W, or x^T B x between them.
+
+    With r the rigid motion of one metre, W = [r - w, w] with w = x + (1 - a . x) r, which moves the actuator by
+    one metre and the handle by none. What is tied to the ground has no r, and only the damper between.
+    """
+    between = float(deflection @ plant.damping @ deflection) * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    try:
+        _, rigid = _rigid_motion(plant)
+    except ModelError:
+        return between
+    if not _drag(plant, rigid):
+        return between
+    motor_alone = deflection + (1.0 - plant.actuator @ deflection) * rigid
+    sides = np.stack([rigid - motor_alone, motor_alone], axis=1)
+    damping = sides.T @ plant.damping @ sides
+    return np.asarray((damping + damping.T) / 2)
 
 
 def _spring(plant: Plant) -> tuple[float, Floats]:
