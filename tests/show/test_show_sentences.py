@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import numpy as np
 import pytest
 
 from zwidth.device.load import from_document, load
+from zwidth.show.motions import counted
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import gather
 
@@ -43,6 +45,25 @@ def far_sensor(stiffness=2000.0):
     return gather(from_document({"name": "far", "plant": plant, "loop": {"sampling_period_s": 0.001}}))
 
 
+@cache
+def held_back():
+    """A wall of reversed sign takes away the spring to the ground: K = 500 N/m, whatever else is changed."""
+    plant = {"mass_kg": 0.1, "damping_Ns_per_m": 2.0, "stiffness_N_per_m": 500.0, "sensor": [-1.0]}
+    return gather(from_document({"name": "back", "plant": plant, "loop": {"sampling_period_s": 0.001}}))
+
+
+@cache
+def runaway(damping=1.0, stiffness=-50.0):
+    plant = {
+        "mass_kg": [[0.1, 0.0], [0.0, 0.2]],
+        "damping_Ns_per_m": [[1.0, 0.0], [0.0, damping]],
+        "stiffness_N_per_m": [[0.0, 0.0], [0.0, stiffness]],
+        "actuator": [1.0, 0.0],
+        "sensor": [1.0, 0.0],
+    }
+    return gather(from_document({"name": "away", "plant": plant, "loop": {"sampling_period_s": 0.001}}))
+
+
 def plain(text):
     return text.replace("\u00a0", " ")
 
@@ -55,20 +76,23 @@ BY_SPRING = "it is its flexibility, at 131 Hz: if it were rigid it would reach"
 ONE_LATE = "with one sample of delay it would"
 
 RENDERS = [
-    (lambda: facts("five-bar"), f"{HERE} 7.8 kN/m, at 11 Ns/m of virtual damping."),
-    (lambda: facts("five-bar", LATE), f"{HERE} 1.7 kN/m, at 3.2 Ns/m of virtual damping."),
+    (lambda: facts("five-bar"), f"{HERE} 7.84 kN/m, at 10.8 Ns/m of virtual damping."),
+    (lambda: facts("five-bar", LATE), f"{HERE} 1.70 kN/m, at 3.22 Ns/m of virtual damping."),
     (
         lambda: facts("five-bar", at=(0.02, 0.2), direction=(-1.0, 0.0)),
         "Along −x at (0.02, 0.2) m this device renders walls of up to ",
     ),
     (
         lambda: facts("five-bar", model="rigid"),
-        "Along y at (0, 0.25) m the rigid model of this device renders walls of up to 130 kN/m,",
+        "Along y at (0, 0.25) m the rigid model of this device renders walls of up to 126 kN/m,",
     ),
-    (lambda: facts("hapkit-course"), "This device renders walls of up to 22 kN/m, at 25 Ns/m of virtual damping."),
+    (
+        lambda: facts("hapkit-course"),
+        "This device renders walls of up to 21.9 kN/m, at 24.7 Ns/m of virtual damping.",
+    ),
     (
         lambda: facts("hapkit-course", FILTER),
-        "This device renders walls of up to 2.0 kN/m, those without any virtual damping; every bit",
+        "This device renders walls of up to 2.01 kN/m, those without any virtual damping; every bit",
     ),
     (
         lambda: facts("published-two-mass", UNDAMPED, LATE),
@@ -83,7 +107,7 @@ def test_what_it_renders(of, text):
 
 
 LIMIT = [
-    (lambda: facts("five-bar"), f"{BY_DRIVES} 126 kN/m; {ONE_LATE} fall to 1.71 kN/m."),
+    (lambda: facts("five-bar"), f"{BY_DRIVES} 126 kN/m; {ONE_LATE} fall to 1.70 kN/m."),
     (lambda: facts("published-two-mass"), f"What limits {BY_SPRING} 126 kN/m; {ONE_LATE} fall to 1.10 kN/m."),
     (lambda: facts("five-bar", LATE), f"{BY_DRIVES} 26.5 kN/m."),
     (
@@ -92,17 +116,22 @@ LIMIT = [
     ),
     (
         lambda: facts("five-bar", *RIGID, LATE),
-        "What limits it is the delay of 1 sample (1.25 ms): without it it would reach 126 kN/m.",
+        "What limits it is the delay of 1 sample (1.25 ms): without this delay it would reach 126 kN/m.",
     ),
     (
         lambda: facts("five-bar", FILTER),
-        "What limits it is the filter of the velocity: without it it would reach 7.85 kN/m;",
+        "What limits it is the filter of the velocity: without this filter it would reach 7.84 kN/m;",
     ),
     (
         lambda: one_mass(0.1, 9.347, 1669590.0),
         "What limits it is how little it damps its own vibrations: with twice the structural damping it",
     ),
-    (lambda: far_sensor(), f"None of the single changes tried lets it render a stiffer wall; {ONE_LATE} fall to"),
+    (lambda: held_back(), "None of the single changes tried lets it render a stiffer wall"),
+    (
+        lambda: far_sensor(),
+        "What limits it is that the sensor does not sit where the wall acts: with the sensor at the actuator it "
+        "would reach",
+    ),
     (
         lambda: facts("published-two-mass", UNDAMPED),
         f"What limits {BY_SPRING} 126 kN/m; {ONE_LATE} render no wall at all.",
@@ -130,10 +159,10 @@ def test_at_which_vibration(of, text):
 
 
 NEXT = [
-    (lambda: facts("five-bar"), "The next best single change, half the sampling period, would reach 42.1 kN/m."),
-    (lambda: facts("five-bar", LATE), "The next best single change, no delay, would reach 7.85 kN/m."),
+    (lambda: facts("five-bar"), "The next best single change, half the sampling period, would reach 42.0 kN/m."),
+    (lambda: facts("five-bar", LATE), "The next best single change, no delay, would reach 7.84 kN/m."),
     (lambda: facts("five-bar", *RIGID), ""),
-    (far_sensor, ""),
+    (lambda: held_back(), ""),
 ]
 
 
@@ -153,13 +182,38 @@ def test_unobserved_motions_are_named():
     assert "rigid motion (0 Hz)" in sentences.unobserved(facts("five-bar"))
 
 
+def test_equal_motions_are_counted():
+    assert counted(["rigid motion (0 Hz)"] * 2) == ["2 rigid motions (0 Hz)"]
+    assert counted(["mode at 9 Hz (x)", "mode at 8 Hz"]) == ["mode at 9 Hz (x)", "mode at 8 Hz"]
+
+
+def test_a_device_that_runs_away_is_warned_of_first():
+    for of in (runaway(), runaway(-1.0, 50.0), runaway(-1.0, 0.0)):
+        assert sentences.summary(of)[0].startswith("Warning: this device runs away whatever the wall")
+        assert sentences.unobserved(of) == ""
+    for of in (runaway(1.0, 50.0), runaway(1.0, 0.0), facts("five-bar")):
+        assert sentences.warning(of) == ""
+
+
+def test_what_happens_outside_depends_on_the_edge():
+    assert "the straight edge at K = 0 (0 Hz), the handle drifts away" in sentences.outside(facts("five-bar"))
+    assert "at K = −5.00 kN/m (0 Hz)" in plain(sentences.outside(one_mass(0.1, 1.0, 5000.0)))
+
+
+@pytest.mark.parametrize("of", [lambda: facts("five-bar"), lambda: facts("five-bar", LATE), far_sensor])
+def test_up_to_promises_no_more_than_there_is(of):
+    found = of()
+    value, prefix = re.search(r"up to ([\d.]+) (k?)N/m", plain(sentences.renders(found))).groups()
+    assert 0.99 * found.base.stiffness_max < float(value) * (1e3 if prefix else 1.0) <= found.base.stiffness_max
+
+
 def test_the_nearest_model():
     full = sentences.models(facts("five-bar"))
     assert plain(full) == (
-        "Of the simpler models, motor mass with damping comes nearest: 7.98 kN/m, 1.6 % above the device "
+        "Of the simpler models, motor mass with damping comes nearest: 7.97 kN/m, 1.6 % above the device "
         "as described."
     )
-    assert "rigid without damping comes nearest: 20.6 kN/m, 6.2 % below" in plain(
+    assert "rigid without damping comes nearest: 20.5 kN/m, 6.2 % below" in plain(
         sentences.models(facts("hapkit-course"))
     )
     assert sentences.models(facts("published-two-mass", UNDAMPED, LATE)) == ""

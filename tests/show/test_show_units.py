@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given as over
 from hypothesis import strategies as st
 
-from zwidth.show.units import NONE, PREFIXES, amount, given, number, point, quantity, vector
+from zwidth.show.units import NONE, PREFIXES, amount, at_most, given, number, point, quantity, scaled, vector
 
 
 @pytest.mark.parametrize(
@@ -19,6 +19,10 @@ from zwidth.show.units import NONE, PREFIXES, amount, given, number, point, quan
         (999.96, "N/m", 3, "1.00 kN/m"),
         (0.9999, "Ns/m", 2, "1.0 Ns/m"),
         (126043.4, "N/m", 3, "126 kN/m"),
+        (1e-5, "N/m", 3, "1.00\u2009×\u200910⁻⁵ N/m"),
+        (3e9, "N/m", 3, "3.00\u2009×\u200910⁹ N/m"),
+        (0.02, "Ns/m", 3, "0.0200 Ns/m"),
+        (25000.0, "Ns/m", 3, "2.50\u2009×\u200910⁴ Ns/m"),
         (-9145.7, "N/m", 3, "−9.15 kN/m"),
         (0.0253667, "kg", 4, "0.02537 kg"),
         (164944.5, "N²s/m²", 3, "1.65\u2009×\u200910⁵ N²s/m²"),
@@ -31,7 +35,7 @@ def test_quantities(value, unit, digits, text):
     assert quantity(value, unit, digits).replace("\u00a0", " ") == text
 
 
-@over(st.floats(1e-8, 1e11), st.integers(2, 5), st.sampled_from([1.0, -1.0]))
+@over(st.floats(1e-3, 9e8), st.integers(2, 5), st.sampled_from([1.0, -1.0]))
 def test_a_quantity_reads_back_as_the_rounded_value(value, digits, sign):
     text = quantity(sign * value, "N/m", digits)
     mantissa, prefix = re.fullmatch(r"(−?[\d.]+)\u00a0(\D?)N/m", text).groups()
@@ -43,6 +47,26 @@ def test_a_quantity_reads_back_as_the_rounded_value(value, digits, sign):
 @over(st.floats(-1e12, 1e12))
 def test_numbers_have_no_hyphen_for_a_minus(value):
     assert "-" not in number(value)
+
+
+@over(st.floats(1e-8, 1e12), st.integers(2, 5))
+def test_a_largest_value_is_never_rounded_up(value, digits):
+    text = at_most(value, "kg", digits).split("\u00a0")[0].replace("\u2009", "")
+    read = float(text.replace("×10", "e").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
+    assert value * (1.0 - 1.001 * 10.0 ** (1 - digits)) <= read <= value * (1.0 + 1e-15)
+
+
+def test_largest_values():
+    assert at_most(147.04, "N/m") == "147\u00a0N/m"
+    assert at_most(147.96, "N/m") == "147\u00a0N/m"
+    assert at_most(math.nan, "N/m") == "–"
+
+
+@over(st.floats(1e-12, 1e15))
+def test_damping_takes_no_prefix(value):
+    assert all(write(value, "Ns/m").endswith("\u00a0Ns/m") for write in (quantity, given))
+    assert scaled(-3, "Ns/m") == "10⁻³\u00a0Ns/m"
+    assert (scaled(3, "N/m"), scaled(9, "N/m")) == ("kN/m", "10⁹\u00a0N/m")
 
 
 def test_what_somebody_chose_is_not_padded():

@@ -118,7 +118,33 @@ def test_where_nothing_is_stable_the_stiffness_is_zero_and_not_unknown():
     assert (base.stiffness_max, base.area, base.frequencies) == (0.0, 0.0, ())
 
 
+FAR = {
+    "name": "read at the far mass, tied to the ground",
+    "plant": {
+        "mass_kg": [[0.2, 0.0], [0.0, 0.1]],
+        "damping_Ns_per_m": [[0.6, -0.1], [-0.1, 0.1]],
+        "stiffness_N_per_m": [[4000.0, -2000.0], [-2000.0, 2000.0]],
+        "actuator": [1.0, 0.0],
+        "sensor": [0.0, 1.0],
+    },
+    "loop": {"sampling_period_s": 0.001},
+}
+
+
+def test_the_sensor_moves_to_the_actuator():
+    moved = from_document(FAR | {"plant": FAR["plant"] | {"sensor": [1.0, 0.0]}})
+    found = find(what_if(from_document(FAR)), "collocated")
+    assert found.stiffness_max == pytest.approx(what_if(moved)[0].stiffness_max, rel=1e-9)
+    assert find(what_if(moved), "collocated").reason == "the sensor reads where the wall acts already"
+
+
+def test_rigid_is_called_after_what_becomes_rigid():
+    assert find(what_if(load("five-bar")), "rigid-drives").label == "rigid drives"
+    assert find(what_if(load("published-two-mass")), "rigid-drives").label == "rigid structure"
+
+
 LIMITS = {
+    "collocated": from_document(FAR),
     "rigid-drives": load("five-bar"),
     "half-period": load("five-bar", RIGID),
     "no-delay": load("five-bar", [*RIGID, "loop.delay_samples=1"]),
@@ -139,13 +165,12 @@ def test_what_limits_is_the_change_that_gains_most(key):
 
 def test_nothing_limits_where_no_change_helps():
     document = {
-        "name": "read at the far mass, tied to the ground",
+        "name": "read with the wrong sign, tied to the ground",
         "plant": {
-            "mass_kg": [[0.2, 0.0], [0.0, 0.1]],
-            "damping_Ns_per_m": [[0.6, -0.1], [-0.1, 0.1]],
-            "stiffness_N_per_m": [[4000.0, -2000.0], [-2000.0, 2000.0]],
-            "actuator": [1.0, 0.0],
-            "sensor": [0.0, 1.0],
+            "mass_kg": 0.1,
+            "damping_Ns_per_m": 2.0,
+            "stiffness_N_per_m": 500.0,
+            "sensor": [-1.0],
         },
         "loop": {"sampling_period_s": 0.001},
     }

@@ -1,18 +1,20 @@
 """Numbers with units for people: sensible digits, SI prefixes, a real minus sign.
 
-Figures and reports use `quantity`, `number` and `point`; terminals `amount` and `vector`, the same notation
-with blanks and signs that can be typed and searched.
+Figures and reports use `quantity`, `at_most`, `number` and `point`; terminals `amount` and `vector`, the same
+notation with blanks and signs that can be typed and searched.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from decimal import ROUND_DOWN, Context
 from math import floor, isfinite, isnan, log10
 from typing import Final
 
 PREFIXES: Final = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-# Units that take no prefix: kg has one, and a prefix before a square would be squared with it.
-PLAIN: Final = ("kg", "N²s/m²", "")
+# Prefixes, as powers of ten, that a unit may take; one that is not named takes none: kg has a prefix already, one
+# before a square would be squared with it, and mNs/m reads as a metre-newton.
+_TAKES: Final = {"N/m": (0, 3, 6), **dict.fromkeys(("Hz", "s", "m", "N"), tuple(PREFIXES))}
 SPACE: Final = "\u00a0"
 MINUS: Final = "\u2212"
 THIN: Final = "\u2009"
@@ -27,6 +29,23 @@ def exponent_of(value: float) -> int:
     if value == 0.0 or not isfinite(value):
         return 0
     return min(max(3 * floor(log10(abs(value)) / 3.0 + 1e-12), -9), 9)
+
+
+def scaled(exponent: int, unit: str) -> str:
+    """A unit under a power of ten: the prefix where the unit may take it, else the power itself.
+
+    >>> scaled(3, "N/m"), scaled(3, "Ns/m"), scaled(0, "Ns/m")
+    ('kN/m', '10³\xa0Ns/m', 'Ns/m')
+    """
+    if exponent == 0 or exponent in _TAKES.get(unit, ()):
+        return f"{PREFIXES[exponent]}{unit}"
+    return f"10{str(exponent).translate(_RAISED)}{SPACE}{unit}"
+
+
+def _prefixed(value: float, unit: str) -> int:
+    """The power of ten of the prefix that a value of this unit is written with; 0 for none."""
+    exponent = exponent_of(value)
+    return exponent if exponent in _TAKES.get(unit, ()) else 0
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -54,15 +73,26 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     """A value with its unit and the prefix that suits it; a dash where the value is not known (nan).
 
     >>> quantity(7849.44, "N/m", 2), quantity(0.02, "Ns/m"), quantity(0.2616, "kg")
-    ('7.8\xa0kN/m', '20.0\xa0mNs/m', '0.262\xa0kg')
+    ('7.8\xa0kN/m', '0.0200\xa0Ns/m', '0.262\xa0kg')
     """
     if isnan(value):
         return UNKNOWN
-    if unit in PLAIN or not isfinite(value):
+    if not isfinite(value):
         return f"{number(value, digits)}{SPACE}{unit}".strip()
     rounded = float(f"{value:.{digits - 1}e}")  # so that 999.96 becomes 1.00 k, not 1000
-    exponent = exponent_of(rounded)
-    return f"{number(rounded / 10.0**exponent, digits)}{SPACE}{PREFIXES[exponent]}{unit}"
+    exponent = _prefixed(rounded, unit)
+    return f"{number(rounded / 10.0**exponent, digits)}{SPACE}{PREFIXES[exponent]}{unit}".strip()
+
+
+def at_most(value: float, unit: str, digits: int = 3) -> str:
+    """A largest value, rounded towards 0, so that it promises no more than there is.
+
+    >>> at_most(147.04, "N/m"), at_most(7849.44, "N/m")
+    ('147\xa0N/m', '7.84\xa0kN/m')
+    """
+    if isfinite(value):
+        value = float(Context(prec=digits, rounding=ROUND_DOWN).create_decimal(repr(float(value))))
+    return quantity(value, unit, digits)
 
 
 def given(value: float, unit: str) -> str:
@@ -71,9 +101,12 @@ def given(value: float, unit: str) -> str:
     >>> given(0.00125, "s"), given(0.03, "kg"), given(1000.0, "Hz")
     ('1.25\xa0ms', '0.03\xa0kg', '1\xa0kHz')
     """
-    exponent = 0 if unit in PLAIN else exponent_of(value)
-    shown = f"{value / 10.0**exponent:.6g}".replace("-", MINUS)
-    return f"{shown}{SPACE}{PREFIXES[exponent]}{unit}"
+    exponent = _prefixed(value, unit)
+    shown = f"{value / 10.0**exponent:.6g}"
+    if "e" in shown:
+        mantissa, power = shown.split("e")
+        shown = f"{mantissa}{THIN}×{THIN}10{str(int(power)).translate(_RAISED)}"
+    return f"{shown.replace('-', MINUS)}{SPACE}{PREFIXES[exponent]}{unit}"
 
 
 def point(coordinates: Iterable[float], unit: str = "m") -> str:

@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from math import isnan, nan
 from typing import Any, Final
 
+import numpy as np
+
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.region import ChartError
 from zwidth.device.device import Device
@@ -22,7 +24,7 @@ from zwidth.model.reduction import ModelError
 
 BASE: Final = "as-described"
 # The changes a designer may hope for, of which the one that gains most names what limits the device.
-REMEDIES: Final = ("rigid-drives", "half-period", "no-delay", "no-filter", "twice-damping")
+REMEDIES: Final = ("rigid-drives", "half-period", "no-delay", "no-filter", "twice-damping", "collocated")
 MODELS: Final = ("full", "two-mass", "motor-mass", "motor-mass-undamped", "rigid-undamped")
 WORTH: Final = 1.01  # a change that gains less than 1 % does not count as one that helps
 THESIS_CUTOFF_HZ: Final = 20.0
@@ -143,8 +145,9 @@ def _changes(device: Device, plant: Plant, reduce: Reduce) -> Iterator[Step]:
     usual = usual_filter(controller.sampling_period)
     own = "structural damping" if flexible else "friction"
 
-    rigid = only(flexible, "its drives are rigid already")
-    yield "rigid-drives", "rigid drives", rigid, lambda: Loop(reduce("rigid"), controller)
+    rigid = only(flexible, f"its {'drives are' if device.mechanism is not None else 'structure is'} rigid already")
+    name = "rigid drives" if device.mechanism is not None else "rigid structure"
+    yield "rigid-drives", name, rigid, lambda: Loop(reduce("rigid"), controller)
     yield "half-period", "half the sampling period", "", lambda: Loop(plant, half_period(device))
     yield "no-delay", "no delay", only(delay != 0.0, "the device has no delay"), computed(delay=0.0)
     late = only(delay != 1.0, "the device has one sample of delay")
@@ -157,6 +160,16 @@ def _changes(device: Device, plant: Plant, reduce: Reduce) -> Iterator[Step]:
     twice = replace(plant, damping=2.0 * plant.damping)
     lossless = only(damped, f"the device has no {own}")
     yield "twice-damping", f"twice the {own}", lossless, lambda: Loop(twice, controller)
+    there = only(not _collocated(plant), "the sensor reads where the wall acts already")
+    moved = replace(plant, sensor=plant.actuator)
+    yield "collocated", "sensor at the actuator", there, lambda: Loop(moved, controller)
+
+
+def _collocated(plant: Plant) -> bool:
+    """Does the sensor read along the coordinate on which the wall acts, whatever its gain?"""
+    sensor, actuator = plant.sensor, plant.actuator
+    along = float(sensor @ actuator) / float(actuator @ actuator)
+    return bool(np.max(np.abs(sensor - along * actuator)) <= 1e-9 * np.max(np.abs(sensor)))
 
 
 def _models(device: Device, reduce: Reduce) -> Iterator[Step]:

@@ -27,7 +27,8 @@ def _computer(controller: Controller) -> str:
     from zwidth.loop.controller import FirstOrder
 
     period = f"{1e3 * controller.sampling_period:.6g} ms"
-    delay = f"{controller.delay:.6g} samples of delay" if controller.delay else "no delay"
+    samples = "sample" if controller.delay == 1.0 else "samples"
+    delay = f"{controller.delay:.6g} {samples} of delay" if controller.delay else "no delay"
     low_pass = controller.velocity_filter
     if low_pass is None:
         velocity = "velocity not filtered"

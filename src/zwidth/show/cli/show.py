@@ -17,7 +17,7 @@ from zwidth.show.units import amount
 if TYPE_CHECKING:
     from zwidth.device.device import Device
     from zwidth.model.effective import EffectiveParameters
-    from zwidth.model.mechanism import Mechanism
+    from zwidth.model.mechanism import Floats, Mechanism
     from zwidth.model.plant import Plant
     from zwidth.model.posture import Posture
 
@@ -151,10 +151,11 @@ def _pages(question: Question, device: Device, document: Mapping[str, Any]) -> I
         ]
     )
     if found["joints_rad"]:
+        units = _dexterity_units(document["jacobian"])
         yield sheet(
             [
-                ("manipulability", amount(found["manipulability"])),
-                ("dynamic manipulability", amount(found["dynamic_manipulability"])),
+                ("manipulability", amount(found["manipulability"], units[0])),
+                ("dynamic manipulability", amount(found["dynamic_manipulability"], units[1])),
                 ("isotropy (1 is best)", amount(found["isotropy"])),
             ]
         )
@@ -165,6 +166,21 @@ def _pages(question: Question, device: Device, document: Mapping[str, Any]) -> I
         yield table(["numbers", "source"], list(found["sources"].items()))
     if "file" in found:
         yield f"written: {found['file']}"
+
+
+def _dexterity_units(jacobian: Floats) -> tuple[str, str]:
+    """Units of both manipulabilities, products of as many singular values as there are directions to move in.
+
+    jacobian  (3, d)  [m/rad]
+    """
+    import numpy as np
+
+    from zwidth.measures.dexterity import MOVES
+
+    rows = np.max(np.abs(jacobian), axis=1)
+    r = min(jacobian.shape[1], int(np.sum(rows > MOVES * np.max(rows))))
+    power = {2: "²", 3: "³"}.get(r, "")
+    return f"m{power}", f"1/(kg m){power}"
 
 
 def _modes(found: Mapping[str, Any]) -> Iterator[str]:

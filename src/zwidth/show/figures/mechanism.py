@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch
+from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.device.device import Device
@@ -37,10 +39,10 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
     size = max(float(np.max(np.ptp(everything[:, flat], axis=0))), 1e-9)
     for n, stroke in enumerate(strokes):
         _link(ax, stroke[:, flat], mechanism.links.names[n], n)
-    _joints(ax, mechanism, placed, flat, size)
+    _joints(ax, mechanism, placed, flat, size, [stroke[:, flat] for stroke in strokes])
     _handle(ax, posture.position[flat], np.asarray(direction, dtype=float)[flat], size)
     ax.set_aspect("equal")
-    ax.margins(0.12)
+    ax.margins(0.12, 0.06)
     ax.autoscale_view()
     ax.grid(color="#E4E4E4", linewidth=0.5)
     ax.set_axisbelow(True)
@@ -79,7 +81,9 @@ def _link(ax: Axes, stroke: Floats, name: str, n: int) -> None:
     ax.plot(*stroke.T, color=colour, linestyle=LINES[n % len(LINES)][1], linewidth=1.2, label=name, zorder=2.1)
 
 
-def _joints(ax: Axes, mechanism: Mechanism, placed: LinkPoints, flat: list[int], size: float) -> None:
+def _joints(
+    ax: Axes, mechanism: Mechanism, placed: LinkPoints, flat: list[int], size: float, strokes: list[Floats]
+) -> None:
     """Base, joints and loop closures; driven joints filled, with the names of their drives."""
     links, closures, drives = mechanism.links, mechanism.closures, mechanism.drives
     turning = np.flatnonzero(links.joint == REVOLUTE)
@@ -97,16 +101,38 @@ def _joints(ax: Axes, mechanism: Mechanism, placed: LinkPoints, flat: list[int],
     if len(driven):
         ax.plot(*driven.T, markerfacecolor=BLUE, zorder=3.1, label="driven joint", **circle)
     for place, names in _together(driven, drives.names, SAME_POINT * max(size, 1.0)):
+        aside = _free_side(place, strokes, SAME_POINT * max(size, 1.0))
+        room = place + 0.2 * size * aside  # texts do not widen the view
+        ax.plot(*room[:, None], linestyle="none", marker=None)
         ax.annotate(
             "\n".join(names),
             (float(place[0]), float(place[1])),
-            xytext=(9, -3),
+            xytext=(float(16.0 * aside[0]), float(16.0 * aside[1])),
             textcoords="offset points",
-            va="top",
+            ha="left" if aside[0] > 0.3 else "right" if aside[0] < -0.3 else "center",
+            va="bottom" if aside[1] > 0.3 else "top" if aside[1] < -0.3 else "center",
             fontsize=8.0,
             color=BLACK,
+            path_effects=[withStroke(linewidth=3.0, foreground="white")],
             zorder=5.0,
         )
+
+
+def _free_side(place: Floats, strokes: list[Floats], near: float) -> Floats:
+    """Unit vector (2,) into the middle of the widest gap between the lines at a point; right if there is none."""
+    angles = []
+    for stroke in strokes:
+        for a, b in pairwise(stroke):
+            angles += [
+                float(np.arctan2(*(to - start)[::-1]))
+                for start, to in ((a, b), (b, a))
+                if np.linalg.norm(start - place) <= near < np.linalg.norm(to - start)
+            ]
+    around = np.unique(np.array(angles or [np.pi]))
+    gaps = np.diff(around, append=around[0] + 2.0 * np.pi)
+    widest = int(np.argmax(gaps))
+    middle = around[widest] + 0.5 * gaps[widest]
+    return np.array([np.cos(middle), np.sin(middle)])
 
 
 def _together(points: Floats, names: tuple[str, ...], near: float) -> list[tuple[Floats, list[str]]]:

@@ -11,7 +11,7 @@ from matplotlib.patches import Polygon
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above
-from zwidth.show.units import quantity
+from zwidth.show.units import at_most, quantity
 
 # KMIN, KMAX [N/m], BMIN, BMAX [N s/m]
 Window = tuple[float, float, float, float]
@@ -53,7 +53,7 @@ def draw_models(ax: Axes, charts: Mapping[str, StabilityChart], window: Window |
 
 
 def _mark_stiffest(ax: Axes, chart: StabilityChart) -> None:
-    numbers = f"{quantity(chart.stiffness_max, 'N/m')} at {quantity(chart.damping_at_stiffness_max, 'Ns/m')}"
+    numbers = f"{at_most(chart.stiffness_max, 'N/m')} at {quantity(chart.damping_at_stiffness_max, 'Ns/m')}"
     vibration = " and ".join(quantity(f, "Hz") for f in chart.frequencies_at_stiffness_max)
     ax.plot(
         [chart.stiffness_max],

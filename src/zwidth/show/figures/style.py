@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter
 
 from zwidth.show.output import replacing
-from zwidth.show.units import MINUS, PREFIXES, exponent_of
+from zwidth.show.units import MINUS, exponent_of, scaled
 
 BLACK: Final = "#000000"
 BLUE: Final = "#0072B2"
@@ -120,7 +120,7 @@ def inline_svg(made: Figure, name: str, description: str) -> str:
 
 
 class Prefixed(Formatter):
-    """Tick labels under an SI prefix common to the axis, which the axis's label names.
+    """Tick labels under an SI prefix, or a power of ten, common to the axis, which the axis's label names.
 
         Virtual stiffness [kN/m]   0  2  4  6  8
 
@@ -133,10 +133,13 @@ class Prefixed(Formatter):
 
     def set_locs(self, locs: Sequence[float]) -> None:
         low, high = sorted(self.of.get_view_interval())
-        self.exponent = 0 if self.plain else exponent_of(max(abs(low), abs(high)))
+        largest = max(abs(low), abs(high))
+        self.exponent = 0 if self.plain else exponent_of(largest)
+        if scaled(self.exponent, self.unit).startswith("10") and 0.01 <= largest < 1e4:
+            self.exponent = 0  # short enough without a power of ten
         inside = sorted({round(x / 10.0**self.exponent, 9) for x in locs if low <= x <= high})
         self.decimals = next((d for d in range(7) if all(abs(x - round(x, d)) < 1e-7 for x in inside)), 6)
-        self.of.set_label_text(f"{self.name} [{PREFIXES[self.exponent]}{self.unit}]")
+        self.of.set_label_text(f"{self.name} [{scaled(self.exponent, self.unit)}]")
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         return f"{x / 10.0**self.exponent + 0.0:.{self.decimals}f}".replace("-", MINUS)

@@ -14,6 +14,7 @@ from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import plant_effective_parameters
+from zwidth.study.hidden import hidden_instability
 from zwidth.study.what_if import BASE, Variant, find, what_if
 
 
@@ -27,6 +28,7 @@ class Facts:
     effective           masses and stiffness felt along the direction
     natural             undamped natural frequencies of the plant [Hz]; rigid modes 0
     bounds              the published conditions on the loop
+    runs_away           a motion that no wall moves grows by itself
     """
 
     device: Device
@@ -37,6 +39,7 @@ class Facts:
     effective: EffectiveParameters
     natural: Floats
     bounds: tuple[Bound, ...]
+    runs_away: bool
 
     @property
     def base(self) -> Variant:
@@ -90,4 +93,5 @@ def gather(
         effective=effective,
         natural=natural_frequencies(loop.plant),
         bounds=tuple(compare(loop)),
+        runs_away=hidden_instability(loop),
     )

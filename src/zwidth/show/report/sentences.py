@@ -11,8 +11,9 @@ import numpy as np
 from zwidth.loop.controller import Controller, FirstOrder
 from zwidth.model.mechanism import Floats
 from zwidth.show.figures.decay import tenfold_time
+from zwidth.show.motions import counted
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import MINUS, given, number, point, quantity
+from zwidth.show.units import MINUS, at_most, given, number, point, quantity
 from zwidth.study.what_if import REMEDIES, WORTH, Variant, find, limiting_change
 
 NO_WALL: Final = "no wall with positive stiffness and without negative damping is stable"
@@ -20,8 +21,20 @@ NO_WALL: Final = "no wall with positive stiffness and without negative damping i
 
 def summary(facts: Facts) -> list[str]:
     """What a reader in a hurry wants to know, in at most a handful of sentences."""
-    found = [renders(facts), limit(facts), vibration(facts), next_best(facts), regions(facts), unobserved(facts)]
+    found = [warning(facts), renders(facts), limit(facts), vibration(facts), next_best(facts), regions(facts)]
+    found += [unobserved(facts)]
     return [sentence for sentence in found if sentence]
+
+
+def warning(facts: Facts) -> str:
+    """Said before all else where the device runs away by itself; "" where it does not."""
+    if not facts.runs_away:
+        return ""
+    names = listed(counted(facts.chart.unobserved_modes))
+    return (
+        f"Warning: this device runs away whatever the wall, by a motion that no wall moves: {names}; "
+        "what is said below leaves that motion out."
+    )
 
 
 def where(facts: Facts) -> str:
@@ -48,7 +61,7 @@ def renders(facts: Facts) -> str:
     start = start[0].upper() + start[1:]
     if not facts.renders:
         return f"{start} renders no wall: {NO_WALL}."
-    stiffness = quantity(facts.base.stiffness_max, "N/m", 2)
+    stiffness = at_most(facts.base.stiffness_max, "N/m")
     if facts.base.damping <= 1e-9 * facts.chart.box[3]:
         return (
             f"{start} renders walls of up to {stiffness}, those without any virtual damping; "
@@ -56,7 +69,7 @@ def renders(facts: Facts) -> str:
         )
     return (
         f"{start} renders walls of up to {stiffness}, "
-        f"at {quantity(facts.base.damping, 'Ns/m', 2)} of virtual damping."
+        f"at {quantity(facts.base.damping, 'Ns/m')} of virtual damping."
     )
 
 
@@ -96,6 +109,8 @@ def _cause(facts: Facts, best: Variant) -> str:
         return f"the delay of {delay_name(controller)}"
     if best.key == "no-filter":
         return "the filter of the velocity"
+    if best.key == "collocated":
+        return "that the sensor does not sit where the wall acts"
     if best.key == "half-period":
         mass = float(facts.effective.rigid_mass)
         moved = "its mass" if isnan(mass) else f"its mass of {quantity(mass, 'kg', 2)}"
@@ -108,13 +123,14 @@ def _with(facts: Facts, best: Variant) -> str:
     return {
         "rigid-drives": rigid,
         "half-period": "sampled twice as fast",
-        "no-delay": "without it",
-        "no-filter": "without it",
+        "no-delay": "without this delay",
+        "no-filter": "without this filter",
+        "collocated": "with the sensor at the actuator",
     }.get(best.key, f"with {best.label}")
 
 
 def _reached(variant: Variant) -> str:
-    return quantity(variant.stiffness_max, "N/m", 3)
+    return at_most(variant.stiffness_max, "N/m")
 
 
 def _late(facts: Facts) -> str:
@@ -146,8 +162,23 @@ def regions(facts: Facts) -> str:
 
 def unobserved(facts: Facts) -> str:
     """Which motions were left out of the stability test; "" where none was."""
-    names = list(facts.chart.unobserved_modes)
-    return f"No wall moves the {listed(names)}: left out of what is called stable here." if names else ""
+    names = counted(facts.chart.unobserved_modes)
+    if not names or facts.runs_away:  # the warning has named them
+        return ""
+    the = "" if names[0][0].isdigit() else "the "
+    return f"No wall moves {the}{listed(names)}: left out of what is called stable here."
+
+
+def outside(facts: Facts) -> str:
+    """What happens on either side of the edge, as far as it has such sides."""
+    nyquist = 0.5 / facts.loop.period
+    straight = [arc for arc in facts.chart.boundary if np.all(arc.frequency <= 1e-9 * nyquist)]
+    text = "Walls inside the edge come to rest; outside, a vibration builds up"
+    if not straight:
+        return f"{text}."
+    K = float(np.mean(straight[0].stiffness))
+    place = "0" if abs(K) <= 1e-9 * (facts.chart.box[1] - facts.chart.box[0]) else quantity(K, "N/m")
+    return f"{text} or, across the straight edge at K = {place} (0 Hz), the handle drifts away without vibrating."
 
 
 def models(facts: Facts) -> str:

@@ -11,7 +11,7 @@ from zwidth.conditions import Bound
 from zwidth.model.mechanism import Floats
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import UNKNOWN, given, number, quantity
+from zwidth.show.units import UNKNOWN, at_most, given, number, quantity
 from zwidth.study.what_if import Variant
 
 Row = tuple[str, ...]
@@ -44,7 +44,7 @@ def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:
     return [
         (
             v.label,
-            quantity(v.stiffness_max, "N/m") if v.stiffness_max > 0.0 else "none",
+            at_most(v.stiffness_max, "N/m") if v.stiffness_max > 0.0 else "none",
             f"{number(v.stiffness_max / base)}\u00a0×" if base > 0.0 else UNKNOWN,
             quantity(v.damping, "Ns/m"),
             ", ".join(sentences.hertz(f) for f in v.frequencies) or UNKNOWN,
@@ -99,8 +99,8 @@ def _told(bound: Bound) -> str:
     if bound.stiffness_max == 0.0:
         return "none"
     if bound.damping_at_stiffness_max != bound.damping_at_stiffness_max:
-        return quantity(bound.stiffness_max, "N/m")
-    return f"{quantity(bound.stiffness_max, 'N/m')} at {quantity(bound.damping_at_stiffness_max, 'Ns/m')}"
+        return at_most(bound.stiffness_max, "N/m")
+    return f"{at_most(bound.stiffness_max, 'N/m')} at {quantity(bound.damping_at_stiffness_max, 'Ns/m')}"
 
 
 def document(facts: Facts) -> dict[str, Any]:

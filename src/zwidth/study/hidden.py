@@ -1,0 +1,47 @@
+"""Motions that grow by themselves and that no wall reaches: a chart leaves them out, a device does not."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.loop.hold import real_section
+from zwidth.loop.loop import Loop
+from zwidth.model.modes import damped_modes, real_modes
+from zwidth.model.plant import Plant
+
+Complex = NDArray[np.complex128]
+GROWS = 1e-12  # growth of |z|^2 - 1 in one sample that is no rounding
+
+
+def hidden_instability(loop: Loop) -> bool:
+    """Does the plant move by itself, ever faster, in a way that no wall moves or the sensor does not read?
+
+    True if the plant has more poles outside the unit circle than are left in the sampled sections, from which
+    such motions have been cancelled.
+    Raises  ModesError  as sampling the loop does
+    """
+    if not loop.unobserved_modes:
+        return False
+    seen = _of_sections(loop.sections.rows[:, :2])
+    return _growing(_poles(loop.plant, loop.period)) > _growing(seen)
+
+
+def _poles(plant: Plant, period: float) -> Complex:
+    """All poles of the sampled plant, as z - 1; those of free motions, which do not grow, may be missing."""
+    modes = real_modes(plant)
+    if modes is None:
+        return np.expm1(damped_modes(plant).poles * period)
+    pairs = zip(modes.decay.tolist(), modes.frequency_squared.tolist(), strict=True)
+    return _of_sections(np.array([real_section(decay, squared, period, 0.0)[:2] for decay, squared in pairs]))
+
+
+def _of_sections(denominators: NDArray[np.float64]) -> Complex:
+    """Roots e of e^2 + d1 e + d0 for each row d1, d0."""
+    roots = [np.roots([1.0, *row]) for row in denominators]
+    return np.concatenate([np.zeros(0, dtype=complex), *roots])
+
+
+def _growing(e: Complex) -> int:
+    """How many z = 1 + e lie outside the unit circle."""
+    return int(np.sum(2.0 * e.real + np.abs(e) ** 2 > GROWS))
