@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.hurwitz import edges_stable_set, working_room
-from zwidth.compiled import compiled
+from zwidth.compiled import compiled, compiled_lean
 from zwidth.loop.evaluate import Factors, divide, plant_response, velocity_response
 
 Floats = NDArray[np.float64]
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 OF_K, OF_B, OF_SLOPE = ((0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0, 0.0))
 
 
-@compiled
+@compiled_lean
 def on_circle(theta: float, radius: float) -> tuple[complex, complex]:
     """z = rho exp(i theta) and d = z - 1, the latter without cancellation near theta = 0."""
     s, c = np.sin(0.5 * theta), np.cos(0.5 * theta)
@@ -33,7 +33,7 @@ def on_circle(theta: float, radius: float) -> tuple[complex, complex]:
     return complex(radius + radius * away.real, radius * away.imag), (radius - 1.0) + radius * away
 
 
-@compiled
+@compiled_lean
 def wall_at(factors: Factors, radius: float, theta: float) -> tuple[float, float, float, float]:
     """K, B of the wall with a root at rho exp(i theta), and dK/dtheta, dB/dtheta."""
     rows, whole, split, numerator, denominator = factors
@@ -56,7 +56,7 @@ def wall_at(factors: Factors, radius: float, theta: float) -> tuple[float, float
     return K, B, dK, dB
 
 
-@compiled
+@compiled_lean
 def zero_between(
     factors: Factors, radius: float, weights: tuple[float, float, float, float, float], low: float, high: float
 ) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.compiled import compiled
+from zwidth.compiled import compiled, compiled_lean
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ def working_room(degree: int) -> Floats:
     return np.zeros((8, degree + 2))
 
 
-@compiled
+@compiled_lean
 def combine(polynomials: Floats, K: float, B: float, room: Floats) -> None:
     """p = A + K S + B V and its sizes, into rows 0 and 1."""
     for i in range(polynomials.shape[1]):
@@ -36,7 +36,7 @@ def combine(polynomials: Floats, K: float, B: float, room: Floats) -> None:
         room[1, i] = abs(a) + abs(s) + abs(v)
 
 
-@compiled
+@compiled_lean
 def deflate(room: Floats, degree: int, square: float) -> None:
     """Divide p (rows 0, 1) by s^2 + square, whose roots it has; the quotient goes into rows 2 and 3.
 
@@ -65,7 +65,7 @@ def deflate(room: Floats, degree: int, square: float) -> None:
             room[3, i - 2] += square * room[3, i]
 
 
-@compiled
+@compiled_lean
 def _start(room: Floats, row: int, degree: int, sign: float) -> None:
     """The first two rows of Routh's array, into rows 4 and 5."""
     for i in range(degree // 2 + 2):
@@ -74,7 +74,7 @@ def _start(room: Floats, row: int, degree: int, sign: float) -> None:
         room[5, i] = sign * room[row, j - 1] if j >= 1 else 0.0
 
 
-@compiled
+@compiled_lean
 def _plainly_hurwitz(room: Floats, row: int, degree: int) -> int:
     """Routh's array with one error bound for all of it: 1 or -1 where that settles the question, else 0.
 
@@ -107,7 +107,7 @@ def _plainly_hurwitz(room: Floats, row: int, degree: int) -> int:
     return 1
 
 
-@compiled
+@compiled_lean
 def hurwitz(room: Floats, row: int, degree: int) -> int:
     """Whether all roots of the polynomial in `row` (P or QUOTIENT) have Re s < 0: 1 yes, -1 no, 0 unsure.
 
@@ -142,7 +142,7 @@ def hurwitz(room: Floats, row: int, degree: int) -> int:
     return 1
 
 
-@compiled
+@compiled_lean
 def edges_stable_set(polynomials: Floats, theta: float, K: float, B: float, room: Floats) -> int:
     """Whether all roots but the pair at exp(+-i theta) lie inside the circle that `polynomials` were built for:
     1 yes, -1 no, 0 lost in rounding."""
@@ -156,7 +156,7 @@ def edges_stable_set(polynomials: Floats, theta: float, K: float, B: float, room
     return hurwitz(room, QUOTIENT, N - 2)
 
 
-@compiled
+@compiled_lean
 def edges_on_line(polynomials: Floats, low_end: int, K: float, B: float, room: Floats) -> int:
     """The same for a real root: without the lowest coefficient (low_end 1, root at s = 0) or the highest (0)."""
     N = polynomials.shape[1] - 1
@@ -166,7 +166,7 @@ def edges_on_line(polynomials: Floats, low_end: int, K: float, B: float, room: F
     return hurwitz(room, QUOTIENT, N - 1)
 
 
-@compiled
+@compiled_lean
 def is_stable(polynomials: Floats, K: float, B: float, room: Floats) -> int:
     """Whether the wall K, B has all its roots inside the circle that `polynomials` were built for: 1, -1 or 0."""
     combine(polynomials, K, B, room)

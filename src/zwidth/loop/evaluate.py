@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.compiled import compiled
+from zwidth.compiled import compiled, compiled_lean
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
@@ -37,14 +37,14 @@ def factor_arrays(loop: Loop) -> Factors:
     )
 
 
-@compiled
+@compiled_lean
 def divide(a: complex, b: complex) -> complex:
     """a / b, inf or nan where b is 0: plain arithmetic, several times faster than guarded complex division."""
     scale = 1.0 / (b.real * b.real + b.imag * b.imag)
     return complex((a.real * b.real + a.imag * b.imag) * scale, (a.imag * b.real - a.real * b.imag) * scale)
 
 
-@compiled
+@compiled_lean
 def plant_response(rows: Floats, whole: int, split: int, z: complex, d: complex) -> tuple[complex, complex]:
     """P(z) and dP/dz."""
     P = 0.0 + 0.0j
@@ -68,7 +68,7 @@ def plant_response(rows: Floats, whole: int, split: int, z: complex, d: complex)
     return P, slope
 
 
-@compiled
+@compiled_lean
 def velocity_response(numerator: Floats, denominator: Floats, d: complex) -> tuple[complex, complex]:
     """w(z) and dw/dz."""
     w = 1.0 + 0.0j
