@@ -19,6 +19,8 @@ from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
+# Angles, K and B along every arc of every ring.
+Samples = list[list[tuple[Floats, Floats, Floats]]]
 
 
 @dataclass(frozen=True)
@@ -100,15 +102,8 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     (0.686292, 2.0)
     """
     tracer = Tracer.of(loop, radius)
-    rings, blur = closed_rings(tracer)
-    samples = _sampled(tracer, rings)
-    if not all(shapely.Polygon(_outline(arcs)).is_valid for arcs in samples):
-        # An outline that crosses itself has passed a small loop of the curve between two samples: look closer
-        seen = np.concatenate([thetas[1:-1] for arcs in samples for thetas, _, _ in arcs])
-        rings, blur = closed_rings(tracer, seen)
-        samples = _sampled(tracer, rings)
-    outlines = [_outline(arcs) for arcs in samples]
-    width = max((float(np.max(np.abs(outline[:, 0]))) for outline in outlines), default=0.0)
+    rings, blur, samples, outlines = _traced(tracer)
+    width = _width(outlines)
     peak = stiffest(tracer, rings, width)
     in_hertz = 1.0 / (2.0 * np.pi * loop.period)
     return StabilityChart(
@@ -121,7 +116,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
         frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
         damping_max=largest_damping(tracer, rings, width),
         stable_area=max(quadrant_area(tracer, rings), 0.0) if peak else 0.0,
-        fastest_decay=fastest_decay(loop, tracer, outlines) if decay else None,
+        fastest_decay=fastest_decay(tracer, outlines) if decay else None,
         corner_blur=blur,
     )
 
@@ -129,12 +124,8 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
 def largest_stiffness(loop: Loop) -> Peak | None:
     """Only the stiffest stable wall with K > 0, B >= 0; None if there is none."""
     tracer = Tracer.of(loop)
-    rings, _ = closed_rings(tracer)
-    width = max(
-        (float(np.max(np.abs(tracer.trace(arc.thetas)[0]), initial=0.0)) for ring in rings for arc in ring),
-        default=0.0,
-    )
-    return stiffest(tracer, rings, width)
+    rings, _, _, outlines = _traced(tracer)
+    return stiffest(tracer, rings, _width(outlines))
 
 
 def boundary_points(
@@ -146,9 +137,26 @@ def boundary_points(
     return K, B, thetas / (2.0 * np.pi * loop.period), edge
 
 
-def _sampled(tracer: Tracer, rings: Rings) -> list[list[tuple[Floats, Floats, Floats]]]:
-    """Angles, K and B along every arc of every ring."""
-    return [[sample_arc(tracer, arc) for arc in ring] for ring in rings]
+def _traced(tracer: Tracer) -> tuple[Rings, float, Samples, list[Floats]]:
+    """The rings, how far corners are known, angles, K and B along every arc, and each ring's outline.
+
+    An outline that crosses itself has passed a small loop of the curve between two samples: then the curve is
+    traced again through all the angles seen.
+    """
+    seen = None
+    for _ in range(2):
+        rings, blur = closed_rings(tracer, seen)
+        samples = [[sample_arc(tracer, arc) for arc in ring] for ring in rings]
+        outlines = [_outline(arcs) for arcs in samples]
+        if all(shapely.Polygon(outline).is_valid for outline in outlines):
+            break
+        seen = np.concatenate([thetas[1:-1] for arcs in samples for thetas, _, _ in arcs])
+    return rings, blur, samples, outlines
+
+
+def _width(outlines: list[Floats]) -> float:
+    """Largest |K| on any outline; 0 if there is none."""
+    return max((float(np.max(np.abs(outline[:, 0]))) for outline in outlines), default=0.0)
 
 
 def _outline(arcs: list[tuple[Floats, Floats, Floats]]) -> Floats:

@@ -12,7 +12,6 @@ from zwidth.chart.roots import polynomial_radius, spread_roots
 from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled
 from zwidth.loop.evaluate import Factors, characteristic, degree_of_loop
-from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -144,7 +143,7 @@ def coalesced(factors: Factors, positive: bool, low: float, high: float) -> tupl
     return K, B, ends[1]
 
 
-def fastest_decay(loop: Loop, tracer: Tracer, outlines: list[Floats]) -> FastestDecay | None:
+def fastest_decay(tracer: Tracer, outlines: list[Floats]) -> FastestDecay | None:
     """Smallest spectral radius over the cells with these outlines (k, 2), both signs of K and B.
 
     A simplex search can end in a narrow valley's wall. So the curve is traced on a smaller circle: whatever edge
@@ -158,7 +157,7 @@ def fastest_decay(loop: Loop, tracer: Tracer, outlines: list[Floats]) -> Fastest
         radius = 1.0 - (1.0 - best.spectral_radius) * (1.0 + FASTER) if best else 0.0
         if not 0.0 < radius < 1.0:
             break
-        walls = _edge_walls(Tracer.of(loop, radius))
+        walls = _edge_walls(Tracer.of(tracer.loop, radius))
         previous, best = best, _search(tracer, walls, best) if len(walls) else best
         if best is previous:
             break
