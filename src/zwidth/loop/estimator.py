@@ -6,7 +6,7 @@ their digits.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Estimator:
-    """w(z) = product of numerators / product of denominators, factor by factor.
+    """w(z) = product of numerators / product of denominators * sum_k window_k z^-k.
 
     numerator, denominator  (k, 3)  rows c2, c1, c0 of  c2 d^2 + c1 d + c0,  d = z - 1; every denominator monic and
                                     of at least its numerator's degree
+    window                  (n,)    weights of the newest to the oldest sample
     """
 
     numerator: Floats
     denominator: Floats
+    window: Floats = field(default_factory=lambda: np.ones(1))
 
 
 def backward_difference(period: float) -> tuple[list[list[float]], list[list[float]]]:
