@@ -1,0 +1,143 @@
+"""What holds the largest stiffness where it is, and how it moves when the loop changes a little.
+
+The stiffest wall is an extreme point of the stable set's edge. To first order it moves as the pieces of edge that
+hold it move, and each piece says where it goes in one equation  n . dwall = dr:
+
+    curve at a fixed angle       n = (B', -K'),  r = n . (K, B) at that angle
+    line of a real root          n = (s, v),     r = -(a + s K + v B) at the wall held fixed
+    the axis B = 0               n = (0, 1),     r = 0
+
+with K', B' the curve's derivatives by the angle. Where K' = 0, a smooth maximum, the first equation alone gives
+dK = dr/B', which is the change of K at a fixed angle (envelope theorem). At a corner two pieces give two
+equations: implicit differentiation of K1(angle 1) = K2(angle 2), B1 = B2 with both angles free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.peak import Peak
+from zwidth.chart.tracer import RealRoot, Tracer
+from zwidth.loop.loop import Loop
+
+Floats = NDArray[np.float64]
+Kind = Literal["smooth maximum", "corner", "edge at B = 0", "end of the curve"]
+
+# A Newton step of K'(angle) longer than this share of the angle means that the wall is no smooth maximum.
+AT_MAXIMUM: Final = 1e-5
+
+Piece = tuple[Floats, Callable[[Tracer], float]]
+
+
+class OptimumError(ValueError):
+    """The largest stiffness has no derivative that could be computed."""
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The stiffest wall with what holds it.
+
+    peak   the wall, and the angles of its roots
+    kind   a smooth maximum of the edge; a corner of two pieces of edge; an edge that crosses B = 0; or a double
+           real root at an end of the curve
+    moves  loop -> a number whose derivative by anything in the loop is that of the largest stiffness [N/m];
+           at the loop itself it is the largest stiffness
+    """
+
+    peak: Peak
+    kind: Kind
+    moves: Callable[[Loop], float]
+
+
+def optimum(loop: Loop, peak: Peak) -> Optimum:
+    """What holds the stiffest wall of a loop.
+
+    peak    `largest_stiffness(loop)`
+    Raises  OptimumError  where the wall is neither of the kinds, as where rounding hides a piece of the edge
+
+    >>> from zwidth.chart.chart import largest_stiffness
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> def wall_of(mass):
+    ...     one, none = np.ones(1), np.zeros((1, 1))
+    ...     return Loop(Plant(np.array([[mass]]), none, none, one, one), Controller(0.001))
+    >>> held = optimum(wall_of(0.1), largest_stiffness(wall_of(0.1)))
+    >>> held.kind, round((held.moves(wall_of(0.1001)) - held.moves(wall_of(0.0999))) / (0.002 * 68629.15), 6)
+    ('smooth maximum', 1.0)
+    """
+    tracer = Tracer.of(loop)
+    inside = [angle for angle in peak.angles if 0.0 < angle < pi]
+    real: list[RealRoot] = ["plus" if angle == 0.0 else "minus" for angle in peak.angles if angle not in inside]
+    pieces = [_curve(tracer, angle) for angle in inside] + [_line(tracer, root, peak) for root in real]
+    if len(pieces) == 1 and peak.damping == 0.0:
+        return _crossing(peak, "edge at B = 0", [*pieces, (np.array([0.0, 1.0]), lambda _: 0.0)], loop.period)
+    if len(pieces) == 2:
+        return _crossing(peak, "corner", pieces, loop.period)
+    if inside:
+        angle = inside[0]
+        if not _is_maximum(tracer, angle):
+            raise OptimumError(
+                "the edge is hidden by rounding where the largest stiffness lies, so that it has no derivative"
+            )
+        return Optimum(peak, "smooth maximum", lambda other: Tracer.of(other).wall(angle)[0])
+    return Optimum(peak, "end of the curve", lambda other: _end(other, real[0]))
+
+
+def _curve(tracer: Tracer, angle: float) -> Piece:
+    _, _, dK, dB = tracer.wall(angle)
+    normal = np.array([dB, -dK]) / np.hypot(dB, dK)
+    return normal, lambda other: float(normal @ other.wall(angle)[:2])
+
+
+def _line(tracer: Tracer, root: RealRoot, peak: Peak) -> Piece:
+    wall = np.array([1.0, peak.stiffness, peak.damping])
+
+    def size(line: Floats) -> float:
+        return float(np.abs(line) @ np.abs(wall))
+
+    here = tracer.line(root)
+    normal = here[1:] / size(here)
+    start = float(normal @ wall[1:])
+
+    def read(other: Tracer) -> float:
+        # scaled by itself: a line is the same line at any multiple, and its scale jumps with the number of roots
+        line = other.line(root)
+        return start - float(line @ wall) / size(line)
+
+    return normal, read
+
+
+def _crossing(peak: Peak, kind: Kind, pieces: list[Piece], period: float) -> Optimum:
+    normals = np.array([normal for normal, _ in pieces])
+    scaled = normals * np.array([1.0 / period, 1.0])  # K T and B have one unit
+    if np.linalg.cond(scaled / np.linalg.norm(scaled, axis=1)[:, None]) > 1e9:
+        raise OptimumError("two pieces of the edge touch at the largest stiffness, which then has no derivative")
+    weights = np.linalg.solve(normals.T, np.array([1.0, 0.0]))
+    readers = [read for _, read in pieces]
+
+    def moves(other: Loop) -> float:
+        tracer = Tracer.of(other)
+        return float(weights @ [read(tracer) for read in readers])
+
+    return Optimum(peak, kind, moves)
+
+
+def _is_maximum(tracer: Tracer, angle: float) -> bool:
+    """Whether dK/dangle vanishes at the angle, as nearly as bisection can place it."""
+    step = 1e-6 * min(angle, pi - angle)
+    low, here, high = (tracer.wall(angle + shift)[2] for shift in (-step, 0.0, step))
+    bend = (high - low) / (2.0 * step)
+    return bool(abs(here) <= AT_MAXIMUM * angle * abs(bend))
+
+
+def _end(loop: Loop, root: RealRoot) -> float:
+    end = Tracer.of(loop).curve_end(root)
+    if end is None:
+        raise OptimumError("the curve's end goes to infinity")
+    return end[0]

@@ -1,0 +1,334 @@
+"""What to change first: how the largest stiffness answers to each number of a device and its loop.
+
+    e = d ln K_max / d ln p = (p / K_max) dK_max/dp,       + 1 % of p gives + e % of K_max
+
+exactly at the optimum: the stiffest wall is not searched anew for each number, its first-order motion follows from
+the edge that holds it (`study.optimum`). What is differenced is the device itself, built anew with the number a
+little larger and smaller (`study.slope`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite, isnan, nan
+from typing import Any, Final
+
+import numpy as np
+
+from zwidth.chart.chart import largest_stiffness, stability_chart
+from zwidth.chart.peak import Peak
+from zwidth.device import address
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError, Path, dotted
+from zwidth.device.load import from_document
+from zwidth.device.schema import file as schema
+from zwidth.loop.loop import Loop
+from zwidth.study.optimum import Kind, Optimum, OptimumError, optimum
+from zwidth.study.rivals import rival_stiffness
+from zwidth.study.slope import Slope, central_slope, one_sided_slope
+
+# Numbers of a device file that say where it is asked about, or how its posture is found, and not what it is.
+NO_PROPERTY: Final = {
+    "assemblies": "an approximate angle from which the posture is found",
+    "reference": "where the device is asked about, not what it is",
+    "workspace": "where the device is asked about, not what it is",
+}
+ZERO: Final = "0 has no logarithm; the derivative by the number itself stands beside it"
+WORTHLESS: Final = 1e-3  # a derivative with a larger estimated error, per relative change, is not given
+TIE: Final = 1e-5  # relative difference of two stiffest walls that are one
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """How the largest stiffness answers to one number.
+
+    path         where it stands in the device file; an element of a symmetric matrix moves with its mirror image
+    value        the number
+    unit         as the schema names it; "" if it has none
+    logarithmic  d ln K_max / d ln value; nan for the value 0, and where it could not be computed
+    derivative   dK_max/dvalue [N/m per unit of the value]; nan where it could not be computed
+    error        estimated error of `logarithmic`, for the value 0 of `derivative`
+    side         "both"; "above" or "below" where the derivative is that of a growing or falling number alone
+    reason       why a number is missing; "" where none is
+    """
+
+    path: str
+    value: float
+    unit: str
+    logarithmic: float
+    derivative: float
+    error: float
+    side: str = "both"
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Numbers scaled together: a whole list or matrix, or one key of all links (a * in its path).
+
+    path         of the list, or with * for the names
+    members      paths of its numbers
+    logarithmic  d ln K_max / d ln of the common factor: the sum of the members'; nan where it is not known
+    """
+
+    path: str
+    members: tuple[str, ...]
+    logarithmic: float
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """All of them, with the wall they speak of.
+
+    peak      the stiffest wall; None where no wall is stable, and then nothing else is there
+    kind      what holds it (see `study.optimum`); None where that is not known
+    numbers   largest |logarithmic| first, then those without a logarithm
+    groups    largest first
+    left_out  path -> why the number is none of the device
+    rival     largest stiffness of another, separate extreme point of the edge [N/m]; nan if there is none. As
+              soon as a change lifts it above the stiffest wall, it takes over.
+    """
+
+    peak: Peak | None
+    kind: Kind | None
+    numbers: tuple[Sensitivity, ...]
+    groups: tuple[Group, ...]
+    left_out: dict[str, str]
+    rival: float
+
+    @property
+    def tie(self) -> bool:
+        """Are two walls stiffest at once? Then each number's derivative is one-sided: that of this one."""
+        return self.peak is not None and bool(self.rival >= (1.0 - TIE) * self.peak.stiffness)
+
+
+def sensitivities(
+    device: Device,
+    at: Sequence[float] | None = None,
+    direction: Sequence[float] | None = None,
+    assembly: str | None = None,
+    model: str | None = None,
+) -> Sensitivities:
+    """Sensitivity of the largest stiffness to every number of the device file, and to the delay if it gives none.
+
+    Arguments are those of `Device.plant`; the handle stays where it is while links grow. Numbers that cannot be
+    varied, such as whole ones, are reported with the reason. Accuracy: derivatives are extrapolated differences
+    at relative steps of 2e-3 and less, good to about 1e-9 of d ln K_max / d ln p where the device's modes are
+    damped; `error` estimates it for each.
+
+    Raises  what `Device.plant` raises; ChartError, ModesError if the device itself cannot be charted
+
+    >>> from zwidth.device.load import from_document
+    >>> plain = from_document({"name": "m", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}})
+    >>> [(n.path, round(n.logarithmic, 6)) for n in sensitivities(plain).numbers][:2]
+    [('loop.sampling_period_s', -2.0), ('plant.mass_kg', 1.0)]
+    """
+
+    def loop_of(changed: Device) -> Loop:
+        return Loop(changed.plant(at, direction, assembly, model), changed.controller)
+
+    loop = loop_of(device)
+    peak = largest_stiffness(loop)
+    left_out = dict(_left_out(device.document))
+    if peak is None:
+        return Sensitivities(None, None, (), (), left_out, nan)
+    try:
+        held, obstacle = optimum(loop, peak), ""
+    except OptimumError as error:
+        held, obstacle = None, str(error)
+    answer = _Answer(device, loop_of, held, obstacle)
+    numbers = [answer.to(*number) for number in _numbers(device.document)]
+    groups = answer.together({number.path: number for number in numbers})
+    return Sensitivities(
+        peak=peak,
+        kind=None if held is None else held.kind,
+        numbers=tuple(sorted(numbers, key=_rank)),
+        groups=tuple(sorted(groups, key=lambda group: -abs(group.logarithmic))),
+        left_out=left_out,
+        rival=rival_stiffness(stability_chart(loop, decay=False)),
+    )
+
+
+def _rank(number: Sensitivity) -> tuple[bool, float, bool, float]:
+    """Largest first, then the zeros with a derivative, then what is not known."""
+    known, slope = not isnan(number.logarithmic), not isnan(number.derivative)
+    return (
+        not known,
+        -abs(number.logarithmic) if known else 0.0,
+        not slope,
+        -abs(number.derivative) if slope else 0.0,
+    )
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """How the stiffest wall answers to changes of the device's document.
+
+    held      None where it has no derivative, for the reason `obstacle`
+    """
+
+    device: Device
+    loop_of: Callable[[Device], Loop]
+    held: Optimum | None
+    obstacle: str
+
+    def to(self, path: str, steps: Path, value: float) -> Sensitivity:
+        """The sensitivity to one number; a number that cannot be varied says why."""
+        document = self.device.document
+        unit = _unit(steps)
+        scale = abs(value) or _scale(document, steps)
+        reason = _obstacle(steps, value)
+        slope, side = Slope(nan, nan), ""
+        if not reason:
+            slope, side, reason = self._slope(lambda changed: _with(document, steps, changed), value, scale)
+        if self.held is None or reason:
+            return Sensitivity(path, value, unit, nan, nan, nan, "", reason)
+        K = self.held.peak.stiffness
+        if value == 0.0:
+            return Sensitivity(path, value, unit, nan, slope.value * K, slope.error * K, side, ZERO)
+        return Sensitivity(path, value, unit, slope.value * value, slope.value * K, slope.error * scale, side)
+
+    def together(self, found: dict[str, Sensitivity]) -> Iterator[Group]:
+        """The groups of numbers. Lists and matrices are scaled as a whole: so a free plant stays free."""
+        steps_of = {path: steps for path, steps, _ in _numbers(self.device.document)}
+        for name, paths in _groups(self.device.document).items():
+            parts = [found[path] for path in paths if found[path].value != 0.0]
+            if len(parts) < 2:
+                continue
+            total = float(sum(part.logarithmic for part in parts))
+            if "*" not in name:
+                scaled = self._scaling([(steps_of[part.path], part.value) for part in parts])
+                total = self._slope(scaled, 1.0, 1.0)[0].value
+            yield Group(name, tuple(paths), total)
+
+    def _scaling(self, places: list[tuple[Path, float]]) -> Callable[[float], dict[str, Any]]:
+        """Common factor -> the document with these numbers multiplied by it."""
+
+        def scaled(factor: float) -> dict[str, Any]:
+            document = self.device.document
+            for steps, value in places:
+                document = _with(document, steps, factor * value)
+            return document
+
+        return scaled
+
+    def _slope(self, change: Callable[[float], dict[str, Any]], at: float, scale: float) -> tuple[Slope, str, str]:
+        """Derivative of ln K_max, its side, and the reason why there is none: from both sides where these are
+        alike, else from above, else from below.
+
+        A delay that crosses whole samples changes the form of the loop, and the largest stiffness bends there.
+        """
+        if self.held is None:
+            return Slope(nan, nan), "", self.obstacle
+        held, seen = self.held, dict[int, tuple[int, bool]]()
+
+        def stiffness(changed: float) -> float:
+            loop = self.loop_of(from_document(change(changed)))
+            seen[int(np.sign(changed - at))] = (loop.whole_delay, loop.fractional_delay > 0.0)
+            return held.moves(loop) / held.peak.stiffness
+
+        reason = ""
+        for side, sign in (("both", 0), ("above", 1), ("below", -1)):
+            try:
+                slope = (
+                    one_sided_slope(stiffness, at, scale, sign) if sign else central_slope(stiffness, at, scale)
+                )
+            except DeviceError as error:
+                reason = reason or error.faults[0].message
+                continue
+            except (ValueError, np.linalg.LinAlgError) as error:
+                reason = reason or str(error)
+                continue
+            if side == "both" and seen[-1] != seen[1]:
+                continue
+            if slope.error * scale <= WORTHLESS * max(1.0, abs(slope.value) * scale):
+                return slope, side, ""
+            reason = reason or "it changes too abruptly here to have a derivative"
+        return Slope(nan, nan), "", reason
+
+
+def _obstacle(steps: Path, value: float) -> str:
+    """Why a number has no derivative whatever the device; "" if it may have one."""
+    if not isfinite(value):
+        return "it is infinite, of which there is no share to change"
+    whole = any(found.get("type") == "integer" for found in schema.at(steps))
+    return "it is a whole number, which has no derivative" if whole else ""
+
+
+def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, Path, float]]:
+    """Dotted path, steps and value of each number that is the device's; of a matrix those on and above the
+    diagonal."""
+    for steps, value in address.numbers(document):
+        if not _no_property(steps) and not _mirrored(document, steps):
+            yield dotted(steps, document), steps, float(value)
+    if not {"delay_samples", "delay_s"} & document.get("loop", {}).keys():
+        yield "loop.delay_samples", ("loop", "delay_samples"), 0.0
+
+
+def _no_property(steps: Path) -> str:
+    return NO_PROPERTY.get(str(steps[1]), "") if steps[0] == "mechanism" and len(steps) > 1 else ""
+
+
+def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    for steps, _ in address.numbers(document):
+        if reason := _no_property(steps):
+            yield dotted(steps, document), reason
+
+
+def _mirrored(document: dict[str, Any], steps: Path) -> bool:
+    """Is it an element below the diagonal of a matrix?"""
+    return _is_matrix(document, steps) and int(steps[-2]) > int(steps[-1])
+
+
+def _is_matrix(document: dict[str, Any], steps: Path) -> bool:
+    return len(steps) > 2 and isinstance(steps[-1], int) and isinstance(steps[-2], int)
+
+
+def _with(document: dict[str, Any], steps: Path, value: float) -> dict[str, Any]:
+    """The document with a number changed, and its mirror image where it stands in a symmetric matrix."""
+    changed = address.assign(document, dotted(steps, document), value)
+    if _is_matrix(document, steps) and steps[-1] != steps[-2]:
+        mirror = (*steps[:-2], steps[-1], steps[-2])
+        changed = address.assign(changed, dotted(mirror, document), value)
+    return changed
+
+
+def _unit(steps: Path) -> str:
+    """The unit that the schema states for the number, or for the list that it stands in."""
+    while steps:
+        if found := re.search(r" \[([^\]]*)\]$", schema.description(steps)):
+            return found[1]
+        if isinstance(steps[-1], str):
+            return ""
+        steps = steps[:-1]
+    return ""
+
+
+def _scale(document: dict[str, Any], steps: Path) -> float:
+    """What a number that is 0 is measured by: the largest of its list, or else of its unit in the file, or 1."""
+    if steps[-1] == "delay_samples":
+        return 1.0
+    beside = [abs(v) for path, v in address.numbers(document) if _key(path) == _key(steps) and path[0] == steps[0]]
+    alike = [abs(v) for path, v in address.numbers(document) if _unit(path) == _unit(steps) and np.isfinite(v)]
+    return max(beside, default=0.0) or max(alike, default=0.0) or 1.0
+
+
+def _key(steps: Path) -> str:
+    return next(str(step) for step in reversed(steps) if isinstance(step, str))
+
+
+def _groups(document: dict[str, Any]) -> dict[str, list[str]]:
+    """Lists and matrices as wholes, and the same key of all elements of a list of tables: path -> members."""
+    members: dict[str, list[str]] = {}
+    for path, steps, _ in _numbers(document):
+        whole = steps
+        while whole and isinstance(whole[-1], int):
+            whole = whole[:-1]
+        names = {dotted(whole, document)} if whole != steps else set()
+        if any(isinstance(step, int) for step in whole):
+            names.add(".".join("*" if isinstance(step, int) else step for step in whole))
+        for name in names:
+            members.setdefault(name, []).append(path)
+    return members
