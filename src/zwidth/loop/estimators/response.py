@@ -9,8 +9,6 @@ is the estimator's gain and, by its phase phi, how late it is: tau(f) = -phi(f) 
 
 from __future__ import annotations
 
-from math import copysign, sqrt
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -114,28 +112,22 @@ def _difference_quotient(angle: Floats) -> Complex:
 def _factor_phase(row: Floats, angle: Floats) -> Floats:
     """Continuous phase of c2 d^2 + c1 d + c0 from theta = 0, less the right angle of the differentiator's i.
 
-    A root at z = r within the unit circle turns the phase by theta + arg(1 - r/z), whose second part stays within
-    a right angle of 0; at r = 1 (d = 0) and r = -1 (d = -2) it is theta/2, to the ends of the range.
+    A root r within the unit circle turns the phase by theta + arg(1 - r/z), whose second part stays within a right
+    angle of 0, so that two of them are told by one principal value. At r = 1 (d = 0) and r = -1 (d = -2) it is
+    theta/2; these are divided out first, for at the ends of the range nothing is left to take a phase of.
     """
+    c2, c1, c0 = (float(c) for c in row)
     phase = np.zeros_like(angle)
+    if c0 == 0.0:
+        c2, c1, c0 = 0.0, c2, c1
+        phase = phase + 0.5 * angle
+    while (c2 or c1) and 4.0 * c2 - 2.0 * c1 + c0 == 0.0:
+        c2, c1, c0 = 0.0, c2, c1 - 2.0 * c2
+        phase = phase + 0.5 * angle
+    degree = 2 if c2 else 1 if c1 else 0
     d = _distance(angle)
-    for root in _roots(*row):
-        on_circle = root in (0.0, -2.0)
-        phase = phase + (0.5 * angle if on_circle else angle + np.angle((d - root) / (1.0 + d)))
-    return phase
-
-
-def _roots(c2: float, c1: float, c0: float) -> list[complex]:
-    """Roots of c2 d^2 + c1 d + c0, as many as its degree: double ones are found exactly."""
-    if c2 == 0.0:
-        return [] if c1 == 0.0 else [-c0 / c1]
-    middle, product = -0.5 * c1 / c2, c0 / c2
-    square = middle * middle - product
-    if square < 0.0:
-        aside = 1j * sqrt(-square)
-        return [middle + aside, middle - aside]
-    far = middle + copysign(sqrt(square), middle)
-    return [far, product / far] if far else [0.0, 0.0]
+    rest = np.angle(((c2 * d + c1) * d + c0) * np.exp(-1j * degree * angle))
+    return np.asarray(phase + degree * angle + rest)
 
 
 def _window_response(window: Floats, angle: Floats) -> Complex:
