@@ -1,0 +1,155 @@
+"""The sampled loop of m rendered directions under one wall law:  det(1 + P(z) (K + B w(z))) = 0, P (m, m)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from math import floor
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.loop.controller import Controller
+from zwidth.loop.hold import UnmovedError
+from zwidth.loop.loop import Loop
+from zwidth.loop.multi_hold import Held, Motion, hold, moved
+from zwidth.loop.series import Series, series
+from zwidth.model.directions import MultiPlant
+from zwidth.model.plant import Plant
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class MultiLoop:
+    """A plant with m rendered directions under f_i = -(K y_i + B v_i), the same K and B along each.
+
+    >>> free = MultiPlant(np.diag([0.3, 0.1]), *np.zeros((2, 2, 2)), np.eye(2), np.eye(2))
+    >>> MultiLoop(free, Controller(sampling_period=0.001)).transition_matrix(1000.0, 1.0).shape
+    (6, 6)
+    """
+
+    plant: MultiPlant
+    controller: Controller
+
+    @property
+    def period(self) -> float:
+        """Sampling period T [s]."""
+        return self.controller.sampling_period
+
+    @property
+    def count(self) -> int:
+        """Number of rendered directions m."""
+        return self.plant.count
+
+    @property
+    def whole_delay(self) -> int:
+        """Whole samples l of the delay."""
+        return floor(self.controller.delay + 1e-12)
+
+    @property
+    def fractional_delay(self) -> float:
+        """Remaining part f of the delay, 0 <= f < 1 [samples]."""
+        return max(self.controller.delay - self.whole_delay, 0.0)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """What the walls move of the plant, in continuous time. Raises UnmovedError where that is nothing."""
+        found = moved(self.plant, self.period, self.fractional_delay)
+        if not len(found.A):
+            raise UnmovedError("the wall forces move nothing that the sensors read; check actuators and sensors")
+        return found
+
+    @property
+    def unobserved_modes(self) -> tuple[str, ...]:
+        """Motions that no wall moves, by name; they are left out and do not count for stability."""
+        return self.motion.unobserved
+
+    @cached_property
+    def held(self) -> Held:
+        """The plant from sample to sample."""
+        lag = getattr(self.controller, "actuator_time_constant", 0.0)
+        return hold(self.motion, self.period, self.fractional_delay, lag)
+
+    @cached_property
+    def estimator(self) -> Series:
+        """The velocity estimate w(z), the same along each direction."""
+        own = _stand_in(self.controller).estimator
+        return series(own.numerator, own.denominator, own.window)
+
+    @cached_property
+    def force_filter(self) -> Series:
+        """F(z), what the force of each direction passes before the hold."""
+        if getattr(self.controller, "force_filter", None) is None:
+            return series(np.empty((0, 3)), np.empty((0, 3)), np.ones(1))
+        without = Controller(self.period, force_filter=self.controller.force_filter)
+        own = _stand_in(without).force_path
+        return series(own.numerator, own.denominator, np.ones(1))
+
+    def plant_response(self, z: ArrayLike) -> Complexes:
+        """P(z) (..., m, m) from force commands to readings at complex z (...), hold to filter included."""
+        return self.plant_slope(z)[0]
+
+    def velocity_response(self, z: ArrayLike) -> Complexes:
+        """w(z) (...), the velocity estimate per reading, at complex z (...)."""
+        return self.estimator.response(z)[0]
+
+    def plant_slope(self, z: ArrayLike) -> tuple[Complexes, Complexes]:
+        """P(z) and dP/dz, (..., m, m)."""
+        z = np.asarray(z, dtype=complex)
+        held, at = self.held, z[..., None, None]
+        resolvent = (at - 1.0) * np.eye(len(held.step)) - held.step
+        inner = np.linalg.solve(resolvent, held.new + held.old / at)
+        slope = -np.linalg.solve(resolvent, inner + held.old / at**2)
+        F, dF = self.force_filter.response(z)
+        gain = (F / z**self.whole_delay)[..., None, None]
+        dgain = (dF / z**self.whole_delay)[..., None, None] - self.whole_delay * gain / at
+        P, dP = held.reading @ inner, held.reading @ slope
+        return gain * P, gain * dP + dgain * P
+
+    @cached_property
+    def _affine(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """L = open - input (K position + B velocity): (N, N), (N, m), (m, N), (m, N)."""
+        held, w, F = self.held, self.estimator, self.force_filter
+        m, l = self.count, self.whole_delay
+        queue = l + (self.fractional_delay > 0.0)
+        sizes = np.cumsum([0, len(held.step), m * queue, m * len(w.A), m * len(F.A)])
+        x, q, e, f = (slice(a, b) for a, b in pairwise(sizes))
+        N, one = int(sizes[-1]), np.eye(m)
+        states = np.eye(N)
+        position = held.reading @ states[x]
+        velocity = w.direct * position + np.kron(w.output[None], one) @ states[e]
+        # the command: `direct` times the wall's own force, and what the filter holds of its past
+        past = np.kron(F.output[None], one) @ states[f]
+        open_, enters = np.zeros((N, N)), np.zeros((N, m))
+        open_[x] = states[x] + held.step @ states[x]
+        open_[e] = states[e] + np.kron(w.A, one) @ states[e] + np.kron(w.input[:, None], one) @ position
+        open_[f] = states[f] + np.kron(F.A, one) @ states[f]
+        enters[f] = np.kron(F.input[:, None], one)
+        late = [past, *(states[q][m * k : m * (k + 1)] for k in range(queue))]
+        for gain, at in ((held.new, l), (held.old, l + 1)):
+            if at < len(late):
+                open_[x] += gain @ late[at]
+                enters[x] += gain * F.direct * (at == 0)
+        if queue:
+            open_[q] = np.vstack(late[:-1])
+            enters[q][:m] = F.direct * one
+        return open_, enters, position, velocity
+
+    def transition_matrix(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
+        """The map Z_{j+1} = L Z_j (thesis eq. 2.38) for walls K, B of any shape (...): (..., N, N).
+
+        N = moved states + m (delayed forces + states of estimator and filter). Unobserved motions are left out.
+        """
+        K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
+        open_, enters, position, velocity = self._affine
+        feedback = K[..., None, None] * position + B[..., None, None] * velocity
+        return np.asarray(open_ - enters @ feedback)
+
+
+def _stand_in(controller: Controller) -> Loop:
+    """A loop of one mass under the same controller, for what does not depend on the plant."""
+    one = np.ones(1)
+    return Loop(Plant(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), one, one), controller)

@@ -1,0 +1,212 @@
+"""A plant with several rendered directions between samples: what walls move of it, held exactly.
+
+The mechanical states are undamped modes, each with its velocity in units of its own rate, so that slow and fast
+modes have entries of one size. What no wall moves or no encoder sees is left out: of modes with equal poles the
+m x m residue says how many motions the walls know of (its rank), of modes coupled by damping each damped mode's
+residue does.
+
+A delay of l + f samples splits the interval: the older force acts for f T, the newer for (1 - f) T. With
+Gamma(t) the integral of exp(A s) over [0, t], one exponential of the augmented matrix [A, 1; 0, 0] each,
+
+    x_{j+1} = x_j + A Gamma(T) x_j + Gamma((1 - f) T) B u_{j-l} + exp(A (1 - f) T) Gamma(f T) B u_{j-l-1}.
+
+An actuator lag tau f' + f = u adds m states f to A before the exponential is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from zwidth.model.directions import MultiPlant
+from zwidth.model.modes import REPEATED, undamped_modes
+
+Floats = NDArray[np.float64]
+
+# Shares of all residues below which a motion is one that no wall moves; for undamped ones the wall would move the
+# poles by less than the band in which stability is left undecided.
+UNMOVED, UNMOVED_UNDAMPED = 1e-11, 1e-9
+# Condition of damped modes beyond which their residues say nothing.
+DEFECTIVE = 1e7
+
+
+@dataclass(frozen=True)
+class Motion:
+    """x' = A x + B f,  y = C x: what walls move of a plant.
+
+    A (N, N), B (N, m), C (m, N)
+    unobserved  names of the motions that were left out
+    """
+
+    A: Floats
+    B: Floats
+    C: Floats
+    unobserved: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Held:
+    """x_{j+1} = (1 + step) x_j + new u_{j-l} + old u_{j-l-1},  y = C x.
+
+    step  (N, N);  new, old  (N, m);  reading  (m, N)
+    """
+
+    step: Floats
+    new: Floats
+    old: Floats
+    reading: Floats
+
+
+def moved(plant: MultiPlant, period: float, fraction: float) -> Motion:
+    """The motions that walls move and encoders read, in states of comparable size.
+
+    What moves them is a force held for a sampling period T [s], after the fraction f of a delay.
+    """
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
+    runs = np.split(np.arange(len(squared)), np.flatnonzero(np.diff(squared) > REPEATED * scale) + 1)
+    for run in runs:  # equal frequencies: onto the axes of their own damping
+        local = shapes[:, run].T @ plant.damping @ shapes[:, run]
+        shapes[:, run] = shapes[:, run] @ np.linalg.eigh((local + local.T) / 2.0)[1]
+    damping = shapes.T @ plant.damping @ shapes
+    level = max(float(np.max(np.abs(damping))), np.finfo(float).tiny)
+    damping[np.abs(damping) <= 1e-14 * level] = 0.0
+    inputs, outputs = shapes.T @ plant.actuators.T, plant.sensors @ shapes
+    total = float(np.linalg.norm(inputs, axis=1).sum() * np.linalg.norm(outputs, axis=0).sum())
+    coupled = np.abs(damping - np.diag(np.diag(damping))) > REPEATED * level
+    count, of = connected_components(coupled, directed=False)
+    alone = np.array([int(np.sum(of == of[k])) == 1 for k in range(len(of))], dtype=bool)
+    same = [float(REPEATED * scale), float(REPEATED * level)]
+    parts = [
+        _equal_poles(squared[k], damping[k, k], inputs[group], outputs[:, group], (period, fraction), total)
+        for group in _groups(squared, np.diag(damping), np.flatnonzero(alone), same)
+        for k in group[:1]
+    ]
+    for c in range(count):
+        members = np.flatnonzero(of == c)
+        if len(members) > 1:
+            block = damping[np.ix_(members, members)]
+            parts.append(_coupled(squared[members], block, inputs[members], outputs[:, members], period))
+    A = scipy.linalg.block_diag(*(part.A for part in parts))
+    return Motion(
+        A.reshape(-1, sum(len(part.A) for part in parts)),
+        np.vstack([part.B for part in parts]),
+        np.hstack([part.C for part in parts]),
+        tuple(name for part in parts for name in part.unobserved),
+    )
+
+
+def _groups(squared: Floats, drag: Floats, members: NDArray[np.int64], same: list[float]) -> list[list[int]]:
+    """Members of equal frequency and damping."""
+    groups: list[list[int]] = []
+    for k in members.tolist():
+        for group in groups:
+            g = group[0]
+            if abs(squared[k] - squared[g]) <= same[0] and abs(drag[k] - drag[g]) <= same[1]:
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    return groups
+
+
+def _pairs(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float) -> Motion:
+    """Second-order modes as states [x; v / rate]: a slow mode's pair stays well apart from z = 1."""
+    k = len(squared)
+    rate = np.maximum(np.sqrt(np.abs(squared)), np.abs(np.diag(damping)))
+    rate[rate == 0.0] = 1.0 / period
+    A = np.block(
+        [[np.zeros((k, k)), np.diag(rate)], [-np.diag(squared / rate), -damping * (rate / rate[:, None])]]
+    )
+    B = np.vstack([np.zeros_like(inputs), inputs / rate[:, None]])
+    return Motion(A, B, np.hstack([outputs, np.zeros_like(outputs)]), ())
+
+
+def _equal_poles(
+    squared: float, drag: float, inputs: Floats, outputs: Floats, sampling: tuple[float, float], total: float
+) -> Motion:
+    """Modes of one pair of poles: as many as the rank of their residue, by its singular values."""
+    period, decay = sampling[0], drag / 2.0
+    left, strength, right = np.linalg.svd(outputs @ inputs)
+    level = total * (UNMOVED_UNDAMPED if abs(decay) * period < 1e-9 else UNMOVED)
+    rank = int(np.sum(strength[: len(inputs)] * _reach(squared, drag, *sampling) > level))
+    root = np.sqrt(strength[:rank])
+    enters, leaves = root[:, None] * right[:rank], left[:, :rank] * root
+    found = _pairs(np.full(rank, squared), drag * np.eye(rank), enters, leaves, period)
+    return Motion(found.A, found.B, found.C, (_label(squared, decay),) * (len(inputs) - rank))
+
+
+def _reach(squared: float, drag: float, period: float, fraction: float) -> float:
+    """How far a held force moves a mode, in shares of a free mass: none at multiples of the sampling rate."""
+    one = np.ones((1, 1))
+    mode = _pairs(np.array([squared]), np.array([[drag]]), one, one, period)
+    held = hold(mode, period, fraction, 0.0)
+    size = np.array([[1.0], [period * mode.A[0, 1]]]) / period**2
+    return float(max(np.max(np.abs(held.new * size)), np.max(np.abs(held.old * size))))
+
+
+def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float) -> Motion:
+    """Modes that their damping couples; damped modes that no wall moves are split off by their eigenvectors."""
+    whole = _pairs(squared, damping, inputs, outputs, period)
+    poles, right = np.linalg.eig(whole.A)
+    if np.linalg.cond(right) > DEFECTIVE:
+        return whole
+    source = np.linalg.solve(right, whole.B.astype(complex))
+    seen = whole.C @ right
+    reach = np.abs(np.expm1(poles * period) / np.where(poles == 0.0, 1.0, poles)) + period * (poles == 0.0)
+    strength = np.linalg.norm(source, axis=1) * np.linalg.norm(seen, axis=0) * reach
+    keep = strength > UNMOVED * float(np.sum(strength))
+    if keep.all():
+        return whole
+    names = [_damped_label(poles[k]) for k in np.flatnonzero(~keep & (poles.imag >= 0.0))]
+    chosen = np.flatnonzero(keep & (poles.imag >= 0.0))
+    # real and imaginary parts of the kept eigenvectors span what stays
+    basis = np.hstack([np.column_stack([right[:, k].real, right[:, k].imag]) for k in chosen])
+    basis = basis[:, np.linalg.norm(basis, axis=0) > 0.0]
+    dual = np.linalg.inv(right)
+    rows = np.vstack([np.vstack([2.0 * dual[k].real, -2.0 * dual[k].imag]) for k in chosen])
+    real = np.concatenate([[poles[k].imag == 0.0] * 2 for k in chosen])
+    rows = np.where(real[:, None], rows / 2.0, rows)[~(real & (np.arange(len(rows)) % 2 == 1))]
+    return Motion(rows @ whole.A @ basis, rows @ whole.B, whole.C @ basis, tuple(names))
+
+
+def _label(squared: float, decay: float) -> str:
+    """A motion's name for people."""
+    if squared <= 0.0:
+        return "rigid motion (0 Hz)" if squared == 0.0 else "unstable motion (negative stiffness)"
+    rate = sqrt(squared)
+    return f"mode at {rate / (2.0 * np.pi):.4g} Hz (damping ratio {decay / rate:.3g})"
+
+
+def _damped_label(pole: complex) -> str:
+    if pole.imag == 0.0:
+        return "overdamped motion"
+    return f"mode at {abs(pole) / (2.0 * np.pi):.4g} Hz (coupled damping)"
+
+
+def hold(motion: Motion, period: float, fraction: float, lag: float) -> Held:
+    """The motion under forces held for a period T [s], with a fraction f of delay and a lag tau [s]."""
+    A, B, C = motion.A, motion.B, motion.C
+    N, m = B.shape
+    if lag > 0.0:
+        A = np.block([[A, B], [np.zeros((m, N)), -np.eye(m) / lag]])
+        B = np.vstack([np.zeros((N, m)), np.eye(m) / lag])
+        C = np.hstack([C, np.zeros((m, m))])
+    _, whole = _integrals(A, period)
+    late, new = _integrals(A, (1.0 - fraction) * period)
+    _, early = _integrals(A, fraction * period)
+    return Held(A @ whole, new @ B, late @ early @ B, C)
+
+
+def _integrals(A: Floats, time: float) -> tuple[Floats, Floats]:
+    """exp(A t) and its integral over [0, t]."""
+    N = len(A)
+    whole = np.zeros((2 * N, 2 * N))
+    whole[:N, :N], whole[:N, N:] = A * time, np.eye(N)
+    found = scipy.linalg.expm(whole)
+    return found[:N, :N], found[:N, N:] * time
