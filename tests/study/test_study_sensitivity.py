@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -28,12 +29,13 @@ def one_mass(mass=0.1, damping=0.0, stiffness=0.0, **loop):
     return from_document({"name": "one", "plant": plant, "loop": {"sampling_period_s": 0.001, **loop}})
 
 
-def logarithmic(device, **question):
-    return {number.path: number.logarithmic for number in sensitivities(device, **question).numbers}
+def logarithmic(device):
+    return {number.path: number.logarithmic for number in sensitivities(device).numbers}
 
 
-def groups(device):
-    return {group.path: group.logarithmic for group in sensitivities(device).groups}
+@cache
+def answered(name, *settings):
+    return sensitivities(load(name, settings))
 
 
 def largest(device):
@@ -101,8 +103,7 @@ DEVICES = [
 @pytest.mark.parametrize(("name", "settings", "kind"), DEVICES)
 def test_mass_and_time_have_units(name, settings, kind):
     """K is kg/s^2: scaling all kilograms scales it by as much, scaling all seconds by the inverse square."""
-    device = load(name, settings)
-    found = sensitivities(device)
+    device, found = load(name, settings), answered(name, *settings)
     assert found.kind == kind
     of = {n.path: n.logarithmic for n in found.numbers} | {g.path: g.logarithmic for g in found.groups}
     if device.mechanism is not None:
@@ -131,8 +132,8 @@ def test_mass_and_time_have_units(name, settings, kind):
 )
 def test_the_whole_search_differenced_agrees(name, settings, path):
     device = load(name, settings)
-    found = logarithmic(device)[path]
-    for step in (2e-3, 1e-3):
+    found = {number.path: number.logarithmic for number in answered(name, *settings).numbers}[path]
+    for step in (2e-3,) if device.mechanism else (2e-3, 1e-3):
         assert found == pytest.approx(differenced(device, path, step), abs=3e-6)
 
 
@@ -215,7 +216,7 @@ def test_a_symmetric_matrix_stays_symmetric():
 
 
 def test_numbers_that_say_where_are_left_out_and_named():
-    found = sensitivities(load("five-bar"))
+    found = answered("five-bar")
     assert not any("reference" in n.path or "assemblies" in n.path for n in found.numbers)
     assert "where the device is asked about" in found.left_out["mechanism.reference.position_m.1"]
     paths = {n.path for n in found.numbers} | found.left_out.keys() | {"loop.delay_samples"}
@@ -223,7 +224,7 @@ def test_numbers_that_say_where_are_left_out_and_named():
 
 
 def test_sorted_by_what_helps_most_and_failures_are_data():
-    found = sensitivities(load("five-bar", [FILTER]))
+    found = answered("five-bar", FILTER)
     magnitudes = [abs(n.logarithmic) for n in found.numbers if not np.isnan(n.logarithmic)]
     assert magnitudes == sorted(magnitudes, reverse=True)
     of = {n.path: n for n in found.numbers}
@@ -269,9 +270,9 @@ def test_slopes_know_what_they_are_worth():
             assert abs(slope.value - exact) < 1e-8
             assert abs(slope.value - exact) <= 10.0 * slope.error + 1e-13
 
-    def rough(x):
-        return np.exp(x) + 1e-9 * np.sin(1e9 * x)
-
-    slope = central_slope(rough, 1.0, 1.0)
-    assert 1e-10 < abs(slope.value - np.e) < 1e-6
-    assert slope.error > 1e-10
+    rng = np.random.default_rng(3)
+    slopes = [central_slope(lambda x: np.exp(x) + 1e-10 * rng.normal(), 1.0, 1.0) for _ in range(50)]
+    errors = np.array([abs(slope.value - np.e) for slope in slopes])
+    estimates = np.array([slope.error for slope in slopes])
+    assert np.median(errors) < 1e-7
+    assert np.mean(errors > 10.0 * estimates) < 0.1

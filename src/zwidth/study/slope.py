@@ -66,20 +66,26 @@ def _extrapolated(quotient: Callable[[float], float], scale: float, factor: floa
 
 
 def _table(quotient: Callable[[float], float], first: float, scale: float, factor: float) -> Slope:
-    """Richardson's table of D(h), D(h/2), ..., whose error falls by `factor` at the first halving; its best."""
+    """Richardson's table of D(h), D(h/2), ..., whose error falls by `factor` at the first halving; its best.
+
+    Where it ends in rounding, of which the last quotient is a sample, no entry is better than this rounding over
+    its own step: that two entries agree may be luck.
+    """
     row: list[float] = []
-    best = Slope(float("nan"), float("inf"))
+    best, found = Slope(float("nan"), float("inf")), 0
     for level in range(MOST):
         above, row = row, [quotient(first / 2.0**level)]
         for k, coarse in enumerate(above):
             row.append(row[k] + (row[k] - coarse) / (factor ** (k + 1) - 1.0))
             error = max(abs(row[k + 1] - row[k]), abs(row[k + 1] - coarse))
-            if k > 0 and error < best.error:  # that two agree may be luck
-                best = Slope(row[k + 1], error)
-        done = best.error <= ENOUGH * max(abs(best.value), 1.0 / scale)
-        if level + 1 >= LEVELS and (done or _rounding(row, best)):
-            break
-    return best
+            if k > 0 and error < best.error:
+                best, found = Slope(row[k + 1], error), level
+        if level + 1 >= LEVELS:
+            if best.error <= ENOUGH * max(abs(best.value), 1.0 / scale):
+                return best
+            if _rounding(row, best):
+                break
+    return Slope(best.value, max(best.error, abs(row[0] - best.value) * 2.0 ** (found - level)))
 
 
 def _rounding(row: list[float], best: Slope) -> bool:
