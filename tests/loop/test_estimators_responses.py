@@ -69,16 +69,20 @@ def test_the_delay_is_the_limit_of_the_phase_delay(method, period):
     assert phase_delay(method, period, 0.0) == want
 
 
-@pytest.mark.parametrize("method", METHODS, ids=str)
+# windows whose phase goes beyond half a turn, and beyond a whole one
+LONG = (SavitzkyGolay(8, 7), SavitzkyGolay(400, 2), SavitzkyGolay(300, 8))
+
+
+@pytest.mark.parametrize("method", [*METHODS, *LONG], ids=str)
 def test_the_phase_delay_is_that_of_a_dense_trace(method):
     T = 0.001
-    f = np.linspace(0.0, 500.0, 40001)[1:-1]
+    f = np.linspace(0.0, 500.0, 8001)[1:-1]
     R = relative_response(method, T, f)
     delay = phase_delay(method, T, f)
     turned = R * np.exp(2j * np.pi * f * delay)  # real, and positive until a zero changes the sign
     np.testing.assert_allclose(turned.imag, 0.0, atol=1e-12)
-    assert np.max(np.abs(np.diff(f * delay))) < 0.02  # in turns: no jump is left
-    assert np.all(turned.real[:100] > 0.0)
+    assert np.max(np.abs(np.diff(f * delay))) < 0.2  # in turns: no jump is left
+    assert np.all(turned.real[:10] > 0.0)
 
 
 def test_the_phase_delay_of_random_methods_is_the_sum_over_roots():
