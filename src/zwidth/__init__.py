@@ -31,6 +31,13 @@ if TYPE_CHECKING:
     from zwidth.loop.controller import Butterworth as Butterworth
     from zwidth.loop.controller import Controller as Controller
     from zwidth.loop.controller import FirstOrder as FirstOrder
+    from zwidth.loop.estimators import AlphaBeta as AlphaBeta
+    from zwidth.loop.estimators import BackwardDifference as BackwardDifference
+    from zwidth.loop.estimators import CentralDifference as CentralDifference
+    from zwidth.loop.estimators import Kalman as Kalman
+    from zwidth.loop.estimators import LeastSquaresSlope as LeastSquaresSlope
+    from zwidth.loop.estimators import SavitzkyGolay as SavitzkyGolay
+    from zwidth.loop.estimators import WindowedDifference as WindowedDifference
     from zwidth.loop.loop import Loop as Loop
     from zwidth.measures.dexterity import dynamic_manipulability as dynamic_manipulability
     from zwidth.measures.dexterity import isotropy as isotropy
@@ -55,6 +62,15 @@ _HOME = {
     "device.load": ("from_document", "load", "schema"),
     "device.read": ("bundled",),
     "loop.controller": ("Butterworth", "Controller", "FirstOrder"),
+    "loop.estimators": (
+        "AlphaBeta",
+        "BackwardDifference",
+        "CentralDifference",
+        "Kalman",
+        "LeastSquaresSlope",
+        "SavitzkyGolay",
+        "WindowedDifference",
+    ),
     "loop.loop": ("Loop",),
     "measures.dexterity": ("dynamic_manipulability", "isotropy", "manipulability"),
     "model.effective": ("effective_parameters",),
