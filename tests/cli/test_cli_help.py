@@ -18,7 +18,7 @@ COMMANDS = sorted(group.commands)
 
 
 def test_the_commands_are_those_promised():
-    assert set(COMMANDS) == {"devices", "schema", "show", "chart", "check", "report"}
+    assert set(COMMANDS) == {"devices", "schema", "show", "chart", "check", "report", "sensitivity"}
 
 
 @pytest.mark.parametrize("words", [(), ("--help",), ("-h",)])

@@ -14,6 +14,7 @@ from zwidth.show.cli.check import check
 from zwidth.show.cli.devices import devices
 from zwidth.show.cli.report import report
 from zwidth.show.cli.schema import schema
+from zwidth.show.cli.sensitivity import sensitivity
 from zwidth.show.cli.show import show
 
 EPILOG = """\b
@@ -37,7 +38,7 @@ def zwidth(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (devices, schema, show, chart, check, report):
+for command in (devices, schema, show, chart, check, report, sensitivity):
     zwidth.add_command(command)
 
 

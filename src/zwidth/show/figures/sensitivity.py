@@ -1,0 +1,66 @@
+"""What to change first, as bars."""
+
+from __future__ import annotations
+
+from math import isnan
+
+from matplotlib.axes import Axes
+
+from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION
+from zwidth.show.units import MINUS, NONE
+from zwidth.study.sensitivity import Sensitivities
+
+
+def draw_sensitivities(ax: Axes, found: Sensitivities, top: int = 12) -> None:
+    """Per cent of largest stiffness that one per cent more of each number gives, the most telling on top.
+
+    top  how many numbers at most; those without influence are left out
+    """
+    shown = [n for n in found.numbers if not isnan(n.logarithmic) and n.logarithmic != 0.0][:top]
+    rows = list(range(len(shown), 0, -1))
+    values = [number.logarithmic for number in shown]
+    widest = max((abs(value) for value in values), default=1.0)
+    for row, value in zip(rows, values, strict=True):
+        # gains and losses differ in hatching too, for a grey print
+        ax.barh(
+            row,
+            value,
+            height=0.62,
+            color=BLUE if value > 0.0 else "white",
+            edgecolor=BLUE if value > 0.0 else VERMILION,
+            hatch=None if value > 0.0 else "//////",
+            linewidth=0.8,
+        )
+        ax.annotate(
+            _signed(value),
+            (value, row),
+            xytext=(4 if value > 0.0 else -4, 0),
+            textcoords="offset points",
+            ha="left" if value > 0.0 else "right",
+            va="center",
+            fontsize=7.5,
+        )
+    ax.axvline(0.0, color=BLACK, linewidth=0.8)
+    low, high = min([0.0, *values]), max([0.0, *values])
+    ax.set_xlim(
+        low - 0.16 * widest * (low < 0.0) - 0.02 * widest, high + 0.16 * widest * (high > 0.0) + 0.02 * widest
+    )
+    ax.set_ylim(0.4, len(shown) + 0.6)
+    ax.set_yticks(rows, [_short(number.path) for number in shown])
+    ax.tick_params(axis="y", length=0.0)
+    ax.spines["left"].set_visible(False)
+    ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}".replace("-", MINUS))
+    ax.set_xlabel("change of the largest stiffness by 1 % more [%]")
+    if not shown:
+        ax.set_yticks([])
+        ax.text(0.5, 0.5, NONE, transform=ax.transAxes, ha="center", va="center", color=GREY)
+
+
+def _short(path: str) -> str:
+    """A path without the table that all its neighbours share."""
+    return path.removeprefix("mechanism.")
+
+
+def _signed(value: float) -> str:
+    text = f"{value:+.2f}" if abs(value) >= 0.005 else f"{value:+.0e}"
+    return text.replace("-", MINUS)

@@ -1,0 +1,100 @@
+"""`zwidth sensitivity`: what to change first, for people and for programs."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, refused, strict, zwidth
+
+LATE = ("--set", "loop.delay_samples=1")
+UNSTABLE = (TWO_MASS, *LATE, "--set", "plant.damping_Ns_per_m=unset")
+
+
+def of(document):
+    return {entry["path"]: entry for entry in document["sensitivities"]}
+
+
+def test_the_promised_keys_with_the_closed_form_of_a_free_mass():
+    document = found("sensitivity", ONE_MASS, "--set", "plant.damping_Ns_per_m=unset")
+    entries = of(document)
+    assert entries["plant.mass_kg"]["d_ln_stiffness_max_d_ln_value"] == pytest.approx(1.0, abs=1e-9)
+    assert entries["loop.sampling_period_s"]["d_ln_stiffness_max_d_ln_value"] == pytest.approx(-2.0, abs=1e-9)
+    assert entries["plant.mass_kg"]["value"] == 0.03
+    assert entries["plant.mass_kg"]["unit"] == "kg"
+    assert document["stiffness_max_N_per_m"] == pytest.approx(0.03e6 * 0.68629150101524)
+    assert document["held_by"] == "smooth maximum"
+    gain = entries["plant.mass_kg"]["one_percent_gives_N_per_m"]
+    assert gain == pytest.approx(0.01 * document["stiffness_max_N_per_m"])
+    assert document["one_sided"] is False
+
+
+def test_sorted_by_magnitude_and_zeros_carry_a_derivative_and_a_reason():
+    document = found("sensitivity", TWO_MASS)
+    values = [entry["d_ln_stiffness_max_d_ln_value"] for entry in document["sensitivities"]]
+    known = [abs(value) for value in values if value is not None]
+    assert known == sorted(known, reverse=True)
+    assert values[: len(known)] == [value for value in values if value is not None]
+    late = of(document)["loop.delay_samples"]
+    assert late["d_ln_stiffness_max_d_ln_value"] is None
+    assert late["d_stiffness_max_d_value_N_per_m"] == pytest.approx(-28078.0756, rel=1e-6)
+    assert "0 has no logarithm" in late["reason"]
+    assert {group["path"] for group in document["groups"]} >= {"plant.mass_kg", "plant.damping_Ns_per_m"}
+
+
+def test_the_question_is_that_of_every_command():
+    document = found("sensitivity", MECHANISM, "--model", "rigid", "--direction", "1,0", "--at", "0.02,0.2")
+    assert document["model"] == "rigid"
+    entries = of(document)
+    assert entries["loop.sampling_period_s"]["d_ln_stiffness_max_d_ln_value"] == pytest.approx(-2.0, abs=1e-9)
+    assert "mechanism.reference.position_m.0" in {entry["path"] for entry in document["left_out"]}
+
+
+def test_people_see_the_top_of_the_list_with_units():
+    ran = zwidth("sensitivity", TWO_MASS, "--top", "2")
+    assert ran.code == 0
+    rows = [line.split() for line in ran.out.splitlines() if line.startswith((" loop.", " plant."))]
+    assert [row[0] for row in rows] == ["loop.sampling_period_s", "plant.mass_kg.1.1"]
+    assert rows[0][1:] == ["0.00125", "s", "-2.8504", "-203", "N/m"]
+    assert rows[1][1:] == ["0.0254", "kg", "+1.2147", "+86.7", "N/m"]
+    assert "a delay of 0.01 samples gives -281 N/m" in ran.out
+    assert "and 10 more" in ran.out
+
+
+def test_no_stable_wall_is_no_answer():
+    ran = zwidth("sensitivity", *UNSTABLE, "--json")
+    assert ran.code == 1
+    document = strict(ran.out)
+    assert document["sensitivities"] == []
+    assert document["stiffness_max_N_per_m"] is None
+    assert "no stable wall" in document["reason"]
+    ran = zwidth("sensitivity", *UNSTABLE)
+    assert (ran.code, ran.err.startswith("zwidth: no stable wall")) == (1, True)
+
+
+def test_out_of_reach_is_no_answer_either():
+    ran = zwidth("sensitivity", MECHANISM, "--at", "5,5", "--json")
+    assert ran.code == 1
+    assert strict(ran.out)["sensitivities"] is None
+
+
+def test_files(tmp_path):
+    table, figure = tmp_path / "all.csv", tmp_path / "bars.svg"
+    found("sensitivity", TWO_MASS, "--output", table)
+    with table.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert rows[0]["path"] == "loop.sampling_period_s"
+    assert float(rows[0]["d_ln_stiffness_max_d_ln_value"]) == pytest.approx(-2.8504059866, abs=1e-8)
+    assert rows[-1]["d_ln_stiffness_max_d_ln_value"] == ""
+    found("sensitivity", TWO_MASS, "--output", figure)
+    assert "<svg" in figure.read_text()
+    empty = tmp_path / "none.png"
+    assert zwidth("sensitivity", *UNSTABLE, "--output", empty).code == 1
+    assert empty.read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_cannot_be_meant_is_refused(tmp_path):
+    assert refused("sensitivity", TWO_MASS, "--top", "0")
+    assert refused("sensitivity", TWO_MASS, "--output", tmp_path / "a.xyz")
+    assert refused("sensitivity", TWO_MASS, "--at", "0,0")
