@@ -1,0 +1,75 @@
+"""The stability chart as the hand reads it: felt static stiffness in the place of the commanded one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from zwidth.chart.chart import BoundaryArc, StabilityChart
+from zwidth.measures.felt import hardest_static_stiffness, static_stiffness
+
+Floats = NDArray[np.float64]
+
+# A straight side of the chart bends on the way; it is cut into pieces of this share of the largest stiffness.
+PIECE = 1e-3
+
+
+@dataclass(frozen=True)
+class FeltChart:
+    """The stable walls with K >= 0, each at the stiffness that the hand feels at rest.
+
+    regions   closed rings (k, 2) of [felt stiffness, wall damping], counter-clockwise
+    boundary  the arcs of the stable set's edge with K >= 0; `stiffness` is the felt one
+    stiffest  felt stiffness of the stiffest stable wall with B >= 0 [N/m]; nan if there is none
+    limit     felt stiffness that no wall exceeds [N/m]; inf for a rigid device
+    """
+
+    regions: tuple[Floats, ...]
+    boundary: tuple[BoundaryArc, ...]
+    stiffest: float
+    limit: float
+
+
+def felt_chart(chart: StabilityChart) -> FeltChart:
+    """A chart in felt static stiffness (see `felt.static_stiffness`), for walls with K >= 0 of either sign of B.
+
+    Walls of negative stiffness are left out: at K = -k a spring k in series has no finite felt stiffness.
+
+    Raises  HandleError  where the plant has no handle
+    """
+    plant = chart.loop.plant
+    walls = np.vstack(chart.regions) if chart.regions else np.zeros((1, 2))
+    (_, low), (right, high) = walls.min(axis=0), walls.max(axis=0)
+    half_plane = shapely.box(0.0, low - 1.0, max(right, 0.0) + 1.0, high + 1.0)
+    rings = []
+    for region in chart.regions:
+        cut = shapely.intersection(shapely.Polygon(region), half_plane)
+        for part in shapely.get_parts(cut):
+            if isinstance(part, shapely.Polygon) and part.area > 0.0:
+                ring = np.array(
+                    shapely.segmentize(part, PIECE * float(np.hypot(right, high - low))).exterior.coords
+                )
+                ring[:, 0] = static_stiffness(plant, np.maximum(ring[:, 0], 0.0))
+                rings.append(ring if shapely.LinearRing(ring).is_ccw else ring[::-1])
+    arcs = []
+    for arc in chart.boundary:
+        for run in _runs(arc.stiffness >= 0.0):
+            felt = static_stiffness(plant, arc.stiffness[run])
+            arcs.append(BoundaryArc(felt, arc.damping[run], arc.frequency[run]))
+    return FeltChart(
+        regions=tuple(rings),
+        boundary=tuple(arcs),
+        stiffest=float(static_stiffness(plant, chart.stiffness_max))
+        if chart.stiffness_max > 0.0
+        else float("nan"),
+        limit=hardest_static_stiffness(plant),
+    )
+
+
+def _runs(inside: NDArray[np.bool_]) -> list[slice]:
+    """Stretches of True of at least two."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
+    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 1]
