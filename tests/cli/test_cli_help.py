@@ -18,7 +18,7 @@ COMMANDS = sorted(group.commands)
 
 
 def test_the_commands_are_those_promised():
-    assert set(COMMANDS) == {"devices", "schema", "show", "chart", "check", "report", "sensitivity"}
+    assert set(COMMANDS) == {"devices", "schema", "show", "chart", "check", "report", "sensitivity", "felt"}
 
 
 @pytest.mark.parametrize("words", [(), ("--help",), ("-h",)])

@@ -12,6 +12,7 @@ from zwidth import __version__
 from zwidth.show.cli.chart import chart
 from zwidth.show.cli.check import check
 from zwidth.show.cli.devices import devices
+from zwidth.show.cli.felt import felt
 from zwidth.show.cli.report import report
 from zwidth.show.cli.schema import schema
 from zwidth.show.cli.sensitivity import sensitivity
@@ -38,7 +39,7 @@ def zwidth(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (devices, schema, show, chart, check, report, sensitivity):
+for command in (devices, schema, show, chart, check, report, sensitivity, felt):
     zwidth.add_command(command)
 
 

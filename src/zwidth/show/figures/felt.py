@@ -1,0 +1,71 @@
+"""What the hand feels: impedances over frequency, and the chart at felt stiffness."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
+from numpy.typing import NDArray
+
+from zwidth.measures.felt_chart import FeltChart
+from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above
+from zwidth.show.units import MINUS, at_most, quantity
+
+
+def draw_impedance(
+    ax: Axes,
+    frequency: NDArray[np.float64],
+    felt: NDArray[np.complex128],
+    commanded: NDArray[np.complex128],
+    free_motion: NDArray[np.complex128],
+) -> None:
+    """Magnitudes of the felt, the commanded and the free-motion impedance over frequency, both axes logarithmic.
+
+    frequency                      (k,)  [Hz]
+    felt, commanded, free_motion   (k,)  [N s/m]
+    """
+    curves = (
+        ("felt at the handle", felt),
+        ("commanded, K/jω + B", commanded),
+        ("free motion, no wall", free_motion),
+    )
+    for (name, values), (colour, dashes) in zip(curves, LINES, strict=False):
+        ax.loglog(frequency, np.abs(values), color=colour, linestyle=dashes, label=name)
+    ax.set_xlim(frequency[0], frequency[-1])
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter(lambda x, _: f"{x:g}".replace("-", MINUS))
+        axis.set_minor_formatter(lambda *_: "")
+    ax.set_xlabel("Frequency [Hz]")
+    ax.set_ylabel("Impedance, magnitude [Ns/m]")
+    legend_above(ax, columns=2)
+
+
+def draw_felt_chart(ax: Axes, chart: FeltChart) -> None:
+    """The stable walls with K >= 0 at the static stiffness that the hand feels; the limit drawn across."""
+    for n, ring in enumerate(chart.regions):
+        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label="" if n else "stable walls"))
+    for arc in chart.boundary:
+        ax.plot(arc.stiffness, arc.damping, color=BLACK, solid_capstyle="round")
+    widest = max((float(ring[:, 0].max()) for ring in chart.regions), default=1.0)
+    if isfinite(chart.stiffest):
+        text = f"hardest felt contact: {at_most(chart.stiffest, 'N/m')}"
+        ax.axvline(chart.stiffest, color=VERMILION, linewidth=0.9, linestyle=":", label=text)
+    if isfinite(chart.limit) and chart.limit < 4.0 * widest:
+        text = f"no wall is felt above {quantity(chart.limit, 'N/m')}"
+        ax.axvline(chart.limit, color=GREY, linestyle=(0, (6, 3)), linewidth=0.9, label=text)
+        widest = max(widest, chart.limit)
+    walls = np.vstack(chart.regions) if chart.regions else np.array([[0.0, 0.0], [1.0, 1.0]])
+    low, high = float(walls[:, 1].min()), float(walls[:, 1].max())
+    ax.set_xlim(0.0, 1.05 * widest)
+    ax.set_ylim(low - 0.05 * (high - low) * (low < 0.0), high + 0.05 * (high - low))
+    if low < 0.0:
+        ax.axhline(0.0, color=GREY, linewidth=0.6, zorder=1.5)
+    label(ax.xaxis, "Stiffness felt at rest", "N/m")
+    label(ax.yaxis, "Virtual damping B", "Ns/m")
+    if not chart.regions:
+        ax.set_xticks([])
+        ax.set_yticks([])
+        ax.text(0.5, 0.5, "no wall is stable", transform=ax.transAxes, ha="center", va="center", color=GREY)
+    legend_above(ax)

@@ -1,0 +1,82 @@
+"""`zwidth felt`: what the hand feels of a wall, and when that question has no answer."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+
+from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, refused, strict, zwidth
+
+WALL = ("--stiffness", "4000", "--damping", "10")
+
+
+def test_the_promised_keys_with_two_springs_in_series():
+    document = found("felt", TWO_MASS, *WALL)
+    k, K = 15620.0, 4000.0
+    assert document["static_stiffness_N_per_m"] == pytest.approx(K * k / (K + k), rel=1e-9)
+    assert document["static_stiffness_limit_N_per_m"] == pytest.approx(k)
+    assert document["free_motion_mass_kg"] == pytest.approx(0.287)
+    K = document["stiffness_max_N_per_m"]
+    assert pytest.approx(7133.8692938) == K
+    assert document["static_stiffness_at_stiffness_max_N_per_m"] == pytest.approx(K * k / (K + k))
+    f = np.array(document["frequency_Hz"])
+    assert len(f) == len(document["impedance_real_Ns_per_m"]) == len(document["free_motion_imag_Ns_per_m"])
+    assert document["commanded_real_Ns_per_m"][7] == 10.0
+    assert document["commanded_imag_Ns_per_m"][7] == pytest.approx(-4000.0 / (2 * np.pi * f[7]))
+    slow = -document["impedance_imag_Ns_per_m"][0] * 2 * np.pi * f[0]
+    assert slow == pytest.approx(document["static_stiffness_N_per_m"], rel=2e-3)
+
+
+def test_people_read_the_same():
+    out = zwidth("felt", TWO_MASS, *WALL).out
+    for row in (
+        "wall                  4.000 kN/m, 10.00 Ns/m: stable",
+        "felt at rest          3.185 kN/m (79.6 % of it)",
+        "felt in free motion   0.2870 kg",
+        "no wall is felt above  15.62 kN/m",
+    ):
+        assert " ".join(row.split()) in " ".join(out.split())
+    assert "no wall is felt above" not in zwidth("felt", ONE_MASS, *WALL).out
+
+
+def test_an_unstable_wall_is_no_answer_and_leaves_no_file(tmp_path):
+    file = tmp_path / "felt.csv"
+    ran = zwidth("felt", TWO_MASS, "--stiffness", "9000", "--damping", "10", "--json", "--output", file)
+    assert ran.code == 1
+    document = strict(ran.out)
+    assert document["static_stiffness_N_per_m"] is None
+    assert document["impedance_real_Ns_per_m"] is None
+    assert document["free_motion_mass_kg"] == pytest.approx(0.287)
+    assert "unstable" in document["reason"]
+    assert "7.134 kN/m" in document["reason"]
+    assert not file.exists()
+
+
+def test_a_posture_out_of_reach_is_no_answer():
+    ran = zwidth("felt", MECHANISM, *WALL, "--at", "5,5", "--json")
+    assert ran.code == 1
+    assert strict(ran.out)["impedance_real_Ns_per_m"] is None
+
+
+def test_without_a_handle_it_is_refused():
+    (line,) = refused("felt", MECHANISM, *WALL, "--model", "motor-mass")
+    assert "no handle" in line
+    (line,) = refused("felt", TWO_MASS, *WALL, "--set", "plant.handle=unset")
+    assert "give plant.handle" in line
+
+
+def test_both_numbers_of_the_wall_are_needed():
+    assert "--damping" in refused("felt", TWO_MASS, "--stiffness", "100")[0]
+    assert refused("felt", TWO_MASS, "--stiffness", "nan", "--damping", "1")
+
+
+def test_files(tmp_path):
+    table, figure = tmp_path / "felt.csv", tmp_path / "felt.svg"
+    document = found("felt", TWO_MASS, *WALL, "--output", table)
+    with table.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["impedance_real_Ns_per_m"]) for row in rows] == document["impedance_real_Ns_per_m"]
+    found("felt", TWO_MASS, *WALL, "--output", figure)
+    assert "<svg" in figure.read_text()
