@@ -7,7 +7,7 @@ import pytest
 from conditions.conditions_cases import devices, one_mass
 
 from zwidth.chart.verdict import STABLE, judge
-from zwidth.conditions import colgate_schenkel
+from zwidth.conditions import colgate_schenkel, diolaiti
 from zwidth.conditions.passivity import passive_set
 from zwidth.loop.controller import Butterworth, FirstOrder
 
@@ -46,7 +46,7 @@ def test_the_filtered_closed_form_is_where_the_theorem_turns():
 
 @pytest.mark.parametrize("late", [0, 1, 2, 5])
 def test_the_delayed_spring_is_where_the_theorem_turns(late):
-    K = float(colgate_schenkel.spring_stiffness_limit(1.3, 0.002, late))
+    K = float(diolaiti.viscous_stiffness_limit(1.3, 0.002, late))
     assert margin(lambda z: 0.999 * K / z**late, 1.3, 0.002) > 0.0
     assert margin(lambda z: 1.001 * K / z**late, 1.3, 0.002) < 0.0
 
@@ -64,7 +64,7 @@ def test_the_set_by_frequency_meets_the_closed_forms():
         expected = colgate_schenkel.stiffness_limit_filtered(B, b, T, tau)
         np.testing.assert_allclose(filtered.stiffness_limit(B), expected, rtol=1e-6, atol=1e-6 * b / T)
         for late in (1, 3):
-            spring = colgate_schenkel.spring_stiffness_limit(b, T, late)
+            spring = diolaiti.viscous_stiffness_limit(b, T, late)
             delayed = passive_set(one_mass(m, T, b=b, delay=late), b)
             assert float(delayed.stiffness_limit(0.0)) == pytest.approx(float(spring), rel=1e-6)
             assert delayed.largest()[0] >= float(spring) * (1.0 - 1e-6)

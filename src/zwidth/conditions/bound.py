@@ -30,6 +30,7 @@ class Bound:
     assumptions        one sentence each
     violated           those of them that the loop does not meet, measured on its plant and controller
     taken              the numbers that it takes from the loop, by names that end in their unit; nan: not there
+    lacking            the names of those that are not there; with any, the condition is silent
     limit              B (...) to the largest stiffness there (...); use `stiffness_max_at`
     """
 
@@ -43,6 +44,7 @@ class Bound:
     assumptions: tuple[str, ...]
     violated: tuple[str, ...]
     taken: Mapping[str, float]
+    lacking: tuple[str, ...]
     limit: Callable[[Floats], Floats] = field(repr=False, compare=False)
 
     def stiffness_max_at(self, wall_damping: ArrayLike) -> Floats:
@@ -54,5 +56,5 @@ class Bound:
 
     @property
     def holds(self) -> bool:
-        """Does the loop meet all assumptions, so that the condition's claim stands?"""
-        return not self.violated
+        """Does the loop meet all assumptions, and have all numbers, so that the condition's claim stands?"""
+        return not self.violated and not self.lacking

@@ -10,8 +10,25 @@ for which the worst frequency is known.
 
 from __future__ import annotations
 
+from functools import partial
+from math import nan
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from zwidth.conditions.assumptions import (
+    AT_ONCE,
+    COLLOCATED,
+    DIFFERENCE,
+    DIRECT,
+    FIRST_ORDER,
+    PLAIN,
+    RESISTIVE,
+    RIGID,
+    Case,
+)
+from zwidth.conditions.bound import Bound
+from zwidth.loop.controller import FirstOrder
 
 Floats = NDArray[np.float64]
 
@@ -56,15 +73,35 @@ def stiffness_limit_filtered(
     return np.asarray(2.0 * np.maximum(b - burden, 0.0) / T)
 
 
-def spring_stiffness_limit(
-    device_damping: ArrayLike, sampling_period: ArrayLike, delay_samples: ArrayLike = 0
-) -> Floats:
-    """Largest passive stiffness of a pure spring, B = 0, delayed by l whole samples.
+def condition(case: Case) -> Bound:
+    """The unfiltered, undelayed wall on a loop."""
+    b, T = case.traits.drag, case.loop.period
+    return case.bound(
+        name="passive wall",
+        source="Colgate and Schenkel 1997; thesis eq. 4.15",
+        kind="passivity",
+        claim="sufficient",
+        statement="b > K T/2 + |B|",
+        assumptions=(RIGID, COLLOCATED, AT_ONCE, *PLAIN, RESISTIVE),
+        taken={"damping_Ns_per_m": b, "sampling_period_s": T},
+        limit=partial(stiffness_limit, device_damping=b, sampling_period=T),
+        largest=(float(stiffness_limit(0.0, b, T)), 0.0),
+    )
 
-        b >= K T (l + 1/2)            (agrees with Diolaiti et al. 2006, eq. 19, known here at second hand)
 
-    device_damping, sampling_period as in `stiffness_limit`; delay_samples (...) l, whole
-    Returns  (...)  [N/m]
-    """
-    b, T, l = (np.asarray(value, dtype=float) for value in (device_damping, sampling_period, delay_samples))
-    return np.asarray(np.maximum(b, 0.0) / (T * (l + 0.5)))
+def filtered_condition(case: Case) -> Bound:
+    """The wall with a first-order velocity filter on a loop."""
+    b, T = case.traits.drag, case.loop.period
+    low_pass = case.loop.controller.velocity_filter
+    tau = low_pass.time_constant if isinstance(low_pass, FirstOrder) else nan
+    return case.bound(
+        name="passive wall with a first-order filter",
+        source="Colgate and Schenkel 1997; Brown 1995, eq. 7 (read without its formulas, derived here)",
+        kind="passivity",
+        claim="sufficient",
+        statement="B >= 0: b > K T/2 + B (1 - a)/(1 + a); B < 0: b > K T/2 + |B|; with a = tau/(tau + T)",
+        assumptions=(RIGID, COLLOCATED, AT_ONCE, DIFFERENCE, FIRST_ORDER, *DIRECT, RESISTIVE),
+        taken={"damping_Ns_per_m": b, "sampling_period_s": T, "time_constant_s": tau},
+        limit=partial(stiffness_limit_filtered, device_damping=b, sampling_period=T, time_constant=tau),
+        largest=(float(stiffness_limit_filtered(0.0, b, T, tau)), 0.0),
+    )

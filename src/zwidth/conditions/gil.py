@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from zwidth.conditions.assumptions import COLLOCATED, LIGHT, PLAIN, RESISTIVE, RIGID, Case
+from zwidth.conditions.bound import Bound
 
-# b T/m below which the condition is trusted: its error is of first order in b T/m and B T/m.
-SMALL = 0.1
+Floats = NDArray[np.float64]
 
 
 def stiffness_limit(
@@ -34,3 +36,20 @@ def stiffness_limit(
     """
     B, b, T, late = (np.asarray(v, dtype=float) for v in (wall_damping, device_damping, sampling_period, delay))
     return np.asarray(np.maximum(b + B, 0.0) / (T / 2.0 + late))
+
+
+def condition(case: Case) -> Bound:
+    """The linear condition on a loop."""
+    b, T = case.traits.drag, case.loop.period
+    late = case.loop.controller.delay * T
+    return case.bound(
+        name="linear condition",
+        source="thesis eq. 4.17, which names Gil et al. 2004 and Minsky et al. 1990; with delay Gil et al. 2009 "
+        "(read in its abstract)",
+        kind="stability",
+        claim="approximate",
+        statement="K < (b + B)/(T/2 + t_d), for dampings well below m/T and short delays",
+        assumptions=(RIGID, LIGHT, COLLOCATED, *PLAIN, RESISTIVE),
+        taken={"damping_Ns_per_m": b, "sampling_period_s": T, "delay_s": late},
+        limit=partial(stiffness_limit, device_damping=b, sampling_period=T, delay=late),
+    )

@@ -12,10 +12,13 @@ so that the passive walls are a convex set, an intersection of half planes, one 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite, nan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, WHOLE, Case
+from zwidth.conditions.bound import Bound
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
@@ -77,3 +80,30 @@ def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
     spring = T / 2.0 * np.sin((l + 0.5) * t) / sine
     damper = np.real(d * np.exp(-1j * (l + 1) * t) * w) * T / (4.0 * sine**2)
     return PassiveSet(device_damping, spring, damper)
+
+
+def condition(case: Case) -> Bound:
+    """The theorem on a loop with its own delay and velocity estimate."""
+    loop, b = case.loop, case.traits.drag
+    known = WHOLE not in case.unmet and isfinite(b)
+    passive = passive_set(loop, b) if known else None
+    return case.bound(
+        name="passive wall with its delay and filter",
+        source="Colgate and Schenkel 1997, theorem for any sampled feedback; Weir and Colgate 2008, eq. 8.2",
+        kind="passivity",
+        claim="sufficient",
+        statement="b > (T/2)/(1 - cos wT) Re{(1 - e^-jwT) H(e^jwT)} for 0 < w <= pi/T, with H = z^-l (K + B w(z))",
+        assumptions=(RIGID, COLLOCATED, WHOLE, *DIRECT, RESISTIVE),
+        taken={
+            "damping_Ns_per_m": b,
+            "sampling_period_s": loop.period,
+            "delay_samples": loop.controller.delay,
+        },
+        limit=passive.stiffness_limit if passive else _silent,
+        largest=passive.largest() if passive else (nan, nan),
+    )
+
+
+def _silent(wall_damping: Floats) -> Floats:
+    """The limit where the theorem does not speak."""
+    return np.full(wall_damping.shape, nan)

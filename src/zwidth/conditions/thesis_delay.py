@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from zwidth.conditions.assumptions import COLLOCATED, ONE_LATE, PLAIN, RIGID, UNDAMPED, Case
+from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
 
@@ -54,3 +59,19 @@ def damping_at_largest_stiffness(mass: ArrayLike, sampling_period: ArrayLike) ->
 def largest_damping(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
     """Largest stable damping for K -> 0: 2 (sqrt 2 - 1) m/T = 0.828 m/T (thesis eq. 5.6) [N s/m], (...)."""
     return np.asarray(LARGEST_D * np.asarray(mass) / np.asarray(sampling_period))
+
+
+def condition(case: Case) -> Bound:
+    """(4.32) on a loop."""
+    m, T = case.traits.rigid_mass, case.loop.period
+    return case.bound(
+        name="rigid mass, one sample of delay",
+        source="thesis eq. 4.32 and 5.6",
+        kind="stability",
+        claim="exact",
+        statement="0 < p < ((2 + d) sqrt(36 - 20 d + d^2) - 12 - d^2)/4, with p = K T^2/m and d = B T/m",
+        assumptions=(RIGID, UNDAMPED, COLLOCATED, ONE_LATE, *PLAIN),
+        taken={"rigid_mass_kg": m, "sampling_period_s": T},
+        limit=partial(stiffness_limit, mass=m, sampling_period=T),
+        largest=(float(largest_stiffness(m, T)), float(damping_at_largest_stiffness(m, T))),
+    )

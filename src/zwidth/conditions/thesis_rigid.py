@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, PLAIN, RIGID, UNDAMPED, Case
+from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
 
@@ -51,3 +56,19 @@ def stable_area(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
     Thesis eq. 5.5, the integral of (4.14) over 0 < d < 2.
     """
     return np.asarray((12.0 - 16.0 * np.log(2.0)) * np.asarray(mass) ** 2 / np.asarray(sampling_period) ** 3)
+
+
+def condition(case: Case) -> Bound:
+    """(4.14) on a loop."""
+    m, T = case.traits.rigid_mass, case.loop.period
+    return case.bound(
+        name="rigid mass",
+        source="thesis eq. 4.14 and 5.4",
+        kind="stability",
+        claim="exact",
+        statement="0 < p < 2 d (2 - d)/(2 + d), with p = K T^2/m and d = B T/m",
+        assumptions=(RIGID, UNDAMPED, COLLOCATED, AT_ONCE, *PLAIN),
+        taken={"rigid_mass_kg": m, "sampling_period_s": T},
+        limit=partial(stiffness_limit, mass=m, sampling_period=T),
+        largest=(float(largest_stiffness(m, T)), float(damping_at_largest_stiffness(m, T))),
+    )

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
+from math import isfinite, isnan, nan
 
 import numpy as np
 
+from zwidth.loop.controller import FirstOrder
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import REPEATED, clusters, undamped_modes
 from zwidth.model.plant import Floats, Plant
@@ -28,20 +30,43 @@ class Traits:
     side_mass      the mass that (4.43) means: of a plant that the wall moves as one mass on a grounded spring
                    that mass, else the motor side's, 1/(a^T M^-1 a) with two sides [kg]
     side_stiffness the spring of that mass, else the effective stiffness between actuator and handle [N/m]
+    mode_mass      of a plant that the wall moves as one mass, on at most one spring and one damper to the ground,
+    mode_drag      its mass, friction and spring [kg], [N s/m], [N/m]
+    mode_stiffness
+    electrical_damping  what b_e/(1 + s L/R) brakes the free motion with, below all corners [N s/m]
+    corners        the corner frequencies R/L of lagged dampers [rad/s]
     free           the wall moves only free motion: one rigid mass, tied to nothing
     sprung         the wall moves only one motion, of one frequency, on springs to the ground
-    undamped       no damping acts on what the wall moves
+    undamped       no viscous damping acts on what the wall moves
     collocated     the wall acts where the encoder reads
+    differences    the velocity is estimated by the backward difference, whatever filter follows
+    first_order    a first-order filter follows
+    force_filtered the force is filtered in the computer
+    actuator_lags  the actuator follows with a time constant
     """
 
     rigid_mass: float
     drag: float
     side_mass: float
     side_stiffness: float
+    mode_mass: float
+    mode_drag: float
+    mode_stiffness: float
+    electrical_damping: float
+    corners: tuple[float, ...]
     free: bool
     sprung: bool
     undamped: bool
     collocated: bool
+    differences: bool
+    first_order: bool
+    force_filtered: bool
+    actuator_lags: bool
+
+    @property
+    def single(self) -> bool:
+        """Does the wall move one mass only, on at most one spring and one damper to the ground?"""
+        return not isnan(self.mode_mass)
 
 
 def traits(loop: Loop) -> Traits:
@@ -51,11 +76,12 @@ def traits(loop: Loop) -> Traits:
     push, read = shapes.T @ plant.actuator, shapes.T @ plant.sensor
     moved = _moved(squared, push, read)
     rates = [float(np.mean(squared[run])) for run in moved]
-    sprung = len(rates) == 1 and rates[0] > 0.0
+    single = len(rates) == 1 and _by_itself(plant, shapes, moved[0], push)
+    sprung = single and rates[0] > 0.0
     mass, drag = _free_motion(plant, squared, shapes)
+    mode_mass, mode_drag, mode_stiffness = _mode(plant, shapes, moved[0], push, rates[0]) if single else 3 * (nan,)
     if sprung:
-        side_mass = 1.0 / float(push[moved[0]] @ push[moved[0]])
-        side_stiffness = side_mass * rates[0]
+        side_mass, side_stiffness = mode_mass, mode_stiffness
     else:
         numbers = plant_effective_parameters(plant)
         side_mass, side_stiffness = float(numbers.motor_side_mass), float(numbers.stiffness)
@@ -64,12 +90,21 @@ def traits(loop: Loop) -> Traits:
         drag=drag,
         side_mass=side_mass,
         side_stiffness=side_stiffness,
-        free=rates == [0.0],
+        mode_mass=mode_mass,
+        mode_drag=mode_drag,
+        mode_stiffness=mode_stiffness,
+        electrical_damping=nan,
+        corners=(),
+        free=single and rates == [0.0],
         sprung=sprung,
         undamped=not _is_damped(plant, shapes, moved),
         collocated=bool(
             np.allclose(plant.actuator, plant.sensor, rtol=0.0, atol=1e-9 * np.max(np.abs(plant.sensor)))
         ),
+        differences=True,
+        first_order=isinstance(loop.controller.velocity_filter, FirstOrder),
+        force_filtered=False,
+        actuator_lags=False,
     )
 
 
@@ -78,6 +113,26 @@ def _moved(squared: Floats, push: Floats, read: Floats) -> list[slice]:
     scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
     whole = float(np.linalg.norm(push) * np.linalg.norm(read))
     return [run for run in clusters(squared, REPEATED * scale) if abs(push[run] @ read[run]) > UNSEEN * whole]
+
+
+def _by_itself(plant: Plant, shapes: Floats, run: slice, push: Floats) -> bool:
+    """Does the motion that the wall makes in one group of modes stay there, damping included?"""
+    motion = np.zeros(len(push))
+    motion[run] = push[run]
+    modal = shapes.T @ plant.damping @ shapes
+    force = modal @ motion
+    along = motion * (force @ motion) / (motion @ motion)
+    scale = np.abs(modal) @ np.abs(motion)
+    return bool(np.all(np.abs(force - along) <= 1e-9 * np.max(scale, initial=0.0)))
+
+
+def _mode(plant: Plant, shapes: Floats, run: slice, push: Floats, rate: float) -> tuple[float, float, float]:
+    """Mass, friction and spring of the one motion that the wall makes, one metre at the actuator."""
+    mass = 1.0 / float(push[run] @ push[run])
+    motion = mass * (shapes[:, run] @ push[run])
+    inside = float(np.abs(motion) @ np.abs(plant.damping) @ np.abs(motion))
+    drag = float(motion @ plant.damping @ motion)
+    return mass, drag if drag > UNDAMPED * inside else 0.0, mass * rate
 
 
 def _is_damped(plant: Plant, shapes: Floats, moved: list[slice]) -> bool:
@@ -89,11 +144,11 @@ def _is_damped(plant: Plant, shapes: Floats, moved: list[slice]) -> bool:
 
 def _free_motion(plant: Plant, squared: Floats, shapes: Floats) -> tuple[float, float]:
     """Mass and friction against the ground of the free motion at the actuator; nan where there is none."""
-    mass = float("nan")
+    mass = nan
     with suppress(ValueError):
         mass = float(plant_effective_parameters(plant).rigid_mass)
-    if not np.isfinite(mass):
-        return mass, float("nan")
+    if not isfinite(mass):
+        return mass, nan
     Z = shapes[:, squared == 0.0]
     motion = mass * (Z @ (Z.T @ plant.actuator))
     inside = float(np.abs(motion) @ np.abs(plant.damping) @ np.abs(motion))

@@ -1,0 +1,132 @@
+"""What published conditions assume, in sentences, and which of them a loop does not meet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import isnan, nan
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.conditions.bound import Bound, Claim, Kind
+from zwidth.conditions.traits import Traits, traits
+from zwidth.loop.loop import Loop
+
+Floats = NDArray[np.float64]
+
+# b T/m below which conditions of first order in it are trusted.
+LIGHT_FRICTION: Final = 0.1
+# W = sqrt(k/m) T below which conditions of second order in it are trusted.
+SLOW_SPRING: Final = 0.3
+
+RIGID: Final = "The device moves along the wall as one rigid mass, tied to nothing."
+SPRUNG: Final = "The motor side rests on one spring, whose far end stands still."
+ONE_MODE: Final = "Device and hand move along the wall as one mass, on at most one spring and one damper."
+UNDAMPED: Final = "Nothing in the device dissipates."
+COLLOCATED: Final = "The wall acts where the encoder reads."
+AT_ONCE: Final = "The force acts without delay."
+ONE_LATE: Final = "The force acts exactly one sample late."
+WHOLE: Final = "The delay is a whole number of samples."
+DIFFERENCE: Final = "The velocity is the backward difference of two successive readings."
+UNFILTERED: Final = "The velocity is not filtered."
+FIRST_ORDER: Final = "The velocity passes a first-order filter."
+AS_COMPUTED: Final = "The force is not filtered."
+PROMPT: Final = "The actuator follows at once."
+RESISTIVE: Final = "No electrical damping lags behind the motion."
+NYQUIST_BELOW_CORNER: Final = "Electrical damping has its corner frequency R/L above half the sampling rate."
+LIGHT: Final = f"Friction is light: b T/m is at most {LIGHT_FRICTION:g}."
+SLOW: Final = f"The spring is slow against the sampling: W is at most {SLOW_SPRING:g}."
+
+# The computer that most sources have in mind, but for its delay: for springs, and for walls with damping.
+DIRECT: Final = (AS_COMPUTED, PROMPT)
+PLAIN: Final = (DIFFERENCE, UNFILTERED, *DIRECT)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A loop as the conditions see it.
+
+    coulomb_friction  f_c, dry friction against the ground where the wall acts [N]; nan: not known
+    resolution        Delta, the encoder's step there [m]; nan: not known
+    unmet             the assumptions that it does not meet
+    """
+
+    loop: Loop
+    traits: Traits
+    coulomb_friction: float
+    resolution: float
+    unmet: frozenset[str]
+
+    def bound(
+        self,
+        *,
+        name: str,
+        source: str,
+        kind: Kind,
+        claim: Claim,
+        statement: str,
+        assumptions: tuple[str, ...],
+        taken: Mapping[str, float],
+        limit: Callable[[Floats], Floats],
+        largest: tuple[float, float] = (nan, nan),
+    ) -> Bound:
+        """One condition on this loop; silent where a number that it takes is not there.
+
+        largest  largest stiffness over B >= 0 and its damping; nan: it names none
+        """
+        lacking = tuple(key for key, value in taken.items() if isnan(value))
+        stiffness, damping = (nan, nan) if lacking else (float(largest[0]), float(largest[1]))
+        return Bound(
+            name=name,
+            source=source,
+            kind=kind,
+            claim=claim,
+            statement=statement,
+            stiffness_max=stiffness,
+            damping_at_stiffness_max=damping if stiffness > 0.0 else nan,
+            assumptions=assumptions,
+            violated=tuple(sentence for sentence in assumptions if sentence in self.unmet),
+            taken=taken,
+            lacking=lacking,
+            limit=_silent if lacking else limit,
+        )
+
+
+def case_of(loop: Loop, coulomb_friction: float = nan, resolution: float = nan) -> Case:
+    """Measure a loop once for all conditions."""
+    found = traits(loop)
+    return Case(loop, found, coulomb_friction, resolution, _unmet(loop, found))
+
+
+def _silent(wall_damping: Floats) -> Floats:
+    """The limit of a condition that lacks a number."""
+    return np.full(wall_damping.shape, nan)
+
+
+def _unmet(loop: Loop, found: Traits) -> frozenset[str]:
+    T = loop.period
+    mass, drag = (found.mode_mass, found.mode_drag) if found.single else (found.rigid_mass, found.drag)
+    sprung, spring = (mass, found.mode_stiffness) if found.single else (found.side_mass, found.side_stiffness)
+    met = {
+        RIGID: found.free,
+        SPRUNG: found.sprung,
+        ONE_MODE: found.single,
+        UNDAMPED: found.undamped and not found.corners,
+        COLLOCATED: found.collocated,
+        AT_ONCE: loop.whole_delay == 0 and loop.fractional_delay == 0.0,
+        ONE_LATE: loop.whole_delay == 1 and loop.fractional_delay == 0.0,
+        WHOLE: loop.fractional_delay == 0.0,
+        DIFFERENCE: found.differences,
+        UNFILTERED: loop.controller.velocity_filter is None,
+        FIRST_ORDER: found.first_order,
+        AS_COMPUTED: not found.force_filtered,
+        PROMPT: not found.actuator_lags,
+        RESISTIVE: not found.corners,
+        NYQUIST_BELOW_CORNER: all(corner * T >= np.pi for corner in found.corners),
+        # a number that is not there breaks nothing
+        LIGHT: not drag * T > LIGHT_FRICTION * mass,
+        SLOW: not spring * T**2 > SLOW_SPRING**2 * sprung,
+    }
+    return frozenset(sentence for sentence, holds in met.items() if not holds)

@@ -1,0 +1,62 @@
+"""The linear condition with a hand on the device, after Hulin et al. 2008."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.conditions.assumptions import COLLOCATED, LIGHT, ONE_MODE, PLAIN, RESISTIVE, SLOW, Case
+from zwidth.conditions.bound import Bound
+
+Floats = NDArray[np.float64]
+
+
+def stiffness_limit(
+    wall_damping: ArrayLike,
+    device_damping: ArrayLike,
+    operator_damping: ArrayLike,
+    sampling_period: ArrayLike,
+    delay: ArrayLike = 0.0,
+) -> Floats:
+    """Stiffness that the dampings of wall, device and hand balance together.
+
+        K < (b + b_h + B) / (T/2 + t_d)
+
+    for a hand that is a mass, a spring and a damper to the ground, held fast. It works through its damping alone:
+    its mass and, to first order, its spring leave the tangent at the origin where it is. Known at second hand; the
+    tests hold it against the exact region (`one_mode`). An approximation with an error of first order in
+    (b + b_h + B) T/m and of second order in W.
+
+    wall_damping      (...)  B [N s/m], any sign
+    device_damping    (...)  b of the device against the ground [N s/m]
+    operator_damping  (...)  b_h of the hand [N s/m]
+    sampling_period   (...)  T [s], positive
+    delay             (...)  t_d [s], not negative
+    Returns           (...)  [N/m], all broadcast; 0 where B <= -(b + b_h)
+
+    >>> float(stiffness_limit(1.0, 0.1, 5.4, 0.001))
+    13000.0
+    """
+    B, b, hand, T, late = (
+        np.asarray(v, dtype=float)
+        for v in (wall_damping, device_damping, operator_damping, sampling_period, delay)
+    )
+    return np.asarray(np.maximum(b + hand + B, 0.0) / (T / 2.0 + late))
+
+
+def condition(case: Case) -> Bound:
+    """The linear condition on a loop, with all friction of device and hand that the wall feels."""
+    drag, T = case.traits.mode_drag if case.traits.single else float("nan"), case.loop.period
+    late = case.loop.controller.delay * T
+    return case.bound(
+        name="linear condition with a hand",
+        source="Hulin et al. 2008 (known at second hand; derived here)",
+        kind="stability",
+        claim="approximate",
+        statement="K < (b + b_h + B)/(T/2 + t_d), for dampings well below m/T, short delays and slow springs",
+        assumptions=(ONE_MODE, SLOW, LIGHT, COLLOCATED, *PLAIN, RESISTIVE),
+        taken={"mode_damping_Ns_per_m": drag, "sampling_period_s": T, "delay_s": late},
+        limit=partial(stiffness_limit, device_damping=drag, operator_damping=0.0, sampling_period=T, delay=late),
+    )

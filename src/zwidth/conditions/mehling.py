@@ -1,0 +1,65 @@
+"""Electrical damping as friction, after Mehling, Gifford, Colgate and Peshkin 2005."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.conditions import colgate_schenkel
+from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, NYQUIST_BELOW_CORNER, PLAIN, RIGID, Case
+from zwidth.conditions.bound import Bound
+
+Floats = NDArray[np.float64]
+
+
+def effective_damping(
+    angular_frequency: ArrayLike, device_damping: ArrayLike, electrical_damping: ArrayLike, corner: ArrayLike
+) -> Floats:
+    """Friction that a vibration feels: b + b_e/(1 + (w L/R)^2) [N s/m], (...).
+
+    A motor shorted through R and L brakes with b_e/(1 + s L/R), b_e = k_t^2/R at the handle; this is its real
+    part. Full below the corner frequency R/L, nothing far above. (It follows from the circuit; of the source only
+    its abstract is known here, which says as much.)
+
+    angular_frequency   (...)  w [rad/s]
+    device_damping      (...)  b [N s/m]
+    electrical_damping  (...)  b_e [N s/m]
+    corner              (...)  R/L [rad/s]; inf: no inductance
+
+    >>> float(effective_damping(100.0, 1.0, 2.0, 100.0))
+    2.0
+    """
+    w, b, e, c = (
+        np.asarray(v, dtype=float) for v in (angular_frequency, device_damping, electrical_damping, corner)
+    )
+    return np.asarray(b + e / (1.0 + (w / c) ** 2))
+
+
+def stiffness_limit(
+    wall_damping: ArrayLike, device_damping: ArrayLike, electrical_damping: ArrayLike, sampling_period: ArrayLike
+) -> Floats:
+    """Largest passive stiffness with electrical damping counted as friction, b + b_e > K T/2 + |B| [N/m], (...).
+
+    An approximation for corner frequencies well above half the sampling rate; too much otherwise, and nothing is
+    left of it for b = 0: what moves between the samples is faster than any corner (`passivity`).
+    """
+    b, e = np.asarray(device_damping, dtype=float), np.asarray(electrical_damping, dtype=float)
+    return colgate_schenkel.stiffness_limit(wall_damping, b + e, sampling_period)
+
+
+def condition(case: Case) -> Bound:
+    """The condition on a loop."""
+    b, e, T = case.traits.drag, case.traits.electrical_damping, case.loop.period
+    return case.bound(
+        name="passive wall with electrical damping",
+        source="Mehling et al. 2005 (known by its abstract)",
+        kind="passivity",
+        claim="approximate",
+        statement="b + b_e > K T/2 + |B|, where b_e/(1 + s L/R) is the electrical damping",
+        assumptions=(RIGID, COLLOCATED, AT_ONCE, *PLAIN, NYQUIST_BELOW_CORNER),
+        taken={"damping_Ns_per_m": b, "electrical_damping_Ns_per_m": e, "sampling_period_s": T},
+        limit=partial(stiffness_limit, device_damping=b, electrical_damping=e, sampling_period=T),
+        largest=(float(stiffness_limit(0.0, b, e, T)), 0.0),
+    )
