@@ -96,21 +96,25 @@ class MultiLoop:
         """w(z) (...), the velocity estimate per reading, at complex z (...)."""
         return self.estimator.response(z)[0]
 
-    def plant_slope(self, z: ArrayLike) -> tuple[Complexes, Complexes]:
-        """P(z) and dP/dz, (..., m, m)."""
+    def plant_slope(self, z: ArrayLike, d: ArrayLike | None = None) -> tuple[Complexes, Complexes]:
+        """P(z) and dP/dz, (..., m, m); d is z - 1 where that is known to more digits than z has."""
         z = np.asarray(z, dtype=complex)
+        away = z - 1.0 if d is None else np.asarray(d, dtype=complex)
         held, at = self.held, z[..., None, None]
-        resolvent = (at - 1.0) * np.eye(len(held.step)) - held.step
-        inner = np.linalg.solve(resolvent, held.new + held.old / at)
+        resolvent = away[..., None, None] * np.eye(len(held.step)) - held.step
+        try:
+            inner = np.linalg.solve(resolvent, held.new + held.old / at)
+        except np.linalg.LinAlgError:  # on an undamped pole: step aside by a rounding
+            return self.plant_slope(z * (1.0 + 1e-15j), away + 1e-15j * z)
         slope = -np.linalg.solve(resolvent, inner + held.old / at**2)
-        F, dF = self.force_filter.response(z)
+        F, dF = self.force_filter.response(z, away)
         gain = (F / z**self.whole_delay)[..., None, None]
         dgain = (dF / z**self.whole_delay)[..., None, None] - self.whole_delay * gain / at
         P, dP = held.reading @ inner, held.reading @ slope
         return gain * P, gain * dP + dgain * P
 
     @cached_property
-    def _affine(self) -> tuple[Floats, Floats, Floats, Floats]:
+    def affine(self) -> tuple[Floats, Floats, Floats, Floats]:
         """L = open - input (K position + B velocity): (N, N), (N, m), (m, N), (m, N)."""
         held, w, F = self.held, self.estimator, self.force_filter
         m, l = self.count, self.whole_delay
@@ -144,7 +148,7 @@ class MultiLoop:
         N = moved states + m (delayed forces + states of estimator and filter). Unobserved motions are left out.
         """
         K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
-        open_, enters, position, velocity = self._affine
+        open_, enters, position, velocity = self.affine
         feedback = K[..., None, None] * position + B[..., None, None] * velocity
         return np.asarray(open_ - enters @ feedback)
 

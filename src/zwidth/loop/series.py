@@ -25,12 +25,13 @@ class Series:
     output: Floats
     direct: float
 
-    def response(self, z: ArrayLike) -> tuple[Complexes, Complexes]:
-        """H(z) and dH/dz (...) at complex z (...)."""
+    def response(self, z: ArrayLike, d: ArrayLike | None = None) -> tuple[Complexes, Complexes]:
+        """H(z) and dH/dz (...) at complex z (...); d is z - 1 where that is known to more digits than z has."""
         z = np.asarray(z, dtype=complex)
+        away = z - 1.0 if d is None else np.asarray(d, dtype=complex)
         if not len(self.A):
             return np.full(z.shape, complex(self.direct)), np.zeros(z.shape, dtype=complex)
-        resolvent = (z - 1.0)[..., None, None] * np.eye(len(self.A)) - self.A
+        resolvent = away[..., None, None] * np.eye(len(self.A)) - self.A
         inner = np.linalg.solve(resolvent, np.broadcast_to(self.input[:, None], (*z.shape, len(self.A), 1)))
         slope = -np.linalg.solve(resolvent, inner)
         found = self.direct + (self.output @ inner)[..., 0], (self.output @ slope)[..., 0]

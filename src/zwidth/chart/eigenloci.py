@@ -1,0 +1,147 @@
+"""The stability chart of one wall law over several rendered directions: a corner, a point held by a spring."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from shapely.geometry.polygon import orient
+
+from zwidth.chart.chart import BoundaryArc, _cells, _outline
+from zwidth.chart.loci import Loci, refine_loci, trace_loci, with_angles
+from zwidth.chart.loci_arcs import ring_arcs, sample_arc
+from zwidth.chart.loci_cells import Line, cut_lines, reach, real_root_lines, stable_polygons
+from zwidth.chart.loci_numbers import is_stable, largest_damping, quadrant_area, stiffest
+from zwidth.loop.multi import MultiLoop
+
+Floats = NDArray[np.float64]
+
+# How closely branches are sampled round the stable set before its corners are solved, in shares of its size.
+CLOSE = 1e-5
+# Margin about the stable set in which it is looked at again, and how often.
+MARGIN = 0.25
+LOOKS, MOST_LOOKS = 2, 6
+# Walls tried along each side of the set's box, and how far outside the circle a root shows that one is unstable.
+RASTER = 24
+OUTSIDE = 1e-9
+
+
+@dataclass(frozen=True)
+class MultiChart:
+    """The stable walls of several directions under one law, both signs of K and B, never clipped.
+
+    loop            what was asked
+    regions         closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set
+    boundary        arcs of its edge, with frequency
+    stiffness_max   supremum of K over stable walls with K > 0, B >= 0 [N/m]; nan if there is none
+    damping_at_stiffness_max     [N s/m]; nan if there is none
+    frequencies_at_stiffness_max [Hz] one, or two at a corner, ascending; () if there is none
+    damping_max     supremum of B >= 0 stable for all sufficiently small K > 0 [N s/m]; 0 if there is none
+    stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
+    """
+
+    loop: MultiLoop
+    regions: tuple[Floats, ...]
+    boundary: tuple[BoundaryArc, ...]
+    stiffness_max: float
+    damping_at_stiffness_max: float
+    frequencies_at_stiffness_max: tuple[float, ...]
+    damping_max: float
+    stable_area: float
+
+    @property
+    def unobserved_modes(self) -> tuple[str, ...]:
+        """Motions that no wall moves, by name; they were left out and do not count."""
+        return self.loop.unobserved_modes
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
+        if not self.regions:
+            return 0.0, 1.0, 0.0, 1.0
+        walls = np.vstack(self.regions)
+        low, high = walls.min(axis=0), walls.max(axis=0)
+        (K0, B0), (K1, B1) = low - 0.05 * (high - low), high + 0.05 * (high - low)
+        return float(K0), float(K1), float(B0), float(B1)
+
+    def spectral_radius(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
+        """Largest |z| of walls K, B (...) that broadcast, by the eigenvalues of the transition matrix."""
+        z = np.linalg.eigvals(self.loop.transition_matrix(wall_stiffness, wall_damping))
+        return np.asarray(np.abs(z).max(axis=-1))
+
+
+def multi_chart(loop: MultiLoop) -> MultiChart:
+    """The exact chart of det(1 + P(z) (K + B w(z))) = 0 over walls K, B (see `chart.loci` for the derivation).
+
+    The plane of walls is cut by the eigenloci and the lines of real roots, a wall in each piece is judged by
+    eigenvalues of the transition matrix, and the corners and peaks of what is stable are solved on the curves.
+
+    Raises  UnmovedError  where the walls move nothing that is read
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.directions import MultiPlant
+    >>> free = MultiPlant(np.diag([1.0, 2.0]), *np.zeros((2, 2, 2)), np.eye(2), np.eye(2))
+    >>> chart = multi_chart(MultiLoop(free, Controller(sampling_period=1.0)))
+    >>> round(chart.stiffness_max, 6), round(chart.damping_max, 6)       # the lighter mass's, thesis 4.14
+    (0.686292, 2.0)
+    """
+    loci, lines = trace_loci(loop), real_root_lines(loop)
+    far = reach(loci, lines)
+    polygons = stable_polygons(loop, cut_lines(loci, lines, -far, far))
+    for look in range(MOST_LOOKS):
+        if not polygons:
+            return MultiChart(loop, (), (), np.nan, np.nan, (), 0.0, 0.0)
+        missed = _missed(loop, polygons)
+        if look >= LOOKS and not len(missed):
+            break
+        loci = with_angles(loci, missed)
+        found = np.array(shapely.total_bounds(np.array(polygons))).reshape(2, 2)
+        low, high = found + MARGIN * (found[1] - found[0]) * np.array([[-1.0], [1.0]])
+        loci = refine_loci(loci, low, high, CLOSE)
+        polygons = stable_polygons(loop, cut_lines(loci, lines, low, high))
+    return _measured(loop, loci, lines, polygons)
+
+
+def _missed(loop: MultiLoop, polygons: list[shapely.Polygon]) -> Floats:
+    """Angles about roots outside the circle of walls in cells taken as stable: there a branch fell between two.
+
+    A mode that walls hardly move draws its whole branch within a sliver of angle.
+    """
+    cells = shapely.MultiPolygon(polygons)
+    low, high = np.array(cells.bounds).reshape(2, 2)
+    share = (np.arange(RASTER) + 0.5) / RASTER
+    x, y = (axis.ravel() for axis in np.meshgrid(*(low + share[:, None] * (high - low)).T))
+    inside = shapely.contains_xy(cells, x, y)
+    z = np.linalg.eigvals(loop.transition_matrix(x[inside] / loop.period, y[inside]))
+    outside = z[np.abs(z) > 1.0 + OUTSIDE]
+    if not len(outside):
+        return np.empty(0)
+    centres = np.unique(np.round(np.abs(np.angle(outside)), 12))
+    centres = centres[:: max(1, len(centres) // 20)]
+    steps = np.logspace(-13, -2, 45)
+    return np.unique(centres[:, None] * (1.0 + np.concatenate([-steps, [0.0], steps])))
+
+
+def _measured(loop: MultiLoop, loci: Loci, lines: list[Line], polygons: list[shapely.Polygon]) -> MultiChart:
+    rings = [
+        ring_arcs(loci, lines, np.array(ring.coords))
+        for polygon in polygons
+        for ring in (orient(polygon).exterior, *orient(polygon).interiors)
+    ]
+    walls = shapely.get_coordinates(np.array(polygons)) / (loop.period, 1.0)
+    size, (width, height) = np.ptp(walls, axis=0), np.abs(walls).max(axis=0).tolist()
+    samples = [[sample_arc(loci, arc, size) for arc in ring] for ring in rings]
+    in_hertz = 1.0 / (2.0 * np.pi * loop.period)
+    peak = stiffest(loci, rings, width)
+    return MultiChart(
+        loop=loop,
+        regions=_cells([_outline(arcs) for arcs in samples]),
+        boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for arcs in samples for thetas, K, B in arcs),
+        stiffness_max=peak.stiffness if peak else np.nan,
+        damping_at_stiffness_max=peak.damping if peak else np.nan,
+        frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
+        damping_max=largest_damping(loci, rings, width, height, lambda K, B: is_stable(loop, K, B)),
+        stable_area=quadrant_area(loci, rings) if peak else 0.0,
+    )

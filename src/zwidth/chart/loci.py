@@ -1,0 +1,217 @@
+"""The eigenloci of several rendered directions: m curves of walls with a root on the unit circle.
+
+Under one wall law for all directions the loop is det(1 + P(z) (K + B w(z))) = 0. With the eigenvalues g_i(z) of
+the m x m plant P(z) that is the product of m single loops,
+
+    1 + g_i(z) (K + B w(z)) = 0,      h = -1/g_i,     B = Im h / Im w,     K = Re h - B Re w,
+
+so that each eigenvalue draws one curve of walls (characteristic loci, MacFarlane and Postlethwaite 1977, known at
+second hand; D-decomposition, Neimark 1949). Eigenvalues are followed by continuity: the angles are halved until
+each moves less than half of the way to its neighbour, also where two of them meet in a branch point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from zwidth.chart.grid import angles
+from zwidth.loop.multi import MultiLoop
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Steps between angles, in shares of the distance to the nearest pole or zero.
+SHARE = 0.1
+# Eigenvalues closer than this share of their size are one, all along (equal directions).
+EQUAL = 1e-9
+# Intervals are halved down to this share of their angle.
+NARROWEST = 1e-8
+# Largest distance of a chord from its curve, in shares of the chord.
+SAG = 0.02
+ROUNDS = 24
+
+
+@dataclass(frozen=True)
+class Loci:
+    """Eigenvalues of P(exp(i theta)), each column one branch.
+
+    loop
+    thetas  (N,)    ascending in (0, pi)
+    g       (N, m)  eigenvalues followed by continuity
+    """
+
+    loop: MultiLoop
+    thetas: Floats
+    g: Complexes
+
+    @property
+    def walls(self) -> Floats:
+        """Walls (N, m, 2) of [K T, B]: one unit, in which distances are taken."""
+        z, d = on_circle(self.thetas)
+        w, _ = self.loop.estimator.response(z, d)
+        return _walls(self.g, w[:, None]) * (self.loop.period, 1.0)
+
+    def at(self, branch: int, thetas: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """K, B, dK/dtheta, dB/dtheta (k,) on a branch at angles in (0, pi)."""
+        z, d = on_circle(thetas)
+        P, dP = self.loop.plant_slope(z, d)
+        g, right = np.linalg.eig(P)
+        expected = np.interp(thetas, self.thetas, self.g[:, branch])
+        own = np.argmin(np.abs(g - expected[:, None]), axis=-1)
+        row, each = np.linalg.inv(right), np.arange(len(own))
+        dg = np.einsum("ki,kij,kj->k", row[each, own], dP, right[each, :, own])
+        w, dw = self.loop.estimator.response(z, d)
+        h = -1.0 / g[each, own]
+        dh, dw = 1j * z * dg * h * h, 1j * z * dw
+        B = h.imag / w.imag
+        dB = (dh.imag - B * dw.imag) / w.imag
+        return h.real - B * w.real, B, dh.real - dB * w.real - B * dw.real, dB
+
+
+def on_circle(thetas: Floats) -> tuple[Complexes, Complexes]:
+    """z = exp(i theta) and d = z - 1, the latter without cancellation near theta = 0."""
+    s, c = np.sin(0.5 * thetas), np.cos(0.5 * thetas)
+    d = -2.0 * s * s + 2j * s * c
+    return 1.0 + d, d
+
+
+def _walls(g: Complexes, w: Complexes) -> Floats:
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        h = -1.0 / g
+        B = h.imag / w.imag
+        return np.stack([h.real - B * w.real, B], axis=-1)
+
+
+def eigenvalues_of_plant(loop: MultiLoop, thetas: Floats) -> Complexes:
+    """Eigenvalues (N, m) of P(exp(i theta)), in no order."""
+    return np.asarray(np.linalg.eigvals(loop.plant_slope(*on_circle(thetas))[0]), dtype=complex)
+
+
+def trace_loci(loop: MultiLoop) -> Loci:
+    """All branches, sampled so that chords follow them wherever they go."""
+    thetas = angles(features(loop), 1.0, SHARE)
+    g = eigenvalues_of_plant(loop, thetas)
+    for _ in range(ROUNDS):
+        loci = Loci(loop, thetas, _followed(g))
+        middles = 0.5 * (thetas[1:] + thetas[:-1])
+        wide = np.diff(thetas) > NARROWEST * middles
+        middles = middles[wide & (_ambiguous(loci.g) | _bent(loci))]
+        if not len(middles):
+            break
+        thetas, g = _merged(loci.thetas, loci.g, middles, eigenvalues_of_plant(loop, middles))
+    return Loci(loop, thetas, _followed(g))
+
+
+def refine_loci(loci: Loci, low: Floats, high: Floats, tolerance: float) -> Loci:
+    """More samples where a branch runs through the box from low to high (2,) of [K T, B].
+
+    tolerance  largest distance of a chord from its branch, in shares of the box
+    """
+    for _ in range(ROUNDS):
+        walls = loci.walls
+        near = (walls > low).all(axis=-1) & (walls < high).all(axis=-1)
+        inside = (near[1:] | near[:-1]).any(axis=-1) & (np.diff(loci.thetas) > NARROWEST * loci.thetas[1:])
+        middles = (0.5 * (loci.thetas[1:] + loci.thetas[:-1]))[inside]
+        g = eigenvalues_of_plant(loci.loop, middles)
+        thetas, every = _merged(loci.thetas, loci.g, middles, g)
+        found = Loci(loci.loop, thetas, _followed(every))
+        at = np.searchsorted(thetas, middles)
+        points = found.walls
+        with np.errstate(invalid="ignore", over="ignore"):
+            sag = np.abs(points[at] - 0.5 * (points[at - 1] + points[at + 1])) / (high - low)
+            here = (near[1:] | near[:-1])[inside]
+            loose = (np.where(here[..., None], sag, 0.0) > tolerance).any(axis=(-1, -2))
+        keep = np.ones(len(thetas), dtype=bool)
+        keep[at[~loose]] = False
+        loci = Loci(loci.loop, thetas[keep], found.g[keep])
+        if not loose.any():
+            return loci
+    return loci
+
+
+def with_angles(loci: Loci, more: Floats) -> Loci:
+    """More samples, at these angles."""
+    more = np.setdiff1d(more[(more > loci.thetas[0]) & (more < loci.thetas[-1])], loci.thetas)
+    thetas, g = _merged(loci.thetas, loci.g, more, eigenvalues_of_plant(loci.loop, more))
+    return Loci(loci.loop, thetas, _followed(g))
+
+
+def _merged(thetas: Floats, g: Complexes, more: Floats, h: Complexes) -> tuple[Floats, Complexes]:
+    every = np.concatenate([thetas, more])
+    order = np.argsort(every)
+    return every[order], np.concatenate([g, h])[order]
+
+
+def _followed(g: Complexes) -> Complexes:
+    """Columns in the order in which each eigenvalue moves least."""
+    if g.shape[1] == 1:
+        return g
+    out = g.copy()
+    for k in range(1, len(g)):
+        cost = np.abs(out[k - 1][:, None] - g[k])
+        if g.shape[1] == 2:
+            if cost[0, 0] + cost[1, 1] > cost[0, 1] + cost[1, 0]:
+                out[k] = g[k, ::-1]
+        else:
+            out[k] = g[k, linear_sum_assignment(cost)[1]]
+    return out
+
+
+def _ambiguous(g: Complexes) -> NDArray[np.bool_]:
+    """Intervals (N - 1,) in which an eigenvalue moves more than half of the way to another one."""
+    m = g.shape[1]
+    found = np.zeros(len(g) - 1, dtype=bool)
+    for i in range(m):
+        for j in range(m):
+            if i != j:
+                gap, size = np.abs(g[:, i] - g[:, j]), np.abs(g[:, i]) + np.abs(g[:, j])
+                apart = np.minimum(gap[1:], gap[:-1])
+                distinct = np.maximum(gap[1:] / size[1:], gap[:-1] / size[:-1]) > EQUAL
+                found |= distinct & (np.abs(np.diff(g[:, i])) > 0.5 * apart)
+    return found
+
+
+def _bent(loci: Loci) -> NDArray[np.bool_]:
+    """Intervals (N - 1,) beside which a branch turns by more than its chords follow."""
+    chords = np.diff(loci.walls, axis=0)
+    length = np.hypot(chords[..., 0], chords[..., 1])
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        cross = chords[1:, :, 0] * chords[:-1, :, 1] - chords[1:, :, 1] * chords[:-1, :, 0]
+        along = np.einsum("kmi,kmi->km", chords[1:], chords[:-1])
+        turn = np.abs(np.arctan2(cross, along)) > 8.0 * SAG
+        turn &= np.isfinite(length[1:] + length[:-1])
+    bent = np.zeros(len(chords), dtype=bool)
+    bent[1:] |= turn.any(axis=-1)
+    bent[:-1] |= turn.any(axis=-1)
+    # curves turn about cusps and branch points without end
+    return bent & (np.diff(loci.thetas) > 1e-3 * np.minimum(loci.thetas[1:], np.pi - loci.thetas[:-1]))
+
+
+def features(loop: MultiLoop) -> Complexes:
+    """Poles and zeros of P, poles of w, and where w is real on the circle; Im z >= 0."""
+    held, estimator, force = loop.held, loop.estimator, loop.force_filter
+    m = loop.count
+    split = loop.fractional_delay > 0.0
+    A = held.step
+    B, C = held.new, held.reading
+    if split:  # the older force as states
+        A = np.block([[held.step, held.old], [np.zeros((m, len(held.step))), -np.eye(m)]])
+        B, C = np.vstack([B, np.eye(m)]), np.hstack([C, np.zeros((m, m))])
+    B, C = B / np.max(np.abs(B)), C / np.max(np.abs(C))
+    whole = np.block([[A, B], [C, np.zeros((m, m))]])
+    mass = scipy.linalg.block_diag(np.eye(len(A)), np.zeros((m, m)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        zeros = scipy.linalg.eigvals(whole, mass)
+    thetas = np.linspace(0.0, np.pi, 200)[1:-1]
+    w = estimator.response(*on_circle(thetas))[0].imag
+    turns = np.flatnonzero(w[1:] * w[:-1] < 0.0)
+    share = w[turns] / (w[turns] - w[turns + 1])
+    in_phase = np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0])))
+    poles = [1.0 + np.linalg.eigvals(matrix) for matrix in (held.step, estimator.A, force.A)]
+    points = np.concatenate([*poles, 1.0 + zeros[np.isfinite(zeros)], in_phase]).astype(complex)
+    return points[(points.imag >= -1e-12) & (np.abs(points) < 1e6)]
