@@ -1,0 +1,97 @@
+"""Which walls the error of a measurement leaves in doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from math import nan
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from zwidth.chart.chart import _cut as cut
+from zwidth.chart.measured_cells import Cells, edges_stable_set
+from zwidth.chart.measured_loop import MeasuredLoop
+
+Floats = NDArray[np.float64]
+
+CORNERS = 24  # of a polygon round an ellipse
+MOST_ELLIPSES = 600
+
+
+@dataclass(frozen=True)
+class Band:
+    """The doubtful walls along the stable set's edge.
+
+    regions         rings (k, 2) of [stiffness, damping] that cover them
+    stiffness_low   the largest stiffness (K > 0, B >= 0) that is stable beyond doubt [N/m]; nan: none
+    stiffness_high  the largest that may be stable [N/m]
+    meaning         what the band covers, for people
+    """
+
+    regions: tuple[Floats, ...]
+    stiffness_low: float
+    stiffness_high: float
+    meaning: str
+
+
+def uncertainty(loop: MeasuredLoop, cells: Cells) -> Band | None:
+    """The band along the stable set's edge; None where nothing is known of the error.
+
+    With an error of radius r in h, a wall is in doubt where |K + B w - h| <= r: an ellipse round each point of the
+    curve. The band is the ellipses along the edge, neighbours joined.
+    """
+    if loop.errors is None:
+        return None
+    scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
+    covered = shapely.union_all(list(_ellipses(loop, cells, scale)))
+    stable = shapely.union_all([shapely.transform(cell, lambda xy: xy / scale) for cell in cells.polygons])
+    parts = [part for part in shapely.get_parts(covered) if isinstance(part, shapely.Polygon)]
+    return Band(
+        regions=tuple(np.array(piece.exterior.coords) * scale for part in parts for piece in cut(part)),
+        stiffness_low=_largest(stable.difference(covered), scale),
+        stiffness_high=_largest(stable.union(covered), scale),
+        meaning="the farthest of the repeated sweeps"
+        if loop.response.sweeps is not None
+        else "95 % of the error that the coherence tells",
+    )
+
+
+def _ellipses(loop: MeasuredLoop, cells: Cells, scale: Floats) -> Iterator[shapely.Geometry]:
+    """Convex hulls of each two neighbouring ellipses along the stable set's edge, in units of `scale`."""
+    edge = cells.edge
+    curve = np.flatnonzero(edge.at >= 0)
+    low, high = (
+        np.minimum(edge.segments[:, :2], edge.segments[:, 2:]),
+        np.maximum(edge.segments[:, :2], edge.segments[:, 2:]),
+    )
+    K0, K1, B0, B1 = cells.box
+    curve = curve[np.all((high[curve] >= (K0, B0)) & (low[curve] <= (K1, B1)), axis=1)]
+    curve = curve[edges_stable_set(edge, curve, scale)]
+    every = max(1, len(curve) // MOST_ELLIPSES)
+    for run in np.split(curve, np.flatnonzero(np.diff(curve) > 1) + 1) if len(curve) else []:
+        at = edge.at[run]
+        at = np.unique(np.concatenate([at[::every], at[-1:], at[-1:] + 1]))
+        outlines = _outlines(loop, edge.angles[at], edge.walls[at]) / scale
+        for one, next_one in pairwise(outlines):
+            yield shapely.MultiPoint(np.vstack([one, next_one])).convex_hull
+
+
+def _outlines(loop: MeasuredLoop, theta: Floats, walls: Floats) -> Floats:
+    """Points (n, CORNERS, 2) round the ellipses |dK + dB w| = r at walls (n, 2) of the curve."""
+    w, r = loop.w(theta), loop.error(theta) / np.cos(np.pi / CORNERS)
+    disk = r[:, None] * np.exp(2j * np.pi * np.arange(CORNERS) / CORNERS)
+    dB = disk.imag / w.imag[:, None]
+    dK = disk.real - dB * w.real[:, None]
+    return np.asarray(walls[:, None, :] + np.stack([dK, dB], axis=2))
+
+
+def _largest(area: shapely.Geometry, scale: Floats) -> float:
+    """The largest K of an area within K > 0, B >= 0; nan where there is none."""
+    _, _, high_K, high_B = area.bounds
+    if not (high_K > 0.0 and high_B > 0.0):
+        return nan
+    high = float(shapely.intersection(area, shapely.box(0.0, 0.0, 2.0 * high_K, 2.0 * high_B)).bounds[2])
+    return high * float(scale[0]) if high > 0.0 else nan

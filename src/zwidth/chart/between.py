@@ -1,0 +1,142 @@
+"""A measured response between its frequencies: smooth through every point, mirrored at 0 and at half the rate.
+
+With m the poles of P at z = 1 and D whole samples of delay, G = P (z - 1)^m z^D has no singularity left at z = 1
+and turns slowly. Cubic Hermite pieces with slopes of five points lead through G, 1/G or log G, whichever predicts
+its neighbours best where the piece lies: near a zero of P that is G, near a pole 1/G, elsewhere the logarithm. The
+error falls with the fourth power of the spacing. A real loop has P(conj z) = conj P(z), so that G continues beyond
+both ends of the upper half circle as its own mirror image.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.model.response import ResponseError
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+MIRRORED = 3  # points repeated beyond an end
+FEWEST = 6  # frequencies; fewer make no curve
+
+
+@dataclass(frozen=True)
+class Between:
+    """Cubic pieces of G, 1/G and log G over ascending nodes theta, and which of them each interval uses.
+
+    values, slopes  (3, n) at the nodes;   kind (n - 1,) 0, 1 or 2
+    error           (n - 1,) relative error of P to be expected there: a 64th of what the cubic through four
+                    neighbours misses a node by, which is the fourth derivative's part in both on even spacing
+    closed          whether the response reaches half the sampling rate
+    """
+
+    nodes: Floats
+    values: Complexes
+    slopes: Complexes
+    kind: NDArray[np.int64]
+    error: Floats
+    integrators: int
+    delay: int
+    closed: bool
+
+    def _at(self, theta: Floats) -> NDArray[np.int64]:
+        return np.clip(np.searchsorted(self.nodes, theta, side="right") - 1, 0, len(self.nodes) - 2)
+
+    def inverse(self, theta: Floats) -> Complexes:
+        """1 / P at angles (...) within (0, pi]."""
+        i = self._at(theta)
+        kind = self.kind[i]
+        step = self.nodes[i + 1] - self.nodes[i]
+        t = (theta - self.nodes[i]) / step
+        u = 1.0 - t
+        found = u * u * ((1.0 + 2.0 * t) * self.values[kind, i] + t * step * self.slopes[kind, i])
+        found += t * t * ((1.0 + 2.0 * u) * self.values[kind, i + 1] - u * step * self.slopes[kind, i + 1])
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            inverse = np.where(kind == 0, 1.0 / found, np.where(kind == 1, found, 0.0))
+        inverse = np.where(kind == 2, np.exp(-np.where(kind == 2, found, 0.0)), inverse)
+        return np.asarray(inverse * around_one(theta) ** self.integrators * np.exp(1j * self.delay * theta))
+
+    def relative_error(self, theta: Floats) -> Floats:
+        """Relative error of P (...) that interpolation is expected to leave."""
+        return np.asarray(self.error[self._at(theta)])
+
+
+def around_one(theta: Floats) -> Complexes:
+    """z - 1 = exp(i theta) - 1 without cancellation near 0."""
+    s, c = np.sin(theta / 2.0), np.cos(theta / 2.0)
+    return np.asarray(-2.0 * s * s + 2j * s * c)
+
+
+def smooth_part(theta: Floats, P: Complexes, integrators: int) -> tuple[Complexes, int]:
+    """G at measured angles (n,), and the whole delay D that it leaves out, from the mean fall of the phase."""
+    G = P * around_one(theta) ** integrators
+    phase = np.unwrap(np.angle(G))
+    delay = max(int(np.round((phase[0] - phase[-1]) / (theta[-1] - theta[0]))), 0)
+    return G * np.exp(1j * delay * theta), delay
+
+
+def between(theta: Floats, P: Complexes, integrators: int, *, closed: bool) -> Between:
+    """The interpolation through a response P (n,) at ascending angles (n,) in (0, pi].
+
+    closed  whether the last angle is near enough to pi for its mirror image to be the next point
+    """
+    if len(theta) < FEWEST:
+        raise ResponseError(
+            f"has {len(theta)} usable frequencies; a chart needs at least {FEWEST}, and some hundreds to be exact"
+        )
+    G, delay = smooth_part(theta, P, integrators)
+    nodes, values = [-theta[MIRRORED - 1 :: -1], theta], [np.conj(G[MIRRORED - 1 :: -1]), G]
+    if closed:
+        at_end = np.pi - theta[-1] < 1e-9
+        if at_end:
+            values[1] = np.append(G[:-1], G[-1].real)
+        near = slice(-2, -MIRRORED - 2, -1) if at_end else slice(None, -MIRRORED - 1, -1)
+        nodes.append(2.0 * np.pi - theta[near])
+        values.append(np.conj(G[near]))
+    x, y = np.concatenate(nodes), np.concatenate(values)
+    with np.errstate(divide="ignore"):
+        log = np.log(np.abs(y)) + 1j * np.unwrap(np.angle(y))
+    kinds = np.where(np.isfinite(y) & (y != 0.0), np.array([y, 1.0 / np.where(y == 0.0, 1.0, y), log]), 0.0)
+    missed = np.array([_missed(x, kinds[0], y), _missed(x, kinds[1], kinds[1]), _missed(x, kinds[2], 1.0)])
+    missed = np.maximum(missed[:, :-1], missed[:, 1:])
+    kind = np.argmin(missed, axis=0)
+    slopes, error = np.array([_slopes(x, v) for v in kinds]), np.min(missed, axis=0) / 64.0
+    return Between(x, kinds, slopes, kind, error, integrators, delay, closed)
+
+
+def _windows(n: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Five neighbouring nodes (n, 5) round each node, and which of them it is itself."""
+    window = np.clip(np.arange(n) - 2, 0, n - 5)[:, None] + np.arange(5)
+    return window, window == np.arange(n)[:, None]
+
+
+def _slopes(x: Floats, y: Complexes) -> Complexes:
+    """Derivative at each node of the polynomial through it and its four neighbours (nodes of any spacing)."""
+    window, here = _windows(len(x))
+    scale, gaps = _products(x, window, here)
+    weights = scale[here][:, None] / (scale * gaps)
+    weights[here] = np.sum(np.where(here, 0.0, 1.0 / gaps), axis=1)
+    return np.asarray(np.sum(weights * y[window], axis=1))
+
+
+def _missed(x: Floats, y: Complexes, size: Complexes | float) -> Floats:
+    """How far the cubic through its four neighbours misses each node, relative to `size`."""
+    window, here = _windows(len(x))
+    scale, _ = _products(x, window, here)
+    # Lagrange's basis on the four others, at the node: the fourth difference over the node's own weight
+    weights = -scale[here][:, None] / scale
+    weights[here] = 0.0
+    predicted = np.sum(weights * y[window], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.nan_to_num(np.abs(predicted - y) / np.abs(size), nan=np.inf))
+
+
+def _products(x: Floats, window: NDArray[np.int64], here: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """For every window: the product of each node's distances to the others, and its distance from the middle."""
+    at = x[window]
+    apart = at[:, :, None] - at[:, None, :]
+    apart[:, np.arange(5), np.arange(5)] = 1.0
+    return np.prod(apart, axis=2), np.where(here, 1.0, x[:, None] - at)

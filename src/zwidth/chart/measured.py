@@ -1,0 +1,332 @@
+"""The stability chart of a measured device, without a model: boundary by its response, cells by counting roots."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import isnan, nan
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.chart.band import Band, uncertainty
+from zwidth.chart.chart import _cut
+from zwidth.chart.measured_cells import Cells, cells_within, edges_stable_set, window
+from zwidth.chart.measured_curve import Boundary, Box, boundary, coarse, real_root
+from zwidth.chart.measured_loop import MeasuredLoop
+from zwidth.chart.measured_verdict import MeasuredVerdicts, judge_measured
+from zwidth.chart.trust import Stretch
+from zwidth.loop.controller import Controller
+from zwidth.model.response import Response, ResponseError
+
+Floats = NDArray[np.float64]
+
+ZOOMED = 2e-8  # of the stiffest wall: chords in the window round it
+FEWEST_ON_EDGE = 3  # measured frequencies, without which the edge is guesswork
+
+
+@dataclass(frozen=True)
+class MeasuredArc:
+    """Measured points along a piece of the stable set's edge.
+
+    stiffness, damping, frequency  (k,)  [N/m], [N s/m], [Hz]; a line of real roots by its two ends, 0 or 1/(2T)
+    stiffness_low, stiffness_high  (k,)  [N/m] extent of the band of each point; None where no error is known
+    """
+
+    stiffness: Floats
+    damping: Floats
+    frequency: Floats
+    stiffness_low: Floats | None = None
+    stiffness_high: Floats | None = None
+
+
+@dataclass(frozen=True)
+class MeasuredChart:
+    """The stable walls of a measured device. The names of `StabilityChart` mean here what they mean there.
+
+    boundary              arcs of measured points, ascending in frequency; what is interpolated between them shows
+                          in `regions` only
+    interpolation_error   relative error that interpolation is expected to leave in stiffness_max
+    measured_stiffness_max  the stiffest of the measured points on the edge with K > 0, B >= 0 [N/m]; nan: none
+    band                  walls whose verdict the measurement's error leaves open; None where no error is known
+    stiffness_max_of_sweeps  of each repeated sweep by itself [N/m]; () for one measurement
+    unusable              stretches of frequency that cannot be relied on
+    open                  whether some edge of a stable region is missing: it ends at a window not its own
+    integrators           poles of the response at z = 1
+    """
+
+    loop: MeasuredLoop
+    edge: Boundary
+    regions: tuple[Floats, ...]
+    boundary: tuple[MeasuredArc, ...]
+    stiffness_max: float
+    damping_at_stiffness_max: float
+    frequencies_at_stiffness_max: tuple[float, ...]
+    damping_max: float
+    stable_area: float
+    interpolation_error: float
+    measured_stiffness_max: float
+    band: Band | None
+    stiffness_max_of_sweeps: tuple[float, ...]
+    unusable: tuple[Stretch, ...]
+    open: bool
+    window: Box
+    fastest_decay: None = None
+    unobserved_modes: tuple[str, ...] = ()
+
+    @property
+    def integrators(self) -> int:
+        """Poles of the response at z = 1."""
+        return self.loop.integrators
+
+    @property
+    def box(self) -> Box:
+        """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
+        if not self.regions:
+            return 0.0, 1.0, 0.0, 1.0
+        walls = np.vstack(self.regions)
+        low, high = walls.min(axis=0), walls.max(axis=0)
+        (K0, B0), (K1, B1) = low - 0.05 * (high - low), high + 0.05 * (high - low)
+        return float(K0), float(K1), float(B0), float(B1)
+
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> MeasuredVerdicts:
+        """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, by the count of their roots."""
+        return judge_measured(self.loop, self.edge, wall_stiffness, wall_damping)
+
+
+def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
+    """The chart of a device of which only the frequency response is known.
+
+        h = -1/P,   B = Im h / Im w,   K = Re h - B Re w          at every measured frequency
+
+    The stable cells are those without a root outside the unit circle (`chart.count`). Assumed of the device:
+    without a wall it is stable but for its integrators.
+
+    response    force command sample -> encoder sample, hold and hardware delay included
+    controller  the computer's part; its delay is what software adds, whole samples
+    Raises      ResponseError  where the response cannot be that of a device, or holds nothing near the edge
+
+    >>> f = np.linspace(0.5e-3, 0.499, 1000)
+    >>> z = np.exp(2j * np.pi * f)
+    >>> free_mass = Response(f, 0.5 * (z + 1.0) / (z - 1.0) ** 2)
+    >>> chart = measured_chart(free_mass, Controller(sampling_period=1.0))
+    >>> chart.integrators, round(chart.stiffness_max, 5), round(chart.damping_max, 5)   # 12 - 8 sqrt 2 and 2
+    (2, 0.68629, 2.0)
+    """
+    loop = MeasuredLoop(response, controller)
+    cells, closed = _cells(loop)
+    if cells is None:
+        return _empty(loop)
+    chart = _chart(loop, cells, not closed)
+    if sum(len(arc.frequency) for arc in chart.boundary if 0.0 < arc.frequency[0] < 0.5 / loop.period) < (
+        FEWEST_ON_EDGE
+    ):
+        raise ResponseError(_nothing_near(loop))
+    if response.sweeps is None:
+        return chart
+    each = [measured_chart(_single(response, k), controller).stiffness_max for k in range(len(response.sweeps))]
+    return replace(chart, stiffness_max_of_sweeps=tuple(each))
+
+
+def _single(response: Response, sweep: int) -> Response:
+    assert response.sweeps is not None
+    return replace(response, value=response.sweeps[sweep], sweeps=None, coherence=None)
+
+
+def _cells(loop: MeasuredLoop) -> tuple[Cells | None, bool]:
+    """The stable cells, and whether the boundary closes them: if not, they reach the window's edge."""
+    known = boundary(loop, coarse(loop))
+    box = window(loop, known)
+    if box is None:
+        return None, True
+    cells = cells_within(loop, known, box)
+    for _ in range(3):
+        if not cells.open:
+            break
+        K0, K1, B0, B1 = box
+        box = (K0 - (K1 - K0), K1 + (K1 - K0), B0 - (B1 - B0), B1 + (B1 - B0))
+        cells = cells_within(loop, known, box)
+    return (cells if cells.polygons else None), not cells.open
+
+
+def _empty(loop: MeasuredLoop) -> MeasuredChart:
+    """The chart of a device without a stable wall. Raises ResponseError where the data cannot tell."""
+    if any(stretch.low == loop.response.frequency[loop.good][-1] for stretch in loop.unusable):
+        raise ResponseError(_nothing_near(loop))
+    known = boundary(loop, coarse(loop))
+    return MeasuredChart(
+        loop, known, (), (), nan, nan, (), 0.0, 0.0, nan, nan, None, (), loop.unusable, False, (0.0, 1.0, 0.0, 1.0)
+    )
+
+
+def _nothing_near(loop: MeasuredLoop) -> str:
+    f = loop.response.frequency[loop.good]
+    return (
+        f"has no frequencies near the boundary's: {f[0]:.6g} to {f[-1]:.6g} Hz, within which no edge of the "
+        f"stable walls is found; measure up to half the sampling rate, {0.5 / loop.period:.6g} Hz"
+    )
+
+
+def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
+    """The chart from its cells."""
+    quadrant = [cell for cell in map(_in_quadrant, cells.polygons) if not cell.is_empty]
+    peak, zoomed = _peak(loop, cells, quadrant)
+    arcs = tuple(_arcs(loop, cells))
+    points = [(K, B) for arc in arcs for K, B in zip(arc.stiffness, arc.damping, strict=True)]
+    angles = _angles_at(loop, zoomed, peak)
+    at_peak = np.array([a for a in angles if 0.0 < a < np.pi])
+    h, w = loop.h(at_peak), loop.w(at_peak)
+    errors = loop.between.relative_error(at_peak) * np.abs(h * w / w.imag)
+    return MeasuredChart(
+        loop=loop,
+        edge=cells.edge,
+        regions=tuple(np.array(piece.exterior.coords) for cell in cells.polygons for piece in _cut(cell)),
+        boundary=arcs,
+        stiffness_max=peak[0],
+        damping_at_stiffness_max=peak[1],
+        frequencies_at_stiffness_max=tuple(a / (2.0 * np.pi * loop.period) for a in angles),
+        damping_max=_largest_damping(loop, cells),
+        stable_area=float(sum(cell.area for cell in quadrant)),
+        interpolation_error=float(np.max(errors, initial=0.0) / peak[0]) + ZOOMED,
+        measured_stiffness_max=max((K for K, B in points if K > 0.0 and B >= 0.0), default=nan),
+        band=uncertainty(loop, cells),
+        stiffness_max_of_sweeps=(),
+        unusable=tuple(_told(loop, cells)),
+        open=opened,
+        window=cells.box,
+    )
+
+
+def _in_quadrant(cell: shapely.Geometry) -> shapely.Geometry:
+    """The part with K >= 0, B >= 0."""
+    _, _, high_K, high_B = cell.bounds
+    if high_K <= 0.0 or high_B <= 0.0:
+        return shapely.Polygon()
+    return cell.intersection(shapely.box(0.0, 0.0, 2.0 * high_K, 2.0 * high_B))
+
+
+def _stiffest(parts: list[shapely.Geometry], box: Box) -> tuple[float, float]:
+    """The vertex of largest K; nan where no part has K > 0."""
+    corners = np.vstack([np.empty((0, 2)), *(shapely.get_coordinates(part) for part in parts)])
+    corners = corners[corners[:, 0] > 1e-9 * (box[1] - box[0])]
+    if not len(corners):
+        return nan, nan
+    K, B = corners[np.argmax(corners[:, 0])]
+    return float(K), float(B)
+
+
+def _peak(loop: MeasuredLoop, cells: Cells, quadrant: list[shapely.Geometry]) -> tuple[tuple[float, float], Cells]:
+    """The largest stiffness with K > 0, B >= 0: found among the cells' corners, then in a window on its own."""
+    peak, seen = _stiffest(quadrant, cells.box), cells
+    for _ in range(2):
+        if isnan(peak[0]):
+            break
+        near = _around(peak, seen.box, 1e-3, 2e-2)
+        closer = cells_within(loop, cells.edge, near)
+        better = _stiffest([_in_quadrant(cell) for cell in closer.polygons], near)
+        if isnan(better[0]) or better[0] > near[1] - 1e-6 * (near[1] - near[0]):
+            break
+        peak, seen = better, closer
+        if near[2] < peak[1] < near[3]:
+            break
+    return peak, seen
+
+
+def _around(wall: tuple[float, float], box: Box, of_K: float, of_B: float) -> Box:
+    K, B = wall
+    half_K, half_B = of_K * (box[1] - box[0]), of_B * (box[3] - box[2])
+    return K - half_K, K + half_K, B - half_B, B + half_B
+
+
+def _angles_at(loop: MeasuredLoop, cells: Cells, wall: tuple[float, float]) -> list[float]:
+    """The angles of the branches that pass through a wall, ascending: one, or two at a corner."""
+    if isnan(wall[0]):
+        return []
+    K0, K1, B0, B1 = cells.box
+    scale = np.array([K1 - K0, B1 - B0])
+    ends = (cells.edge.segments.reshape(-1, 2, 2) - np.array(wall)) / scale
+    a, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    length = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+    share = np.clip(-np.einsum("ij,ij->i", a, along) / length, 0.0, 1.0)
+    away = np.hypot(*(a + share[:, None] * along).T)
+    found: list[float] = []
+    near = np.flatnonzero(away < 1e-4)
+    for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else []:
+        k = run[np.argmin(away[run])]
+        at = cells.edge.at[k]
+        if at >= 0:
+            low, high = cells.edge.angles[at], cells.edge.angles[at + 1]
+            found.append(float(low + share[k] * (high - low)))
+        elif at > -3:
+            found.append(0.0 if at == -1 else float(np.pi))
+    return sorted(found)
+
+
+def _largest_damping(loop: MeasuredLoop, cells: Cells) -> float:
+    """Supremum of B >= 0 stable for all small K > 0: on a line close to K = 0, then in a window there."""
+    found, seen = 0.0, cells
+    for _ in range(2):
+        K0, K1, B0, B1 = seen.box
+        upright = shapely.LineString([(1e-6 * (K1 - K0), min(B0, 0.0)), (1e-6 * (K1 - K0), B1)])
+        tops = [shapely.intersection(cell, upright).bounds for cell in seen.polygons]
+        top = max((bounds[3] for bounds in tops if not isnan(bounds[3])), default=0.0)
+        if top <= 0.0:
+            break
+        found = float(top)
+        seen = cells_within(loop, cells.edge, _around((0.0, found), cells.box, 1e-3, 1e-3))
+    return found
+
+
+def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
+    """Runs of measured points on the stable set's edge, then its pieces of the lines of real roots."""
+    edge, half = cells.edge, 0.5 / loop.period
+    scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
+    first = np.full(len(edge.angles), -1)
+    first[edge.at[edge.at >= 0]] = np.flatnonzero(edge.at >= 0)
+    measured = loop.angles[loop.angles < np.pi]
+    at = np.searchsorted(edge.angles, measured)
+    known = first[at] >= 0
+    on = np.zeros(len(at), dtype=bool)
+    on[known] = edges_stable_set(edge, first[at[known]], scale)
+    numbers = np.flatnonzero(on)
+    for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else []:
+        theta = measured[run]
+        K, B, _ = loop.walls(theta)
+        if loop.errors is None:
+            yield MeasuredArc(K, B, theta / (2.0 * np.pi * loop.period))
+        else:
+            w = loop.w(theta)
+            reach = loop.error(theta) * np.abs(w) / np.abs(w.imag)
+            yield MeasuredArc(K, B, theta / (2.0 * np.pi * loop.period), K - reach, K + reach)
+    lines = [(-1, 0.0), (-2, half)] if loop.between.closed else [(-1, 0.0)]
+    for kind, frequency in lines:
+        static, turned = real_root(loop, kind)
+        for cell in cells.polygons:
+            for low, high in _along(np.array(cell.exterior.coords), static, turned, scale):
+                ends = np.array([low, high])
+                yield MeasuredArc(static - ends * turned, ends, np.full(2, frequency))
+
+
+def _along(ring: Floats, h: float, w: float, scale: Floats) -> Iterator[tuple[float, float]]:
+    """The pieces of a ring that lie on the line K + B w = h, as intervals of B."""
+    on = np.abs(ring[:, 0] + ring[:, 1] * w - h) < 1e-8 * (scale[0] + scale[1] * abs(w))
+    pieces = np.flatnonzero(on[:-1] & on[1:])
+    for run in np.split(pieces, np.flatnonzero(np.diff(pieces) > 1) + 1) if len(pieces) else []:
+        B = ring[run[0] : run[-1] + 2, 1]
+        if np.ptp(B) > 1e-6 * scale[1]:
+            yield float(B.min()), float(B.max())
+
+
+def _told(loop: MeasuredLoop, cells: Cells) -> Iterator[Stretch]:
+    """The unusable stretches, and whether the stable set's edge runs through each."""
+    edge = cells.edge
+    scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
+    f = edge.angles / (2.0 * np.pi * loop.period)
+    for stretch in loop.unusable:
+        within = np.zeros(len(f) + 1, dtype=bool)
+        within[:-1] = (f >= stretch.low) & (f < stretch.high)
+        which = np.flatnonzero((edge.at >= 0) & within[edge.at])
+        touched = bool(np.any(edges_stable_set(edge, which[:: max(1, len(which) // 200)], scale)))
+        beyond = not loop.between.closed and stretch.high >= 0.5 / loop.period * (1.0 - 1e-9)
+        yield replace(stretch, on_edge=touched or (beyond and cells.open))

@@ -1,0 +1,131 @@
+"""The cells that a measured boundary cuts a window of the plane into, and which of them are stable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.polygon import orient
+
+from zwidth.chart.measured_curve import Boundary, Box, boundary, real_root, refine, sizes
+from zwidth.chart.measured_loop import MeasuredLoop
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Whole = NDArray[np.int64]
+
+CHORD = 1e-5  # a chord's distance from the curve, as a share of the window
+GRID = 1e-11  # to which lines are noded, as a share of the window
+LARGEST = 1e3  # stable walls, in `sizes` of the curve
+TICK = 1e-9  # by which the curve's ends are drawn across the lines they end on
+BESIDE = 1e-4  # from a chord, in its lengths: where its side is asked for its count
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The stable cells within a window.
+
+    box       KMIN, KMAX, BMIN, BMAX
+    edge      the boundary, close enough to the curve within the window
+    polygons  stable cells; their edge may be the window's own
+    """
+
+    box: Box
+    edge: Boundary
+    polygons: tuple[shapely.Polygon, ...]
+
+    @property
+    def open(self) -> bool:
+        """Whether a stable cell reaches the window's own edge."""
+        K0, K1, B0, B1 = self.box
+        near_K, near_B = 1e-9 * (K1 - K0), 1e-9 * (B1 - B0)
+        for cell in self.polygons:
+            low_K, low_B, high_K, high_B = cell.bounds
+            if low_K < K0 + near_K or high_K > K1 - near_K or low_B < B0 + near_B or high_B > B1 - near_B:
+                return True
+        return False
+
+
+def cells_within(loop: MeasuredLoop, known: Boundary, box: Box) -> Cells:
+    """Stable cells within a window: the boundary refined there, noded, and one wall of each cell counted."""
+    edge = boundary(loop, refine(loop, known.angles, box, CHORD), known)
+    K0, K1, B0, B1 = box
+    low, scale = np.array([K0, B0]), np.array([K1 - K0, B1 - B0])
+    chords = _chords(edge, low, scale)
+    frame = shapely.box(0.0, 0.0, 1.0, 1.0)
+    lines = shapely.union_all([*chords, frame.exterior], grid_size=GRID)
+    faces = [face for face in shapely.get_parts(shapely.polygonize([lines])) if face.area > 1e-12]
+    if not faces:
+        return Cells(box, edge, ())
+    inside = np.array([face.representative_point().coords[0] for face in faces]) * scale + low
+    stable = edge.outside(inside) == 0
+    polygons = tuple(
+        orient(shapely.transform(face, lambda xy: xy * scale + low))
+        for face, good in zip(faces, stable, strict=True)
+        if good
+    )
+    return Cells(box, edge, polygons)
+
+
+def _chords(edge: Boundary, low: Floats, scale: Floats) -> list[shapely.Geometry]:
+    """The segments that meet the unit window, clipped to it; ends of the curve drawn a tick across."""
+    ends = (edge.segments.reshape(-1, 2, 2) - low) / scale
+    for first, kind in ((0, -1), (np.flatnonzero(edge.at >= 0)[-1], -2)):
+        if np.any(edge.at == kind):
+            a, b = ends[first]
+            along = (a - b if kind == -1 else b - a) / max(float(np.hypot(*(b - a))), 1e-300)
+            ends[first, 0 if kind == -1 else 1] += TICK * along
+    meets = np.all((ends.max(axis=1) >= 0.0) & (ends.min(axis=1) <= 1.0), axis=1)
+    clipped = shapely.clip_by_rect(shapely.linestrings(ends[meets]), -1e-6, -1e-6, 1.0 + 1e-6, 1.0 + 1e-6)
+    return [line for line in clipped if not line.is_empty]
+
+
+def edges_stable_set(edge: Boundary, which: Whole, scale: Floats) -> Flags:
+    """Whether the chords `which` (indices into the segments, of the curve) have stable walls on their inner side.
+
+    scale  (2,) what counts as one unit of K and of B
+    """
+    segments = edge.segments[which] / np.concatenate([scale, scale])
+    along = segments[:, 2:] - segments[:, :2]
+    length = np.maximum(np.hypot(*along.T), 1e-300)
+    left = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
+    aside = BESIDE * np.minimum(length, 1.0) * np.where(edge.jumps[which] < 0, 1.0, -1.0)
+    middle = 0.5 * (segments[:, 2:] + segments[:, :2])
+    return np.asarray(edge.outside((middle + aside[:, None] * left) * scale) == 0)
+
+
+def window(loop: MeasuredLoop, edge: Boundary) -> Box | None:
+    """A window that holds every stable cell that the boundary closes, with room to spare; None if there is none.
+
+    Every cell has a piece of the curve on its edge, and any further corner where the two lines cross.
+    """
+    scale = sizes(loop)
+    # where P is all but zero the curve runs out along a line of real roots, nearer to it than chords can tell
+    near = np.all(np.abs(edge.segments) < LARGEST * np.concatenate([scale, scale]), axis=1)
+    curve = np.flatnonzero((edge.at >= 0) & near)
+    flagged = curve[edges_stable_set(edge, curve, scale)]
+    if not len(flagged):
+        return None
+    walls = edge.segments[flagged].reshape(-1, 2)
+    size = np.ptp(walls, axis=0)
+    crossing = _lines_cross(loop)
+    if crossing is not None:
+        beside = crossing + 1e-3 * size * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
+        if np.any(edge.outside(beside) == 0):
+            walls = np.vstack([walls, crossing])
+    low, high = walls.min(axis=0), walls.max(axis=0)
+    (K0, B0), (K1, B1) = low - 0.1 * (high - low), high + 0.1 * (high - low)
+    return float(K0), float(K1), float(B0), float(B1)
+
+
+def _lines_cross(loop: MeasuredLoop) -> Floats | None:
+    """The wall with real roots at both z = 1 and z = -1; None if there is none."""
+    if not loop.between.closed:
+        return None
+    (h0, w0), (h1, w1) = real_root(loop, -1), real_root(loop, -2)
+    if abs(w1 - w0) * loop.period < 1e-9:
+        return None
+    B = (h1 - h0) / (w1 - w0)
+    return np.array([h0 - B * w0, B])

@@ -1,0 +1,247 @@
+"""The boundary of a measured loop as directed segments, and one wall's roots counted by Nyquist's criterion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.count import curve_segments, roots_outside
+from zwidth.chart.measured_loop import MeasuredLoop
+from zwidth.model.response import ResponseError
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Whole = NDArray[np.int64]
+Box = tuple[float, float, float, float]  # KMIN, KMAX, BMIN, BMAX
+
+NEAREST = 1e-5  # to an end of the curve or an asymptote, of the spacing there
+FAR = 1e9  # how far lines are drawn, in `sizes`
+COARSE = 0.02  # of its distance from K = B = 0, to which the whole curve is kept
+MOST = 200_000  # angles on the curve
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Every wall with a root on the circle, as far as it was measured.
+
+    angles    (n,) theta along the curve, ascending;  walls (n, 2) K, B;  orientation (n,) sign of Im w
+    segments  (k, 4) and jumps (k,): curve, real-root lines and what closes an open end, for `roots_outside`
+    at        (k,) index of the angle where a segment begins; -1, -2: lines of z = 1, z = -1; -3: beyond the data
+    reference, count  a wall far from the boundary and its roots outside
+    """
+
+    angles: Floats
+    walls: Floats
+    orientation: Floats
+    segments: Floats
+    jumps: Whole
+    at: Whole
+    reference: Floats
+    count: int
+
+    def outside(self, walls: Floats) -> Whole:
+        """Roots outside the circle at walls (n, 2): (n,)."""
+        return roots_outside(self.segments, self.jumps, self.reference, self.count, np.ascontiguousarray(walls))
+
+
+def first_angles(loop: MeasuredLoop) -> Floats:
+    """The measured angles, three between each two, and angles that close in on ends and asymptotes."""
+    measured = loop.angles[loop.angles < np.pi]
+    shares = np.arange(4) / 4.0
+    inner = (measured[:-1, None] + np.diff(measured)[:, None] * shares).ravel()
+    closing = np.geomspace(NEAREST, 0.9, 30)
+    parts = [closing * measured[0], inner, measured[-1:]]
+    if loop.between.closed:
+        parts.append(np.pi - closing[::-1] * (np.pi - measured[-1]))
+    angles = np.unique(np.concatenate(parts))
+    dense = np.union1d(angles, np.linspace(angles[0], loop.last, 4097)[:-1])
+    for low, high in _sign_changes(loop, dense):
+        steps = closing * (high - low + 1e-3 * high)
+        angles = np.concatenate([angles, low - steps, high + steps])
+    angles = np.unique(angles)
+    return angles[(angles > 0.0) & (angles < np.pi) & (angles <= loop.last)]
+
+
+def _sign_changes(loop: MeasuredLoop, angles: Floats) -> list[tuple[float, float]]:
+    """Brackets, closed to rounding, of the angles where Im w = 0: there the curve passes through infinity."""
+    positive = loop.w(angles).imag > 0.0
+    at = np.flatnonzero(positive[1:] != positive[:-1])
+    low, high = angles[at], angles[at + 1]
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        same = (loop.w(middle).imag > 0.0) == positive[at]
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return list(zip(low.tolist(), high.tolist(), strict=True))
+
+
+def refine(loop: MeasuredLoop, angles: Floats, box: Box, tolerance: float) -> Floats:
+    """Angles at which chords within the box keep to the curve, to a share of the box."""
+    K0, K1, B0, B1 = box
+    scale, low = np.array([K1 - K0, B1 - B0]), np.array([K0, B0])
+
+    def wanted(a: Floats, b: Floats, middle: Floats) -> Floats:
+        touches = np.all((np.maximum(a, b) >= 0.0) & (np.minimum(a, b) <= 1.0), axis=1)
+        return np.where(touches, tolerance, np.inf)
+
+    return _bisected(loop, angles, low, scale, wanted)
+
+
+def coarse(loop: MeasuredLoop) -> Floats:
+    """Angles at which chords keep to the curve to a share of its own distance from no wall, wherever it runs."""
+
+    def wanted(a: Floats, b: Floats, middle: Floats) -> Floats:
+        return np.asarray(COARSE * np.maximum(np.hypot(*middle.T), 1e-12))
+
+    return _bisected(loop, first_angles(loop), np.zeros(2), sizes(loop), wanted)
+
+
+def _bisected(
+    loop: MeasuredLoop,
+    angles: Floats,
+    low: Floats,
+    scale: Floats,
+    wanted: Callable[[Floats, Floats, Floats], Floats],
+) -> Floats:
+    """The angles, with those between added until each chord passes its middle on the curve as closely as wanted.
+
+    wanted  of the ends (n, 2) and middles (n, 2), (walls - low) / scale, the distances allowed (n,)
+    """
+    for _ in range(40):
+        K, B, orientation = loop.walls(angles)
+        points = (np.column_stack([K, B]) - low) / scale
+        near = np.all(np.abs(points) < FAR, axis=1)
+        joined = (orientation[:-1] == orientation[1:]) & near[:-1] & near[1:]
+        at = np.flatnonzero(joined & (np.diff(angles) > 1e-13 * angles[1:]))
+        middle = 0.5 * (angles[at] + angles[at + 1])
+        Km, Bm, _ = loop.walls(middle)
+        m = (np.column_stack([Km, Bm]) - low) / scale
+        a, b = points[at], points[at + 1]
+        along, to = b - a, m - a
+        length = np.maximum(np.hypot(*along.T), 1e-150)
+        off = np.abs(along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0]) / length
+        reach = np.einsum("ij,ij->i", to, along) / length**2
+        allowed = wanted(a, b, m)
+        bent = (off > allowed) | ((np.abs(reach - 0.5) > 0.6) & np.isfinite(allowed) & (length > 1e-3 * allowed))
+        if not np.any(bent) or len(angles) > MOST:
+            break
+        angles = np.sort(np.concatenate([angles, middle[bent]]))
+    return angles
+
+
+def sizes(loop: MeasuredLoop) -> Floats:
+    """(2,) what is large for |h| and |h / w|: exceeded at a tenth of the measured frequencies."""
+    h, w = np.abs(loop.h(loop.angles)), np.abs(loop.w(loop.angles))
+    return np.array([np.quantile(h, 0.9), np.quantile(h / w, 0.9)])
+
+
+def boundary(loop: MeasuredLoop, angles: Floats, known: Boundary | None = None) -> Boundary:
+    """The boundary sampled at these angles; reference wall and count are those of `known`, where it is given."""
+    K, B, orientation = loop.walls(angles)
+    segments, jumps = curve_segments(K, B, orientation)
+    whole = np.isfinite(K) & np.isfinite(B)
+    at = np.flatnonzero(whole[:-1] & whole[1:] & (orientation[:-1] == orientation[1:]))
+    far = FAR * float(sizes(loop)[1])
+    more = [_real_line(loop, angles[0], -1, far)]
+    more.append(_real_line(loop, angles[-1], -2, far) if loop.between.closed else _open_end(segments, jumps, far))
+    segments = np.vstack([segments, *(s for s, _, _ in more)])
+    jumps = np.concatenate([jumps, *(j for _, j, _ in more)])
+    at = np.concatenate([at, *(k for _, _, k in more)])
+    walls = np.column_stack([K, B])
+    if known is not None:
+        return Boundary(angles, walls, orientation, segments, jumps, at, known.reference, known.count)
+    return _with_reference(loop, Boundary(angles, walls, orientation, segments, jumps, at, np.zeros(2), 0))
+
+
+def real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float]:
+    """h and w of the line K + B w = h of real roots at z = 1 (kind -1) or z = -1 (kind -2)."""
+    if kind == -1:
+        near = np.array([NEAREST * loop.angles[0]])
+        h = 0.0 if loop.integrators else float(loop.h(near)[0].real)
+        return h, 0.0 if abs(loop.w(near)[0]) * loop.period < 2.0 * near[0] else float(loop.w(near)[0].real)
+    end = np.array([np.pi])
+    return float(loop.h(end)[0].real), float(loop.w(end)[0].real)
+
+
+def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[Floats, Whole, Whole]:
+    """The line of real roots, upwards, cut where the curve ends on it: there the count's jump changes its sign.
+
+    On it D = K + B w - h = 0. The root moves by -dK / D', and D' (z = +-1) has the sign of -+(B Im w - Im h)
+    at an angle just beside.
+    """
+    h, w = real_root(loop, kind)
+    theta = np.array([near])
+    Im_h, Im_w = float(loop.h(theta)[0].imag), float(loop.w(theta)[0].imag)
+    cut = float(np.clip(Im_h / Im_w, -far, far))
+    ends = np.unique([-far, cut, far])
+    middle = 0.5 * (ends[:-1] + ends[1:])
+    rising = np.sign(middle * Im_w - Im_h)
+    jumps = (rising if kind == -1 else -rising).astype(np.int64)
+    segments = np.column_stack([h - ends[:-1] * w, ends[:-1], h - ends[1:] * w, ends[1:]])
+    return segments, jumps, np.full(len(jumps), kind)
+
+
+def _open_end(segments: Floats, jumps: Whole, far: float) -> tuple[Floats, Whole, Whole]:
+    """Where the data stop, the curve is led straight on to infinity: what fails beyond them is not seen."""
+    Ka, Ba, Kb, Bb = segments[-1]
+    reach = far / max(abs(Kb - Ka), abs(Bb - Ba))
+    onward = [[Kb, Bb, Kb + reach * (Kb - Ka), Bb + reach * (Bb - Ba)]]
+    return np.array(onward), jumps[-1:], np.array([-3])
+
+
+def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Whole, Floats]:
+    """Roots outside the circle at walls (n, 2) by the turning of 1 + L, L = P (K + B w), and how clear each is.
+
+    From z = 1 + 0 round the integrators (a turn of L by -pi/2 each) and along the upper half circle, 1 + L turns
+    by -pi times the number of roots outside. Assumed: no open-loop pole outside, none on the circle but the
+    integrators.
+
+    Returns  (n,) counts, and the least |1 + L| / (1 + |L|) along the way: near 0 a wall too close to the boundary
+    """
+    L = -(walls[:, :1] + walls[:, 1:] * loop.w(angles)) / loop.h(angles)
+    F = 1.0 + L
+    clear = np.min(np.abs(F) / (1.0 + np.abs(L)), axis=1)
+    h, w = real_root(loop, -1)
+    static = np.sign(walls[:, 0]) if loop.integrators else np.sign(1.0 - (walls[:, 0] + walls[:, 1] * w) / h)
+    start = np.where(static > 0.0, 0.0, np.pi)
+    first = np.angle(F[:, 0] * np.exp(-1j * (start - 0.5 * np.pi * loop.integrators)))
+    turn = first - 0.5 * np.pi * loop.integrators + np.sum(np.angle(F[:, 1:] / F[:, :-1]), axis=1)
+    if loop.between.closed:
+        h, w = real_root(loop, -2)
+        end = 1.0 - (walls[:, 0] + walls[:, 1] * w) / h
+        turn += np.angle(end / F[:, -1])
+    else:
+        turn -= np.angle(F[:, -1])  # beyond the data |L| < 1 is assumed
+    return -np.round(turn / np.pi).astype(np.int64), np.asarray(clear)
+
+
+def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
+    """The boundary with the clearest of many walls as its reference, the next clearest counted against it."""
+    h, w = np.abs(loop.h(loop.angles)), np.abs(loop.w(loop.angles))
+    sizes = np.geomspace(1e-3, 3.0, 9)
+    K = np.quantile(h, [0.25, 0.5, 0.75])[:, None] * sizes
+    B = np.quantile(h / w, [0.25, 0.5, 0.75])[:, None] * sizes
+    walls = np.array([(k, b) for k in K.ravel() for b in B.ravel()])
+    every = max(1, len(found.angles) // 4000)
+    counts, clear = nyquist_count(loop, found.angles[::every], walls)
+    order = np.argsort(-clear)[:7]
+    best = order[0]
+    made = Boundary(
+        found.angles,
+        found.walls,
+        found.orientation,
+        found.segments,
+        found.jumps,
+        found.at,
+        walls[best],
+        int(counts[best]),
+    )
+    sure = order[clear[order] > 0.2]
+    if counts[best] < 0 or np.mean(made.outside(walls[sure]) != counts[sure]) > 0.5:
+        raise ResponseError(
+            "does not turn as that of a device would: counts of unstable roots disagree; is it a response from "
+            "force to position with all its frequencies, closely enough spaced, and is `integrators` right?"
+        )
+    return made

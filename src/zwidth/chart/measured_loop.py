@@ -1,0 +1,124 @@
+"""A measured device under a sampled wall law, 1 + P(z)(K + B w(z)) = 0 with P known at points of the circle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.between import FEWEST, Between, around_one, between
+from zwidth.chart.trust import Stretch, reaches_the_end, stretches, usable
+from zwidth.loop.controller import Controller
+from zwidth.loop.estimator import velocity_estimator
+from zwidth.model.response import Response, ResponseError, integrators_of, relative_error
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Radius of the disk that holds 95 % of a circular Gaussian error, in standard deviations: sqrt(-2 ln 0.05)
+DISK = float(np.sqrt(-2.0 * np.log(0.05)))
+
+
+@dataclass(frozen=True)
+class MeasuredLoop:
+    """A response and the computer's part of the loop. Its delay is that of software alone, in whole samples."""
+
+    response: Response
+    controller: Controller
+    good: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        delay, f = self.controller.delay, self.response.frequency
+        if abs(delay - round(delay)) > 1e-9:
+            raise ResponseError(
+                f"a measured response holds the device's delay already, and the computer can add whole samples "
+                f"only, got {delay:g}; leave delay_samples out"
+            )
+        half = 0.5 / self.period
+        if len(f) and f[-1] > half * (1.0 + 1e-9):
+            raise ResponseError(
+                f"has frequencies up to {f[-1]:.6g} Hz, above half the sampling rate, {half:.6g} Hz; leave them "
+                "out, or correct sampling_period_s"
+            )
+        good = usable(self.response)
+        if np.count_nonzero(good) < FEWEST:
+            raise ResponseError(
+                f"has {np.count_nonzero(good)} usable frequencies of {len(f)}; a chart needs at least {FEWEST}, "
+                "and some hundreds to be exact"
+            )
+        object.__setattr__(self, "good", good)
+
+    @property
+    def period(self) -> float:
+        """Sampling period T [s]."""
+        return self.controller.sampling_period
+
+    @cached_property
+    def integrators(self) -> int:
+        """Poles of P at z = 1."""
+        return integrators_of(self.response, self.period)
+
+    @cached_property
+    def angles(self) -> Floats:
+        """theta of the usable frequencies (n,)."""
+        theta = 2.0 * np.pi * self.response.frequency[self.good] * self.period
+        return np.where(theta > np.pi * (1.0 - 1e-9), np.pi, theta)
+
+    @cached_property
+    def between(self) -> Between:
+        """The response between them."""
+        P = self.response.value[self.good]
+        return between(self.angles, P, self.integrators, closed=reaches_the_end(self.angles)[0])
+
+    @cached_property
+    def unusable(self) -> tuple[Stretch, ...]:
+        """Stretches of frequency that cannot be relied on, ascending."""
+        return tuple(stretches(self.response, self.good, self.period, self.between))
+
+    @property
+    def last(self) -> float:
+        """The largest angle that the response reaches: pi, or that of the last frequency."""
+        return float(np.pi if self.between.closed else self.angles[-1])
+
+    def h(self, theta: Floats) -> Complexes:
+        """h = -1/P (...) at angles in (0, pi], the computer's own delay in P."""
+        return np.asarray(-self.between.inverse(theta) * np.exp(1j * theta * round(self.controller.delay)))
+
+    def w(self, theta: Floats) -> Complexes:
+        """The velocity estimate w (...) at angles in (0, pi]."""
+        d = around_one(theta)
+        estimator = velocity_estimator(self.controller)
+        w = np.ones_like(d)
+        for c, e in zip(estimator.numerator, estimator.denominator, strict=True):
+            w = w * ((c[0] * d + c[1]) * d + c[2]) / ((e[0] * d + e[1]) * d + e[2])
+        return np.asarray(w * sum(weight * (1.0 + d) ** -k for k, weight in enumerate(estimator.window)))
+
+    def walls(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
+        """K, B of the wall that fails at each angle, and the sign of Im w there."""
+        h, w = self.h(theta), self.w(theta)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            B = h.imag / w.imag
+            return h.real - B * w.real, B, np.sign(w.imag)
+
+    @cached_property
+    def errors(self) -> Floats | None:
+        """Radius (n,) of the disk round each h of `angles` that holds the true one; None where nothing is known.
+
+        From coherence: 95 % of the error. From repeated sweeps: the farthest of them.
+        """
+        response, good = self.response, self.good
+        h = self.h(self.angles)
+        if response.sweeps is not None:
+            P = response.value[good]
+            return np.asarray(np.max(np.abs(P / response.sweeps[:, good] - 1.0), axis=0) * np.abs(h))
+        if response.coherence is not None:
+            return np.asarray(DISK * relative_error(response.coherence[good], response.averages) * np.abs(h))
+        return None
+
+    def error(self, theta: Floats) -> Floats:
+        """That radius (...) at any angle; 0 where nothing is known of it."""
+        if self.errors is None:
+            return np.zeros(np.shape(theta))
+        return np.exp(np.interp(theta, self.angles, np.log(np.maximum(self.errors, 1e-300))))

@@ -1,0 +1,61 @@
+"""Verdicts on single walls of a measured device: by the count of their roots, undecided within the error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.chart.measured_curve import Boundary
+from zwidth.chart.measured_loop import MeasuredLoop
+from zwidth.chart.verdict import NAMES, STABLE, UNDECIDED, UNSTABLE
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MeasuredVerdicts:
+    """Answers of shape (...) for as many walls.
+
+    verdict    STABLE, UNSTABLE or UNDECIDED (`chart.verdict`)
+    outside    roots outside the unit circle
+    frequency  at which |1 + L| is least: the vibration nearest to starting, or to dying [Hz]
+    """
+
+    verdict: NDArray[np.int8]
+    outside: NDArray[np.int64]
+    frequency: Floats
+
+    @property
+    def names(self) -> object:
+        """Verdicts as words, lists nested like the shape."""
+        return np.array(NAMES)[self.verdict].tolist()
+
+
+def judge_measured(
+    loop: MeasuredLoop, edge: Boundary, wall_stiffness: ArrayLike, wall_damping: ArrayLike
+) -> MeasuredVerdicts:
+    """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast.
+
+    A wall is undecided where, at any measured frequency, K + B w lies within the disk round h that the
+    measurement's error leaves: there the device may have a root on the circle for it. So is one not finite.
+    """
+    K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
+    walls = np.column_stack([K.ravel(), B.ravel()])
+    finite = np.all(np.isfinite(walls), axis=1)
+    safe = np.where(finite[:, None], walls, 0.0)
+    outside = edge.outside(safe)
+    theta = loop.angles
+    h, w = loop.h(theta), loop.w(theta)
+    error = loop.error(theta)
+    doubtful = ~finite
+    frequency = np.full(len(walls), np.nan)
+    for start in range(0, len(walls), 500):
+        part = slice(start, start + 500)
+        away = np.abs(safe[part, :1] + safe[part, 1:] * w - h)
+        doubtful[part] |= np.any(away < error, axis=1)
+        frequency[part] = theta[np.argmin(away / np.abs(h), axis=1)] / (2.0 * np.pi * loop.period)
+    frequency[~finite] = np.nan
+    verdict = np.where(doubtful, UNDECIDED, np.where(outside == 0, STABLE, UNSTABLE)).astype(np.int8)
+    return MeasuredVerdicts(verdict.reshape(K.shape), outside.reshape(K.shape), frequency.reshape(K.shape))
