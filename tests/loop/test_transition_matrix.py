@@ -75,5 +75,5 @@ def test_half_a_sample_of_delay_lies_between_none_and_one():
     T, m, f = 0.001, 1.0, 0.5
     rows = Loop(mass(m), Controller(T, f)).sections.rows[0]
     new = (T * (1 - f)) ** 2 / (2 * m)
-    assert rows[2] == pytest.approx(new, rel=1e-14)
-    assert rows[4] == pytest.approx(T**2 / (2 * m) - new, rel=1e-14)
+    assert rows[3] == pytest.approx(new, rel=1e-14)
+    assert rows[6] == pytest.approx(T**2 / (2 * m) - new, rel=1e-14)

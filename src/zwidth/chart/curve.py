@@ -36,15 +36,14 @@ def on_circle(theta: float, radius: float) -> tuple[complex, complex]:
 @compiled_lean
 def wall_at(factors: Factors, radius: float, theta: float) -> tuple[float, float, float, float]:
     """K, B of the wall with a root at rho exp(i theta), and dK/dtheta, dB/dtheta."""
-    rows, whole, split, numerator, denominator = factors
     z, d = on_circle(theta, radius)
-    P, dP = plant_response(rows, whole, split, z, d)
+    P, dP = plant_response(factors, z, d)
     aside = 4e-16
     while not np.isfinite(P.real + P.imag) and aside < 1e-12:  # on an undamped pole: step aside by a rounding
         z, d = on_circle(theta * (1.0 + aside), radius)
-        P, dP = plant_response(rows, whole, split, z, d)
+        P, dP = plant_response(factors, z, d)
         aside *= 10.0
-    w, dw = velocity_response(numerator, denominator, d)
+    w, dw = velocity_response(factors, z, d)
     turn = 1j * z
     h = divide(-1.0 + 0.0j, P)
     dh = turn * dP * h * h

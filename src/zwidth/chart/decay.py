@@ -120,7 +120,7 @@ def coalesced(factors: Factors, positive: bool, low: float, high: float) -> tupl
     K, B = 0.0, 0.0
     for i in range(60):
         radius = ends[i] if i < 2 else (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0])
-        A, S, V = characteristic(factors, radius)
+        A, S, V = characteristic(factors, radius)[:3]
         m, n = (0, 1) if positive else (N, N - 1)
         det = S[m] * V[n] - S[n] * V[m]
         K, B = (A[n] * V[m] - A[m] * V[n]) / det, (A[m] * S[n] - A[n] * S[m]) / det

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.curve import OF_B, OF_K, wall_at, zero_between
+from zwidth.chart.curve import OF_B, OF_K, on_circle, wall_at, zero_between
 from zwidth.compiled import compiled
-from zwidth.loop.evaluate import Factors, characteristic
+from zwidth.loop.evaluate import Factors, characteristic, velocity_response
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -24,37 +24,60 @@ Complexes = NDArray[np.complex128]
 NEAREST = 1e-3
 FIRST = 1e-3
 LONGEST_STEP = 0.05
+NO_FACTORS = np.empty((0, 3))
 
 
-def singular_points(rows: Floats, split: int, numerator: Floats, denominator: Floats, radius: float) -> Complexes:
-    """Poles and zeros of P without its whole delay, poles of w and real w on the circle; Im z >= 0, z plane."""
-    nothing = np.empty((0, 3))
-    s = _roots(characteristic((rows, 0, split, nothing, nothing), radius)[1])
+def singular_points(factors: Factors, radius: float) -> Complexes:
+    """Poles and zeros of P without its delay, poles of w and real w on the circle; Im z >= 0, z plane."""
+    bare = factors._replace(
+        whole=0,
+        shared_top=NO_FACTORS,
+        shared_bottom=NO_FACTORS,
+        top=NO_FACTORS,
+        bottom=NO_FACTORS,
+        window=np.ones(1),
+    )
+    s = _roots(characteristic(bare, radius)[1])
     with np.errstate(divide="ignore", invalid="ignore"):
         zeros = radius * (1.0 + s) / (1.0 - s)
-    quadratic = denominator[denominator[:, 0] != 0.0]
     points = np.concatenate(
         [
-            1.0 + _pairs(rows[:, 0], rows[:, 1]),
+            1.0 + _pairs(factors.rows[:, 0], factors.rows[:, 1]),
             zeros[np.isfinite(zeros)],
-            1.0 + _pairs(quadratic[:, 1], quadratic[:, 2]),
-            1.0 - denominator[denominator[:, 0] == 0.0, 2],
-            _in_phase(numerator, denominator, radius),
+            _factor_roots(factors.shared_bottom),
+            _factor_roots(factors.shared_top),
+            _factor_roots(factors.bottom),
+            _in_phase(factors, radius),
         ]
     )
     return np.asarray(points[points.imag >= -1e-12], dtype=complex)
 
 
-def _in_phase(numerator: Floats, denominator: Floats, radius: float) -> Complexes:
+def _factor_roots(factors: Floats) -> Complexes:
+    """Roots z of factors c2 d^2 + c1 d + c0; a constant has none."""
+    quadratic = factors[factors[:, 0] != 0.0]
+    linear = factors[(factors[:, 0] == 0.0) & (factors[:, 1] != 0.0)]
+    pairs = _pairs(quadratic[:, 1] / quadratic[:, 0], quadratic[:, 2] / quadratic[:, 0])
+    return np.asarray(1.0 + np.concatenate([pairs, -linear[:, 2] / linear[:, 1]]), dtype=complex)
+
+
+def _in_phase(factors: Factors, radius: float) -> Complexes:
     """Where w is real on the circle, by linear interpolation: B is infinite there."""
-    thetas = np.linspace(0.0, np.pi, 200)[1:-1]
-    z = radius * np.exp(1j * thetas)
-    d = (z - 1.0)[:, None]
-    factors = [(f[:, 0] * d + f[:, 1]) * d + f[:, 2] for f in (numerator, denominator)]
-    imaginary = np.prod(factors[0] / factors[1], axis=1).imag
+    thetas = np.linspace(0.0, np.pi, 200 + 20 * len(factors.window))[1:-1]
+    imaginary = velocity_on_circle(factors, radius, thetas).imag
     turns = np.flatnonzero(imaginary[1:] * imaginary[:-1] < 0.0)
     share = imaginary[turns] / (imaginary[turns] - imaginary[turns + 1])
     return np.asarray(radius * np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0]))), dtype=complex)
+
+
+@compiled
+def velocity_on_circle(factors: Factors, radius: float, thetas: Floats) -> Complexes:
+    """w at angles on the circle."""
+    out = np.empty(len(thetas), dtype=np.complex128)
+    for i in range(len(thetas)):
+        z, d = on_circle(thetas[i], radius)
+        out[i] = velocity_response(factors, z, d)[0]
+    return out
 
 
 def _pairs(d1: Floats, d0: Floats) -> Complexes:

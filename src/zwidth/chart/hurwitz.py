@@ -33,7 +33,7 @@ def combine(polynomials: Floats, K: float, B: float, room: Floats) -> None:
     for i in range(polynomials.shape[1]):
         a, s, v = polynomials[0, i], K * polynomials[1, i], B * polynomials[2, i]
         room[0, i] = a + s + v
-        room[1, i] = abs(a) + abs(s) + abs(v)
+        room[1, i] = abs(a) + abs(s) + abs(v) + abs(K * polynomials[3, i]) + abs(B * polynomials[4, i])
 
 
 @compiled_lean

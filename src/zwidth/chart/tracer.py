@@ -28,7 +28,7 @@ class Tracer:
 
     loop         the loop
     factors      `factor_arrays(loop)`
-    polynomials  (3, N + 1) A, S, V in the bilinear variable of the circle
+    polynomials  (5, N + 1) A, S, V in the bilinear variable of the circle, and what cancelled in S and V
     radius       rho
     """
 
@@ -55,8 +55,7 @@ class Tracer:
 
     def features(self) -> NDArray[np.complex128]:
         """Where the curve's shape comes from: see `grid.singular_points`."""
-        rows, _, split, numerator, denominator = self.factors
-        return singular_points(rows, split, numerator, denominator, self.radius)
+        return singular_points(self.factors, self.radius)
 
     def wall(self, theta: float) -> tuple[float, float, float, float]:
         """K, B, dK/dtheta, dB/dtheta at one angle in (0, pi)."""
@@ -114,15 +113,15 @@ class Tracer:
         Moving a root by dz = -(S dK + V dB)/p'(z) along the left normal changes |z| by an amount of the sign of
         -Im(V conj S) = -|S|^2 Im w (Neimark's rule).
         """
-        d = self.radius * np.exp(1j * theta) - 1.0
-        return velocity_response(*self.factors[3:], complex(d))[0].imag > 0.0
+        z = complex(self.radius * np.exp(1j * theta))
+        return velocity_response(self.factors, z, z - 1.0)[0].imag > 0.0
 
     def line(self, root: RealRoot) -> Floats:
         """Coefficients a, s, v of  a + s K + v B = 0, the walls with a root at +rho or -rho; stable side > 0.
 
         These are the lowest and the highest coefficient of p, which a Hurwitz polynomial has positive.
         """
-        return self.polynomials[:, 0 if root == "plus" else -1].copy()
+        return self.polynomials[:3, 0 if root == "plus" else -1].copy()
 
     def edge_on_line(self, root: RealRoot, K: float, B: float) -> bool:
         """Whether a wall on that line has all its other roots inside."""
@@ -138,7 +137,7 @@ class Tracer:
 
         There the two outermost coefficients of p vanish together: two linear equations.
         """
-        A, S, V = self.polynomials
+        A, S, V = self.polynomials[:3]
         i, j = (0, 1) if root == "plus" else (self.degree, self.degree - 1)
         det = S[i] * V[j] - S[j] * V[i]
         if abs(det) <= 1e-13 * (abs(S[i] * V[j]) + abs(S[j] * V[i])) or det == 0.0:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
+
+from zwidth.loop.estimators import BackwardDifference, VelocityMethod
 
 Discretisation = Literal["tustin", "tustin-prewarped"]
 
@@ -26,13 +28,19 @@ class Butterworth:
 
 @dataclass(frozen=True)
 class Controller:
-    """The sampled wall law: f = -(K y + B v), v by backward difference of the (filtered) position.
+    """The sampled wall law: f = -F (K y + B v), v estimated from samples of y.
 
-    sampling_period  T [s]
-    delay            from reading to force, in samples, any real >= 0
-    velocity_filter  acts on the velocity only; None: none
+    sampling_period         T [s]
+    delay                   from reading to force, in samples, any real >= 0
+    velocity_filter         acts on the velocity only; None: none
+    velocity                how the velocity is estimated
+    force_filter            F, acts on the whole force; None: none
+    actuator_time_constant  tau of the actuator, tau a' + a = held force [s]; 0: none
     """
 
     sampling_period: float
     delay: float = 0.0
     velocity_filter: FirstOrder | Butterworth | None = None
+    velocity: VelocityMethod = field(default_factory=BackwardDifference)
+    force_filter: FirstOrder | Butterworth | None = None
+    actuator_time_constant: float = 0.0

@@ -11,6 +11,8 @@ s = 0, and their coefficients are products without cancellation.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,20 +22,38 @@ from zwidth.loop.loop import Loop
 Floats = NDArray[np.float64]
 
 
-# What the kernels take: plant sections (m, 6), whole delay, 1 if the delay splits the hold, and the estimator's
-# numerators and denominators (k, 3).
-Factors = tuple[Floats, int, int, Floats, Floats]
+class Factors(NamedTuple):
+    """A loop as the kernels take it.
+
+    rows                      (m, 9)  plant sections, see `loop.sections`
+    whole, split              whole samples of delay, and 1 if the rest of the delay splits the hold
+    shared_top, shared_bottom (k, 3)  factors of the force on its way to all sections: filter and actuator lag
+    top, bottom               (k, 3)  factors of the velocity estimate
+    window                    (n,)    its weights of past samples
+    """
+
+    rows: Floats
+    whole: int
+    split: int
+    shared_top: Floats
+    shared_bottom: Floats
+    top: Floats
+    bottom: Floats
+    window: Floats
 
 
 def factor_arrays(loop: Loop) -> Factors:
-    """The loop as the kernels take it."""
-    estimator = loop.estimator
-    return (
+    """The loop's factors."""
+    force, estimator = loop.force_path, loop.estimator
+    return Factors(
         loop.sections.rows,
         loop.whole_delay,
         int(loop.fractional_delay > 0.0),
+        force.numerator,
+        force.denominator,
         estimator.numerator,
         estimator.denominator,
+        estimator.window,
     )
 
 
@@ -45,44 +65,68 @@ def divide(a: complex, b: complex) -> complex:
 
 
 @compiled_lean
-def plant_response(rows: Floats, whole: int, split: int, z: complex, d: complex) -> tuple[complex, complex]:
-    """P(z) and dP/dz."""
-    P = 0.0 + 0.0j
-    slope = 0.0 + 0.0j
-    back = divide(1.0 + 0.0j, z)
-    for k in range(rows.shape[0]):
-        den = (d + rows[k, 0]) * d + rows[k, 1]
-        num = rows[k, 2] * d + rows[k, 3]
-        dnum = rows[k, 2] + 0.0j
-        if split:
-            old = (rows[k, 4] * d + rows[k, 5]) * back
-            num += old
-            dnum += (rows[k, 4] - old) * back
+def product(top: Floats, bottom: Floats, d: complex, value: complex, slope: complex) -> tuple[complex, complex]:
+    """A function's value and slope times factors top/bottom, each c2 d^2 + c1 d + c0."""
+    for k in range(top.shape[0]):
+        num = (top[k, 0] * d + top[k, 1]) * d + top[k, 2]
+        den = (bottom[k, 0] * d + bottom[k, 1]) * d + bottom[k, 2]
+        dnum = 2.0 * top[k, 0] * d + top[k, 1]
+        dden = 2.0 * bottom[k, 0] * d + bottom[k, 1]
         over = divide(1.0 + 0.0j, den)
         ratio = num * over
-        P += ratio
-        slope += (dnum - ratio * (2.0 * d + rows[k, 0])) * over
-    for _ in range(whole):
-        slope = back * (slope - P * back)
-        P = back * P
-    return P, slope
+        slope = slope * ratio + value * (dnum - ratio * dden) * over
+        value = value * ratio
+    return value, slope
 
 
 @compiled_lean
-def velocity_response(numerator: Floats, denominator: Floats, d: complex) -> tuple[complex, complex]:
-    """w(z) and dw/dz."""
-    w = 1.0 + 0.0j
+def plant_response(factors: Factors, z: complex, d: complex) -> tuple[complex, complex]:
+    """P(z) and dP/dz, from force command to reading: delay, force filter, actuator lag and hold included."""
+    rows = factors.rows
+    P = 0.0 + 0.0j
     slope = 0.0 + 0.0j
-    for k in range(numerator.shape[0]):
-        num = (numerator[k, 0] * d + numerator[k, 1]) * d + numerator[k, 2]
-        den = (denominator[k, 0] * d + denominator[k, 1]) * d + denominator[k, 2]
-        dnum = 2.0 * numerator[k, 0] * d + numerator[k, 1]
-        dden = 2.0 * denominator[k, 0] * d + denominator[k, 1]
+    before = 1.0 + 0.0j  # what the denominators of a chain's earlier rows divide by, and its slope
+    before_slope = 0.0 + 0.0j
+    back = divide(1.0 + 0.0j, z)
+    for k in range(rows.shape[0]):
+        den = (d + rows[k, 0]) * d + rows[k, 1]
+        num = (rows[k, 2] * d + rows[k, 3]) * d + rows[k, 4]
+        dnum = 2.0 * rows[k, 2] * d + rows[k, 3]
+        if factors.split:
+            old = ((rows[k, 5] * d + rows[k, 6]) * d + rows[k, 7]) * back
+            num += old
+            dnum += (2.0 * rows[k, 5] * d + rows[k, 6] - old) * back
         over = divide(1.0 + 0.0j, den)
-        ratio = num * over
-        slope = slope * ratio + w * (dnum - ratio * dden) * over
-        w = w * ratio
-    return w, slope
+        over_slope = -(2.0 * d + rows[k, 0]) * over * over
+        if rows[k, 8] != 0.0:
+            over_slope = over_slope * before + over * before_slope
+            over = over * before
+        P += num * over
+        slope += dnum * over + num * over_slope
+        before, before_slope = over, over_slope
+    for _ in range(factors.whole):
+        slope = back * (slope - P * back)
+        P = back * P
+    return product(factors.shared_top, factors.shared_bottom, d, P, slope)
+
+
+@compiled_lean
+def velocity_response(factors: Factors, z: complex, d: complex) -> tuple[complex, complex]:
+    """w(z) and dw/dz."""
+    window = factors.window
+    value, slope = 1.0 + 0.0j, 0.0 + 0.0j
+    n = window.shape[0]
+    if n > 1:
+        # Horner's scheme in 1/z, oldest sample first
+        back = divide(1.0 + 0.0j, z)
+        value, slope = complex(window[n - 1], 0.0), 0.0 + 0.0j
+        for k in range(n - 2, -1, -1):
+            slope = slope * back + value
+            value = value * back + window[k]
+        slope = -slope * back * back
+    else:
+        value = complex(window[0], 0.0)
+    return product(factors.top, factors.bottom, d, value, slope)
 
 
 @compiled
@@ -109,13 +153,21 @@ def bilinear(c2: float, c1: float, c0: float, degree: int, radius: float, out: F
         out[2] = (c2 * a1 - c1) * a1 + c0
 
 
+@compiled_lean
+def order(bottom: Floats, k: int) -> int:
+    """Degree of one factor's denominator."""
+    degree: int = 2 if bottom[k, 0] != 0.0 else 1
+    return degree
+
+
 @compiled
 def degree_of_loop(factors: Factors) -> int:
     """Degree N of the characteristic polynomial."""
-    rows, whole, split, _, denominator = factors
-    N: int = 2 * rows.shape[0] + whole + split
-    for k in range(denominator.shape[0]):
-        N += 2 if denominator[k, 0] != 0.0 else 1
+    N: int = 2 * factors.rows.shape[0] + factors.whole + factors.split + factors.window.shape[0] - 1
+    for k in range(factors.shared_bottom.shape[0]):
+        N += order(factors.shared_bottom, k)
+    for k in range(factors.bottom.shape[0]):
+        N += order(factors.bottom, k)
     return N
 
 
@@ -129,56 +181,118 @@ def _times(total: Floats, degree: int, factor: Floats, order: int, spare: Floats
 
 
 @compiled
+def _times_factors(total: Floats, degree: int, rows: Floats, bottom: Floats, radius: float, spare: Floats) -> int:
+    """total *= all factors in `rows`, each taken at the order of its partner in `bottom`."""
+    factor = np.zeros(3)
+    for k in range(rows.shape[0]):
+        bilinear(rows[k, 0], rows[k, 1], rows[k, 2], order(bottom, k), radius, factor)
+        degree = _times(total, degree, factor, order(bottom, k), spare)
+    return degree
+
+
+@compiled
+def _row_numerator(rows: Floats, k: int, split: int, radius: float, part: Floats, spare: Floats) -> int:
+    """One row's numerator, times z (1 - s) if the hold is split; returns its degree, 2 or 3."""
+    factor = np.zeros(3)
+    part[:] = 0.0
+    bilinear(rows[k, 2], rows[k, 3], rows[k, 4], 2, radius, part)
+    if not split:
+        return 2
+    degree = _times(part, 2, np.array([radius, radius, 0.0]), 1, spare)
+    bilinear(rows[k, 5], rows[k, 6], rows[k, 7], 2, radius, factor)
+    for i in range(3):
+        part[i] += factor[i]
+        part[i + 1] -= factor[i]
+    return degree
+
+
+@compiled
+def _plant_numerator(factors: Factors, N: int, radius: float, total: Floats, lost: Floats, spare: Floats) -> int:
+    """Numerator of the sum over rows, times (1 - s)^degree, into `total`; returns the degree.
+
+    What cancels in the sum goes into `lost`: a coefficient is known to rounding of |total| + lost.
+    """
+    rows, split = factors.rows, factors.split
+    m = rows.shape[0]
+    part, factor = np.zeros(N + 3), np.zeros(3)
+    first = 0
+    degree: int = 2 * m + split
+    for k in range(m):
+        if rows[k, 8] == 0.0:
+            first = k  # where this row's chain begins
+        at = _row_numerator(rows, k, split, radius, part, spare)
+        for j in range(m):
+            if j < first or j > k:
+                bilinear(1.0, rows[j, 0], rows[j, 1], 2, radius, factor)
+                at = _times(part, at, factor, 2, spare)
+        for _ in range(k - first):  # divided by more than its own pair of poles
+            for _ in range(2):
+                at = _times(part, at, np.array([1.0, -1.0, 0.0]), 1, spare)
+        for i in range(at + 1):
+            total[i] += part[i]
+            lost[i] += abs(part[i])
+    for i in range(degree + 1):
+        lost[i] -= abs(total[i])
+    return degree
+
+
+@compiled
+def _window_polynomial(window: Floats, radius: float, N: int, spare: Floats) -> Floats:
+    """sum_k window_k z^-k times [z (1 - s)]^(n - 1)."""
+    n = window.shape[0]
+    out, power = np.zeros(N + 3), np.zeros(N + 3)
+    out[0], power[0] = window[0], 1.0
+    for k in range(1, n):
+        _times(out, k - 1, np.array([radius, radius, 0.0]), 1, spare)
+        _times(power, k - 1, np.array([1.0, -1.0, 0.0]), 1, spare)
+        for i in range(k + 1):
+            out[i] += window[k] * power[i]
+    return out
+
+
+@compiled
+def _wall_polynomials(factors: Factors, N: int, radius: float, plant: Floats, degree: int, out: Floats) -> None:
+    """N_P, of some degree in `plant`, times D_w into out[0] and times N_w into out[1], both with the force path's
+    numerators and times the power of (1 - s) that is missing."""
+    spare, n = np.zeros(N + 3), factors.window.shape[0]
+    for _ in range(factors.whole):
+        degree = _times(plant, degree, np.array([1.0, -1.0, 0.0]), 1, spare)
+    degree = _times_factors(plant, degree, factors.shared_top, factors.shared_bottom, radius, spare)
+    S, V = plant, plant.copy()
+    at = _times_factors(S, degree, factors.bottom, factors.bottom, radius, spare)
+    _times_factors(V, degree, factors.top, factors.bottom, radius, spare)
+    for k in range(n - 1):
+        _times(S, at + k, np.array([radius, radius, 0.0]), 1, spare)
+    if n > 1:
+        _times(V, at, _window_polynomial(factors.window, radius, N, spare), n - 1, spare)
+    else:
+        V *= factors.window[0]
+    out[0], out[1] = S[: N + 1], V[: N + 1]
+
+
+@compiled
 def characteristic(factors: Factors, radius: float) -> Floats:
-    """(3, N + 1): coefficients of A, S, V with p(s) = A + K S + B V, ascending powers of s.
+    """(5, N + 1): coefficients of A, S, V with p(s) = A + K S + B V, ascending powers of s; and the magnitudes
+    that cancelled in those of S and of V.
 
     With P = N_P/D_P and w = N_w/D_w:  A = D_P D_w,  S = N_P D_w,  V = N_P N_w, each times (1 - s)^N.
     """
-    rows, whole, split, numerator, denominator = factors
-    m = rows.shape[0]
+    rows = factors.rows
     N = degree_of_loop(factors)
-    coefficients = np.zeros((3, N + 1))
-    spare, factor, part = np.zeros(N + 1), np.zeros(3), np.zeros(N + 1)
-    advance, retreat = (np.array([radius, radius, 0.0]), np.array([1.0, -1.0, 0.0]))  # z (1 - s) and (1 - s)
-    plant_den, plant_num = np.zeros(N + 1), np.zeros(N + 1)
-
-    plant_den[0] = 1.0
+    spare, factor, advance = np.zeros(N + 3), np.zeros(3), np.array([radius, radius, 0.0])  # z (1 - s)
+    A, plant, lost = np.zeros(N + 3), np.zeros(N + 3), np.zeros(N + 3)
+    A[0] = 1.0
     degree = 0
-    for k in range(m):
+    for k in range(rows.shape[0]):
         bilinear(1.0, rows[k, 0], rows[k, 1], 2, radius, factor)
-        degree = _times(plant_den, degree, factor, 2, spare)
-    for _ in range(whole + split):
-        degree = _times(plant_den, degree, advance, 1, spare)
-
-    for k in range(m):
-        part[:] = 0.0
-        bilinear(0.0, rows[k, 2], rows[k, 3], 1, radius, part)
-        order = 1
-        if split:
-            order = _times(part, order, advance, 1, spare)
-            bilinear(0.0, rows[k, 4], rows[k, 5], 1, radius, factor)
-            part[0] += factor[0]
-            part[1] += factor[1] - factor[0]
-            part[2] -= factor[1]
-        for j in range(m):
-            if j != k:
-                bilinear(1.0, rows[j, 0], rows[j, 1], 2, radius, factor)
-                order = _times(part, order, factor, 2, spare)
-        for i in range(order + 1):
-            plant_num[i] += part[i]
-    order = 2 * m - 1 + split
-    for _ in range(whole + 1):
-        order = _times(plant_num, order, retreat, 1, spare)
-
-    coefficients[0] = plant_den
-    coefficients[1] = plant_num
-    coefficients[2] = plant_num
-    at, at_v = degree, degree
-    for k in range(denominator.shape[0]):
-        step = 2 if denominator[k, 0] != 0.0 else 1
-        bilinear(denominator[k, 0], denominator[k, 1], denominator[k, 2], step, radius, factor)
-        _times(coefficients[0], at, factor, step, spare)
-        at = _times(coefficients[1], at, factor, step, spare)
-        bilinear(numerator[k, 0], numerator[k, 1], numerator[k, 2], step, radius, factor)
-        at_v = _times(coefficients[2], at_v, factor, step, spare)
+        degree = _times(A, degree, factor, 2, spare)
+    degree = _times_factors(A, degree, factors.shared_bottom, factors.shared_bottom, radius, spare)
+    degree = _times_factors(A, degree, factors.bottom, factors.bottom, radius, spare)
+    for _ in range(factors.whole + factors.split + factors.window.shape[0] - 1):
+        degree = _times(A, degree, advance, 1, spare)
+    coefficients = np.empty((5, N + 1))
+    coefficients[0] = A[: N + 1]
+    reached = _plant_numerator(factors, N, radius, plant, lost, spare)
+    _wall_polynomials(factors, N, radius, plant, reached, coefficients[1:3])
+    _wall_polynomials(factors, N, radius, lost, reached, coefficients[3:5])
     return coefficients

@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.loop.controller import Controller
-from zwidth.loop.estimator import Estimator, velocity_estimator
-from zwidth.loop.hold import Sections, sampled_sections
+from zwidth.loop.estimator import Estimator
+from zwidth.loop.filters import Filter, force_path, velocity_estimator
 from zwidth.loop.realisation import StateSpace, realise
+from zwidth.loop.response import product, rows_response, window_response
+from zwidth.loop.sections import Sections, sampled_sections
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -54,12 +57,31 @@ class Loop:
     @cached_property
     def sections(self) -> Sections:
         """The plant between samples, one row per observed pair of poles."""
-        return sampled_sections(self.plant, self.period, self.fractional_delay)
+        lag = self.controller.actuator_time_constant
+        return sampled_sections(self.plant, self.period, self.fractional_delay, lag)
+
+    @cached_property
+    def force_path(self) -> Filter:
+        """What the force passes before it moves anything: its filter, then the actuator's lag."""
+        return force_path(self.controller)
 
     @cached_property
     def estimator(self) -> Estimator:
         """The velocity estimate w(z)."""
         return velocity_estimator(self.controller)
+
+    def plant_response(self, z: ArrayLike) -> Complexes:
+        """P(z) (...) from force command to reading, at complex z (...): hold, delay, filter and lag included."""
+        at: Complexes = np.asarray(z, dtype=complex)
+        force, split = self.force_path, self.fractional_delay > 0.0
+        passed = product(force.numerator, force.denominator, at - 1.0) / at**self.whole_delay
+        return np.asarray(rows_response(self.sections.rows, split, at) * passed)
+
+    def velocity_response(self, z: ArrayLike) -> Complexes:
+        """w(z) (...), the velocity estimate per reading, at complex z (...)."""
+        at: Complexes = np.asarray(z, dtype=complex)
+        own = self.estimator
+        return np.asarray(product(own.numerator, own.denominator, at - 1.0) * window_response(own.window, at))
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
@@ -69,11 +91,14 @@ class Loop:
     @cached_property
     def state_space(self) -> StateSpace:
         """The loop's transition matrix as L0 + K LK + B LB."""
-        return realise(self.sections.rows, self.whole_delay, self.fractional_delay > 0.0, self.estimator)
+        return realise(
+            self.sections, self.whole_delay, self.fractional_delay > 0.0, self.force_path, self.estimator
+        )
 
     def transition_matrix(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
         """The map Z_{j+1} = L Z_j (thesis eq. 2.38) for walls K, B of any shape (...): (..., N, N).
 
-        N = 2 (observed pole pairs) + delayed forces + estimator states. Unobserved motions are left out.
+        N counts plant states, states of filter and lag, delayed forces and states of the velocity estimate.
+        Unobserved motions are left out.
         """
         return self.state_space.transition_matrix(np.asarray(wall_stiffness), np.asarray(wall_damping))

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.loop.chain import Chain
 from zwidth.loop.estimator import Estimator
+from zwidth.loop.filters import Filter
+from zwidth.loop.sections import Sections
 
 Floats = NDArray[np.float64]
 
@@ -54,56 +57,120 @@ def _numerator_input(n1: float, n0: float, d1: float, t: float) -> Floats:
     return np.array([n1, (n0 - d1 / 2.0 * n1) / t])
 
 
-def realise(rows: Floats, whole_delay: int, split: bool, estimator: Estimator) -> StateSpace:
-    """Assemble plant sections, delayed forces and the estimator's factors into one state vector."""
-    m = len(rows)
+@dataclass
+class _Signal:
+    """An affine function of the states and of the wall force u:  states . Z + force u."""
+
+    states: Floats
+    force: float
+
+    def into(self, at: slice, gain: Floats, space: StateSpace) -> None:
+        """Let the signal drive some states with a gain each."""
+        space.open[at] += np.outer(gain, self.states)
+        space.input[at] += gain * self.force
+
+    def scaled(self, factor: float) -> _Signal:
+        return _Signal(factor * self.states, factor * self.force)
+
+
+def _orders(denominator: Floats) -> list[int]:
+    return [2 if row[0] != 0.0 else 1 for row in denominator]
+
+
+def realise(sections: Sections, whole_delay: int, split: bool, force: Filter, estimator: Estimator) -> StateSpace:
+    """Assemble plant sections, force path, delayed forces and the estimate's factors into one state vector."""
     queue = whole_delay + split
-    orders = [2 if row[0] != 0.0 else 1 for row in estimator.denominator]
-    N = 2 * m + queue + sum(orders)
-    open_, source = np.zeros((N, N)), np.zeros(N)
-    position = np.zeros(N)
-    first = 2 * m  # states of the force queue: u_{j-1}, u_{j-2}, ...
-    for k, (d1, d0, n1, n0, o1, o0) in enumerate(rows):
+    sizes = (_plant_states(sections), sum(_orders(force.denominator)), queue, len(estimator.window) - 1)
+    N = sum(sizes) + sum(_orders(estimator.denominator))
+    space = StateSpace(np.zeros((N, N)), np.zeros(N), np.zeros(N), np.zeros(N))
+    first = np.cumsum((0, *sizes))
+    command = _through(space, _Signal(np.zeros(N), 1.0), force.numerator, force.denominator, int(first[1]))
+    late = _queued(space, command, queue, int(first[2]))
+    reading = _plant(space, sections, late[whole_delay], late[whole_delay + 1] if split else None)
+    space.position[:] = reading
+    past = _queued(space, _Signal(reading, 0.0), len(estimator.window) - 1, int(first[3]))
+    window = _Signal(sum(w * signal.states for w, signal in zip(estimator.window, past, strict=True)), 0.0)
+    velocity = _through(space, window, estimator.numerator, estimator.denominator, int(first[4]))
+    space.velocity[:] = velocity.states
+    return space
+
+
+def _plant_states(sections: Sections) -> int:
+    """Number of states of the plant."""
+    if sections.chain is None:
+        return 2 * len(sections.rows)
+    return 2 * _leading(sections) + len(sections.chain.output)
+
+
+def _leading(sections: Sections) -> int:
+    """How many rows stand before the chain, which begins at the last row that is not chained."""
+    return int(np.flatnonzero(sections.rows[:, 8] == 0.0)[-1]) if sections.chain else len(sections.rows)
+
+
+def _queued(space: StateSpace, signal: _Signal, count: int, start: int) -> list[_Signal]:
+    """The signal and its `count` past values, newest first."""
+    signals = [signal]
+    for at in range(start, start + count):
+        signals[-1].into(slice(at, at + 1), np.ones(1), space)
+        signals.append(_Signal(np.eye(1, len(space.open), at)[0], 0.0))
+    return signals
+
+
+def _plant(space: StateSpace, sections: Sections, new: _Signal, old: _Signal | None) -> Floats:
+    """How the reading follows from the states, once the signals drive them."""
+    reading = np.zeros(len(space.open))
+    leading = _leading(sections)
+    _row_states(space, sections.rows[:leading], new, old, reading)
+    if sections.chain is not None:
+        _chain_states(space, sections.chain, slice(2 * leading, _plant_states(sections)), new, old, reading)
+    return reading
+
+
+def _row_states(space: StateSpace, rows: Floats, new: _Signal, old: _Signal | None, reading: Floats) -> None:
+    """In a chain each row drives the one before it, through that one's 1/(d^2 + d1 d + d0)."""
+    before = np.zeros(2)
+    for k, (d1, d0, n2, n1, n0, o2, o1, o0, chained) in enumerate(rows):
         at = slice(2 * k, 2 * k + 2)
-        open_[at, at], t = pole_pair(d1, d0)
-        new, old = _numerator_input(n1, n0, d1, t), _numerator_input(o1, o0, d1, t)
-        if whole_delay == 0:
-            source[at] = new
+        space.open[at, at], t = pole_pair(d1, d0)
+        for signal, (c2, c1, c0) in ((new, (n2, n1, n0)), (old, (o2, o1, o0))):
+            if signal is not None:
+                signal.into(at, _numerator_input(c1 - c2 * d1, c0 - c2 * d0, d1, t), space)
+                reading += c2 * signal.states
+        if chained:
+            space.open[2 * k - 2 : 2 * k, 2 * k] += before
         else:
-            open_[at, first + whole_delay - 1] = new
-        if split:
-            open_[at, first + whole_delay] += old
-        position[2 * k] = 1.0
-    if queue:
-        source[first] = 1.0
-        open_[np.arange(first + 1, first + queue), np.arange(first, first + queue - 1)] = 1.0
-    velocity = _append_estimator(open_, position, first + queue, estimator, orders)
-    return StateSpace(open_, source, position, velocity)
+            reading[2 * k] += 1.0
+        before = _numerator_input(0.0, 1.0, d1, t)
 
 
-def _append_estimator(
-    open_: Floats, position: Floats, start: int, estimator: Estimator, orders: list[int]
-) -> Floats:
-    """Cascade the estimator's factors behind the position; returns the read-out of the velocity.
+def _chain_states(
+    space: StateSpace, sampled: Chain, at: slice, new: _Signal, old: _Signal | None, reading: Floats
+) -> None:
+    """The states that the chained rows come from."""
+    space.open[at, at] = np.eye(len(sampled.output)) + sampled.growth
+    reading[at] += sampled.output
+    for signal, source, direct in ((new, sampled.new, sampled.direct_new), (old, sampled.old, sampled.direct_old)):
+        if signal is not None:
+            signal.into(at, source, space)
+            reading += direct * signal.states
 
-    Each factor's input is an affine function of the states, so the whole chain stays one matrix.
-    """
-    signal = position.copy()
+
+def _through(space: StateSpace, signal: _Signal, numerator: Floats, denominator: Floats, start: int) -> _Signal:
+    """The signal after a cascade of factors, whose states begin at `start`."""
     at = start
-    for numerator, denominator, order in zip(estimator.numerator, estimator.denominator, orders, strict=True):
-        if order == 1:
-            (_, c1, c0), d0 = numerator, denominator[2]
-            open_[at] += signal
-            open_[at, at] += 1.0 - d0
-            signal = c1 * signal
-            signal[at] += c0 - c1 * d0
+    for (c2, c1, c0), (lead, d1, d0) in zip(numerator, denominator, strict=True):
+        if lead == 0.0:
+            signal.into(slice(at, at + 1), np.ones(1), space)
+            space.open[at, at] += 1.0 - d0
+            signal = signal.scaled(c1)
+            signal.states[at] += c0 - c1 * d0
+            at += 1
         else:
-            (c2, c1, c0), (_, d1, d0) = numerator, denominator
             block, t = pole_pair(d1, d0)
-            open_[at : at + 2, at : at + 2] += block
-            open_[at : at + 2] += np.outer(_numerator_input(1.0, 0.0, d1, t), signal) * (c1 - c2 * d1)
-            open_[at : at + 2] += np.outer(_numerator_input(0.0, 1.0, d1, t), signal) * (c0 - c2 * d0)
-            signal = c2 * signal
-            signal[at] += 1.0
-        at += order
+            pair = slice(at, at + 2)
+            space.open[pair, pair] += block
+            signal.into(pair, _numerator_input(c1 - c2 * d1, c0 - c2 * d0, d1, t), space)
+            signal = signal.scaled(c2)
+            signal.states[at] += 1.0
+            at += 2
     return signal

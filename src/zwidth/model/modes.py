@@ -1,4 +1,4 @@
-"""The modes of a plant: undamped where the damping is classical, damped (complex) where it is not."""
+"""The undamped modes of a plant, with a damping each where the damping does not couple them."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ RIGID = 1e-13
 # Relative distance under which two frequencies or damping rates are one: above the rounding of the
 # eigenvalue problem, below anything a mechanism is built to.
 REPEATED = 1e-10
-
-
-class ModesError(ValueError):
-    """A plant whose modes cannot be told apart in double precision."""
+# A motion whose residue is below this share of all residues is rounding: no wall moves it.
+UNOBSERVED = 1e-11
+# The same for a motion without damping: the wall would move its poles by less than the band in which stability is
+# left undecided, so that it could only hide the stability of the rest.
+UNOBSERVED_UNDAMPED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -67,11 +68,13 @@ def clusters(values: Floats, tolerance: float) -> list[slice]:
 
 
 def real_modes(plant: Plant) -> RealModes | None:
-    """The undamped modes with their own damping each, or None where the damping couples them.
+    """The undamped modes with their own damping each, or None where the damping couples them or lags.
 
     Damping is classical if V^T B V is diagonal once each group of equal frequencies has been turned onto the
     axes of its own damping (Caughey's condition B M^-1 K = K M^-1 B, in modal coordinates).
     """
+    if plant.lagged_dampers:
+        return None
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
     for run in clusters(squared, REPEATED * scale):
@@ -86,50 +89,3 @@ def real_modes(plant: Plant) -> RealModes | None:
     # A free rigid mode's own damping is exactly zero, not what rounding leaves of it.
     damping[np.abs(damping) <= 1e-14 * max(float(np.max(np.abs(damping))), 0.0)] = 0.0
     return RealModes(damping / 2.0, squared, shapes.T @ plant.actuator, shapes.T @ plant.sensor, shapes)
-
-
-@dataclass(frozen=True)
-class DampedModes:
-    """First-order modes of a plant whose damping couples its undamped modes:  y/f = sum residue / (s - pole).
-
-    poles, residues  (k,)  complex, [1/s] and [m/(N s)]; conjugates both present
-    free             residue of the rigid, undamped motion, y/f = free / s^2 [1/kg]
-    free_count       how many such motions there are
-    """
-
-    poles: NDArray[np.complex128]
-    residues: NDArray[np.complex128]
-    free: float
-    free_count: int
-
-
-def damped_modes(plant: Plant) -> DampedModes:
-    """Poles and residues of the first-order form of M x'' + B x' + K x = actuator f.
-
-    Motions with neither stiffness nor damping are split off first: they are M-orthogonal to the rest and
-    their double pole at 0 has no first-order modes. Raises ModesError where other poles nearly coincide in a
-    defective way (a coupled pair at critical damping), so that residues lose more than half of the digits.
-    """
-    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
-    rigid, elastic = shapes[:, squared == 0.0], shapes[:, squared != 0.0]
-    drag, axes = np.linalg.eigh(rigid.T @ plant.damping @ rigid)
-    level = 1e-13 * max(float(np.max(np.abs(shapes.T @ plant.damping @ shapes))), np.finfo(float).tiny)
-    free = rigid @ axes[:, np.abs(drag) <= level]
-    kept = np.hstack([rigid @ axes[:, np.abs(drag) > level], elastic])
-    k = kept.shape[1]
-    K, B = kept.T @ plant.stiffness @ kept, kept.T @ plant.damping @ kept
-    # Each velocity in units of its own mode's rate: a slow mode's conjugate pair stays well apart
-    rate = np.maximum(np.sqrt(np.abs(np.diag(K))), np.abs(np.diag(B)))
-    A = np.block([[np.zeros((k, k)), np.diag(rate)], [-K / rate[:, None], -B * (rate / rate[:, None])]])
-    poles, right = np.linalg.eig(A)
-    if np.linalg.cond(right) > 1e7:
-        raise ModesError(
-            "two damped modes nearly coincide (coupled critical damping) and cannot be told apart in double "
-            "precision; change damping_Ns_per_m by a relative 1e-5"
-        )
-    source = np.concatenate([np.zeros(k), kept.T @ plant.actuator / rate])
-    reading = np.concatenate([kept.T @ plant.sensor, np.zeros(k)])
-    residues = (reading @ right) * np.linalg.solve(right, source.astype(complex))
-    poles[np.abs(poles) <= 1e-13 * np.max(np.abs(poles))] = 0.0
-    inertia = float((free.T @ plant.sensor) @ (free.T @ plant.actuator))
-    return DampedModes(poles, residues, inertia, int(free.shape[1]))

@@ -11,10 +11,27 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class LaggedDamper:
+    """A damper whose force follows the velocity with a lag:  force = -along F,  tau F' + F = c along . x'.
+
+    A motor whose winding is closed through a resistor brakes like this, c/(1 + tau s) = k_t^2/(R + L s)
+    (Mehling, Colgate and Peshkin 2005); so does a spring of stiffness c/tau in series with a dashpot (Maxwell).
+
+    along          (n,)  the velocity it works on is along . x'
+    damping        c [N s/m], not negative
+    time_constant  tau = L/R [s], positive; a damper without lag belongs into the damping matrix
+    """
+
+    along: Floats
+    damping: float
+    time_constant: float
+
+
+@dataclass(frozen=True)
 class Plant:
     """Linear dynamics about the haptic equilibrium (thesis eq. 2.5).
 
-        M x'' + B x' + K x = actuator * f,     y = sensor . x
+        M x'' + B x' + K x = actuator * f + lagged dampers,     y = sensor . x
 
     mass       (n, n)  symmetric positive definite [kg]
     damping    (n, n)  symmetric [N s/m]
@@ -23,6 +40,7 @@ class Plant:
     sensor     (n,)    what the encoder reads
     handle     (n,)    where the operator holds it; None: not known
     names      (n,)    coordinates, for people
+    lagged_dampers     electrical damping and the like
     """
 
     mass: Floats
@@ -32,6 +50,7 @@ class Plant:
     sensor: Floats
     handle: Floats | None = None
     names: tuple[str, ...] = ()
+    lagged_dampers: tuple[LaggedDamper, ...] = ()
 
     @property
     def size(self) -> int:

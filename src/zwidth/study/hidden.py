@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.loop.hold import real_section
+from zwidth.loop.hold import denominator
 from zwidth.loop.loop import Loop
-from zwidth.model.modes import damped_modes, real_modes
+from zwidth.model.first_order import first_order_form
+from zwidth.model.modes import real_modes
 from zwidth.model.plant import Plant
 
 Complex = NDArray[np.complex128]
@@ -19,7 +20,6 @@ def hidden_instability(loop: Loop) -> bool:
 
     True if the plant has more poles outside the unit circle than are left in the sampled sections, from which
     such motions have been cancelled.
-    Raises  ModesError  as sampling the loop does
     """
     if not loop.unobserved_modes:
         return False
@@ -31,9 +31,10 @@ def _poles(plant: Plant, period: float) -> Complex:
     """All poles of the sampled plant, as z - 1; those of free motions, which do not grow, may be missing."""
     modes = real_modes(plant)
     if modes is None:
-        return np.expm1(damped_modes(plant).poles * period)
+        form = first_order_form(plant, period)
+        return np.expm1(np.concatenate([form.poles, form.hidden]) * period)
     pairs = zip(modes.decay.tolist(), modes.frequency_squared.tolist(), strict=True)
-    return _of_sections(np.array([real_section(decay, squared, period, 0.0)[:2] for decay, squared in pairs]))
+    return _of_sections(np.array([denominator(decay, squared, period) for decay, squared in pairs]))
 
 
 def _of_sections(denominators: NDArray[np.float64]) -> Complex:

@@ -18,7 +18,6 @@ from zwidth.chart.region import ChartError
 from zwidth.device.device import Device
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
-from zwidth.model.modes import ModesError
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
 
@@ -84,7 +83,7 @@ def what_if(
 
     Arguments are those of `Device.plant`. A change that does not apply has no chart and says why; the device as
     described comes first and always has one.
-    Raises  what `Device.plant` raises, and ChartError or ModesError if the device itself cannot be charted
+    Raises  what `Device.plant` raises, and ChartError if the device itself cannot be charted
     """
 
     def reduce(to: str | None) -> Plant:
@@ -127,7 +126,7 @@ def _charted(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
     try:
         loop = make()
         return Variant(key, label, loop, stability_chart(loop, decay=False))
-    except (ModelError, ModesError, ChartError) as error:
+    except (ModelError, ChartError) as error:
         return Variant(key, label, None, None, str(error))
 
 

@@ -31,8 +31,7 @@ def computing(question: Question) -> Iterator[None]:
             BadInput  where the model, or the loop, does not fit the device
     """
     from zwidth.chart.region import ChartError
-    from zwidth.loop.hold import UnmovedError
-    from zwidth.model.modes import ModesError
+    from zwidth.loop.sections import UnmovedError
     from zwidth.model.posture import PostureError
     from zwidth.model.reduction import DirectionError, ModelError
 
@@ -40,7 +39,7 @@ def computing(question: Question) -> Iterator[None]:
         yield
     except PostureError as error:
         raise NoAnswer(str(error)) from None
-    except (ChartError, ModesError) as error:
+    except ChartError as error:
         raise NoAnswer(f"this is undecided: {error}", decided=False) from None
     except DirectionError as error:
         raise BadInput(f"{question.name}: direction: {error}") from None

@@ -32,7 +32,7 @@ def write_report(
     at, direction, assembly, model   as for `Device.plant`
     Returns  a dict under the names of the command line's --json, `file` and `summary` (its first sentences)
              among them; with a `reason` where no wall is stable
-    Raises   what `Device.plant` raises; ChartError or ModesError if the device cannot be charted
+    Raises   what `Device.plant` raises; ChartError if the device cannot be charted
              OutputError (show.output)  where the file cannot be written
     """
     facts = gather(device, at, direction, assembly, model)

@@ -1,0 +1,86 @@
+"""Low passes as factors in d = z - 1, and what the controller's signals pass: force path and velocity estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.loop.controller import Butterworth, Controller, FirstOrder
+from zwidth.loop.estimator import Estimator
+from zwidth.loop.hold import lag_share
+
+Floats = NDArray[np.float64]
+Rows = list[list[float]]
+
+
+@dataclass(frozen=True)
+class Filter:
+    """product of numerators / product of denominators, (k, 3) rows c2, c1, c0 of  c2 d^2 + c1 d + c0."""
+
+    numerator: Floats
+    denominator: Floats
+
+
+def first_order_factors(low_pass: FirstOrder, period: float) -> tuple[Rows, Rows]:
+    """Backward Euler of 1/(tau s + 1):  (1 - a) z / (z - a),  a = tau / (tau + T)."""
+    share = period / (low_pass.time_constant + period)
+    return [[0.0, share, share]], [[0.0, 1.0, share]]
+
+
+def butterworth_factors(low_pass: Butterworth, period: float) -> tuple[Rows, Rows]:
+    """Butterworth by s = (2/T) (z - 1)/(z + 1), of unit gain at z = 1 (thesis 3.17-3.19 for order 2).
+
+    With u = w_c T / 2 (prewarped: tan of it) a pair of analog poles of damping ratio q becomes
+
+        u^2 (d + 2)^2 / [ (1 + 2 q u + u^2) d^2 + (4 q u + 4 u^2) d + 4 u^2 ]
+    """
+    u = np.pi * low_pass.cutoff_Hz * period
+    if low_pass.discretisation == "tustin-prewarped":
+        u = np.tan(u)
+    numerators, denominators = [], []
+    for k in range(low_pass.order // 2):
+        q = np.sin(np.pi * (2 * k + 1) / (2 * low_pass.order))
+        lead = 1.0 + 2.0 * q * u + u * u
+        gain = u * u / lead
+        numerators.append([gain, 4.0 * gain, 4.0 * gain])
+        denominators.append([1.0, 4.0 * (q * u + u * u) / lead, 4.0 * u * u / lead])
+    if low_pass.order % 2:
+        gain = u / (1.0 + u)
+        numerators.append([0.0, gain, 2.0 * gain])
+        denominators.append([0.0, 1.0, 2.0 * gain])
+    return numerators, denominators
+
+
+def low_pass_factors(low_pass: FirstOrder | Butterworth | None, period: float) -> tuple[Rows, Rows]:
+    """The factors of any low pass; none for None."""
+    match low_pass:
+        case FirstOrder():
+            return first_order_factors(low_pass, period)
+        case Butterworth():
+            return butterworth_factors(low_pass, period)
+        case None:
+            return [], []
+
+
+def _stacked(rows: Rows) -> Floats:
+    return np.array(rows, dtype=float).reshape(-1, 3)
+
+
+def force_path(controller: Controller) -> Filter:
+    """The force filter, then the actuator's lag 1/(d + s), whose numerators `loop.hold` has."""
+    T, lag = controller.sampling_period, controller.actuator_time_constant
+    top, bottom = low_pass_factors(controller.force_filter, T)
+    if lag > 0.0:
+        top, bottom = [*top, [0.0, 0.0, 1.0]], [*bottom, [0.0, 1.0, lag_share(T, lag)]]
+    return Filter(_stacked(top), _stacked(bottom))
+
+
+def velocity_estimator(controller: Controller) -> Estimator:
+    """The controller's velocity estimate through its velocity filter."""
+    own = controller.velocity.estimator(controller.sampling_period)
+    top, bottom = low_pass_factors(controller.velocity_filter, controller.sampling_period)
+    return Estimator(
+        np.vstack([own.numerator, _stacked(top)]), np.vstack([own.denominator, _stacked(bottom)]), own.window
+    )

@@ -1,0 +1,141 @@
+"""The sampled plant as rows of second-order factors, without what no wall moves or no sensor reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.loop.chain import Chain, chain, chain_rows
+from zwidth.loop.hold import modal_row
+from zwidth.model.first_order import FirstOrderForm, first_order_form, seen
+from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes
+from zwidth.model.plant import Plant
+
+Floats = NDArray[np.float64]
+
+
+# Relative distance within which two pairs of poles of a chain are one, rounding split them.
+SAME_POLES = 1e-6
+
+
+class UnmovedError(ValueError):
+    """A plant of which the wall moves nothing that the sensor reads."""
+
+
+@dataclass(frozen=True)
+class Sections:
+    """The sampled plant, one row per observed pair of poles, and the names of what was cancelled.
+
+    rows        (m, 9)  d1, d0, n2, n1, n0, o2, o1, o0 as in `loop.hold`, and 1 where the row is divided by the
+                        denominators of the row before it too (and of those that one is divided by), else 0
+    unobserved  motions that the wall force does not move or the sensor does not read
+    chain       states that the chained rows, which come last, are made from; None: rows have no better than their
+                own
+    """
+
+    rows: Floats
+    unobserved: tuple[str, ...]
+    chain: Chain | None = None
+
+
+def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: float = 0.0) -> Sections:
+    """The plant's rows for a sampling period T [s], the fractional part f of the delay [samples] and the time
+    constant of the actuator [s].
+
+    Raises UnmovedError where no mode is both moved by the wall force and read by the sensor.
+    """
+    modes = real_modes(plant)
+    if modes is not None:
+        sections = _modal_sections(modes, period, fraction, lag)
+    else:
+        sections = _chained_sections(first_order_form(plant, period), period, fraction, lag)
+    if not len(sections.rows):
+        raise UnmovedError("the wall force moves nothing that the sensor reads; check actuator and sensor")
+    return sections
+
+
+def _modal_sections(modes: RealModes, period: float, fraction: float, lag: float) -> Sections:
+    """Rows of classically damped modes; equal modes are one pair of poles with the sum of their residues."""
+    residue = modes.input * modes.output
+    total = float(np.sum(np.abs(modes.input)) * np.sum(np.abs(modes.output)))
+    rows, unobserved = [], []
+    for group in _equal_modes(modes):
+        decay, squared = float(modes.decay[group[0]]), float(modes.frequency_squared[group[0]])
+        row = modal_row(decay, squared, period, fraction, lag)
+        row[2:] *= float(np.sum(residue[group]))
+        # What counts is the sampled residue: a mode at a multiple of the sampling rate is not reached by a hold
+        level = total * period**2 * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)
+        observed = bool(np.max(np.abs(row[2:])) > level)
+        unobserved += [_label(squared, decay)] * (len(group) - observed)
+        if observed:
+            rows.append([*row, 0.0])
+    return Sections(np.array(rows).reshape(-1, 9), tuple(unobserved))
+
+
+def _equal_modes(modes: RealModes) -> list[list[int]]:
+    """Modes of one frequency and one damping, to rounding."""
+    scale = max(float(np.max(np.abs(modes.frequency_squared))), np.finfo(float).tiny)
+    drag = max(float(np.max(np.abs(modes.decay))), np.finfo(float).tiny)
+    groups: list[list[int]] = []
+    for k in range(len(modes.decay)):
+        for group in groups:
+            apart = abs(modes.frequency_squared[k] - modes.frequency_squared[group[0]])
+            if apart <= REPEATED * scale and abs(modes.decay[k] - modes.decay[group[0]]) <= REPEATED * drag:
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    return groups
+
+
+def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag: float) -> Sections:
+    """Rows of a first-order form, and of the free motion beside it."""
+    alone = []
+    if form.free_count:
+        row = modal_row(0.0, 0.0, period, fraction, lag)
+        row[2:] *= form.free
+        alone.append([*row, 0.0])
+    unobserved = [_label(0.0, 0.0)] * (form.free_count - 1)
+    unobserved += [_pole_label(pole) for pole in form.hidden if pole.imag >= 0.0]
+    rows = chain_rows(form, chain(form, period, fraction, lag), period)
+    m = len(rows)
+    while m and _repeats(rows[m - 1], rows[: m - 1]):
+        m -= 1
+    unobserved += ["motion that decays as another one does"] * (len(rows) - m)
+    states = chain(seen(form), period, fraction, lag) if m == len(rows) else None
+    chained = np.column_stack([rows[:m], np.arange(m) > 0])
+    return Sections(np.vstack([np.array(alone).reshape(-1, 9), chained]), tuple(unobserved), states)
+
+
+def _repeats(row: Floats, earlier: Floats) -> bool:
+    """Whether a chain's row has the poles of an earlier one and adds nothing to it: two equal motions, of which
+    force and sensor see but one."""
+
+    def size(other: Floats) -> float:
+        n2, n1, n0 = np.max(np.abs(other[2:].reshape(2, 3)), axis=0)
+        return float((n2 * rate + n1) * rate + n0)
+
+    rate = max(float(np.sqrt(abs(row[1]))), abs(float(row[0])))
+    for other in earlier:
+        apart = abs(row[0] - other[0]) / max(rate, 1e-300), abs(row[1] - other[1]) / max(rate**2, 1e-300)
+        if max(apart) <= SAME_POLES and size(row) <= SAME_POLES * rate**2 * size(other):
+            return True
+    return False
+
+
+def _label(squared: float, decay: float) -> str:
+    """A motion's name for people."""
+    if squared <= 0.0:
+        return "rigid motion (0 Hz)" if squared == 0.0 else "unstable motion (negative stiffness)"
+    rate = sqrt(squared)
+    return f"mode at {rate / (2.0 * np.pi):.4g} Hz (damping ratio {decay / rate:.3g})"
+
+
+def _pole_label(pole: complex) -> str:
+    """The same for a motion with a pole of its own."""
+    if pole.imag != 0.0:
+        return f"mode at {abs(pole) / (2.0 * np.pi):.4g} Hz (coupled damping)"
+    return "overdamped motion"

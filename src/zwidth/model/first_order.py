@@ -1,0 +1,161 @@
+"""A plant's first-order form, where damping couples the undamped modes or lags behind the velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.model.modes import UNOBSERVED_UNDAMPED, undamped_modes
+from zwidth.model.plant import Plant
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# A pole whose left and right vectors are this near to orthogonal shares its motion with a neighbour.
+SHARED = 1e-3
+ZERO = 1e-13  # a pole below this share of the largest is a rounded zero
+ROUNDING = 1e-13  # of a residue, in shares of the terms that it is summed from
+
+
+@dataclass(frozen=True)
+class FirstOrderForm:
+    """y/f = free/s^2 + output (s - A)^-1 input
+
+    dynamics    (k, k)  A [1/s]
+    input       (k,)
+    output      (k,)
+    poles       (p,)    eigenvalues of A [1/s], conjugates both, but for
+    hidden      (h,)    those that the force does not move or the sensor does not read
+    free        residue of the rigid, undamped motion [1/kg]
+    free_count  how many such motions there are
+    """
+
+    dynamics: Floats
+    input: Floats
+    output: Floats
+    poles: Complexes
+    hidden: Complexes
+    free: float
+    free_count: int
+
+
+def first_order_form(plant: Plant, period: float) -> FirstOrderForm:
+    """The plant's first-order form on coordinates, velocities [m per period] and forces of lagged dampers.
+
+    Motions with neither stiffness nor damping are split off: they are M-orthogonal to the rest, and their double
+    pole at 0 is known exactly. Hidden is a pole that moves the reading within a period T [s] by no
+    more than rounding.
+    """
+    free, kept = _free_motions(plant)
+    A, source, reading = _assembled(plant, kept, period)
+    ends = np.abs(np.hstack([free, kept]).T @ np.stack([plant.actuator, plant.sensor], axis=1))
+    poles, hidden = _poles(A, source, reading, period, float(np.prod(ends.sum(axis=0))) * period**2)
+    inertia = float((free.T @ plant.sensor) @ (free.T @ plant.actuator))
+    return FirstOrderForm(A, source, reading, poles[~hidden], poles[hidden], inertia, int(free.shape[1]))
+
+
+def _drag(plant: Plant) -> Floats:
+    """All damping as if no damper lagged, (n, n)."""
+    lagged = [damper.damping * np.outer(damper.along, damper.along) for damper in plant.lagged_dampers]
+    return np.asarray(plant.damping + sum(lagged, np.zeros_like(plant.damping)))
+
+
+def _free_motions(plant: Plant) -> tuple[Floats, Floats]:
+    """Mass-normalised motions (n, f) with neither stiffness nor damping, and the others (n, k)."""
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    drag = _drag(plant)
+    rigid, elastic = shapes[:, squared == 0.0], shapes[:, squared != 0.0]
+    braked, axes = np.linalg.eigh(rigid.T @ drag @ rigid)
+    level = 1e-13 * max(float(np.max(np.abs(shapes.T @ drag @ shapes))), np.finfo(float).tiny)
+    slides = np.abs(braked) <= level
+    return rigid @ axes[:, slides], np.hstack([rigid @ axes[:, ~slides], elastic])
+
+
+def _assembled(plant: Plant, kept: Floats, period: float) -> tuple[Floats, Floats, Floats]:
+    """A, input and output on the motions kept."""
+    k, lags = kept.shape[1], plant.lagged_dampers
+    n = 2 * k + len(lags)
+    A = np.zeros((n, n))
+    A[:k, k : 2 * k] = np.eye(k) / period
+    A[k : 2 * k, :k] = -(kept.T @ plant.stiffness @ kept) * period
+    A[k : 2 * k, k : 2 * k] = -(kept.T @ plant.damping @ kept)
+    for i, damper in enumerate(lags):
+        along = kept.T @ damper.along
+        A[k : 2 * k, 2 * k + i] = -damper.damping * along
+        A[2 * k + i, k : 2 * k] = along / damper.time_constant
+        A[2 * k + i, 2 * k + i] = -1.0 / damper.time_constant
+    source = np.concatenate([np.zeros(k), kept.T @ plant.actuator * period, np.zeros(len(lags))])
+    reading = np.concatenate([kept.T @ plant.sensor, np.zeros(k + len(lags))])
+    return A, source, reading
+
+
+def _poles(
+    A: Floats, source: Floats, reading: Floats, period: float, alone_gain: float
+) -> tuple[Complexes, NDArray[np.bool_]]:
+    """All poles, and which of them the force does not move or the sensor does not read.
+
+    alone_gain  what a unit force held for T would leave in the reading if no motion held another back [m/N]
+
+    Balancing first gives each motion units of its own, in which a slow pair of poles stays apart.
+    """
+    from scipy.linalg import eig, matrix_balance
+
+    if not len(A):
+        return np.zeros(0, dtype=complex), np.zeros(0, dtype=bool)
+    balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    poles, left, right = eig(balanced, left=True)
+    poles[np.abs(poles) <= ZERO * np.max(np.abs(poles))] = 0.0
+    overlap = np.sum(left.conj() * right, axis=0)
+    alone = np.abs(overlap) > SHARED
+    source, reading = source / scale, reading * scale
+    still = poles == 0.0
+    # |(exp(s T) - 1)/s|: what a unit force held for T leaves
+    reach = np.where(still, period, np.abs(np.expm1(poles * period)) / np.where(still, 1.0, np.abs(poles)))
+    reach = reach / np.where(alone, np.abs(overlap), 1.0)
+    gain = np.abs((left.conj().T @ source) * (reading @ right)) * reach
+    rounding = ROUNDING * (np.abs(left.T) @ np.abs(source)) * (np.abs(reading) @ np.abs(right)) * reach
+    # an undamped motion that the wall hardly moves could only hide the stability of the rest
+    least = np.where(np.abs(poles.real) * period < 1e-9, UNOBSERVED_UNDAMPED * alone_gain, 0.0)
+    hidden = alone & (gain <= np.maximum(least, rounding))
+    return poles, hidden & hidden[_partners(poles)]
+
+
+def _partners(poles: Complexes) -> NDArray[np.int64]:
+    """The index of each pole's conjugate."""
+    return np.asarray(np.argmin(np.abs(poles[:, None] - poles.conj()), axis=1))
+
+
+def seen(form: FirstOrderForm) -> FirstOrderForm:
+    """The form without its hidden poles, on the invariant subspace of the others."""
+    if not len(form.hidden):
+        return form
+    right, left = invariant_subspace(form, form.poles)
+    return replace(
+        form,
+        dynamics=left.T @ form.dynamics @ right,
+        input=left.T @ form.input,
+        output=form.output @ right,
+        hidden=form.hidden[:0],
+    )
+
+
+def invariant_subspace(form: FirstOrderForm, poles: Complexes) -> tuple[Floats, Floats]:
+    """Bases (k, p) of the right and the left invariant subspace of some of the poles, left^T right = 1."""
+    from scipy.linalg import matrix_balance, schur
+
+    every = np.concatenate([form.poles, form.hidden])
+    wanted = np.min(np.abs(every[:, None] - poles), axis=1, initial=np.inf) == 0.0
+
+    def chosen(value: complex) -> bool:
+        return bool(wanted[np.argmin(np.abs(value - every))])
+
+    def basis(A: Floats) -> Floats:
+        _, vectors, count = schur(A, output="complex", sort=chosen)
+        U, _, _ = np.linalg.svd(np.hstack([vectors[:, :count].real, vectors[:, :count].imag]))
+        return np.asarray(U[:, :count])
+
+    balanced, (scale, _) = matrix_balance(form.dynamics, permute=False, separate=True)
+    right, left = basis(balanced), basis(balanced.T)
+    return scale[:, None] * right, np.linalg.solve(left.T @ right, left.T).T / scale[:, None]

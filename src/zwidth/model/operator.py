@@ -1,0 +1,79 @@
+"""The operator's hand and arm at the handle: thesis 3.3, and what others have used instead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from zwidth.model.plant import Plant
+
+
+class OperatorError(ValueError):
+    """An operator that cannot be attached to this plant."""
+
+
+@dataclass(frozen=True)
+class Operator:
+    """Arm and grasp as five numbers (thesis eq. 3.23-3.24): a mass, tied to the ground by the arm and to the
+    handle by the grasp, all along the rendered direction.
+
+        m_a x_a'' = -k_a x_a - b_a x_a' - k_g (x_a - x_h) - b_g (x_a' - x_h')
+
+    arm_mass, arm_stiffness, arm_damping  m_a [kg], k_a [N/m], b_a [N s/m], not negative
+    grasp_stiffness, grasp_damping        k_g [N/m], b_g [N s/m]; None: the grasp is rigid, and mass, spring and
+                                          damper act on the handle itself (Hulin, Preusche and Hirzinger 2006)
+    """
+
+    arm_mass: float
+    arm_stiffness: float
+    arm_damping: float
+    grasp_stiffness: float | None = None
+    grasp_damping: float | None = None
+
+    @property
+    def rigid_grasp(self) -> bool:
+        """Is the arm one with the handle?"""
+        return self.grasp_stiffness is None
+
+
+def attach(plant: Plant, operator: Operator) -> Plant:
+    """The plant with an operator at its handle.
+
+    Returns  Plant; an elastic grasp adds the arm as the last coordinate, a rigid one adds none
+    Raises   OperatorError  for a plant without a handle, or an elastic grasp of an arm without mass
+
+    >>> one = np.ones(1)
+    >>> paddle = Plant(np.array([[0.03]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one, one)
+    >>> float(attach(paddle, Operator(0.5, 500.0, 10.0)).mass[0, 0])
+    0.53
+    """
+    h = plant.handle
+    if h is None:
+        raise OperatorError("an operator needs a handle to hold; give the plant's `handle`, or leave him out")
+    if operator.grasp_stiffness is None:
+        held = np.outer(h, h)
+        return replace(
+            plant,
+            mass=plant.mass + operator.arm_mass * held,
+            damping=plant.damping + operator.arm_damping * held,
+            stiffness=plant.stiffness + operator.arm_stiffness * held,
+        )
+    if not operator.arm_mass > 0.0:
+        raise OperatorError(f"an arm held by an elastic grasp needs a mass, got {operator.arm_mass:g} kg")
+    arm, slip = np.append(np.zeros(plant.size), 1.0), np.append(h, -1.0)
+
+    def grown(matrix: np.ndarray, own: float, between: float) -> np.ndarray:
+        return np.pad(matrix, (0, 1)) + own * np.outer(arm, arm) + between * np.outer(slip, slip)
+
+    return replace(
+        plant,
+        mass=grown(plant.mass, operator.arm_mass, 0.0),
+        damping=grown(plant.damping, operator.arm_damping, operator.grasp_damping or 0.0),
+        stiffness=grown(plant.stiffness, operator.arm_stiffness, operator.grasp_stiffness),
+        actuator=np.append(plant.actuator, 0.0),
+        sensor=np.append(plant.sensor, 0.0),
+        handle=np.append(h, 0.0),
+        names=(*plant.names, "arm") if plant.names else (),
+        lagged_dampers=tuple(replace(d, along=np.append(d.along, 0.0)) for d in plant.lagged_dampers),
+    )
