@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from gallery import estimators as gallery
+from tests.systems import second_matrix
 from zwidth.loop.estimators import METHODS, AlphaBeta
 from zwidth.loop.estimators.bounds import quantisation_noise
 from zwidth.loop.estimators.response import phase_delay, relative_response
@@ -23,7 +24,7 @@ def test_four_of_the_gallery_are_equally_late():
     parabola, window = "parabola at the newest of 9", "windowed difference, 8 samples"
     assert gallery.delays[parabola] == 0.0
     assert gallery.noise_gains[parabola] / gallery.noise_gains[window] == pytest.approx(2.68, abs=5e-3)
-    f = np.linspace(0.0, 500.0, 2001)
+    f = np.linspace(0.0, 0.5 / gallery.PERIOD, 2001)
     tallest = np.abs(relative_response(gallery.methods[parabola], gallery.PERIOD, f)).max()
     assert tallest == pytest.approx(1.52, abs=5e-3)
 
@@ -54,15 +55,41 @@ def test_the_figures_draw_the_numbers(draw):
     assert legend.x1 <= made.bbox.x1
 
 
+@pytest.mark.parametrize("name", gallery.methods)
+def test_the_gallerys_stiffest_walls_are_those_of_brute_force(name):
+    for charts in (gallery.rigid, gallery.flexible):
+        chart = charts[name]
+        K, B = chart.stiffness_max, chart.damping_at_stiffness_max
+        nearby = np.concatenate([B * np.linspace(0.97, 1.03, 61), chart.damping_max * np.linspace(0.0, 1.5, 40)])
+        inside, beyond = (
+            [np.max(np.abs(np.linalg.eigvals(second_matrix(chart.loop, share * K, b)))) for b in nearby]
+            for share in (0.9995, 1.0001)
+        )
+        assert min(inside) < 1.0 - 1e-7
+        assert min(beyond) > 1.0
+
+
+def test_one_delay_at_all_frequencies_is_one_stiffness_on_one_mass():
+    slope, window = gallery.rigid["least-squares slope of 9"], gallery.rigid["windowed difference, 8 samples"]
+    assert slope.stiffness_max == pytest.approx(window.stiffness_max, rel=1e-12)
+    assert gallery.rigid["backward difference"].stiffness_max / slope.stiffness_max == pytest.approx(
+        12.36, abs=0.01
+    )
+    least = min(gallery.flexible, key=lambda name: gallery.flexible[name].stiffness_max)
+    assert least == "parabola at the newest of 9"
+
+
 def test_the_page_lists_every_method():
     rows = re.findall(r"^\| `([a-z-]+)` \|", PAGE.partition("## Their parameters")[0], re.MULTILINE)
     assert rows == ["method", *METHODS]
 
 
 def test_the_pages_table_is_the_gallerys():
-    rows = re.findall(r"^\| ([^|`]+) \| ([\d.]+) \| ([\d.]+) \|$", PAGE, re.MULTILINE)
+    rows = re.findall(r"^\| ([^|`]+)" + r" \| ([\d.]+)" * 4 + r" \|$", PAGE, re.MULTILINE)
     assert {name for name, *_ in rows} == set(gallery.methods)
-    for name, delay, noise in rows:
+    for name, delay, noise, rigid, flexible in rows:
+        assert rigid == f"{gallery.rigid[name].stiffness_max / 1e3:#.3g}".rstrip(".")
+        assert flexible == f"{gallery.flexible[name].stiffness_max / 1e3:#.3g}"
         assert float(delay) == pytest.approx(gallery.delays[name] * 1e3, abs=1e-9)
         speed = gallery.noise_gains[name] * quantisation_noise(gallery.RESOLUTION) * 1e3
         assert noise == f"{speed:#.3g}"
