@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators import VelocityMethod
+from zwidth.loop.response import window_response
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -45,7 +46,7 @@ def relative_response(method: VelocityMethod | Estimator, period: float, frequen
         else:
             ratio *= (top[0] * d + top[1]) * d + top[2]
         ratio /= (bottom[0] * d + bottom[1]) * d + bottom[2]
-    return ratio * _window_response(estimator.window, angle)
+    return ratio * window_response(estimator.window, np.exp(1j * angle))
 
 
 def phase_delay(method: VelocityMethod | Estimator, period: float, frequency_Hz: ArrayLike) -> Floats:
@@ -130,11 +131,6 @@ def _factor_phase(row: Floats, angle: Floats) -> Floats:
     return np.asarray(phase + degree * angle + rest)
 
 
-def _window_response(window: Floats, angle: Floats) -> Complex:
-    """sum_k W_k e^{-i k theta}."""
-    return np.asarray(np.exp(-1j * np.multiply.outer(angle, np.arange(window.size))) @ window)
-
-
 def _window_phase(window: Floats, angle: Floats) -> Floats:
     """Continuous phase of the window's response, traced from theta = 0."""
     if np.array_equal(window, window[::-1]):
@@ -143,4 +139,4 @@ def _window_phase(window: Floats, angle: Floats) -> Floats:
     grid = np.fft.rfft(window, 2 * POINTS * window.size)
     traced = np.unwrap(np.angle(grid))
     nearest = np.rint(angle / step).astype(int)
-    return np.asarray(traced[nearest] + np.angle(_window_response(window, angle) / grid[nearest]))
+    return np.asarray(traced[nearest] + np.angle(window_response(window, np.exp(1j * angle)) / grid[nearest]))
