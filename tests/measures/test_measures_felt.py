@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg
 from numpy.testing import assert_allclose
 
-from tests.systems import mass, published, random_loop, second_matrix, two_mass, velocity_filter
+from tests.systems import (
+    low_pass_sections,
+    mass,
+    published,
+    random_loop,
+    second_matrix,
+    two_mass,
+    velocity_weights,
+)
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.device.load import load
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
+from zwidth.loop.estimators import WindowedDifference
 from zwidth.loop.loop import Loop
 from zwidth.measures.felt import (
     HandleError,
@@ -23,7 +34,21 @@ from zwidth.measures.felt import (
 )
 from zwidth.measures.felt_chart import felt_chart
 from zwidth.model.effective import effective_parameters
-from zwidth.model.plant import Plant
+from zwidth.model.plant import LaggedDamper, Plant
+
+
+class Filter:
+    """Second-order sections in transposed direct form II, one sample at a time."""
+
+    def __init__(self, sections):
+        self.sections, self.memory = sections, np.zeros((len(sections), 2))
+
+    def __call__(self, v):
+        for i, (b0, b1, b2, _, a1, a2) in enumerate(self.sections):
+            out = b0 * v + self.memory[i, 0]
+            self.memory[i] = b1 * v - a1 * out + self.memory[i, 1], b2 * v - a2 * out
+            v = out
+        return v
 
 
 def simulated(loop, K, B, cycles, samples, settle, pieces=32):
@@ -36,29 +61,37 @@ def simulated(loop, K, B, cycles, samples, settle, pieces=32):
     T, n = loop.period, plant.size
     rate = 2.0 * np.pi * cycles / (samples * T)
     inverse = np.linalg.inv(plant.mass)
-    A = np.zeros((2 * n + 3, 2 * n + 3))  # x, v, cos, sin, held force
+    dampers, lag = plant.lagged_dampers, controller.actuator_time_constant
+    size = 2 * n + 4 + len(dampers)
+    A = np.zeros((size, size))  # x, v, cos, sin, held force, what the actuator makes of it, lagged dampers
     A[:n, n : 2 * n] = np.eye(n)
     A[n : 2 * n, :n], A[n : 2 * n, n : 2 * n] = -inverse @ plant.stiffness, -inverse @ plant.damping
     A[n : 2 * n, 2 * n] = inverse @ plant.handle
-    A[n : 2 * n, 2 * n + 2] = inverse @ plant.actuator
+    A[n : 2 * n, 2 * n + 3 if lag else 2 * n + 2] = inverse @ plant.actuator
+    if lag:
+        A[2 * n + 3, 2 * n + 2], A[2 * n + 3, 2 * n + 3] = 1.0 / lag, -1.0 / lag
+    for i, damper in enumerate(dampers, 2 * n + 4):
+        A[n : 2 * n, i] = -inverse @ damper.along
+        A[i, n : 2 * n] = damper.damping / damper.time_constant * damper.along
+        A[i, i] = -1.0 / damper.time_constant
     A[2 * n, 2 * n + 1], A[2 * n + 1, 2 * n] = -rate, rate
     step = scipy.linalg.expm(A * T / pieces)
     late = round(controller.delay * pieces)  # delays in whole pieces
     assert late == pytest.approx(controller.delay * pieces)
-    state = np.zeros(2 * n + 3)
+    state = np.zeros(size)
     state[2 * n] = 1.0
     commands = [0.0] * (late // pieces + 2)
-    sections = velocity_filter(controller)
-    memory = np.zeros((len(sections), 2))
-    before, total = 0.0, 0.0
+    low_pass, on_force = (
+        Filter(low_pass_sections(f, T)) for f in (controller.velocity_filter, controller.force_filter)
+    )
+    weights_of = velocity_weights(controller.velocity, T)
+    readings = np.zeros(len(weights_of))
+    total = 0.0
     for j in range(settle + samples):
         y = plant.sensor @ state[:n]
-        v, before = (y - before) / T, y
-        for i, (b0, b1, b2, _, a1, a2) in enumerate(sections):
-            out = b0 * v + memory[i, 0]
-            memory[i] = b1 * v - a1 * out + memory[i, 1], b2 * v - a2 * out
-            v = out
-        commands = [-(K * y + B * v), *commands[:-1]]
+        readings = np.append(y, readings[:-1])
+        force = -(K * y + B * low_pass(weights_of @ readings))
+        commands = [on_force(force), *commands[:-1]]
         values = []
         for k in range(pieces):
             state[2 * n + 2] = commands[late // pieces + (k < late % pieces)]
@@ -86,6 +119,21 @@ SYSTEMS = {
         3.0,
     ),
     "one mass with friction": (mass(0.1, 2.0), Controller(0.001, 0.0, FirstOrder(0.001)), 1000.0, 1.0),
+    "lagging actuator, filtered force": (
+        two_mass(0.26, 0.03, 15620.0, 6.0),
+        Controller(0.00125, 0.5, None, WindowedDifference(3), FirstOrder(0.0005), 0.0007),
+        50.0,
+        2.0,
+    ),
+    "braked by its winding": (
+        replace(
+            two_mass(0.26, 0.03, 15620.0, 2.0),
+            lagged_dampers=(LaggedDamper(np.array([0.0, 1.0]), 5.0, 0.002),),
+        ),
+        Controller(0.00125),
+        2000.0,
+        6.0,
+    ),
     "with drag, two ends apart": (
         Plant(
             np.array([[0.3, 0.01], [0.01, 0.05]]),

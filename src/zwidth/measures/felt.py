@@ -5,10 +5,14 @@ the samples of the sensor move by Y e^{jwkT}, and the loop answers with commands
 
     U = -C Y,      C = K + B w(z),      z = e^{jwT}
 
-Held for T after the delay they are a staircase, whose part at w itself is U times H = H0/T e^{-jw delay},
-H0 = (1 - e^{-jwT})/(jw). Its other parts, at w + 2 pi n/T, move the sensor too, and the samples cannot tell:
+Filtered by F(z), held for T after the delay they are a staircase, which the actuator follows with its lag tau; its
+part at w itself is U times
 
-    Y = s^T x + S U,      S = P(z) - H s^T D^-1 a,      D = -w^2 M + jw B + K
+    H = F(z) e^{-jw delay} (1 - e^{-jwT})/(jwT) / (1 + jw tau)
+
+Its other parts, at w + 2 pi n/T, move the sensor too, and the samples cannot tell:
+
+    Y = s^T x + S U,      S = P(z) - H s^T D^-1 a,      D = -w^2 M + jw B + K + lagged dampers
 
 with P the sampled plant, in which all of the staircase is. So the motion x at w obeys
 
@@ -26,7 +30,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.loop.evaluate import factor_arrays, plant_response, velocity_response
+from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
+from zwidth.loop.response import product
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
 
@@ -68,7 +74,7 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
     plant, T = loop.plant, loop.period
     s = 2j * np.pi * f
     dynamic, act, read, h = _dynamic(plant, s)
-    hold = -np.expm1(-s * T) / (s * T) * np.exp(-s * T * loop.controller.delay)
+    hold = _held(loop, s)
     P, w = _sampled(loop, s * T)
     C = wall_stiffness + wall_damping * w
     beside = P - hold * (_solved(dynamic, act) @ read)
@@ -155,6 +161,10 @@ def _dynamic(plant: Plant, s: Complex | Floats) -> tuple[Any, Floats, Floats, Fl
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     own = s[..., None, None] ** 2 * np.eye(plant.size) + np.diag(squared)
     dynamic = own + s[..., None, None] * (shapes.T @ plant.damping @ shapes)
+    for damper in plant.lagged_dampers:
+        along = shapes.T @ damper.along
+        lagged = damper.damping * s / (1.0 + s * damper.time_constant)
+        dynamic = dynamic + lagged[..., None, None] * np.outer(along, along)
     return dynamic, shapes.T @ plant.actuator, shapes.T @ plant.sensor, shapes.T @ handle_of(plant)
 
 
@@ -164,12 +174,23 @@ def _solved(matrices: Complex, right: Floats) -> Complex:
     return np.asarray(np.linalg.solve(matrices, column)[..., 0])
 
 
+def _held(loop: Loop, s: Complex) -> Complex:
+    """H, from commands to the part of the force at s itself."""
+    controller, T = loop.controller, loop.period
+    numerator, denominator = (
+        np.array(rows, dtype=float).reshape(-1, 3) for rows in low_pass_factors(controller.force_filter, T)
+    )
+    filtered = product(numerator, denominator, np.expm1(s * T))
+    stairs = -np.expm1(-s * T) / (s * T) * np.exp(-s * T * controller.delay)
+    return np.asarray(filtered * stairs / (1.0 + s * controller.actuator_time_constant))
+
+
 def _sampled(loop: Loop, log_z: Complex) -> tuple[Complex, Complex]:
     """P and w at z = exp(log_z)."""
-    rows, whole, split, numerator, denominator = factor_arrays(loop)
-    flat, d = np.exp(log_z).ravel(), np.expm1(log_z).ravel()
-    P = [plant_response(rows, whole, split, *pair)[0] for pair in zip(flat, d, strict=True)]
-    w = [velocity_response(numerator, denominator, at)[0] for at in d]
+    factors = factor_arrays(loop)
+    at = list(zip(np.exp(log_z).ravel(), np.expm1(log_z).ravel(), strict=True))
+    P = [plant_response(factors, z, d)[0] for z, d in at]
+    w = [velocity_response(factors, z, d)[0] for z, d in at]
     return np.array(P).reshape(log_z.shape), np.array(w).reshape(log_z.shape)
 
 

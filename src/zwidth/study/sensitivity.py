@@ -118,7 +118,7 @@ def sensitivities(
     at relative steps of 2e-3 and less, good to about 1e-9 of d ln K_max / d ln p where the device's modes are
     damped; `error` estimates it for each.
 
-    Raises  what `Device.plant` raises; ChartError, ModesError if the device itself cannot be charted
+    Raises  what `Device.plant` raises; ChartError if the device itself cannot be charted
 
     >>> from zwidth.device.load import from_document
     >>> plain = from_document({"name": "m", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}})

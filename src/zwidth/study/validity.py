@@ -1,0 +1,248 @@
+"""Which model where: how far along the edge of the stable walls a simpler model tells the same (thesis 4.3).
+
+Each wall on the full model's edge has one frequency, at which it starts to vibrate, and so the edge can be walked
+by frequency: slow vibrations see the device as one mass, fast ones the motors on their springs. At a wall (K, B)
+that fails at the frequency F a model is off by
+
+    e = min over the model's edge (k, b, f) of  max( |k/K - 1|, |b/B - 1|, |f/F - 1| )
+
+the least share by which stiffness, damping and frequency must all be allowed to differ for the model to say the
+same. Without the frequency the edges of two models would count as alike where they merely cross.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from math import nan, pi
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.region import ChartError
+from zwidth.chart.tracer import Tracer
+from zwidth.device.device import Device
+from zwidth.loop.controller import Controller
+from zwidth.loop.loop import Loop
+from zwidth.model.modes import natural_frequencies
+from zwidth.model.plant import Plant
+from zwidth.model.reduction import ModelError
+
+Floats = NDArray[np.float64]
+Interval = tuple[float, float]
+
+TOLERANCE: Final = 0.1
+WALLS: Final = 160  # of the full model's edge that are compared; ends of intervals are closed in on between them
+NEGLIGIBLE: Final = 1e-4  # share of the edge's extent below which K or B is 0, and no relative error is one
+MODELS: Final = (("rigid", "rigid"), ("motor-mass", "motor mass"), ("two-mass", "two masses"))  # simplest first
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How far one model tells the same as the full one.
+
+    key        "rigid", "motor-mass" or "two-mass", with "-undamped" where its damping was left out
+    label      for people
+    frequency  (k,)  of walls along the full model's edge, ascending [Hz]
+    error      (k,)  e at these walls; inf where the model has no stable wall
+    within     frequency ranges of the edge in which e stays within the tolerance, ascending [Hz]
+    reason     why the model does not apply; "" where it does
+    """
+
+    key: str
+    label: str
+    frequency: Floats
+    error: Floats
+    within: tuple[Interval, ...]
+    reason: str = ""
+
+    @property
+    def everywhere(self) -> bool:
+        """Does it stay within the tolerance along the whole edge?"""
+        return len(self.error) > 0 and self.within == ((float(self.frequency[0]), float(self.frequency[-1])),)
+
+
+@dataclass(frozen=True)
+class Validity:
+    """The models of a device beside its full model.
+
+    tolerance      that `Fit.within` means
+    first_natural  the full model's first flexible natural frequency [Hz]; nan if it has none
+    frequency      (k,)  along the full model's edge, for walls with K > 0 and B > 0, ascending [Hz]
+    walls          (k, 3)  their K, B and frequency
+    arc            (k,)  which piece of edge each belongs to
+    fits           simplest first
+    """
+
+    tolerance: float
+    first_natural: float
+    frequency: Floats
+    walls: Floats
+    arc: NDArray[np.int64]
+    fits: tuple[Fit, ...]
+
+
+def validity(
+    device: Device,
+    at: Sequence[float] | None = None,
+    direction: Sequence[float] | None = None,
+    assembly: str | None = None,
+    tolerance: float = TOLERANCE,
+) -> Validity:
+    """Compare the rigid, the motor-mass and the two-mass model, with and without damping, with the full one.
+
+    at, direction, assembly  as for `Device.plant`
+    tolerance                the largest e that still counts as the same
+    Raises  what `Device.plant` raises, and ChartError if the full model cannot be charted
+    """
+    full = device.plant(at, direction, assembly, "full")
+    chart = stability_chart(Loop(full, device.controller), decay=False)
+    natural = natural_frequencies(full)
+    flexible = natural[natural > 0.0]
+    edge = _Edge(chart)
+
+    def reduce(model: str) -> Plant:
+        return device.plant(at, direction, assembly, model)
+
+    fits = [_fit(edge, device.controller, *model, tolerance) for model in _models(full, reduce)]
+    return Validity(
+        tolerance=tolerance,
+        first_natural=float(flexible[0]) if len(flexible) else nan,
+        frequency=edge.frequency,
+        walls=edge.walls,
+        arc=edge.arc,
+        fits=tuple(fits),
+    )
+
+
+def edge_distance(walls: Floats, chart: StabilityChart) -> Floats:
+    """e of each wall from a chart's edge, (k,); inf where the chart is empty.
+
+    walls  (k, 3)  K, B and frequency, none of them 0
+
+    >>> from zwidth.chart.chart import BoundaryArc
+    >>> from types import SimpleNamespace
+    >>> chart = SimpleNamespace(boundary=[BoundaryArc(np.array([0, 100]), np.array([2, 2]), np.array([10, 20]))])
+    >>> edge_distance(np.array([[50.0, 1.6, 15.0], [200.0, 2.0, 20.0]]), chart).round(9).tolist()
+    [0.25, 0.5]
+    """
+    best = np.full(len(walls), np.inf)
+    for arc in chart.boundary:
+        points = np.column_stack([arc.stiffness, arc.damping, arc.frequency])
+        for n, wall in enumerate(walls):
+            best[n] = min(best[n], _nearest(points / wall - 1.0))
+    return best
+
+
+def _error(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Floats:
+    """`edge_distance`, with the model's own curve at the same frequency beside: the chords of a large chart are
+    too coarse for small walls."""
+    best = edge_distance(walls, chart)
+    for n, wall in enumerate(walls):
+        if any(arc.frequency.min() < wall[2] < arc.frequency.max() for arc in chart.boundary):
+            own = tracer.wall(2.0 * pi * chart.loop.period * wall[2])[:2]
+            best[n] = min(best[n], float(np.max(np.abs(own / wall[:2] - 1.0))))
+    return best
+
+
+def _nearest(points: Floats) -> float:
+    """Least max(|u|, |v|, ...) along a walk of straight pieces, points (k, n).
+
+    Along each piece it is convex, and least at an end, where one of them vanishes, or where two are equal or
+    opposite.
+    """
+    start, step = points[:-1].T, np.diff(points, axis=0).T
+    pairs = list(combinations(range(len(start)), 2))
+    zeros = [(start[i], step[i]) for i in range(len(start))]
+    zeros += [(start[i] - sign * start[j], step[i] - sign * step[j]) for i, j in pairs for sign in (1.0, -1.0)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        places = np.array([0.0 * start[0], 1.0 + 0.0 * start[0], *(-a / b for a, b in zeros)])
+    places = np.clip(np.nan_to_num(places, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    return float(np.min(np.max(np.abs(start[:, None] + places * step[:, None]), axis=0), initial=np.inf))
+
+
+class _Edge:
+    """Up to about WALLS walls with K > 0, B > 0 along the pair curve of a chart's edge, by ascending frequency."""
+
+    def __init__(self, chart: StabilityChart) -> None:
+        self.tracer = Tracer.of(chart.loop)
+        self.hertz = 1.0 / (2.0 * pi * chart.loop.period)
+        nyquist = 0.5 / chart.loop.period
+        arcs = [arc for arc in chart.boundary if np.ptp(arc.frequency) > 0.0]
+        K, B, f = (
+            np.concatenate([np.zeros(0), *(getattr(arc, name) for arc in arcs)])
+            for name in ("stiffness", "damping", "frequency")
+        )
+        least_K, least_B = (NEGLIGIBLE * np.max(np.abs(values), initial=0.0) for values in (K, B))
+        inside = (least_K < K) & (least_B < B) & (f > 0.0) & (f < nyquist)
+        order = np.flatnonzero(inside)[np.argsort(f[inside], kind="stable")]
+        order = order[:: max(1, len(order) // WALLS)]
+        self.frequency, self.walls = f[order], np.column_stack([K, B, f])[order]
+        self.arc = np.repeat(np.arange(len(arcs)), [len(arc.frequency) for arc in arcs])[order]
+
+    def wall(self, frequency: float) -> Floats:
+        """K, B and frequency of the curve at a frequency, (1, 3)."""
+        return np.array([[*self.tracer.wall(frequency / self.hertz)[:2], frequency]])
+
+
+def _fit(
+    edge: _Edge, controller: Controller, key: str, label: str, plant: Plant | None, reason: str, tolerance: float
+) -> Fit:
+    """One model beside the full one; `reason` says why it has no plant."""
+    none = np.empty(0)
+    if plant is None:
+        return Fit(key, label, none, none, (), reason)
+    try:
+        model = Loop(plant, controller)
+        chart, tracer = stability_chart(model, decay=False), Tracer.of(model)
+    except ChartError as problem:
+        return Fit(key, label, none, none, (), str(problem))
+
+    def fits(frequency: float) -> bool:
+        return bool(_error(edge.wall(frequency), chart, tracer)[0] <= tolerance)
+
+    error = _error(edge.walls, chart, tracer)
+    within = [
+        (_turn(edge.frequency, fits, first, first - 1), _turn(edge.frequency, fits, last, last + 1))
+        for first, last in _runs(np.asarray(error <= tolerance))
+    ]
+    return Fit(key, label, edge.frequency, error, tuple(within))
+
+
+def _turn(frequency: Floats, fits: Callable[[float], bool], good: int, bad: int) -> float:
+    """The frequency between two neighbours at which a model ceases to fit, by bisection."""
+    on = float(frequency[good])
+    if not 0 <= bad < len(frequency):
+        return on
+    off = float(frequency[bad])
+    for _ in range(20):
+        middle = 0.5 * (on + off)
+        on, off = (middle, off) if fits(middle) else (on, middle)
+    return on
+
+
+def _runs(good: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """First and last of each stretch of True."""
+    turns = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
+    for start, end in zip(turns[::2], turns[1::2], strict=True):
+        yield int(start), int(end) - 1
+
+
+def _models(full: Plant, reduce: Callable[[str], Plant]) -> Iterator[tuple[str, str, Plant | None, str]]:
+    """Key, label, plant and reason of each model; without damping only where it has some."""
+    for key, label in MODELS:
+        try:
+            plant = reduce(key)
+        except ModelError as error:
+            yield key, label, None, str(error)
+            continue
+        if plant is full:
+            continue
+        damped = bool(plant.damping.any() or plant.lagged_dampers)
+        yield key, label + (" with damping" if damped else ""), plant, ""
+        if damped:
+            lossless = replace(plant, damping=0.0 * plant.damping, lagged_dampers=())
+            yield f"{key}-undamped", f"{label} without damping", lossless, ""
