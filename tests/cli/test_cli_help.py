@@ -18,7 +18,17 @@ COMMANDS = sorted(group.commands)
 
 
 def test_the_commands_are_those_promised():
-    assert set(COMMANDS) == {"devices", "schema", "show", "chart", "check", "report", "sensitivity", "felt"}
+    assert set(COMMANDS) == {
+        "devices",
+        "schema",
+        "show",
+        "chart",
+        "check",
+        "report",
+        "sensitivity",
+        "felt",
+        "bounds",
+    }
 
 
 @pytest.mark.parametrize("words", [(), ("--help",), ("-h",)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from zwidth.chart.verdict import judge
 from zwidth.conditions import assumptions, compare
 from zwidth.device.load import load
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
+from zwidth.loop.estimators import AlphaBeta, LeastSquaresSlope, WindowedDifference
 from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
+from zwidth.model.operator import Operator, attach
+from zwidth.model.plant import LaggedDamper, Plant
 
 NAMES = [bound.name for bound in compare(one_mass(1.0, 0.001))]
 RIGID, FRICTION, LATE, DELAYED, SPRUNG, ONE_MODE = (
@@ -34,7 +37,7 @@ SOFT, SLOW, SLOW_LINEAR = (
 PASSIVE, FILTERED, PASSIVE_LOOP = (
     "passive wall",
     "passive wall with a first-order filter",
-    "passive wall with its delay and filter",
+    "passive wall with its delay and filters",
 )
 ELECTRICAL, ENCODER, PLANE = (
     "passive wall with electrical damping",
@@ -149,6 +152,14 @@ def test_friction_is_seen():
     assert heavy[FRICTION] == set()
 
 
+def test_the_walls_own_damping_is_seen_where_it_is_given():
+    loop = one_mass(0.3, 0.001, b=0.1)
+    assert all(assumptions.LIGHT_WALL not in bound.violated for bound in compare(loop))
+    for B, seen in ((29.0, False), (31.0, True), (-31.0, True)):
+        broken = {b.name for b in compare(loop, wall_damping=B) if assumptions.LIGHT_WALL in b.violated}
+        assert broken == ({SOFT, SLOW_LINEAR, LINEAR, HAND} if seen else set())
+
+
 def test_a_hand_is_seen_by_its_friction():
     """A device held by one mass, spring and damper: its mode is what the wall moves."""
     found = bounds(one_mass(1.0, 0.001, b=5.6, k=500.0))
@@ -183,6 +194,72 @@ def test_delay_and_filter_are_seen():
     assert filtered[FILTERED] == {assumptions.FIRST_ORDER}
     smooth = broken(one_mass(0.3, 0.001, velocity_filter=FirstOrder(0.002)))
     assert smooth[FILTERED] == set()
+
+
+def with_controller(**more):
+    return Loop(one_mass(0.3, 0.001, b=0.1).plant, Controller(0.001, **more))
+
+
+def test_other_estimates_of_the_velocity_are_seen():
+    other = broken(with_controller(velocity=WindowedDifference(3)))
+    assert assumptions.DIFFERENCE in other[FRICTION] & other[PASSIVE] & other[LINEAR] & other[FILTERED]
+    assert other[PASSIVE_LOOP] == other[ENCODER] == other[PLANE] == set()
+    for same in (WindowedDifference(1), LeastSquaresSlope(2), AlphaBeta(1.0, 1.0)):
+        assert broken(with_controller(velocity=same))[FRICTION] == set()
+    filtered = broken(with_controller(velocity=WindowedDifference(1), velocity_filter=FirstOrder(0.01)))
+    assert filtered[FILTERED] == set()
+
+
+def test_a_filter_of_the_force_and_a_lag_of_the_actuator_are_seen():
+    for more, sentence in (
+        ({"force_filter": FirstOrder(0.001)}, assumptions.AS_COMPUTED),
+        ({"actuator_time_constant": 0.001}, assumptions.PROMPT),
+    ):
+        found = broken(with_controller(**more))
+        spared = {PASSIVE_LOOP} if "force_filter" in more else set()
+        assert {name for name in NAMES if sentence not in found[name]} == spared
+
+
+def test_electrical_damping_is_seen():
+    """It is no friction: b stays what it was, and the conditions that know none say so."""
+    plain = one_mass(0.3, 0.001, b=0.1)
+    for time_constant, fast in ((1e-5, True), (0.01, False)):
+        braked = replace(plain.plant, lagged_dampers=(LaggedDamper(np.ones(1), 2.0, time_constant),))
+        found = bounds(Loop(braked, plain.controller))
+        names = {name for name, bound in found.items() if assumptions.RESISTIVE in bound.violated}
+        silent = {RIGID, LATE, DELAYED, SPRUNG, SLOW, SLOW_LINEAR}
+        assert names == set(NAMES) - silent - {ELECTRICAL}
+        assert assumptions.UNDAMPED in found[RIGID].violated
+        assert (found[ELECTRICAL].violated == ()) == fast
+        assert found[ELECTRICAL].taken["electrical_damping_Ns_per_m"] == pytest.approx(2.0)
+        assert found[ELECTRICAL].stiffness_max == pytest.approx(4200.0)
+        assert found[PASSIVE].taken["damping_Ns_per_m"] == pytest.approx(0.1)
+
+
+def test_electrical_damping_of_what_no_wall_moves_does_not_count():
+    lagged = (LaggedDamper(np.array([0.0, 1.0]), 2.0, 0.01),)
+    aside = Plant(
+        np.eye(2), np.zeros((2, 2)), np.diag([0.0, 1e4]), *2 * (np.array([1.0, 0.0]),), lagged_dampers=lagged
+    )
+    assert broken(Loop(aside, Controller(0.001)))[RIGID] == set()
+
+
+@pytest.mark.parametrize("grasp", [None, 10000.0], ids=["rigid grasp", "elastic grasp"])
+def test_an_operator_is_seen(grasp):
+    """A rigid grasp makes one mode, which the exact condition and the one with a hand know; an elastic one two."""
+    plain = one_mass(0.3, 0.001, b=0.1)
+    hand = Operator(0.8, 580.0, 5.5, grasp, grasp and 5.0)
+    plant = attach(replace(plain.plant, handle=np.ones(1)), hand)
+    loop = Loop(plant, plain.controller)
+    found = bounds(loop)
+    assert assumptions.RIGID in found[FRICTION].violated
+    assert "rigid_mass_kg" in found[FRICTION].lacking
+    assert found[ONE_MODE].holds == found[HAND].holds == (grasp is None)
+    if grasp is None:
+        assert found[HAND].taken["mode_damping_Ns_per_m"] == pytest.approx(5.6)
+        assert found[ONE_MODE].taken["mode_mass_kg"] == pytest.approx(1.1)
+        chart = stability_chart(loop, decay=False)
+        assert found[ONE_MODE].stiffness_max == pytest.approx(chart.stiffness_max, rel=1e-9)
 
 
 def test_a_split_hold_silences_the_theorem():

@@ -9,7 +9,16 @@ from conditions.conditions_cases import devices, one_mass
 from zwidth.chart.verdict import STABLE, judge
 from zwidth.conditions import colgate_schenkel, diolaiti
 from zwidth.conditions.passivity import passive_set
-from zwidth.loop.controller import Butterworth, FirstOrder
+from zwidth.loop.controller import Butterworth, Controller, FirstOrder
+from zwidth.loop.estimators import (
+    AlphaBeta,
+    CentralDifference,
+    Kalman,
+    LeastSquaresSlope,
+    SavitzkyGolay,
+    WindowedDifference,
+)
+from zwidth.loop.loop import Loop
 
 ANGLES = np.linspace(0.0, np.pi, 20002)[1:]
 
@@ -88,6 +97,42 @@ def test_passive_walls_are_stable(velocity_filter, late):
         assert np.any(inside)
         assert np.all(judge(loop, 0.999 * K[inside], 0.999 * B[inside]).verdict == STABLE)
         assert np.all(judge(loop, 0.3 * K[inside], B[inside]).verdict == STABLE)
+
+
+METHODS = [
+    WindowedDifference(4),
+    LeastSquaresSlope(5),
+    CentralDifference(),
+    SavitzkyGolay(6, 2),
+    AlphaBeta(0.36, 0.08),
+    Kalman(100.0, 1e-5),
+]
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
+def test_passive_walls_are_stable_whatever_estimates_the_velocity(method):
+    for m, T, rng in devices(1998, 2):
+        b = 10.0 ** rng.uniform(-3, 0) * m / T
+        for force_filter in (None, FirstOrder(T * rng.uniform(0.1, 2.0))):
+            plant = one_mass(m, T, b=b).plant
+            loop = Loop(plant, Controller(T, velocity=method, force_filter=force_filter))
+            passive = passive_set(loop, b)
+            B = np.append(b * rng.uniform(-1.0, 1.0, 8), passive.largest()[1])
+            K = passive.stiffness_limit(B)
+            inside = K > 0.0
+            assert np.any(inside)
+            assert np.all(judge(loop, 0.999 * K[inside], 0.999 * B[inside]).verdict == STABLE)
+
+
+def test_the_filter_of_the_force_is_where_the_theorem_turns():
+    T, b, a = 0.001, 0.7, 0.6
+    loop = Loop(one_mass(0.1, T, b=b).plant, Controller(T, force_filter=FirstOrder(T * a / (1.0 - a))))
+    K = float(passive_set(loop, b).stiffness_limit(0.2))
+
+    def wall(K):
+        return lambda z: (1.0 - a) * z / (z - a) * (K + 0.2 * (z - 1.0) / (T * z))
+
+    assert margin(wall(0.999 * K), b, T) > 0.0 > margin(wall(1.001 * K), b, T)
 
 
 def test_the_largest_passive_stiffness_needs_some_damping_once_there_is_delay():

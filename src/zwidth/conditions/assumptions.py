@@ -16,7 +16,7 @@ from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
 
-# b T/m below which conditions of first order in it are trusted.
+# b T/m and B T/m below which conditions of first order in them are trusted.
 LIGHT_FRICTION: Final = 0.1
 # W = sqrt(k/m) T below which conditions of second order in it are trusted.
 SLOW_SPRING: Final = 0.3
@@ -37,6 +37,7 @@ PROMPT: Final = "The actuator follows at once."
 RESISTIVE: Final = "No electrical damping lags behind the motion."
 NYQUIST_BELOW_CORNER: Final = "Electrical damping has its corner frequency R/L above half the sampling rate."
 LIGHT: Final = f"Friction is light: b T/m is at most {LIGHT_FRICTION:g}."
+LIGHT_WALL: Final = f"The wall's damping is light: B T/m is at most {LIGHT_FRICTION:g}."
 SLOW: Final = f"The spring is slow against the sampling: W is at most {SLOW_SPRING:g}."
 
 # The computer that most sources have in mind, but for its delay: for springs, and for walls with damping.
@@ -48,6 +49,7 @@ PLAIN: Final = (DIFFERENCE, UNFILTERED, *DIRECT)
 class Case:
     """A loop as the conditions see it.
 
+    wall_damping      B of the walls asked about [N s/m]; nan: any
     coulomb_friction  f_c, dry friction against the ground where the wall acts [N]; nan: not known
     resolution        Delta, the encoder's step there [m]; nan: not known
     unmet             the assumptions that it does not meet
@@ -55,6 +57,7 @@ class Case:
 
     loop: Loop
     traits: Traits
+    wall_damping: float
     coulomb_friction: float
     resolution: float
     unmet: frozenset[str]
@@ -94,10 +97,10 @@ class Case:
         )
 
 
-def case_of(loop: Loop, coulomb_friction: float = nan, resolution: float = nan) -> Case:
+def case_of(loop: Loop, wall_damping: float = nan, coulomb_friction: float = nan, resolution: float = nan) -> Case:
     """Measure a loop once for all conditions."""
     found = traits(loop)
-    return Case(loop, found, coulomb_friction, resolution, _unmet(loop, found))
+    return Case(loop, found, wall_damping, coulomb_friction, resolution, _unmet(loop, found, wall_damping))
 
 
 def _silent(wall_damping: Floats) -> Floats:
@@ -105,7 +108,7 @@ def _silent(wall_damping: Floats) -> Floats:
     return np.full(wall_damping.shape, nan)
 
 
-def _unmet(loop: Loop, found: Traits) -> frozenset[str]:
+def _unmet(loop: Loop, found: Traits, wall_damping: float) -> frozenset[str]:
     T = loop.period
     mass, drag = (found.mode_mass, found.mode_drag) if found.single else (found.rigid_mass, found.drag)
     sprung, spring = (mass, found.mode_stiffness) if found.single else (found.side_mass, found.side_stiffness)
@@ -127,6 +130,7 @@ def _unmet(loop: Loop, found: Traits) -> frozenset[str]:
         NYQUIST_BELOW_CORNER: all(corner * T >= np.pi for corner in found.corners),
         # a number that is not there breaks nothing
         LIGHT: not drag * T > LIGHT_FRICTION * mass,
+        LIGHT_WALL: not abs(wall_damping) * T > LIGHT_FRICTION * mass,
         SLOW: not spring * T**2 > SLOW_SPRING**2 * sprung,
     }
     return frozenset(sentence for sentence, holds in met.items() if not holds)

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import COLLOCATED, LIGHT, PLAIN, RESISTIVE, RIGID, Case
+from zwidth.conditions.assumptions import COLLOCATED, LIGHT, LIGHT_WALL, PLAIN, RESISTIVE, RIGID, Case
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -49,7 +49,7 @@ def condition(case: Case) -> Bound:
         kind="stability",
         claim="approximate",
         statement="K < (b + B)/(T/2 + t_d), for dampings well below m/T and short delays",
-        assumptions=(RIGID, LIGHT, COLLOCATED, *PLAIN, RESISTIVE),
+        assumptions=(RIGID, LIGHT, LIGHT_WALL, COLLOCATED, *PLAIN, RESISTIVE),
         taken={"damping_Ns_per_m": b, "sampling_period_s": T, "delay_s": late},
         limit=partial(stiffness_limit, device_damping=b, sampling_period=T, delay=late),
     )

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import COLLOCATED, LIGHT, ONE_MODE, PLAIN, RESISTIVE, SLOW, Case
+from zwidth.conditions.assumptions import COLLOCATED, LIGHT, LIGHT_WALL, ONE_MODE, PLAIN, RESISTIVE, SLOW, Case
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -56,7 +56,7 @@ def condition(case: Case) -> Bound:
         kind="stability",
         claim="approximate",
         statement="K < (b + b_h + B)/(T/2 + t_d), for dampings well below m/T, short delays and slow springs",
-        assumptions=(ONE_MODE, SLOW, LIGHT, COLLOCATED, *PLAIN, RESISTIVE),
+        assumptions=(ONE_MODE, SLOW, LIGHT, LIGHT_WALL, COLLOCATED, *PLAIN, RESISTIVE),
         taken={"mode_damping_Ns_per_m": drag, "sampling_period_s": T, "delay_s": late},
         limit=partial(stiffness_limit, device_damping=drag, operator_damping=0.0, sampling_period=T, delay=late),
     )

@@ -1,4 +1,4 @@
-"""Electrical damping as friction, after Mehling, Gifford, Colgate and Peshkin 2005."""
+"""Electrical damping as friction, after Mehling, Colgate and Peshkin 2005."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def condition(case: Case) -> Bound:
     b, e, T = case.traits.drag, case.traits.electrical_damping, case.loop.period
     return case.bound(
         name="passive wall with electrical damping",
-        source="Mehling et al. 2005 (known by its abstract)",
+        source="Mehling, Colgate and Peshkin 2005 (known by its abstract)",
         kind="passivity",
         claim="approximate",
         statement="b + b_e > K T/2 + |B|, where b_e/(1 + s L/R) is the electrical damping",

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, ONE_MODE, PLAIN, RESISTIVE, Case
 from zwidth.conditions.bound import Bound
-from zwidth.loop.hold import real_section
+from zwidth.loop.hold import denominator, step_response
 
 Floats = NDArray[np.float64]
 
@@ -102,8 +102,12 @@ def one_mode(mass: float, device_damping: float, stiffness: float, sampling_peri
     >>> round(one_mode(1.0, 0.0, 0.0, 1.0).largest()[0], 6)        # thesis eq. 4.14
     0.686292
     """
-    e, h, n, g, *_ = real_section(device_damping / (2.0 * mass), stiffness / mass, sampling_period, 0.0)
-    return OneMode(float(n) / mass, float(g) / mass, float(e), float(h), sampling_period)
+    decay, squared = device_damping / (2.0 * mass), stiffness / mass
+    e, h = denominator(decay, squared, sampling_period)
+    n, speed = step_response(decay, squared, sampling_period)
+    # at z = 1 the answer n (1 - phi_22) + speed phi_12 of the map over one period, without differences
+    g = (2.0 * decay * speed + squared * n) * n + speed**2
+    return OneMode(n / mass, g / mass, e, h, sampling_period)
 
 
 def _roots(a: float, b: float, c: float) -> list[float]:

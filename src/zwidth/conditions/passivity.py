@@ -1,25 +1,28 @@
 """Passivity of any sampled wall by Colgate and Schenkel's theorem, over frequency.
 
-With a wall H = z^-l (K + B w(z)) and t = wT the theorem's right-hand side is linear in K and B,
+With a wall H = z^-l F(z) (K + B w(z)), F the filter of the force, and t = wT the theorem's right-hand side is
+linear in K and B,
 
     b > K S(t) + B V(t)
-    S = (T/2) sin((l + 1/2) t) / sin(t/2)
-    V = T Re{ (1 - e^-jt) e^-jlt w(e^jt) } / (4 sin^2(t/2))
+    S = T Re{ (1 - e^-jt) e^-jlt F(e^jt) } / (4 sin^2(t/2))
+    V = T Re{ (1 - e^-jt) e^-jlt F(e^jt) w(e^jt) } / (4 sin^2(t/2))
 
 so that the passive walls are a convex set, an intersection of half planes, one for each frequency.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, nan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, WHOLE, Case
+from zwidth.conditions.assumptions import COLLOCATED, PROMPT, RESISTIVE, RIGID, WHOLE, Case
 from zwidth.conditions.bound import Bound
+from zwidth.loop.filters import force_path
 from zwidth.loop.loop import Loop
+from zwidth.loop.response import product, window_response
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +65,9 @@ class PassiveSet:
 
 
 def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
-    """The passive walls of a loop's period, whole delay and velocity estimate on a mass with friction b.
+    """The passive walls of a loop on a mass with friction b: its period, whole delay, velocity and force filter.
+
+    The actuator is taken to follow at once, whatever its time constant.
 
     Raises  ValueError  if the delay is not a whole number of samples: the theorem holds a sample for a whole
                         period
@@ -74,12 +79,10 @@ def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
     t, l, T = ANGLES, loop.whole_delay, loop.period
     sine = np.sin(t / 2.0)
     d = 2.0 * sine * (1j * np.cos(t / 2.0) - sine)  # e^jt - 1 without cancellation
-    w = np.ones_like(d)
-    for numerator, denominator in zip(loop.estimator.numerator, loop.estimator.denominator, strict=True):
-        w = w * np.polyval(numerator, d) / np.polyval(denominator, d)
-    spring = T / 2.0 * np.sin((l + 0.5) * t) / sine
-    damper = np.real(d * np.exp(-1j * (l + 1) * t) * w) * T / (4.0 * sine**2)
-    return PassiveSet(device_damping, spring, damper)
+    force, own, z = force_path(replace(loop.controller, actuator_time_constant=0.0)), loop.estimator, 1.0 + d
+    w = product(own.numerator, own.denominator, d) * window_response(own.window, z)
+    late = d * np.exp(-1j * (l + 1) * t) * product(force.numerator, force.denominator, d) * T / (4.0 * sine**2)
+    return PassiveSet(device_damping, np.real(late), np.real(late * w))
 
 
 def condition(case: Case) -> Bound:
@@ -88,12 +91,13 @@ def condition(case: Case) -> Bound:
     known = WHOLE not in case.unmet and isfinite(b)
     passive = passive_set(loop, b) if known else None
     return case.bound(
-        name="passive wall with its delay and filter",
+        name="passive wall with its delay and filters",
         source="Colgate and Schenkel 1997, theorem for any sampled feedback; Weir and Colgate 2008, eq. 8.2",
         kind="passivity",
         claim="sufficient",
-        statement="b > (T/2)/(1 - cos wT) Re{(1 - e^-jwT) H(e^jwT)} for 0 < w <= pi/T, with H = z^-l (K + B w(z))",
-        assumptions=(RIGID, COLLOCATED, WHOLE, *DIRECT, RESISTIVE),
+        statement="b > (T/2)/(1 - cos wT) Re{(1 - e^-jwT) H(e^jwT)} for 0 < w <= pi/T, "
+        "with H = z^-l F(z) (K + B w(z))",
+        assumptions=(RIGID, COLLOCATED, WHOLE, PROMPT, RESISTIVE),
         taken={
             "damping_Ns_per_m": b,
             "sampling_period_s": loop.period,

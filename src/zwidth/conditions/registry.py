@@ -47,12 +47,15 @@ CONDITIONS = (
 )
 
 
-def compare(loop: Loop, *, coulomb_friction: float = nan, resolution: float = nan) -> list[Bound]:
+def compare(
+    loop: Loop, *, wall_damping: float = nan, coulomb_friction: float = nan, resolution: float = nan
+) -> list[Bound]:
     """Every condition of this package on a loop, always in the same order.
 
     Each takes from the plant the numbers named in its `taken`, whether or not the device meets its assumptions:
     what it then says is what somebody who applies it would be told. `violated` says where not to trust it.
 
+    wall_damping      B of the walls asked about, for assumptions on it [N s/m]; nan: they count as met
     coulomb_friction  f_c, dry friction against the ground where the wall acts [N]; nan: not known
     resolution        Delta, the encoder's step there [m]; nan: not known
 
@@ -65,5 +68,5 @@ def compare(loop: Loop, *, coulomb_friction: float = nan, resolution: float = na
     >>> "rigid mass" in [bound.name for bound in held]
     True
     """
-    case = case_of(loop, coulomb_friction, resolution)
+    case = case_of(loop, wall_damping, coulomb_friction, resolution)
     return [condition(case) for condition in CONDITIONS]

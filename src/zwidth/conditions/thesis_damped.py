@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammainc
 
-from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, PLAIN, RESISTIVE, RIGID, Case
+from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, LIGHT, LIGHT_WALL, PLAIN, RESISTIVE, RIGID, Case
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -179,7 +179,7 @@ def tangent_condition(case: Case) -> Bound:
         kind="stability",
         claim="approximate",
         statement="p < (d + x) x (1 - e^-x)(1 + x)/(1 - e^-x - x e^-x), for p well below 1",
-        assumptions=(RIGID, COLLOCATED, AT_ONCE, *PLAIN, RESISTIVE),
+        assumptions=(RIGID, LIGHT, LIGHT_WALL, COLLOCATED, AT_ONCE, *PLAIN, RESISTIVE),
         taken={"rigid_mass_kg": m, "damping_Ns_per_m": b, "sampling_period_s": T},
         limit=partial(tangent_stiffness_limit, device_damping=b, mass=m, sampling_period=T),
     )

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, PLAIN, SLOW, SPRUNG, UNDAMPED, Case
+from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, LIGHT_WALL, PLAIN, SLOW, SPRUNG, UNDAMPED, Case
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -98,7 +98,7 @@ def linear_condition(case: Case) -> Bound:
         kind="stability",
         claim="approximate",
         statement="K < B (2 - W^2)/T, for W and d well below 1",
-        assumptions=(SPRUNG, SLOW, UNDAMPED, COLLOCATED, AT_ONCE, *PLAIN),
+        assumptions=(SPRUNG, SLOW, LIGHT_WALL, UNDAMPED, COLLOCATED, AT_ONCE, *PLAIN),
         taken={"motor_side_mass_kg": m, "stiffness_N_per_m": k, "sampling_period_s": T},
         limit=partial(linear_stiffness_limit, mass=m, stiffness=k, sampling_period=T),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, isnan, nan
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from zwidth.loop.controller import FirstOrder
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import REPEATED, clusters, undamped_modes
-from zwidth.model.plant import Floats, Plant
+from zwidth.model.plant import Floats, LaggedDamper, Plant
 from zwidth.model.reduction import plant_effective_parameters
 
 # A motion whose share in the wall's compliance is less is one that no wall moves.
@@ -33,8 +33,8 @@ class Traits:
     mode_mass      of a plant that the wall moves as one mass, on at most one spring and one damper to the ground,
     mode_drag      its mass, friction and spring [kg], [N s/m], [N/m]
     mode_stiffness
-    electrical_damping  what b_e/(1 + s L/R) brakes the free motion with, below all corners [N s/m]
-    corners        the corner frequencies R/L of lagged dampers [rad/s]
+    electrical_damping  b_e of what brakes the free motion with b_e/(1 + s L/R), all together [N s/m]
+    corners        the corner frequencies R/L of the lagged dampers that brake what the wall moves [rad/s]
     free           the wall moves only free motion: one rigid mass, tied to nothing
     sprung         the wall moves only one motion, of one frequency, on springs to the ground
     undamped       no viscous damping acts on what the wall moves
@@ -78,7 +78,8 @@ def traits(loop: Loop) -> Traits:
     rates = [float(np.mean(squared[run])) for run in moved]
     single = len(rates) == 1 and _by_itself(plant, shapes, moved[0], push)
     sprung = single and rates[0] > 0.0
-    mass, drag = _free_motion(plant, squared, shapes)
+    mass, drag, electrical = _free_motion(plant, squared, shapes)
+    corners = tuple(1.0 / d.time_constant for d in plant.lagged_dampers if _brakes(d, shapes, moved))
     mode_mass, mode_drag, mode_stiffness = _mode(plant, shapes, moved[0], push, rates[0]) if single else 3 * (nan,)
     if sprung:
         side_mass, side_stiffness = mode_mass, mode_stiffness
@@ -93,18 +94,18 @@ def traits(loop: Loop) -> Traits:
         mode_mass=mode_mass,
         mode_drag=mode_drag,
         mode_stiffness=mode_stiffness,
-        electrical_damping=nan,
-        corners=(),
+        electrical_damping=electrical,
+        corners=corners,
         free=single and rates == [0.0],
         sprung=sprung,
         undamped=not _is_damped(plant, shapes, moved),
         collocated=bool(
             np.allclose(plant.actuator, plant.sensor, rtol=0.0, atol=1e-9 * np.max(np.abs(plant.sensor)))
         ),
-        differences=True,
+        differences=_differences(loop),
         first_order=isinstance(loop.controller.velocity_filter, FirstOrder),
-        force_filtered=False,
-        actuator_lags=False,
+        force_filtered=loop.controller.force_filter is not None,
+        actuator_lags=loop.controller.actuator_time_constant > 0.0,
     )
 
 
@@ -142,15 +143,34 @@ def _is_damped(plant: Plant, shapes: Floats, moved: list[slice]) -> bool:
     return worst > UNDAMPED * float(np.max(modal))
 
 
-def _free_motion(plant: Plant, squared: Floats, shapes: Floats) -> tuple[float, float]:
-    """Mass and friction against the ground of the free motion at the actuator; nan where there is none."""
+def _brakes(damper: LaggedDamper, shapes: Floats, moved: list[slice]) -> bool:
+    """Does a lagged damper act on what the wall moves?"""
+    reach = np.abs(damper.along @ shapes)
+    worst = max((float(np.max(reach[run])) for run in moved), default=0.0)
+    return damper.damping > 0.0 and worst > UNSEEN * float(np.max(reach))
+
+
+def _differences(loop: Loop) -> bool:
+    """Is the velocity the backward difference, by whatever name, before its filter?"""
+    T = loop.period
+    z = np.exp(1j * np.linspace(0.1, np.pi, 7))
+    plain = Loop(loop.plant, replace(loop.controller, velocity_filter=None)).velocity_response(z)
+    return bool(np.allclose(plain, (1.0 - 1.0 / z) / T, rtol=1e-9, atol=0.0))
+
+
+def _free_motion(plant: Plant, squared: Floats, shapes: Floats) -> tuple[float, float, float]:
+    """Mass, friction against the ground and electrical damping of the free motion at the actuator.
+
+    nan where there is no free motion, or no electrical damping
+    """
     mass = nan
     with suppress(ValueError):
         mass = float(plant_effective_parameters(plant).rigid_mass)
     if not isfinite(mass):
-        return mass, nan
+        return nan, nan, nan
     Z = shapes[:, squared == 0.0]
     motion = mass * (Z @ (Z.T @ plant.actuator))
     inside = float(np.abs(motion) @ np.abs(plant.damping) @ np.abs(motion))
     drag = float(motion @ plant.damping @ motion)
-    return mass, drag if drag > UNDAMPED * inside else 0.0
+    electrical = sum(d.damping * float(d.along @ motion) ** 2 for d in plant.lagged_dampers)
+    return mass, drag if drag > UNDAMPED * inside else 0.0, electrical if plant.lagged_dampers else nan

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from zwidth import __version__
+from zwidth.show.cli.bounds import bounds
 from zwidth.show.cli.chart import chart
 from zwidth.show.cli.check import check
 from zwidth.show.cli.devices import devices
@@ -39,7 +40,7 @@ def zwidth(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (devices, schema, show, chart, check, report, sensitivity, felt):
+for command in (devices, schema, show, chart, check, report, sensitivity, felt, bounds):
     zwidth.add_command(command)
 
 
