@@ -30,7 +30,7 @@ CASES = [
     # not supported yet
     (PLANT, {"operator": {"arm_mass_kg": 0.8}}, "operator", "is not supported yet"),
     (PLANT, {"friction": {"coulomb_N": [0, 1]}}, "friction", "is not supported yet"),
-    (PLANT, {"plant": GONE, "response": {"file": "a.csv"}}, "response", "is not supported yet"),
+    (PLANT, {"plant": GONE, "response": {}, "loop__delay_samples": GONE}, "response", "names no file"),
     (PLANT, {"loop__actuator": {"time_constant_s": 0.0}}, "loop.actuator", "is not supported yet"),
     (PLANT, {"loop__encoder__resolution_m": 1e-6}, "loop.encoder", "is not supported yet"),
     (PLANT, {"loop__saturation__force_N": INF}, "loop.saturation", "is not supported yet"),

@@ -92,7 +92,7 @@ def between(theta: Floats, P: Complexes, integrators: int, *, closed: bool) -> B
     if closed:
         at_end = np.pi - theta[-1] < 1e-9
         if at_end:
-            values[1] = np.append(G[:-1], G[-1].real)
+            values[1] = np.append(G[:-1], G[-1].real or 1e-15 * abs(G[-2]))
         near = slice(-2, -MIRRORED - 2, -1) if at_end else slice(None, -MIRRORED - 1, -1)
         nodes.append(2.0 * np.pi - theta[near])
         values.append(np.conj(G[near]))
@@ -100,7 +100,9 @@ def between(theta: Floats, P: Complexes, integrators: int, *, closed: bool) -> B
     with np.errstate(divide="ignore"):
         log = np.log(np.abs(y)) + 1j * np.unwrap(np.angle(y))
     kinds = np.where(np.isfinite(y) & (y != 0.0), np.array([y, 1.0 / np.where(y == 0.0, 1.0, y), log]), 0.0)
-    missed = np.array([_missed(x, kinds[0], y), _missed(x, kinds[1], kinds[1]), _missed(x, kinds[2], 1.0)])
+    # what is next to nothing at half the sampling rate (a free mass) is measured by its neighbours
+    size = np.maximum(np.abs(y), 0.2 * np.mean(np.abs(y[_windows(len(y))[0]]), axis=1))
+    missed = np.array([_missed(x, kinds[0], size), _missed(x, kinds[1], kinds[1]), _missed(x, kinds[2], 1.0)])
     missed = np.maximum(missed[:, :-1], missed[:, 1:])
     kind = np.argmin(missed, axis=0)
     slopes, error = np.array([_slopes(x, v) for v in kinds]), np.min(missed, axis=0) / 64.0
@@ -122,7 +124,7 @@ def _slopes(x: Floats, y: Complexes) -> Complexes:
     return np.asarray(np.sum(weights * y[window], axis=1))
 
 
-def _missed(x: Floats, y: Complexes, size: Complexes | float) -> Floats:
+def _missed(x: Floats, y: Complexes, size: Floats | Complexes | float) -> Floats:
     """How far the cubic through its four neighbours misses each node, relative to `size`."""
     window, here = _windows(len(x))
     scale, _ = _products(x, window, here)

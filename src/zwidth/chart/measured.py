@@ -284,7 +284,7 @@ def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
     first = np.full(len(edge.angles), -1)
     first[edge.at[edge.at >= 0]] = np.flatnonzero(edge.at >= 0)
-    measured = loop.angles[loop.angles < np.pi]
+    measured = loop.inner
     at = np.searchsorted(edge.angles, measured)
     known = first[at] >= 0
     on = np.zeros(len(at), dtype=bool)
@@ -302,6 +302,8 @@ def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
     lines = [(-1, 0.0), (-2, half)] if loop.between.closed else [(-1, 0.0)]
     for kind, frequency in lines:
         static, turned = real_root(loop, kind)
+        if not np.isfinite(static):
+            continue
         for cell in cells.polygons:
             for low, high in _along(np.array(cell.exterior.coords), static, turned, scale):
                 ends = np.array([low, high])

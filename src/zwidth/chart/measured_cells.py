@@ -125,7 +125,7 @@ def _lines_cross(loop: MeasuredLoop) -> Floats | None:
     if not loop.between.closed:
         return None
     (h0, w0), (h1, w1) = real_root(loop, -1), real_root(loop, -2)
-    if abs(w1 - w0) * loop.period < 1e-9:
+    if abs(w1 - w0) * loop.period < 1e-9 or not np.isfinite(h1):
         return None
     B = (h1 - h0) / (w1 - w0)
     return np.array([h0 - B * w0, B])

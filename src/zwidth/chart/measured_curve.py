@@ -49,7 +49,7 @@ class Boundary:
 
 def first_angles(loop: MeasuredLoop) -> Floats:
     """The measured angles, three between each two, and angles that close in on ends and asymptotes."""
-    measured = loop.angles[loop.angles < np.pi]
+    measured = loop.inner
     shares = np.arange(4) / 4.0
     inner = (measured[:-1, None] + np.diff(measured)[:, None] * shares).ravel()
     closing = np.geomspace(NEAREST, 0.9, 30)
@@ -133,7 +133,7 @@ def _bisected(
 
 def sizes(loop: MeasuredLoop) -> Floats:
     """(2,) what is large for |h| and |h / w|: exceeded at a tenth of the measured frequencies."""
-    h, w = np.abs(loop.h(loop.angles)), np.abs(loop.w(loop.angles))
+    h, w = np.abs(loop.h(loop.inner)), np.abs(loop.w(loop.inner))
     return np.array([np.quantile(h, 0.9), np.quantile(h / w, 0.9)])
 
 
@@ -156,13 +156,14 @@ def boundary(loop: MeasuredLoop, angles: Floats, known: Boundary | None = None) 
 
 
 def real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float]:
-    """h and w of the line K + B w = h of real roots at z = 1 (kind -1) or z = -1 (kind -2)."""
+    """h and w of the line K + B w = h of real roots at z = 1 (kind -1) or z = -1 (kind -2); h is inf without one."""
     if kind == -1:
         near = np.array([NEAREST * loop.angles[0]])
         h = 0.0 if loop.integrators else float(loop.h(near)[0].real)
         return h, 0.0 if abs(loop.w(near)[0]) * loop.period < 2.0 * near[0] else float(loop.w(near)[0].real)
     end = np.array([np.pi])
-    return float(loop.h(end)[0].real), float(loop.w(end)[0].real)
+    h = complex(loop.h(end)[0])
+    return h.real if np.isfinite(h) else np.inf, float(loop.w(end)[0].real)
 
 
 def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[Floats, Whole, Whole]:
@@ -172,6 +173,8 @@ def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[
     at an angle just beside.
     """
     h, w = real_root(loop, kind)
+    if not np.isfinite(h):
+        return np.empty((0, 4)), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     theta = np.array([near])
     Im_h, Im_w = float(loop.h(theta)[0].imag), float(loop.w(theta)[0].imag)
     cut = float(np.clip(Im_h / Im_w, -far, far))
@@ -219,7 +222,7 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Wh
 
 def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
     """The boundary with the clearest of many walls as its reference, the next clearest counted against it."""
-    h, w = np.abs(loop.h(loop.angles)), np.abs(loop.w(loop.angles))
+    h, w = np.abs(loop.h(loop.inner)), np.abs(loop.w(loop.inner))
     sizes = np.geomspace(1e-3, 3.0, 9)
     K = np.quantile(h, [0.25, 0.5, 0.75])[:, None] * sizes
     B = np.quantile(h / w, [0.25, 0.5, 0.75])[:, None] * sizes

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from zwidth.chart.between import FEWEST, Between, around_one, between
 from zwidth.chart.trust import Stretch, reaches_the_end, stretches, usable
 from zwidth.loop.controller import Controller
-from zwidth.loop.estimator import velocity_estimator
+from zwidth.loop.filters import force_path, velocity_estimator
+from zwidth.loop.response import product, window_response
 from zwidth.model.response import Response, ResponseError, integrators_of, relative_error
 
 Floats = NDArray[np.float64]
@@ -35,6 +36,10 @@ class MeasuredLoop:
             raise ResponseError(
                 f"a measured response holds the device's delay already, and the computer can add whole samples "
                 f"only, got {delay:g}; leave delay_samples out"
+            )
+        if self.controller.actuator_time_constant > 0.0:
+            raise ResponseError(
+                "a measured response holds the actuator's lag already; leave actuator_time_constant out"
             )
         half = 0.5 / self.period
         if len(f) and f[-1] > half * (1.0 + 1e-9):
@@ -66,6 +71,11 @@ class MeasuredLoop:
         theta = 2.0 * np.pi * self.response.frequency[self.good] * self.period
         return np.where(theta > np.pi * (1.0 - 1e-9), np.pi, theta)
 
+    @property
+    def inner(self) -> Floats:
+        """Those below pi, where K and B are defined."""
+        return self.angles[self.angles < np.pi]
+
     @cached_property
     def between(self) -> Between:
         """The response between them."""
@@ -83,17 +93,16 @@ class MeasuredLoop:
         return float(np.pi if self.between.closed else self.angles[-1])
 
     def h(self, theta: Floats) -> Complexes:
-        """h = -1/P (...) at angles in (0, pi], the computer's own delay in P."""
-        return np.asarray(-self.between.inverse(theta) * np.exp(1j * theta * round(self.controller.delay)))
+        """h = -1/P (...) at angles in (0, pi], the computer's own delay and force filter in P; inf where P is 0."""
+        delay, force = round(self.controller.delay), force_path(self.controller)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            passed = product(force.numerator, force.denominator, around_one(theta))
+            return np.asarray(-self.between.inverse(theta) * np.exp(1j * theta * delay) / passed)
 
     def w(self, theta: Floats) -> Complexes:
         """The velocity estimate w (...) at angles in (0, pi]."""
-        d = around_one(theta)
-        estimator = velocity_estimator(self.controller)
-        w = np.ones_like(d)
-        for c, e in zip(estimator.numerator, estimator.denominator, strict=True):
-            w = w * ((c[0] * d + c[1]) * d + c[2]) / ((e[0] * d + e[1]) * d + e[2])
-        return np.asarray(w * sum(weight * (1.0 + d) ** -k for k, weight in enumerate(estimator.window)))
+        d, own = around_one(theta), velocity_estimator(self.controller)
+        return np.asarray(product(own.numerator, own.denominator, d) * window_response(own.window, 1.0 + d))
 
     def walls(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
         """K, B of the wall that fails at each angle, and the sign of Im w there."""
@@ -104,21 +113,19 @@ class MeasuredLoop:
 
     @cached_property
     def errors(self) -> Floats | None:
-        """Radius (n,) of the disk round each h of `angles` that holds the true one; None where nothing is known.
+        """Radius (n,) of the disk round each h of `angles` that holds the true one, over |h|; None: nothing known.
 
         From coherence: 95 % of the error. From repeated sweeps: the farthest of them.
         """
         response, good = self.response, self.good
-        h = self.h(self.angles)
         if response.sweeps is not None:
-            P = response.value[good]
-            return np.asarray(np.max(np.abs(P / response.sweeps[:, good] - 1.0), axis=0) * np.abs(h))
+            return np.asarray(np.max(np.abs(response.value[good] / response.sweeps[:, good] - 1.0), axis=0))
         if response.coherence is not None:
-            return np.asarray(DISK * relative_error(response.coherence[good], response.averages) * np.abs(h))
+            return np.asarray(DISK * relative_error(response.coherence[good], response.averages))
         return None
 
     def error(self, theta: Floats) -> Floats:
-        """That radius (...) at any angle; 0 where nothing is known of it."""
+        """The radius (...) of the disk round h at any angle; 0 where nothing is known of it."""
         if self.errors is None:
             return np.zeros(np.shape(theta))
-        return np.exp(np.interp(theta, self.angles, np.log(np.maximum(self.errors, 1e-300))))
+        return np.asarray(np.interp(theta, self.angles, self.errors) * np.abs(self.h(theta)))

@@ -46,7 +46,7 @@ def judge_measured(
     finite = np.all(np.isfinite(walls), axis=1)
     safe = np.where(finite[:, None], walls, 0.0)
     outside = edge.outside(safe)
-    theta = loop.angles
+    theta = loop.inner
     h, w = loop.h(theta), loop.w(theta)
     error = loop.error(theta)
     doubtful = ~finite

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,9 +18,11 @@ from zwidth.device.schema.mechanism import (
     MechanismSection,
 )
 from zwidth.device.schema.plant import PlantSection
+from zwidth.device.schema.response import ResponseSection
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.model.mechanism import FIXED, REVOLUTE, Closures, Drives, Floats, Links, Mechanism
 from zwidth.model.plant import Plant
+from zwidth.model.response import Response
 
 if TYPE_CHECKING:
     from zwidth.model.damping import Damping
@@ -53,6 +56,13 @@ def plant(section: PlantSection) -> Plant:
         handle=None if handle is None else np.array(handle),
         names=tuple(f"coordinate {i}" for i in range(n)),
     )
+
+
+def response(section: ResponseSection, label: str, period: float) -> Response:
+    """The measured response, from files beside the device file; `label` is its path."""
+    from zwidth.device.response_file import read_response
+
+    return read_response(section, Path(label).parent, period)
 
 
 def damping(section: DampingSection | None) -> Damping:

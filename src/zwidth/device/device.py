@@ -13,6 +13,7 @@ from zwidth.device.faults import DeviceError, fail, quote, suggestion
 from zwidth.loop.controller import Controller
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.plant import Plant
+from zwidth.model.response import Response
 
 if TYPE_CHECKING:
     from zwidth.model.damping import Damping
@@ -30,7 +31,8 @@ class Device:
     sources             dotted path -> where that group of numbers comes from
     label               the file or bundled name, for messages
     mechanism           None for a device given by its plant
-    given_plant         None for a device given by its mechanism
+    given_plant         None for a device given by its mechanism or response
+    response            the measured response; None for a device given by a model
     controller          sampling, delay, velocity filter
     damping             how the mechanism's flexible modes are damped
     reference_position  (3,) handle position meant where none is given [m]; None for a plant
@@ -46,6 +48,7 @@ class Device:
     label: str
     mechanism: Mechanism | None
     given_plant: Plant | None
+    response: Response | None
     controller: Controller
     damping: Damping
     reference_position: Floats | None
@@ -95,6 +98,9 @@ class Device:
         """
         if model is not None and model not in MODELS:
             raise fail(self.label, "model", f"must be one of {', '.join(MODELS)}, got {quote(model)}")
+        if self.response is not None:
+            self._mechanism_only(at=at, direction=direction, assembly=assembly, model=model)
+            raise fail(self.label, "", "has a measured [response] and no model; chart and check it")
         if self.given_plant is not None:
             self._mechanism_only(at=at, direction=direction, assembly=assembly)
             return self._given(self.given_plant, model)
@@ -140,16 +146,22 @@ class Device:
         """The mechanism, or the reason why these arguments do not apply to a given plant."""
         if self.mechanism is None:
             self._mechanism_only(**given)
-            raise fail(self.label, "", "has a [plant] and no [mechanism]; it has no postures or directions")
+            raise fail(self.label, "", f"has a {self._kind} and no [mechanism]; it has no postures or directions")
         return self.mechanism
 
     def _mechanism_only(self, **given: object) -> None:
         named = [name for name, value in given.items() if value is not None]
         if named:
             raise DeviceError(
-                fail(self.label, name, "does not apply to a device given by its [plant]; leave it out").faults[0]
+                fail(
+                    self.label, name, f"does not apply to a device given by its {self._kind}; leave it out"
+                ).faults[0]
                 for name in named
             )
+
+    @property
+    def _kind(self) -> str:
+        return "[response]" if self.response is not None else "[plant]"
 
     def _vector(self, name: str, value: Sequence[float]) -> Floats:
         try:

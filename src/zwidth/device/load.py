@@ -56,7 +56,7 @@ def from_document(document: dict[str, Any], label: str = "device") -> Device:
 
 
 def _device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device:
-    section = checked.mechanism
+    section, controller = checked.mechanism, build.controller(checked.loop)
     reference = section.reference if section else None
     return Device(
         name=checked.name,
@@ -66,7 +66,8 @@ def _device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device
         label=label,
         mechanism=build.mechanism(section) if section else None,
         given_plant=build.plant(checked.plant) if checked.plant else None,
-        controller=build.controller(checked.loop),
+        response=build.response(checked.response, label, controller.sampling_period) if checked.response else None,
+        controller=controller,
         damping=build.damping(section.damping if section else None),
         reference_position=build.in_space(reference.position_m) if reference else None,
         reference_direction=build.in_space(reference.direction) if reference else None,

@@ -72,7 +72,7 @@ def parse(text: str, label: str) -> dict[str, Any]:
     except ValueError as error:  # a whole number of thousands of digits
         raise fail(label, "", f"holds a number that cannot be read: {_lower_first(str(error))}") from None
     if not document:
-        raise fail(label, "", "is empty; a device needs a name, [loop], and [mechanism] or [plant]")
+        raise fail(label, "", "is empty; a device needs a name, [loop], and [mechanism], [plant] or [response]")
     if not within_depth(document):
         raise fail(label, "", f"is nested too deeply; at most {DEEPEST} levels are allowed")
     return document

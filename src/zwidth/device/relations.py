@@ -26,6 +26,7 @@ def relations(document: dict[str, Any], original: dict[str, Any]) -> Found:
     yield from _sources(document)
     yield from _plant(_table(document, "plant"))
     yield from _loop(_table(document, "loop"))
+    yield from _response(original)
     mechanism = _table(document, "mechanism")
     if mechanism:
         yield from _tree(mechanism)
@@ -39,7 +40,7 @@ def relations(document: dict[str, Any], original: dict[str, Any]) -> Found:
 def _one_kind(document: dict[str, Any]) -> Found:
     given = [f"[{kind}]" for kind in KINDS if kind in document]
     if not given:
-        yield (), "has neither [mechanism] nor [plant]; give one of them"
+        yield (), "has neither [mechanism] nor [plant] nor [response]; give one of them"
     elif len(given) > 1:
         yield (), f"has {' and '.join(given)}; only one of them is allowed: remove the other"
 
@@ -66,6 +67,30 @@ def _plant(plant: dict[str, Any]) -> Found:
             yield ("plant", key), f"has {length} numbers, but mass_kg has {size} rows; give {size} numbers"
         elif value is None and size > 1 and key != "handle":
             yield ("plant", key), f"is missing; with {size} coordinates give {size} numbers"
+
+
+def _response(document: dict[str, Any]) -> Found:
+    """A measured response: one way of naming its files, and nothing beside it that it holds already."""
+    if "response" not in document:
+        return
+    response, loop = _table(document, "response"), _table(document, "loop")
+    if isinstance(document["response"], dict) and ("file" in response) == ("files" in response):
+        told = "names both file and files" if "file" in response else "names no file"
+        yield ("response",), f"{told}; give file for one measurement, or files for repetitions of it"
+    if "operator" in document:
+        yield ("operator",), "cannot be attached to a measured [response], which knows no handle; leave it out"
+    if "actuator" in loop:
+        yield ("loop", "actuator"), "is part of a measured [response] already; leave it out"
+    period = loop.get("sampling_period_s")
+    T = period if _number(period) and 0 < period <= 1 else math.nan
+    for key, unit in (("delay_samples", 1.0), ("delay_s", T)):
+        delay = loop.get(key)
+        if _number(delay) and abs(delay / unit - round(delay / unit if delay / unit < 1e9 else 0)) > 1e-6:
+            yield (
+                ("loop", key),
+                f"must be a whole number of samples with a [response], got {delay:.10g}: the response holds the "
+                "device's own delay, and only what software adds stands here; leave it out",
+            )
 
 
 def _loop(loop: dict[str, Any]) -> Found:

@@ -9,7 +9,6 @@ from typing import Any, Final
 from zwidth.device.faults import Path
 
 KEYS: Final[dict[tuple[str, ...], str]] = {
-    ("response",): "a measured [response]",
     ("operator",): "an [operator]",
     ("friction",): "[friction]",
     ("loop", "actuator"): "a lag of the force, [loop.actuator],",

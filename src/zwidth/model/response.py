@@ -77,10 +77,10 @@ def integrators_of(response: Response, period: float) -> int:
     measured = np.degrees(np.angle(P[0]))
     where = f"the phase is {measured:.0f} degrees at {f[0]:.6g} Hz, the lowest frequency"
     nearest = int(np.argmin(np.abs(phases)))
-    if abs(phases[nearest]) < CLEAR and abs(fall - nearest) > UNLIKE:
+    if abs(phases[nearest]) < CLEAR and abs(fall - nearest) > UNLIKE and 0.0 <= fall <= 2.5:
         raise ResponseError(
-            f"{where}, but the magnitude falls like f^-{max(fall, 0.0):.1f} there, which goes with "
-            f"{-90 * min(max(round(fall), 0), 2)} degrees; are columns swapped, or is this no force to position?"
+            f"{where}, but the magnitude falls like f^-{fall:.1f} there, which goes with "
+            f"{-90 * min(round(fall), 2)} degrees; are columns swapped, or is this no force to position?"
         )
     if response.integrators is not None:
         m = response.integrators

@@ -12,6 +12,7 @@ from zwidth.device.schema.loop import LoopSection
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.device.schema.numbers import Section, Text, quantity
 from zwidth.device.schema.plant import PlantSection
+from zwidth.device.schema.response import ResponseSection
 
 
 def flat_sources(value: Any) -> Any:
@@ -28,13 +29,13 @@ def flat_sources(value: Any) -> Any:
 
 
 class DeviceFile(Section):
-    """A haptic device: either its [mechanism] or the [plant] of its rendered direction, and its [loop]."""
+    """A haptic device: its [mechanism], its rendered direction's [plant] or a [response]; and its [loop]."""
 
     model_config = ConfigDict(
         title="zwidth device file",
         json_schema_extra={
             "$schema": "https://json-schema.org/draft/2020-12/schema",
-            "oneOf": [{"required": ["mechanism"]}, {"required": ["plant"]}],
+            "oneOf": [{"required": ["mechanism"]}, {"required": ["plant"]}, {"required": ["response"]}],
         },
     )
 
@@ -46,6 +47,7 @@ class DeviceFile(Section):
     )
     mechanism: MechanismSection | None = quantity("the mechanism; or [plant]", default=None)
     plant: PlantSection | None = quantity("the rendered direction's dynamics; or [mechanism]", default=None)
+    response: ResponseSection | None = quantity("a measured response, in place of either", default=None)
     loop: LoopSection = quantity("what the computer does")
 
 

@@ -34,6 +34,7 @@ def computing(question: Question) -> Iterator[None]:
     from zwidth.loop.sections import UnmovedError
     from zwidth.model.posture import PostureError
     from zwidth.model.reduction import DirectionError, ModelError
+    from zwidth.model.response import ResponseError
 
     try:
         yield
@@ -46,5 +47,7 @@ def computing(question: Question) -> Iterator[None]:
     except ModelError as error:
         model = f"model {question.model}: " if question.model else ""
         raise BadInput(f"{question.name}: {model}{error}") from None
+    except ResponseError as error:
+        raise BadInput(f"{question.name}: response: {error}") from None
     except UnmovedError as error:
         raise BadInput(f"{question.name}: {error}") from None

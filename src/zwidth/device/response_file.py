@@ -1,0 +1,247 @@
+"""Measured responses from CSV files, every fault with its line."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.faults import DeviceError, Fault, fail, listed
+from zwidth.device.schema.response import ResponseSection
+from zwidth.model.response import Response, ResponseError
+from zwidth.model.sweep import sweep_response
+
+Floats = NDArray[np.float64]
+Table = dict[str, Floats]  # columns, with the line of each row under LINE
+
+SPECTRUM: Final = ("frequency_Hz", "real_m_per_N", "imag_m_per_N")
+RECORD: Final = ("time_s", "force_command_N", "position_m")
+OPTIONAL: Final = ("coherence", "sweep")
+LINE: Final = ""
+LARGEST_FILE: Final = 200_000_000  # bytes
+MOST_FAULTS: Final = 20
+UNEVEN: Final = 0.05  # of the sampling period, by which time stamps may jitter
+OFF: Final = 1e-3  # relative, by which their mean may differ from it
+
+
+def read_response(section: ResponseSection, folder: Path, period: float) -> Response:
+    """The response of a device file; several sweeps come with their mean.
+
+    folder  where the device file stands
+    period  sampling period T [s]
+    Raises  DeviceError  with every fault of the first file that has some
+    """
+    names = section.files or (section.file or "",)
+    responses = [one for name in names for one in _responses(folder / name, section, period)]
+    first = responses[0]
+    for name, other in zip(
+        [names[0], *names[1:]] if len(names) == len(responses) else [], responses, strict=False
+    ):
+        if len(other.frequency) != len(first.frequency) or np.any(
+            np.abs(other.frequency - first.frequency) > 1e-6 * first.frequency
+        ):
+            raise fail(str(folder / name), "", f"has other frequencies than {names[0]}; sweeps must share them")
+    return first if len(responses) == 1 else _mean(responses)
+
+
+def _mean(responses: Sequence[Response]) -> Response:
+    """Repeated sweeps as one response; a frequency is as coherent as in the worst of them."""
+    sweeps = np.array([response.value for response in responses])
+    known = [response.coherence for response in responses if response.coherence is not None]
+    coherence = np.min(known, axis=0) if known else None
+    note = f"mean of {len(responses)} sweeps" + (f", each {responses[0].note}" if responses[0].note else "")
+    return replace(responses[0], value=sweeps.mean(axis=0), coherence=coherence, sweeps=sweeps, note=note)
+
+
+def _responses(path: Path, section: ResponseSection, period: float) -> Iterator[Response]:
+    """What one file holds: a response, several by their `sweep`, or a raw sweep turned into one."""
+    table = _table(path)
+    if "time_s" in table:
+        yield _recorded(path, table, section, period)
+        return
+    if "sweep" not in table:
+        yield _spectrum(path, table, section, period)
+        return
+    numbers = table["sweep"]
+    parts = [
+        _spectrum(path, {key: column[numbers == n] for key, column in table.items()}, section, period)
+        for n in dict.fromkeys(numbers.tolist())
+    ]
+    for n, part in zip(dict.fromkeys(numbers.tolist()), parts, strict=True):
+        if len(part.frequency) != len(parts[0].frequency) or np.any(part.frequency != parts[0].frequency):
+            raise fail(
+                str(path), "sweep", f"sweep {n:g} has other frequencies than the first; sweeps must share them"
+            )
+    yield from parts
+
+
+def _spectrum(path: Path, table: Table, section: ResponseSection, period: float) -> Response:
+    """A response as it stands, its frequencies checked."""
+    f, lines = table["frequency_Hz"], table[LINE].astype(int)
+    half = 0.5 / period
+    found = [
+        (i, "must be greater than 0, got {:.10g}; leave the static value out") for i in np.flatnonzero(f <= 0.0)
+    ]
+    found += [(i + 1, "{:.10g} is there twice; keep one of them") for i in np.flatnonzero(np.diff(f) == 0.0)]
+    found += [
+        (i + 1, f"{{:.10g}} follows {f[i]:.10g}; sort the lines by rising frequency")
+        for i in np.flatnonzero(np.diff(f) < 0.0)
+    ]
+    above = np.flatnonzero(f > half * (1.0 + 1e-9))[:1]
+    found += [
+        (i, f"{{:.10g}} is above half the sampling rate, {half:.10g}; leave it out, or correct sampling_period_s")
+        for i in above
+    ]
+    coherence = table.get("coherence")
+    faults = [Fault(str(path), f"line {lines[i]}: frequency_Hz", text.format(f[i])) for i, text in sorted(found)]
+    if coherence is not None:
+        faults += [
+            Fault(str(path), f"line {lines[i]}: coherence", f"must be from 0 to 1, got {coherence[i]:.10g}")
+            for i in np.flatnonzero((coherence < 0.0) | (coherence > 1.0))
+        ]
+    _raise(path, faults)
+    if len(f) < 6:
+        raise fail(str(path), "", f"has {len(f)} frequencies; at least 6 are needed, some hundreds to be exact")
+    value = table["real_m_per_N"] + 1j * table["imag_m_per_N"]
+    if not np.any(value):
+        raise fail(str(path), "", "is 0 m/N at every frequency; is the position in metres?")
+    return Response(f, value, section.integrators, coherence, section.averages or 1.0)
+
+
+def _recorded(path: Path, table: Table, section: ResponseSection, period: float) -> Response:
+    """A raw sweep as a response, its time stamps checked against the loop's sampling period."""
+    time, lines = table["time_s"], table[LINE].astype(int)
+    steps = np.diff(time)
+    if len(steps) == 0:
+        raise fail(str(path), "", "has one line only; record a sweep")
+    mean = float(np.median(steps))
+    uneven = np.flatnonzero(np.abs(steps - mean) > UNEVEN * abs(mean))
+    if mean <= 0.0 or len(uneven):
+        i = int(uneven[0]) if len(uneven) else 0
+        raise fail(
+            str(path),
+            f"line {lines[i + 1]}: time_s",
+            f"comes {steps[i]:.6g} s after the line before, most others {mean:.6g} s; a sweep needs every sample, "
+            "evenly spaced",
+        )
+    mean = float((time[-1] - time[0]) / len(steps))
+    if abs(mean - period) > OFF * period:
+        raise fail(
+            str(path),
+            "time_s",
+            f"rises by {mean:.8g} s from line to line, but sampling_period_s is {period:.8g}; record every "
+            "sample of the loop, or correct sampling_period_s",
+        )
+    try:
+        return sweep_response(
+            table["force_command_N"], table["position_m"], period, section.integrators, section.segment_samples
+        )
+    except ResponseError as error:
+        raise fail(str(path), "", str(error)) from None
+
+
+def _table(path: Path) -> Table:
+    """The columns wanted, as numbers, and each row's line."""
+    rows = csv.reader(_text(path).splitlines(), strict=True)
+    values: list[list[float]] = []
+    lines: list[int] = []
+    faults: list[Fault] = []
+    try:
+        header = [name.strip() for name in next(_filled(rows), [])]
+        columns = _columns(path, header)
+        places = [header.index(name) for name in columns]
+        for row in _filled(rows):
+            if len(row) > len(header):
+                faults.append(
+                    Fault(
+                        str(path),
+                        f"line {rows.line_num}",
+                        f"has {len(row)} cells, but the header names {len(header)} columns; write a decimal "
+                        "point, not a comma",
+                    )
+                )
+                continue
+            cells = [row[place].strip() if place < len(row) else "" for place in places]
+            numbers = [_number(cell) for cell in cells]
+            faults += [
+                Fault(str(path), f"line {rows.line_num}: {name}", f"must be a finite number, {_got(cell)}")
+                for name, cell, number in zip(columns, cells, numbers, strict=True)
+                if not np.isfinite(number)
+            ]
+            values.append(numbers)
+            lines.append(rows.line_num)
+    except csv.Error as error:
+        raise fail(str(path), f"line {rows.line_num}", f"is not CSV: {error}") from None
+    _raise(path, faults)
+    if not values:
+        raise fail(str(path), "", f"holds no numbers; give lines with {', '.join(columns)}")
+    table = np.array(values).T
+    return {LINE: np.array(lines, dtype=float), **dict(zip(columns, table, strict=True))}
+
+
+def _columns(path: Path, header: list[str]) -> list[str]:
+    """The columns to read: those of a response or those of a raw sweep."""
+    if not header:
+        raise fail(str(path), "", f"is empty; its first line must name columns, such as {', '.join(SPECTRUM)}")
+    wanted = RECORD if "time_s" in header else SPECTRUM
+    used = [*wanted, *(name for name in OPTIONAL if name in header and wanted is SPECTRUM)]
+    faults = [
+        Fault(
+            str(path),
+            "line 1",
+            f"column {name} is {'missing' if name not in header else 'there more than once'}; there are "
+            f"{listed(header, 8)[:200]}, needed are {', '.join(wanted)}",
+        )
+        for name in used
+        if header.count(name) != 1
+    ]
+    if faults:
+        raise DeviceError(faults)
+    return used
+
+
+def _raise(path: Path, faults: list[Fault]) -> None:
+    if faults:
+        more = [Fault(str(path), "", f"and {len(faults) - MOST_FAULTS} more faults")] * (len(faults) > MOST_FAULTS)
+        raise DeviceError([*islice(faults, MOST_FAULTS), *more])
+
+
+def _filled(rows: Iterator[list[str]]) -> Iterator[list[str]]:
+    return (row for row in rows if any(cell.strip() for cell in row))
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return float("nan")
+
+
+def _got(cell: str) -> str:
+    return f"got {cell[:60]!r}" if cell else "but it is missing"
+
+
+def _text(path: Path) -> str:
+    try:
+        with open(path, "rb") as stream:
+            data = stream.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise fail(str(path), "", "there is no such file; response.file is meant beside the device file") from None
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise fail(str(path), "", f"cannot be read: {reason[:1].lower() + reason[1:]}") from None
+    if len(data) > LARGEST_FILE:
+        raise fail(str(path), "", f"is larger than {LARGEST_FILE // 1_000_000} MB; shorten it")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise fail(str(path), "", f"is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8") from None
+    if "\x00" in text:
+        raise fail(str(path), "", "is a binary file; give a CSV text file")
+    return text
