@@ -1,0 +1,9 @@
+"""What a wall is guaranteed against: every passive operator, every spring, every passive environment.
+
+    passive        stable with whatever passive linear operator holds the handle
+    spring-stable  stable with whatever spring holds the handle
+    stable         stable with the handle as the device is described: the stability chart
+
+Each is a set of walls (K, B) inside the next; `nested` puts them side by side. `two_port` and `coupling` ask the
+same of a virtual coupling between the device and an environment that is passive and otherwise unknown.
+"""

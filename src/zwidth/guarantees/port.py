@@ -1,0 +1,170 @@
+"""The device between samples as a port that an operator holds: responses and dissipation over frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.model.modes import undamped_modes
+from zwidth.model.plant import LaggedDamper, Plant
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Modal damping below this share of the largest is rounding of an exact zero.
+UNDAMPED = 1e-13
+# A mode with less than this share in a force, a reading or a coupling has none.
+IDLE = 1e-11
+
+
+@dataclass(frozen=True)
+class Port:
+    """Plant M x'' + B x' + K x = a u + h f in modal coordinates; u acts at the actuator, f at the port.
+
+    squared  (n,)    squared natural frequencies, rigid ones exactly 0 [1/s^2]
+    damping  (n, n)  modal damping, symmetric [1/s]
+    push, read, hold  (n,)  participation of actuator, sensor and port
+    lagged   dampers with a lag, in modal coordinates
+    """
+
+    squared: Floats
+    damping: Floats
+    push: Floats
+    read: Floats
+    hold: Floats
+    lagged: tuple[LaggedDamper, ...]
+
+    @property
+    def poles(self) -> Complexes:
+        """All poles s [1/s], conjugates included."""
+        n, m = len(self.squared), len(self.lagged)
+        A = np.zeros((2 * n + m, 2 * n + m))
+        A[:n, n : 2 * n] = np.eye(n)
+        A[n : 2 * n, :n], A[n : 2 * n, n : 2 * n] = -np.diag(self.squared), -self.damping
+        for i, damper in enumerate(self.lagged, start=2 * n):
+            A[n : 2 * n, i] = -damper.along
+            A[i, n : 2 * n] = damper.damping / damper.time_constant * damper.along
+            A[i, i] = -1.0 / damper.time_constant
+        return np.asarray(np.linalg.eigvals(A), dtype=complex)
+
+
+def port(plant: Plant, held: Floats) -> Port:
+    """The plant held along `held` (n,)."""
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    damping = shapes.T @ plant.damping @ shapes
+    damping = (damping + damping.T) / 2.0
+    # B is positive semidefinite: a mode that dissipates nothing by itself is not damped through others either
+    still = np.abs(np.diag(damping)) <= UNDAMPED * np.max(np.abs(damping), initial=0.0)
+    damping[still, :] = damping[:, still] = 0.0
+    lagged = tuple(replace(damper, along=shapes.T @ damper.along) for damper in plant.lagged_dampers)
+    return Port(squared, damping, shapes.T @ plant.actuator, shapes.T @ plant.sensor, shapes.T @ held, lagged)
+
+
+@dataclass(frozen=True)
+class PortResponse:
+    """At angular frequencies w (...): compliances [m/N] and what the port takes in.
+
+    direct       G_ya  from the actuator's force to the reading
+    back, felt   G_yh, G_ha  from the port's force to the reading, from the actuator's force to the port
+    port         G_hh  at the port itself
+    dissipation  Re(jw G_hh), power taken in at the port by a force of one newton (times 2) [m/(N s)]
+    """
+
+    direct: Complexes
+    back: Complexes
+    felt: Complexes
+    port: Complexes
+    dissipation: Floats
+
+
+def port_response(held: Port, frequency: Floats) -> PortResponse:
+    """Responses of a held port at angular frequencies (...) [rad/s], not zero.
+
+    The dissipation is the quadratic form w^2 X^H Re(B) X of the motion X, a sum without cancellation, where the real
+    part of jw G_hh would lose its digits against the imaginary part.
+    """
+    w = np.asarray(frequency, dtype=float)
+    stiff = held.squared - w[..., None] ** 2
+    damping: Complexes = np.broadcast_to(held.damping, (*w.shape, *held.damping.shape)).astype(complex)
+    for damper in held.lagged:
+        share = damper.damping / (1.0 + 1j * w * damper.time_constant)
+        damping = damping + share[..., None, None] * np.outer(damper.along, damper.along)
+    own = np.abs(np.diagonal(damping, axis1=-2, axis2=-1))
+    scale = 1.0 / np.sqrt(np.hypot(stiff, w[..., None] * own))
+    D = 1j * w[..., None, None] * damping
+    index = np.arange(len(held.squared))
+    D[..., index, index] += stiff
+    D = D * scale[..., :, None] * scale[..., None, :]
+    sources = np.stack([held.push, held.hold], axis=-1) * scale[..., :, None]
+    X = np.linalg.solve(D, sources.astype(complex)) * scale[..., :, None]
+    pushed, pulled = X[..., 0], X[..., 1]
+    power = np.einsum("...i,...ij,...j->...", pulled.conj(), damping.real, pulled).real
+    return PortResponse(
+        pushed @ held.read, pulled @ held.read, pushed @ held.hold, pulled @ held.hold, w**2 * power
+    )
+
+
+def static_compliances(plant: Plant, held: Floats) -> tuple[float, float]:
+    """What the reading gives way to a steady wall force [m/N], the port free and the port held fixed.
+
+    inf (with its sign) where a rigid motion gives way without end; the two are the ends of what springs make of it.
+    """
+    return _static(plant), _static(fixed(plant, held))
+
+
+def _static(plant: Plant) -> float:
+    if plant.size == 0:
+        return 0.0
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    push, read = shapes.T @ plant.actuator, shapes.T @ plant.sensor
+    share = push * read
+    rigid = squared == 0.0
+    free = float(np.sum(share[rigid]))
+    if abs(free) > 1e-12 * float(np.sum(np.abs(share))):
+        return float(np.copysign(np.inf, free))
+    return float(np.sum(share[~rigid] / squared[~rigid]))
+
+
+def fixed(plant: Plant, held: Floats) -> Plant:
+    """The plant with the coordinate `held` . x held fixed, in coordinates of what is left."""
+    return _within(plant, np.linalg.svd(held[None, :])[2][1:].T, None)
+
+
+def reached(plant: Plant) -> Plant:
+    """The plant without the free motions that no wall, no reading and no operator has to do with.
+
+    A mechanism that slides along the wall keeps its sliding out of what an operator at the handle couples.
+    Coordinates become modal where there is such a motion.
+    """
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    free = shapes[:, squared == 0.0]
+    ends = [plant.actuator, plant.sensor, *([] if plant.handle is None else [plant.handle])]
+    ends += [damper.along for damper in plant.lagged_dampers]
+    if not free.shape[1]:
+        return plant
+    drag = free.T @ plant.damping
+    rows = [free.T @ end / np.linalg.norm(end) for end in ends]
+    rows += list(drag.T / max(float(np.max(np.abs(plant.damping))), 1e-300))
+    _, sizes, turns = np.linalg.svd(np.array(rows))
+    level = IDLE * np.max(np.abs(rows))
+    V = np.hstack([free @ turns[: np.count_nonzero(sizes > level)].T, shapes[:, squared != 0.0]])
+    if V.shape[1] == plant.size:
+        return plant
+    return _within(plant, V, plant.handle)
+
+
+def _within(plant: Plant, V: Floats, handle: Floats | None) -> Plant:
+    """The plant confined to x = V q, in coordinates q."""
+    return replace(
+        plant,
+        mass=V.T @ plant.mass @ V,
+        damping=V.T @ plant.damping @ V,
+        stiffness=V.T @ plant.stiffness @ V,
+        actuator=V.T @ plant.actuator,
+        sensor=V.T @ plant.sensor,
+        handle=None if handle is None else V.T @ handle,
+        names=(),
+        lagged_dampers=tuple(replace(d, along=V.T @ d.along) for d in plant.lagged_dampers),
+    )

@@ -1,0 +1,73 @@
+"""A set of walls as polygons, with the numbers read off it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from shapely.geometry.polygon import orient
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Region:
+    """Walls that have one guarantee.
+
+    rings          closed rings (k, 2) of [K, B], counter-clockwise; their union is the set, () if it is empty
+    stiffness_max  supremum of K over its walls with K > 0, B >= 0 [N/m]; nan if there is none
+    damping_at_stiffness_max  [N s/m]; nan if there is none
+    reason         why there is no wall with K > 0, B >= 0; None if there is one
+    """
+
+    rings: tuple[Floats, ...]
+    stiffness_max: float
+    damping_at_stiffness_max: float
+    reason: str | None = None
+
+    @property
+    def polygon(self) -> Any:
+        """The set as a shapely geometry."""
+        return shapely.union_all([shapely.Polygon(ring) for ring in self.rings])
+
+    def contains(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.bool_]:
+        """Whether walls K, B of any shape (...) lie inside, to the accuracy of the rings."""
+        K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
+        inside = np.zeros(K.shape, dtype=bool)
+        for ring in self.rings:
+            inside |= shapely.contains_xy(shapely.Polygon(ring), K, B)
+        return inside
+
+
+def empty(reason: str) -> Region:
+    """No wall at all, and why."""
+    return Region((), float("nan"), float("nan"), reason)
+
+
+def rings_of(shape: Any) -> tuple[Floats, ...]:
+    """The rings of a polygon without holes, or of several."""
+    parts: Iterable[Any] = getattr(shape, "geoms", [shape])
+    solid = [part for part in parts if part.geom_type == "Polygon" and part.area > 0.0]
+    return tuple(np.asarray(orient(part).exterior.coords) for part in sorted(solid, key=lambda p: -p.area))
+
+
+def stiffest_corner(rings: Iterable[Floats]) -> tuple[float, float]:
+    """Largest K over the rings within K > 0, B >= 0, and its B; nan where there is none."""
+    best = (float("nan"), float("nan"))
+    for ring in rings:
+        K, B = ring.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = B[:-1] / (B[:-1] - B[1:])
+            crossing = K[:-1] + share * (K[1:] - K[:-1])
+        K, B = np.concatenate([K, crossing]), np.concatenate([B, np.zeros(len(crossing))])
+        usable = (K > 0.0) & (B >= 0.0)
+        usable[len(ring) :] &= (share >= 0.0) & (share <= 1.0)
+        if usable.any():
+            top = int(np.argmax(np.where(usable, K, -np.inf)))
+            if not K[top] <= best[0]:
+                best = float(K[top]), float(B[top])
+    return best
