@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,7 +29,7 @@ class MeasuredVerdicts:
     frequency: Floats
 
     @property
-    def names(self) -> object:
+    def names(self) -> Any:
         """Verdicts as words, lists nested like the shape."""
         return np.array(NAMES)[self.verdict].tolist()
 

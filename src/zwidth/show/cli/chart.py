@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.show.cli import measured
 from zwidth.show.cli.answer import Answer, deliver, sheet
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Numbers, Question, about_a_device, as_json, example, output_option
@@ -64,6 +65,8 @@ def chart(question: Question, window: Window | None, output: str | None, as_json
     """Find the walls that DEVICE renders stably: the exact chart of stiffness and damping."""
     path = None if output is None else destination(output, FIGURES + DATA)
     device = question.device()
+    if device.response is not None:
+        return measured.answer_chart(question, device, path, window, as_json)
     try:
         with computing(question):
             found = _charted(question, device)
@@ -126,7 +129,7 @@ def _answer(question: Question, device: Device, chart: StabilityChart, path: Pat
 
     def pages() -> Iterator[Any]:
         yield heading(question, device)
-        yield sheet(list(_rows(chart)))
+        yield sheet(list(rows(chart)))
         if path is not None:
             yield f"written: {path}"
 
@@ -134,7 +137,7 @@ def _answer(question: Question, device: Device, chart: StabilityChart, path: Pat
     return Answer(document, lambda: list(pages()), reason)
 
 
-def _rows(chart: StabilityChart) -> Iterator[tuple[str, str]]:
+def rows(chart: StabilityChart) -> Iterator[tuple[str, str]]:
     yield "largest stiffness", _stiffest(chart)
     yield "largest damping", _most_damped(chart)
     yield "stable area", amount(chart.stable_area, "N²s/m²")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.show.cli import measured
 from zwidth.show.cli.answer import Answer, deliver, table
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, named, output_option
@@ -63,6 +64,8 @@ def check(
 
 def _judged(question: Question, device: Device, walls: Walls) -> list[dict[str, Any]]:
     """One entry per wall: the wall, its verdict, spectral radius and frequency."""
+    if device.response is not None:
+        return measured.judged(question, device, walls)
     from zwidth.chart.verdict import judge
     from zwidth.loop.loop import Loop
 

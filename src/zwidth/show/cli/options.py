@@ -45,6 +45,11 @@ class Question:
         """The rendered direction's dynamics. Raises what `Device.plant` raises."""
         return device.plant(self.at, self.direction, self.assembly, self.model)
 
+    def as_measured(self, device: Device) -> None:
+        """Raises DeviceError for whatever is asked of a [response] that needs a model."""
+        if any((self.at, self.direction, self.assembly, self.model)):
+            self.plant(device)
+
     def model_of(self, device: Device) -> str:
         """The model's name, also where none was asked for."""
         return self.model or ("full" if device.mechanism else AS_GIVEN)

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 def heading(question: Question, device: Device) -> str:
     """One line, or two: the device and its posture; the computer."""
     facts = question.facts(device)
-    place = f"model {facts['model']}" if device.mechanism else f"[plant] {facts['model']}"
+    kind = "[response]" if device.response is not None else "[plant]"
+    place = f"model {facts['model']}" if device.mechanism else f"{kind} {facts['model']}"
     if device.mechanism:
         where = f"along {vector(facts['direction'])} at {vector(facts['position_m'], 'm')}"
         place = f"{where}, assembly {facts['assembly']}, {place}"

@@ -9,6 +9,7 @@ import click
 
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
 from zwidth.show.cli.computing import NoAnswer, computing
+from zwidth.show.cli.measured import NO_MODEL
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, destination, plain, write_data
@@ -49,6 +50,10 @@ def show(question: Question, output: str | None, as_json: bool) -> int:
     """Show DEVICE at a posture: masses and stiffness felt along the direction, frequencies, dexterity."""
     path = None if output is None else destination(output, DATA)
     device = question.device()
+    if device.response is not None:
+        question.as_measured(device)
+        unanswered = question.facts(device) | dict.fromkeys(KEYS) | {"sources": device.sources}
+        return deliver(Answer(unanswered, reason=NO_MODEL), as_json)
     try:
         with computing(question):
             plant = question.plant(device)

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 from zwidth.chart.chart import StabilityChart
+from zwidth.chart.measured import MeasuredChart
 from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above
 from zwidth.show.units import at_most, quantity
 
@@ -27,7 +28,7 @@ def draw_chart(ax: Axes, chart: StabilityChart, window: Window | None = None) ->
     for arc in chart.boundary:
         ax.plot(arc.stiffness, arc.damping, color=BLACK, solid_capstyle="round")
     if not isnan(chart.stiffness_max):
-        _mark_stiffest(ax, chart)
+        mark_stiffest(ax, chart)
     frame(ax, window or chart.box, empty=not chart.regions)
     legend_above(ax)
 
@@ -52,7 +53,8 @@ def draw_models(ax: Axes, charts: Mapping[str, StabilityChart], window: Window |
     legend_above(ax, columns=2)
 
 
-def _mark_stiffest(ax: Axes, chart: StabilityChart) -> None:
+def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart) -> None:
+    """The stiffest wall, with its numbers in the legend."""
     numbers = f"{at_most(chart.stiffness_max, 'N/m')} at {quantity(chart.damping_at_stiffness_max, 'Ns/m')}"
     vibration = " and ".join(quantity(f, "Hz") for f in chart.frequencies_at_stiffness_max)
     ax.plot(

@@ -1,0 +1,164 @@
+"""What `zwidth chart` and `zwidth check` say of a device that is known by its measured response."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from zwidth.show.cli.answer import Answer, deliver, sheet
+from zwidth.show.cli.computing import computing
+from zwidth.show.cli.place import heading
+from zwidth.show.output import DATA, replacing, write_data
+from zwidth.show.units import amount
+
+if TYPE_CHECKING:
+    from zwidth.chart.chart import StabilityChart
+    from zwidth.chart.measured import MeasuredChart
+    from zwidth.chart.trust import Stretch
+    from zwidth.device.device import Device
+    from zwidth.show.cli.chart import Window
+    from zwidth.show.cli.options import Question
+    from zwidth.show.cli.points import Walls
+
+NO_MODEL: Final = (
+    "a measured response has no masses, stiffnesses, modes or postures to show; `zwidth chart` and `zwidth check` "
+    "answer for it, a [plant] or [mechanism] answers the rest"
+)
+
+
+def answer_chart(
+    question: Question, device: Device, path: Path | None, window: Window | None, as_json: bool
+) -> int:
+    """`zwidth chart` for a device with a [response]."""
+    from zwidth.show.cli.chart import NO_WALL, numbers, rows
+
+    found = _charted(question, device)
+    common = cast("StabilityChart", found)  # the fields asked for are the same in both
+    document = question.facts(device) | numbers(common) | {"boundary": arcs(found), "decided": True}
+    document |= more_numbers(found)
+    if path is not None:
+        document["file"] = str(path)
+    written = [] if path is None else [f"written: {path}"]
+    reason = None if found.stiffness_max == found.stiffness_max else NO_WALL
+    if path is not None:
+        _write(path, found, document | ({} if reason is None else {"reason": reason}), window)
+
+    def pages() -> list[Any]:
+        return [heading(question, device), sheet([*rows(common), *more_rows(found)]), *written]
+
+    return deliver(Answer(document, pages, reason), as_json)
+
+
+def _charted(question: Question, device: Device) -> MeasuredChart:
+    from zwidth.chart.measured import measured_chart
+
+    question.as_measured(device)
+    assert device.response is not None
+    with computing(question):
+        return measured_chart(device.response, device.controller)
+
+
+def _write(path: Path, chart: MeasuredChart, document: dict[str, Any], window: Window | None) -> None:
+    if path.suffix.lower() in DATA:
+        write_data(path, document, table(chart))
+        return
+    from zwidth.show.figures.measured import draw_measured_chart
+    from zwidth.show.figures.style import figure, save
+
+    drawing, ax = figure()
+    draw_measured_chart(ax, chart, window=window)
+    with replacing(path) as draft:
+        save(drawing, draft)
+
+
+def more_numbers(chart: MeasuredChart) -> dict[str, Any]:
+    """The keys of --json that only a measured device has."""
+    band = chart.band
+    return {
+        "integrators": chart.integrators,
+        "measurement": chart.loop.response.note or None,
+        "measured_stiffness_max_N_per_m": chart.measured_stiffness_max,
+        "interpolation_error": chart.interpolation_error,
+        "band": band
+        and {
+            "stiffness_low_N_per_m": band.stiffness_low,
+            "stiffness_high_N_per_m": band.stiffness_high,
+            "meaning": band.meaning,
+            "regions": list(band.regions),
+        },
+        "stiffness_max_of_sweeps_N_per_m": chart.stiffness_max_of_sweeps or None,
+        "unusable": [
+            {"low_Hz": s.low, "high_Hz": s.high, "reason": s.reason, "on_edge": s.on_edge} for s in chart.unusable
+        ],
+        "closed": not chart.open,
+    }
+
+
+def arcs(chart: MeasuredChart) -> list[dict[str, Any]]:
+    """The boundary's measured points, with the extent of the band at each."""
+    return [
+        {
+            "stiffness_N_per_m": arc.stiffness,
+            "damping_Ns_per_m": arc.damping,
+            "frequency_Hz": arc.frequency,
+            "stiffness_low_N_per_m": arc.stiffness_low,
+            "stiffness_high_N_per_m": arc.stiffness_high,
+        }
+        for arc in chart.boundary
+    ]
+
+
+def table(chart: MeasuredChart) -> dict[str, list[Any]]:
+    """The same as columns, arcs one after another and counted from 0."""
+    found = arcs(chart)
+    columns: dict[str, list[Any]] = {"arc": [n for n, arc in enumerate(found) for _ in arc["frequency_Hz"]]}
+    for key in found[0] if found else ():
+        columns[key] = list(
+            chain.from_iterable(
+                [None] * len(arc["frequency_Hz"]) if arc[key] is None else arc[key] for arc in found
+            )
+        )
+    return columns
+
+
+def more_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
+    """Rows for people, below those of every chart."""
+    if chart.band is not None:
+        low, high = amount(chart.band.stiffness_low, "N/m"), amount(chart.band.stiffness_high, "N/m")
+        yield "largest stiffness from", f"{low} to {high} within {chart.band.meaning}"
+    if chart.stiffness_max_of_sweeps:
+        yield "in the single sweeps", ", ".join(amount(K, "N/m") for K in chart.stiffness_max_of_sweeps)
+    response = chart.loop.response
+    kept, given = len(chart.loop.angles), len(response.frequency)
+    measured = f"{kept} of {given} frequencies used, {chart.integrators} integrators"
+    yield "measured", f"{measured}; {response.note}" if response.note else measured
+    for stretch in chart.unusable:
+        yield "not to be relied on", told(stretch)
+    if chart.open:
+        yield "WARNING", "the measured edge does not close round the stable walls; some of them may be unstable"
+
+
+def told(stretch: Stretch) -> str:
+    """A stretch in words."""
+    where = "; the edge of the stable walls runs through it" if stretch.on_edge else ""
+    return f"{stretch.low:.6g} to {stretch.high:.6g} Hz: {stretch.reason}{where}"
+
+
+def judged(question: Question, device: Device, walls: Walls) -> list[dict[str, Any]]:
+    """One entry per wall, as `zwidth check` gives it; the spectral radius is not known without a model."""
+    found = _charted(question, device).check([K for K, _ in walls], [B for _, B in walls])
+    return [
+        {
+            "stiffness_N_per_m": K,
+            "damping_Ns_per_m": B,
+            "verdict": verdict,
+            "spectral_radius": None,
+            "frequency_Hz": frequency,
+            "roots_outside": outside,
+        }
+        for (K, B), verdict, frequency, outside in zip(
+            walls, found.names, found.frequency.tolist(), found.outside.tolist(), strict=True
+        )
+    ]
