@@ -12,6 +12,7 @@ each moves less than half of the way to its neighbour, also where two of them me
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,8 @@ NARROWEST = 1e-8
 # Largest distance of a chord from its curve, in shares of the chord.
 SAG = 0.02
 ROUNDS = 24
+# Angles beyond which no more are added: what still bends then is rounding.
+MOST = 20000
 
 
 @dataclass(frozen=True)
@@ -59,15 +62,16 @@ class Loci:
     def at(self, branch: int, thetas: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """K, B, dK/dtheta, dB/dtheta (k,) on a branch at angles in (0, pi)."""
         z, d = on_circle(thetas)
-        P, dP = self.loop.plant_slope(z, d)
-        g, right = np.linalg.eig(P)
         expected = np.interp(thetas, self.thetas, self.g[:, branch])
-        own = np.argmin(np.abs(g - expected[:, None]), axis=-1)
-        row, each = np.linalg.inv(right), np.arange(len(own))
-        dg = np.einsum("ki,kij,kj->k", row[each, own], dP, right[each, :, own])
+        g, dg = _nearest(*self.loop.plant_slope(z, d), expected)
+        h, dh = -1.0 / g, dg / g**2
+        if self.loop.count > 1:
+            small = _small(np.abs(self.g))[np.searchsorted(self.thetas, thetas).clip(0, len(self.g) - 1), branch]
+            with suppress(np.linalg.LinAlgError):
+                inverse, slope = _nearest(*self.loop.inverse_slope(z, d), 1.0 / expected)
+                h, dh = np.where(small, -inverse, h), np.where(small, -slope, dh)
         w, dw = self.loop.estimator.response(z, d)
-        h = -1.0 / g[each, own]
-        dh, dw = 1j * z * dg * h * h, 1j * z * dw
+        dh, dw = 1j * z * dh, 1j * z * dw
         B = h.imag / w.imag
         dB = (dh.imag - B * dw.imag) / w.imag
         return h.real - B * w.real, B, dh.real - dB * w.real - B * dw.real, dB
@@ -87,9 +91,33 @@ def _walls(g: Complexes, w: Complexes) -> Floats:
         return np.stack([h.real - B * w.real, B], axis=-1)
 
 
+def _nearest(matrix: Complexes, slope: Complexes, expected: Complexes) -> tuple[Complexes, Complexes]:
+    """The eigenvalue (k,) of matrices (k, m, m) nearest what is expected, and its derivative."""
+    values, right = np.linalg.eig(matrix)
+    own, each = np.argmin(np.abs(values - expected[:, None]), axis=-1), np.arange(len(expected))
+    row = np.linalg.inv(right)[each, own]
+    return values[each, own], np.einsum("ki,kij,kj->k", row, slope, right[each, :, own])
+
+
+def _small(size: Floats) -> NDArray[np.bool_]:
+    """Which of the eigenvalues' sizes (k, m) lie below the geometric mean of the largest and the smallest."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(size < np.sqrt(size.max(axis=-1) * size.min(axis=-1))[:, None])
+
+
 def eigenvalues_of_plant(loop: MultiLoop, thetas: Floats) -> Complexes:
-    """Eigenvalues (N, m) of P(exp(i theta)), in no order."""
-    return np.asarray(np.linalg.eigvals(loop.plant_slope(*on_circle(thetas))[0]), dtype=complex)
+    """Eigenvalues (N, m) of P(exp(i theta)), in no order: large ones from P, small ones from its inverse."""
+    z, d = on_circle(thetas)
+    g = np.asarray(np.linalg.eigvals(loop.plant_slope(z, d)[0]), dtype=complex)
+    if loop.count == 1:
+        return g
+    try:
+        inverse = np.linalg.eigvals(loop.inverse_slope(z, d)[0])
+    except np.linalg.LinAlgError:
+        return g
+    g = np.take_along_axis(g, np.argsort(np.abs(g), axis=-1), axis=-1)
+    inverse = np.take_along_axis(inverse, np.argsort(-np.abs(inverse), axis=-1), axis=-1)
+    return np.where(_small(np.abs(g)) & (inverse != 0.0), 1.0 / np.where(inverse == 0.0, 1.0, inverse), g)
 
 
 def trace_loci(loop: MultiLoop) -> Loci:
@@ -101,7 +129,7 @@ def trace_loci(loop: MultiLoop) -> Loci:
         middles = 0.5 * (thetas[1:] + thetas[:-1])
         wide = np.diff(thetas) > NARROWEST * middles
         middles = middles[wide & (_ambiguous(loci.g) | _bent(loci))]
-        if not len(middles):
+        if not len(middles) or len(thetas) > MOST:
             break
         thetas, g = _merged(loci.thetas, loci.g, middles, eigenvalues_of_plant(loop, middles))
     return Loci(loop, thetas, _followed(g))
@@ -129,7 +157,7 @@ def refine_loci(loci: Loci, low: Floats, high: Floats, tolerance: float) -> Loci
         keep = np.ones(len(thetas), dtype=bool)
         keep[at[~loose]] = False
         loci = Loci(loci.loop, thetas[keep], found.g[keep])
-        if not loose.any():
+        if not loose.any() or len(loci.thetas) > MOST:
             return loci
     return loci
 
@@ -213,5 +241,5 @@ def features(loop: MultiLoop) -> Complexes:
     share = w[turns] / (w[turns] - w[turns + 1])
     in_phase = np.exp(1j * (thetas[turns] + share * (thetas[1] - thetas[0])))
     poles = [1.0 + np.linalg.eigvals(matrix) for matrix in (held.step, estimator.A, force.A)]
-    points = np.concatenate([*poles, 1.0 + zeros[np.isfinite(zeros)], in_phase]).astype(complex)
+    points: Complexes = np.concatenate([*poles, 1.0 + zeros[np.isfinite(zeros)], in_phase]).astype(complex)
     return points[(points.imag >= -1e-12) & (np.abs(points) < 1e6)]

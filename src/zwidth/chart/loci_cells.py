@@ -143,7 +143,7 @@ def cut_lines(loci: Loci, lines: list[Line], low: Floats, high: Floats) -> list[
     pieces: list[shapely.Geometry] = [box.exterior]
     for i in range(walls.shape[1]):
         for part in _runs(_with_ends(loci.thetas, walls[:, i]), low, high):
-            pieces.append(shapely.intersection(shapely.LineString(part), box))
+            pieces.append(shapely.clip_by_rect(shapely.LineString(part), *low, *high))
     span = float(np.hypot(*(high - low)))
     middle = 0.5 * (low + high)
     for line in lines:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.loop.controller import Controller
-from zwidth.loop.hold import UnmovedError
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_hold import Held, Motion, hold, moved
+from zwidth.loop.sections import UnmovedError
 from zwidth.loop.series import Series, series
 from zwidth.model.directions import MultiPlant
 from zwidth.model.plant import Plant
@@ -70,7 +70,7 @@ class MultiLoop:
     @cached_property
     def held(self) -> Held:
         """The plant from sample to sample."""
-        lag = getattr(self.controller, "actuator_time_constant", 0.0)
+        lag = self.controller.actuator_time_constant
         return hold(self.motion, self.period, self.fractional_delay, lag)
 
     @cached_property
@@ -82,8 +82,6 @@ class MultiLoop:
     @cached_property
     def force_filter(self) -> Series:
         """F(z), what the force of each direction passes before the hold."""
-        if getattr(self.controller, "force_filter", None) is None:
-            return series(np.empty((0, 3)), np.empty((0, 3)), np.ones(1))
         without = Controller(self.period, force_filter=self.controller.force_filter)
         own = _stand_in(without).force_path
         return series(own.numerator, own.denominator, np.ones(1))
@@ -112,6 +110,29 @@ class MultiLoop:
         dgain = (dF / z**self.whole_delay)[..., None, None] - self.whole_delay * gain / at
         P, dP = held.reading @ inner, held.reading @ slope
         return gain * P, gain * dP + dgain * P
+
+    def inverse_slope(self, z: Complexes, d: Complexes) -> tuple[Complexes, Complexes]:
+        """P^-1 and its derivative, (..., m, m), without forming P: near z = 1 a free motion's 1/d^2 hides others.
+
+        The forces f that give the readings y solve  [d - A, -G; C, 0] [x; f] = [0; y].
+        Raises LinAlgError where the readings are not independent.
+        """
+        held, at, m = self.held, z[..., None, None], self.count
+        N = len(held.step)
+        whole = np.zeros((*z.shape, N + m, N + m), dtype=complex)
+        whole[..., :N, :N] = d[..., None, None] * np.eye(N) - held.step
+        whole[..., :N, N:] = -(held.new + held.old / at)
+        whole[..., N:, :N] = held.reading
+        wanted = np.zeros((*z.shape, N + m, m), dtype=complex)
+        wanted[..., N:, :] = np.eye(m)
+        found = np.linalg.solve(whole, wanted)
+        change = np.zeros_like(wanted)
+        change[..., :N, :] = -found[..., :N, :] - (held.old / at**2) @ found[..., N:, :]
+        slope = np.linalg.solve(whole, change)[..., N:, :]
+        F, dF = self.force_filter.response(z, d)
+        lead = (z**self.whole_delay / F)[..., None, None]
+        dlead = lead * (self.whole_delay / z - dF / F)[..., None, None]
+        return lead * found[..., N:, :], lead * slope + dlead * found[..., N:, :]
 
     @cached_property
     def affine(self) -> tuple[Floats, Floats, Floats, Floats]:
