@@ -12,16 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.band import Band, uncertainty
 from zwidth.chart.chart import _cut
-from zwidth.chart.measured_cells import Cells, cells_within, edges_stable_set, window
+from zwidth.chart.measured_cells import CHORD, Cells, cells_within, edges_stable_set, window
 from zwidth.chart.measured_curve import Boundary, Box, boundary, coarse, real_root
 from zwidth.chart.measured_loop import MeasuredLoop
 from zwidth.chart.measured_verdict import MeasuredVerdicts, judge_measured
 from zwidth.chart.trust import Stretch
+from zwidth.chart.verdict import UNDECIDED
 from zwidth.loop.controller import Controller
 from zwidth.model.response import Response, ResponseError
 
 Floats = NDArray[np.float64]
 
+BEGINNING = 1e-6  # of a chord: near enough to the measured point at its beginning
 ZOOMED = 2e-8  # of the stiffest wall: chords in the window round it
 FEWEST_ON_EDGE = 3  # measured frequencies, without which the edge is guesswork
 
@@ -52,7 +54,8 @@ class MeasuredChart:
     band                  walls whose verdict the measurement's error leaves open; None where no error is known
     stiffness_max_of_sweeps  of each repeated sweep by itself [N/m]; () for one measurement
     unusable              stretches of frequency that cannot be relied on
-    open                  whether some edge of a stable region is missing: it ends at a window not its own
+    open                  whether the edge does not close, for lack of data: regions then end at a window not their
+                          own, and what would be read off them is nan
     integrators           poles of the response at z = 1
     """
 
@@ -82,10 +85,12 @@ class MeasuredChart:
 
     @property
     def box(self) -> Box:
-        """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
+        """KMIN, KMAX, BMIN, BMAX of the regions (or the measured points, if they are open) and 5 %."""
         if not self.regions:
             return 0.0, 1.0, 0.0, 1.0
-        walls = np.vstack(self.regions)
+        inner = [arc for arc in self.boundary if 0.0 < arc.frequency[0] < 0.5 / self.loop.period]
+        points = np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in inner])
+        walls = points if self.open else np.vstack(self.regions)
         low, high = walls.min(axis=0), walls.max(axis=0)
         (K0, B0), (K1, B1) = low - 0.05 * (high - low), high + 0.05 * (high - low)
         return float(K0), float(K1), float(B0), float(B1)
@@ -119,10 +124,6 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
     if cells is None:
         return _empty(loop)
     chart = _chart(loop, cells, not closed)
-    if sum(len(arc.frequency) for arc in chart.boundary if 0.0 < arc.frequency[0] < 0.5 / loop.period) < (
-        FEWEST_ON_EDGE
-    ):
-        raise ResponseError(_nothing_near(loop))
     if response.sweeps is None:
         return chart
     each = [measured_chart(_single(response, k), controller).stiffness_max for k in range(len(response.sweeps))]
@@ -132,6 +133,22 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
 def _single(response: Response, sweep: int) -> Response:
     assert response.sweeps is not None
     return replace(response, value=response.sweeps[sweep], sweeps=None, coherence=None)
+
+
+def _credible(loop: MeasuredLoop, cells: Cells) -> Cells:
+    """The cells that are not made by noise: loops of the curve between a few points, or all in doubt."""
+    K0, K1, B0, B1 = cells.box
+    scale = np.array([K1 - K0, B1 - B0])
+    K, B, _ = loop.walls(loop.inner)
+    points = shapely.points(np.column_stack([K, B]) / scale)
+    kept = []
+    for cell in cells.polygons:
+        unit = shapely.transform(cell, lambda xy: xy / scale)
+        on_it = np.count_nonzero(shapely.distance(unit.boundary, points) < 10.0 * CHORD)
+        deepest = shapely.get_coordinates(shapely.maximum_inscribed_circle(unit))[0] * scale
+        doubtful = judge_measured(loop, cells.edge, *deepest).verdict == UNDECIDED
+        kept.append(on_it >= FEWEST_ON_EDGE and not doubtful)
+    return cells.only(np.array(kept, dtype=bool))
 
 
 def _cells(loop: MeasuredLoop) -> tuple[Cells | None, bool]:
@@ -147,7 +164,15 @@ def _cells(loop: MeasuredLoop) -> tuple[Cells | None, bool]:
         K0, K1, B0, B1 = box
         box = (K0 - (K1 - K0), K1 + (K1 - K0), B0 - (B1 - B0), B1 + (B1 - B0))
         cells = cells_within(loop, known, box)
-    return (cells if cells.polygons else None), not cells.open
+    credible = _credible(loop, cells)
+    if 0 < len(credible.polygons) < len(cells.polygons):
+        low_K, low_B, high_K, high_B = shapely.union_all(credible.polygons).bounds
+        room_K, room_B = 0.1 * (high_K - low_K), 0.1 * (high_B - low_B)
+        near = (low_K - room_K, high_K + room_K, low_B - room_B, high_B + room_B)
+        credible = _credible(loop, cells_within(loop, known, near))
+    if cells.polygons and not credible.polygons:
+        raise ResponseError(_nothing_near(loop))
+    return (credible if credible.polygons else None), not credible.open
 
 
 def _empty(loop: MeasuredLoop) -> MeasuredChart:
@@ -171,7 +196,7 @@ def _nothing_near(loop: MeasuredLoop) -> str:
 def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
     """The chart from its cells."""
     quadrant = [cell for cell in map(_in_quadrant, cells.polygons) if not cell.is_empty]
-    peak, zoomed = _peak(loop, cells, quadrant)
+    peak, zoomed = ((nan, nan), cells) if opened else _peak(loop, cells, quadrant)
     arcs = tuple(_arcs(loop, cells))
     points = [(K, B) for arc in arcs for K, B in zip(arc.stiffness, arc.damping, strict=True)]
     angles = _angles_at(loop, zoomed, peak)
@@ -186,11 +211,11 @@ def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
         stiffness_max=peak[0],
         damping_at_stiffness_max=peak[1],
         frequencies_at_stiffness_max=tuple(a / (2.0 * np.pi * loop.period) for a in angles),
-        damping_max=_largest_damping(loop, cells),
-        stable_area=float(sum(cell.area for cell in quadrant)),
+        damping_max=nan if opened else _largest_damping(loop, cells),
+        stable_area=nan if opened else float(sum(cell.area for cell in quadrant)),
         interpolation_error=float(np.max(errors, initial=0.0) / peak[0]) + ZOOMED,
         measured_stiffness_max=max((K for K, B in points if K > 0.0 and B >= 0.0), default=nan),
-        band=uncertainty(loop, cells),
+        band=None if opened else uncertainty(loop, cells),
         stiffness_max_of_sweeps=(),
         unusable=tuple(_told(loop, cells)),
         open=opened,
@@ -288,7 +313,7 @@ def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
     at = np.searchsorted(edge.angles, measured)
     known = first[at] >= 0
     on = np.zeros(len(at), dtype=bool)
-    on[known] = edges_stable_set(edge, first[at[known]], scale)
+    on[known] = edges_stable_set(edge, first[at[known]], scale, BEGINNING)
     numbers = np.flatnonzero(on)
     for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else []:
         theta = measured[run]

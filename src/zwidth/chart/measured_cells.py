@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -35,6 +35,10 @@ class Cells:
     box: Box
     edge: Boundary
     polygons: tuple[shapely.Polygon, ...]
+
+    def only(self, kept: Flags) -> Cells:
+        """Some of these cells."""
+        return replace(self, polygons=tuple(cell for cell, keep in zip(self.polygons, kept, strict=True) if keep))
 
     @property
     def open(self) -> bool:
@@ -82,17 +86,19 @@ def _chords(edge: Boundary, low: Floats, scale: Floats) -> list[shapely.Geometry
     return [line for line in clipped if not line.is_empty]
 
 
-def edges_stable_set(edge: Boundary, which: Whole, scale: Floats) -> Flags:
+def edges_stable_set(edge: Boundary, which: Whole, scale: Floats, share: float = 0.5) -> Flags:
     """Whether the chords `which` (indices into the segments, of the curve) have stable walls on their inner side.
 
     scale  (2,) what counts as one unit of K and of B
+    share  of each chord at which its side is asked
     """
     segments = edge.segments[which] / np.concatenate([scale, scale])
     along = segments[:, 2:] - segments[:, :2]
     length = np.maximum(np.hypot(*along.T), 1e-300)
     left = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
     aside = BESIDE * np.minimum(length, 1.0) * np.where(edge.jumps[which] < 0, 1.0, -1.0)
-    middle = 0.5 * (segments[:, 2:] + segments[:, :2])
+    aside *= 2.0 * share
+    middle = segments[:, :2] + share * along
     return np.asarray(edge.outside((middle + aside[:, None] * left) * scale) == 0)
 
 

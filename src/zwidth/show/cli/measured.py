@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from zwidth.show.cli.options import Question
     from zwidth.show.cli.points import Walls
 
+OPEN: Final = (
+    "the measured edge does not close round the stable walls: frequencies are missing; measure up to half the "
+    "sampling rate"
+)
 NO_MODEL: Final = (
     "a measured response has no masses, stiffnesses, modes or postures to show; `zwidth chart` and `zwidth check` "
     "answer for it, a [plant] or [mechanism] answers the rest"
@@ -41,7 +45,7 @@ def answer_chart(
     if path is not None:
         document["file"] = str(path)
     written = [] if path is None else [f"written: {path}"]
-    reason = None if found.stiffness_max == found.stiffness_max else NO_WALL
+    reason = None if found.stiffness_max == found.stiffness_max else OPEN if found.open else NO_WALL
     if path is not None:
         _write(path, found, document | ({} if reason is None else {"reason": reason}), window)
 
@@ -136,8 +140,6 @@ def more_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
     yield "measured", f"{measured}; {response.note}" if response.note else measured
     for stretch in chart.unusable:
         yield "not to be relied on", told(stretch)
-    if chart.open:
-        yield "WARNING", "the measured edge does not close round the stable walls; some of them may be unstable"
 
 
 def told(stretch: Stretch) -> str:
