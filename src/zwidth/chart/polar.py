@@ -1,0 +1,110 @@
+"""The largest stiffness against direction: many rendered directions of one posture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.chart.chart import largest_stiffness
+from zwidth.chart.region import ChartError
+from zwidth.loop.controller import Controller
+from zwidth.loop.loop import Loop
+from zwidth.loop.sections import UnmovedError
+from zwidth.model.damping import Damping
+from zwidth.model.mechanism import Mechanism
+from zwidth.model.posture import Posture
+from zwidth.model.reduction import DirectionError, Model, ModelError, reduce_mechanism
+
+Floats = NDArray[np.float64]
+
+OK, NO_WALL = "ok", "no stable wall"
+
+
+@dataclass(frozen=True)
+class ByDirection:
+    """The stiffest wall along each of k directions.
+
+    directions  (k, 3)  unit vectors
+    stiffness   (k,)    largest K with K > 0, B >= 0 [N/m]; nan where there is none
+    damping     (k,)    B there [N s/m]
+    frequency   (k,)    of the vibration there, the lower one at a corner [Hz]
+    status      (k,)    "ok", "no stable wall", or why the direction has no answer
+    """
+
+    directions: Floats
+    stiffness: Floats
+    damping: Floats
+    frequency: Floats
+    status: tuple[str, ...]
+
+
+def circle(count: int, first: ArrayLike = (1.0, 0.0, 0.0), second: ArrayLike = (0.0, 1.0, 0.0)) -> Floats:
+    """Unit vectors (count, 3) all round the plane of two orthonormal axes, counter-clockwise from the first.
+
+    >>> circle(4)[1]
+    array([0., 1., 0.])
+    """
+    angles = 2.0 * np.pi * np.arange(count)[:, None] / count
+    turned = np.cos(angles) * np.asarray(first, float) + np.sin(angles) * np.asarray(second, float)
+    return np.round(turned, 15) + 0.0  # what rounding leaves of a zero is none
+
+
+def largest_stiffness_by_direction(
+    mechanism: Mechanism,
+    posture: Posture,
+    directions: ArrayLike,
+    controller: Controller,
+    model: Model,
+    damping: Damping,
+) -> ByDirection:
+    """The largest stiffness along each direction, each traced exactly as `largest_stiffness` does.
+
+    A direction and its opposite render the same walls: actuator and sensor both change sign, the loop does not.
+    Each such pair is computed once. A direction that has no answer is data: nan, and a status that says why.
+
+    posture     a single one, OK
+    directions  (k, 3)  of any length but zero
+    Raises      ValueError  for a direction without length, an unknown model, a posture that is not a single OK one
+    """
+    given = np.atleast_2d(np.asarray(directions, dtype=float))
+    length = np.linalg.norm(given, axis=1, keepdims=True)
+    if given.shape[1] != 3 or not (length > 0.0).all():
+        raise ValueError("directions must be an array (k, 3) of vectors that have a length")
+    units = given / length
+    results: dict[tuple[float, ...], tuple[float, float, float, str]] = {}
+    rows = []
+    for unit in units:
+        key = _either_way(unit)
+        if key not in results:
+            results[key] = _stiffest(mechanism, posture, unit, controller, model, damping)
+        rows.append(results[key])
+    stiffness, damper, frequency, status = zip(*rows, strict=True)
+    return ByDirection(units, np.array(stiffness), np.array(damper), np.array(frequency), status)
+
+
+def _either_way(unit: Floats) -> tuple[float, ...]:
+    """One name for a direction and its opposite."""
+    rounded = np.round(unit, 13) + 0.0
+    lead = next(x for x in rounded if x != 0.0)
+    return tuple((rounded * np.sign(lead) + 0.0).tolist())
+
+
+def _stiffest(
+    mechanism: Mechanism, posture: Posture, unit: Floats, controller: Controller, model: Model, damping: Damping
+) -> tuple[float, float, float, str]:
+    """Stiffness, damping, frequency and status along one direction."""
+    none = float("nan")
+    try:
+        loop = Loop(reduce_mechanism(mechanism, posture, unit, model, damping), controller)
+        peak = largest_stiffness(loop)
+    except (DirectionError, UnmovedError):
+        return none, none, none, "the handle cannot move along the direction"
+    except ModelError as error:
+        return none, none, none, str(error)
+    except ChartError as error:
+        return none, none, none, f"undecided: {error}"
+    if peak is None:
+        return none, none, none, NO_WALL
+    return peak.stiffness, peak.damping, min(peak.angles) / (2.0 * np.pi * loop.period), OK
