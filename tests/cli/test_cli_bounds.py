@@ -57,7 +57,7 @@ def test_left_out_the_damping_is_that_of_the_stiffest_wall(device):
     assert document["decided"] is True
 
 
-@pytest.mark.parametrize("damping", [-1.0, 0.1, 2.0, 9.0, 20.0, 28.0])
+@pytest.mark.parametrize("damping", [-1.0, 0.5, 2.0, 9.0, 20.0, 28.0])
 def test_the_exact_answer_at_a_damping_is_the_edge(damping):
     """By eigenvalues: a hair less stiff is stable, a hair stiffer is not; on the two-mass plant of the thesis."""
     exact = found("bounds", TWO_MASS, "--damping", damping)["exact_N_per_m"]
@@ -66,7 +66,7 @@ def test_the_exact_answer_at_a_damping_is_the_edge(damping):
         return
     verdicts = [
         found("check", TWO_MASS, "--stiffness", K, "--damping", damping)["points"][0]["verdict"]
-        for K in (exact * (1.0 - 1e-6), exact * (1.0 + 1e-6))
+        for K in (exact * (1.0 - 1e-5), exact * (1.0 + 1e-5))
     ]
     assert verdicts == ["stable", "unstable"]
 
@@ -114,7 +114,7 @@ def test_no_stable_wall_is_an_answer():
     assert "exact, largest" in zwidth("bounds", TWO_MASS, *words).out
 
 
-def test_a_chart_that_cannot_be_drawn_leaves_the_table(monkeypatch):
+def test_a_chart_that_cannot_be_drawn_leaves_the_table(monkeypatch, tmp_path):
     def undecided(*_, **__):
         from zwidth.chart.region import ChartError
 
@@ -127,6 +127,7 @@ def test_a_chart_that_cannot_be_drawn_leaves_the_table(monkeypatch):
     assert document["exact_N_per_m"] is document["exact_largest_N_per_m"] is None
     assert by_name(document)["rigid mass"]["stiffness_max_N_per_m"] > 0.0
     assert found("bounds", TWO_MASS)["damping_Ns_per_m"] == 0.0
+    assert found("bounds", TWO_MASS, "--output", tmp_path / "bounds.svg")["decided"] is False
     ran = zwidth("bounds", TWO_MASS)
     assert "undecided: the edge cannot be closed" in ran.out
     assert ran.code == 0

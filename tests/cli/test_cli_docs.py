@@ -79,6 +79,8 @@ def test_the_keys_that_come_out_are_those_explained(folder):
     for device in (MECHANISM, TWO_MASS):
         assert set(found("show", device)) - asked == keys("show")
         assert set(found("chart", device)) - asked == keys("chart")
+    told = found("bounds", TWO_MASS)
+    assert set(told) - asked | set(told["bounds"][0]) == keys("bounds") - {"undecided"}
     document = found("check", TWO_MASS, "--points", "walls.csv")
     assert set(document) - asked == {"points"}
     assert set(document["points"][0]) | {"points"} >= keys("check")

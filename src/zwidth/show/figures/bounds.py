@@ -15,9 +15,10 @@ from zwidth.show.figures.style import BLACK, LINES, STABLE, legend_above
 
 
 def draw_bounds(ax: Axes, bounds: Iterable[Bound], chart: StabilityChart | None) -> None:
-    """The stable walls with K, B >= 0, and the line of each condition that has one; legend says which to trust.
+    """The stable walls with K, B >= 0, and the line of each condition that has one.
 
-    Conditions that say the same are drawn once. Lines may leave the view, which is that of the exact chart.
+    The legend says which of them assume what is not so. Conditions that say nearly the same (2 % of the view) are
+    drawn once, under the name of the first. The view is that of the exact chart.
 
     chart  None: only the conditions, over the dampings at which they admit stiffness
     """
@@ -32,12 +33,13 @@ def draw_bounds(ax: Axes, bounds: Iterable[Bound], chart: StabilityChart | None)
     drawn: list[np.ndarray] = []
     for bound in lines:
         stiffness = bound.stiffness_max_at(dampings)
-        stiffness = np.where(stiffness > 0.0, stiffness, np.nan)
+        # what is out of view is drawn at its border, and told apart from nothing else there
+        stiffness = np.where(stiffness > 0.0, np.minimum(stiffness, 1.01 * top[0]), np.nan)
         if not np.any(np.isfinite(stiffness)) or any(_same(stiffness, other, top[0]) for other in drawn):
             continue
         colour, dashes = LINES[1:][len(drawn) % (len(LINES) - 1)]
         wide = 2.2 if len(drawn) >= len(LINES) - 1 else 1.4
-        text = bound.name if bound.holds else f"{bound.name} (assumes what is not so)"
+        text = bound.name if bound.holds else f"{bound.name} (assumptions broken)"
         ax.plot(stiffness, dampings, color=colour, linestyle=dashes, linewidth=wide, label=text)
         drawn.append(stiffness)
     frame(ax, (0.0, top[0], 0.0, top[1]), empty=chart is not None and not chart.regions)
@@ -54,7 +56,7 @@ def _highest(bounds: list[Bound], chart: StabilityChart | None) -> tuple[float, 
 
 
 def _same(one: np.ndarray, other: np.ndarray, scale: float) -> bool:
-    """Would the two lines lie over each other?"""
+    """Would the two lines all but lie over each other?"""
     apart = np.abs(one - other)
     alike = np.isfinite(one) == np.isfinite(other)
-    return bool(np.all(alike) and np.nanmax(apart, initial=0.0) < 2e-3 * scale)
+    return bool(np.all(alike) and np.nanmax(apart, initial=0.0) < 0.02 * scale)
