@@ -104,7 +104,7 @@ def test_all_sections_are_there(written):
     headings = ["Which walls it renders", "What limits it", "What simpler models say", "The device",
                 "What published conditions say", "Where the numbers come from"]  # fmt: skip
     if found["stiffness_max_N_per_m"] is not None:
-        headings += ["At which vibration it fails", "How fast it comes to rest"]
+        headings += ["At which vibration it fails", "How fast it comes to rest", "What to change first"]
     shown = Page(text).text
     assert [heading for heading in headings if heading not in shown] == []
     for entry in found["bounds"]:
@@ -124,12 +124,34 @@ def test_the_numbers_of_the_published_plant(tmp_path):
     assert gains["no-delay"] is None
 
 
+def test_the_numbers_of_what_to_change_is_felt_and_may_be_simplified(tmp_path):
+    found = write_report(load("published-two-mass"), tmp_path / "a.html")
+    first = found["sensitivities"][0]
+    assert first["path"] == "loop.sampling_period_s"
+    assert first["d_ln_stiffness_max_d_ln_value"] == pytest.approx(-2.8504059866, abs=1e-8)
+    K, k = found["stiffness_max_N_per_m"], 15620.0
+    assert found["static_stiffness_at_stiffness_max_N_per_m"] == pytest.approx(K * k / (K + k), rel=1e-9)
+    assert found["static_stiffness_limit_N_per_m"] == pytest.approx(k, rel=1e-9)
+    models = {entry["key"]: entry for entry in found["models"]["within"]}
+    assert found["models"]["tolerance"] == 0.1
+    assert found["models"]["first_natural_frequency_Hz"] == pytest.approx(130.727, abs=1e-3)
+    assert models["rigid"]["frequency_ranges_Hz"][0][1] == pytest.approx(20.29, abs=0.01)
+    # the figures are there, and only where they say something
+    text = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert all(f'<figure id="{name}">' in text for name in ("felt", "answers", "fits"))
+    write_report(load("hapkit-course"), tmp_path / "a.html")
+    text = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert [name for name in ("felt", "answers", "fits") if f'<figure id="{name}">' in text] == ["answers"]
+
+
 def test_nothing_stable_has_a_reason_and_nulls(tmp_path):
     found = write_report(load("published-two-mass", EMPTY), tmp_path / "a.html")
     assert found["stiffness_max_N_per_m"] is None
     assert found["damping_at_stiffness_max_Ns_per_m"] is None
     assert found["reason"]
     assert found["stable_area_N2s_per_m2"] == 0.0
+    assert found["sensitivities"] == []
+    assert found["static_stiffness_at_stiffness_max_N_per_m"] is None
 
 
 def test_names_cannot_do_harm(tmp_path):

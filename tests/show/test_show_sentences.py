@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from zwidth.device.load import from_document, load
 from zwidth.show.motions import counted
-from zwidth.show.report import sentences
+from zwidth.show.report import answers, sentences
 from zwidth.show.report.facts import gather
 
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"
@@ -276,3 +278,110 @@ def test_the_summary_leads_with_what_and_why():
     assert said[0] == sentences.renders(facts("five-bar"))
     assert said[1] == sentences.limit(facts("five-bar"))
     assert all(sentence.endswith(".") for sentence in said)
+
+
+FIRST = [
+    (
+        lambda: facts("five-bar"),
+        "What to change first is loop.sampling_period_s: 1 % less of it gives 2.7 % more stiffness, 209 N/m; then "
+        "mechanism.links.upper-left.length_m (1 % less gives 1.6 %) and mechanism.links.upper-right.length_m "
+        "(1 % less gives 1.6 %).",
+    ),
+    (
+        lambda: facts("five-bar", LATE),
+        "What to change first is mechanism.drives.motor-left.transmission_ratio: 1 % more of it gives 1.8 %",
+    ),
+    (
+        lambda: facts("published-two-mass"),
+        "What to change first is loop.sampling_period_s: 1 % less of it gives 2.9 % more stiffness, 203 N/m; then "
+        "plant.mass_kg (1 % more gives 1.2 %) and plant.stiffness_N_per_m (1 % less gives 0.65 %).",
+    ),
+    (
+        lambda: held_back(),
+        "What to change first is plant.stiffness_N_per_m: 1 % more of it gives 1.0 % more stiffness, 5.00 N/m.",
+    ),
+    (lambda: facts("published-two-mass", UNDAMPED, LATE), ""),
+]
+
+
+@pytest.mark.parametrize(("of", "text"), FIRST)
+def test_what_to_change_first(of, text):
+    said = plain(answers.first_change(of()))
+    assert said.startswith(text)
+    assert bool(said) == bool(text)
+
+
+def test_another_summit_is_spoken_of_where_it_is_near():
+    here = facts("published-two-mass")
+    assert answers.summit(here) == ""
+    for share, text in (
+        (0.85, ""),
+        (0.95, "Another summit of the edge stands at 6.77 kN/m: "),
+        (1.0, "Two walls"),
+    ):
+        of = SimpleNamespace(base=here.base, answers=replace(here.answers, rival=share * here.base.stiffness_max))
+        assert plain(answers.summit(of)).startswith(text)
+        assert bool(answers.summit(of)) == bool(text)
+
+
+FELT = [
+    (
+        lambda: facts("five-bar"),
+        "At rest the hand feels the stiffest wall with 4.71 kN/m, 60 % of its stiffness; whatever is commanded, "
+        "nothing stiffer than 11.8 kN/m can be felt.",
+    ),
+    (lambda: facts("published-two-mass"), "At rest the hand feels the stiffest wall with 4.89 kN/m, 69 % of"),
+    (lambda: facts("hapkit-course"), "Nothing gives way between the wall and the hand: at rest a wall is felt as"),
+    (lambda: facts("five-bar", model="motor-mass"), ""),
+    (lambda: facts("published-two-mass", UNDAMPED, LATE), ""),
+]
+
+
+@pytest.mark.parametrize(("of", "text"), FELT)
+def test_what_the_hand_feels(of, text):
+    said = plain(answers.felt(of()))
+    assert said.startswith(text)
+    assert bool(said) == bool(text)
+
+
+ALIKE = "within 10 % of it in stiffness, damping and frequency"
+WHICH = [
+    (
+        lambda: facts("published-two-mass"),
+        "The walls of the full model fail at up to 212 Hz, 1.6 times its first natural frequency of 131 Hz. "
+        f"There are {ALIKE}: rigid below 20.3 Hz (16 % of that); motor mass with damping above 145 Hz "
+        "(111 % of that); and nowhere motor mass without damping.",
+    ),
+    (
+        lambda: facts("five-bar", LATE),
+        "The walls of the full model fail at up to 138 Hz, 1.4 times its first natural frequency of 101 Hz. "
+        f"There are {ALIKE}: rigid below 17.5 Hz (17 % of that); two masses with damping below 9.96 Hz "
+        "(10 % of that); and nowhere motor mass with damping, motor mass without damping and two masses without "
+        "damping.",
+    ),
+    (lambda: facts("hapkit-course"), ""),
+    (lambda: facts("published-two-mass", UNDAMPED, LATE), ""),
+]
+
+
+@pytest.mark.parametrize(("of", "text"), WHICH)
+def test_which_model_where(of, text):
+    assert plain(answers.which_model(of())) == text
+
+
+def test_a_model_that_fits_everywhere_between_or_not_at_all():
+    here = facts("published-two-mass").fits
+    low, high = float(here.frequency[0]), float(here.frequency[-1])
+
+    def said(*within, natural=here.first_natural):
+        fit = replace(here.fits[0], within=within)
+        return plain(answers.which_model(SimpleNamespace(fits=replace(here, fits=(fit,), first_natural=natural))))
+
+    assert said((low, high)).endswith(f"There is {ALIKE}: rigid everywhere.")
+    assert said((3.0, 9.0)).endswith("rigid between 3.00 Hz and 9.00 Hz.")
+    assert said((low, 5.0), (150.0, high)).endswith(
+        "below 5.00 Hz (4 % of that) and above 150 Hz (115 % of that)."
+    )
+    assert said().endswith(f"None of the simpler models is {ALIKE}, at any frequency.")
+    assert "natural" not in said((low, 5.0), natural=np.nan)
+    assert said((low, 5.0), natural=np.nan).endswith("rigid below 5.00 Hz.")

@@ -37,6 +37,7 @@ NO_PROPERTY: Final = {
 }
 ZERO: Final = "0 has no logarithm; the derivative by the number itself stands beside it"
 WORTHLESS: Final = 1e-3  # a derivative with a larger estimated error, per relative change, is not given
+NOTHING: Final = 1e-8  # a sensitivity that is rounding of none
 TIE: Final = 1e-5  # relative difference of two stiffest walls that are one
 
 
@@ -97,6 +98,17 @@ class Sensitivities:
     groups: tuple[Group, ...]
     left_out: dict[str, str]
     rival: float
+
+    @property
+    def wholes(self) -> tuple[tuple[str, float], ...]:
+        """Path and logarithmic sensitivity with lists and matrices as wholes, as those who build a device think of
+        them; largest first, without those that are not known or have no influence."""
+        lists = [group for group in self.groups if "*" not in group.path]
+        members = {path for group in lists for path in group.members}
+        single = [(number.path, number.logarithmic) for number in self.numbers if number.path not in members]
+        found = [*single, *((group.path, group.logarithmic) for group in lists)]
+        told = [(path, value) for path, value in found if abs(value) > NOTHING]
+        return tuple(sorted(told, key=lambda pair: -abs(pair[1])))
 
     @property
     def tie(self) -> bool:
@@ -191,14 +203,14 @@ class _Answer:
         return Sensitivity(path, value, unit, slope.value * value, slope.value * K, slope.error * scale, side)
 
     def together(self, found: dict[str, Sensitivity]) -> Iterator[Group]:
-        """The groups of numbers. Lists and matrices are scaled as a whole: so a free plant stays free."""
+        """The groups of numbers. A plant's matrices are scaled as a whole: so a free plant stays free."""
         steps_of = {path: steps for path, steps, _ in _numbers(self.device.document)}
         for name, paths in _groups(self.device.document).items():
             parts = [found[path] for path in paths if found[path].value != 0.0]
             if len(parts) < 2:
                 continue
             total = float(sum(part.logarithmic for part in parts))
-            if "*" not in name:
+            if name.startswith("plant."):
                 scaled = self._scaling([(steps_of[part.path], part.value) for part in parts])
                 total = self._slope(scaled, 1.0, 1.0)[0].value
             yield Group(name, tuple(paths), total)

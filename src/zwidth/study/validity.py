@@ -37,6 +37,8 @@ Interval = tuple[float, float]
 TOLERANCE: Final = 0.1
 WALLS: Final = 160  # of the full model's edge that are compared; ends of intervals are closed in on between them
 NEGLIGIBLE: Final = 1e-4  # share of the edge's extent below which K or B is 0, and no relative error is one
+NEAR: Final = 0.2  # error at the same frequency below which no farther piece of a model's edge can be nearer
+CLOSE: Final = np.linspace(-1.0, 1.0, 33)
 MODELS: Final = (("rigid", "rigid"), ("motor-mass", "motor mass"), ("two-mass", "two masses"))  # simplest first
 
 
@@ -138,13 +140,20 @@ def edge_distance(walls: Floats, chart: StabilityChart) -> Floats:
 
 
 def _error(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Floats:
-    """`edge_distance`, with the model's own curve at the same frequency beside: the chords of a large chart are
-    too coarse for small walls."""
+    """`edge_distance`, but where the model's own wall at the same frequency is near, by a closer look at its curve
+    there: the chords of a large chart are too coarse for small walls."""
+    in_radians = 2.0 * pi * chart.loop.period
+    ranges = [(float(arc.frequency.min()), float(arc.frequency.max())) for arc in chart.boundary]
     best = edge_distance(walls, chart)
     for n, wall in enumerate(walls):
-        if any(arc.frequency.min() < wall[2] < arc.frequency.max() for arc in chart.boundary):
-            own = tracer.wall(2.0 * pi * chart.loop.period * wall[2])[:2]
-            best[n] = min(best[n], float(np.max(np.abs(own / wall[:2] - 1.0))))
+        for low, high in ranges:
+            if not low < wall[2] < high:
+                continue
+            off = float(np.max(np.abs(np.array(tracer.wall(in_radians * wall[2])[:2]) / wall[:2] - 1.0)))
+            if off < NEAR:
+                about = [f for f in wall[2] * (1.0 + off * CLOSE) if low < f < high]
+                own = np.array([(*tracer.wall(in_radians * f)[:2], f) for f in about])
+                best[n] = _nearest(own / wall - 1.0)
     return best
 
 

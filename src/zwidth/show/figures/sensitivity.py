@@ -11,14 +11,16 @@ from zwidth.show.units import MINUS, NONE
 from zwidth.study.sensitivity import Sensitivities
 
 
-def draw_sensitivities(ax: Axes, found: Sensitivities, top: int = 12) -> None:
+def draw_sensitivities(ax: Axes, found: Sensitivities, top: int = 12, *, wholes: bool = False) -> None:
     """Per cent of largest stiffness that one per cent more of each number gives, the most telling on top.
 
-    top  how many numbers at most; those without influence are left out
+    top     how many numbers at most; those without influence are left out
+    wholes  lists and matrices as wholes, not their elements
     """
-    shown = [n for n in found.numbers if not isnan(n.logarithmic) and n.logarithmic != 0.0][:top]
+    single = [(n.path, n.logarithmic) for n in found.numbers if not isnan(n.logarithmic) and n.logarithmic != 0.0]
+    shown = list(found.wholes if wholes else single)[:top]
     rows = list(range(len(shown), 0, -1))
-    values = [number.logarithmic for number in shown]
+    values = [value for _, value in shown]
     widest = max((abs(value) for value in values), default=1.0)
     for row, value in zip(rows, values, strict=True):
         # gains and losses differ in hatching too, for a grey print
@@ -46,7 +48,7 @@ def draw_sensitivities(ax: Axes, found: Sensitivities, top: int = 12) -> None:
         low - 0.16 * widest * (low < 0.0) - 0.02 * widest, high + 0.16 * widest * (high > 0.0) + 0.02 * widest
     )
     ax.set_ylim(0.4, len(shown) + 0.6)
-    ax.set_yticks(rows, [_short(number.path) for number in shown])
+    ax.set_yticks(rows, [_short(path) for path, _ in shown])
     ax.tick_params(axis="y", length=0.0)
     ax.spines["left"].set_visible(False)
     ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}".replace("-", MINUS))

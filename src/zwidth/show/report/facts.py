@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 from zwidth.chart.chart import StabilityChart
+from zwidth.chart.region import ChartError
 from zwidth.conditions import Bound, compare
 from zwidth.device.device import Device
 from zwidth.loop.loop import Loop
+from zwidth.measures.felt_chart import FeltChart, felt_chart
 from zwidth.model.effective import EffectiveParameters, effective_parameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import plant_effective_parameters
 from zwidth.study.hidden import hidden_instability
+from zwidth.study.sensitivity import Sensitivities, sensitivities
+from zwidth.study.validity import Validity, validity
 from zwidth.study.what_if import BASE, Variant, find, what_if
 
 
@@ -29,6 +35,7 @@ class Facts:
     natural             undamped natural frequencies of the plant [Hz]; rigid modes 0
     bounds              the published conditions on the loop
     runs_away           a motion that no wall moves grows by itself
+    asked               at, direction and assembly as they were asked for
     """
 
     device: Device
@@ -40,6 +47,7 @@ class Facts:
     natural: Floats
     bounds: tuple[Bound, ...]
     runs_away: bool
+    asked: dict[str, Any]
 
     @property
     def base(self) -> Variant:
@@ -64,6 +72,24 @@ class Facts:
     def renders(self) -> bool:
         """Is any wall with K > 0 and B >= 0 stable?"""
         return self.base.stiffness_max > 0.0
+
+    @cached_property
+    def answers(self) -> Sensitivities:
+        """How the largest stiffness answers to each number."""
+        return sensitivities(self.device, **self.asked, model=None if self.model == "full" else self.model)
+
+    @cached_property
+    def fits(self) -> Validity | None:
+        """Which simpler model holds where along the edge of the full one; None if that has no chart."""
+        try:
+            return validity(self.device, **self.asked)
+        except ChartError:
+            return None
+
+    @cached_property
+    def felt(self) -> FeltChart | None:
+        """The chart at the stiffness that the hand feels; None without a handle."""
+        return None if self.loop.plant.handle is None else felt_chart(self.chart)
 
 
 def gather(
@@ -94,4 +120,5 @@ def gather(
         natural=natural_frequencies(loop.plant),
         bounds=tuple(compare(loop)),
         runs_away=hidden_instability(loop),
+        asked={"at": at, "direction": direction, "assembly": assembly},
     )

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 
 from matplotlib.axes import Axes
 
 from zwidth.chart.chart import StabilityChart
+from zwidth.measures.felt_chart import FeltChart
 from zwidth.show.figures.decay import draw_decay_contours
+from zwidth.show.figures.felt import draw_felt_chart
 from zwidth.show.figures.frequency import draw_frequency
 from zwidth.show.figures.mechanism import draw_mechanism
 from zwidth.show.figures.plant import as_chain, draw_chain
+from zwidth.show.figures.sensitivity import draw_sensitivities
 from zwidth.show.figures.stability import draw_chart, draw_models
 from zwidth.show.figures.style import context, figure, inline_svg
+from zwidth.show.figures.validity import draw_validity
 from zwidth.show.report.facts import Facts
+from zwidth.study.validity import Validity
+
+TOP = 10  # bars of sensitivities
 
 
 def pictures(facts: Facts) -> dict[str, str]:
@@ -35,6 +43,9 @@ def pictures(facts: Facts) -> dict[str, str]:
         if chart.regions
         else "",
         "device": "",
+        "felt": _felt(facts.felt) if facts.renders else "",
+        "answers": _answers(facts),
+        "fits": _fits(facts.fits),
     }
     if facts.posture is not None and facts.direction is not None:
         posture, direction = facts.posture, facts.direction
@@ -47,6 +58,32 @@ def pictures(facts: Facts) -> dict[str, str]:
     elif (chain := as_chain(plant)) is not None:
         drawn["device"] = _svg("device", "The plant", lambda ax: draw_chain(ax, plant, chain), 2.0)
     return drawn
+
+
+def _felt(felt: FeltChart | None) -> str:
+    """Only where what is felt differs from what is commanded."""
+    if felt is None or not isfinite(felt.limit) or not felt.regions:
+        return ""
+    return _svg("felt", "Stable walls at the stiffness that is felt", lambda ax: draw_felt_chart(ax, felt))
+
+
+def _answers(facts: Facts) -> str:
+    rows = len(facts.answers.wholes[:TOP])
+    if not rows:
+        return ""
+    height = 0.8 + 0.24 * max(rows, 2)
+    return _svg(
+        "answers",
+        "Sensitivity of the largest stiffness to each number",
+        lambda ax: draw_sensitivities(ax, facts.answers, TOP, wholes=True),
+        height,
+    )
+
+
+def _fits(fits: Validity | None) -> str:
+    if fits is None or not len(fits.frequency) or not any(len(fit.error) for fit in fits.fits):
+        return ""
+    return _svg("fits", "Error of simpler models by frequency", lambda ax: draw_validity(ax, fits))
 
 
 def _models(facts: Facts) -> dict[str, StabilityChart]:

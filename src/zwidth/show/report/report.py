@@ -13,7 +13,7 @@ from markupsafe import Markup
 from zwidth import __version__
 from zwidth.device.device import Device
 from zwidth.show.output import write_text
-from zwidth.show.report import sentences, tables
+from zwidth.show.report import answers, sentences, tables
 from zwidth.show.report.facts import Facts, gather
 from zwidth.show.report.pictures import pictures
 
@@ -54,6 +54,7 @@ def page(facts: Facts) -> str:
         facts=facts,
         device=facts.device,
         say=sentences,
+        more=answers,
         tables=tables,
         picture={name: Markup(svg) for name, svg in pictures(facts).items()},
         version=__version__,

@@ -12,6 +12,7 @@ from zwidth.model.mechanism import Floats
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
 from zwidth.show.units import UNKNOWN, at_most, given, number, quantity
+from zwidth.study.validity import Validity
 from zwidth.study.what_if import Variant
 
 Row = tuple[str, ...]
@@ -128,6 +129,18 @@ def document(facts: Facts) -> dict[str, Any]:
             "spectral_radius": best.spectral_radius,
         },
         "unobserved_modes": list(chart.unobserved_modes),
+        "static_stiffness_at_stiffness_max_N_per_m": facts.felt and facts.felt.stiffest,
+        "static_stiffness_limit_N_per_m": facts.felt and facts.felt.limit,
+        "sensitivities": [
+            {
+                "path": number.path,
+                "value": number.value,
+                "d_ln_stiffness_max_d_ln_value": number.logarithmic,
+                **({"reason": number.reason} if number.reason else {}),
+            }
+            for number in facts.answers.numbers
+        ],
+        "models": facts.fits and _models(facts.fits),
         "what_if": [{"key": v.key, "label": v.label, **_walls(v)} for v in facts.variants],
         "bounds": [
             {
@@ -144,6 +157,22 @@ def document(facts: Facts) -> dict[str, Any]:
     }
     reason = {} if facts.renders else {"reason": sentences.NO_WALL}
     return {key: _known(value) for key, value in {**found, **reason}.items()}
+
+
+def _models(fits: Validity) -> dict[str, Any]:
+    return {
+        "tolerance": fits.tolerance,
+        "first_natural_frequency_Hz": fits.first_natural,
+        "within": [
+            {
+                "key": fit.key,
+                "label": fit.label,
+                "frequency_ranges_Hz": [list(interval) for interval in fit.within],
+                **({"reason": fit.reason} if fit.reason else {}),
+            }
+            for fit in fits.fits
+        ],
+    }
 
 
 def _walls(variant: Variant) -> dict[str, Any]:
