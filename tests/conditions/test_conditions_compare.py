@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conditions.conditions_cases import devices, one_mass
+from systems import FEATURES, random_loop
 
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.verdict import judge
@@ -260,6 +261,42 @@ def test_an_operator_is_seen(grasp):
         assert found[ONE_MODE].taken["mode_mass_kg"] == pytest.approx(1.1)
         chart = stability_chart(loop, decay=False)
         assert found[ONE_MODE].stiffness_max == pytest.approx(chart.stiffness_max, rel=1e-9)
+
+
+@pytest.mark.parametrize("features", [(), *((feature,) for feature in FEATURES), FEATURES], ids=" ".join)
+def test_no_condition_holds_where_it_fails(features):
+    """One random mass, spring and friction with every feature of loop and plant, and what holds is true."""
+    for m, T, rng in devices(20, 6):
+        loop = random_loop(np.random.default_rng(rng.integers(10**6)), features=features)
+        b, k = rng.choice([0.0, 1.0], 2) * 10.0 ** rng.uniform(-3, -0.5, 2)
+        plain = one_mass(m, T, b=b * m / T, k=k * m / T**2).plant
+        hand = {"handle": np.ones(1)}
+        plant = attach(replace(plain, **hand), Operator(0.5, 300.0, 4.0)) if "operator" in features else plain
+        if "electrical" in features:
+            plant = replace(plant, lagged_dampers=(LaggedDamper(np.ones(1), 0.1 * m / T, T),))
+        controller = replace(loop.controller, sampling_period=T, velocity_filter=None)
+        slow = {"actuator_time_constant": T} if "lag" in features else {}
+        loop = Loop(plant, replace(controller, **slow))
+        told = [
+            b for b in compare(loop, coulomb_friction=1e-3, resolution=1e-6) if b.holds and b.stiffness_max > 0.0
+        ]
+        for bound in told:
+            if bound.claim != "approximate":
+                B = bound.damping_at_stiffness_max
+                assert judge(loop, 0.999 * bound.stiffness_max, B).names == ["stable"], bound.name
+            if bound.claim == "exact":
+                assert judge(loop, 1.001 * bound.stiffness_max, B).names == ["unstable"], bound.name
+
+
+def test_conditions_speak_on_any_loop():
+    """Whatever the plant and the controller: numbers or silence, never less than 0, and no arithmetic warning."""
+    rng = np.random.default_rng(30)
+    for features in ((), FEATURES) * 10:
+        for bound in compare(random_loop(rng, features=features), coulomb_friction=0.1, resolution=1e-5):
+            limits = bound.stiffness_max_at([[-1.0, 0.0, 1.0], [0.1, 10.0, 1e6]])
+            assert limits.shape == (2, 3)
+            assert not np.any(limits < 0.0)
+            assert not bound.stiffness_max < 0.0
 
 
 def test_a_split_hold_silences_the_theorem():
