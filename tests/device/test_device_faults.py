@@ -28,15 +28,12 @@ CASES = [
     (PLANT, {"colour": "red"}, "colour", "is not a key of a device file; allowed: "),
     (PLANT, {"lop": {}}, "lop", "did you mean 'loop'?"),
     # not supported yet
-    (PLANT, {"operator": {"arm_mass_kg": 0.8}}, "operator", "is not supported yet"),
     (PLANT, {"friction": {"coulomb_N": [0, 1]}}, "friction", "is not supported yet"),
     (PLANT, {"plant": GONE, "response": {}, "loop__delay_samples": GONE}, "response", "names no file"),
-    (PLANT, {"loop__actuator": {"time_constant_s": 0.0}}, "loop.actuator", "is not supported yet"),
-    (PLANT, {"loop__encoder__resolution_m": 1e-6}, "loop.encoder", "is not supported yet"),
     (PLANT, {"loop__saturation__force_N": INF}, "loop.saturation", "is not supported yet"),
     (
         PLANT,
-        {"loop__velocity__method": "windowed-difference"},
+        {"loop__velocity__method": "foaw"},
         "loop.velocity.method",
         "is not supported yet",
     ),

@@ -20,12 +20,12 @@ from zwidth.device.schema import file as schema
 UNSET: Final = object()
 OPTION: Final = "--set"
 
+FILTERS: Final = (frozenset({"time_constant_s"}), frozenset({"order", "cutoff_Hz", "discretisation"}))
 EXCLUSIVE: Final[dict[tuple[str, ...], tuple[frozenset[str], ...]]] = {
     ("loop",): (frozenset({"delay_s"}), frozenset({"delay_samples"})),
-    ("loop", "velocity", "filter"): (
-        frozenset({"time_constant_s"}),
-        frozenset({"order", "cutoff_Hz", "discretisation"}),
-    ),
+    ("loop", "velocity", "filter"): FILTERS,
+    ("loop", "force", "filter"): FILTERS,
+    ("operator",): (frozenset({"grasp"}), frozenset({"grasp_stiffness_N_per_m", "grasp_damping_Ns_per_m"})),
     ("mechanism", "damping"): (
         frozenset({"mode_ratio"}),
         frozenset({"mass_coefficient_1_per_s", "stiffness_coefficient_s"}),
@@ -65,7 +65,8 @@ def allowed(path: str) -> bool:
 def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     """A copy of the document with one value set (`UNSET`: removed); exclusive keys are dropped.
 
-    A table of kinds whose keys of the other kind are dropped gets the `type` that the key belongs to.
+    A table of kinds whose keys of the other kind are dropped gets the `type` that the key belongs to; a velocity
+    that gets another `method` keeps of its keys those that the method reads.
 
     Raises DeviceError  if the schema has no such path, or a list no such element
     """
@@ -85,9 +86,13 @@ def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
             table.pop(last, None)
         return document
     table[last] = value
+    tag, kinds = schema.kinds(tuple(outer))
+    if tag == last == "method" and value in kinds:
+        for key in schema.keys(tuple(outer)) - kinds[value]:
+            table.pop(key, None)
     dropped = [key for key in _rivals(tuple(outer), last) if table.pop(key, UNSET) is not UNSET]
     if dropped:  # the table may now be of another kind, as a filter is that gets the other filter's key
-        table.update(("type", kind) for kind, keys in schema.kinds(tuple(outer)).items() if last in keys)
+        table.update((tag, kind) for kind, keys in kinds.items() if last in keys)
     return document
 
 
@@ -202,7 +207,7 @@ def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
     if near:
         right = [near] if near in schema.keys(()) else ["mechanism", near]
         return f"did you mean '{'.'.join([*right, *rest])}'?"
-    for section in ("loop", "plant", "mechanism"):
+    for section in ("loop", "plant", "mechanism", "operator"):
         near = nearest(first, schema.keys((section,))) if section in document else None
         if near:
             return f"did you mean '{'.'.join([section, near, *rest])}'?"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from zwidth.device.schema.loop import FirstOrderFilter, LoopSection
+from zwidth.device.schema.loop import LoopSection
 from zwidth.device.schema.mechanism import (
     DampingSection,
     DriveSection,
@@ -17,11 +17,16 @@ from zwidth.device.schema.mechanism import (
     LoopClosure,
     MechanismSection,
 )
+from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.plant import PlantSection
 from zwidth.device.schema.response import ResponseSection
+from zwidth.device.schema.velocity import ButterworthFilter, FirstOrderFilter, KalmanSection
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
+from zwidth.loop.estimators import METHODS, Kalman, VelocityMethod
+from zwidth.model.dampers import with_dampers
 from zwidth.model.mechanism import FIXED, REVOLUTE, Closures, Drives, Floats, Links, Mechanism
-from zwidth.model.plant import Plant
+from zwidth.model.operator import Operator
+from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.response import Response
 
 if TYPE_CHECKING:
@@ -32,13 +37,27 @@ def controller(loop: LoopSection) -> Controller:
     """The sampled wall law; a delay in seconds becomes samples, a filter of no time constant none."""
     period = loop.sampling_period_s
     delay = loop.delay_s / period if loop.delay_s is not None else loop.delay_samples or 0.0
-    given = loop.velocity.filter
-    velocity_filter: FirstOrder | Butterworth | None = None
+    return Controller(
+        sampling_period=period,
+        delay=delay,
+        velocity_filter=_low_pass(loop.velocity.filter),
+        velocity=_velocity(loop),
+        force_filter=_low_pass(loop.force.filter),
+        actuator_time_constant=loop.actuator.time_constant_s,
+    )
+
+
+def _low_pass(given: FirstOrderFilter | ButterworthFilter | None) -> FirstOrder | Butterworth | None:
     if isinstance(given, FirstOrderFilter):
-        velocity_filter = FirstOrder(given.time_constant_s) if given.time_constant_s > 0 else None
-    elif given is not None:
-        velocity_filter = Butterworth(given.order, given.cutoff_Hz, given.discretisation)
-    return Controller(period, delay, velocity_filter)
+        return FirstOrder(given.time_constant_s) if given.time_constant_s > 0 else None
+    return None if given is None else Butterworth(given.order, given.cutoff_Hz, given.discretisation)
+
+
+def _velocity(loop: LoopSection) -> VelocityMethod:
+    section, own = loop.velocity, loop.velocity.parameters()
+    if isinstance(section, KalmanSection) and loop.encoder.resolution_m is not None:
+        return Kalman.of_encoder(section.acceleration_noise_m_per_s2, loop.encoder.resolution_m)
+    return METHODS[section.method](**own)
 
 
 def plant(section: PlantSection) -> Plant:
@@ -47,14 +66,36 @@ def plant(section: PlantSection) -> Plant:
     n = len(M)
     one = (1.0,) if n == 1 else None
     handle = section.handle or one
-    return Plant(
+    actuator = np.array(section.actuator or one, dtype=np.float64)
+    bare = Plant(
         mass=_even(M),
         damping=_even(np.array(section.damping_Ns_per_m or np.zeros((n, n)))),
         stiffness=_even(np.array(section.stiffness_N_per_m or np.zeros((n, n)))),
-        actuator=np.array(section.actuator or one, dtype=np.float64),
+        actuator=actuator,
         sensor=np.array(section.sensor or one, dtype=np.float64),
         handle=None if handle is None else np.array(handle),
         names=tuple(f"coordinate {i}" for i in range(n)),
+    )
+    motors = [
+        LaggedDamper(
+            along=actuator if motor.along is None else np.array(motor.along),
+            damping=motor.force_constant_N_per_A**2 / motor.resistance_ohm,
+            time_constant=motor.inductance_H / motor.resistance_ohm,
+        )
+        for motor in section.electrical_damping
+    ]
+    return with_dampers(bare, motors)
+
+
+def operator(section: OperatorSection) -> Operator:
+    """The arm and its grasp."""
+    rigid = section.grasp == "rigid"
+    return Operator(
+        arm_mass=section.arm_mass_kg,
+        arm_stiffness=section.arm_stiffness_N_per_m,
+        arm_damping=section.arm_damping_Ns_per_m,
+        grasp_stiffness=None if rigid else section.grasp_stiffness_N_per_m,
+        grasp_damping=None if rigid else section.grasp_damping_Ns_per_m or 0.0,
     )
 
 
@@ -157,6 +198,7 @@ def _drives(drives: Sequence[DriveSection], index: dict[str, int]) -> Drives:
         values = [getattr(drive, key) for drive in drives]
         return np.array([omitted if value is None else value for value in values], dtype=np.float64)
 
+    windings = [_winding(drive) for drive in drives]
     return Drives(
         names=tuple(drive.name for drive in drives),
         joint=np.array([index[drive.joint] for drive in drives], dtype=np.int64),
@@ -167,7 +209,17 @@ def _drives(drives: Sequence[DriveSection], index: dict[str, int]) -> Drives:
         torque_constant=column("torque_constant_Nm_per_A", math.nan),
         torque_limit=column("torque_limit_Nm", math.inf),
         encoder_counts=column("encoder_counts_per_rev", math.nan),
+        winding_damping=np.array([damping for damping, _ in windings]),
+        winding_time_constant=np.array([lag for _, lag in windings]),
     )
+
+
+def _winding(drive: DriveSection) -> tuple[float, float]:
+    """Damping k^2/R [N m s/rad] and lag L/R [s] at the motor of a winding closed through a resistor; else 0."""
+    if drive.damping_resistance_ohm is None:
+        return 0.0, 0.0
+    R = (drive.winding_resistance_ohm or 0.0) + drive.damping_resistance_ohm
+    return (drive.torque_constant_Nm_per_A or 0.0) ** 2 / R, (drive.winding_inductance_H or 0.0) / R
 
 
 def _parents_first(links: Sequence[LinkSection]) -> list[LinkSection]:

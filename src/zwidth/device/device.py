@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
@@ -17,8 +18,9 @@ from zwidth.model.response import Response
 
 if TYPE_CHECKING:
     from zwidth.model.damping import Damping
+    from zwidth.model.operator import Operator
     from zwidth.model.posture import Posture
-    from zwidth.model.reduction import Model
+    from zwidth.model.reduction import Encoders, Model
 
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
 
@@ -38,6 +40,9 @@ class Device:
     reference_position  (3,) handle position meant where none is given [m]; None for a plant
     reference_direction (3,) rendered direction meant where none is given, any length; None for a plant
     reference_assembly  assembly meant where none is given; None for a plant
+    operator            the arm and grasp at the handle; None: nobody
+    operator_name       what he is called; None: nobody
+    encoders            what a mechanism's encoders read: "motor" or "link"
     document            the file's tables after settings: for saving, and for addressing its numbers
     """
 
@@ -54,6 +59,9 @@ class Device:
     reference_position: Floats | None
     reference_direction: Floats | None
     reference_assembly: str | None
+    operator: Operator | None
+    operator_name: str | None
+    encoders: Encoders
     document: dict[str, Any]
 
     def posture(self, at: Sequence[float] | None = None, assembly: str | None = None) -> Posture:
@@ -87,12 +95,16 @@ class Device:
         direction: Sequence[float] | None = None,
         assembly: str | None = None,
         model: str | None = None,
+        *,
+        held: bool = True,
     ) -> Plant:
-        """The rendered direction's dynamics at a posture, in one of the models.
+        """The rendered direction's dynamics at a posture, in one of the models, with the operator at its handle.
 
         at, direction   x, y or x, y, z [m], [1]; a direction may have any length but zero
         model           "full", "two-mass", "motor-mass" or "rigid"; left out: full for a mechanism, and a
                         given plant as it is
+        held            False: the device by itself, without its operator. "motor-mass" holds the link side, and so
+                        the operator, fixed: he does nothing to it
         Raises  DeviceError  if the arguments cannot be meant for this device
                 ValueError   where the posture does not exist (PostureError), or the model
         """
@@ -101,14 +113,35 @@ class Device:
         if self.response is not None:
             self._mechanism_only(at=at, direction=direction, assembly=assembly, model=model)
             raise fail(self.label, "", "has a measured [response] and no model; chart and check it")
+        holding = held and self.operator is not None and model != "motor-mass"
         if self.given_plant is not None:
             self._mechanism_only(at=at, direction=direction, assembly=assembly)
-            return self._given(self.given_plant, model)
+            given = self._given(self.given_plant, model)
+            if not holding:
+                return given
+            return self._given_and_held if given is self.given_plant else self._attached(given)
         along = self.direction(direction)
         posture = self.posture(at, assembly)
         from zwidth.model.reduction import reduce_mechanism
 
-        return reduce_mechanism(self._mechanism(), posture, along, cast("Model", model or "full"), self.damping)
+        chosen = cast("Model", model or "full")
+        plant = reduce_mechanism(self._mechanism(), posture, along, chosen, self.damping, self.encoders)
+        return self._attached(plant) if holding else plant
+
+    @cached_property
+    def _given_and_held(self) -> Plant:
+        """The given plant with its operator: one object, so that a model that changes nothing is seen to."""
+        assert self.given_plant is not None
+        return self._attached(self.given_plant)
+
+    def _attached(self, plant: Plant) -> Plant:
+        from zwidth.model.operator import OperatorError, attach
+
+        assert self.operator is not None
+        try:
+            return attach(plant, self.operator)
+        except OperatorError as error:
+            raise fail(self.label, "operator", str(error)) from None
 
     def position(self, at: Sequence[float] | None = None) -> Floats:
         """The handle's position meant, (3,) [m]; left out: that of the file.

@@ -4,31 +4,40 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
 from zwidth.device import address, build, geometry, unsupported
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, Path, dotted
+from zwidth.device.holding import held_by
 from zwidth.device.read import bundled, read
 from zwidth.device.relations import relations
 from zwidth.device.schema.file import DeviceFile, schema
 from zwidth.device.translate import sentences
 
+AS_GIVEN: Final = "as given"  # an operator without a name
+
 __all__ = ["bundled", "from_document", "load", "schema"]
 
 
-def load(name_or_path: str | os.PathLike[str], settings: Sequence[str | tuple[str, Any]] = ()) -> Device:
+def load(
+    name_or_path: str | os.PathLike[str],
+    settings: Sequence[str | tuple[str, Any]] = (),
+    operator: str | os.PathLike[str] | None = None,
+) -> Device:
     """The device of a bundled name or a file, with settings applied before it is checked.
 
-        load("my-device.toml", ["loop.delay_samples=1", ("links.upper.length_m", 0.15)])
+        load("my-device.toml", ["loop.delay_samples=1", ("links.upper.length_m", 0.15)], operator="firm-grasp")
 
     settings  "PATH=VALUE" texts or (path, value) pairs, see `address.apply`
+    operator  who holds the handle: a bundled operator's name, a file with an [operator], or "none"; left out: as
+              the device file says
     Raises DeviceError  with all the faults of the file, or else of the settings
     """
     document, label = read(name_or_path)
-    return from_document(address.apply(document, settings), label)
+    return from_document(address.apply(held_by(document, operator), settings), label)
 
 
 def from_document(document: dict[str, Any], label: str = "device") -> Device:
@@ -74,6 +83,9 @@ def _device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device
         reference_assembly=(reference.assembly or next(iter(section.assemblies)))
         if reference and section
         else None,
+        operator=build.operator(checked.operator) if checked.operator else None,
+        operator_name=(checked.operator.name or AS_GIVEN) if checked.operator else None,
+        encoders="motor" if checked.loop.encoder.at in (None, "motor") else "link",
         document=document,
     )
 

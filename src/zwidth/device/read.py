@@ -4,44 +4,68 @@ from __future__ import annotations
 
 import os
 import tomllib
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
 from zwidth.device.faults import fail, listed, nearest
 
+
+@dataclass(frozen=True)
+class Shelf:
+    """Files that come with the package.
+
+    folder  in this package
+    noun    what each describes
+    file    the same with "file" and its article
+    needs   what a file of this kind must hold, as a sentence
+    """
+
+    folder: str
+    noun: str
+    file: str
+    needs: str
+
+
+DEVICES: Final = Shelf(
+    "zoo", "device", "a device file", "a device needs a name, [loop], and [mechanism], [plant] or [response]"
+)
+OPERATORS: Final = Shelf("operators", "operator", "an operator file", "an operator needs an [operator] table")
 LARGEST_FILE: Final = 10_000_000  # bytes; the bundled ones have a few thousand
 DEEPEST: Final = 20  # tables and lists within each other; a mechanism needs 5
 
 
-def bundled_names() -> list[str]:
+def bundled_names(shelf: Shelf = DEVICES) -> list[str]:
     """Names of the bundled devices, sorted."""
-    return sorted(entry.name.removesuffix(".toml") for entry in _zoo().iterdir() if entry.name.endswith(".toml"))
+    entries = (entry.name for entry in _place(shelf).iterdir())
+    return sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml"))
 
 
-def bundled() -> list[tuple[str, str, str]]:
+def bundled(shelf: Shelf = DEVICES) -> list[tuple[str, str, str]]:
     """(name, description, source) of every bundled device; their numbers are not checked here."""
     listing = []
-    for name in bundled_names():
-        document = parse(_bundled_text(name), name)
-        listing.append((name, str(document.get("description", "")), str(document.get("source", ""))))
+    for name in bundled_names(shelf):
+        document = parse(_bundled_text(name, shelf), name, shelf)
+        told = document.get("operator", document)
+        listing.append((name, str(told.get("description", "")), str(told.get("source", ""))))
     return listing
 
 
-def read(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
-    """The document of a bundled device or of a file, and what to call it in messages.
+def read(name_or_path: str | os.PathLike[str], shelf: Shelf = DEVICES) -> tuple[dict[str, Any], str]:
+    """The document of a bundled device (or operator) or of a file, and what to call it in messages.
 
     A bundled name wins over a file of the same name; write ./name for the file.
     Raises DeviceError  if there is no such file, it cannot be read, or it is not TOML
     """
     label = os.fspath(name_or_path)
+    names = bundled_names(shelf)
     if not label:
-        raise fail(
-            "device", "", f"the name is empty; give a device file, or a bundled name: {listed(bundled_names())}"
-        )
-    if label in bundled_names():
-        return parse(_bundled_text(label), label), label
-    return parse(decode(_bytes(label), label), label), label
+        message = f"the name is empty; give {shelf.file}, or a bundled name: {listed(names)}"
+        raise fail(shelf.noun, "", message)
+    if label in names:
+        return parse(_bundled_text(label, shelf), label, shelf), label
+    return parse(decode(_bytes(label, shelf), label), label, shelf), label
 
 
 def decode(data: bytes, label: str) -> str:
@@ -61,7 +85,7 @@ def decode(data: bytes, label: str) -> str:
     return text
 
 
-def parse(text: str, label: str) -> dict[str, Any]:
+def parse(text: str, label: str, shelf: Shelf = DEVICES) -> dict[str, Any]:
     """The document a TOML text holds; never empty, never nested beyond reason."""
     try:
         document = tomllib.loads(text)
@@ -72,7 +96,7 @@ def parse(text: str, label: str) -> dict[str, Any]:
     except ValueError as error:  # a whole number of thousands of digits
         raise fail(label, "", f"holds a number that cannot be read: {_lower_first(str(error))}") from None
     if not document:
-        raise fail(label, "", "is empty; a device needs a name, [loop], and [mechanism], [plant] or [response]")
+        raise fail(label, "", f"is empty; {shelf.needs}")
     if not within_depth(document):
         raise fail(label, "", f"is nested too deeply; at most {DEEPEST} levels are allowed")
     return document
@@ -93,37 +117,37 @@ def within_depth(value: Any, deepest: int = DEEPEST) -> bool:
     return False
 
 
-def _bytes(label: str) -> bytes:
+def _bytes(label: str, shelf: Shelf) -> bytes:
     try:
         with open(label, "rb") as stream:
             data = stream.read(LARGEST_FILE + 1)
     except FileNotFoundError:
-        raise fail(label, "", _not_found(label)) from None
+        raise fail(label, "", _not_found(label, shelf)) from None
     except IsADirectoryError:
-        raise fail(label, "", "is a directory; give a device file or a bundled name") from None
+        raise fail(label, "", f"is a directory; give {shelf.file} or a bundled name") from None
     except PermissionError:
         raise fail(label, "", "cannot be read: permission denied; change its permissions") from None
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise fail(label, "", f"cannot be read: {_lower_first(reason)}") from None
     if len(data) > LARGEST_FILE:
-        raise fail(label, "", f"is larger than {LARGEST_FILE // 1_000_000} MB; this is no device file")
+        raise fail(label, "", f"is larger than {LARGEST_FILE // 1_000_000} MB; this is no {shelf.noun} file")
     return data
 
 
-def _not_found(label: str) -> str:
-    names = bundled_names()
+def _not_found(label: str, shelf: Shelf) -> str:
+    names = bundled_names(shelf)
     near = nearest(Path(label).name.removesuffix(".toml"), names)
     hint = f"did you mean '{near}'? " if near else ""
-    return f"is neither a file nor a bundled device; {hint}bundled: {listed(names)}"
+    return f"is neither a file nor a bundled {shelf.noun}; {hint}bundled: {listed(names)}"
 
 
-def _bundled_text(name: str) -> str:
-    return str((_zoo() / f"{name}.toml").read_text(encoding="utf-8"))
+def _bundled_text(name: str, shelf: Shelf) -> str:
+    return str((_place(shelf) / f"{name}.toml").read_text(encoding="utf-8"))
 
 
-def _zoo() -> Any:
-    return files("zwidth.device") / "zoo"
+def _place(shelf: Shelf) -> Any:
+    return files("zwidth.device") / shelf.folder
 
 
 def _lower_first(text: str) -> str:

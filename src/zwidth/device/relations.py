@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, Final, TypeGuard
+from typing import Any, Final
 
 from zwidth.device.address import allowed, exists
 from zwidth.device.faults import Path, listed, quote, suggestion
+from zwidth.device.loop_relations import electrical_relations, loop_relations
+from zwidth.device.plain import number, rows, table, tables
 from zwidth.device.schema.file import flat_sources
-from zwidth.device.schema.loop import LONGEST_DELAY
 
 Found = Iterator[tuple[Path, str]]
 
@@ -24,10 +25,12 @@ def relations(document: dict[str, Any], original: dict[str, Any]) -> Found:
     """Path and sentence of every disagreement; `original` still has the sections not supported yet."""
     yield from _one_kind(original)
     yield from _sources(document)
-    yield from _plant(_table(document, "plant"))
-    yield from _loop(_table(document, "loop"))
+    yield from _plant(table(document, "plant"))
+    yield from loop_relations(document)
     yield from _response(original)
-    mechanism = _table(document, "mechanism")
+    yield from electrical_relations(document)
+    yield from operator_relations(document)
+    mechanism = table(document, "mechanism")
     if mechanism:
         yield from _tree(mechanism)
         if _joints(mechanism):
@@ -46,34 +49,56 @@ def _one_kind(document: dict[str, Any]) -> Found:
 
 
 def _sources(document: dict[str, Any]) -> Found:
-    sources = flat_sources(_table(document, "sources"))
+    sources = flat_sources(table(document, "sources"))
     for key in sources:
         if not exists(document, key) and not allowed(key):
             yield ("sources", key), "names no key of this file; give a dotted path, with * for any step"
 
 
 def _plant(plant: dict[str, Any]) -> Found:
-    size = _rows(plant.get("mass_kg"))
+    size = rows(plant.get("mass_kg"))
     if size is None:
         return
     for key in ("damping_Ns_per_m", "stiffness_N_per_m"):
-        rows = _rows(plant.get(key))
-        if rows is not None and rows != size:
-            yield ("plant", key), f"has {rows} rows, but mass_kg has {size}; give a {size} x {size} matrix"
+        count = rows(plant.get(key))
+        if count is not None and count != size:
+            yield ("plant", key), f"has {count} rows, but mass_kg has {size}; give a {size} x {size} matrix"
     for key in ("actuator", "sensor", "handle"):
         value = plant.get(key)
-        length = 1 if _number(value) else len(value) if isinstance(value, list) else None
+        length = 1 if number(value) else len(value) if isinstance(value, list) else None
         if length is not None and length != size:
             yield ("plant", key), f"has {length} numbers, but mass_kg has {size} rows; give {size} numbers"
         elif value is None and size > 1 and key != "handle":
             yield ("plant", key), f"is missing; with {size} coordinates give {size} numbers"
 
 
+def operator_relations(document: dict[str, Any]) -> Found:
+    """A handle to hold, one way of holding it, and a mass where the grasp is elastic."""
+    operator, plant = table(document, "operator"), table(document, "plant")
+    size = rows(plant.get("mass_kg"))
+    if "operator" in document and size is not None and size > 1 and "handle" not in plant:
+        yield ("operator",), f"needs a handle; give plant.handle, {size} numbers, or leave the operator out"
+    elastic = [key for key in ("grasp_stiffness_N_per_m", "grasp_damping_Ns_per_m") if key in operator]
+    if "grasp" in operator and elastic:
+        yield ("operator", "grasp"), f"stands beside {' and '.join(elastic)}; only one way is allowed: remove one"
+    if operator and "grasp" not in operator and "grasp_stiffness_N_per_m" not in operator:
+        yield (
+            ("operator",),
+            'does not say how the handle is held; give grasp_stiffness_N_per_m, or grasp = "rigid"',
+        )
+    mass = operator.get("arm_mass_kg")
+    if elastic and "grasp" not in operator and number(mass) and mass == 0:
+        yield (
+            ("operator", "arm_mass_kg"),
+            'must be greater than 0 behind an elastic grasp, got 0; give a mass, or grasp = "rigid"',
+        )
+
+
 def _response(document: dict[str, Any]) -> Found:
     """A measured response: one way of naming its files, and nothing beside it that it holds already."""
     if "response" not in document:
         return
-    response, loop = _table(document, "response"), _table(document, "loop")
+    response, loop = table(document, "response"), table(document, "loop")
     if isinstance(document["response"], dict) and ("file" in response) == ("files" in response):
         told = "names both file and files" if "file" in response else "names no file"
         yield ("response",), f"{told}; give file for one measurement, or files for repetitions of it"
@@ -82,10 +107,10 @@ def _response(document: dict[str, Any]) -> Found:
     if "actuator" in loop:
         yield ("loop", "actuator"), "is part of a measured [response] already; leave it out"
     period = loop.get("sampling_period_s")
-    T = period if _number(period) and 0 < period <= 1 else math.nan
+    T = period if number(period) and 0 < period <= 1 else math.nan
     for key, unit in (("delay_samples", 1.0), ("delay_s", T)):
         delay = loop.get(key)
-        if _number(delay) and abs(delay / unit - round(delay / unit if delay / unit < 1e9 else 0)) > 1e-6:
+        if number(delay) and abs(delay / unit - round(delay / unit if delay / unit < 1e9 else 0)) > 1e-6:
             yield (
                 ("loop", key),
                 f"must be a whole number of samples with a [response], got {delay:.10g}: the response holds the "
@@ -93,36 +118,10 @@ def _response(document: dict[str, Any]) -> Found:
             )
 
 
-def _loop(loop: dict[str, Any]) -> Found:
-    period = loop.get("sampling_period_s")
-    T = period if _number(period) and 0 < period <= 1 else math.nan  # every comparison with nan is false
-    if "delay_samples" in loop and "delay_s" in loop:
-        yield (
-            ("loop", "delay_s"),
-            "stands beside delay_samples; only one of them is allowed: remove the other",
-        )
-    for key, unit in (("delay_samples", 1.0), ("delay_s", T)):
-        delay = loop.get(key)
-        if _number(delay) and delay / unit > LONGEST_DELAY and math.isfinite(delay):
-            yield (
-                ("loop", key),
-                f"is {delay:.10g}, a delay of more than {LONGEST_DELAY} samples, which is not supported; "
-                "give a shorter one (is the unit right?)",
-            )
-    filter_ = _table(_table(loop, "velocity"), "filter")
-    cutoff = filter_.get("cutoff_Hz")
-    if _number(cutoff) and math.isfinite(cutoff) and cutoff * T >= 0.5:
-        yield (
-            ("loop", "velocity", "filter", "cutoff_Hz"),
-            f"must be below half the sampling frequency, {0.5 / T:.10g} Hz, got {cutoff:.10g}; "
-            "lower it or sample faster",
-        )
-
-
 def _tree(mechanism: dict[str, Any]) -> Found:
     """Links: unique names, parents that exist, no link its own ancestor."""
     parents: dict[str, Any] = {}
-    for index, link in _tables(mechanism, "links"):
+    for index, link in tables(mechanism, "links"):
         name = link.get("name")
         if name == "base":
             yield (
@@ -131,7 +130,7 @@ def _tree(mechanism: dict[str, Any]) -> Found:
             )
         elif isinstance(name, str):
             parents.setdefault(name, link.get("parent", "base"))
-    for index, link in _tables(mechanism, "links"):
+    for index, link in tables(mechanism, "links"):
         parent = link.get("parent")
         if isinstance(parent, str) and parent not in parents and parent != "base":
             yield (
@@ -139,7 +138,7 @@ def _tree(mechanism: dict[str, Any]) -> Found:
                 f"names no link, got '{parent}'; {suggestion(parent, {*parents, 'base'}, 'links')}",
             )
     reported: set[str] = set()
-    for index, link in _tables(mechanism, "links"):
+    for index, link in tables(mechanism, "links"):
         circle = _circle(link.get("name"), parents)
         if circle and not reported & set(circle):
             reported |= set(circle)
@@ -165,7 +164,7 @@ def _circle(name: Any, parents: dict[str, Any]) -> list[str]:
 
 def _twice(mechanism: dict[str, Any], group: str) -> Found:
     seen: set[str] = set()
-    for index, entry in _tables(mechanism, group):
+    for index, entry in tables(mechanism, group):
         name = entry.get("name")
         if isinstance(name, str) and name in seen:
             yield ("mechanism", group, index, "name"), f"'{name}' is given twice; names must differ"
@@ -176,7 +175,7 @@ def _twice(mechanism: dict[str, Any], group: str) -> Found:
 def _references(mechanism: dict[str, Any]) -> Found:
     """Loops, handle and drives speak of links that exist; drives of revolute joints, one each."""
     links = _joints(mechanism)
-    for index, loop in _tables(mechanism, "loops"):
+    for index, loop in tables(mechanism, "loops"):
         names = loop.get("links")
         names = names if isinstance(names, list) else []
         for place, name in enumerate(names):
@@ -190,14 +189,14 @@ def _references(mechanism: dict[str, Any]) -> Found:
                 ("mechanism", "loops", index, "links"),
                 f"joins '{names[0]}' to itself; name two different links",
             )
-    link = _table(mechanism, "handle").get("link")
+    link = table(mechanism, "handle").get("link")
     if isinstance(link, str) and link not in links:
         yield (
             ("mechanism", "handle", "link"),
             f"names no link, got '{link}'; {suggestion(link, links, 'links')}",
         )
     driven: set[str] = set()
-    for index, drive in _tables(mechanism, "drives"):
+    for index, drive in tables(mechanism, "drives"):
         joint, path = drive.get("joint"), ("mechanism", "drives", index, "joint")
         if not isinstance(joint, str):
             continue
@@ -212,7 +211,7 @@ def _references(mechanism: dict[str, Any]) -> Found:
 
 def _assemblies(mechanism: dict[str, Any]) -> Found:
     turning = {name for name, joint in _joints(mechanism).items() if joint != "fixed"}
-    assemblies = _table(mechanism, "assemblies")
+    assemblies = table(mechanism, "assemblies")
     for name, assembly in assemblies.items():
         angles = assembly.get("joints_rad") if isinstance(assembly, dict) else None
         if not isinstance(angles, dict):
@@ -223,7 +222,7 @@ def _assemblies(mechanism: dict[str, Any]) -> Found:
                 yield (*path, joint), f"names no revolute joint; {suggestion(joint, turning, 'joints')}"
         for joint in sorted(turning - set(angles)):
             yield (*path, joint), "is missing; give an approximate angle for every revolute joint"
-    reference = _table(mechanism, "reference")
+    reference = table(mechanism, "reference")
     wanted, place = reference.get("assembly"), ("mechanism", "reference", "assembly")
     if isinstance(wanted, str) and assemblies and wanted not in assemblies:
         yield place, f"names no assembly, got '{wanted}'; {suggestion(wanted, set(assemblies), 'assemblies')}"
@@ -232,14 +231,14 @@ def _assemblies(mechanism: dict[str, Any]) -> Found:
 
 
 def _workspace(mechanism: dict[str, Any]) -> Found:
-    position = _table(mechanism, "reference").get("position_m")
-    workspace = _table(mechanism, "workspace")
+    position = table(mechanism, "reference").get("position_m")
+    workspace = table(mechanism, "workspace")
     for axis, value in zip("xyz", position if isinstance(position, list) else [], strict=False):
         bounds = workspace.get(f"{axis}_m")
         if (
             isinstance(bounds, list)
             and len(bounds) == 2
-            and all(map(_number, [value, *bounds]))
+            and all(map(number, [value, *bounds]))
             and bounds[0] < bounds[1]
             and not bounds[0] <= value <= bounds[1]
         ):
@@ -261,14 +260,14 @@ def _damping(mechanism: dict[str, Any]) -> Found:
         elif len(ways) > 1:
             yield path, f"has {', '.join(ways)}; exactly one way is allowed: {choice}"
     given = isinstance(damping, dict) and "given" in damping
-    for index, drive in _tables(mechanism, "drives"):
+    for index, drive in tables(mechanism, "drives"):
         if "damping_Nms_per_rad" in drive and not given:
             yield (
                 ("mechanism", "drives", index, "damping_Nms_per_rad"),
                 "is used only with mechanism.damping.given = true; set that or remove this",
             )
         stiffness, inertia = drive.get("stiffness_Nm_per_rad", math.inf), drive.get("motor_inertia_kg_m2")
-        if _number(inertia) and inertia == 0 and _number(stiffness) and math.isfinite(stiffness):
+        if number(inertia) and inertia == 0 and number(stiffness) and math.isfinite(stiffness):
             yield (
                 ("mechanism", "drives", index, "motor_inertia_kg_m2"),
                 "must be greater than 0 behind a flexible transmission, got 0; "
@@ -279,29 +278,6 @@ def _damping(mechanism: dict[str, Any]) -> Found:
 def _joints(mechanism: dict[str, Any]) -> dict[str, Any]:
     return {
         link["name"]: link.get("joint")
-        for _, link in _tables(mechanism, "links")
+        for _, link in tables(mechanism, "links")
         if isinstance(link.get("name"), str)
     }
-
-
-def _table(document: dict[str, Any], key: str) -> dict[str, Any]:
-    value = document.get(key)
-    return value if isinstance(value, dict) else {}
-
-
-def _tables(document: dict[str, Any], key: str) -> list[tuple[int, dict[str, Any]]]:
-    value = document.get(key)
-    return [(i, v) for i, v in enumerate(value if isinstance(value, list) else []) if isinstance(v, dict)]
-
-
-def _number(value: Any) -> TypeGuard[float]:
-    """Whether the value is a number that a float can hold (TOML's whole numbers have no end)."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return isinstance(value, float) or abs(value) < 10**300
-
-
-def _rows(value: Any) -> int | None:
-    if _number(value):
-        return 1
-    return len(value) if isinstance(value, list) and value else None

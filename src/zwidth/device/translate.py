@@ -10,6 +10,7 @@ from pydantic_core import ErrorDetails
 
 from zwidth.device.faults import Path, nearest, quote, suggestion
 from zwidth.device.schema import file as schema
+from zwidth.device.schema.velocity import DEFAULT
 
 
 def sentences(error: ValidationError, document: dict[str, Any]) -> Iterator[tuple[Path, str]]:
@@ -50,7 +51,7 @@ def _where(detail: ErrorDetails, document: Any) -> Path:
             continue
         path.append(part)
     if detail["type"] in ("union_tag_invalid", "union_tag_not_found"):
-        return (*path, "type")
+        return (*path, schema.kinds(tuple(path))[0])
     return (*path, last) if detail["type"] == "missing" else tuple(path)
 
 
@@ -93,9 +94,13 @@ def _sentence(detail: ErrorDetails, path: Path, document: dict[str, Any]) -> str
         case "literal_error":
             return _literal(limits["expected"], got, about)
         case "union_tag_invalid":
-            return f"must be {limits['expected_tags'].replace(', ', ' or ')}, got {limits['tag']!r}"
+            kinds = [tag.strip("'") for tag in limits["expected_tags"].split(", ")]
+            near = nearest(str(limits["tag"]), kinds)
+            hint = f"; did you mean '{near}'?" if near else ""
+            return f"must be {limits['expected_tags'].replace(', ', ' or ')}, got {limits['tag']!r}{hint}"
         case "union_tag_not_found":
-            return "is missing or no text; give 'butterworth' or 'first-order'"
+            kinds = sorted(schema.kinds(path[:-1])[1])
+            return f"is missing or no text; give {' or '.join(map(repr, kinds))}"
         case "tuple_type" | "list_type":
             return f"must be a list, got {quote(got)}{about}"
         case "model_type" | "model_attributes_type" | "dict_type":
@@ -106,14 +111,17 @@ def _sentence(detail: ErrorDetails, path: Path, document: dict[str, Any]) -> str
 
 def _unknown(path: Path, document: dict[str, Any]) -> str:
     key, table = str(path[-1]), path[:-1]
-    kinds = schema.kinds(table)
-    kind = _value(document, (*table, "type")) if kinds else None
+    tag, kinds = schema.kinds(table)
+    kind = _value(document, table).get(tag, DEFAULT) if kinds else None
     allowed = kinds[kind] if kind in kinds else schema.keys(table)
     readers = [other for other, keys in kinds.items() if key in keys]
     if readers:
-        return f'is not read with type = "{kind}"; remove it, or set type = "{readers[0]}"'
+        others = " or ".join(f'"{reader}"' for reader in readers)
+        return f'is not read with {tag} = "{kind}"; remove it, or set {tag} = {others}'
     if nearest(key, allowed) is None:
-        elsewhere = [section for section in ("loop", "plant", "mechanism") if key in schema.keys((section,))]
+        elsewhere = [
+            section for section in ("loop", "plant", "mechanism", "operator") if key in schema.keys((section,))
+        ]
         if elsewhere and table != (elsewhere[0],):
             return f"is not a key here; it belongs into [{elsewhere[0]}]"
     return f"is not a key of a device file; {suggestion(key, allowed)}"

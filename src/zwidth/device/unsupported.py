@@ -9,12 +9,8 @@ from typing import Any, Final
 from zwidth.device.faults import Path
 
 KEYS: Final[dict[tuple[str, ...], str]] = {
-    ("operator",): "an [operator]",
     ("friction",): "[friction]",
-    ("loop", "actuator"): "a lag of the force, [loop.actuator],",
-    ("loop", "encoder"): "the encoder's resolution, [loop.encoder],",
     ("loop", "saturation"): "a limit of the force, [loop.saturation],",
-    ("loop", "velocity", "samples"): "a windowed velocity (samples)",
     ("mechanism", "drives", "*", "coulomb_Nm"): "friction of the drives (coulomb_Nm)",
     ("mechanism", "drives", "*", "coulomb"): "friction of the drives (coulomb)",
     ("mechanism", "friction"): "friction in a mechanism, [mechanism.friction],",
@@ -23,7 +19,7 @@ KEYS: Final[dict[tuple[str, ...], str]] = {
 
 VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str]]] = {
     ("loop", "velocity", "method"): (
-        frozenset({"windowed-difference", "windowed", "foaw", "kalman", "least-squares", "measured"}),
+        frozenset({"foaw", "measured"}),
         "backward-difference",
     ),
     ("mechanism", "links", "*", "joint"): (

@@ -74,6 +74,8 @@ class Drives:
     torque_constant  (..., d)  [N m/A], nan if not known
     torque_limit     (..., d)  at the motor [N m], inf if none
     encoder_counts   (..., d)  per motor revolution after quadrature, nan if not known
+    winding_damping  (..., d)  k_t^2/R of a winding closed through a resistor, at the motor [N m s/rad]; None: none
+    winding_time_constant  (..., d)  its L/R [s]
     """
 
     names: tuple[str, ...]
@@ -85,6 +87,8 @@ class Drives:
     torque_constant: Floats
     torque_limit: Floats
     encoder_counts: Floats
+    winding_damping: Floats | None = None
+    winding_time_constant: Floats | None = None
 
 
 @dataclass(frozen=True)

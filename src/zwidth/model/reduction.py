@@ -4,7 +4,10 @@ Coordinates and signs. The driven joints' coordinates are phi for the links and 
 the joint; with h = J^T u the handle moves by h . phi along the direction u, and a force f along u at the
 handle is the joint torques h f. The wall's force acts through the motors, which take h f, and the encoders
 read the motors, whose reading of the handle is h . theta: actuator = sensor = [0; h], handle = [h; 0] on
-[phi; theta].
+[phi; theta]. Encoders behind the drives read the links instead: sensor = [h; 0].
+
+A reduced model's coordinates are shares of motions of the full one. Sensor and electrical dampers are carried
+over by what these motions move them by.
 """
 
 from __future__ import annotations
@@ -16,14 +19,16 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth.model.dampers import carried, seen_by, winding_dampers, with_dampers
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
 from zwidth.model.effective import EffectiveParameters, effective_parameters, unit_direction
 from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.modes import undamped_modes
-from zwidth.model.plant import Plant
+from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.posture import OK, Posture
 
 Model = Literal["full", "two-mass", "motor-mass", "rigid"]
+Encoders = Literal["motor", "link"]
 MODELS: Final = get_args(Model)
 TOGETHER: Final = 1e-6  # relative difference of two readings of a rigid motion that still counts as none
 
@@ -37,7 +42,12 @@ class DirectionError(ModelError):
 
 
 def reduce_mechanism(
-    mechanism: Mechanism, posture: Posture, direction: ArrayLike, model: Model, damping: Damping
+    mechanism: Mechanism,
+    posture: Posture,
+    direction: ArrayLike,
+    model: Model,
+    damping: Damping,
+    encoders: Encoders = "motor",
 ) -> Plant:
     """The plant that a direction renders in one posture.
 
@@ -48,6 +58,7 @@ def reduce_mechanism(
 
     posture    a single one, OK
     direction  (3,)  unit vector in the base frame
+    encoders   what they read: the motors, or the links behind the drives
     Returns    Plant; a drive of infinite stiffness has no theta of its own, its rotor moves with its link
     Raises     ModelError  where the model does not apply: no flexible drive in this direction
                DirectionError  (a ModelError) for a direction along which the handle cannot move
@@ -63,17 +74,23 @@ def reduce_mechanism(
     if not np.linalg.norm(h) > 1e-12 * np.linalg.norm(posture.jacobian):
         along = ", ".join(f"{component:.6g}" for component in u)
         raise DirectionError(f"the handle cannot move along the direction ({along}); choose one it can move along")
+    full, electrical = _full(mechanism, posture.mass_matrix, h, damping, encoders)
     if model == "full":
-        return _full(mechanism, posture.mass_matrix, h, damping)
+        return with_dampers(full, electrical)
     numbers = effective_parameters(mechanism, posture, u)
     if model == "rigid":
         slip = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0
-        return _rigid(float(numbers.rigid_mass), slip * float(numbers.rigid_mass))
-    if not np.isfinite(numbers.stiffness):
+        reduced = _rigid(float(numbers.rigid_mass), slip * float(numbers.rigid_mass))
+    elif np.isfinite(numbers.stiffness):
+        reduced = _two_mass(mechanism.drives, numbers, h, damping, held=model == "motor-mass")
+    else:
         raise ModelError(
             f"model {model!r} needs a flexible drive in this direction and all are rigid; use 'rigid'"
         )
-    return _two_mass(mechanism.drives, numbers, h, damping, held=model == "motor-mass")
+    if encoders == "motor" and not electrical:
+        return reduced
+    motions = _motions(full, model)
+    return with_dampers(_read(reduced, full, motions), carried(electrical, motions))
 
 
 def reduce_plant(plant: Plant, model: Model) -> Plant:
@@ -89,6 +106,8 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
     rigid       1/(a^T Z (Z^T M Z)^-1 Z^T a), damper x^T B x of the rigid motion x of one metre at
                 the actuator
 
+    Sensor and lagged dampers are what these motions move them by: W^T sensor, W^T along.
+
     Returns  Plant; `full` gives the plant itself, and so does the model it already is
     Raises   ModelError  where the model does not apply, with the reason
     """
@@ -97,14 +116,16 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
         return plant
     if model == "rigid":
         mass, motion = _rigid_motion(plant)
-        return plant if plant.size == 1 else _rigid(mass, _drag(plant, motion))
+        if plant.size == 1:
+            return plant
+        return _carried(_held(_rigid(mass, _drag(plant, motion)), plant, motion), plant, model)
     stiffness, deflection = _spring(plant)
     assert plant.handle is not None  # _spring has checked
     link, motor = _mass_at(plant, plant.handle), _mass_at(plant, plant.actuator)
     pair = replace(_pair(link, motor, 0.0, stiffness), damping=_side_damping(plant, deflection))
     if model == "motor-mass":
-        return _motor_mass(motor, float(pair.damping[1, 1]), stiffness)
-    return pair
+        pair = _motor_mass(motor, float(pair.damping[1, 1]), stiffness)
+    return _carried(pair, plant, model)
 
 
 def plant_effective_parameters(plant: Plant) -> EffectiveParameters:
@@ -141,8 +162,11 @@ def _at_joint(drives: Drives) -> tuple[Floats, Floats, Floats]:
     return n2 * drives.motor_inertia, n2 * drives.stiffness, n2 * drives.damping
 
 
-def _full(mechanism: Mechanism, link_mass: Floats, h: Floats, damping: Damping) -> Plant:
-    """M = [M_phi, 0; 0, M_theta], K = [k, -k; -k, k] on the links and the motors of the flexible drives."""
+def _full(
+    mechanism: Mechanism, link_mass: Floats, h: Floats, damping: Damping, encoders: Encoders
+) -> tuple[Plant, list[LaggedDamper]]:
+    """M = [M_phi, 0; 0, M_theta], K = [k, -k; -k, k] on the links and the motors of the flexible drives; and the
+    electrical dampers beside the structural ones."""
     drives = mechanism.drives
     rotor, spring, damper = _at_joint(drives)
     flexible = np.flatnonzero(np.isfinite(spring))
@@ -156,7 +180,11 @@ def _full(mechanism: Mechanism, link_mass: Floats, h: Floats, damping: Damping) 
     actuator = np.concatenate([np.where(np.isfinite(spring), 0.0, h), h[flexible]])
     B = _full_damping(M, K, D, damper[flexible], damping)
     names = [f"{name} link" for name in drives.names] + [f"{drives.names[i]} motor" for i in flexible]
-    return Plant(M, B, K, actuator, actuator.copy(), np.concatenate([h, np.zeros(f)]), tuple(names))
+    handle = np.concatenate([h, np.zeros(f)])
+    sensor = actuator.copy() if encoders == "motor" else handle.copy()
+    motors = np.eye(d, d + f)
+    motors[flexible] = np.eye(d + f)[d:]
+    return Plant(M, B, K, actuator, sensor, handle, tuple(names)), winding_dampers(drives, motors)
 
 
 def _full_damping(M: Floats, K: Floats, D: Floats, damper: Floats, damping: Damping) -> Floats:
@@ -227,7 +255,6 @@ def _is_two_mass(plant: Plant) -> bool:
         and np.array_equal(plant.stiffness, k * np.array([[1.0, -1.0], [-1.0, 1.0]]))
         and np.array_equal(plant.handle, [1.0, 0.0])
         and np.array_equal(plant.actuator, [0.0, 1.0])
-        and np.array_equal(plant.sensor, [0.0, 1.0])
     )
 
 
@@ -252,23 +279,71 @@ def _drag(plant: Plant, motion: Floats) -> float:
     return drag if drag > 1e-12 * inside else 0.0
 
 
-def _side_damping(plant: Plant, deflection: Floats) -> Floats:
-    """Damping of the two sides, (2, 2) on [link side, motor side]: W^T B W, or x^T B x between them.
+def _sides(plant: Plant, deflection: Floats) -> Floats | None:
+    """Motions (n, 2) of the link side alone and of the motor side alone; None where a spring ties both to the
+    ground, so that only their difference is a motion.
 
     With r the rigid motion of one metre, W = [r - w, w] with w = x + (1 - a . x) r, which moves the actuator by
-    one metre and the handle by none. What is tied to the ground has no r, and only the damper between.
+    one metre and the handle by none.
     """
-    between = float(deflection @ plant.damping @ deflection) * np.array([[1.0, -1.0], [-1.0, 1.0]])
     try:
         _, rigid = _rigid_motion(plant)
     except ModelError:
-        return between
-    if not _drag(plant, rigid):
-        return between
+        return None
     motor_alone = deflection + (1.0 - plant.actuator @ deflection) * rigid
-    sides = np.stack([rigid - motor_alone, motor_alone], axis=1)
+    return np.stack([rigid - motor_alone, motor_alone], axis=1)
+
+
+def _side_damping(plant: Plant, deflection: Floats) -> Floats:
+    """Damping of the two sides, (2, 2) on [link side, motor side]: W^T B W, or x^T B x between them."""
+    sides = _sides(plant, deflection)
+    if sides is None or not _drag(plant, sides.sum(axis=1)):
+        return float(deflection @ plant.damping @ deflection) * np.array([[1.0, -1.0], [-1.0, 1.0]])
     damping = sides.T @ plant.damping @ sides
     return np.asarray((damping + damping.T) / 2)
+
+
+def _motions(plant: Plant, model: Model) -> Floats:
+    """The motions (n, m) of a plant that a reduced model's coordinates stand for."""
+    if model == "rigid":
+        return _rigid_motion(plant)[1][:, None]
+    _, deflection = _spring(plant)
+    sides = _sides(plant, deflection)
+    both = np.stack([-deflection, deflection], axis=1) if sides is None else sides
+    return both[:, 1:] if model == "motor-mass" else both
+
+
+def _carried(reduced: Plant, plant: Plant, model: Model) -> Plant:
+    """The reduced plant with the sensor and the lagged dampers of the one it stands for."""
+    if not plant.lagged_dampers and np.array_equal(plant.sensor, plant.actuator):
+        return reduced
+    motions = _motions(plant, model)
+    return with_dampers(_read(reduced, plant, motions), carried(plant.lagged_dampers, motions))
+
+
+def _held(reduced: Plant, plant: Plant, motion: Floats) -> Plant:
+    """The rigid model held where the plant is: at what its rigid motion moves the handle by."""
+    if plant.handle is None:
+        return reduced
+    share = float(plant.handle @ motion)
+    near = abs(share - 1.0) <= TOGETHER
+    return reduced if near else replace(reduced, handle=np.array([share]) if share else None)
+
+
+def _read(reduced: Plant, plant: Plant, motions: Floats) -> Plant:
+    """The reduced plant's sensor: where the wall acts, where the hand is, or what the motions move it by."""
+    if np.array_equal(plant.sensor, plant.actuator):
+        return reduced
+    seen = seen_by(plant.sensor, motions)
+    if reduced.size > 1 and plant.handle is not None and np.array_equal(plant.sensor, plant.handle):
+        seen = reduced.handle if reduced.handle is not None else seen
+    elif not abs(plant.actuator @ motions[:, -1] - 1.0) <= TOGETHER:
+        raise ModelError(
+            "the plant is tied to the ground, and what the sensor reads of two masses is not known; use 'full'"
+        )
+    if not np.any(seen):
+        raise ModelError("the sensor reads nothing of what moves in this model; use 'full'")
+    return replace(reduced, sensor=seen)
 
 
 def _spring(plant: Plant) -> tuple[float, Floats]:

@@ -2,7 +2,9 @@
 
     numbers    the kinds of values: numbers, vectors, matrices that are right by themselves
     plant      [plant]
+    velocity   [loop.velocity], and the low passes
     loop       [loop]
+    operator   [operator]
     mechanism  [mechanism]
     file       the whole file, and its JSON Schema
 

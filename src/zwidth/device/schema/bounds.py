@@ -23,6 +23,10 @@ STIFFEST: Final = 1e15  # N/m or N m/rad, of a spring there is
 STRONGEST_DAMPING: Final = 1e15  # N s/m or N m s/rad
 LEAST_RATIO: Final = 1e-6  # motor turns per joint turn
 LARGEST_RATIO: Final = 1e6  # motor turns per joint turn
+LEAST_RESISTANCE: Final = 1e-9  # ohm
+LARGEST_RESISTANCE: Final = 1e12  # ohm
+LEAST_INDUCTANCE: Final = 1e-15  # H
+LARGEST_INDUCTANCE: Final = 1e6  # H
 LEAST_SHARE: Final = 1e-9  # of a coordinate in what is driven or read
 LARGEST_SHARE: Final = 1e9  # of a coordinate in what is driven or read
 

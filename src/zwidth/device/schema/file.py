@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, ConfigDict
 
 from zwidth.device.schema.loop import LoopSection
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.device.schema.numbers import Section, Text, quantity
+from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.plant import PlantSection
 from zwidth.device.schema.response import ResponseSection
+
+TAGS: Final = ("type", "method")  # of a filter, of a velocity's estimate
 
 
 def flat_sources(value: Any) -> Any:
@@ -49,6 +52,7 @@ class DeviceFile(Section):
     plant: PlantSection | None = quantity("the rendered direction's dynamics; or [mechanism]", default=None)
     response: ResponseSection | None = quantity("a measured response, in place of either", default=None)
     loop: LoopSection = quantity("what the computer does")
+    operator: OperatorSection | None = quantity("the arm and grasp at the handle; omitted: nobody", default=None)
 
 
 @lru_cache(maxsize=1)
@@ -70,10 +74,15 @@ def keys(path: tuple[str | int, ...]) -> set[str]:
     return {key for found in at(path) for key in found.get("properties", {})}
 
 
-def kinds(path: tuple[str | int, ...]) -> dict[str, set[str]]:
-    """For a table that comes in kinds, told apart by its `type`: the keys of each kind; {} for any other."""
+def kinds(path: tuple[str | int, ...]) -> tuple[str, dict[str, set[str]]]:
+    """For a table that comes in kinds: the key that tells them apart, and the keys of each kind; "", {} for any
+    other."""
     tables = [found.get("properties", {}) for found in at(path)]
-    return {table["type"]["const"]: set(table) for table in tables if "const" in table.get("type", {})}
+    for tag in TAGS:
+        found = {table[tag]["const"]: set(table) for table in tables if "const" in table.get(tag, {})}
+        if len(found) > 1:
+            return tag, found
+    return "", {}
 
 
 def description(path: tuple[str | int, ...]) -> str:

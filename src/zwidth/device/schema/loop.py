@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator
 
 from zwidth.device.faults import quote
-from zwidth.device.schema.numbers import Number, Section, WholeNumber, quantity
+from zwidth.device.schema.numbers import Number, Section, quantity
+from zwidth.device.schema.velocity import BackwardDifferenceSection, LowPass, VelocitySection
 
 SHORTEST_PERIOD: Final = 1e-7  # s; 10 MHz, far beyond any loop round a motor
 LONGEST_PERIOD: Final = 1.0  # s
 LONGEST_DELAY: Final = 100  # samples; each adds a state to the loop
-HIGHEST_ORDER: Final = 20  # of a Butterworth filter; each adds a state to the loop
 
 
 def _a_period(value: Any) -> Any:
@@ -30,37 +30,39 @@ def _a_period(value: Any) -> Any:
     return value
 
 
-class FirstOrderFilter(Section):
-    """First-order low pass by backward Euler, a = tau / (tau + T)."""
+class ForceSection(Section):
+    """What the computed force passes before it is set."""
 
-    type: Literal["first-order"] = quantity('kind of filter: "first-order" or "butterworth"')
-    time_constant_s: Number = quantity("time constant tau; 0: no filter", "s", ge=0)
+    filter: LowPass | None = quantity("low pass on the whole force; omitted: none", default=None)
 
 
-class ButterworthFilter(Section):
-    """Butterworth low pass by the bilinear (Tustin) rule."""
+class ActuatorSection(Section):
+    """How the force follows its command."""
 
-    type: Literal["butterworth"] = quantity('kind of filter: "first-order" or "butterworth"')
-    order: WholeNumber = quantity("order, a whole number from 1 to 20", ge=1, le=HIGHEST_ORDER)
-    cutoff_Hz: Number = quantity("cutoff frequency, below half the sampling frequency", "Hz", gt=0)
-    discretisation: Literal["tustin", "tustin-prewarped"] = quantity(
-        "bilinear rule, plain or prewarped at the cutoff", default="tustin"
+    time_constant_s: Number = quantity(
+        "time constant tau of the force's first-order lag, tau f' + f = held command; 0: none", "s", ge=0
     )
 
 
-class VelocitySection(Section):
-    """How the velocity is estimated from the encoder."""
+class EncoderSection(Section):
+    """Where the encoder sits, and its step."""
 
-    method: Literal["backward-difference"] = quantity(
-        "estimator of the velocity; (x_j - x_{j-1}) / T", default="backward-difference"
+    at: Literal["motor", "link", "handle"] | None = quantity(
+        'what the encoders of a mechanism read: "motor" (omitted), or behind the drives the "link" or "handle", '
+        "which are the same with rigid links; a [plant] says it by `sensor`",
+        default=None,
     )
-    filter: Annotated[FirstOrderFilter | ButterworthFilter, Field(discriminator="type")] | None = quantity(
-        "low pass on the velocity; omitted: none", default=None
+    resolution_m: Number | None = quantity(
+        'step of the reading, for a [plant] with method = "kalman", whose position_noise_m it replaces by '
+        "step/sqrt(12); the chart itself is linear and knows no steps",
+        "m",
+        gt=0,
+        default=None,
     )
 
 
 class LoopSection(Section):
-    """The sampled wall law, f = -(K y + B v)."""
+    """The sampled wall law, f = -F (K y + B v)."""
 
     sampling_period_s: Annotated[Number, BeforeValidator(_a_period)] = quantity(
         "sampling period T, 1e-7 <= T <= 1", "s", ge=SHORTEST_PERIOD, le=LONGEST_PERIOD
@@ -75,5 +77,11 @@ class LoopSection(Section):
         "time from reading the encoder to setting the force; or delay_samples", "s", ge=0, default=None
     )
     velocity: VelocitySection = quantity(
-        "how the velocity is estimated", default=VelocitySection(method="backward-difference", filter=None)
+        "how the velocity is estimated",
+        default=BackwardDifferenceSection(method="backward-difference", filter=None),
+    )
+    force: ForceSection = quantity("what the force passes", default=ForceSection(filter=None))
+    actuator: ActuatorSection = quantity("how the force follows", default=ActuatorSection(time_constant_s=0.0))
+    encoder: EncoderSection = quantity(
+        "where the encoder sits", default=EncoderSection(at=None, resolution_m=None)
     )

@@ -9,6 +9,7 @@ from zwidth.device.schema.numbers import (
     Bounds,
     Damper,
     Direction,
+    Inductance,
     Inertia,
     Mass,
     Name,
@@ -17,6 +18,7 @@ from zwidth.device.schema.numbers import (
     Offset,
     Position,
     Ratio,
+    Resistance,
     RotorInertia,
     Section,
     Spring,
@@ -123,6 +125,19 @@ class DriveSection(Section):
     )
     torque_constant_Nm_per_A: Number | None = quantity(
         "torque constant of the motor; omitted: not known", "N m/A", gt=0, default=None
+    )
+    winding_resistance_ohm: Resistance | None = quantity(
+        "resistance of the motor's winding; with damping_resistance_ohm", "ohm", gt=0, default=None
+    )
+    winding_inductance_H: Inductance | None = quantity(
+        "inductance of the motor's winding; with damping_resistance_ohm; omitted: none", "H", ge=0, default=None
+    )
+    damping_resistance_ohm: Resistance | None = quantity(
+        "resistor through which the winding is closed, so that the motor brakes by its own induction; 0: shorted; "
+        "omitted: the winding is open or on a current amplifier, and there is no electrical damping",
+        "ohm",
+        ge=0,
+        default=None,
     )
     torque_limit_Nm: NumberOrInfinity | None = quantity(
         "largest torque at the motor; omitted or inf: no limit", "N m", gt=0, default=None

@@ -2,7 +2,30 @@
 
 from __future__ import annotations
 
-from zwidth.device.schema.numbers import DampingMatrix, MassMatrix, Section, StiffnessMatrix, Vector, quantity
+from zwidth.device.schema.numbers import (
+    DampingMatrix,
+    Inductance,
+    MassMatrix,
+    Name,
+    Number,
+    Resistance,
+    Section,
+    StiffnessMatrix,
+    Vector,
+    quantity,
+)
+
+
+class ElectricalDampingSection(Section):
+    """A motor whose winding is closed through a resistor: it brakes by k^2/(R + L s) (Mehling et al. 2005)."""
+
+    name: Name | None = quantity("the motor's name: letters, digits, - and _; omitted: none", default=None)
+    force_constant_N_per_A: Number = quantity("force per current, k", "N/A", gt=0)
+    resistance_ohm: Resistance = quantity("resistance of winding and resistor together, R", "ohm", gt=0)
+    inductance_H: Inductance = quantity("inductance of the winding, L; 0: no lag", "H", ge=0, default=0.0)
+    along: Vector | None = quantity(
+        "the coordinates that move the motor, n numbers; omitted: those of the actuator", "1", default=None
+    )
 
 
 class PlantSection(Section):
@@ -25,4 +48,7 @@ class PlantSection(Section):
         "where the operator holds the device, n numbers; omitted for n = 1, or where no operator is wanted",
         "1",
         default=None,
+    )
+    electrical_damping: tuple[ElectricalDampingSection, ...] = quantity(
+        "motors whose windings are closed through a resistor", default=()
     )

@@ -1,0 +1,63 @@
+"""Who holds the device: the [operator] of its file, one of the bundled operators, one from a file, or nobody."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from zwidth.device.faults import DeviceError, Fault, dotted, fail
+from zwidth.device.read import OPERATORS, read
+from zwidth.device.relations import operator_relations
+from zwidth.device.schema.numbers import Section
+from zwidth.device.schema.operator import OperatorSection
+from zwidth.device.translate import sentences
+
+NOBODY: Final = "none"
+
+
+class OperatorFile(Section):
+    """A file with nothing but an operator."""
+
+    operator: OperatorSection
+
+
+def held_by(document: dict[str, Any], operator: str | os.PathLike[str] | None) -> dict[str, Any]:
+    """The device's document with another operator.
+
+    operator  a bundled operator's name, a file with an [operator], "none" for nobody; None: as the document says
+    Raises DeviceError  with all faults of the operator's file
+    """
+    if operator is None:
+        return document
+    without = {key: value for key, value in document.items() if key != "operator"}
+    return without if operator == NOBODY else without | {"operator": operator_table(operator)}
+
+
+def operator_table(name_or_path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The [operator] table of a bundled operator or a file, checked; its keys may also stand bare in the file.
+
+    A device file with an [operator] serves, too. An operator without a name is called as his file is.
+    Raises DeviceError  with all faults
+    """
+    document, label = read(name_or_path, OPERATORS)
+    others = sorted(document.keys() - {"operator"})
+    if "operator" not in document:
+        if {"plant", "mechanism", "response", "loop"} & document.keys():
+            raise fail(label, "operator", "is missing; a device file without an [operator] holds none")
+        document = {"operator": document}
+    elif others and "loop" not in document:
+        raise DeviceError(
+            Fault(label, key, "is no part of an operator; put it into [operator] or remove it") for key in others
+        )
+    table = document["operator"]
+    document = {"operator": table}
+    found = list(operator_relations(document))
+    try:
+        OperatorFile.model_validate(document)
+    except ValidationError as error:
+        found += sentences(error, document)
+    if found:
+        raise DeviceError(Fault(label, dotted(path), message) for path, message in found)
+    return {"name": label, **table}

@@ -1,0 +1,154 @@
+"""[loop.velocity]: how the velocity is estimated, one table per method, and the low passes there are."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal, Self
+
+from pydantic import Discriminator, Field, Strict, Tag, ValidationInfo, field_validator, model_validator
+
+from zwidth.device.schema.numbers import Number, Section, WholeNumber, quantity
+from zwidth.loop.estimators import METHODS
+
+HIGHEST_DEGREE: Final = 10  # of a Savitzky-Golay polynomial
+HIGHEST_ORDER: Final = 20  # of a Butterworth filter; each adds a state to the loop
+LONGEST_WINDOW: Final = 100  # samples; each adds a state to the loop, and a chart with more takes minutes
+DEFAULT: Final = "backward-difference"
+
+
+class FirstOrderFilter(Section):
+    """First-order low pass by backward Euler, a = tau / (tau + T)."""
+
+    type: Literal["first-order"] = quantity('kind of filter: "first-order" or "butterworth"')
+    time_constant_s: Number = quantity("time constant tau; 0: no filter", "s", ge=0)
+
+
+class ButterworthFilter(Section):
+    """Butterworth low pass by the bilinear (Tustin) rule."""
+
+    type: Literal["butterworth"] = quantity('kind of filter: "first-order" or "butterworth"')
+    order: WholeNumber = quantity("order, a whole number from 1 to 20", ge=1, le=HIGHEST_ORDER)
+    cutoff_Hz: Number = quantity("cutoff frequency, below half the sampling frequency", "Hz", gt=0)
+    discretisation: Literal["tustin", "tustin-prewarped"] = quantity(
+        "bilinear rule, plain or prewarped at the cutoff", default="tustin"
+    )
+
+
+LowPass = Annotated[FirstOrderFilter | ButterworthFilter, Field(discriminator="type")]
+
+_METHOD: Final = "estimator of the velocity: " + ", ".join(f'"{name}"' for name in METHODS)
+_SAMPLES: Final = (
+    'n: of "windowed-difference" the periods between its two positions, of "least-squares-slope" and '
+    '"savitzky-golay" the positions used; a whole number up to 100'
+)
+
+
+class _Method(Section):
+    """What every method has; two parameters that do not fit each other are told by the estimator itself."""
+
+    method: str
+    filter: LowPass | None = quantity("low pass on the velocity; omitted: none", default=None)
+
+    @model_validator(mode="after")
+    def _can_be_built(self) -> Self:
+        own = self.parameters()
+        if None not in own.values():
+            METHODS[self.method](**own)
+        return self
+
+    def parameters(self) -> dict[str, Any]:
+        """The estimator's parameters under their names in Python; None where not given."""
+        units = ("_m_per_s2", "_m")
+        own = {key: value for key, value in self if key not in ("method", "filter")}
+        return {next((key.removesuffix(u) for u in units if key.endswith(u)), key): own[key] for key in own}
+
+
+class BackwardDifferenceSection(_Method):
+    """(x_j - x_{j-1}) / T"""
+
+    method: Literal["backward-difference"] = quantity(_METHOD, default=DEFAULT)
+
+
+class WindowedDifferenceSection(_Method):
+    """(x_j - x_{j-n}) / (n T)"""
+
+    method: Literal["windowed-difference"] = quantity(_METHOD)
+    samples: WholeNumber = quantity(_SAMPLES, "1", ge=1, le=LONGEST_WINDOW)
+
+
+class LeastSquaresSlopeSection(_Method):
+    """Slope of the line through the newest n positions."""
+
+    method: Literal["least-squares-slope"] = quantity(_METHOD)
+    samples: WholeNumber = quantity(_SAMPLES, "1", ge=2, le=LONGEST_WINDOW)
+
+
+class CentralDifferenceSection(_Method):
+    """(x_j - x_{j-2}) / (2 T)"""
+
+    method: Literal["central-difference"] = quantity(_METHOD)
+
+
+class SavitzkyGolaySection(_Method):
+    """Slope of the polynomial through the newest n positions."""
+
+    method: Literal["savitzky-golay"] = quantity(_METHOD)
+    samples: WholeNumber = quantity(_SAMPLES, "1", ge=2, le=LONGEST_WINDOW)
+    order: WholeNumber = quantity(
+        '"savitzky-golay": degree of the polynomial, a whole number from 1 to 10', "1", ge=1, le=HIGHEST_DEGREE
+    )
+    centred: Annotated[bool, Strict()] = quantity(
+        '"savitzky-golay": true for the slope in the middle of the window instead of at its newest position',
+        default=False,
+    )
+
+    @field_validator("order")
+    @classmethod
+    def _below_samples(cls, order: int, info: ValidationInfo) -> int:
+        samples = info.data.get("samples")
+        if samples is not None and order >= samples:
+            raise ValueError(
+                f"must be below samples = {samples}, got {order}; a polynomial of order p takes p + 1 positions"
+            )
+        return order
+
+
+class AlphaBetaSection(_Method):
+    """A tracker that corrects its position and velocity by shares of its error."""
+
+    method: Literal["alpha-beta"] = quantity(_METHOD)
+    alpha: Number = quantity('"alpha-beta": share of the error given to the position, below 2', "1", gt=0, lt=2)
+    beta: Number = quantity(
+        '"alpha-beta": share of the error given, over T, to the velocity, below 4 - 2 alpha', "1", gt=0, lt=4
+    )
+
+
+class KalmanSection(_Method):
+    """The alpha-beta filter with the gains that two noise figures call for."""
+
+    method: Literal["kalman"] = quantity(_METHOD)
+    acceleration_noise_m_per_s2: Number = quantity(
+        '"kalman": standard deviation of the accelerations to expect', "m/s^2", gt=0
+    )
+    position_noise_m: Number | None = quantity(
+        '"kalman": standard deviation of the encoder\'s error; or loop.encoder.resolution_m',
+        "m",
+        gt=0,
+        default=None,
+    )
+
+
+def _method(table: Any) -> Any:
+    method = table.get("method", DEFAULT) if isinstance(table, dict) else getattr(table, "method", DEFAULT)
+    return method if isinstance(method, str) else None
+
+
+VelocitySection = Annotated[
+    Annotated[BackwardDifferenceSection, Tag("backward-difference")]
+    | Annotated[WindowedDifferenceSection, Tag("windowed-difference")]
+    | Annotated[LeastSquaresSlopeSection, Tag("least-squares-slope")]
+    | Annotated[CentralDifferenceSection, Tag("central-difference")]
+    | Annotated[SavitzkyGolaySection, Tag("savitzky-golay")]
+    | Annotated[AlphaBetaSection, Tag("alpha-beta")]
+    | Annotated[KalmanSection, Tag("kalman")],
+    Discriminator(_method),
+]
