@@ -94,11 +94,11 @@ def _equal_modes(modes: RealModes) -> list[list[int]]:
 def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag: float) -> Sections:
     """Rows of a first-order form, and of the free motion beside it."""
     alone = []
-    if form.free_count:
+    if form.free:
         row = modal_row(0.0, 0.0, period, fraction, lag)
         row[2:] *= form.free
         alone.append([*row, 0.0])
-    unobserved = [_label(0.0, 0.0)] * (form.free_count - 1)
+    unobserved = [_label(0.0, 0.0)] * (form.free_count - len(alone))
     unobserved += [_pole_label(pole) for pole in form.hidden if pole.imag >= 0.0]
     rows = chain_rows(form, chain(form, period, fraction, lag), period)
     m = len(rows)

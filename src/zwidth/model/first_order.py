@@ -28,7 +28,8 @@ class FirstOrderForm:
     output      (k,)
     poles       (p,)    eigenvalues of A [1/s], conjugates both, but for
     hidden      (h,)    those that the force does not move or the sensor does not read
-    free        residue of the rigid, undamped motion [1/kg]
+    free        residue of the rigid, undamped motion [1/kg]; 0 where the force does not move it or the sensor
+                does not read it
     free_count  how many such motions there are
     """
 
@@ -51,8 +52,11 @@ def first_order_form(plant: Plant, period: float) -> FirstOrderForm:
     free, kept = _free_motions(plant)
     A, source, reading = _assembled(plant, kept, period)
     ends = np.abs(np.hstack([free, kept]).T @ np.stack([plant.actuator, plant.sensor], axis=1))
-    poles, hidden = _poles(A, source, reading, period, float(np.prod(ends.sum(axis=0))) * period**2)
+    together = float(np.prod(ends.sum(axis=0)))
+    poles, hidden = _poles(A, source, reading, period, together * period**2)
     inertia = float((free.T @ plant.sensor) @ (free.T @ plant.actuator))
+    if abs(inertia) <= UNOBSERVED_UNDAMPED * together:
+        inertia = 0.0
     return FirstOrderForm(A, source, reading, poles[~hidden], poles[hidden], inertia, int(free.shape[1]))
 
 
