@@ -16,6 +16,7 @@ from zwidth.chart.measured_cells import Cells, edges_stable_set
 from zwidth.chart.measured_loop import MeasuredLoop
 
 Floats = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 CORNERS = 24  # of a polygon round an ellipse
 MOST_ELLIPSES = 600
@@ -46,7 +47,7 @@ def uncertainty(loop: MeasuredLoop, cells: Cells) -> Band | None:
     if loop.errors is None:
         return None
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
-    covered = shapely.union_all(list(_ellipses(loop, cells, scale)))
+    covered = _covered(loop, cells, scale)
     stable = shapely.union_all([shapely.transform(cell, lambda xy: xy / scale) for cell in cells.polygons])
     parts = [part for part in shapely.get_parts(covered) if isinstance(part, shapely.Polygon)]
     return Band(
@@ -59,17 +60,28 @@ def uncertainty(loop: MeasuredLoop, cells: Cells) -> Band | None:
     )
 
 
-def _ellipses(loop: MeasuredLoop, cells: Cells, scale: Floats) -> Iterator[shapely.Geometry]:
-    """Convex hulls of each two neighbouring ellipses along the stable set's edge, in units of `scale`."""
+def _covered(loop: MeasuredLoop, cells: Cells, scale: Floats) -> shapely.Geometry:
+    """The ellipses along the stable set's edge, in units of `scale`.
+
+    Where two arcs meet, each goes on beyond the corner as far as the other leaves it in doubt: there the edge would
+    run if both were as far out as they can be.
+    """
     edge = cells.edge
     curve = np.flatnonzero(edge.at >= 0)
-    low, high = (
-        np.minimum(edge.segments[:, :2], edge.segments[:, 2:]),
-        np.maximum(edge.segments[:, :2], edge.segments[:, 2:]),
-    )
+    segments = edge.segments[curve]
+    low, high = np.minimum(segments[:, :2], segments[:, 2:]), np.maximum(segments[:, :2], segments[:, 2:])
     K0, K1, B0, B1 = cells.box
-    curve = curve[np.all((high[curve] >= (K0, B0)) & (low[curve] <= (K1, B1)), axis=1)]
-    curve = curve[edges_stable_set(edge, curve, scale)]
+    curve = curve[np.all((high >= (K0, B0)) & (low <= (K1, B1)), axis=1)]
+    flags = edges_stable_set(edge, curve, scale)
+    covered = shapely.union_all(list(_ellipses(loop, cells, scale, curve[flags])))
+    starts = edge.segments[curve, :2] / scale
+    beyond = flags | shapely.contains_xy(covered, starts[:, 0], starts[:, 1])
+    return shapely.union_all(list(_ellipses(loop, cells, scale, curve[beyond])))
+
+
+def _ellipses(loop: MeasuredLoop, cells: Cells, scale: Floats, curve: Whole) -> Iterator[shapely.Geometry]:
+    """Convex hulls of each two neighbouring ellipses along these chords."""
+    edge = cells.edge
     every = max(1, len(curve) // MOST_ELLIPSES)
     for run in np.split(curve, np.flatnonzero(np.diff(curve) > 1) + 1) if len(curve) else []:
         at = edge.at[run]

@@ -316,14 +316,14 @@ def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
     on[known] = edges_stable_set(edge, first[at[known]], scale, BEGINNING)
     numbers = np.flatnonzero(on)
     for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else []:
-        theta = measured[run]
+        theta, frequency = measured[run], loop.response.frequency[loop.good][run]
         K, B, _ = loop.walls(theta)
         if loop.errors is None:
-            yield MeasuredArc(K, B, theta / (2.0 * np.pi * loop.period))
+            yield MeasuredArc(K, B, frequency)
         else:
             w = loop.w(theta)
             reach = loop.error(theta) * np.abs(w) / np.abs(w.imag)
-            yield MeasuredArc(K, B, theta / (2.0 * np.pi * loop.period), K - reach, K + reach)
+            yield MeasuredArc(K, B, frequency, K - reach, K + reach)
     lines = [(-1, 0.0), (-2, half)] if loop.between.closed else [(-1, 0.0)]
     for kind, frequency in lines:
         static, turned = real_root(loop, kind)

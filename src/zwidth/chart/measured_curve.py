@@ -156,7 +156,7 @@ def boundary(loop: MeasuredLoop, angles: Floats, known: Boundary | None = None) 
 
 
 def real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float]:
-    """h and w of the line K + B w = h of real roots at z = 1 (kind -1) or z = -1 (kind -2); h is inf without one."""
+    """h and w of the line K + B w = h of real roots at z = 1 (kind -1) or -1 (kind -2); h is inf without one."""
     if kind == -1:
         near = np.array([NEAREST * loop.angles[0]])
         h = 0.0 if loop.integrators else float(loop.h(near)[0].real)

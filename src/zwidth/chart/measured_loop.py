@@ -93,7 +93,7 @@ class MeasuredLoop:
         return float(np.pi if self.between.closed else self.angles[-1])
 
     def h(self, theta: Floats) -> Complexes:
-        """h = -1/P (...) at angles in (0, pi], the computer's own delay and force filter in P; inf where P is 0."""
+        """h = -1/P (...) at angles in (0, pi], software delay and force filter in P; inf where P is 0."""
         delay, force = round(self.controller.delay), force_path(self.controller)
         with np.errstate(divide="ignore", invalid="ignore"):
             passed = product(force.numerator, force.denominator, around_one(theta))

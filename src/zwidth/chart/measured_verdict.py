@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,9 +28,9 @@ class MeasuredVerdicts:
     frequency: Floats
 
     @property
-    def names(self) -> Any:
-        """Verdicts as words, lists nested like the shape."""
-        return np.array(NAMES)[self.verdict].tolist()
+    def names(self) -> list[str]:
+        """The verdicts in words, flattened."""
+        return [NAMES[int(v)] for v in self.verdict.ravel()]
 
 
 def judge_measured(

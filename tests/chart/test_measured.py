@@ -1,0 +1,278 @@
+"""A plant's own exact response gives back its exact chart; what data cannot tell is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from tests import systems
+from tests.measured_cases import dense, measured, sampled_response
+from zwidth.chart.chart import stability_chart
+from zwidth.chart.measured import measured_chart
+from zwidth.chart.measured_curve import boundary, coarse, nyquist_count
+from zwidth.chart.measured_loop import MeasuredLoop
+from zwidth.chart.verdict import eigenvalues
+from zwidth.loop.controller import Butterworth, Controller
+from zwidth.loop.loop import Loop
+from zwidth.model.response import Response, ResponseError, integrators_of
+
+DAMPED = (0.01, 0.05, 0.3, 1.0, 1.5)
+
+
+def own(loop, **more):
+    return measured_chart(*measured(loop, **more))
+
+
+def random_walls(loop, rng, count=300):
+    """Walls of both signs over four decades round the middle of the curve."""
+    sizes = [
+        np.quantile(np.abs(x), [0.02, 0.9]) for x in (loop.h(loop.inner), loop.h(loop.inner) / loop.w(loop.inner))
+    ]
+    return np.column_stack(
+        [np.exp(rng.uniform(*np.log(size), count)) * rng.choice([-1.0, 1.0], count) for size in sizes]
+    )
+
+
+@pytest.mark.parametrize("seed", range(9))
+def test_a_plants_own_response_gives_back_its_exact_chart(seed):
+    rng = np.random.default_rng(100 + seed)
+    loop = systems.random_loop(rng, DAMPED)
+    exact = stability_chart(loop, decay=False)
+    chart = own(loop)
+    assert chart.stiffness_max == pytest.approx(exact.stiffness_max, rel=1e-5)
+    assert chart.damping_max == pytest.approx(exact.damping_max, rel=1e-4)
+    assert chart.stable_area == pytest.approx(exact.stable_area, rel=2e-4)
+    assert_allclose(chart.frequencies_at_stiffness_max, exact.frequencies_at_stiffness_max, rtol=2e-3)
+    assert len(chart.regions) == len(exact.regions)
+    assert not chart.open
+    walls = random_walls(chart.loop, rng)
+    radius = np.max(np.abs(eigenvalues(loop, *walls.T)), axis=-1)
+    clear = np.abs(radius - 1.0) > 1e-5
+    verdicts = chart.check(*walls.T).verdict
+    assert_allclose(verdicts[clear], np.sign(1.0 - radius[clear]))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_count_is_that_of_the_eigenvalues_outside(seed):
+    """Both by crossings of the curve and by the turning of 1 + L, for any number of roots outside."""
+    rng = np.random.default_rng(seed)
+    loop = systems.random_loop(rng, DAMPED)
+    own_loop = MeasuredLoop(*measured(loop))
+    edge = boundary(own_loop, coarse(own_loop))
+    walls = random_walls(own_loop, rng)
+    sizes = np.abs(eigenvalues(loop, *walls.T))
+    clear = np.min(np.abs(sizes - 1.0), axis=-1) > 1e-6
+    true = np.sum(sizes > 1.0, axis=-1)[clear]
+    assert_allclose(edge.outside(walls)[clear], true)
+    counts, margin = nyquist_count(own_loop, edge.angles, walls)
+    sure = margin[clear] > 0.01
+    assert_allclose(counts[clear][sure], true[sure])
+    assert len(set(true.tolist())) > 2
+
+
+def test_boundary_points_are_the_measured_ones():
+    loop = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
+    f = np.linspace(0.5, 400.0, 800)
+    chart = own(loop, frequency=f)
+    arcs = [arc for arc in chart.boundary if 0.0 < arc.frequency[0] < 400.0]
+    assert np.all(np.isin(np.round(np.concatenate([arc.frequency for arc in arcs]), 6), np.round(f, 6)))
+    for arc in arcs:
+        z = np.exp(2j * np.pi * arc.frequency * loop.period)
+        w = loop.velocity_response(z)
+        residue = 1.0 + loop.plant_response(z) * (arc.stiffness + arc.damping * w)
+        assert np.max(np.abs(residue)) < 1e-9
+    exact = stability_chart(loop, decay=False)
+    assert chart.stiffness_max == pytest.approx(exact.stiffness_max, rel=1e-6)
+    assert 0.9 * exact.stiffness_max < chart.measured_stiffness_max <= exact.stiffness_max * (1.0 + 1e-9)
+
+
+def test_interpolation_has_the_fourth_order():
+    """Halving the spacing divides the error by 16, and the error told is of the right size."""
+    loop = systems.published(delay=1.3)
+    errors, told = [], []
+    for count in (200, 400, 800):
+        f = np.linspace(400.0 / count, 400.0, count)
+        between = MeasuredLoop(*measured(loop, frequency=f)).between
+        middle = np.linspace(20.0, 380.0, 5000)
+        P = sampled_response(loop, middle)
+        errors.append(np.max(np.abs(P * between.inverse(2.0 * np.pi * middle * loop.period) - 1.0)))
+        told.append(np.max(between.relative_error(2.0 * np.pi * middle * loop.period)))
+    assert 8.0 < errors[0] / errors[1] < 40.0
+    assert 8.0 < errors[1] / errors[2] < 40.0
+    assert np.all((np.array(told) / errors > 0.1) & (np.array(told) / errors < 20.0))
+
+
+def test_lines_of_real_roots_edge_the_set():
+    """A mass on a spring under negative stiffness runs away at K = -k."""
+    loop = Loop(systems.mass(0.1, 2.0, 300.0), Controller(0.001))
+    chart, exact = own(loop), stability_chart(loop, decay=False)
+    assert chart.integrators == 0
+    (line,) = [arc for arc in chart.boundary if arc.frequency[0] == 0.0]
+    assert_allclose(line.stiffness, -300.0, rtol=1e-6)
+    ends = [arc.damping[k] for k in (0, -1) for arc in exact.boundary if arc.frequency[0] == 0.0]
+    assert_allclose(sorted(line.damping), [np.min(ends), np.max(ends)], rtol=1e-5)
+
+
+def test_software_delay_and_a_filter_of_the_force_are_added_to_what_was_measured():
+    loop = systems.published()
+    response, _ = measured(loop)
+    computer = Controller(loop.period, delay=2.0, force_filter=Butterworth(2, 150.0))
+    exact = stability_chart(Loop(loop.plant, computer), decay=False)
+    assert measured_chart(response, computer).stiffness_max == pytest.approx(exact.stiffness_max, rel=1e-6)
+    with pytest.raises(ResponseError, match=r"whole samples only, got 0\.5"):
+        measured_chart(response, Controller(loop.period, delay=0.5))
+    with pytest.raises(ResponseError, match="lag already"):
+        measured_chart(response, Controller(loop.period, actuator_time_constant=0.001))
+
+
+@pytest.mark.parametrize(
+    ("damping", "stiffness", "integrators"), [(0.0, 0.0, 2), (5.0, 0.0, 1), (5.0, 900.0, 0), (0.01, 0.0, 2)]
+)
+def test_integrators_are_read_off_the_phase(damping, stiffness, integrators):
+    """A dashpot too weak to be seen at the lowest frequency counts as none."""
+    response, _ = measured(
+        Loop(systems.mass(0.1, damping, stiffness), Controller(0.001)), np.linspace(0.5, 500.0, 999)
+    )
+    assert integrators_of(response, 0.001) == integrators
+
+
+def test_integrators_that_do_not_fit_and_swapped_columns_are_refused():
+    response, _ = measured(systems.published(), np.linspace(0.5, 400.0, 800))
+    with pytest.raises(ResponseError, match="integrators = 0 does not fit: the phase is 180 degrees"):
+        integrators_of(replace(response, integrators=0), 0.00125)
+    swapped = replace(response, value=response.value.imag + 1j * response.value.real)
+    with pytest.raises(ResponseError, match="are columns swapped"):
+        integrators_of(swapped, 0.00125)
+    between = measured(Loop(systems.mass(0.1, 5.0), Controller(0.001)), np.linspace(8.0, 500.0, 800))[0]
+    with pytest.raises(ResponseError, match="cannot be read off"):
+        integrators_of(between, 0.001)
+
+
+# --- what the data cannot tell ----------------------------------------------------------------------------
+
+
+def without(response, low, high):
+    """The response without the frequencies between."""
+    kept = (response.frequency < low) | (response.frequency > high)
+    return Response(response.frequency[kept], response.value[kept])
+
+
+def test_a_gap_is_named_and_whether_the_edge_runs_through_it():
+    loop = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
+    response, computer = measured(loop, np.linspace(0.5, 400.0, 800))
+    (away,) = measured_chart(without(response, 200.0, 300.0), computer).unusable
+    assert (away.low, away.high, away.on_edge) == (199.5, 300.5, False)
+    assert "nothing measured" in away.reason
+    (across,) = measured_chart(without(response, 8.0, 15.0), computer).unusable
+    assert across.on_edge
+
+
+def test_incoherent_frequencies_are_left_out_and_named():
+    loop = systems.published()
+    f = np.linspace(0.5, 400.0, 800)
+    coherence = np.where((f > 60.0) & (f < 64.0), 0.3, 0.9999)
+    response, computer = measured(loop, f, coherence=coherence, averages=50.0)
+    spoilt = replace(response, value=np.where(coherence < 0.5, 1.0, response.value))
+    chart = measured_chart(spoilt, computer)
+    (stretch,) = chart.unusable
+    assert (stretch.low, stretch.high) == (60.0, 64.0)
+    assert "coherence down to 0.3" in stretch.reason
+    assert chart.stiffness_max == pytest.approx(stability_chart(loop, decay=False).stiffness_max, rel=1e-4)
+
+
+def test_a_mode_between_two_frequencies_is_followed_and_a_crowd_of_them_is_named():
+    """One sharp pole or zero among its neighbours is interpolated well; closer together they are not resolved."""
+    loop = Loop(systems.two_mass(0.3, 0.03, 20000.0, 0.5), Controller(0.001))
+    exact = stability_chart(loop, decay=False)
+    sparse = own(loop, frequency=np.linspace(5.0, 495.0, 99))
+    assert sparse.stiffness_max == pytest.approx(exact.stiffness_max, rel=1e-3)
+    assert sparse.unusable == ()
+    (stretch,) = own(loop, frequency=np.linspace(500.0 / 12.0, 500.0, 12)).unusable
+    assert "measure closer" in stretch.reason
+    assert stretch.low < 136.0 < stretch.high
+
+
+def test_data_that_end_below_the_edge_leave_it_open():
+    loop = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
+    response, computer = measured(loop, np.linspace(0.5, 400.0, 800))
+    enough = measured_chart(without(response, 150.0, 500.0), computer)  # fails at 11 and 132 Hz
+    assert "are not seen" in enough.unusable[-1].reason
+    assert enough.stiffness_max == pytest.approx(stability_chart(loop, decay=False).stiffness_max, rel=1e-6)
+    missing = measured_chart(without(response, 100.0, 500.0), computer)
+    assert missing.open
+    assert np.isnan(missing.stiffness_max)
+    assert missing.unusable[-1].on_edge
+    nearly = measured_chart(without(response, 350.0, 500.0), computer)
+    assert "continued to half the sampling rate" in nearly.unusable[-1].reason
+    assert not nearly.open
+
+
+def test_nothing_near_the_boundary_is_one_clear_error():
+    response, computer = measured(systems.published(), np.linspace(300.0, 400.0, 50))
+    with pytest.raises(
+        ResponseError, match=r"no frequencies near|cannot be read off|disagree|does not fit|swapped"
+    ):
+        measured_chart(replace(response, integrators=2), computer)
+    few = Response(response.frequency[:4], response.value[:4])
+    with pytest.raises(ResponseError, match="4 usable frequencies of 4"):
+        measured_chart(few, computer)
+    above = replace(response, frequency=response.frequency * 2.0)
+    with pytest.raises(ResponseError, match="above half the sampling rate"):
+        measured_chart(above, computer)
+
+
+# --- how sure it is --------------------------------------------------------------------------------------
+
+
+def noisy(response, coherence, averages, rng):
+    """The response with the error that its coherence tells."""
+    error = np.sqrt((1.0 - coherence) / (2.0 * averages * coherence))
+    n = len(response.frequency)
+    value = response.value * (1.0 + error * (rng.normal(size=n) + 1j * rng.normal(size=n)))
+    return replace(response, value=value, coherence=np.full(n, coherence), averages=averages)
+
+
+def test_the_band_of_the_coherence_holds_the_true_chart():
+    loop = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
+    exact = stability_chart(loop, decay=False)
+    response, computer = measured(loop, np.linspace(1.0, 400.0, 400))
+    rng, held, decided = np.random.default_rng(3), [], []
+    for _ in range(10):
+        chart = measured_chart(noisy(response, 0.99, 16.0, rng), computer)
+        held.append(chart.band.stiffness_low <= exact.stiffness_max <= chart.band.stiffness_high)
+        walls = np.column_stack([rng.uniform(0.0, 2500.0, 60), rng.uniform(0.0, 9.0, 60)])
+        found = chart.check(*walls.T).verdict
+        true = np.sign(1.0 - np.max(np.abs(eigenvalues(loop, *walls.T)), axis=-1))
+        decided += (found[found != 0] == true[found != 0]).tolist()
+        assert chart.band.stiffness_low < chart.stiffness_max < chart.band.stiffness_high
+        assert len(chart.regions) == 1
+    assert np.mean(held) >= 0.9
+    assert np.mean(decided) > 0.97
+    assert len(decided) > 300
+
+
+def test_repeated_sweeps_span_the_band():
+    loop = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
+    response, computer = measured(loop, np.linspace(1.0, 400.0, 400))
+    rng = np.random.default_rng(4)
+    sweeps = np.array([noisy(response, 0.99, 16.0, rng).value for _ in range(3)])
+    chart = measured_chart(replace(response, value=sweeps.mean(axis=0), sweeps=sweeps), computer)
+    assert len(chart.stiffness_max_of_sweeps) == 3
+    assert chart.band.stiffness_low <= min(chart.stiffness_max_of_sweeps)
+    assert max(chart.stiffness_max_of_sweeps) <= chart.band.stiffness_high
+    alone = measured_chart(replace(response, value=sweeps[1]), computer)
+    assert chart.stiffness_max_of_sweeps[1] == alone.stiffness_max
+    inner = [arc for arc in chart.boundary if 0.0 < arc.frequency[0] < 400.0]
+    assert all(np.all((arc.stiffness_low < arc.stiffness) & (arc.stiffness < arc.stiffness_high)) for arc in inner)
+
+
+def test_an_unstable_device_has_no_stable_wall():
+    """Three samples of delay and a spring that pushes away: nothing helps."""
+    f = dense(systems.published())
+    z = np.exp(2j * np.pi * f * 0.00125)
+    hopeless = Response(f, -0.001 / (z - 0.5) / z**3, integrators=0)
+    with pytest.raises(ResponseError):
+        measured_chart(hopeless, Controller(0.00125))
