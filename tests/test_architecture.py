@@ -17,7 +17,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 DEVICES = sorted(path.stem for path in (PACKAGE / "device" / "zoo").glob("*.toml"))
 
 # Numbers flow from left to right: a package imports itself and what stands before it.
-FLOW = ("model", "loop", "chart", "conditions", "contact", "measures", "study", "show")
+FLOW = ("model", "loop", "chart", "conditions", "guarantees", "contact", "measures", "study", "show")
 # Device files become models and loops; what computes knows nothing of files.
 MAY_IMPORT = {package: {*FLOW[: place + 1], "compiled"} for place, package in enumerate(FLOW)}
 MAY_IMPORT["compiled"] = set()

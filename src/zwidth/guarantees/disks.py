@@ -82,7 +82,7 @@ def response_disks(loop: Loop, held: Port, angles: Floats) -> Disks:
     centre = centre.sum(axis=1) + _interpolated(tail_c, at)
     radius = radius.sum(axis=1) + _interpolated(tail_r, at).real
     late = np.exp(-1j * theta * loop.whole_delay)
-    common = _one_less_z_inverse(theta) * late * _force_filter(loop, theta)
+    common = _one_less_z_inverse(theta) * late * force_filter_response(loop, theta)
     with np.errstate(invalid="ignore"):
         return Disks(theta, np.where(np.isfinite(radius), common * centre, 0.0), np.abs(common) * radius)
 
@@ -119,7 +119,7 @@ def _one_less_z_inverse(theta: Floats) -> Complexes:
     return 2j * np.sin(theta / 2.0) * np.exp(-0.5j * theta)
 
 
-def _force_filter(loop: Loop, theta: Floats) -> Complexes:
+def force_filter_response(loop: Loop, theta: Floats) -> Complexes:
     """The discrete filter of the whole force."""
     top, bottom = low_pass_factors(loop.controller.force_filter, loop.period)
     d = np.exp(1j * theta) * _one_less_z_inverse(theta)

@@ -17,13 +17,17 @@ from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
 
 # Springs looked at first, by the frequency of the mode they make: so many, up to so many times Nyquist's.
-SPRINGS, BEYOND = 24, 6.0
+SPRINGS, BEYOND = 32, 6.0
 # Springs that walls on the edge are tried with, walls taken from the edge, and rounds of adding the worst springs.
-TRIED, WALLS, ROUNDS = 96, 48, 8
+TRIED, WALLS, ROUNDS = 160, 30, 5
+# Springs whose mode looks, sampled, like an edge wall's own vibration are tried too: to so many times the sampling
+# rate, and this far beside it.
+ALIASES, BESIDE = 2, np.array([-0.01, -0.002, 0.0, 0.002, 0.01])
 # An edge wall is unstable with a spring if a motion grows by more than this per sample.
 OUTSIDE = 1e-8
 NOTHING = "no wall at all is stable with every spring at the handle"
 NO_SPRING = "no wall with K > 0 and B >= 0 is stable with every spring at the handle"
+NO_NYQUIST = "no wall with K > 0 and B >= 0 is stable with the Nyquist spring"
 
 
 def with_spring(plant: Plant, stiffness: float) -> Plant:
@@ -56,8 +60,10 @@ def spring_stable_region(loop: Loop) -> Region:
     """The walls that are stable with every spring 0 <= k <= inf at the handle.
 
     The intersection of the charts of many springs. Walls on its edge are then tried with more springs, by
-    eigenvalues, and the worst of these join until none makes an edge wall unstable.
+    eigenvalues, and the worst of these join until none makes an edge wall unstable. Among them are springs whose mode
+    looks, sampled, like the vibration at the edge: they are the worst, and the sharper the stiffer.
     """
+    loop = Loop(reached(loop.plant), loop.controller)
     tried = _springs(loop, TRIED)
     new = _springs(loop, SPRINGS)
     shape: Any = None
@@ -104,7 +110,7 @@ def _springs(loop: Loop, count: int) -> Floats:
 
 def _sprung(loop: Loop, stiffness: float) -> Loop | None:
     """The loop with a spring at the handle; None where the wall then moves nothing, which is stable."""
-    plant = with_spring(reached(loop.plant), stiffness)
+    plant = with_spring(loop.plant, stiffness)
     if plant.size == 0:
         return None
     found = Loop(plant, loop.controller)
@@ -123,25 +129,41 @@ def _stable_set(loop: Loop, stiffness: float) -> Any:
     return shapely.make_valid(shapely.union_all([shapely.Polygon(ring) for ring in regions]))
 
 
-def _growth(loops: list[Loop], K: Floats, B: Floats) -> Floats:
-    """Spectral radius minus 1 (loops, k) of walls (k,)."""
-    radii = [np.abs(np.linalg.eigvals(one.transition_matrix(K, B))).max(axis=-1) for one in loops]
-    return np.asarray(radii) - 1.0
-
-
 def _worst(loop: Loop, rings: tuple[Floats, ...], tried: Floats) -> Floats:
     """Springs that make walls on the edge most unstable, between those tried too (by a parabola); () if none does."""
     walls = np.vstack([_spread(ring) for ring in rings])
-    loops = {k: found for k in tried if (found := _sprung(loop, k)) is not None}
-    springs = np.array(list(loops))
-    growth = _growth(list(loops.values()), *walls.T)
-    top = np.argmax(growth, axis=0)
+    growth, springs, vibration = _growth(loop, tried, walls)
+    theta = vibration[np.argmax(growth, axis=0), np.arange(len(walls))][:: max(len(walls) // 8, 1)]
+    like = _alike(loop, theta)
+    more, others, _ = _growth(loop, like, walls)
+    order = np.argsort(np.concatenate([springs, others]))
+    growth, springs = np.vstack([growth, more])[order], np.concatenate([springs, others])[order]
     found = set()
-    for wall, i in enumerate(top):
+    for wall, i in enumerate(np.argmax(growth, axis=0)):
         if growth[i, wall] > OUTSIDE:
-            found.add(_between(springs[max(i - 1, 0) : i + 2], growth[max(i - 1, 0) : i + 2, wall]))
-            found.add(float(springs[i]))
+            near = slice(max(i - 1, 0), i + 2)
+            found |= {float(springs[i]), _between(springs[near], growth[near, wall])}
     return np.array(sorted(found))
+
+
+def _growth(loop: Loop, stiffness: Floats, walls: Floats) -> tuple[Floats, Floats, Floats]:
+    """Spectral radius minus 1 (springs, walls), the springs that leave something to move, and the angles of the
+    dominant roots (springs, walls)."""
+    loops = {float(k): found for k in stiffness if (found := _sprung(loop, k)) is not None}
+    radius, angle = np.zeros((2, len(loops), len(walls)))
+    for i, one in enumerate(loops.values()):
+        z = np.linalg.eigvals(one.transition_matrix(*walls.T))
+        top = np.take_along_axis(z, np.abs(z).argmax(axis=-1)[:, None], axis=-1)[:, 0]
+        radius[i], angle[i] = np.abs(top) - 1.0, np.abs(np.angle(top))
+    return radius, np.array(list(loops)), angle
+
+
+def _alike(loop: Loop, theta: Floats) -> Floats:
+    """Springs whose mode has an alias at, or just beside, the angles theta (k,)."""
+    turns = 2.0 * np.pi * np.arange(ALIASES + 1)
+    w = np.concatenate([(turns[:, None] + theta).ravel(), (turns[1:, None] - theta).ravel()])
+    k = _spring_of(loop.plant, (w[:, None] * (1.0 + BESIDE)).ravel() / loop.period)
+    return np.unique(k[np.isfinite(k) & (k > 0.0)])
 
 
 def _spread(ring: Floats) -> Floats:
@@ -160,3 +182,16 @@ def _between(springs: Floats, growth: Floats) -> float:
     bend, slope, _ = np.polyfit((springs - springs[1]) / np.ptp(springs), growth, 2)
     at = springs[1] - slope / (2.0 * bend) * np.ptp(springs) if bend < 0.0 else np.nan
     return float(at) if springs[0] < at < springs[2] else best
+
+
+def nyquist_region(loop: Loop) -> Region:
+    """The walls that are stable with the Nyquist spring alone; empty, with a reason, where there is none."""
+    k = nyquist_spring(loop)
+    if not np.isfinite(k):
+        return empty("no spring at the handle puts a mode at the Nyquist frequency")
+    shape = _stable_set(Loop(reached(loop.plant), loop.controller), k)
+    rings = () if shape is None else rings_of(shape)
+    if not rings:
+        return empty(f"nothing is stable with the Nyquist spring of {k:.6g} N/m")
+    K, B = stiffest_corner(rings)
+    return Region(rings, K, B, None if K > 0.0 else NO_NYQUIST)

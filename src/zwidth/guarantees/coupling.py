@@ -1,0 +1,148 @@
+"""Virtual couplings k_c, b_c that keep a device stable, and the softest limit that a given wall needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from zwidth.guarantees.grid import angle_grid
+from zwidth.guarantees.port import Floats
+from zwidth.guarantees.region import Region, empty
+from zwidth.guarantees.two_port import (
+    Demand,
+    coupling_impedance,
+    llewellyn_demand,
+    raisbeck_demand,
+    sampled_demand,
+)
+from zwidth.loop.loop import Loop
+
+# Ratios of damping to stiffness tried, and steps of golden section between them.
+DIRECTIONS, STEPS = 721, 60
+NOTHING = "no coupling meets the condition at all frequencies: the device dissipates too little at the handle"
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """The stiffest coupling that a wall may be rendered through.
+
+    stiffness, damping  k_c [N/m], b_c [N s/m]; inf and 0 where the wall needs none, 0 where none is soft enough
+    felt                stiffness of wall and coupling in series, k_c K/(k_c + K) [N/m]
+    """
+
+    stiffness: float
+    damping: float
+    felt: float
+
+
+@dataclass(frozen=True)
+class Couplings:
+    """Couplings (k_c, b_c) as regions: after Llewellyn, after Raisbeck, and of the sampled device itself.
+
+    limit  of the wall asked about, on the sampled device; None if none was
+    """
+
+    llewellyn: Region
+    raisbeck: Region
+    sampled: Region
+    limit: Coupling | None
+
+
+def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None) -> Couplings:
+    """All that is known of a loop's couplings, held along `held` (n,); wall K, B: the limit that it needs."""
+    angles = coupling_angles(loop, held)
+    sampled = sampled_demand(loop, angles, held)
+    return Couplings(
+        coupling_region(llewellyn_demand(loop, angles, held), loop.period),
+        coupling_region(raisbeck_demand(loop, angles, held), loop.period),
+        coupling_region(sampled, loop.period),
+        None if wall is None else softest_limit(sampled, *wall, loop.period),
+    )
+
+
+def coupling_angles(loop: Loop, held: Floats) -> Floats:
+    """Angles in (0, pi): the last, at which a hold passes nothing, is left out by a rounding."""
+    angles = angle_grid(loop, held)
+    even = np.linspace(0.0, np.pi, 2001)[1:]
+    return np.minimum(np.union1d(angles, even), np.pi * (1.0 - 1e-9))
+
+
+def coupling_region(demand: Demand, period: float) -> Region:
+    """The couplings that meet a demand for every passive environment: rings of [k_c, b_c].
+
+    Along a ray from 0 couplings meet it up to  min over angles of Re(1/Z_c)/conductance;  each angle asks for an
+    ellipse, so that the set is convex.
+    """
+    if not np.all(np.isfinite(demand.conductance)):
+        return empty(NOTHING)
+
+    def reach(direction: Floats) -> Floats:
+        Z = coupling_impedance(np.cos(direction) / period, np.sin(direction), demand.angles, period)
+        # a negative k_c drifts away by itself
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(demand.conductance > 0.0, Z.real / np.abs(Z) ** 2 / demand.conductance, np.inf)
+            return np.asarray(np.maximum(ratio.min(axis=-1), 0.0))
+
+    direction = np.linspace(-np.pi / 2.0, np.pi / 2.0, DIRECTIONS)
+    far = reach(direction)
+    k, b = far * np.cos(direction) / period, far * np.sin(direction)
+    if not np.max(k) > 0.0 or not np.all(np.isfinite(far)):
+        return empty(NOTHING)
+    ring = np.vstack([np.column_stack([k, b]), [[k[0], b[0]]]])
+    best = _stiffest(reach, direction[int(np.argmax(np.where(direction >= 0.0, k, -np.inf)))])
+    top = float(reach(np.array([best]))[0])
+    return Region((ring,), top * float(np.cos(best)) / period, top * float(np.sin(best)))
+
+
+def _stiffest(reach: Callable[[Floats], Floats], near: float) -> float:
+    """The direction of the largest k_c with b_c >= 0, by golden section round a sampled one."""
+    step = np.pi / (DIRECTIONS - 1)
+    low, high = max(near - step, 0.0), min(near + step, np.pi / 2.0)
+    ratio = (np.sqrt(5.0) - 1.0) / 2.0
+
+    def stiffness(direction: float) -> float:
+        return float(reach(np.array([direction]))[0] * np.cos(direction))
+
+    ends = (low, high)
+    for _ in range(STEPS):
+        a, b = high - ratio * (high - low), low + ratio * (high - low)
+        if stiffness(b) > stiffness(a):
+            low = a
+        else:
+            high = b
+    return max((*ends, (low + high) / 2.0), key=stiffness)
+
+
+def softest_limit(demand: Demand, wall_stiffness: float, wall_damping: float, period: float) -> Coupling:
+    """The stiffest coupling through which one wall is stable with every passive operator.
+
+    Wall Z_w = B + K T z/(z - 1) and coupling in series must stay clear of the disk that the device shows,
+
+        |1/Z_c + 1/Z_w + q| >= r
+
+    Along a ray of couplings from 0 that is a quadratic at each angle; the best ratio b_c/k_c is searched for.
+    """
+    angles = demand.angles
+    wall = coupling_impedance(wall_stiffness, wall_damping, angles, period)
+    shown = demand.centre + 1.0 / wall
+    direction = np.linspace(0.0, np.pi / 2.0, DIRECTIONS)[:-1]
+
+    def reach(direction: Floats) -> Floats:
+        a = 1.0 / coupling_impedance(np.cos(direction) / period, np.sin(direction), angles, period)
+        lean, size = np.real(a.conj() * shown), np.abs(a) ** 2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            under = lean**2 - size * (np.abs(shown) ** 2 - demand.radius**2)
+            mu = np.where(under >= 0.0, (np.sqrt(np.maximum(under, 0.0)) - lean) / size, 0.0)
+            return np.asarray(1.0 / np.maximum(np.max(mu, axis=-1), 0.0))
+
+    if not np.all(np.isfinite(demand.radius)):
+        return Coupling(0.0, 0.0, 0.0)
+    far = reach(direction)
+    if np.isinf(far).any():
+        return Coupling(float("inf"), 0.0, wall_stiffness)
+    best = _stiffest(reach, float(direction[int(np.argmax(far * np.cos(direction)))]))
+    top = float(reach(np.array([best]))[0])
+    k, b = top * float(np.cos(best)) / period, top * float(np.sin(best))
+    return Coupling(k, b, k * wall_stiffness / (k + wall_stiffness))

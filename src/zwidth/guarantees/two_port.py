@@ -1,0 +1,111 @@
+"""Llewellyn and Raisbeck: a device and a virtual coupling between any passive operator and any passive environment.
+
+Adams and Hannaford (1999, 2002) make the device discrete by Tustin's rule and the hold (z + 1)/(2 z), and look at it
+as a two-port between the operator (f_h, v_h) and the environment (f_e, v_e), in hybrid form (known at second hand;
+the numbers of their equations were not at hand):
+
+    [ f_h ]   [ h11  h12 ] [ v_h ]        h11 = 1/Y_hh,          h12 =  D Y_ha/Y_hh
+    [-v_e ] = [ h21  h22 ] [ f_e ]        h21 = -Y_yh/Y_hh,      h22 =  D (Y_ya - Y_yh Y_ha/Y_hh) + 1/Z_c
+
+with Y = s G the device's mobilities at s = (2/T)(z - 1)/(z + 1), D the hold, the delay and the force's filter, and
+the coupling Z_c = b_c + k_c T z/(z - 1). A single mass has h11 = m s + b, h12 = D, h21 = -1, h22 = 1/Z_c.
+
+Both conditions bound Re(1/Z_c) from below, frequency by frequency. An environment of admittance Y_e and the coupling
+in series see of the device, held by any passive operator, an admittance in a disk: centre q, radius r,
+
+    q = h22 - 1/Z_c - h12 h21/(2 Re h11),       r = |h12 h21|/(2 Re h11)
+
+    Llewellyn:  Re(1/Z_c) >= r - Re q,          Raisbeck:  4 Re h11 Re h22 >= |h12 + conj(h21)|^2
+
+`sampled_demand` asks the same of the sampled device itself, without Tustin's rule: aliases and the half sample of
+the backward difference included, the disk that `disks` computes times (z - 1)/(T z).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.guarantees.disks import force_filter_response, response_disks
+from zwidth.guarantees.port import Floats, port, port_response
+from zwidth.loop.loop import Loop
+
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What a device asks of whatever it is coupled to, at angles (k,).
+
+    centre, radius  of the disk of admittances it shows, held by any passive operator [m/(N s)]
+    conductance     least Re(1/Z_c) for a passive environment behind the coupling [m/(N s)]
+    """
+
+    angles: Floats
+    centre: Complexes
+    radius: Floats
+    conductance: Floats
+
+
+def coupling_impedance(stiffness: ArrayLike, damping: ArrayLike, angles: Floats, period: float) -> Complexes:
+    """Z_c = b_c + k_c T z/(z - 1) = b_c + k_c T/2 - j (k_c T/2) cot(theta/2), of couplings (...): (..., k)."""
+    q = np.asarray(stiffness, dtype=float)[..., None] * period / 2.0
+    b = np.asarray(damping, dtype=float)[..., None]
+    return np.asarray(b + q - 1j * q / np.tan(np.asarray(angles) / 2.0), dtype=complex)
+
+
+def hybrid_matrix(loop: Loop, angles: Floats, held: Floats) -> tuple[Complexes, Complexes, Complexes, Complexes]:
+    """h11, h12, h21 and h22 without the coupling, in Adams and Hannaford's discretisation, at angles in (0, pi)."""
+    w = 2.0 / loop.period * np.tan(angles / 2.0)
+    s = 1j * w
+    G = port_response(port(loop.plant, held), w)
+    hold = np.cos(angles / 2.0) * np.exp(-0.5j * angles)
+    lag = 1.0 + s * loop.controller.actuator_time_constant
+    D = hold * np.exp(-1j * angles * loop.controller.delay) * force_filter_response(loop, angles) / lag
+    # Re h11 from the dissipation: no digits lost against the mass
+    h11 = G.dissipation / np.abs(s * G.port) ** 2 + 1j * np.imag(1.0 / (s * G.port))
+    return h11, D * G.felt / G.port, -G.back / G.port, D * s * (G.direct - G.back * G.felt / G.port)
+
+
+def llewellyn_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
+    """Absolute stability of the two-port: 2 Re h11 Re h22 >= |h12 h21| + Re(h12 h21), Re h11 >= 0, Re h22 >= 0."""
+    h11, h12, h21, h22 = hybrid_matrix(loop, angles, held)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        swing = h12 * h21 / (2.0 * h11.real)
+        centre, radius = h22 - swing, np.abs(swing)
+    return _demand(angles, centre, radius, np.maximum(radius - centre.real, -h22.real), h11.real)
+
+
+def raisbeck_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
+    """Passivity of the two-port: 4 Re h11 Re h22 >= |h12 + conj(h21)|^2, Re h11 >= 0, Re h22 >= 0."""
+    h11, h12, h21, h22 = hybrid_matrix(loop, angles, held)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        swing = h12 * h21 / (2.0 * h11.real)
+        need = np.abs(h12 + h21.conj()) ** 2 / (4.0 * h11.real) - h22.real
+    return _demand(angles, h22 - swing, np.abs(swing), need, h11.real)
+
+
+def sampled_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
+    """Stability with any passive operator and environment of the sampled device itself, velocity by (z - 1)/(T z)."""
+    disks = response_disks(loop, port(loop.plant, held), angles)
+    difference = 2j * np.sin(angles / 2.0) * np.exp(-0.5j * angles) / loop.period
+    centre, radius = disks.centre * difference, disks.radius * np.abs(difference)
+    return Demand(angles, centre, radius, radius - centre.real)
+
+
+def _demand(angles: Floats, centre: Complexes, radius: Floats, need: Floats, resistance: Floats) -> Demand:
+    """inf where the device itself dissipates nothing."""
+    dead = ~(resistance > 0.0)
+    return Demand(
+        angles, np.where(dead, 0.0, centre), np.where(dead, np.inf, radius), np.where(dead, np.inf, need)
+    )
+
+
+def allows(demand: Demand, stiffness: ArrayLike, damping: ArrayLike, period: float) -> NDArray[np.bool_]:
+    """Whether couplings k_c, b_c (...) meet a demand at all its angles."""
+    Z = coupling_impedance(stiffness, damping, demand.angles, period)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        given = np.where(Z == 0.0, np.inf, Z.real / np.abs(Z) ** 2)
+    return np.asarray(np.all(given >= demand.conductance, axis=-1))
