@@ -72,6 +72,7 @@ class MultiChart:
         return np.asarray(np.abs(z).max(axis=-1))
 
 
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")  # walls at infinity are data
 def multi_chart(loop: MultiLoop) -> MultiChart:
     """The exact chart of det(1 + P(z) (K + B w(z))) = 0 over walls K, B (see `chart.loci` for the derivation).
 

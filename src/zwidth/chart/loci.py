@@ -26,8 +26,8 @@ from zwidth.loop.multi import MultiLoop
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-# Steps between angles, in shares of the distance to the nearest pole or zero.
-SHARE = 0.1
+# Steps between angles, in shares of the distance to the nearest pole or zero; and the longest.
+SHARE, LONGEST = 0.1, 0.05
 # Eigenvalues closer than this share of their size are one, all along (equal directions).
 EQUAL = 1e-9
 # Intervals are halved down to this share of their angle.
@@ -122,7 +122,9 @@ def eigenvalues_of_plant(loop: MultiLoop, thetas: Floats) -> Complexes:
 
 def trace_loci(loop: MultiLoop) -> Loci:
     """All branches, sampled so that chords follow them wherever they go."""
-    thetas = angles(features(loop), 1.0, SHARE)
+    # what is late by n samples turns n times as fast as z
+    late = 1 + loop.whole_delay + len(loop.estimator.A)
+    thetas = angles(features(loop), 1.0, SHARE, min(LONGEST, 0.5 / late))
     g = eigenvalues_of_plant(loop, thetas)
     for _ in range(ROUNDS):
         loci = Loci(loop, thetas, _followed(g))
@@ -206,9 +208,9 @@ def _ambiguous(g: Complexes) -> NDArray[np.bool_]:
 
 def _bent(loci: Loci) -> NDArray[np.bool_]:
     """Intervals (N - 1,) beside which a branch turns by more than its chords follow."""
-    chords = np.diff(loci.walls, axis=0)
-    length = np.hypot(chords[..., 0], chords[..., 1])
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        chords = np.diff(loci.walls, axis=0)
+        length = np.hypot(chords[..., 0], chords[..., 1])
         cross = chords[1:, :, 0] * chords[:-1, :, 1] - chords[1:, :, 1] * chords[:-1, :, 0]
         along = np.einsum("kmi,kmi->km", chords[1:], chords[:-1])
         turn = np.abs(np.arctan2(cross, along)) > 8.0 * SAG

@@ -186,9 +186,10 @@ def _passes(points: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
 
 def stable_polygons(loop: MultiLoop, pieces: list[shapely.LineString]) -> list[shapely.Polygon]:
     """The cells in which a wall inside is stable, joined where they touch."""
-    noded = shapely.union_all(pieces)
-    cells = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
-    area = shapely.area(cells)
+    noded = shapely.union_all(np.array(pieces))
+    with np.errstate(invalid="ignore"):
+        cells = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+        area = shapely.area(cells)
     cells = cells[area > SLIVER * np.sum(area)]
     inside = shapely.point_on_surface(cells)
     K, B = shapely.get_x(inside) / loop.period, shapely.get_y(inside)

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from zwidth.chart.polar import OK, ByDirection
-from zwidth.show.figures.style import BLACK, GREY, STABLE, VERMILION, Prefixed, label, legend_above
-from zwidth.show.units import at_most, quantity
+from zwidth.show.figures.style import BLACK, GREY, STABLE, VERMILION, label, legend_above
+from zwidth.show.units import at_most
 
 
 def draw_polar(ax: Axes, found: ByDirection, angles_deg: np.ndarray, axes: tuple[str, str] = ("x", "y")) -> None:
@@ -28,7 +28,7 @@ def draw_polar(ax: Axes, found: ByDirection, angles_deg: np.ndarray, axes: tuple
     reach = 1.1 * float(np.max(found.stiffness[have])) if have.any() else 1.0
     for name, k, marker in _extremes(found):
         angle = np.deg2rad(angles_deg[k])
-        text = f"{name}: {at_most(found.stiffness[k], 'N/m')} along {quantity(angles_deg[k], '°')}"
+        text = f"{name}: {at_most(found.stiffness[k], 'N/m')} along {angles_deg[k]:.4g}°"
         ax.plot(
             *(found.stiffness[k] * np.array([[np.cos(angle)], [np.sin(angle)]])),
             marker=marker,
@@ -63,14 +63,12 @@ def _frame(ax: Axes, reach: float, axes: tuple[str, str]) -> None:
     ax.set_aspect("equal")
     ax.set_xlim(-1.05 * reach, 1.05 * reach)
     ax.set_ylim(-1.05 * reach, 1.05 * reach)
-    locator = MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10])
-    turn = np.linspace(0.0, 2.0 * np.pi, 181)
-    for radius in locator.tick_values(0.0, reach):
-        if 0.0 < radius <= reach:
-            ax.plot(radius * np.cos(turn), radius * np.sin(turn), color=GREY, linewidth=0.5, zorder=0.5)
     for draw in (ax.axvline, ax.axhline):
         draw(0.0, color=GREY, linewidth=0.5, zorder=0.5)
     for axis, name in ((ax.xaxis, axes[0]), (ax.yaxis, axes[1])):
-        axis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
+        axis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 2.5, 5, 10]))
         label(axis, f"Largest stiffness, {name} part", "N/m")
-        assert isinstance(axis.get_major_formatter(), Prefixed)
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    for radius in ax.xaxis.get_majorticklocs():
+        if 0.0 < radius <= reach:
+            ax.plot(radius * np.cos(turn), radius * np.sin(turn), color=GREY, linewidth=0.5, zorder=0.5)

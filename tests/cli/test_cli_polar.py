@@ -1,0 +1,80 @@
+"""`zwidth polar`: every direction of a plane, and what has none."""
+
+import csv
+
+import pytest
+from cli_run import MECHANISM, TWO_MASS, zwidth
+
+import zwidth as package
+from zwidth.chart.chart import largest_stiffness
+from zwidth.loop.loop import Loop
+
+
+def test_each_direction_is_the_chart_of_its_own():
+    ran = zwidth("polar", MECHANISM, "--count", 6, "--json")
+    assert ran.code == 0
+    document = ran.document
+    assert document["plane"] == "xy"
+    assert document["angle_deg"] == [0.0, 60.0, 120.0, 180.0, 240.0, 300.0]
+    device = package.load(MECHANISM)
+    for k, direction in enumerate(document["directions"]):
+        peak = largest_stiffness(Loop(device.plant(direction=direction), device.controller))
+        assert document["stiffness_max_N_per_m"][k] == pytest.approx(peak.stiffness, rel=1e-12)
+        assert document["damping_at_stiffness_max_Ns_per_m"][k] == pytest.approx(peak.damping, rel=1e-9)
+    assert document["status"] == ["ok"] * 6
+
+
+def test_directions_that_cannot_be_moved_along_are_null_with_a_status():
+    document = zwidth("polar", MECHANISM, "--count", 4, "--plane", "xz", "--json").document
+    assert [value is None for value in document["stiffness_max_N_per_m"]] == [False, True, False, True]
+    assert document["status"][1] == "the handle cannot move along the direction"
+
+
+def test_no_stable_wall_anywhere_is_no_answer():
+    unstable = ("--set", "loop.delay_samples=1", "--set", "mechanism.damping.ratio=0")
+    ran = zwidth("polar", MECHANISM, "--count", 4, *unstable, "--json")
+    assert ran.code in (1, 2)
+    if ran.code == 1:
+        assert ran.document["reason"] == "no direction has a stable wall with K > 0 and B >= 0"
+        assert ran.document["stiffness_max_N_per_m"] == [None] * 4
+
+
+def test_out_of_reach_is_no_answer():
+    ran = zwidth("polar", MECHANISM, "--at", "1,1", "--json")
+    assert ran.code == 1
+    assert ran.document["stiffness_max_N_per_m"] is None
+    assert "cannot reach" in ran.document["reason"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((TWO_MASS,), "one direction only"),
+        ((MECHANISM, "--direction", "0,1"), "--direction"),
+        ((MECHANISM, "--count", "2"), "--count"),
+        ((MECHANISM, "--plane", "ab"), "--plane"),
+        ((MECHANISM, "--output", "polar.xyz"), "polar.xyz"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_on_standard_output(words, said):
+    ran = zwidth("polar", *words)
+    assert (ran.code, ran.out) == (2, "")
+    assert len(ran.lines) == 1
+    assert said in ran.err
+
+
+def test_people_read_the_two_extremes():
+    ran = zwidth("polar", MECHANISM)
+    assert ran.code == 0
+    assert "stiffest     7.997 kN/m" in ran.out
+    assert "least stiff  4.109 kN/m" in ran.out
+
+
+def test_files(tmp_path):
+    for ending in (".csv", ".json", ".svg"):
+        assert zwidth("polar", MECHANISM, "--count", 4, "--output", tmp_path / f"p{ending}").code == 0
+    rows = list(csv.DictReader((tmp_path / "p.csv").read_text().splitlines()))
+    assert len(rows) == 4
+    assert float(rows[1]["stiffness_max_N_per_m"]) == pytest.approx(7849.441493, rel=1e-9)
+    assert (float(rows[1]["direction_x"]), float(rows[1]["direction_y"])) == (0.0, 1.0)
+    assert "<svg" in (tmp_path / "p.svg").read_text()
