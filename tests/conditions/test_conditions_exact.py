@@ -46,6 +46,26 @@ def test_it_is_the_last_stable_wall_of_random_loops():
     assert seen > 30
 
 
+def test_of_several_stable_stretches_the_last_counts():
+    """Loops whose stable stiffnesses at one damping have gaps."""
+    gaps = 0
+    for seed in range(130, 170):
+        try:
+            chart = stability_chart(random_loop(np.random.default_rng(seed)), decay=False)
+        except ChartError:
+            continue
+        if not (chart.stiffness_max > 0.0 and chart.regions):
+            continue
+        exact = stiffness_limit(chart, 0.5 * chart.damping_at_stiffness_max)
+        inside = np.linspace(0.001, 0.999, 400) * exact
+        stable = judge(chart.loop, inside, 0.5 * chart.damping_at_stiffness_max).verdict == STABLE
+        farther = np.linspace(1.002 * exact, 1.1 * chart.box[1], 400)
+        beyond = judge(chart.loop, farther, 0.5 * chart.damping_at_stiffness_max).verdict == STABLE
+        gaps += exact > 0.0 and np.any(np.diff(stable.astype(int)) < 0)
+        assert not np.any(beyond)
+    assert gaps > 0
+
+
 def test_at_the_tip_it_is_the_tip():
     chart = stability_chart(published(), decay=False)
     assert stiffness_limit(chart, chart.damping_at_stiffness_max) == chart.stiffness_max
