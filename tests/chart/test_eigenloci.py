@@ -1,5 +1,8 @@
 """Charts of one wall law over several directions: against single charts, and against matrices built apart."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -228,3 +231,18 @@ def test_a_direction_without_an_answer_is_data():
     assert found.status == ("ok", "ok", "the handle cannot move along the direction")
     assert np.isnan(found.stiffness[2])
     assert np.isfinite(found.stiffness[:2]).all()
+
+
+# --- the page --------------------------------------------------------------------------------------------
+
+
+def test_the_page_says_what_its_examples_give():
+    page = (Path(__file__).parents[2] / "docs" / "directions.md").read_text(encoding="utf-8")
+    names: dict = {}
+    for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+        exec(compile(block, "directions.md", "exec"), names)
+    assert f"# {names['found'].stiffness.min():.0f} and {names['found'].stiffness.max():.0f} N/m" in page
+    chart = names["chart"]
+    assert f"# {chart.stiffness_max:.2f} N/m at {chart.damping_at_stiffness_max:.3f} N s/m" in page
+    along_x = largest_stiffness(Loop(names["device"].plant(direction=(1.0, 0.0)), names["device"].controller))
+    assert f"({along_x.stiffness:.2f} N/m along x)" in page

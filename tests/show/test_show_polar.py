@@ -28,7 +28,7 @@ def test_the_outline_is_closed_and_as_far_out_as_the_stiffness():
 
 def test_the_stiffest_and_the_least_stiff_direction_are_named():
     _, ax = drawn(made([1000.0, 2000.0, 3000.0, 2000.0]))
-    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    texts = [text.get_text().replace("\u00a0", " ") for text in ax.get_legend().get_texts()]
     assert "stiffest: 3.00 kN/m along 180°" in texts
     assert "least stiff: 1.00 kN/m along 0°" in texts
 

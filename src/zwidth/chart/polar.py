@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,9 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import UnmovedError
 from zwidth.model.damping import Damping
+from zwidth.model.directions import DEPENDENT, reduce_directions
 from zwidth.model.mechanism import Mechanism
+from zwidth.model.plant import Plant
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import DirectionError, Model, ModelError, reduce_mechanism
 
@@ -48,7 +51,7 @@ def circle(count: int, first: ArrayLike = (1.0, 0.0, 0.0), second: ArrayLike = (
     """
     angles = 2.0 * np.pi * np.arange(count)[:, None] / count
     turned = np.cos(angles) * np.asarray(first, float) + np.sin(angles) * np.asarray(second, float)
-    return np.round(turned, 15) + 0.0  # what rounding leaves of a zero is none
+    return np.asarray(np.round(turned, 15) + 0.0)  # what rounding leaves of a zero is none
 
 
 def largest_stiffness_by_direction(
@@ -73,12 +76,13 @@ def largest_stiffness_by_direction(
     if given.shape[1] != 3 or not (length > 0.0).all():
         raise ValueError("directions must be an array (k, 3) of vectors that have a length")
     units = given / length
+    plant = _plants(mechanism, posture, model, damping)
     results: dict[tuple[float, ...], tuple[float, float, float, str]] = {}
     rows = []
     for unit in units:
         key = _either_way(unit)
         if key not in results:
-            results[key] = _stiffest(mechanism, posture, unit, controller, model, damping)
+            results[key] = _stiffest(plant, unit, controller)
         rows.append(results[key])
     stiffness, damper, frequency, status = zip(*rows, strict=True)
     return ByDirection(units, np.array(stiffness), np.array(damper), np.array(frequency), status)
@@ -91,13 +95,29 @@ def _either_way(unit: Floats) -> tuple[float, ...]:
     return tuple((rounded * np.sign(lead) + 0.0).tolist())
 
 
+def _plants(mechanism: Mechanism, posture: Posture, model: Model, damping: Damping) -> Callable[[Floats], Plant]:
+    """The plant along a unit vector. Directions share the full model's matrices and differ in their actuator."""
+    if model != "full":
+        return lambda unit: reduce_mechanism(mechanism, posture, unit, model, damping)
+    basis, size, _ = np.linalg.svd(posture.jacobian)
+    axes = basis.T[: len(size)][size > DEPENDENT * size[0]]
+    everywhere = reduce_directions(mechanism, posture, axes, "full", damping)
+
+    def along(unit: Floats) -> Plant:
+        if not np.linalg.norm(posture.jacobian.T @ unit) > 1e-12 * np.linalg.norm(posture.jacobian):
+            raise DirectionError("the handle cannot move along the direction")
+        return everywhere.along(axes @ unit)
+
+    return along
+
+
 def _stiffest(
-    mechanism: Mechanism, posture: Posture, unit: Floats, controller: Controller, model: Model, damping: Damping
+    plant: Callable[[Floats], Plant], unit: Floats, controller: Controller
 ) -> tuple[float, float, float, str]:
     """Stiffness, damping, frequency and status along one direction."""
     none = float("nan")
     try:
-        loop = Loop(reduce_mechanism(mechanism, posture, unit, model, damping), controller)
+        loop = Loop(plant(unit), controller)
         peak = largest_stiffness(loop)
     except (DirectionError, UnmovedError):
         return none, none, none, "the handle cannot move along the direction"
