@@ -10,7 +10,9 @@ import pytest
 
 from tests.systems import random_loop
 from zwidth.chart.chart import largest_stiffness, stability_chart
-from zwidth.chart.region import ChartError
+from zwidth.chart.peak import Peak
+from zwidth.chart.region import ChartError, closed_rings
+from zwidth.chart.tracer import Tracer
 from zwidth.device import address
 from zwidth.device.load import from_document, load
 from zwidth.loop.loop import Loop
@@ -171,15 +173,48 @@ def test_random_loops_move_as_their_whole_search_says(seed):
             assert slope.value == pytest.approx((peaks[0] - peaks[1]) / (2 * h), abs=2e-5 * peak.stiffness)
 
 
-def test_a_corner_on_the_line_of_a_real_root_moves_with_it():
+@pytest.mark.parametrize(("damping", "kind"), [(5.0, "edge at B = 0"), (3.7, "end of the curve")])
+def test_a_wall_held_by_a_real_root_moves_with_it(damping, kind):
     """Strong damping: the damped rigid wall's limit is the root z = -1 (x = b T/m above 3.7208)."""
-    device = one_mass(0.001, 5.0)
+    device = one_mass(0.001, damping)
     found = sensitivities(device)
-    m, b, T = 0.001, 5.0, 0.001
-    assert b * T / m > 3.7208
+    assert found.kind == kind
     numbers = {number.path: number.logarithmic for number in found.numbers}
     for path in ("plant.mass_kg", "plant.damping_Ns_per_m", "loop.sampling_period_s"):
         assert numbers[path] == pytest.approx(differenced(device, path, 1e-3), abs=1e-7)
+
+
+def corners(loop):
+    """Every corner of a pair's arc with the line of a real root: the wall, and the angles there."""
+    rings, _ = closed_rings(Tracer.of(loop))
+    for ring in rings:
+        for arc, following in zip(ring, (*ring[1:], ring[0]), strict=True):
+            kinds = {arc.kind, following.kind}
+            angles = sorted({arc.end, following.start})
+            away = abs(arc.last[0]) * loop.period > 1e-6 * abs(arc.last[1])  # no wall is stiffest at K = 0
+            if "pair" in kinds and kinds & {"plus", "minus"} and len(angles) == 2 and away:
+                yield Peak(*arc.last, tuple(angles))
+
+
+def test_corners_on_lines_of_real_roots_move_as_charts_say():
+    """Any corner will do for the rule, whether the stiffest wall is there or not."""
+    rng = np.random.default_rng(21)
+    seen = {0.0: 0, np.pi: 0}
+    while min(seen.values()) < 3:
+        loop = random_loop(rng, ratios=(0.3, 1.0, 1.5))
+        try:
+            here = list(corners(loop))
+            moved = [list(corners(scaled_plant(loop, "mass", 1.0 + h))) for h in (1e-5, -1e-5)]
+        except ChartError:
+            continue
+        if not len(here) == len(moved[0]) == len(moved[1]):
+            continue
+        for corner, plus, minus in zip(here, *moved, strict=True):
+            held = optimum(loop, corner)
+            slope = central_slope(moved_by(loop, held, "mass"), 1.0, 1.0).value
+            scale = abs(corner.stiffness) + abs(slope)
+            assert slope == pytest.approx((plus.stiffness - minus.stiffness) / 2e-5, abs=1e-3 * scale)
+            seen[corner.angles[0] if corner.angles[0] == 0.0 else corner.angles[1]] += 1
 
 
 def test_a_delay_of_whole_samples_bends_smoothly():

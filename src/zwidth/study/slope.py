@@ -7,11 +7,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
-FIRST: Final = (2e-3, 1e-2, 5e-2)  # first steps, of the scale; the larger ones where rounding hides the smaller
+# First steps, of the scale: smaller where the function changes within a step, larger where rounding hides it.
+FIRST: Final = (2e-3, 1e-4, 5e-6, 1e-2, 5e-2)
 LEVELS: Final = 3  # halvings that are always made
 MOST: Final = 9  # and at most, where the number changes fast
 ENOUGH: Final = 1e-10  # error of the derivative times the scale that asks for no more halvings
-POOR: Final = 1e-8  # and above which larger steps are tried
+POOR: Final = 1e-8  # and above which other first steps are tried
 
 
 @dataclass(frozen=True)
