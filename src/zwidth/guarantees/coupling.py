@@ -21,6 +21,8 @@ from zwidth.loop.loop import Loop
 
 # Ratios of damping to stiffness tried, and steps of golden section between them.
 DIRECTIONS, STEPS = 721, 60
+# Stiffnesses closer than this are equal.
+LEVEL = 1e-7
 NOTHING = "no coupling meets the condition at all frequencies: the device dissipates too little at the handle"
 
 
@@ -112,7 +114,9 @@ def _stiffest(reach: Callable[[Floats], Floats], near: float) -> float:
             low = a
         else:
             high = b
-    return max((*ends, (low + high) / 2.0), key=stiffness)
+    top = max((*ends, (low + high) / 2.0), key=stiffness)
+    # of equal ones the least damped
+    return ends[0] if stiffness(ends[0]) >= (1.0 - LEVEL) * stiffness(top) else top
 
 
 def softest_limit(demand: Demand, wall_stiffness: float, wall_damping: float, period: float) -> Coupling:

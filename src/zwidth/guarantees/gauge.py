@@ -1,7 +1,7 @@
 """How far a wall can be scaled up before some passive operator makes it vibrate.
 
-At each angle the sampled response fills a disk |P - C| <= R (see `disks`). A wall with H = K + B w(z) keeps clear of
-vibration with every passive operator if and only if no P of the disk makes 1 + P H vanish,
+At each angle the sampled response fills a disk |P - C| <= R (see `disks`). A wall with H = K + B w(z) keeps clear
+of vibration with every passive operator if and only if no P of the disk makes 1 + P H vanish,
 
     1 + 2 Re(H C) + |H|^2 (|C|^2 - R^2) > 0,        0 < theta <= pi
 
@@ -66,7 +66,7 @@ def gauge(loop: Loop, held: Floats, angles: Floats) -> Gauge:
 @compiled
 def _mu(H: complex, C: complex, R: float, excess: float) -> float:
     """mu at one angle, excess being R^2 - |C|^2; -inf where the ray passes the disk by."""
-    if R == np.inf:
+    if np.inf == R:
         return np.inf
     size = H.real * H.real + H.imag * H.imag
     beta = H.real * C.real - H.imag * C.imag

@@ -52,7 +52,7 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
         return empty(NOTHING)
     K, B = _walls(directions, reach, loop.period)
     ring = np.column_stack([np.append(K, K[:1]), np.append(B, B[:1])])
-    usable = (directions >= 0.0) & (directions < np.pi / 2.0) & (K > SHORT * np.max(np.abs(K)))
+    usable = (directions >= 0.0) & (directions < np.pi / 2.0) & (SHORT * np.max(np.abs(K)) < K)
     if not usable.any():
         return Region((ring,), float("nan"), float("nan"), NO_SPRING)
     best = int(np.argmax(np.where(usable, K, -np.inf)))

@@ -82,8 +82,8 @@ class PortResponse:
 def port_response(held: Port, frequency: Floats) -> PortResponse:
     """Responses of a held port at angular frequencies (...) [rad/s], not zero.
 
-    The dissipation is the quadratic form w^2 X^H Re(B) X of the motion X, a sum without cancellation, where the real
-    part of jw G_hh would lose its digits against the imaginary part.
+    The dissipation is the quadratic form w^2 X^H Re(B) X of the motion X, a sum without cancellation, where the
+    real part of jw G_hh would lose its digits against the imaginary part.
     """
     w = np.asarray(frequency, dtype=float)
     stiff = held.squared - w[..., None] ** 2
@@ -109,7 +109,7 @@ def port_response(held: Port, frequency: Floats) -> PortResponse:
 def static_compliances(plant: Plant, held: Floats) -> tuple[float, float]:
     """What the reading gives way to a steady wall force [m/N], the port free and the port held fixed.
 
-    inf (with its sign) where a rigid motion gives way without end; the two are the ends of what springs make of it.
+    inf (with its sign) where a rigid motion gives way without end; the two are the ends of what springs make.
     """
     return _static(plant), _static(fixed(plant, held))
 

@@ -1,7 +1,7 @@
-"""Llewellyn and Raisbeck: a device and a virtual coupling between any passive operator and any passive environment.
+"""Llewellyn and Raisbeck: a device and a coupling between any passive operator and any passive environment.
 
-Adams and Hannaford (1999, 2002) make the device discrete by Tustin's rule and the hold (z + 1)/(2 z), and look at it
-as a two-port between the operator (f_h, v_h) and the environment (f_e, v_e), in hybrid form (known at second hand;
+Adams and Hannaford (1999, 2002) make the device discrete by Tustin's rule and the hold (z + 1)/(2 z), and look at
+it as a two-port between the operator (f_h, v_h) and the environment (f_e, v_e), in hybrid form (known at second hand;
 the numbers of their equations were not at hand):
 
     [ f_h ]   [ h11  h12 ] [ v_h ]        h11 = 1/Y_hh,          h12 =  D Y_ha/Y_hh
@@ -10,8 +10,8 @@ the numbers of their equations were not at hand):
 with Y = s G the device's mobilities at s = (2/T)(z - 1)/(z + 1), D the hold, the delay and the force's filter, and
 the coupling Z_c = b_c + k_c T z/(z - 1). A single mass has h11 = m s + b, h12 = D, h21 = -1, h22 = 1/Z_c.
 
-Both conditions bound Re(1/Z_c) from below, frequency by frequency. An environment of admittance Y_e and the coupling
-in series see of the device, held by any passive operator, an admittance in a disk: centre q, radius r,
+Both conditions bound Re(1/Z_c) from below, frequency by frequency. An environment of admittance Y_e and the
+coupling in series see of the device, held by any passive operator, an admittance in a disk: centre q, radius r,
 
     q = h22 - 1/Z_c - h12 h21/(2 Re h11),       r = |h12 h21|/(2 Re h11)
 
@@ -57,7 +57,7 @@ def coupling_impedance(stiffness: ArrayLike, damping: ArrayLike, angles: Floats,
 
 
 def hybrid_matrix(loop: Loop, angles: Floats, held: Floats) -> tuple[Complexes, Complexes, Complexes, Complexes]:
-    """h11, h12, h21 and h22 without the coupling, in Adams and Hannaford's discretisation, at angles in (0, pi)."""
+    """h11, h12, h21 and h22 without the coupling, after Adams and Hannaford, at angles in (0, pi)."""
     w = 2.0 / loop.period * np.tan(angles / 2.0)
     s = 1j * w
     G = port_response(port(loop.plant, held), w)
@@ -88,7 +88,7 @@ def raisbeck_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
 
 
 def sampled_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
-    """Stability with any passive operator and environment of the sampled device itself, velocity by (z - 1)/(T z)."""
+    """Stability with any passive operator and environment of the sampled device, velocity by (z - 1)/(T z)."""
     disks = response_disks(loop, port(loop.plant, held), angles)
     difference = 2j * np.sin(angles / 2.0) * np.exp(-0.5j * angles) / loop.period
     centre, radius = disks.centre * difference, disks.radius * np.abs(difference)

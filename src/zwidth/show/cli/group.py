@@ -14,6 +14,7 @@ from zwidth.show.cli.chart import chart
 from zwidth.show.cli.check import check
 from zwidth.show.cli.devices import devices
 from zwidth.show.cli.felt import felt
+from zwidth.show.cli.guarantees import guarantees
 from zwidth.show.cli.polar import polar
 from zwidth.show.cli.report import report
 from zwidth.show.cli.schema import schema
@@ -41,7 +42,7 @@ def zwidth(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (devices, schema, show, chart, check, polar, report, sensitivity, felt, bounds):
+for command in (devices, schema, show, chart, check, polar, report, sensitivity, felt, bounds, guarantees):
     zwidth.add_command(command)
 
 

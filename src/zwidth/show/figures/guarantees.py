@@ -1,0 +1,104 @@
+"""Nested guarantees on one chart: shades and hatches that survive a grey print."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import PathPatch, Polygon
+from matplotlib.path import Path
+
+from zwidth.guarantees.coupling import Couplings
+from zwidth.guarantees.nested import Guarantee, Guarantees
+from zwidth.guarantees.region import Region
+from zwidth.show.figures.stability import Window, frame
+from zwidth.show.figures.style import BLACK, BLUE, GREEN, PURPLE, VERMILION, label, legend_above
+from zwidth.show.units import at_most
+
+# Fill, hatch and edge of the nested sets; they get darker inwards.
+AREAS: Final = {
+    "stable": ("#E8EFF5", "", BLACK),
+    "robust": ("#D2DEE9", "....", GREEN),
+    "spring-stable": ("#AFC6DA", "////", BLUE),
+    "passive": ("#6F93B3", "\\\\\\\\", VERMILION),
+}
+# Sets that lie across the others are outlines only.
+LINES: Final = {"nyquist-spring": (PURPLE, (0, (5, 1.5))), "passive-at-actuator": (GREEN, (0, (1.2, 1.2)))}
+WORDS: Final = {
+    "stable": "stable",
+    "robust": "a range of operators",
+    "spring-stable": "every spring",
+    "passive": "every passive operator",
+    "nyquist-spring": "Nyquist spring",
+    "passive-at-actuator": "every passive operator at the actuator",
+}
+
+
+def draw_guarantees(ax: Axes, found: Guarantees, window: Window | None = None) -> None:
+    """The sets of walls with each guarantee, the widest below.
+
+    window  what to show; left out: the box of the part of the chart with K and B above 0, and 5 %
+    """
+    by_name = {guarantee.name: guarantee for guarantee in found.guarantees}
+    for depth, (name, (fill, hatch, edge)) in enumerate(AREAS.items()):
+        if name in by_name:
+            _area(ax, by_name[name], fill, hatch, edge, 1.0 + 0.1 * depth)
+    for name, (colour, dashes) in LINES.items():
+        if name in by_name:
+            guarantee = by_name[name]
+            for n, ring in enumerate(guarantee.region.rings or (np.full((1, 2), np.nan),)):
+                text = "" if n else _words(guarantee)
+                ax.plot(*ring.T, color=colour, linestyle=dashes, zorder=3.0, label=text)
+    frame(ax, window or _box(found), empty=not found.chart.regions)
+    legend_above(ax, columns=2)
+
+
+def draw_couplings(ax: Axes, found: Couplings) -> None:
+    """Couplings k_c, b_c that keep a device stable between any operator and any environment."""
+    sets = (
+        ("Llewellyn, discrete", found.llewellyn, "#E8EFF5", "", BLACK),
+        ("Raisbeck, discrete", found.raisbeck, "#AFC6DA", "////", BLUE),
+        ("the sampled device itself", found.sampled, "#6F93B3", "\\\\\\\\", VERMILION),
+    )
+    rings = [ring for _, region, *_ in sets for ring in region.rings]
+    for depth, (name, region, fill, hatch, edge) in enumerate(sets):
+        _patch(ax, region, _with_peak(name, region), (fill, hatch, edge), 1.0 + 0.1 * depth)
+    walls = np.vstack([*rings, [[0.0, 0.0]]])
+    k1 = float(walls[:, 0].max())
+    b0, b1 = float(walls[:, 1].min()), float(walls[:, 1].max())
+    frame(ax, (0.0, 1.05 * (k1 or 1.0), b0 - 0.05 * (b1 - b0), b1 + 0.05 * (b1 - b0) or 1.0), empty=False)
+    label(ax.xaxis, "Coupling stiffness k", "N/m")
+    label(ax.yaxis, "Coupling damping b", "Ns/m")
+    legend_above(ax, columns=1)
+
+
+def _area(ax: Axes, guarantee: Guarantee, fill: str, hatch: str, edge: str, zorder: float) -> None:
+    _patch(ax, guarantee.region, _words(guarantee), (fill, hatch, edge), zorder)
+
+
+def _patch(ax: Axes, region: Region, text: str, look: tuple[str, str, str], zorder: float) -> None:
+    fill, hatch, edge = look
+    if not region.rings:
+        ax.plot([], [], color="none", label=text)
+        return
+    whole = Path.make_compound_path(*(Path(ring, closed=True) for ring in region.rings))
+    patch = PathPatch(whole, facecolor=fill, edgecolor=edge, hatch=hatch, linewidth=1.2, zorder=zorder)
+    ax.add_patch(patch)
+    key = Polygon([[np.nan, np.nan]], facecolor=fill, edgecolor=edge, hatch=hatch, label=text)
+    ax.add_patch(key)
+
+
+def _words(guarantee: Guarantee) -> str:
+    return _with_peak(WORDS.get(guarantee.name, guarantee.name), guarantee.region)
+
+
+def _with_peak(words: str, region: Region) -> str:
+    if region.reason is not None:
+        return f"{words}: none"
+    return f"{words}: {at_most(region.stiffness_max, 'N/m')}"
+
+
+def _box(found: Guarantees) -> Window:
+    K0, K1, B0, B1 = found.chart.box
+    return max(K0, -0.05 * K1), K1, max(B0, -0.1 * B1), B1
