@@ -47,22 +47,21 @@ def test_it_is_the_last_stable_wall_of_random_loops():
 
 
 def test_of_several_stable_stretches_the_last_counts():
-    """Loops whose stable stiffnesses at one damping have gaps."""
+    """Loops whose stable stiffnesses at one damping have a gap."""
     gaps = 0
-    for seed in range(130, 170):
+    for seed in [*range(70, 80), *range(160, 170)]:
         try:
             chart = stability_chart(random_loop(np.random.default_rng(seed)), decay=False)
         except ChartError:
             continue
-        if not (chart.stiffness_max > 0.0 and chart.regions):
+        if not (chart.damping_at_stiffness_max > 0.0 and chart.regions):
             continue
-        exact = stiffness_limit(chart, 0.5 * chart.damping_at_stiffness_max)
-        inside = np.linspace(0.001, 0.999, 400) * exact
-        stable = judge(chart.loop, inside, 0.5 * chart.damping_at_stiffness_max).verdict == STABLE
-        farther = np.linspace(1.002 * exact, 1.1 * chart.box[1], 400)
-        beyond = judge(chart.loop, farther, 0.5 * chart.damping_at_stiffness_max).verdict == STABLE
-        gaps += exact > 0.0 and np.any(np.diff(stable.astype(int)) < 0)
-        assert not np.any(beyond)
+        damping = 0.1 * chart.damping_at_stiffness_max
+        exact = stiffness_limit(chart, damping)
+        inside, beyond = np.linspace(1e-3, 0.999, 400) * exact, np.linspace(1.002 * exact, 1.1 * chart.box[1], 400)
+        stable = judge(chart.loop, inside, damping).verdict == STABLE
+        gaps += exact > 0.0 and not np.all(stable[np.argmax(stable) :])
+        assert not np.any(judge(chart.loop, beyond, damping).verdict == STABLE)
     assert gaps > 0
 
 
