@@ -97,6 +97,7 @@ def test_walls_are_judged_by_count_and_undecided_within_the_error(device, noisy,
     assert [point["roots_outside"] for point in exact] == [0, 2, 1, 0]
     assert all(point["spectral_radius"] is None for point in exact)
     assert exact[1]["frequency_Hz"] == pytest.approx(140.0, abs=15.0)
+    assert exact[2]["frequency_Hz"] == 0.0
     doubted = found("check", noisy, "--points", walls)["points"]
     assert [point["verdict"] for point in doubted] == ["stable", "unstable", "unstable", "undecided"]
     assert "undecided" in zwidth("check", noisy, "--stiffness", "1560", "--damping", "2.02").out

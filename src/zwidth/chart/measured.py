@@ -15,7 +15,7 @@ from zwidth.chart.chart import _cut
 from zwidth.chart.measured_cells import CHORD, Cells, cells_within, edges_stable_set, window
 from zwidth.chart.measured_curve import Boundary, Box, boundary, coarse, real_root
 from zwidth.chart.measured_loop import MeasuredLoop
-from zwidth.chart.measured_verdict import MeasuredVerdicts, judge_measured
+from zwidth.chart.measured_verdict import MeasuredVerdicts, NearestEdge, judge_measured
 from zwidth.chart.trust import Stretch
 from zwidth.chart.verdict import UNDECIDED
 from zwidth.loop.controller import Controller
@@ -97,7 +97,7 @@ class MeasuredChart:
 
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> MeasuredVerdicts:
         """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, by the count of their roots."""
-        return judge_measured(self.loop, self.edge, wall_stiffness, wall_damping)
+        return judge_measured(self.loop, self.edge, wall_stiffness, wall_damping, nearest_edge(self))
 
 
 def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
@@ -128,6 +128,25 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
         return chart
     each = [measured_chart(_single(response, k), controller).stiffness_max for k in range(len(response.sweeps))]
     return replace(chart, stiffness_max_of_sweeps=tuple(each))
+
+
+def nearest_edge(chart: MeasuredChart) -> NearestEdge | None:
+    """The stable set's edge in pieces with their frequencies; None where nothing is stable."""
+    if not chart.regions:
+        return None
+    edge = chart.edge
+    low, high = np.array(chart.window).reshape(2, 2).T
+    ends = edge.segments.reshape(-1, 2, 2)
+    near = np.all((ends.max(axis=1) >= low) & (ends.min(axis=1) <= high), axis=1)
+    curve = np.flatnonzero((edge.at >= 0) & near)
+    curve = curve[edges_stable_set(edge, curve, high - low)]
+    pieces = [edge.segments[curve]]
+    frequencies = [edge.angles[edge.at[curve]] / (2.0 * np.pi * chart.loop.period)]
+    for arc in chart.boundary:
+        if len(arc.frequency) == 2 and arc.frequency[0] == arc.frequency[1]:  # a line of real roots
+            pieces.append(np.column_stack([arc.stiffness, arc.damping]).reshape(1, 4))
+            frequencies.append(arc.frequency[:1])
+    return NearestEdge(np.vstack(pieces), np.concatenate(frequencies), high - low)
 
 
 def _single(response: Response, sweep: int) -> Response:
@@ -316,14 +335,14 @@ def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
     on[known] = edges_stable_set(edge, first[at[known]], scale, BEGINNING)
     numbers = np.flatnonzero(on)
     for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else []:
-        theta, frequency = measured[run], loop.response.frequency[loop.good][run]
+        theta, given = measured[run], loop.response.frequency[loop.good][run]
         K, B, _ = loop.walls(theta)
         if loop.errors is None:
-            yield MeasuredArc(K, B, frequency)
+            yield MeasuredArc(K, B, given)
         else:
             w = loop.w(theta)
             reach = loop.error(theta) * np.abs(w) / np.abs(w.imag)
-            yield MeasuredArc(K, B, frequency, K - reach, K + reach)
+            yield MeasuredArc(K, B, given, K - reach, K + reach)
     lines = [(-1, 0.0), (-2, half)] if loop.between.closed else [(-1, 0.0)]
     for kind, frequency in lines:
         static, turned = real_root(loop, kind)

@@ -20,7 +20,7 @@ class MeasuredVerdicts:
 
     verdict    STABLE, UNSTABLE or UNDECIDED (`chart.verdict`)
     outside    roots outside the unit circle
-    frequency  at which |1 + L| is least: the vibration nearest to starting, or to dying [Hz]
+    frequency  of the nearest point of the stable set's edge [Hz]; of the least |1 + L| where nothing is stable
     """
 
     verdict: NDArray[np.int8]
@@ -33,8 +33,31 @@ class MeasuredVerdicts:
         return [NAMES[int(v)] for v in self.verdict.ravel()]
 
 
+@dataclass(frozen=True)
+class NearestEdge:
+    """The stable set's edge: segments (k, 4) of K, B, K, B, their frequencies (k,) [Hz], and its size (2,)."""
+
+    segments: Floats
+    frequencies: Floats
+    size: Floats
+
+    def frequency(self, walls: Floats) -> Floats:
+        """Frequency (n,) of the piece nearest to each wall (n, 2), K and B in units of the set's size."""
+        a = self.segments[:, :2] / self.size
+        along = self.segments[:, 2:] / self.size - a
+        length = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+        to = walls[:, None, :] / self.size - a
+        share = np.clip(np.einsum("nij,ij->ni", to, along) / length, 0.0, 1.0)
+        away = np.sum((to - share[..., None] * along) ** 2, axis=2)
+        return np.asarray(self.frequencies[np.argmin(away, axis=1)])
+
+
 def judge_measured(
-    loop: MeasuredLoop, edge: Boundary, wall_stiffness: ArrayLike, wall_damping: ArrayLike
+    loop: MeasuredLoop,
+    edge: Boundary,
+    wall_stiffness: ArrayLike,
+    wall_damping: ArrayLike,
+    nearest: NearestEdge | None = None,
 ) -> MeasuredVerdicts:
     """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast.
 
@@ -55,7 +78,10 @@ def judge_measured(
         part = slice(start, start + 500)
         away = np.abs(safe[part, :1] + safe[part, 1:] * w - h)
         doubtful[part] |= np.any(away < error, axis=1)
-        frequency[part] = theta[np.argmin(away / np.abs(h), axis=1)] / (2.0 * np.pi * loop.period)
+        if nearest is None:
+            frequency[part] = theta[np.argmin(away / np.abs(h), axis=1)] / (2.0 * np.pi * loop.period)
+        else:
+            frequency[part] = nearest.frequency(safe[part])
     frequency[~finite] = np.nan
     verdict = np.where(doubtful, UNDECIDED, np.where(outside == 0, STABLE, UNSTABLE)).astype(np.int8)
     return MeasuredVerdicts(verdict.reshape(K.shape), outside.reshape(K.shape), frequency.reshape(K.shape))
