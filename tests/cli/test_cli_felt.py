@@ -67,6 +67,35 @@ def test_without_a_handle_it_is_refused():
     assert "give plant.handle" in line
 
 
+HELD = """
+name = "held"
+[plant]
+mass_kg = [[0.2616, 0.0], [0.0, 0.0254]]
+damping_Ns_per_m = [[1.8744, -1.8744], [-1.8744, 1.8744]]
+stiffness_N_per_m = [[15620.0, -15620.0], [-15620.0, 15620.0]]
+actuator = [0.0, 1.0]
+sensor = [0.0, 1.0]
+handle = [1.0, 0.0]
+[loop]
+sampling_period_s = 0.00125
+[operator]
+arm_mass_kg = 0.8
+arm_stiffness_N_per_m = 580.0
+arm_damping_Ns_per_m = 5.5
+grasp_stiffness_N_per_m = 10000.0
+grasp_damping_Ns_per_m = 5.0
+"""
+
+
+def test_the_operator_decides_what_is_stable_and_feels_the_device_without_himself(tmp_path):
+    file = tmp_path / "held.toml"
+    file.write_text(HELD)
+    held, alone = found("felt", file, *WALL), found("felt", TWO_MASS, *WALL)
+    for key in ("static_stiffness_N_per_m", "free_motion_mass_kg", "impedance_real_Ns_per_m"):
+        assert held[key] == pytest.approx(alone[key], rel=1e-12)
+    assert held["stiffness_max_N_per_m"] != pytest.approx(alone["stiffness_max_N_per_m"], rel=1e-3)
+
+
 def test_both_numbers_of_the_wall_are_needed():
     assert "--damping" in refused("felt", TWO_MASS, "--stiffness", "100")[0]
     assert refused("felt", TWO_MASS, "--stiffness", "nan", "--damping", "1")

@@ -79,6 +79,19 @@ def test_out_of_reach_is_no_answer_either():
     assert strict(ran.out)["sensitivities"] is None
 
 
+def test_the_numbers_of_the_operator_are_among_them(tmp_path):
+    from tests.cli.test_cli_felt import HELD
+
+    file = tmp_path / "held.toml"
+    file.write_text(HELD)
+    entries = of(found("sensitivity", file))
+    value = entries["operator.arm_mass_kg"]["d_ln_stiffness_max_d_ln_value"]
+    moved = [found("chart", file, "--set", f"operator.arm_mass_kg={0.8 * share}")["stiffness_max_N_per_m"]
+             for share in (1.001, 0.999)]  # fmt: skip
+    assert value == pytest.approx((moved[0] / moved[1] - 1.0) / 0.002, abs=1e-5)
+    assert "operator.grasp_stiffness_N_per_m" in entries
+
+
 def test_files(tmp_path):
     table, figure = tmp_path / "all.csv", tmp_path / "bars.svg"
     found("sensitivity", TWO_MASS, "--output", table)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.chart import BoundaryArc, StabilityChart
 from zwidth.measures.felt import hardest_static_stiffness, static_stiffness
+from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
 
@@ -33,14 +34,16 @@ class FeltChart:
     limit: float
 
 
-def felt_chart(chart: StabilityChart) -> FeltChart:
+def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
     """A chart in felt static stiffness (see `felt.static_stiffness`), for walls with K >= 0 of either sign of B.
+
+    device  what the hand holds, without the hand; left out: the chart's own plant, which then has no operator
 
     Walls of negative stiffness are left out: at K = -k a spring k in series has no finite felt stiffness.
 
     Raises  HandleError  where the plant has no handle
     """
-    plant = chart.loop.plant
+    plant = device or chart.loop.plant
     walls = np.vstack(chart.regions) if chart.regions else np.zeros((1, 2))
     (_, low), (right, high) = walls.min(axis=0), walls.max(axis=0)
     half_plane = shapely.box(0.0, low - 1.0, max(right, 0.0) + 1.0, high + 1.0)

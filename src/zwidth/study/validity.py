@@ -72,7 +72,7 @@ class Validity:
     """The models of a device beside its full model.
 
     tolerance      that `Fit.within` means
-    first_natural  the full model's first flexible natural frequency [Hz]; nan if it has none
+    first_natural  the full model's first flexible natural frequency, nobody holding it [Hz]; nan if it has none
     frequency      (k,)  along the full model's edge, for walls with K > 0 and B > 0, ascending [Hz]
     walls          (k, 3)  their K, B and frequency
     arc            (k,)  which piece of edge each belongs to
@@ -94,7 +94,8 @@ def validity(
     assembly: str | None = None,
     tolerance: float = TOLERANCE,
 ) -> Validity:
-    """Compare the rigid, the motor-mass and the two-mass model, with and without damping, with the full one.
+    """Compare the rigid, the motor-mass and the two-mass model, with and without damping, with the full one; each
+    with the operator at the handle, if there is one.
 
     at, direction, assembly  as for `Device.plant`
     tolerance                the largest e that still counts as the same
@@ -102,7 +103,7 @@ def validity(
     """
     full = device.plant(at, direction, assembly, "full")
     chart = stability_chart(Loop(full, device.controller), decay=False)
-    natural = natural_frequencies(full)
+    natural = natural_frequencies(device.plant(at, direction, assembly, "full", held=False))
     flexible = natural[natural > 0.0]
     edge = _Edge(chart)
 

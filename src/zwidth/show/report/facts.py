@@ -89,7 +89,9 @@ class Facts:
     @cached_property
     def felt(self) -> FeltChart | None:
         """The chart at the stiffness that the hand feels; None without a handle."""
-        return None if self.loop.plant.handle is None else felt_chart(self.chart)
+        model = None if self.model == "full" else self.model
+        alone = self.device.plant(**self.asked, model=model, held=False)
+        return None if alone.handle is None else felt_chart(self.chart, alone)
 
 
 def gather(
