@@ -78,3 +78,28 @@ def test_files(tmp_path):
     assert float(rows[1]["stiffness_max_N_per_m"]) == pytest.approx(7849.441493, rel=1e-9)
     assert (float(rows[1]["direction_x"]), float(rows[1]["direction_y"])) == (0.0, 1.0)
     assert "<svg" in (tmp_path / "p.svg").read_text()
+
+
+# --- zwidth chart --with-direction -----------------------------------------------------------------------
+
+
+def test_a_chart_of_two_directions_under_one_law():
+    ran = zwidth("chart", MECHANISM, "--with-direction", "1,0", "--json")
+    assert ran.code == 0
+    assert ran.document["directions"] == [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
+    assert ran.document["stiffness_max_N_per_m"] == pytest.approx(4148.658573678898, rel=1e-9)
+    assert ran.document["fastest_decay"] is None
+    assert "under one law" in zwidth("chart", MECHANISM, "--with-direction", "1,0").out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((TWO_MASS, "--with-direction", "1,0"), "one direction only"),
+        ((MECHANISM, "--with-direction", "0,1"), "not indep"),
+    ],
+)
+def test_directions_that_cannot_be_charted_together(words, said):
+    ran = zwidth("chart", *words)
+    assert (ran.code, ran.out) == (2, "")
+    assert said in ran.err

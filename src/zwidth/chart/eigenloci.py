@@ -57,6 +57,11 @@ class MultiChart:
         return self.loop.unobserved_modes
 
     @property
+    def fastest_decay(self) -> None:
+        """None: the fastest-decaying wall is searched for over one direction only."""
+        return None
+
+    @property
     def box(self) -> tuple[float, float, float, float]:
         """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
         if not self.regions:

@@ -46,8 +46,8 @@ def series(numerator: Floats, denominator: Floats, window: Floats) -> Series:
     window                  (n,)    weights of the newest to the oldest sample
 
     >>> half = series(np.empty((0, 3)), np.empty((0, 3)), np.array([0.5, 0.5]))           # (1 + 1/z) / 2
-    >>> half.response(2.0)[0]
-    np.complex128(0.75+0j)
+    >>> complex(half.response(2.0)[0])
+    (0.75+0j)
     """
     orders = [2 if row[0] != 0.0 else 1 for row in denominator]
     past = len(window) - 1

@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import click
 
 from zwidth.show.cli import measured
 from zwidth.show.cli.answer import Answer, deliver, sheet
 from zwidth.show.cli.computing import NoAnswer, computing
+from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Numbers, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.motions import counted
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
-from zwidth.show.units import amount
+from zwidth.show.units import amount, vector
 
 if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
+    from zwidth.chart.eigenloci import MultiChart
     from zwidth.device.device import Device
+    from zwidth.model.reduction import Model
 
 KEYS: Final = (
     "regions",
@@ -59,21 +62,40 @@ def _ordered(ctx: click.Context, param: click.Parameter, window: Window | None) 
     callback=_ordered,
     help="Part of the chart that a figure shows; results are never clipped.",
 )
+@click.option(
+    "--with-direction",
+    "others",
+    type=Numbers("DX,DY[,DZ]", (2, 3), "1,0"),
+    multiple=True,
+    help="Another direction under the same wall law, as in a corner; repeatable.",
+)
 @output_option("Write a figure (.png .svg .pdf) or the data (.csv: the boundary, .json).")
 @as_json
-def chart(question: Question, window: Window | None, output: str | None, as_json: bool) -> int:
+def chart(
+    question: Question,
+    window: Window | None,
+    others: tuple[tuple[float, ...], ...],
+    output: str | None,
+    as_json: bool,
+) -> int:
     """Find the walls that DEVICE renders stably: the exact chart of stiffness and damping."""
     path = None if output is None else destination(output, FIGURES + DATA)
     device = question.device()
+    if others and device.mechanism is None:
+        raise BadInput(
+            f"{question.name}: has no [mechanism], and so one direction only; leave out --with-direction"
+        )
     if device.response is not None:
         return measured.answer_chart(question, device, path, window, as_json)
+    along = [device.direction(direction) for direction in (question.direction, *others)] if others else []
+    facts = question.facts(device) | ({"directions": along} if along else {})
     try:
         with computing(question):
-            found = _charted(question, device)
+            found = _charted_together(question, device, along) if along else _charted(question, device)
     except NoAnswer as none:
-        unanswered = question.facts(device) | dict.fromkeys(KEYS) | {"decided": none.decided}
+        unanswered = facts | dict.fromkeys(KEYS) | {"decided": none.decided}
         return deliver(Answer(unanswered, reason=str(none)), as_json)
-    answer = _answer(question, device, found, path)
+    answer = _answer(question, device, found, path, facts)
     if path is not None:
         _write(path, found, answer, window)
     return deliver(answer, as_json)
@@ -86,7 +108,19 @@ def _charted(question: Question, device: Device) -> StabilityChart:
     return stability_chart(Loop(question.plant(device), device.controller))
 
 
-def numbers(chart: StabilityChart) -> dict[str, Any]:
+def _charted_together(question: Question, device: Device, along: list[Any]) -> MultiChart:
+    """One wall law over several directions."""
+    from zwidth.chart.eigenloci import multi_chart
+    from zwidth.loop.multi import MultiLoop
+    from zwidth.model.directions import reduce_directions
+
+    assert device.mechanism is not None
+    posture, model = device.posture(question.at, question.assembly), cast("Model", question.model or "full")
+    plant = reduce_directions(device.mechanism, posture, along, model, device.damping)
+    return multi_chart(MultiLoop(plant, device.controller))
+
+
+def numbers(chart: StabilityChart | MultiChart) -> dict[str, Any]:
     """The chart under the keys of --json."""
     frequencies = chart.frequencies_at_stiffness_max
     return {
@@ -111,7 +145,7 @@ def numbers(chart: StabilityChart) -> dict[str, Any]:
     }
 
 
-def boundary_table(chart: StabilityChart) -> dict[str, list[Any]]:
+def boundary_table(chart: StabilityChart | MultiChart) -> dict[str, list[Any]]:
     """The stable set's edge as columns, its arcs one after another and counted from 0."""
     arcs = chart.boundary
     return {
@@ -122,14 +156,23 @@ def boundary_table(chart: StabilityChart) -> dict[str, list[Any]]:
     }
 
 
-def _answer(question: Question, device: Device, chart: StabilityChart, path: Path | None) -> Answer:
-    document = question.facts(device) | numbers(chart) | {"decided": True}
+def _answer(
+    question: Question,
+    device: Device,
+    chart: StabilityChart | MultiChart,
+    path: Path | None,
+    facts: dict[str, Any],
+) -> Answer:
+    document = facts | numbers(chart) | {"decided": True}
     if path is not None:
         document["file"] = str(path)
 
     def pages() -> Iterator[Any]:
         yield heading(question, device)
-        yield sheet(list(rows(chart)))
+        together = (
+            [("under one law", " and ".join(map(vector, facts["directions"])))] if "directions" in facts else []
+        )
+        yield sheet([*together, *rows(chart)])
         if path is not None:
             yield f"written: {path}"
 
@@ -137,7 +180,7 @@ def _answer(question: Question, device: Device, chart: StabilityChart, path: Pat
     return Answer(document, lambda: list(pages()), reason)
 
 
-def rows(chart: StabilityChart) -> Iterator[tuple[str, str]]:
+def rows(chart: StabilityChart | MultiChart) -> Iterator[tuple[str, str]]:
     yield "largest stiffness", _stiffest(chart)
     yield "largest damping", _most_damped(chart)
     yield "stable area", amount(chart.stable_area, "N²s/m²")
@@ -148,21 +191,24 @@ def rows(chart: StabilityChart) -> Iterator[tuple[str, str]]:
     if len(chart.regions) != 1:
         yield "stable regions", f"{len(chart.regions)}"
     if chart.unobserved_modes:
+        from zwidth.loop.loop import Loop
         from zwidth.study.hidden import hidden_instability
 
         names = ", ".join(counted(chart.unobserved_modes))
         warned = "; WARNING: so that the device runs away, whatever the wall"
-        yield "moved by no wall", names + (warned if hidden_instability(chart.loop) else "")
+        # several directions are those of a mechanism, whose springs and dampers feed no motion
+        runs_away = isinstance(chart.loop, Loop) and hidden_instability(chart.loop)
+        yield "moved by no wall", names + (warned if runs_away else "")
 
 
-def _most_damped(chart: StabilityChart) -> str:
+def _most_damped(chart: StabilityChart | MultiChart) -> str:
     damping = amount(chart.damping_max, "Ns/m")
     if chart.damping_max > 0.0 or not chart.regions:
         return damping
     return f"{damping}, because walls of small stiffness are unstable at any damping"
 
 
-def _stiffest(chart: StabilityChart) -> str:
+def _stiffest(chart: StabilityChart | MultiChart) -> str:
     if chart.stiffness_max != chart.stiffness_max:
         return "none"
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
@@ -172,7 +218,7 @@ def _stiffest(chart: StabilityChart) -> str:
     )
 
 
-def _write(path: Path, chart: StabilityChart, answer: Answer, window: Window | None) -> None:
+def _write(path: Path, chart: StabilityChart | MultiChart, answer: Answer, window: Window | None) -> None:
     if path.suffix.lower() in DATA:
         reason = {} if answer.reason is None else {"reason": answer.reason}
         write_data(path, answer.document | reason, boundary_table(chart))
@@ -181,6 +227,6 @@ def _write(path: Path, chart: StabilityChart, answer: Answer, window: Window | N
     from zwidth.show.figures.style import figure, save
 
     drawing, ax = figure()
-    draw_chart(ax, chart, window=window)
+    draw_chart(ax, cast("StabilityChart", chart), window=window)  # of which it draws what both have
     with replacing(path) as draft:
         save(drawing, draft)
