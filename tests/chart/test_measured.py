@@ -16,6 +16,7 @@ from zwidth.chart.measured_curve import boundary, coarse, nyquist_count
 from zwidth.chart.measured_loop import MeasuredLoop
 from zwidth.chart.verdict import eigenvalues
 from zwidth.loop.controller import Butterworth, Controller
+from zwidth.loop.estimators import CentralDifference, LeastSquaresSlope, SavitzkyGolay
 from zwidth.loop.loop import Loop
 from zwidth.model.response import Response, ResponseError, integrators_of
 
@@ -126,6 +127,28 @@ def test_software_delay_and_a_filter_of_the_force_are_added_to_what_was_measured
         measured_chart(response, Controller(loop.period, delay=0.5))
     with pytest.raises(ResponseError, match="lag already"):
         measured_chart(response, Controller(loop.period, actuator_time_constant=0.001))
+
+
+@pytest.mark.parametrize("velocity", [CentralDifference(), LeastSquaresSlope(4), SavitzkyGolay(5, 2)], ids=str)
+def test_any_velocity_estimate_serves(velocity):
+    loop = systems.random_loop(np.random.default_rng(12), (0.05, 0.3, 1.0))
+    computer = replace(loop.controller, velocity=velocity, delay=0.0)
+    exact = stability_chart(Loop(loop.plant, replace(computer, delay=loop.controller.delay)), decay=False)
+    chart = measured_chart(measured(loop)[0], computer)
+    assert chart.stiffness_max == pytest.approx(exact.stiffness_max, rel=1e-5)
+    assert chart.stable_area == pytest.approx(exact.stable_area, rel=2e-4)
+
+
+def test_roots_are_counted_however_long_the_delay():
+    loop = Loop(systems.mass(0.1, 2.0, 50.0), Controller(0.001, delay=90.0))
+    counted = MeasuredLoop(measured(loop, np.linspace(0.1, 500.0, 4000))[0], Controller(0.001))
+    edge = boundary(counted, coarse(counted))
+    walls = np.column_stack(
+        [np.random.default_rng(0).uniform(low, high, 12) for low, high in ((-80, 900), (-5, 20))]
+    )
+    sizes = np.abs(eigenvalues(loop, *walls.T))
+    assert_allclose(edge.outside(walls), np.sum(sizes > 1.0, axis=-1))
+    assert np.max(edge.outside(walls)) > 4
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ LARGEST_PHASE: Final = np.radians(30.0)  # at the lowest frequency, that of the 
 COARSEST: Final = 0.02  # relative error of P that interpolation may be expected to leave
 WIDEST_GAP: Final = 4.0  # times the spacing around it, and
 WIDEST_RATIO: Final = 1.25  # of the frequencies on both sides
+SAME_STRETCH: Final = 10  # frequencies between two that noise makes uncertain
 SHORT_OF_END: Final = 2.0  # times the last spacing: near enough to half the sampling rate
 CONTINUED: Final = 0.8  # of half the sampling rate: from here on the response is continued to it
 
@@ -80,7 +81,7 @@ def stretches(response: Response, good: Flags, period: float, between: Between) 
 
 def _incoherent(response: Response, good: Flags) -> Iterator[Stretch]:
     """Runs of dropped frequencies between the used ones on both sides."""
-    for run in _runs(~good):
+    for run in _runs(~good, SAME_STRETCH):
         low = response.frequency[run[0] - 1] if run[0] > 0 else 0.0
         high = response.frequency[min(run[-1] + 1, len(good) - 1)]
         if response.coherence is None:
@@ -96,18 +97,18 @@ def _gaps(f: Floats, errors: Floats) -> Iterator[Stretch]:
     around = np.array([np.median(spacing[max(0, i - 5) : i + 6]) for i in range(len(spacing))])
     empty = (spacing > WIDEST_GAP * around) & (f[1:] > WIDEST_RATIO * f[:-1])
     coarse = (errors > COARSEST) & ~empty
-    for run in _runs(coarse):
+    for run in _runs(coarse, SAME_STRETCH):
         yield Stretch(
             float(f[run[0]]),
             float(f[run[-1] + 1]),
             "the response changes so fast from one frequency to the next that what lies between is uncertain by "
-            f"{100.0 * float(np.max(errors[run])):.2g} %; measure closer",
+            f"up to {100.0 * float(np.max(errors[run])):.2g} %; measure closer",
         )
     for run in _runs(empty):
         yield Stretch(float(f[run[0]]), float(f[run[-1] + 1]), "nothing measured; the response is interpolated")
 
 
-def _runs(flags: Flags) -> list[NDArray[np.int64]]:
-    """Indices of the true, neighbours together."""
+def _runs(flags: Flags, reach: int = 1) -> list[NDArray[np.int64]]:
+    """Indices of the true, those together that are no farther apart than `reach`."""
     at = np.flatnonzero(flags)
-    return np.split(at, np.flatnonzero(np.diff(at) > 1) + 1) if len(at) else []
+    return np.split(at, np.flatnonzero(np.diff(at) > reach) + 1) if len(at) else []

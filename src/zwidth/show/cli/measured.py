@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from zwidth.show.cli.options import Question
     from zwidth.show.cli.points import Walls
 
+SHOWN: Final = 6  # stretches named on a terminal
 OPEN: Final = (
     "the measured edge does not close round the stable walls: frequencies are missing; measure up to half the "
     "sampling rate"
@@ -138,8 +139,10 @@ def more_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
     kept, given = len(chart.loop.angles), len(response.frequency)
     measured = f"{kept} of {given} frequencies used, {chart.integrators} integrators"
     yield "measured", f"{measured}; {response.note}" if response.note else measured
-    for stretch in chart.unusable:
+    for stretch in chart.unusable[:SHOWN]:
         yield "not to be relied on", told(stretch)
+    if len(chart.unusable) > SHOWN:
+        yield "", f"and {len(chart.unusable) - SHOWN} more stretches; --json holds them all"
 
 
 def told(stretch: Stretch) -> str:
