@@ -62,7 +62,7 @@ class Loci:
     def at(self, branch: int, thetas: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """K, B, dK/dtheta, dB/dtheta (k,) on a branch at angles in (0, pi)."""
         z, d = on_circle(thetas)
-        expected = np.interp(thetas, self.thetas, self.g[:, branch])
+        expected = self._expected(branch, thetas)
         g, dg = _nearest(*self.loop.plant_slope(z, d), expected)
         h, dh = -1.0 / g, dg / g**2
         if self.loop.count > 1:
@@ -75,6 +75,18 @@ class Loci:
         B = h.imag / w.imag
         dB = (dh.imag - B * dw.imag) / w.imag
         return h.real - B * w.real, B, dh.real - dB * w.real - B * dw.real, dB
+
+    def _expected(self, branch: int, thetas: Floats) -> Complexes:
+        """The branch's eigenvalue between samples: g is taken as linear, and past a pole 1/g."""
+        g = self.g[:, branch]
+        straight, inverse = np.interp(thetas, self.thetas, g), np.interp(thetas, self.thetas, 1.0 / g)
+        k = np.searchsorted(self.thetas, thetas).clip(1, len(g) - 1)
+        size = np.abs(np.stack([g[k - 1], g[k]]))
+        turned = np.abs(g[k] - g[k - 1]) > size.max(axis=0)
+        # what changes sign in a step passes a pole or a zero: the neighbours outside tell which
+        outer = np.abs(np.stack([g[np.maximum(k - 2, 0)], g[np.minimum(k + 1, len(g) - 1)]]))
+        pole = turned & (size.min(axis=0) > outer.min(axis=0))
+        return np.where(pole, 1.0 / np.where(inverse == 0.0, 1e-300, inverse), straight)
 
 
 def on_circle(thetas: Floats) -> tuple[Complexes, Complexes]:
@@ -144,7 +156,7 @@ def refine_loci(loci: Loci, low: Floats, high: Floats, tolerance: float) -> Loci
     """
     for _ in range(ROUNDS):
         walls = loci.walls
-        near = (walls > low).all(axis=-1) & (walls < high).all(axis=-1)
+        near: NDArray[np.bool_] = np.asarray(((walls > low) & (walls < high)).all(axis=-1))
         inside = (near[1:] | near[:-1]).any(axis=-1) & (np.diff(loci.thetas) > NARROWEST * loci.thetas[1:])
         middles = (0.5 * (loci.thetas[1:] + loci.thetas[:-1]))[inside]
         g = eigenvalues_of_plant(loci.loop, middles)
@@ -183,7 +195,8 @@ def _followed(g: Complexes) -> Complexes:
         return g
     out = g.copy()
     for k in range(1, len(g)):
-        cost = np.abs(out[k - 1][:, None] - g[k])
+        # in shares: through a pole an eigenvalue changes sign, and the others must not
+        cost = np.abs(out[k - 1][:, None] - g[k]) / (np.abs(out[k - 1][:, None]) + np.abs(g[k]))
         if g.shape[1] == 2:
             if cost[0, 0] + cost[1, 1] > cost[0, 1] + cost[1, 0]:
                 out[k] = g[k, ::-1]
