@@ -1,0 +1,198 @@
+"""Robust charts: the walls that every one of many loops renders stably, and which of them sets each limit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.chart.chart import Samples, _cells, _outline
+from zwidth.chart.outline import CHORD, quadrant_area, sample_arc
+from zwidth.chart.region import ChartError
+from zwidth.chart.robust_common import Shapes, common, excluding
+from zwidth.chart.robust_edges import Piece, pieces
+from zwidth.chart.robust_members import Member, chart_members, polygons
+from zwidth.chart.robust_numbers import robust_largest_damping, robust_stiffest
+from zwidth.chart.verdict import judge
+from zwidth.loop.loop import Loop
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RobustArc:
+    """A piece of the robust set's edge: walls at which one member begins to vibrate.
+
+    member                         index of the loop that binds there; where several do, the first
+    stiffness, damping, frequency  (k,)  [N/m], [N s/m], [Hz]; 0 or 1/(2T) for a real root
+    """
+
+    member: int
+    stiffness: Floats
+    damping: Floats
+    frequency: Floats
+
+
+@dataclass(frozen=True)
+class RobustChart:
+    """The walls that are stable for every member, both signs of K and B, never clipped.
+
+    members         index -> loop, of those that could be charted
+    failed          index -> why a member could not be charted; nothing is claimed for these
+    regions         closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set
+    boundary        arcs of its edge, each with the member that binds
+    binding         indices of the members that bind anywhere on the edge, ascending
+    stiffness_max   supremum of K over these walls with K > 0, B >= 0 [N/m]; nan if there is none
+    damping_at_stiffness_max     [N s/m]; nan if there is none
+    frequencies_at_stiffness_max [Hz] one, or two at a corner, ascending; () if there is none
+    members_at_stiffness_max     the members that bind there, ascending: one, or two at a corner between them
+    damping_max     supremum of B >= 0 stable for every member for all sufficiently small K > 0 [N s/m]
+    stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
+    best_by_area, best_by_stiffness  members that would have the most of each if they were the only ones
+    lost_share      1 - stable_area / that of the best by area
+    lost_stiffness_share  1 - stiffness_max / that of the best by stiffness
+    excluding       members that leave no wall in common (see `robust_common.excluding`); () where there is one
+    outlines        index -> the member's own closed walks (k, 2) of [stiffness, damping]
+    corner_blur     share of the set's size to which its edge is known: 0 for rounding; more where rounding hides
+                    a corner, and 1e-6 where a member cuts off less than chords of the arcs see
+    """
+
+    members: dict[int, Loop]
+    failed: dict[int, str]
+    regions: tuple[Floats, ...]
+    boundary: tuple[RobustArc, ...]
+    binding: tuple[int, ...]
+    stiffness_max: float
+    damping_at_stiffness_max: float
+    frequencies_at_stiffness_max: tuple[float, ...]
+    members_at_stiffness_max: tuple[int, ...]
+    damping_max: float
+    stable_area: float
+    best_by_area: int
+    best_by_stiffness: int
+    lost_share: float
+    lost_stiffness_share: float
+    excluding: tuple[int, ...]
+    outlines: dict[int, tuple[Floats, ...]]
+    corner_blur: float
+
+    @property
+    def unobserved_modes(self) -> tuple[str, ...]:
+        """Motions of any member that no wall moves, each named once; they were cancelled and do not count."""
+        return tuple(dict.fromkeys(name for loop in self.members.values() for name in loop.unobserved_modes))
+
+    def spectral_radius(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
+        """Largest |z| (...) of any member, by eigenvalues, for walls K, B (...) that broadcast."""
+        radii = [judge(loop, wall_stiffness, wall_damping).spectral_radius for loop in self.members.values()]
+        return np.asarray(np.max(radii, axis=0))
+
+
+def robust_chart(members: Sequence[Loop]) -> RobustChart:
+    """The exact chart of the walls stable for every one of several loops.
+
+    Each member is charted by D-decomposition and the charts are intersected; corners between two members are
+    solved for to rounding, so that peak and area have the exactness of a single chart.
+
+    members  loops; they may differ in anything, the sampling period included
+    Raises   ValueError  for no members
+             ChartError  if not one of them can be charted
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> def free_mass(kilograms):
+    ...     one, none = np.ones(1), np.zeros((1, 1))
+    ...     return Loop(Plant(np.array([[kilograms]]), none, none, one, one), Controller(0.001))
+    >>> chart = robust_chart([free_mass(0.3), free_mass(0.1), free_mass(0.2)])
+    >>> chart.binding, round(chart.stiffness_max, 2), round(chart.lost_stiffness_share, 6)
+    ((1,), 68629.15, 0.666667)
+    """
+    if not members:
+        raise ValueError("a robust chart needs at least one member")
+    charted, failed = chart_members(members)
+    return robust_of(charted, failed)
+
+
+def robust_of(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart:
+    """The same for members that are charted already. Raises ChartError if there are none."""
+    if not charted:
+        reason = next(iter(failed.values()), "there is none")
+        raise ChartError(f"no member could be charted; the first: {reason}")
+    unit = max(member.tracer.period for member in charted.values())
+    shapes = {index: polygons(member.outlines, unit) for index, member in charted.items()}
+    shape, cutters = common(list(charted.values()), shapes, unit)
+    rings, blur = pieces(shape, sorted(cutters, key=lambda member: member.index), unit)
+    samples = [[sample_arc(piece.member.tracer, piece.arc) for piece in ring] for ring in rings]
+    peak = robust_stiffest(rings)
+    if _passed_over(samples, list(charted.values()), unit):
+        blur = max(blur, CHORD)
+    area = _area(rings) if peak else 0.0
+    by_area, largest_area = _best_by_area(charted, shapes)
+    by_stiffness = max(charted, key=lambda index: (_stiffness(charted[index]), -index))
+    return RobustChart(
+        members={index: member.tracer.loop for index, member in charted.items()},
+        failed=failed,
+        regions=_cells([_outline(arcs) for arcs in samples]),
+        boundary=tuple(
+            RobustArc(piece.member.index, K, B, thetas / (2.0 * np.pi * piece.member.tracer.period))
+            for ring, arcs in zip(rings, samples, strict=True)
+            for piece, (thetas, K, B) in zip(ring, arcs, strict=True)
+        ),
+        binding=tuple(sorted({piece.member.index for ring in rings for piece in ring})),
+        stiffness_max=peak.stiffness if peak else float("nan"),
+        damping_at_stiffness_max=peak.damping if peak else float("nan"),
+        frequencies_at_stiffness_max=peak.frequencies if peak else (),
+        members_at_stiffness_max=peak.members if peak else (),
+        damping_max=robust_largest_damping(rings, list(charted.values())),
+        stable_area=area,
+        best_by_area=by_area,
+        best_by_stiffness=by_stiffness,
+        lost_share=_lost(area, largest_area),
+        lost_stiffness_share=_lost(peak.stiffness if peak else 0.0, _stiffness(charted[by_stiffness])),
+        excluding=() if peak else excluding(charted, shapes, unit),
+        outlines={index: member.outlines for index, member in charted.items()},
+        corner_blur=blur,
+    )
+
+
+def _passed_over(samples: Samples, members: list[Member], unit: float) -> bool:
+    """Whether a member cuts a piece of edge (at its quarters, 1e-9 of its length inside), by less than chords see."""
+    for _, K, B in (arc for ring in samples for arc in ring):
+        walk = np.column_stack([K * unit, B])
+        depth = 1e-9 * float(np.max(np.ptp(walk, axis=0)))
+        for k in {len(K) // 4, len(K) // 2, 3 * len(K) // 4}:
+            along = walk[min(k + 1, len(K) - 1)] - walk[max(k - 1, 0)]
+            start = walk[k] if len(K) > 2 else walk.mean(axis=0)
+            inside = start + depth * np.array([-along[1], along[0]]) / np.hypot(*along)
+            if any(member.verdict(inside[0] / unit, inside[1]) < 0 for member in members):
+                return True
+    return False
+
+
+def _stiffness(member: Member) -> float:
+    return member.peak.stiffness if member.peak else 0.0
+
+
+def _lost(left: float, whole: float) -> float:
+    """Share lost; nan where there was nothing to lose. Rounding can make a share negative that is 0."""
+    return max(1.0 - left / whole, 0.0) if whole > 0.0 else float("nan")
+
+
+def _area(rings: list[list[Piece]]) -> float:
+    """Area within K >= 0, B >= 0 [N^2 s/m^2], by Green's integral along the arcs."""
+    return max(sum(quadrant_area(piece.member.tracer, ((piece.arc,),)) for ring in rings for piece in ring), 0.0)
+
+
+def _best_by_area(charted: dict[int, Member], shapes: Shapes) -> tuple[int, float]:
+    """The member of the largest area within K >= 0, B >= 0 and that area; the polygons choose, to 1e-6."""
+    cells = [shapes[index] for index in charted]
+    right, top = np.nan_to_num(shapely.total_bounds(cells)[2:])
+    areas = np.zeros(len(cells))
+    if right > 0.0 and top > 0.0:
+        areas = shapely.area(shapely.clip_by_rect(cells, 0.0, 0.0, right, top))
+    best = list(charted)[int(np.argmax(areas))]
+    member = charted[best]
+    area = quadrant_area(member.tracer, member.rings) if member.peak else 0.0
+    return best, max(area, 0.0)

@@ -1,0 +1,208 @@
+"""The edge of what many loops have in common, as pieces of their own arcs between exact corners.
+
+The polygons say only which arcs follow each other round the common set. Where two arcs run closer to each other
+than chords follow them, polygons change from one to the other and back; such runs are found out by asking at their
+middle whether the other members are stable there. Where one member's arc gives way to another's, the corner is
+solved for (`robust_corner`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from zwidth.chart.arcs import Arc
+from zwidth.chart.robust_corner import Run, corner
+from zwidth.chart.robust_members import Member
+
+Floats = NDArray[np.float64]
+
+# Distances in shares of the common set's size: two edges this near are one, ...
+SAME = 1e-9
+# ... and a piece of edge shorter than this is the rounding of a corner.
+SHORTEST = 1e-8
+# How far inside its edge a run is tested for stability.
+INSIDE = 1e-9
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Part of a member's arc that edges the common set, the common set on its left.
+
+    ring, place  where the arc stands in the member's rings
+    arc          the part, its ends included
+    """
+
+    member: Member
+    ring: int
+    place: int
+    arc: Arc
+
+
+@dataclass(frozen=True)
+class _Segments:
+    """All chords of some members' outlines with where they come from.
+
+    ends    (n, 2, 2)  first and last point [K unit, B]
+    angles  (n, 2)     theta there
+    origin  (n, 3)     place among the members, ring, place in the ring
+    """
+
+    ends: Floats
+    angles: Floats
+    origin: NDArray[np.int64]
+
+
+def pieces(shape: shapely.MultiPolygon, members: Sequence[Member], unit: float) -> tuple[list[list[Piece]], float]:
+    """The rings of a common set as pieces of the members' arcs, and the share of its size to which corners are
+    known: rounding, but more where two arcs all but coincide.
+
+    shape    [K unit, B], see `robust_common.common`
+    members  those that cut it out; where several have the same edge, the first of them gets it
+    """
+    if shape.is_empty:
+        return [], 0.0
+    low, bottom, right, top = shape.bounds
+    size = max(right - low, top - bottom)
+    segments = _segments(members, unit)
+    rings, blur = [], 0.0
+    for cell in shapely.get_parts(shape):
+        cell = cell.normalize()  # exterior clockwise, holes counter-clockwise
+        for line in (cell.exterior, *cell.interiors):
+            points = shapely.get_coordinates(line)[::-1]
+            runs = _runs(points, members, segments, SAME * size)
+            runs = _merged([run for run in runs if len(runs) < 3 or run.length > SHORTEST * size])
+            runs = _merged(_confirmed(runs, members, unit, INSIDE * size))
+            ring, blurred = _joined(runs, unit, size)
+            rings.append(ring)
+            blur = max(blur, blurred / size)
+    return rings, blur
+
+
+def _segments(members: Sequence[Member], unit: float) -> _Segments:
+    ends, angles, origin = [], [], []
+    for number, member in enumerate(members):
+        for ring, place, _ in member.arcs():
+            thetas, K, B = member.samples[ring][place]
+            points = np.column_stack([K * unit, B])
+            ends.append(np.stack([points[:-1], points[1:]], axis=1))
+            angles.append(np.column_stack([thetas[:-1], thetas[1:]]))
+            origin.append(np.broadcast_to([number, ring, place], (len(K) - 1, 3)))
+    return _Segments(np.concatenate(ends), np.concatenate(angles), np.concatenate(origin))
+
+
+def _runs(points: Floats, members: Sequence[Member], segments: _Segments, near: float) -> list[Run]:
+    """The walk round a polygon (k, 2), grouped by arc; it begins where one arc gives way to another."""
+    found = _nearest_segments(points, segments, near)
+    own = segments.origin[found]
+    changes = np.flatnonzero(np.any(own != np.roll(own, 1, axis=0), axis=1))
+    start = int(changes[0]) if len(changes) else 0
+    order = np.roll(np.arange(len(found)), -start)
+    runs = []
+    for _, group in groupby(order, key=lambda i: tuple(own[i].tolist())):
+        edges = list(group)
+        number, ring, place = (int(part) for part in own[edges[0]])
+        first, last = points[edges[0]], points[edges[-1] + 1]
+        angles = (_angle(segments, found[edges[0]], first), _angle(segments, found[edges[-1]], last))
+        runs.append(Run(members[number], ring, place, first, last, angles))
+    return runs
+
+
+def _nearest_segments(points: Floats, segments: _Segments, near: float) -> NDArray[np.int64]:
+    """For each edge of a walk the segment that it lies on: the first within `near` of both its ends that runs the
+    same way, and of several the one on the arc of the edge before."""
+    middles = 0.5 * (points[:-1] + points[1:])
+    inside = np.flatnonzero(
+        np.all(segments.ends.max(axis=1) >= points.min(axis=0) - near, axis=1)
+        & np.all(segments.ends.min(axis=1) <= points.max(axis=0) + near, axis=1)
+    )
+    tree = shapely.STRtree(shapely.linestrings(segments.ends[inside]))
+    edge, hit = tree.query(shapely.points(middles), predicate="dwithin", distance=near)
+    hit = inside[hit]
+    along = segments.ends[hit, 1] - segments.ends[hit, 0]
+    ends = _distance(points[edge], segments.ends[hit]), _distance(points[edge + 1], segments.ends[hit])
+    # two edges of a needle are near each other, but run opposite ways
+    ahead = np.sum(along * (points[edge + 1] - points[edge]), axis=1) > 0.0
+    apart = np.where(ahead, np.maximum(*ends), np.inf)
+    out = np.full(len(middles), -1)
+    order = np.lexsort((hit, apart > near, edge))
+    edge, hit, apart = edge[order], hit[order], apart[order]
+    bounds = np.searchsorted(edge, np.arange(len(middles) + 1))
+    before = -1
+    for i in (*range(len(middles)), *range(len(middles))):  # twice: the walk has no first edge
+        choices = hit[bounds[i] : bounds[i + 1]]
+        close = choices[apart[bounds[i] : bounds[i + 1]] <= near]
+        choices = close if len(close) else choices
+        if not len(choices):  # snapped away by more than expected
+            choices = np.array([np.argmin(_distance(middles[i : i + 1], segments.ends))])
+        staying = choices[np.all(segments.origin[choices] == segments.origin[before], axis=1)]
+        before = out[i] = staying[0] if before >= 0 and len(staying) else choices[0]
+    return out
+
+
+def _distance(points: Floats, ends: Floats) -> Floats:
+    """Distances (n,) of points (n, 2) or (1, 2) from segments (n, 2, 2)."""
+    along = ends[:, 1] - ends[:, 0]
+    away = points - ends[:, 0]
+    square = np.maximum(np.sum(along * along, axis=1), 1e-300)
+    share = np.clip(np.sum(away * along, axis=1) / square, 0.0, 1.0)
+    return np.asarray(np.hypot(*(away - share[:, None] * along).T))
+
+
+def _angle(segments: _Segments, k: int, point: Floats) -> float:
+    """theta of a point on a segment, in proportion."""
+    (first, last), (start, end) = segments.ends[k], segments.angles[k]
+    along = last - first
+    share = float(np.clip((point - first) @ along / max(along @ along, 1e-300), 0.0, 1.0))
+    return float(start + share * (end - start))
+
+
+def _confirmed(runs: list[Run], members: Sequence[Member], unit: float, depth: float) -> list[Run]:
+    """Runs without those whose middle is unstable for another member; all of them if none would be left."""
+    kept = []
+    for run in runs:
+        K, B = (run.middle(unit) + depth * run.inwards(unit)) / (unit, 1.0)
+        if all(other is run.member or other.verdict(float(K), float(B)) >= 0 for other in members):
+            kept.append(run)
+    return kept or runs
+
+
+def _merged(runs: list[Run]) -> list[Run]:
+    """Runs with successive ones on one arc joined."""
+    out = runs[:1]
+    for run in runs[1:]:
+        if run.same_arc(out[-1]):
+            out[-1] = out[-1].joined(run)
+        else:
+            out.append(run)
+    if len(out) > 1 and out[-1].same_arc(out[0]):
+        out[0] = out.pop().joined(out[0])
+    return out
+
+
+def _joined(runs: list[Run], unit: float, size: float) -> tuple[list[Piece], float]:
+    """Runs as pieces between exact corners; and how far a corner that could not be solved for may be off."""
+    if len(runs) == 1:
+        (run,) = runs
+        return [Piece(run.member, run.ring, run.place, run.whole)], 0.0
+    corners = [corner(run, runs[(k + 1) % len(runs)], unit, size) for k, run in enumerate(runs)]
+    out = []
+    for k, run in enumerate(runs):
+        before, after = corners[k - 1], corners[k]
+        whole, start, end = run.whole, before.angles[1], after.angles[0]
+        low, high = min(start, end), max(start, end)
+        thetas = whole.thetas[(whole.thetas > low) & (whole.thetas < high)]
+        out.append(
+            Piece(
+                run.member,
+                run.ring,
+                run.place,
+                replace(whole, first=before.wall, last=after.wall, start=start, end=end, thetas=thetas),
+            )
+        )
+    return out, max(corner.blur for corner in corners)

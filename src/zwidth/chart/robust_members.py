@@ -1,0 +1,123 @@
+"""One loop among many: its exact chart as polygons that know which arc each of their edges came from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from zwidth.chart.arcs import Arc, Rings
+from zwidth.chart.chart import Samples, _signed_area, _traced, _width
+from zwidth.chart.hurwitz import is_stable, working_room
+from zwidth.chart.peak import Peak, stiffest
+from zwidth.chart.region import ChartError
+from zwidth.chart.tracer import ROOTS, Tracer
+from zwidth.loop.loop import Loop
+from zwidth.loop.sections import UnmovedError
+
+Floats = NDArray[np.float64]
+
+# Parts of a polygon smaller than this share of it are rounding.
+ROUNDING_AREA = 1e-12
+# An arc is looked at but for this share of its first and last chord, where it touches its neighbours.
+TRIM = 1e-7
+
+
+@dataclass(frozen=True)
+class Member:
+    """The stable walls of one loop.
+
+    index     its place among the loops
+    tracer    the loop on the unit circle
+    rings     arcs round each cell and hole
+    samples   angles, K and B along every arc
+    outlines  (k, 2) closed walks of [K, B], one for each ring
+    peak      its stiffest wall with K > 0, B >= 0; None if there is none
+    """
+
+    index: int
+    tracer: Tracer
+    rings: Rings
+    samples: Samples
+    outlines: tuple[Floats, ...]
+    peak: Peak | None
+
+    def verdict(self, K: float, B: float) -> int:
+        """Whether a wall is stable: 1 yes, -1 no, 0 lost in rounding."""
+        return int(is_stable(self.tracer.polynomials, K, B, working_room(self.tracer.degree)))
+
+    def arcs(self) -> Iterator[tuple[int, int, Arc]]:
+        """Ring, place in it, arc."""
+        for ring, arcs in enumerate(self.rings):
+            for place, arc in enumerate(arcs):
+                yield ring, place, arc
+
+
+def chart_members(loops: Sequence[Loop]) -> tuple[dict[int, Member], dict[int, str]]:
+    """Each loop's chart under its index, and the reason for each that has none: rounding hides a part of its edge,
+    or the wall moves nothing that the sensor reads."""
+    members, failed = {}, {}
+    for index, loop in enumerate(loops):
+        try:
+            members[index] = chart_member(index, loop)
+        except (ChartError, UnmovedError) as error:
+            failed[index] = str(error)
+    return members, failed
+
+
+def chart_member(index: int, loop: Loop) -> Member:
+    """One loop's arcs, outlines and stiffest wall. Raises ChartError."""
+    tracer = Tracer.of(loop)
+    rings, _, samples, outlines = _traced(tracer)
+    return Member(index, tracer, rings, samples, tuple(outlines), stiffest(tracer, rings, _width(outlines)))
+
+
+def polygons(outlines: Sequence[Floats], unit: float) -> shapely.MultiPolygon:
+    """Outlines (k, 2) as one geometry in [K unit, B], clockwise ones as holes.
+
+    unit  seconds: K T and B have one unit, in which distances between walls are taken
+    """
+    scaled = [outline * (unit, 1.0) for outline in outlines]
+    solid = [outline for outline in scaled if _signed_area(outline) > 0.0]
+    holes = [outline for outline in scaled if _signed_area(outline) < 0.0]
+    found: list[shapely.Polygon] = []
+    for outline in solid:
+        shell = shapely.Polygon(outline)
+        cell = shapely.Polygon(outline, [hole for hole in holes if shapely.contains_xy(shell, *hole[0])])
+        found += polygonal(cell if cell.is_valid else shapely.make_valid(cell))
+    return shapely.MultiPolygon(found)
+
+
+def polygonal(geometry: shapely.Geometry) -> list[shapely.Polygon]:
+    """The polygons of a geometry, without what rounding left beside them."""
+    # a collection may hold multipolygons
+    parts = [piece for part in shapely.get_parts(geometry) for piece in shapely.get_parts(part)]
+    parts = [part for part in parts if isinstance(part, shapely.Polygon)]
+    total = sum(part.area for part in parts)
+    return [part for part in parts if part.area > ROUNDING_AREA * total]
+
+
+def curved_edges(member: Member, unit: float) -> shapely.MultiLineString:
+    """The arcs of complex pairs, and chords over gaps, without their very ends; in [K unit, B]."""
+    lines = []
+    for ring, place, arc in member.arcs():
+        if arc.kind in ROOTS:
+            continue
+        _, K, B = member.samples[ring][place]
+        points = np.column_stack([K * unit, B])
+        first, last = points[0] + TRIM * (points[1] - points[0]), points[-1] + TRIM * (points[-2] - points[-1])
+        lines.append(np.vstack([first, points[1:-1], last]))
+    return shapely.MultiLineString(lines)
+
+
+def beyond_lines(member: Member, corners: Floats) -> bool:
+    """Whether any wall (k, 2) [K, B] lies outside one of the two half planes of stable real roots."""
+    for root in ROOTS:
+        a, s, v = member.tracer.line(root)
+        terms = np.abs(a) + np.abs(s * corners[:, 0]) + np.abs(v * corners[:, 1])
+        if np.any(a + s * corners[:, 0] + v * corners[:, 1] < -1e-12 * terms):
+            return True
+    return False
