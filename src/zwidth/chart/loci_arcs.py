@@ -143,7 +143,7 @@ def _segments(loci: Loci, lines: list[Line], ring: Floats) -> _Segments:
     parts: list[tuple[Floats, Floats, NDArray[np.int64], NDArray[np.int64], Floats, Floats]] = []
     for i in range(m):
         with np.errstate(invalid="ignore", over="ignore"):
-            sound = np.isfinite(walls[:, i]).all(axis=-1)
+            sound: NDArray[np.bool_] = np.asarray(np.isfinite(walls[:, i]).all(axis=-1))
             near = sound & (np.abs(walls[:, i] - centre) <= size).all(axis=-1)
             use = (near[1:] & sound[:-1]) | (near[:-1] & sound[1:])
             for j in range(i):  # the same curve twice

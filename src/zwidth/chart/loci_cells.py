@@ -102,7 +102,7 @@ def bounds(loop: MultiLoop) -> tuple[float, float]:
     s = next(k for k, x in enumerate(weights) if k and abs(x) > 1e-9 * scale)
 
     def room(k: int) -> float:
-        return (abs(np.sum(state**k)) + N) / k
+        return float(abs(np.sum(state**k)) + N) / k
 
     kappa = room(r + 1) / abs(traces[r])
     order = r + s + 1
@@ -170,7 +170,7 @@ def _with_ends(thetas: Floats, walls: Floats) -> Floats:
 def _runs(points: Floats, low: Floats, high: Floats) -> list[Floats]:
     """The stretches of a branch near the box; a step between two points far outside passes infinity."""
     with np.errstate(invalid="ignore"):
-        sound = np.isfinite(points).all(axis=-1) & (np.abs(points) < FAR).all(axis=-1)
+        sound: NDArray[np.bool_] = np.asarray((np.abs(points) < FAR).all(axis=-1))
         inside = sound & (points >= low).all(axis=-1) & (points <= high).all(axis=-1)
         # both beyond the same side, or a chord longer than the box: it does not belong to the box
         kept = sound[1:] & sound[:-1] & (inside[1:] | inside[:-1] | _passes(points, low, high))
