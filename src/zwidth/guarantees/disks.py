@@ -123,7 +123,7 @@ def force_filter_response(loop: Loop, theta: Floats) -> Complexes:
     """The discrete filter of the whole force."""
     top, bottom = low_pass_factors(loop.controller.force_filter, loop.period)
     d = np.exp(1j * theta) * _one_less_z_inverse(theta)
-    return product(np.array(top).reshape(-1, 3), np.array(bottom).reshape(-1, 3), d)
+    return np.asarray(product(np.array(top).reshape(-1, 3), np.array(bottom).reshape(-1, 3), d))
 
 
 def _terms(loop: Loop, held: Port, cycles: Floats) -> tuple[Complexes, Floats]:
@@ -170,9 +170,9 @@ def _expansion(loop: Loop, held: Port, far: int) -> Expansion:
     cycles = far / t
     centre, radius = _terms(loop, held, cycles)
     upright = centre * np.exp(2j * np.pi * loop.fractional_delay * cycles)
-    values = np.column_stack([upright, radius]) / (t * t)[:, None]
-    if not np.all(np.isfinite(values)):
+    if not np.all(np.isfinite(radius)):
         return Expansion(far, np.zeros(TERMS, dtype=complex), np.zeros(TERMS, dtype=complex), np.inf)
+    values = np.column_stack([upright, radius]) / (t * t)[:, None]
     powers = t[:, None] ** np.arange(TERMS)
     fit, *_ = np.linalg.lstsq(powers.astype(complex), values, rcond=None)
     near = _terms(loop, held, np.array([0.5]))[1][0] or 1.0
@@ -187,7 +187,7 @@ def _sums_beyond(expansion: Expansion, x: Floats, shift: float) -> tuple[Complex
     first = expansion.far + 1
     orders = np.arange(2, TERMS + 2)
     scale = float(expansion.far) ** orders
-    turned = np.array([_powers_beyond(order, first + x, shift, first) for order in orders])
+    turned = np.array([_powers_beyond(int(order), first + x, shift, first) for order in orders])
     plain = np.array([zeta(order, first + x) for order in orders])
     return (expansion.centre * scale) @ turned, ((expansion.radius * scale) @ plain).real
 
@@ -195,7 +195,7 @@ def _sums_beyond(expansion: Expansion, x: Floats, shift: float) -> tuple[Complex
 def _powers_beyond(order: int, start: Floats, shift: float, far: int) -> Complexes:
     """Sum over k >= 0 of e^(-2 pi i shift (start + k)) (start + k)^-order: Lerch's integral by Laguerre's rule."""
     if shift == 0.0:
-        return zeta(order, start) + 0j
+        return np.asarray(zeta(order, start) + 0j)
     turn = np.exp(-2j * np.pi * shift)
     # terms one by one until the integrand is smooth on the scale of its weight
     count = ceil(min(max(30.0 / abs(1.0 - turn) - far, 0.0), 2e5))

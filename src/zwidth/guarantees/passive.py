@@ -99,7 +99,7 @@ def _distance(point: Complexes, first: Complexes, last: Complexes) -> Floats:
     along = last - first
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.real((point - first) * along.conj()) / np.abs(along) ** 2
-    return np.abs(point - first - np.clip(np.nan_to_num(share), 0.0, 1.0) * along)
+    return np.asarray(np.abs(point - first - np.clip(np.nan_to_num(share), 0.0, 1.0) * along))
 
 
 def _denser(loop: Loop, held: Floats, found: Gauge, directions: Floats) -> Gauge:
@@ -116,8 +116,8 @@ def _stiffest(loop: Loop, held: Floats, found: Gauge, low: float, high: float) -
     for _ in range(REFINEMENTS):
         best = _golden(found, loop.period, low, high)
         found = _denser(loop, held, found, best + np.linspace(-1e-6, 1e-6, 5))
-    best = np.array([_golden(found, loop.period, low, high)])
-    K, B = _walls(best, _reach(found, best, loop.period), loop.period)
+    top = np.array([_golden(found, loop.period, low, high)])
+    K, B = _walls(top, _reach(found, top, loop.period), loop.period)
     return float(K[0]), float(B[0])
 
 

@@ -131,7 +131,7 @@ def _stable_set(loop: Loop, stiffness: float) -> Any:
 
 
 def _worst(loop: Loop, rings: tuple[Floats, ...], tried: Floats) -> Floats:
-    """Springs that make walls on the edge most unstable, also between those tried (by a parabola); () if none does."""
+    """Springs that make edge walls most unstable, also between those tried (by a parabola); () if none does."""
     walls = np.vstack([_spread(ring) for ring in rings])
     growth, springs, vibration = _growth(loop, tried, walls)
     theta = vibration[np.argmax(growth, axis=0), np.arange(len(walls))][:: max(len(walls) // 8, 1)]
@@ -172,7 +172,7 @@ def _spread(ring: Floats) -> Floats:
     size = np.maximum(np.ptp(ring, axis=0), 1e-300)
     along = np.append(0.0, np.cumsum(np.hypot(*(np.diff(ring, axis=0) / size).T)))
     picked = np.searchsorted(along, np.linspace(0.0, along[-1], WALLS, endpoint=False))
-    return ring[np.union1d(picked, [np.argmax(ring[:, 0])])]
+    return np.asarray(ring[np.union1d(picked, [np.argmax(ring[:, 0])])])
 
 
 def _between(springs: Floats, growth: Floats) -> float:

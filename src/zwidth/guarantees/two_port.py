@@ -1,8 +1,8 @@
 """Llewellyn and Raisbeck: a device and a coupling between any passive operator and any passive environment.
 
 Adams and Hannaford (1999, 2002) make the device discrete by Tustin's rule and the hold (z + 1)/(2 z), and look at
-it as a two-port between the operator (f_h, v_h) and the environment (f_e, v_e), in hybrid form (known at second hand;
-the numbers of their equations were not at hand):
+it as a two-port between the operator (f_h, v_h) and the environment (f_e, v_e), in hybrid form (known at second
+hand, and the numbers of their equations not at all):
 
     [ f_h ]   [ h11  h12 ] [ v_h ]        h11 = 1/Y_hh,          h12 =  D Y_ha/Y_hh
     [-v_e ] = [ h21  h22 ] [ f_e ]        h21 = -Y_yh/Y_hh,      h22 =  D (Y_ya - Y_yh Y_ha/Y_hh) + 1/Z_c

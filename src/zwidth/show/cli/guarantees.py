@@ -167,7 +167,8 @@ def _limit(limit: dict[str, Any]) -> str:
         return "the wall needs no coupling: it is stable with every passive operator"
     return (
         f"the wall needs a coupling no stiffer than {amount(limit['stiffness_N_per_m'], 'N/m')}, damped by "
-        f"{amount(limit['damping_Ns_per_m'], 'Ns/m')}; then one feels {amount(limit['felt_stiffness_N_per_m'], 'N/m')}"
+        f"{amount(limit['damping_Ns_per_m'], 'Ns/m')}; "
+        f"then one feels {amount(limit['felt_stiffness_N_per_m'], 'N/m')}"
     )
 
 
@@ -176,13 +177,14 @@ def _write(path: Path, found: Guarantees, coupled: Couplings | None, document: d
         write_data(path, document, outlines(found))
         return
     from zwidth.show.figures.guarantees import draw_couplings, draw_guarantees
-    from zwidth.show.figures.style import figure, save
+    from zwidth.show.figures.style import context, figure, save
 
     drawing, ax = figure()
     if coupled is not None:
         drawing.set_size_inches(5.6, 8.0)
         ax.set_subplotspec(drawing.add_gridspec(2, 1)[0])
-        draw_couplings(drawing.add_subplot(2, 1, 2), coupled)
+        with context():
+            draw_couplings(drawing.add_subplot(2, 1, 2), coupled)
     draw_guarantees(ax, found)
     with replacing(path) as draft:
         save(drawing, draft)

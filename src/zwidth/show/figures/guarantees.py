@@ -14,7 +14,7 @@ from zwidth.guarantees.nested import Guarantee, Guarantees
 from zwidth.guarantees.region import Region
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import BLACK, BLUE, GREEN, PURPLE, VERMILION, label, legend_above
-from zwidth.show.units import at_most
+from zwidth.show.units import quantity
 
 # Fill, hatch and edge of the nested sets; they get darker inwards.
 AREAS: Final = {
@@ -24,14 +24,14 @@ AREAS: Final = {
     "passive": ("#6F93B3", "\\\\\\\\", VERMILION),
 }
 # Sets that lie across the others are outlines only.
-LINES: Final = {"nyquist-spring": (PURPLE, (0, (5, 1.5))), "passive-at-actuator": (GREEN, (0, (1.2, 1.2)))}
+LINES: Final = {"nyquist-spring": (PURPLE, (0, (5, 1.5))), "passive-at-actuator": (BLACK, (0, (1.2, 1.2)))}
 WORDS: Final = {
     "stable": "stable",
     "robust": "a range of operators",
     "spring-stable": "every spring",
     "passive": "every passive operator",
     "nyquist-spring": "Nyquist spring",
-    "passive-at-actuator": "every passive operator at the actuator",
+    "passive-at-actuator": "passive, at the actuator",
 }
 
 
@@ -96,7 +96,7 @@ def _words(guarantee: Guarantee) -> str:
 def _with_peak(words: str, region: Region) -> str:
     if region.reason is not None:
         return f"{words}: none"
-    return f"{words}: {at_most(region.stiffness_max, 'N/m')}"
+    return f"{words}: {quantity(region.stiffness_max, 'N/m')}"
 
 
 def _box(found: Guarantees) -> Window:

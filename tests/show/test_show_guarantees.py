@@ -1,0 +1,27 @@
+"""The figure of nested guarantees shows each set once, with its number."""
+
+from __future__ import annotations
+
+from tests.systems import mass
+from zwidth.guarantees.nested import nested
+from zwidth.loop.controller import Controller
+from zwidth.loop.loop import Loop
+from zwidth.show.figures.guarantees import AREAS, draw_guarantees
+from zwidth.show.figures.style import figure
+
+
+def test_every_guarantee_is_in_the_legend_with_its_largest_stiffness():
+    _, ax = figure()
+    draw_guarantees(ax, nested(Loop(mass(0.03, 1.0), Controller(0.001))))
+    words = " ".join(text.get_text().replace("\u00a0", " ") for text in ax.get_legend().get_texts())
+    assert "every passive operator: 2.00 kN/m" in words or "every passive operator: 2 kN/m" in words
+    assert "every spring: 2.2" in words
+
+
+def test_hatches_and_shades_tell_the_sets_apart_in_grey():
+    def lightness(colour):
+        return sum(int(colour[i : i + 2], 16) for i in (1, 3, 5))
+
+    shades = [lightness(fill) for fill, _, _ in AREAS.values()]
+    assert all(a - b > 40 for a, b in zip(shades, shades[1:], strict=False))
+    assert len({hatch for _, hatch, _ in AREAS.values()}) == len(AREAS)
