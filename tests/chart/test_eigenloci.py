@@ -40,7 +40,10 @@ def random_multi(seed):
     plant = random_plant(rng, rate, kind=kind)
     while plant.size < m:
         plant = random_plant(rng, rate, kind=kind)
-    A = rng.normal(size=(m, plant.size))
+    if rng.random() < 0.5:
+        A = np.linalg.qr(rng.normal(size=(plant.size, plant.size)))[0][:m]
+    else:
+        A = rng.normal(size=(m, plant.size))
     return MultiLoop(
         MultiPlant(plant.mass, plant.damping, plant.stiffness, A, A.copy()), random_controller(rng, rate)
     )
