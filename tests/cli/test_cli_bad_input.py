@@ -126,7 +126,7 @@ LINES = [
     (("chart", MECHANISM, "--model", "soft"), ["'--model': 'soft' is not one of"]),
     (("chart", "hapkit-course", "--model", "two-mass"), ["model two-mass: nothing flexible lies between"]),
     (("chart", TWO_MASS, "--at", "0,0.2", "--assembly", "x"), ["at: does not apply", "assembly: does not apply"]),
-    (("chart", TWO_MASS, "--operator", "student"), ["an operator is not supported yet"]),
+    (("chart", TWO_MASS, "--operator", "student"), ["student: is neither a file nor a bundled operator"]),
     (("chart", TWO_MASS, "--axis", "0,0,1"), ["moments about an axis are not supported yet"]),
     (("chart", TWO_MASS, "--set", "loop.delay"), ["must be PATH=VALUE"]),
     (("chart", TWO_MASS, "--set", "loop.delay=1"), ["loop.delay: is no key"]),

@@ -113,35 +113,37 @@ class Device:
         if self.response is not None:
             self._mechanism_only(at=at, direction=direction, assembly=assembly, model=model)
             raise fail(self.label, "", "has a measured [response] and no model; chart and check it")
-        holding = held and self.operator is not None and model != "motor-mass"
         if self.given_plant is not None:
             self._mechanism_only(at=at, direction=direction, assembly=assembly)
             given = self._given(self.given_plant, model)
-            if not holding:
+            if not held:
                 return given
-            return self._given_and_held if given is self.given_plant else self._attached(given)
+            return self._given_and_held if given is self.given_plant else self.hold(given)
         along = self.direction(direction)
         posture = self.posture(at, assembly)
         from zwidth.model.reduction import reduce_mechanism
 
         chosen = cast("Model", model or "full")
         plant = reduce_mechanism(self._mechanism(), posture, along, chosen, self.damping, self.encoders)
-        return self._attached(plant) if holding else plant
+        return self.hold(plant) if held else plant
 
     @cached_property
     def _given_and_held(self) -> Plant:
         """The given plant with its operator: one object, so that a model that changes nothing is seen to."""
         assert self.given_plant is not None
-        return self._attached(self.given_plant)
+        return self.hold(self.given_plant)
 
-    def _attached(self, plant: Plant) -> Plant:
-        from zwidth.model.operator import OperatorError, attach
+    def hold(self, plant: Plant) -> Plant:
+        """A plant of this device with the operator at its handle.
 
-        assert self.operator is not None
-        try:
-            return attach(plant, self.operator)
-        except OperatorError as error:
-            raise fail(self.label, "operator", str(error)) from None
+        Returns  the plant itself where there is no operator, or no handle: a model that holds the link side fixed
+                 holds the operator, too (a given plant without a handle takes no operator in the first place)
+        """
+        if self.operator is None or plant.handle is None:
+            return plant
+        from zwidth.model.operator import attach
+
+        return attach(plant, self.operator)
 
     def position(self, at: Sequence[float] | None = None) -> Floats:
         """The handle's position meant, (3,) [m]; left out: that of the file.

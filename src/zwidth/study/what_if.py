@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import isnan, nan
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 
@@ -86,13 +86,13 @@ def what_if(
     Raises  what `Device.plant` raises, and ChartError if the device itself cannot be charted
     """
 
-    def reduce(to: str | None) -> Plant:
-        return device.plant(at, direction, assembly, to)
+    def reduce(to: str | None, *, held: bool = True) -> Plant:
+        return device.plant(at, direction, assembly, to, held=held)
 
-    plant = reduce(model)
+    plant, alone = reduce(model), reduce(model, held=False)
     here = Loop(plant, device.controller)
     variants = [Variant(BASE, "as described", here, stability_chart(here))]
-    steps = [*_changes(device, plant, reduce), *_models(device, reduce)]
+    steps = [*_changes(device, plant, alone, reduce), *_models(device, reduce)]
     return variants + [_charted(*step) for step in steps]
 
 
@@ -117,7 +117,12 @@ def find(variants: Sequence[Variant], key: str) -> Variant:
 
 # key, label, why it does not apply ("" if it may), how to make its loop
 Step = tuple[str, str, str, Callable[[], Loop]]
-Reduce = Callable[[str | None], Plant]
+
+
+class Reduce(Protocol):
+    """The device in a model, held by its operator or by itself."""
+
+    def __call__(self, to: str | None, *, held: bool = True) -> Plant: ...
 
 
 def _charted(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> Variant:
@@ -130,7 +135,8 @@ def _charted(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
         return Variant(key, label, None, None, str(error))
 
 
-def _changes(device: Device, plant: Plant, reduce: Reduce) -> Iterator[Step]:
+def _changes(device: Device, plant: Plant, alone: Plant, reduce: Reduce) -> Iterator[Step]:
+    """plant: held by the operator; alone: the same device without him, whose own damping is told from his."""
     controller = device.controller
 
     def computed(**changes: Any) -> Callable[[], Loop]:
@@ -139,7 +145,7 @@ def _changes(device: Device, plant: Plant, reduce: Reduce) -> Iterator[Step]:
     def only(applies: object, obstacle: str) -> str:
         return "" if applies else obstacle
 
-    flexible, damped = plant.stiffness.any(), plant.damping.any()
+    flexible, damped = alone.stiffness.any(), alone.damping.any()
     delay, low_pass = controller.delay, controller.velocity_filter
     usual = usual_filter(controller.sampling_period)
     own = "structural damping" if flexible else "friction"
@@ -156,9 +162,9 @@ def _changes(device: Device, plant: Plant, reduce: Reduce) -> Iterator[Step]:
     filtered = only(low_pass is None, "the device has a velocity filter")
     through = f"velocity through a Butterworth filter of order 2 at {usual.cutoff_Hz:.4g} Hz"
     yield "with-filter", through, filtered, computed(velocity_filter=usual)
-    twice = replace(plant, damping=2.0 * plant.damping)
+    twice = replace(alone, damping=2.0 * alone.damping)
     lossless = only(damped, f"the device has no {own}")
-    yield "twice-damping", f"twice the {own}", lossless, lambda: Loop(twice, controller)
+    yield "twice-damping", f"twice the {own}", lossless, lambda: Loop(device.hold(twice), controller)
     there = only(not _collocated(plant), "the sensor reads where the wall acts already")
     moved = replace(plant, sensor=plant.actuator)
     yield "collocated", "sensor at the actuator", there, lambda: Loop(moved, controller)
@@ -174,7 +180,8 @@ def _collocated(plant: Plant) -> bool:
 def _models(device: Device, reduce: Reduce) -> Iterator[Step]:
     """The models of Fig. 4.4: the full one, and what is left of it by and by."""
     full = reduce("full")
-    damped = " with damping" if full.damping.any() else ""
+    alone = reduce("full", held=False)
+    damped = " with damping" if alone.damping.any() or alone.lagged_dampers else ""
     undamped_only = "" if damped else "there is no damping to leave out"
 
     def same(name: str) -> str:
@@ -189,9 +196,11 @@ def _models(device: Device, reduce: Reduce) -> Iterator[Step]:
 
     def of(name: str, *, lossless: bool = False) -> Callable[[], Loop]:
         def make() -> Loop:
-            reduced = reduce(name)
-            kept = replace(reduced, damping=0.0 * reduced.damping) if lossless else reduced
-            return Loop(kept, device.controller)
+            if not lossless:
+                return Loop(reduce(name), device.controller)
+            reduced = reduce(name, held=False)
+            kept = replace(reduced, damping=0.0 * reduced.damping, lagged_dampers=())
+            return Loop(device.hold(kept), device.controller)
 
         return make
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 from zwidth.show.cli.answer import Answer, deliver, table
@@ -11,9 +13,16 @@ from zwidth.show.cli.options import as_json, example
 @click.command(short_help="List the bundled devices.", epilog=example("zwidth devices", "zwidth devices --json"))
 @as_json
 def devices(as_json: bool) -> int:
-    """List the bundled devices: a name of theirs can stand wherever DEVICE is asked for."""
-    from zwidth.device.read import bundled
+    """List the bundled devices, whose names can stand for DEVICE, and operators, whose names --operator takes."""
+    from zwidth.device.read import DEVICES, OPERATORS, bundled
 
-    listing = [dict(zip(("name", "description", "source"), entry, strict=True)) for entry in bundled()]
-    rows = [tuple(entry.values()) for entry in listing]
-    return deliver(Answer({"devices": listing}, lambda: [table(["name", "description", "source"], rows)]), as_json)
+    keys = ("name", "description", "source")
+    found = {
+        what: [dict(zip(keys, entry, strict=True)) for entry in bundled(shelf)]
+        for what, shelf in (("devices", DEVICES), ("operators", OPERATORS))
+    }
+
+    def pages() -> list[Any]:
+        return [table([what[:-1], *keys[1:]], [tuple(one.values()) for one in found[what]]) for what in found]
+
+    return deliver(Answer(found, pages), as_json)

@@ -34,25 +34,47 @@ class Question:
     direction: tuple[float, ...] | None = None
     assembly: str | None = None
     model: str | None = None
+    operator: str | None = None
 
     def device(self) -> Device:
         """The device, loaded and checked. Raises DeviceError."""
         from zwidth.device.load import load
 
-        return load(self.name, self.settings)
+        return load(self.name, self.settings, self.operator)
 
-    def plant(self, device: Device) -> Plant:
-        """The rendered direction's dynamics. Raises what `Device.plant` raises."""
-        return device.plant(self.at, self.direction, self.assembly, self.model)
+    def plant(self, device: Device, *, held: bool = True) -> Plant:
+        """The rendered direction's dynamics, held by the device's operator. Raises what `Device.plant` raises."""
+        return device.plant(self.at, self.direction, self.assembly, self.model, held=held)
 
     def as_measured(self, device: Device) -> None:
         """Raises DeviceError for whatever is asked of a [response] that needs a model."""
         if any((self.at, self.direction, self.assembly, self.model)):
             self.plant(device)
 
+    def of_several_directions(self, device: Device) -> None:
+        """Raises BadInput for what directions computed together leave out."""
+        from zwidth.show.cli.errors import BadInput
+
+        windings = None if device.mechanism is None else device.mechanism.drives.winding_damping
+        lines = [
+            f"{self.name}: {what} is not supported over several directions; {instead}, or ask for one direction"
+            for there, what, instead in (
+                (device.operator is not None, "an operator", "use --operator none"),
+                (device.encoders != "motor", "an encoder on the link", "use --set loop.encoder.at=motor"),
+                (windings is not None and windings.any(), "electrical damping", "unset damping_resistance_ohm"),
+            )
+            if there
+        ]
+        if lines:
+            raise BadInput(*lines)
+
     def model_of(self, device: Device) -> str:
         """The model's name, also where none was asked for."""
         return self.model or ("full" if device.mechanism else AS_GIVEN)
+
+    def operator_of(self, device: Device) -> str | None:
+        """What the operator at the handle is called; None where nobody holds it, or the model holds it fixed."""
+        return None if self.model == "motor-mass" else device.operator_name
 
     def facts(self, device: Device) -> dict[str, Any]:
         """Name, place and sampling as a result states them; null where inapplicable."""
@@ -64,6 +86,7 @@ class Question:
             "direction": device.direction(self.direction) if mechanism else None,
             "assembly": self.assembly or device.reference_assembly,
             "model": self.model_of(device),
+            "operator": self.operator_of(device),
             "sampling_period_s": device.controller.sampling_period,
             "delay_samples": device.controller.delay,
         }
@@ -108,11 +131,6 @@ class Finite(ParamType):
         return number
 
 
-def _operator(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
-    if value not in (None, "none"):
-        raise click.BadParameter(f"an operator is not supported yet; leave it out or use none, got {value!r}")
-
-
 def _axis(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
     if value is not None:
         raise click.BadParameter("moments about an axis are not supported yet; use --direction")
@@ -143,7 +161,13 @@ def about_a_device(command: Command) -> Command:
             type=click.Choice(MODELS),
             help="How much of the device is modelled. Default: full; a [plant] as it is given.",
         ),
-        click.option("--operator", metavar="none", callback=_operator, expose_value=False, help="No operator."),
+        click.option(
+            "--operator",
+            metavar="NAME|FILE|none",
+            callback=named,
+            help="Who holds the handle: a bundled operator, a file with an [operator], or nobody. Default: the "
+            "[operator] of DEVICE.",
+        ),
         click.option("--axis", hidden=True, callback=_axis, expose_value=False),
         click.option(
             "--set",
@@ -155,8 +179,17 @@ def about_a_device(command: Command) -> Command:
     ]
 
     @wraps(command)
-    def asked(device: str, at: Any, assembly: Any, direction: Any, model: Any, settings: Any, **more: Any) -> int:
-        return command(Question(device, settings, at, direction, assembly, model), **more)
+    def asked(
+        device: str,
+        at: Any,
+        assembly: Any,
+        direction: Any,
+        model: Any,
+        operator: Any,
+        settings: Any,
+        **more: Any,
+    ) -> int:
+        return command(Question(device, settings, at, direction, assembly, model, operator), **more)
 
     for decorate in reversed(decorators):
         asked = decorate(asked)

@@ -9,7 +9,7 @@ from zwidth.show.units import vector
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
-    from zwidth.loop.controller import Controller
+    from zwidth.loop.controller import Butterworth, Controller, FirstOrder
     from zwidth.show.cli.options import Question
 
 
@@ -21,23 +21,42 @@ def heading(question: Question, device: Device) -> str:
     if device.mechanism:
         where = f"along {vector(facts['direction'])} at {vector(facts['position_m'], 'm')}"
         place = f"{where}, assembly {facts['assembly']}, {place}"
-    return f"{shown(device.name)}: {place}\n{_computer(device.controller)}"
+    held = f", held by {shown(facts['operator'])}" if facts["operator"] else ""
+    return f"{shown(device.name)}: {place}{held}\n{computer(device.controller)}"
 
 
-def _computer(controller: Controller) -> str:
-    from zwidth.loop.controller import FirstOrder
+def computer(controller: Controller) -> str:
+    """What the computer and the amplifier do, in one line."""
+    from zwidth.loop.estimators import METHODS, BackwardDifference
 
     period = f"{1e3 * controller.sampling_period:.6g} ms"
     samples = "sample" if controller.delay == 1.0 else "samples"
     delay = f"{controller.delay:.6g} {samples} of delay" if controller.delay else "no delay"
-    low_pass = controller.velocity_filter
-    if low_pass is None:
-        velocity = "velocity not filtered"
-    elif isinstance(low_pass, FirstOrder):
-        velocity = f"velocity through a first-order filter of {low_pass.time_constant:.6g} s"
-    else:
-        velocity = (
-            f"velocity through a Butterworth filter of order {low_pass.order} at "
-            f"{low_pass.cutoff_Hz:.6g} Hz ({low_pass.discretisation})"
+    parts = [f"sampled every {period}", delay]
+    estimate = "velocity"
+    if not isinstance(controller.velocity, BackwardDifference):
+        name = next(name for name, method in METHODS.items() if isinstance(controller.velocity, method))
+        own = ", ".join(
+            key if value is True else f"{key.replace('_', ' ')} {value:.6g}"
+            for key, value in vars(controller.velocity).items()
+            if value is not False
         )
-    return f"sampled every {period}, {delay}, {velocity}"
+        estimate = f"velocity by {name}" + (f" ({own})" if own else "")
+    if controller.velocity_filter is None:
+        parts.append(f"{estimate} not filtered" if estimate == "velocity" else estimate)
+    else:
+        parts.append(f"{estimate} through {_filter(controller.velocity_filter)}")
+    if controller.force_filter is not None:
+        parts.append(f"force through {_filter(controller.force_filter)}")
+    if controller.actuator_time_constant:
+        parts.append(f"force lagging by {controller.actuator_time_constant:.6g} s")
+    return ", ".join(parts)
+
+
+def _filter(low_pass: FirstOrder | Butterworth) -> str:
+    from zwidth.loop.controller import FirstOrder
+
+    if isinstance(low_pass, FirstOrder):
+        return f"a first-order filter of {low_pass.time_constant:.6g} s"
+    kind = f"a Butterworth filter of order {low_pass.order}"
+    return f"{kind} at {low_pass.cutoff_Hz:.6g} Hz ({low_pass.discretisation})"

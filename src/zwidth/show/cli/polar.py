@@ -63,6 +63,7 @@ def polar(question: Question, plane: str | None, count: int, output: str | None,
     device = question.device()
     if device.mechanism is None:
         raise BadInput(f"{question.name}: has no [mechanism], and so one direction only; ask for its chart")
+    question.of_several_directions(device)
     try:
         with computing(question):
             plane, found = _computed(question, device, plane, count)

@@ -56,7 +56,7 @@ def show(question: Question, output: str | None, as_json: bool) -> int:
         return deliver(Answer(unanswered, reason=NO_MODEL), as_json)
     try:
         with computing(question):
-            plant = question.plant(device)
+            plant = question.plant(device, held=False)
             posture = device.posture(question.at, question.assembly) if device.mechanism else None
     except NoAnswer as none:
         return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(none)), as_json)

@@ -32,7 +32,7 @@ class Facts:
     model               "full", "two-mass", "motor-mass" or "rigid"
     variants            the device as described first, then what_if's changes and models
     effective           masses and stiffness felt along the direction
-    natural             undamped natural frequencies of the plant [Hz]; rigid modes 0
+    natural             undamped natural frequencies of the device by itself [Hz]; rigid modes 0
     bounds              the published conditions on the loop
     runs_away           a motion that no wall moves grows by itself
     asked               at, direction and assembly as they were asked for
@@ -67,6 +67,11 @@ class Facts:
         chart = self.base.chart
         assert chart is not None
         return chart
+
+    @property
+    def operator(self) -> str | None:
+        """Who holds the handle; None where nobody does, or a model that holds the link side fixed."""
+        return None if self.model == "motor-mass" else self.device.operator_name
 
     @property
     def renders(self) -> bool:
@@ -119,7 +124,7 @@ def gather(
         model=model or "full",
         variants=tuple(variants),
         effective=effective,
-        natural=natural_frequencies(loop.plant),
+        natural=natural_frequencies(device.plant(at, direction, assembly, model, held=False)),
         bounds=tuple(compare(loop)),
         runs_away=hidden_instability(loop),
         asked={"at": at, "direction": direction, "assembly": assembly},

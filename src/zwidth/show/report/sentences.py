@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from zwidth.loop.controller import Controller, FirstOrder
+from zwidth.loop.controller import Butterworth, Controller, FirstOrder
+from zwidth.loop.estimators import METHODS, BackwardDifference
 from zwidth.model.mechanism import Floats
 from zwidth.show.figures.decay import tenfold_time
 from zwidth.show.motions import counted
@@ -230,14 +231,15 @@ def conditions(facts: Facts) -> str:
 
 
 def setting(facts: Facts) -> str:
-    """Assembly and model, and how the loop is sampled, delayed and filtered."""
+    """Assembly and model, who holds it, and how the loop is sampled, delayed and filtered."""
     model = f"{facts.model.capitalize()} model" if facts.model != "full" else "Plant as given"
     if facts.posture is not None:
         model = f"Assembly {facts.posture.assembly}, {facts.model} model"
     controller = facts.loop.controller
     late = f"a delay of {delay_name(controller)}" if controller.delay else "no delay"
     period = given(controller.sampling_period, "s")
-    return f"{model}; sampled every {period}, {late}, {filter_name(controller)}."
+    held = "" if facts.operator is None else f", held by {facts.operator}"
+    return f"{model}{held}; sampled every {period}, {late}, {computing_name(controller)}."
 
 
 def delay_name(controller: Controller) -> str:
@@ -246,15 +248,27 @@ def delay_name(controller: Controller) -> str:
     return f"{count} ({given(controller.delay * controller.sampling_period, 's')})"
 
 
-def filter_name(controller: Controller) -> str:
-    """What the velocity passes through."""
-    low_pass = controller.velocity_filter
-    if low_pass is None:
-        return "velocity not filtered"
+def computing_name(controller: Controller) -> str:
+    """How the velocity is estimated, and what velocity and force pass through."""
+    plain = isinstance(controller.velocity, BackwardDifference)
+    method = next(name for name, kind in METHODS.items() if isinstance(controller.velocity, kind))
+    estimate = "velocity" if plain else f"velocity by {method}"
+    if controller.velocity_filter is not None:
+        estimate += f" through {filter_name(controller.velocity_filter)}"
+    parts = [f"{estimate} not filtered" if estimate == "velocity" else estimate]
+    if controller.force_filter is not None:
+        parts.append(f"force through {filter_name(controller.force_filter)}")
+    if controller.actuator_time_constant:
+        parts.append(f"force lagging by {given(controller.actuator_time_constant, 's')}")
+    return ", ".join(parts)
+
+
+def filter_name(low_pass: FirstOrder | Butterworth) -> str:
+    """a first-order filter of 2 ms"""
     if isinstance(low_pass, FirstOrder):
-        return f"velocity through a first-order filter of {given(low_pass.time_constant, 's')}"
+        return f"a first-order filter of {given(low_pass.time_constant, 's')}"
     return (
-        f"velocity through a Butterworth filter of order {low_pass.order} at "
+        f"a Butterworth filter of order {low_pass.order} at "
         f"{given(low_pass.cutoff_Hz, 'Hz')} ({low_pass.discretisation})"
     )
 
