@@ -28,6 +28,7 @@ def test_the_commands_are_those_promised():
         "report",
         "sensitivity",
         "felt",
+        "guarantees",
         "bounds",
     }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from tests.systems import mass
 from zwidth.guarantees.nested import nested
 from zwidth.loop.controller import Controller
@@ -23,5 +25,5 @@ def test_hatches_and_shades_tell_the_sets_apart_in_grey():
         return sum(int(colour[i : i + 2], 16) for i in (1, 3, 5))
 
     shades = [lightness(fill) for fill, _, _ in AREAS.values()]
-    assert all(a - b > 40 for a, b in zip(shades, shades[1:], strict=False))
+    assert all(a - b > 40 for a, b in pairwise(shades))
     assert len({hatch for _, hatch, _ in AREAS.values()}) == len(AREAS)

@@ -116,14 +116,14 @@ def followed_disks(loop: Loop, held: Port, angles: Floats) -> Disks:
 
 def _one_less_z_inverse(theta: Floats) -> Complexes:
     """1 - e^(-i theta) without cancellation."""
-    return 2j * np.sin(theta / 2.0) * np.exp(-0.5j * theta)
+    return np.asarray(2j * np.sin(theta / 2.0) * np.exp(-0.5j * theta), dtype=complex)
 
 
 def force_filter_response(loop: Loop, theta: Floats) -> Complexes:
     """The discrete filter of the whole force."""
     top, bottom = low_pass_factors(loop.controller.force_filter, loop.period)
     d = np.exp(1j * theta) * _one_less_z_inverse(theta)
-    return np.asarray(product(np.array(top).reshape(-1, 3), np.array(bottom).reshape(-1, 3), d))
+    return np.asarray(product(np.array(top).reshape(-1, 3), np.array(bottom).reshape(-1, 3), d), dtype=complex)
 
 
 def _terms(loop: Loop, held: Port, cycles: Floats) -> tuple[Complexes, Floats]:
@@ -195,7 +195,7 @@ def _sums_beyond(expansion: Expansion, x: Floats, shift: float) -> tuple[Complex
 def _powers_beyond(order: int, start: Floats, shift: float, far: int) -> Complexes:
     """Sum over k >= 0 of e^(-2 pi i shift (start + k)) (start + k)^-order: Lerch's integral by Laguerre's rule."""
     if shift == 0.0:
-        return np.asarray(zeta(order, start) + 0j)
+        return np.asarray(zeta(order, start) + 0j, dtype=complex)
     turn = np.exp(-2j * np.pi * shift)
     # terms one by one until the integrand is smooth on the scale of its weight
     count = ceil(min(max(30.0 / abs(1.0 - turn) - far, 0.0), 2e5))
