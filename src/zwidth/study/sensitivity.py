@@ -88,8 +88,8 @@ class Sensitivities:
     numbers   largest |logarithmic| first, then those without a logarithm
     groups    largest first
     left_out  path -> why the number is none of the device
-    rival     largest stiffness of another, separate extreme point of the edge [N/m]; nan if there is none. As
-              soon as a change lifts it above the stiffest wall, it takes over.
+    rival     largest stiffness of another, separate extreme point of the edge [N/m]; nan if there is none. It
+              takes over as soon as a change makes it the stiffer one.
     """
 
     peak: Peak | None

@@ -136,7 +136,7 @@ def _remarks(found: Sensitivities, more: int) -> Iterator[str]:
     if late is not None and late.derivative == late.derivative:
         yield f"a delay of 0.01 samples gives {amount(0.01 * late.derivative, 'N/m', 3)}"
     if found.tie:
-        yield "two walls are stiffest at once: each of these holds for changes that this one does not gain by"
+        yield "two walls are stiffest at once: these numbers are of one of them, and a change may lower the other"
     elif found.peak is not None and found.rival > 0.9 * found.peak.stiffness:
         yield f"another summit stands at {amount(found.rival, 'N/m')}: it takes over once this one falls below it"
     if more > 0:

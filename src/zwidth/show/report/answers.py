@@ -35,13 +35,16 @@ def _way(value: float) -> str:
 
 
 def summit(facts: Facts) -> str:
-    """What ends such an improvement: another summit of the edge; "" where there is none nearby."""
+    """Which other wall takes over when the stiffest gives way; "" where there is none nearby."""
     found = facts.answers
     if found.tie:
         return "Two walls are stiffest at once; this is said of one of them, and a change may lower the other."
     if not found.rival > NEAR * facts.base.stiffness_max:
         return ""
-    return f"Another summit of the edge stands at {at_most(found.rival, 'N/m')}: no small change loses more."
+    return (
+        f"Another summit of the edge stands at {at_most(found.rival, 'N/m')}: it takes over where a change lowers "
+        "the stiffest wall below it."
+    )
 
 
 def felt(facts: Facts) -> str:
