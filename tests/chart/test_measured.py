@@ -117,6 +117,19 @@ def test_lines_of_real_roots_edge_the_set():
     assert_allclose(sorted(line.damping), [np.min(ends), np.max(ends)], rtol=1e-5)
 
 
+def test_a_force_that_changes_sign_at_every_sample_edges_the_set_of_a_heavily_damped_device():
+    """With x = b T/m = 8 and B = 0 the root z = -1 binds, K = (2 b/T) / (1 - tanh(x/2) / (x/2))."""
+    loop = Loop(systems.mass(0.02, 80.0), Controller(0.002))
+    chart, exact = own(loop), stability_chart(loop, decay=False)
+    (line,) = [arc for arc in chart.boundary if arc.frequency[0] == 250.0]
+    ends = [arc.damping[k] for k in (0, -1) for arc in exact.boundary if arc.frequency[0] > 249.0]
+    assert_allclose(sorted(line.damping), [np.min(ends), np.max(ends)], rtol=1e-4)
+    stiffest = 2.0 * 80.0 / 0.002 / (1.0 - np.tanh(4.0) / 4.0)
+    assert chart.check(stiffest * np.array([0.999, 1.001]), 0.0).names == ["stable", "unstable"]
+    assert chart.check(1.01 * stiffest, 0.0).outside == 1
+    assert chart.stiffness_max == pytest.approx(exact.stiffness_max, rel=1e-6)
+
+
 def test_software_delay_and_a_filter_of_the_force_are_added_to_what_was_measured():
     loop = systems.published()
     response, _ = measured(loop)

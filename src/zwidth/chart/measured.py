@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.band import Band, uncertainty
 from zwidth.chart.chart import _cut
-from zwidth.chart.measured_cells import CHORD, Cells, cells_within, edges_stable_set, window
+from zwidth.chart.measured_cells import Cells, cells_within, edges_stable_set, window
 from zwidth.chart.measured_curve import Boundary, Box, boundary, coarse, real_root
 from zwidth.chart.measured_loop import MeasuredLoop
 from zwidth.chart.measured_verdict import MeasuredVerdicts, NearestEdge, judge_measured
@@ -23,7 +23,7 @@ from zwidth.model.response import Response, ResponseError
 
 Floats = NDArray[np.float64]
 
-BEGINNING = 1e-6  # of a chord: near enough to the measured point at its beginning
+ON_IT = 1e-9  # of the window, from a cell's edge: a measured point that is a corner of its polygon
 ZOOMED = 2e-8  # of the stiffest wall: chords in the window round it
 FEWEST_ON_EDGE = 3  # measured frequencies, without which the edge is guesswork
 
@@ -158,16 +158,21 @@ def _credible(loop: MeasuredLoop, cells: Cells) -> Cells:
     """The cells that are not made by noise: loops of the curve between a few points, or all in doubt."""
     K0, K1, B0, B1 = cells.box
     scale = np.array([K1 - K0, B1 - B0])
-    K, B, _ = loop.walls(loop.inner)
-    points = shapely.points(np.column_stack([K, B]) / scale)
     kept = []
     for cell in cells.polygons:
         unit = shapely.transform(cell, lambda xy: xy / scale)
-        on_it = np.count_nonzero(shapely.distance(unit.boundary, points) < 10.0 * CHORD)
+        on_it = np.count_nonzero(_away(loop, cell, scale) < ON_IT)
         deepest = shapely.get_coordinates(shapely.maximum_inscribed_circle(unit))[0] * scale
         doubtful = judge_measured(loop, cells.edge, *deepest).verdict == UNDECIDED
         kept.append(on_it >= FEWEST_ON_EDGE and not doubtful)
     return cells.only(np.array(kept, dtype=bool))
+
+
+def _away(loop: MeasuredLoop, cell: shapely.Polygon, scale: Floats) -> Floats:
+    """Distance (n,) of the measured points below pi from a cell's edge, in units of `scale`."""
+    K, B, _ = loop.walls(loop.inner)
+    outline = shapely.transform(cell.boundary, lambda xy: xy / scale)
+    return np.asarray(shapely.distance(outline, shapely.points(np.column_stack([K, B]) / scale)))
 
 
 def _cells(loop: MeasuredLoop) -> tuple[Cells | None, bool]:
@@ -324,15 +329,10 @@ def _largest_damping(loop: MeasuredLoop, cells: Cells) -> float:
 
 def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
     """Runs of measured points on the stable set's edge, then its pieces of the lines of real roots."""
-    edge, half = cells.edge, 0.5 / loop.period
+    half = 0.5 / loop.period
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
-    first = np.full(len(edge.angles), -1)
-    first[edge.at[edge.at >= 0]] = np.flatnonzero(edge.at >= 0)
     measured = loop.inner
-    at = np.searchsorted(edge.angles, measured)
-    known = first[at] >= 0
-    on = np.zeros(len(at), dtype=bool)
-    on[known] = edges_stable_set(edge, first[at[known]], scale, BEGINNING)
+    on = np.any([_away(loop, cell, scale) < ON_IT for cell in cells.polygons], axis=0)
     numbers = np.flatnonzero(on)
     for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else []:
         theta, given = measured[run], loop.response.frequency[loop.good][run]

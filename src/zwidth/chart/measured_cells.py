@@ -86,19 +86,17 @@ def _chords(edge: Boundary, low: Floats, scale: Floats) -> list[shapely.Geometry
     return [line for line in clipped if not line.is_empty]
 
 
-def edges_stable_set(edge: Boundary, which: Whole, scale: Floats, share: float = 0.5) -> Flags:
+def edges_stable_set(edge: Boundary, which: Whole, scale: Floats) -> Flags:
     """Whether the chords `which` (indices into the segments, of the curve) have stable walls on their inner side.
 
     scale  (2,) what counts as one unit of K and of B
-    share  of each chord at which its side is asked
     """
     segments = edge.segments[which] / np.concatenate([scale, scale])
     along = segments[:, 2:] - segments[:, :2]
     length = np.maximum(np.hypot(*along.T), 1e-300)
     left = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
     aside = BESIDE * np.minimum(length, 1.0) * np.where(edge.jumps[which] < 0, 1.0, -1.0)
-    aside *= 2.0 * share
-    middle = segments[:, :2] + share * along
+    middle = 0.5 * (segments[:, :2] + segments[:, 2:])
     return np.asarray(edge.outside((middle + aside[:, None] * left) * scale) == 0)
 
 
@@ -115,23 +113,23 @@ def window(loop: MeasuredLoop, edge: Boundary) -> Box | None:
     if not len(flagged):
         return None
     walls = edge.segments[flagged].reshape(-1, 2)
-    size = np.ptp(walls, axis=0)
-    crossing = _lines_cross(loop)
-    if crossing is not None:
-        beside = crossing + 1e-3 * size * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
-        if np.any(edge.outside(beside) == 0):
-            walls = np.vstack([walls, crossing])
+    sectors = _lines_cross(loop, 1e-3 * float(np.ptp(walls[:, 1])))
+    if len(sectors) and np.any(edge.outside(sectors) == 0):
+        walls = np.vstack([walls, np.mean(sectors, axis=0)])
     low, high = walls.min(axis=0), walls.max(axis=0)
     (K0, B0), (K1, B1) = low - 0.1 * (high - low), high + 0.1 * (high - low)
     return float(K0), float(K1), float(B0), float(B1)
 
 
-def _lines_cross(loop: MeasuredLoop) -> Floats | None:
-    """The wall with real roots at both z = 1 and z = -1; None if there is none."""
-    if not loop.between.closed:
-        return None
+def _lines_cross(loop: MeasuredLoop, beside: float) -> Floats:
+    """Four walls (4, 2), one in each sector that the lines of real roots cut round their crossing; or (0, 2).
+
+    beside  their distance from it, in damping
+    """
     (h0, w0), (h1, w1) = real_root(loop, -1), real_root(loop, -2)
-    if abs(w1 - w0) * loop.period < 1e-9 or not np.isfinite(h1):
-        return None
+    if not loop.between.closed or not np.isfinite(h1) or abs(w1 - w0) * loop.period < 1e-9:
+        return np.empty((0, 2))
     B = (h1 - h0) / (w1 - w0)
-    return np.array([h0 - B * w0, B])
+    along = beside * np.array([[-w0, 1.0], [-w1, 1.0]])
+    signs = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
+    return np.asarray(np.array([h0 - B * w0, B]) + signs @ along)
