@@ -31,11 +31,9 @@ def test_a_paddle_has_its_guarantees_and_couplings(tmp_path):
     assert path.stat().st_size > 1000
 
 
-def test_a_device_without_any_guarantee_says_so():
-    ran = zwidth(
-        "guarantees", ONE_MASS, "--set", "plant.damping_Ns_per_m=0", "--set", "loop.delay_samples=20", "--json"
-    )
-    assert ran.code in (0, 1)
+def test_a_device_that_dissipates_nothing_has_only_its_chart():
+    ran = zwidth("guarantees", ONE_MASS, "--set", "plant.damping_Ns_per_m=0", "--json")
+    assert ran.code == 0  # some wall is stable with a free hand
     passive = ran.document["guarantees"][0]
     assert passive["stiffness_max_N_per_m"] is None
     assert "no wall" in passive["reason"]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.region import ChartError
 from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import Floats
 from zwidth.guarantees.region import Region, empty, stiffest_corner
@@ -84,7 +85,7 @@ def nested(loop: Loop, robust: Sequence[Floats] | None = None) -> Guarantees:
         Guarantee(
             "spring-stable",
             "stable whatever spring holds the handle, from none to one that holds it fixed",
-            spring_stable_region(loop) if held else empty(NO_HANDLE),
+            _decided(spring_stable_region, loop) if held else empty(NO_HANDLE),
             SPRINGS,
         )
     )
@@ -92,7 +93,7 @@ def nested(loop: Loop, robust: Sequence[Floats] | None = None) -> Guarantees:
         Guarantee(
             "nyquist-spring",
             "stable with the one spring that puts a mode at the Nyquist frequency",
-            nyquist_region(loop) if held else empty(NO_HANDLE),
+            _decided(nyquist_region, loop) if held else empty(NO_HANDLE),
             SPRINGS,
         )
     )
@@ -105,6 +106,14 @@ def nested(loop: Loop, robust: Sequence[Floats] | None = None) -> Guarantees:
     stable = Region(chart.regions, peak, chart.damping_at_stiffness_max, None if np.isfinite(peak) else NO_STABLE)
     found.append(Guarantee("stable", "stable with the device as described", stable, EXACT))
     return Guarantees(loop, tuple(found), chart)
+
+
+def _decided(found: Callable[[Loop], Region], loop: Loop) -> Region:
+    """A region made of charts; empty, and undecided, where one of them cannot be closed."""
+    try:
+        return found(loop)
+    except ChartError as error:
+        return empty(f"this is undecided: {error}")
 
 
 def region_of(rings: Sequence[Floats]) -> Region:
