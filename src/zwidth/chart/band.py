@@ -63,8 +63,8 @@ def uncertainty(loop: MeasuredLoop, cells: Cells) -> Band | None:
 def _covered(loop: MeasuredLoop, cells: Cells, scale: Floats) -> shapely.Geometry:
     """The ellipses along the stable set's edge, in units of `scale`.
 
-    Where two arcs meet, each goes on beyond the corner as far as the other leaves it in doubt: there the edge would
-    run if both were as far out as they can be.
+    Where two arcs meet, each goes on beyond the corner as far as the other leaves it in doubt: there the edge
+    would run if both were as far out as they can be.
     """
     edge = cells.edge
     curve = np.flatnonzero(edge.at >= 0)
