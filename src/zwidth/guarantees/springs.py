@@ -73,7 +73,9 @@ def spring_stable_region(loop: Loop) -> Region:
             chart = _stable_set(loop, k)
             if chart is not None:
                 shape = chart if shape is None else shape.intersection(chart)
-        if shape is None or not rings_of(shape):
+            if shape is not None and not rings_of(shape):
+                return empty(NOTHING)
+        if shape is None:
             return empty(NOTHING)
         new = _worst(loop, rings_of(shape), tried)
         if not len(new):
