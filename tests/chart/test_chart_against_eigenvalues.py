@@ -132,3 +132,11 @@ def test_single_modes_up_to_several_times_the_sampling_rate():
         k = m * (swing / T) ** 2
         loop = Loop(mass(m, 2.0 * zeta * np.sqrt(k * m), k), Controller(T, delay))
         assert disagreements(rng, loop) == 0
+
+
+def test_an_outline_that_crosses_itself_within_rounding_is_still_a_cell():
+    loop = random_loop(np.random.default_rng(250))
+    chart = stability_chart(loop, decay=False)
+    assert shapely.unary_union([shapely.Polygon(ring) for ring in chart.regions]).area == pytest.approx(
+        252.55, abs=0.01
+    )

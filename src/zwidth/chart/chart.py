@@ -183,7 +183,7 @@ def _cells(outlines: list[Floats]) -> tuple[Floats, ...]:
             cells.append(outline)
             continue
         # Rounding can cross two chords in a corner of many branches: loops of no area, which are dropped
-        parts = shapely.get_parts(shapely.make_valid(cell))
+        parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(cell)))  # a collection may hold collections
         real = [part for part in parts if isinstance(part, shapely.Polygon) and part.area > 1e-12 * cell.area]
         cells += [np.array(orient(piece).exterior.coords) for part in real for piece in _cut(part)]
     return tuple(cells)

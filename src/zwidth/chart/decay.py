@@ -194,5 +194,5 @@ def _search(tracer: Tracer, outline: Floats, best: FastestDecay | None) -> Faste
 
 def _edge_walls(tracer: Tracer) -> Floats:
     """Walls (k, 2) on whatever edge the curve has on the tracer's circle."""
-    K, B, edge = tracer.trace(angles(tracer.features(), tracer.radius, 0.2))
+    K, B, edge = tracer.trace(angles(tracer.features(), tracer.radius, 0.2, tracer.longest_step))
     return np.column_stack([K[edge], B[edge]])

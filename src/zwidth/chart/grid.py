@@ -94,8 +94,8 @@ def _roots(ascending: Floats) -> Complexes:
 
 
 @compiled
-def angles(points: Complexes, radius: float, share: float) -> Floats:
-    """Angles in (0, pi) whose steps are `share` of the distance to the nearest of the points."""
+def angles(points: Complexes, radius: float, share: float, longest: float) -> Floats:
+    """Angles in (0, pi) whose steps are `share` of the distance to the nearest point, and at most `longest`."""
     first, last = 1.0, 1.0
     floors = np.empty(len(points))
     for k in range(len(points)):
@@ -120,7 +120,7 @@ def angles(points: Complexes, radius: float, share: float) -> Floats:
         near = min(theta, np.pi - theta)
         for k in range(len(points)):
             near = min(near, max(abs(z - points[k]), floors[k]))
-        theta += min(share * max(near, 1e-11), LONGEST_STEP)
+        theta += min(share * max(near, 1e-11), longest)
     return out[:n].copy()
 
 

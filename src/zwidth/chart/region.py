@@ -42,7 +42,7 @@ def closed_rings(tracer: Tracer, seen: Floats | None = None) -> tuple[Rings, flo
     points = tracer.features()
     extra = np.empty(0) if seen is None else seen
     for share in (0.2, 0.1, 0.05, 0.02):
-        thetas = angles(points, tracer.radius, share)
+        thetas = angles(points, tracer.radius, share, tracer.longest_step)
         thetas = np.unique(
             np.concatenate([thetas, around_crossings(tracer.factors, tracer.radius, thetas), extra])
         )

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.curve import trace, wall_at
-from zwidth.chart.grid import singular_points
+from zwidth.chart.curve import trace, wall_at, walls
+from zwidth.chart.grid import LONGEST_STEP, angles, singular_points
 from zwidth.chart.hurwitz import edges_on_line, is_stable, working_room
+from zwidth.chart.nyquist import phase_flags, terms_along
 from zwidth.loop.evaluate import Factors, characteristic, factor_arrays, velocity_response
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
 # A root this near the circle is on neither side of it.
 UNDECIDED = 1e-9
+# Degree from which coefficients have too few digits left, and the phase along the circle is followed instead.
+LONG = 24
 Wall = tuple[float, float]
 RealRoot = Literal["plus", "minus"]
 ROOTS: tuple[RealRoot, RealRoot] = ("plus", "minus")
@@ -64,26 +68,58 @@ class Tracer:
     def trace(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """K, B and stable-edge flag at ascending angles in (0, pi).
 
-        What polynomials leave open, eigenvalues are asked; what they leave open too (several roots on the circle
-        within 1e-9) is taken as at the nearest decided sample before, or after if there is none.
+        What polynomials leave open, eigenvalues are asked; what they, or in a long loop the phase along the
+        circle, leave open (several roots on the circle within rounding) is taken as at the nearest decided sample
+        before, or after if there is none.
         """
-        K, B, flags = trace(self.factors, self.polynomials, self.radius, thetas)
+        K, B, flags = self._flagged(thetas)
         unsure = np.flatnonzero(flags == 0)
         if len(unsure):
-            flags[unsure] = self._edge_by_eigenvalues(thetas[unsure], K[unsure], B[unsure])
+            if not self.long:
+                flags[unsure] = self._edge_by_eigenvalues(thetas[unsure], K[unsure], B[unsure])
             sure = np.flatnonzero(flags)
             if len(sure):
                 flags = flags[sure[np.maximum(np.searchsorted(sure, np.arange(len(flags)), "right") - 1, 0)]]
         return K, B, flags > 0
 
+    def _flagged(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.int64]]:
+        """K, B and flag 1, -1, or 0 where eigenvalues must be asked."""
+        if not self.long:
+            return trace(self.factors, self.polynomials, self.radius, thetas)
+        K, B = walls(self.factors, self.radius, thetas)
+        return K, B, self._by_phase(np.column_stack([K, B]), thetas, 0)
+
+    @property
+    def long(self) -> bool:
+        """Whether the loop's degree is too high for polynomials."""
+        return self.degree > LONG
+
+    @cached_property
+    def _circle(self) -> tuple[Floats, NDArray[np.complex128]]:
+        """Samples of the circle, and the loop's terms along them."""
+        thetas = angles(self.features(), self.radius, 0.2, self.longest_step)
+        # soft walls have roots as near to z = 1 as one likes
+        closer = np.logspace(-8.0, -1.0, 8)
+        thetas = np.concatenate([closer * thetas[0], thetas, np.pi - closer[::-1] * (np.pi - thetas[-1])])
+        return thetas, terms_along(self.factors, self.radius, thetas)
+
+    def _by_phase(self, points: Floats, pairs: Floats, real: int) -> NDArray[np.int64]:
+        return phase_flags(self.factors, self.radius, *self._circle, self.degree, points, pairs, real)
+
+    @property
+    def longest_step(self) -> float:
+        """Between samples of the circle: what is late by n samples turns n times as fast as z."""
+        late = self.factors.whole + len(self.factors.window)
+        return min(LONGEST_STEP, 0.5 / late)
+
     def certain(self, theta: float) -> bool:
         """Whether polynomials alone can tell if the wall at one angle edges the stable set."""
-        return bool(trace(self.factors, self.polynomials, self.radius, np.array([theta]))[2][0])
+        return not self.long and bool(self._flagged(np.array([theta]))[2][0])
 
     def edge_flag(self, theta: float) -> int:
         """Whether the wall at one angle edges the stable set: 1, -1, or 0 where nothing can tell."""
         one = np.array([theta])
-        K, B, flags = trace(self.factors, self.polynomials, self.radius, one)
+        K, B, flags = self._flagged(one)
         return int(flags[0] or self._edge_by_eigenvalues(one, K, B)[0])
 
     def _edge_by_eigenvalues(self, thetas: Floats, K: Floats, B: Floats) -> NDArray[np.int64]:
@@ -102,7 +138,10 @@ class Tracer:
 
     def stable(self, K: float, B: float) -> bool:
         """Whether all roots of a wall lie inside the circle; False too where rounding hides it."""
-        flag = is_stable(self.polynomials, K, B, working_room(self.degree))
+        if self.long:
+            flag = int(self._by_phase(np.array([[K, B]]), np.zeros(1), 0)[0])
+        else:
+            flag = is_stable(self.polynomials, K, B, working_room(self.degree))
         if flag == 0:
             return bool(np.abs(np.linalg.eigvals(self.loop.transition_matrix(K, B))).max() < self.radius)
         return bool(flag > 0)
@@ -125,7 +164,10 @@ class Tracer:
 
     def edge_on_line(self, root: RealRoot, K: float, B: float) -> bool:
         """Whether a wall on that line has all its other roots inside."""
-        flag = edges_on_line(self.polynomials, int(root == "plus"), K, B, working_room(self.degree))
+        if self.long:
+            flag = int(self._by_phase(np.array([[K, B]]), np.zeros(1), 1)[0])
+        else:
+            flag = edges_on_line(self.polynomials, int(root == "plus"), K, B, working_room(self.degree))
         if flag == 0:
             z = np.linalg.eigvals(self.loop.transition_matrix(K, B))
             own = np.argmin(np.abs(z - (self.radius if root == "plus" else -self.radius)))

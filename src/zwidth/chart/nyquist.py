@@ -1,0 +1,174 @@
+"""Roots counted by the phase of the characteristic function along the circle.
+
+    p(z) = A (1 + P (K + B w)),      A = the product of all denominators
+
+is a real polynomial of degree N. From theta = 0 to pi on |z| = rho its phase turns by pi for each root inside and
+by nothing for each outside. Evaluated from factors it keeps its digits where its coefficients have lost theirs:
+long delays and windows give it a degree of a hundred. The phase is followed from sample to sample; where it turns
+too far for the step to be sure, the step is halved.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.curve import on_circle
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.loop.evaluate import Factors, plant_response, velocity_response
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+FAR = 2.0  # a turn of phase beyond which a step is halved
+HALVINGS = 60
+BESIDE = 1e-7  # samples this near to a root on the circle tell nothing of the others
+CLEAR = 0.2  # how far from a whole number of half turns the phase may end
+
+
+@compiled_lean
+def terms_at(factors: Factors, radius: float, theta: float) -> tuple[complex, complex, complex]:
+    """A, A P and A P w at one angle in (0, pi), scaled alike so that the largest is of size 1."""
+    z, d = on_circle(theta, radius)
+    P, _ = plant_response(factors, z, d)
+    aside = 4e-16
+    while not np.isfinite(P.real + P.imag) and aside < 1e-12:  # on an undamped pole: step aside by a rounding
+        z, d = on_circle(theta * (1.0 + aside), radius)
+        P, _ = plant_response(factors, z, d)
+        aside *= 10.0
+    w, _ = velocity_response(factors, z, d)
+    A = 1.0 + 0.0j
+    for k in range(factors.rows.shape[0]):
+        A *= (d + factors.rows[k, 0]) * d + factors.rows[k, 1]
+        A /= abs(A)
+    for k in range(factors.shared_bottom.shape[0]):
+        A *= (factors.shared_bottom[k, 0] * d + factors.shared_bottom[k, 1]) * d + factors.shared_bottom[k, 2]
+        A /= abs(A)
+    for k in range(factors.bottom.shape[0]):
+        A *= (factors.bottom[k, 0] * d + factors.bottom[k, 1]) * d + factors.bottom[k, 2]
+        A /= abs(A)
+    late = factors.whole + factors.split + factors.window.shape[0] - 1
+    A *= complex(np.cos(late * theta), np.sin(late * theta))
+    scale = 1.0 / max(1.0, abs(P), abs(P * w))
+    return A * scale, A * P * scale, A * P * w * scale
+
+
+@compiled
+def terms_along(factors: Factors, radius: float, thetas: Floats) -> Complexes:
+    """(n, 3): A, A P, A P w at angles in (0, pi)."""
+    out = np.empty((len(thetas), 3), dtype=np.complex128)
+    for i in range(len(thetas)):
+        out[i, 0], out[i, 1], out[i, 2] = terms_at(factors, radius, thetas[i])
+    return out
+
+
+@compiled_lean
+def _turn(before: complex, after: complex) -> float:
+    """Change of phase from one value to the next, within half a turn."""
+    ratio = after * before.conjugate()
+    turn: float = np.arctan2(ratio.imag, ratio.real)
+    return turn
+
+
+@compiled_lean
+def _side(theta: float, pair: float) -> float:
+    """Sign of cos theta - cos pair where there is a pair."""
+    return -1.0 if 0.0 < pair < theta else 1.0
+
+
+@compiled_lean
+def _halved(
+    factors: Factors,
+    radius: float,
+    wall: tuple[float, float, float],
+    low: float,
+    high: float,
+    start: complex,
+    end: complex,
+) -> float:
+    """Change of phase over a step, in as many pieces as it takes; nan where rounding is all that is left."""
+    K, B, pair = wall
+    total, position, value, length, pieces = 0.0, low, start, 0.5 * (high - low), 0
+    while position < high:
+        pieces += 1
+        step = min(length, high - position)
+        if pieces > 64 * HALVINGS or length < 1e-15:
+            return np.nan
+        after = end
+        if position + step < high:
+            a, s, v = terms_at(factors, radius, position + step)
+            after = (a + K * s + B * v) * _side(position + step, pair)
+        turn = _turn(value, after)
+        if abs(turn) > FAR / 2.0:
+            length = 0.5 * step
+            continue
+        total += turn
+        position += step
+        value = after
+        length = 2.0 * step
+    return total
+
+
+@compiled_lean
+def roots_inside(
+    factors: Factors, radius: float, thetas: Floats, terms: Complexes, wall: tuple[float, float, float], real: int
+) -> int:
+    """Roots of a wall inside the circle, by the phase along samples; -1 where rounding hides the number.
+
+    wall  K, B, and the angle of a pair of roots that it has on the circle, which is divided out; 0: none
+    real  number of real roots that it has on the circle, divided out too
+    """
+    K, B, pair = wall
+    total, first, at = 0.0, -1, -1
+    before = 0.0 + 0.0j
+    for i in range(len(thetas)):
+        if abs(thetas[i] - pair) <= BESIDE * pair:
+            continue
+        # the pair (z - z0)(z - conj z0) = 2 z (cos theta - cos theta0) changes sign at theta0 and turns as z does
+        after = (terms[i, 0] + K * terms[i, 1] + B * terms[i, 2]) * _side(thetas[i], pair)
+        if first < 0:
+            first = i
+        else:
+            turn = _turn(before, after)
+            if abs(turn) > FAR / 2.0:
+                turn = _halved(factors, radius, wall, thetas[at], thetas[i], before, after)
+            total += turn
+        before, at = after, i
+    # the pair turns as z does, z - rho and z + rho half as fast
+    total -= ((1.0 if pair > 0.0 else 0.0) + 0.5 * real) * (thetas[at] - thetas[first])
+    half_turns = total / np.pi
+    whole = np.rint(half_turns)
+    if not abs(half_turns - whole) < CLEAR:
+        return -1
+    return int(whole)
+
+
+@compiled
+def phase_flags(
+    factors: Factors,
+    radius: float,
+    thetas: Floats,
+    terms: Complexes,
+    degree: int,
+    walls: Floats,
+    pairs: Floats,
+    real: int,
+) -> NDArray[np.int64]:
+    """Whether walls (n, 2) have all roots inside but those divided out: 1, -1, or 0 where rounding hides it.
+
+    thetas, terms  samples of the circle, and `terms_along` them
+    degree         N
+    pairs          (n,) angle of the pair that each wall has on the circle; 0: none
+    real           number of real roots that each has there
+    """
+    out = np.full(len(walls), -1, dtype=np.int64)
+    for k in range(len(walls)):
+        K, B = walls[k]
+        if np.isfinite(K) and np.isfinite(B):
+            inside = roots_inside(factors, radius, thetas, terms, (K, B, pairs[k]), real)
+            left = degree - real - (2 if pairs[k] > 0.0 else 0)
+            if inside < 0 or inside > left:
+                out[k] = 0
+            elif inside == left:
+                out[k] = 1
+    return out

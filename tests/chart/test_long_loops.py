@@ -1,0 +1,80 @@
+"""Long delays and long windows: loops of high degree, judged by eigenvalues."""
+
+import numpy as np
+import pytest
+
+from tests.chart.test_chart_against_eigenvalues import DAMPED, disagreements
+from tests.systems import published, random_plant
+from zwidth.chart.chart import stability_chart
+from zwidth.chart.nyquist import phase_flags, terms_along
+from zwidth.chart.region import ChartError
+from zwidth.chart.tracer import LONG, Tracer
+from zwidth.loop.controller import Controller
+from zwidth.loop.estimators import LeastSquaresSlope, SavitzkyGolay, WindowedDifference
+from zwidth.loop.loop import Loop
+
+
+def long_loop(rng, longest):
+    """A delay or a window of 15 samples and more."""
+    rate = 10.0 ** rng.uniform(2.3, 4.3)
+    n = int(rng.integers(15, longest))
+    methods = (WindowedDifference(n), LeastSquaresSlope(n), SavitzkyGolay(n, 2))
+    controller = Controller(1.0 / rate, n + float(rng.choice([0.0, 0.3])))
+    if rng.random() < 0.6:
+        controller = Controller(1.0 / rate, 0.0, velocity=methods[int(rng.integers(3))])
+    return Loop(random_plant(rng, rate, DAMPED), controller)
+
+
+def test_charts_of_long_loops_agree_with_eigenvalues():
+    rng = np.random.default_rng(30)
+    for _ in range(15):
+        assert disagreements(rng, long_loop(rng, 40), count=15) == 0
+
+
+@pytest.mark.slow
+def test_charts_of_hundreds_of_long_loops_agree_with_eigenvalues():
+    rng = np.random.default_rng(31)
+    given_up = 0
+    for _ in range(200):
+        loop = long_loop(rng, 60)
+        try:
+            assert disagreements(rng, loop, count=15) == 0
+        except ChartError:
+            given_up += 1
+    assert given_up <= 4
+
+
+def test_the_phase_along_the_circle_counts_what_polynomials_count():
+    rng = np.random.default_rng(32)
+    for _ in range(20):
+        rate = 10.0 ** rng.uniform(2.3, 4.3)
+        tracer = Tracer.of(
+            Loop(random_plant(rng, rate, DAMPED), Controller(1.0 / rate, float(rng.integers(0, 4))))
+        )
+        assert not tracer.long
+        thetas, terms = tracer._circle
+        K, B, edge = tracer.trace(thetas)
+        walls = np.column_stack([K, B])
+        flags = phase_flags(tracer.factors, 1.0, thetas, terms, tracer.degree, walls, thetas, 0)
+        sure = flags != 0
+        assert np.mean(sure) > 0.9
+        assert np.array_equal(flags[sure] > 0, edge[sure])
+
+
+def test_terms_along_the_circle_are_those_of_the_loop():
+    loop = published(delay=2.3)
+    tracer = Tracer.of(loop)
+    thetas = np.linspace(0.1, 3.0, 7)
+    A, S, V = terms_along(tracer.factors, 1.0, thetas).T
+    z = np.exp(1j * thetas)
+    assert pytest.approx(loop.plant_response(z), rel=1e-12) == S / A
+    assert pytest.approx(loop.velocity_response(z), rel=1e-12) == V / S
+
+
+def test_a_chart_of_a_hundred_samples_of_delay_is_that_of_its_roots():
+    loop = published(delay=100.0)
+    assert Tracer.of(loop).degree > LONG
+    chart = stability_chart(loop, decay=False)
+    K, B = chart.stiffness_max, chart.damping_at_stiffness_max
+    inside, outside = (np.abs(np.linalg.eigvals(loop.transition_matrix(s * K, B))).max() for s in (0.9999, 1.0001))
+    assert inside < 1.0 < outside
