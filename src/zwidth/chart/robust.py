@@ -158,14 +158,15 @@ def robust_of(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart
 
 
 def _passed_over(samples: Samples, members: list[Member], unit: float) -> bool:
-    """Whether a member cuts a piece of edge (at its quarters, 1e-9 of its length inside), by less than chords see."""
+    """Whether a member cuts a piece of edge, asked at its quarters 1e-9 of its length inside, by less than chords
+    see."""
     for _, K, B in (arc for ring in samples for arc in ring):
         walk = np.column_stack([K * unit, B])
         depth = 1e-9 * float(np.max(np.ptp(walk, axis=0)))
-        for k in {len(K) // 4, len(K) // 2, 3 * len(K) // 4}:
-            along = walk[min(k + 1, len(K) - 1)] - walk[max(k - 1, 0)]
-            start = walk[k] if len(K) > 2 else walk.mean(axis=0)
-            inside = start + depth * np.array([-along[1], along[0]]) / np.hypot(*along)
+        middles = walk if len(K) > 2 else np.vstack([walk[0], walk.mean(axis=0), walk[1]])
+        for k in {len(middles) // 4, len(middles) // 2, 3 * len(middles) // 4} - {0, len(middles) - 1}:
+            along, start = middles[k + 1] - middles[k - 1], middles[k]
+            inside = start + depth * np.array([-along[1], along[0]]) / max(np.hypot(*along), 1e-300)
             if any(member.verdict(inside[0] / unit, inside[1]) < 0 for member in members):
                 return True
     return False

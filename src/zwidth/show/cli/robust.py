@@ -1,0 +1,374 @@
+"""`zwidth robust`: the walls stable for every member of a family of devices."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from zwidth.show.cli.answer import Answer, deliver, sheet, table
+from zwidth.show.cli.computing import NoAnswer, computing
+from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.options import Question, about_a_device, as_json, example, named, output_option
+from zwidth.show.cli.place import heading
+from zwidth.show.motions import counted
+from zwidth.show.output import DATA, FIGURES, destination, replacing, shown, write_data
+from zwidth.show.units import amount
+
+if TYPE_CHECKING:
+    from zwidth.chart.robust import RobustChart
+    from zwidth.device.device import Device
+    from zwidth.study.robust import Progress, RobustStudy
+    from zwidth.study.robust_family import Range
+
+KEYS: Final = (
+    "regions",
+    "boundary",
+    "stiffness_max_N_per_m",
+    "damping_at_stiffness_max_Ns_per_m",
+    "frequency_at_stiffness_max_Hz",
+    "frequencies_at_stiffness_max_Hz",
+    "members_at_stiffness_max",
+    "damping_max_Ns_per_m",
+    "stable_area_N2s_per_m2",
+    "unobserved_modes",
+    "members",
+    "failed",
+    "binding",
+    "best_by_area",
+    "best_by_stiffness",
+    "lost_share",
+    "lost_stiffness_share",
+    "corner_blur",
+    "search",
+    "violation",
+    "excluding",
+)
+MOST: Final = 100_000  # members, or unseen ones
+TOLD: Final = 12  # binding members in what people read
+
+
+@click.command(
+    short_help="Find the walls that DEVICE renders stably whoever holds it.",
+    epilog=example(
+        "zwidth robust my-device.toml --range operator.arm_mass_kg=0.3,2 --range loop.delay_samples=0,1",
+        "zwidth robust my-device.toml --operators none,thesis-arm,my-hand.toml --output robust.svg",
+    ),
+)
+@about_a_device
+@click.option(
+    "--range",
+    "ranges",
+    metavar="PATH=LOW,HIGH[,log]",
+    multiple=True,
+    help="A number of the device file that is known within two values; repeatable. log: samples are spread evenly "
+    "over its logarithm.",
+)
+@click.option("--operators", metavar="A,B,C", callback=named, help="Who may hold the handle: names, files, none.")
+@click.option("--operator-list", metavar="FILE", callback=named, help="The same, one a line; # begins a comment.")
+@click.option("--members", type=click.IntRange(2, MOST), default=256, metavar="N", help="Charts (default 256).")
+@click.option(
+    "--unseen",
+    type=click.IntRange(1, MOST),
+    default=10_000,
+    metavar="N",
+    help="Random members that the answer is tried on afterwards (default 10000).",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=1, metavar="N", help="Of what is random (default 1).")
+@output_option("Write a figure (.png .svg .pdf) or the data (.csv: the edge, .json).")
+@as_json
+def robust(
+    question: Question,
+    ranges: tuple[str, ...],
+    operators: str | None,
+    operator_list: str | None,
+    members: int,
+    unseen: int,
+    seed: int,
+    output: str | None,
+    as_json: bool,
+) -> int:
+    """Find the walls that DEVICE renders stably for every operator of a list, and every value of numbers known in
+    ranges."""
+    from zwidth.study.robust import RobustError
+
+    path = None if output is None else destination(output, FIGURES + DATA)
+    held_by = _operators(question, operators, operator_list)
+    varied = _ranges(ranges)
+    if not varied and not held_by:
+        raise BadInput(f"{question.name}: nothing varies; give --range PATH=LOW,HIGH or --operators A,B,C")
+    device = question.device()
+    try:
+        with computing(question), _progress() as progress:
+            found = _computed(question, device, varied, held_by, (members, unseen, seed), progress)
+    except (NoAnswer, RobustError) as none:
+        unanswered = question.facts(device) | dict.fromkeys(KEYS) | {"decided": getattr(none, "decided", True)}
+        return deliver(Answer(unanswered, reason=str(none)), as_json)
+    reason = None if found.chart.members_at_stiffness_max else _reason(found)
+    document = question.facts(device) | numbers(found) | {"decided": True}
+    if path is not None:
+        document["file"] = str(path)
+        _write(path, found, document, reason)
+    return deliver(Answer(document, lambda: list(_pages(question, device, found, path)), reason), as_json)
+
+
+def _ranges(texts: tuple[str, ...]) -> tuple[Range, ...]:
+    from zwidth.study.robust_family import Range
+
+    found, lines = [], []
+    for text in texts:
+        path, equals, values = (part.strip() for part in text.partition("="))
+        parts = [part.strip() for part in values.split(",")]
+        logarithmic = len(parts) == 3 and parts[2] == "log"
+        try:
+            low, high = map(float, parts[:2] if logarithmic else parts)
+        except ValueError:
+            equals = ""
+        if not equals or not path:
+            lines.append(f"--range: must be PATH=LOW,HIGH or PATH=LOW,HIGH,log with two numbers, got {text!r}")
+            continue
+        found.append(Range(path, low, high, logarithmic))
+    if lines:
+        raise BadInput(*lines)
+    return tuple(found)
+
+
+def _operators(question: Question, names: str | None, file: str | None) -> tuple[str, ...]:
+    if names is None and file is None:
+        return ()
+    if names is not None and file is not None:
+        raise BadInput("--operators and --operator-list say the same; give one of them")
+    if question.operator is not None:
+        raise BadInput("--operator is one of those in the list; leave it out")
+    if file is not None:
+        try:
+            lines = Path(file).read_text(encoding="utf-8").splitlines()
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or "is no text"
+            raise BadInput(f"--operator-list: {file}: cannot be read: {why}") from None
+        listed = [line.split("#")[0].strip() for line in lines]
+        found = tuple(dict.fromkeys(name for name in listed if name))
+    else:
+        found = tuple(dict.fromkeys(name.strip() for name in str(names).split(",")))
+    if not found or "" in found:
+        raise BadInput(f"--operators: must be names with commas between them, got {names or file!r}")
+    return found
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    """A bar on standard error where somebody watches."""
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    with Bar(console=Console(stderr=True), transient=True, disable=not Console(stderr=True).is_terminal) as bar:
+        tasks: dict[str, Any] = {}
+
+        def progress(stage: str, done: int, of: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=of)
+            bar.update(tasks[stage], completed=done, total=of)
+
+        yield progress
+
+
+def _computed(
+    question: Question,
+    device: Device,
+    ranges: tuple[Range, ...],
+    operators: tuple[str, ...],
+    counts: tuple[int, int, int],
+    progress: Progress,
+) -> RobustStudy:
+    from zwidth.study.robust import robust_study
+    from zwidth.study.robust_family import Family
+
+    question.as_measured(device)
+    family = Family(device, ranges, operators, lambda one, held: question.plant(one, held=held))
+    members, unseen, seed = counts
+    return robust_study(family, members, unseen, seed, progress=progress)
+
+
+def _reason(found: RobustStudy) -> str:
+    """Why there is no wall for all."""
+    names = [name_of(found, index) for index in found.chart.excluding]
+    if len(names) == 1:
+        return f"no wall with K > 0 and B >= 0 is stable for member {names[0]}"
+    group = "these two members exclude each other" if len(names) == 2 else "these members have none in common"
+    return f"no wall with K > 0 and B >= 0 is stable for every member; {group}: {'; '.join(names)}"
+
+
+def name_of(found: RobustStudy, index: int) -> str:
+    """A member in words: its number and its values."""
+    values = ", ".join(f"{path} = {_cell(value)}" for path, value in found.members[index].items())
+    return f"{index} ({values})"
+
+
+def numbers(found: RobustStudy) -> dict[str, Any]:
+    """The study under the keys of --json."""
+    chart, violation = found.chart, found.violation
+    return {
+        "regions": list(chart.regions),
+        "boundary": [
+            {
+                "member": arc.member,
+                "stiffness_N_per_m": arc.stiffness,
+                "damping_Ns_per_m": arc.damping,
+                "frequency_Hz": arc.frequency,
+            }
+            for arc in chart.boundary
+        ],
+        "stiffness_max_N_per_m": chart.stiffness_max,
+        "damping_at_stiffness_max_Ns_per_m": chart.damping_at_stiffness_max,
+        "frequency_at_stiffness_max_Hz": min(chart.frequencies_at_stiffness_max, default=None),
+        "frequencies_at_stiffness_max_Hz": chart.frequencies_at_stiffness_max or None,
+        "members_at_stiffness_max": chart.members_at_stiffness_max,
+        "damping_max_Ns_per_m": chart.damping_max,
+        "stable_area_N2s_per_m2": chart.stable_area,
+        "unobserved_modes": chart.unobserved_modes,
+        "members": found.members,
+        "failed": [{"member": index, "reason": reason} for index, reason in chart.failed.items()],
+        "binding": chart.binding,
+        "best_by_area": chart.best_by_area,
+        "best_by_stiffness": chart.best_by_stiffness,
+        "lost_share": chart.lost_share,
+        "lost_stiffness_share": chart.lost_stiffness_share,
+        "corner_blur": chart.corner_blur,
+        "search": {
+            "sampled": found.sampled,
+            "rounds": found.rounds,
+            "moved_share": found.moved,
+            "settled": found.settled,
+        },
+        "violation": violation
+        and {
+            "unseen": violation.unseen,
+            "violating": violation.violating,
+            "worst_spectral_radius": violation.worst_spectral_radius,
+            "worst_stiffness_share": violation.worst_stiffness_share,
+            "worst_member": violation.worst or None,
+        },
+        "excluding": chart.excluding or None,
+    }
+
+
+def edge_table(chart: RobustChart) -> dict[str, list[Any]]:
+    """The robust set's edge as columns, its arcs one after another and counted from 0."""
+    arcs = chart.boundary
+    return {
+        "arc": [index for index, arc in enumerate(arcs) for _ in arc.stiffness],
+        "member": [arc.member for arc in arcs for _ in arc.stiffness],
+        "stiffness_N_per_m": list(chain.from_iterable(arc.stiffness.tolist() for arc in arcs)),
+        "damping_Ns_per_m": list(chain.from_iterable(arc.damping.tolist() for arc in arcs)),
+        "frequency_Hz": list(chain.from_iterable(arc.frequency.tolist() for arc in arcs)),
+    }
+
+
+def _pages(question: Question, device: Device, found: RobustStudy, path: Path | None) -> Iterator[Any]:
+    yield heading(question, device)
+    chart = found.chart
+    if chart.members_at_stiffness_max:
+        yield sheet(list(_rows(found)))
+        binding = [index for index in chart.binding if index in _lengths(chart)]
+        binding.sort(key=lambda index: -_lengths(chart)[index])
+        paths = list(found.members[0])
+        rows = [
+            [str(index), *(_cell(found.members[index][p]) for p in paths), f"{100 * _lengths(chart)[index]:.1f} %"]
+            for index in binding[:TOLD]
+        ]
+        yield table(["binds", *paths, "of the edge"], rows)
+        if len(binding) > TOLD:
+            yield f"... and {len(binding) - TOLD} more; --json lists all"
+    if path is not None:
+        yield f"written: {path}"
+
+
+def _cell(value: Any) -> str:
+    return shown(value) if isinstance(value, str) else f"{value:.4g}"
+
+
+def _lengths(chart: RobustChart) -> dict[int, float]:
+    """Member -> share of the edge's length, on the chart as drawn."""
+    import numpy as np
+
+    size = np.ptp(np.vstack(chart.regions), axis=0)
+    found: dict[int, float] = {}
+    for arc in chart.boundary:
+        length = float(np.hypot(np.diff(arc.stiffness) / size[0], np.diff(arc.damping) / size[1]).sum())
+        found[arc.member] = found.get(arc.member, 0.0) + length
+    total = sum(found.values())
+    return {member: length / total for member, length in found.items()}
+
+
+def _rows(found: RobustStudy) -> Iterator[tuple[str, str]]:
+    chart = found.chart
+    frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
+    members = " and ".join(map(str, chart.members_at_stiffness_max))
+    yield (
+        "largest stiffness",
+        f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "
+        f"there member {members} vibrates at {frequencies}",
+    )
+    yield (
+        "lost against the best",
+        (
+            f"{100 * chart.lost_stiffness_share:.2f} % of its stiffness (member {chart.best_by_stiffness}), "
+            f"{100 * chart.lost_share:.2f} % of its area (member {chart.best_by_area})"
+        ),
+    )
+    yield "largest damping", amount(chart.damping_max, "Ns/m")
+    yield "stable area", amount(chart.stable_area, "N²s/m²")
+    yield "members", _members(found)
+    if chart.failed:
+        first = next(iter(chart.failed))
+        yield (
+            "not charted",
+            (
+                f"{len(chart.failed)} members, about which nothing is claimed; the first, {name_of(found, first)}: "
+                f"{shown(chart.failed[first])}"
+            ),
+        )
+    if found.violation is not None:
+        yield "unseen members", _violation(found)
+    if chart.unobserved_modes:
+        yield "moved by no wall", ", ".join(counted(chart.unobserved_modes))
+
+
+def _members(found: RobustStudy) -> str:
+    count = len(found.members)
+    if found.violation is None:
+        return f"{count}, all of the list"
+    if found.settled:
+        end = f"the search settled, its last round moved the edge by {100 * found.moved:.2g} % of the area"
+    else:
+        end = f"the search used up --members {count} and had still moved the edge by {100 * found.moved:.2g} %"
+    return f"{count}, of which {count - found.sampled} found by searching the ranges for worse ones; {end}"
+
+
+def _violation(found: RobustStudy) -> str:
+    violation = found.violation
+    assert violation is not None
+    if not violation.violating:
+        return f"of {violation.unseen} at random none finds one of these walls unstable"
+    return (
+        f"of {violation.unseen} at random {violation.violating} find a wall unstable; the worst has spectral radius "
+        f"1 + {violation.worst_spectral_radius - 1.0:.2g}, and asks for "
+        f"{100 * violation.worst_stiffness_share:.2g} % less of the largest stiffness"
+    )
+
+
+def _write(path: Path, found: RobustStudy, document: dict[str, Any], reason: str | None) -> None:
+    if path.suffix.lower() in DATA:
+        write_data(path, document | ({} if reason is None else {"reason": reason}), edge_table(found.chart))
+        return
+    from zwidth.show.figures.robust import draw_robust
+    from zwidth.show.figures.style import figure, save
+
+    drawing, ax = figure(5.6, 4.6)
+    draw_robust(ax, found.chart, found.members)
+    with replacing(path) as draft:
+        save(drawing, draft)

@@ -1,0 +1,330 @@
+"""Robust charts of a device whose operator, or any of whose numbers, is known in ranges or as a list only.
+
+A continuum of members cannot be charted; it is sampled, and the sample is then made to bite:
+
+1. corners of the box of ranges, its centre, and Sobol's points (low discrepancy) inside;
+2. at points of the robust edge, above all where the binding member changes, the box is searched for the member
+   with the largest spectral radius (pattern search); what exceeds 1 joins, until the edge stands still;
+3. then members nobody has seen, at random, are asked whether they render the robust walls stably, and the worst
+   violation is stated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from zwidth.chart.region import ChartError
+from zwidth.chart.robust import RobustChart, robust_of
+from zwidth.chart.robust_check import softening, unstable
+from zwidth.chart.robust_members import Member, chart_member
+from zwidth.chart.tracer import Tracer
+from zwidth.chart.verdict import BAND, spectral_radius
+from zwidth.device.faults import DeviceError
+from zwidth.study.robust_family import Family, Point
+
+Floats = NDArray[np.float64]
+# stage, done, of how many
+Progress = Callable[[str, int, int], None]
+
+REFINING: Final = 0.25  # share of the members kept for what the search finds
+SEARCHED: Final = 12  # points of the edge that each round searches from
+FIRST_STEP, LAST_STEP = 0.25, 1e-3  # of the search, in shares of the ranges
+EXCEEDS: Final = 1e-7  # excess of the spectral radius over 1 that makes a member join
+EDGE_WALLS: Final = 200
+RASTER: Final = 12  # walls inside, per axis
+DEPTH: Final = 1e-6  # how far inside the edge walls are asked, in shares of the set's size
+
+
+@dataclass(frozen=True)
+class Violation:
+    """What random members nobody had seen say of the robust walls.
+
+    unseen                 how many were asked; those that could not be built are not counted
+    violating              how many of them find one of the walls unstable
+    worst_spectral_radius  over all of them and all walls; at most 1 if nobody violates
+    worst_stiffness_share  the largest share of the largest stiffness by which a robust wall (K > 0, B >= 0) must
+                           be softened, at its damping, to be stable for a member; 0 if nobody violates
+    worst                  that member's values: path -> value; {} if nobody violates
+    """
+
+    unseen: int
+    violating: int
+    worst_spectral_radius: float
+    worst_stiffness_share: float
+    worst: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class RobustStudy:
+    """A robust chart with who its members are and how far it can be trusted.
+
+    chart      of all members
+    members    path -> value of each; those in `chart.failed` could not be built or charted
+    sampled    members before the search; the rest it found
+    rounds     of the search
+    moved      share of the area by which the last round moved the edge; 0 if it found nobody
+    settled    whether the search ended because nobody it found moves the edge by more than the tolerance
+    violation  None for a list without ranges: all its members are in the chart
+    """
+
+    chart: RobustChart
+    members: tuple[dict[str, Any], ...]
+    sampled: int
+    rounds: int
+    moved: float
+    settled: bool
+    violation: Violation | None
+
+
+class RobustError(ValueError):
+    """Not one member can be built."""
+
+
+def robust_study(
+    family: Family,
+    members: int = 256,
+    unseen: int = 10_000,
+    seed: int = 1,
+    tolerance: float = 1e-4,
+    progress: Progress | None = None,
+) -> RobustStudy:
+    """The robust chart of a family of devices.
+
+    members    at most so many; a list without ranges has as many as it has
+    unseen     random members asked afterwards (see `Violation`)
+    seed       of everything random: equal seeds give equal answers
+    tolerance  share of the area; a round of the search that moves the edge by less is the last
+    Raises     DeviceError  for ranges that cannot be meant
+               RobustError  if not one member can be built or charted
+
+    >>> from zwidth.device.load import from_document
+    >>> from zwidth.study.robust_family import Family, Range
+    >>> plain = from_document({"name": "m", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}})
+    >>> mass = Range("plant.mass_kg", 0.1, 0.3)
+    >>> study = robust_study(Family(plain, (mass,), (), lambda device, held: device.plant(held=held)), 8, 100)
+    >>> round(study.chart.stiffness_max, 2), study.violation.violating    # the lightest mass binds
+    (68629.15, 0)
+    """
+    faults = family.faults()
+    if faults:
+        raise DeviceError(faults)
+    found = _Members(family, progress or (lambda stage, done, of: None))
+    points = list(_sample(family, members, seed))
+    found.add(points, "members")
+    chart = found.chart()
+    rounds, moved, settled = 0, 0.0, not family.free
+    while not settled and len(found.points) < members and chart.regions:
+        found.progress("search", rounds, rounds + 1)
+        bites = _biting(found, chart)[: members - len(found.points)]
+        if not bites:
+            moved, settled = 0.0, True
+            break
+        rounds += 1
+        found.add(bites, "members")
+        before, chart = chart, found.chart()
+        moved = _moved(before, chart)
+        settled = moved < tolerance
+    return RobustStudy(
+        chart=chart,
+        members=tuple(family.values(point) for point in found.points),
+        sampled=len(points),
+        rounds=rounds,
+        moved=moved,
+        settled=settled,
+        violation=_violation(found, chart, unseen, seed) if family.free else None,
+    )
+
+
+class _Members:
+    """The members so far, each charted once."""
+
+    def __init__(self, family: Family, progress: Progress) -> None:
+        self.family, self.progress = family, progress
+        self.points: list[Point] = []
+        self.charted: dict[int, Member] = {}
+        self.failed: dict[int, str] = {}
+
+    def add(self, points: list[Point], stage: str) -> None:
+        """Build and chart more members; those for whom that fails are remembered with the reason."""
+        for done, point in enumerate(points):
+            self.progress(stage, done, len(points))
+            index = len(self.points)
+            self.points.append(point)
+            try:
+                self.charted[index] = chart_member(index, self.family.loop(point))
+            except (ValueError, ChartError, np.linalg.LinAlgError) as error:
+                self.failed[index] = str(error)
+        self.progress(stage, len(points), len(points))
+
+    def chart(self) -> RobustChart:
+        """The robust chart of all of them."""
+        if not self.charted:
+            reason = next(iter(self.failed.values()))
+            raise RobustError(f"not one of {len(self.points)} members could be charted; the first: {reason}")
+        return robust_of(dict(self.charted), dict(self.failed))
+
+    def radius(self, point: Point, K: float, B: float) -> float:
+        """Spectral radius of a wall for a member; -1 for one that cannot be built."""
+        try:
+            loop = self.family.loop(point)
+        except (ValueError, np.linalg.LinAlgError):
+            return -1.0
+        return float(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max())
+
+
+def _sample(family: Family, members: int, seed: int) -> Iterator[Point]:
+    """Corners, centre and Sobol's points of the ranges, for every operator."""
+    from scipy.stats import qmc
+
+    free, operators = family.free, max(len(family.operators), 1)
+    count = max(int(members * (1.0 - REFINING)) // operators, 1) if free else 1
+    shares = [np.full(len(free), 0.5)]
+    if 2 ** len(free) <= count // 2:
+        shares += [np.array(corner, dtype=float) for corner in product((0.0, 1.0), repeat=len(free))]
+    if free and count > len(shares):
+        sobol = qmc.Sobol(len(free), scramble=True, seed=seed)
+        inside = sobol.random_base2(int(np.ceil(np.log2(count))) + 1)
+        if len(shares) == 1:  # too many corners: those nearest the first points
+            corners = np.unique(np.round(inside), axis=0)
+            shares += list(corners[: count // 2])
+        shares += list(inside[: count - len(shares)])
+    for operator in range(operators):
+        for place in shares[:count]:
+            yield _point(family, operator, place)
+
+
+def _point(family: Family, operator: int, free: Floats) -> Point:
+    shares = np.zeros(len(family.ranges))
+    shares[list(family.free)] = free
+    return Point(operator, tuple(shares.tolist()))
+
+
+def _biting(found: _Members, chart: RobustChart) -> list[Point]:
+    """Members that the search finds at the edge and that cut it, the deepest cuts first."""
+    family, bites = found.family, dict[Point, float]()
+    for K, B, starts in _searched_walls(chart):
+        for start in starts:
+            point, radius = _worst(found, found.points[start], K, B)
+            if radius > 1.0 + EXCEEDS and point not in found.points:
+                rounded = _point(family, point.operator, np.round([point.shares[k] for k in family.free], 6))
+                bites[rounded] = max(radius, bites.get(rounded, 0.0))
+    return sorted(bites, key=lambda point: -bites[point])
+
+
+def _searched_walls(chart: RobustChart) -> list[tuple[float, float, tuple[int, ...]]]:
+    """Walls of the edge to search from, with the members that bind there: the stiffest, where the binding member
+    changes, and the middles of the longest arcs."""
+    walls = []
+    if chart.members_at_stiffness_max:
+        walls.append((chart.stiffness_max, chart.damping_at_stiffness_max, chart.members_at_stiffness_max))
+    arcs = chart.boundary
+    for arc, following in zip(arcs, (*arcs[1:], *arcs[:1]), strict=True):
+        if arc.member != following.member:
+            walls.append((float(arc.stiffness[-1]), float(arc.damping[-1]), (arc.member, following.member)))
+    longest = sorted(arcs, key=lambda arc: -len(arc.stiffness))
+    for share in (0.5, 0.25, 0.75):
+        for arc in longest[:4]:
+            k = int(share * (len(arc.stiffness) - 1))
+            K, B = (float((x[k] + x[k + 1]) / 2.0) for x in (arc.stiffness, arc.damping))
+            walls.append((K, B, (arc.member,)))
+    return walls[:SEARCHED]
+
+
+def _worst(found: _Members, start: Point, K: float, B: float) -> tuple[Point, float]:
+    """The member of the largest spectral radius at a wall, by pattern search from a member: one range at a time,
+    steps halved where nothing is gained."""
+    best, radius, step = start, found.radius(start, K, B), FIRST_STEP
+    while step >= LAST_STEP:
+        gained = False
+        for k in found.family.free:
+            for sign in (-1.0, 1.0):
+                share = min(max(best.shares[k] + sign * step, 0.0), 1.0)
+                tried = Point(best.operator, (*best.shares[:k], share, *best.shares[k + 1 :]))
+                reached = found.radius(tried, K, B) if tried != best else -1.0
+                if reached > radius:
+                    best, radius, gained = tried, reached, True
+        if not gained:
+            step *= 0.5
+    return best, radius
+
+
+def _moved(before: RobustChart, after: RobustChart) -> float:
+    """Share by which the whole set became smaller."""
+    areas = [sum(shapely.Polygon(ring).area for ring in chart.regions) for chart in (before, after)]
+    return max(1.0 - areas[1] / areas[0], 0.0) if areas[0] > 0.0 else 0.0
+
+
+def _violation(found: _Members, chart: RobustChart, unseen: int, seed: int) -> Violation:
+    """What `unseen` random members say of the robust walls."""
+    family = found.family
+    walls = promised_walls(chart)
+    random = np.random.default_rng([seed, 1])
+    asked, violating, radius, share, worst = 0, 0, -1.0, 0.0, dict[str, Any]()
+    for done in range(unseen):
+        if done % 50 == 0:
+            found.progress("unseen members", done, unseen)
+        operator = int(random.integers(max(len(family.operators), 1)))
+        point = _point(family, operator, random.random(len(family.free)))
+        try:
+            tracer = Tracer.of(family.loop(point))
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        asked += 1
+        bad = np.flatnonzero(unstable(tracer.polynomials, *walls.T)) if len(walls) else np.empty(0, dtype=int)
+        bad_radius = spectral_radius(tracer.loop, *walls[bad].T) if len(bad) else np.empty(0)
+        bad = bad[bad_radius > 1.0 + BAND]
+        if not len(bad):
+            continue
+        violating += 1
+        softer = [_share(tracer, float(walls[k, 0]), float(walls[k, 1]), chart.stiffness_max) for k in bad]
+        if max(softer) > share or not worst:
+            share, worst = max(max(softer), share), family.values(point)
+        radius = max(radius, float(bad_radius.max()))
+    found.progress("unseen members", unseen, unseen)
+    if radius < 0.0 and len(walls):
+        radius = float(max(np.max(spectral_radius(chart.members[k], *walls.T)) for k in chart.binding))
+    return Violation(asked, violating, radius if len(walls) else float("nan"), share, worst)
+
+
+def _share(tracer: Tracer, K: float, B: float, stiffness_max: float) -> float:
+    return softening(tracer.polynomials, K, B) / stiffness_max if K > 0.0 and B >= 0.0 else 0.0
+
+
+def promised_walls(chart: RobustChart) -> Floats:
+    """Walls (k, 2) of [K, B] that stand for a robust set: along its edge, just inside, and a raster over it."""
+    if not chart.regions:
+        return np.empty((0, 2))
+    size = np.ptp(np.vstack(chart.regions), axis=0)
+    total = sum(_lengths(arc.stiffness, arc.damping, size).sum() for arc in chart.boundary)
+    inside = []
+    for arc in chart.boundary:
+        lengths = _lengths(arc.stiffness, arc.damping, size)
+        along = np.concatenate([[0.0], np.cumsum(lengths)])
+        count = max(int(np.ceil(EDGE_WALLS * along[-1] / total)), 2)
+        at = np.linspace(0.0, along[-1], count + 1)[1:]
+        points = np.column_stack([np.interp(at, along, x) for x in (arc.stiffness, arc.damping)]) / size
+        ahead = (
+            points
+            - np.column_stack([np.interp(at - 1e-3 * at[-1], along, x) for x in (arc.stiffness, arc.damping)])
+            / size
+        )
+        left = np.column_stack([-ahead[:, 1], ahead[:, 0]]) / np.maximum(np.hypot(*ahead.T), 1e-300)[:, None]
+        inside.append((points + DEPTH * left) * size)
+    low = np.vstack(chart.regions).min(axis=0)
+    shares = (np.arange(RASTER) + 0.5) / RASTER
+    inside.append(low + size * np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2))
+    walls = np.vstack(inside)
+    cells = [shapely.Polygon(ring) for ring in chart.regions]
+    kept = np.any([shapely.contains_xy(cell, walls) for cell in cells], axis=0)
+    return np.asarray(walls[kept])
+
+
+def _lengths(K: Floats, B: Floats, size: Floats) -> Floats:
+    return np.asarray(np.hypot(np.diff(K) / size[0], np.diff(B) / size[1]))
