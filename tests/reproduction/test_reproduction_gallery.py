@@ -9,6 +9,7 @@ from gallery import fig_3_7_bilateral_wall as wall
 from gallery import fig_3_8_frequencies as vibration
 from gallery import fig_3_9_no_damping as undamped
 from gallery import fig_3_11_filter as low_pass
+from gallery import fig_3_12_operator as hand
 from gallery import fig_4_1_rigid as rigid
 from gallery import fig_4_2_delay as delay
 from gallery import fig_4_3_mass_spring as spring
@@ -108,6 +109,24 @@ def test_two_masses_with_a_filter():
     assert low_pass.two_mass.stiffness_max == pytest.approx(K, rel=1e-9)
     assert low_pass.two_mass.stiffness_max == pytest.approx(2598.0368, abs=1e-4)
     assert low_pass.two_mass_undamped.regions == ()
+
+
+def test_the_operators_hand():
+    judge = hand.judge_of(hand.ASSUMED)
+    K, B, frequency = judge.largest_stiffness(20000.0, 60.0)
+    assert hand.chart.stiffness_max == pytest.approx(K, rel=1e-11)
+    assert hand.chart.stiffness_max == pytest.approx(8849.455764, abs=1e-6)
+    assert hand.chart.damping_at_stiffness_max == pytest.approx(B, rel=1e-6)
+    assert hand.chart.frequencies_at_stiffness_max[0] == pytest.approx(frequency, rel=1e-7)
+    assert judge.radius(*hand.edge(hand.chart)) == pytest.approx(1.0, abs=2e-7)
+    assert (hand.gain_by_operator, hand.gain_by_damping) == pytest.approx((0.0036, 0.228), abs=5e-4)
+    assert (hand.area_by_operator, hand.area_by_damping) == pytest.approx((0.0853, 0.3241), abs=5e-5)
+    assert abs(hand.area_by_arm_stiffness) < 1e-7
+    assert hand.lowest_damping == pytest.approx(-6.0213, abs=5e-5)
+    assert hand.stiffest_undamped == pytest.approx(6025, abs=15)
+    assert hand.static_edge == pytest.approx(hand.static_edge_by_hand, rel=1e-9)
+    assert hand.alone.regions
+    assert np.all(hand.edge(hand.alone)[1] >= -1e-9)
 
 
 def test_the_rigid_wall():
