@@ -17,6 +17,7 @@ from zwidth.show.cli.felt import felt
 from zwidth.show.cli.guarantees import guarantees
 from zwidth.show.cli.polar import polar
 from zwidth.show.cli.report import report
+from zwidth.show.cli.robust import robust
 from zwidth.show.cli.schema import schema
 from zwidth.show.cli.sensitivity import sensitivity
 from zwidth.show.cli.show import show
@@ -42,7 +43,7 @@ def zwidth(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (devices, schema, show, chart, check, polar, report, sensitivity, felt, bounds, guarantees):
+for command in (devices, schema, show, chart, check, polar, report, sensitivity, felt, bounds, guarantees, robust):
     zwidth.add_command(command)
 
 

@@ -288,7 +288,9 @@ def _pages(question: Question, device: Device, found: RobustStudy, path: Path | 
 
 
 def _cell(value: Any) -> str:
-    return shown(value) if isinstance(value, str) else f"{value:.4g}"
+    from zwidth.study.robust_family import in_words
+
+    return shown(in_words(value))
 
 
 def _lengths(chart: RobustChart) -> dict[int, float]:
@@ -328,7 +330,7 @@ def _rows(found: RobustStudy) -> Iterator[tuple[str, str]]:
         yield (
             "not charted",
             (
-                f"{len(chart.failed)} members, about which nothing is claimed; the first, {name_of(found, first)}: "
+                f"{len(chart.failed)} members, of which nothing is claimed; the first, {name_of(found, first)}: "
                 f"{shown(chart.failed[first])}"
             ),
         )
@@ -354,10 +356,12 @@ def _violation(found: RobustStudy) -> str:
     assert violation is not None
     if not violation.violating:
         return f"of {violation.unseen} at random none finds one of these walls unstable"
+    softer = f"{100 * violation.worst_stiffness_share:.2g} % less of the largest stiffness would do for all"
+    if violation.worst_stiffness_share == 0.0:
+        softer = "all of these have K <= 0 or B < 0"
     return (
-        f"of {violation.unseen} at random {violation.violating} find a wall unstable; the worst has spectral radius "
-        f"1 + {violation.worst_spectral_radius - 1.0:.2g}, and asks for "
-        f"{100 * violation.worst_stiffness_share:.2g} % less of the largest stiffness"
+        f"of {violation.unseen} at random {violation.violating} find a wall unstable, with spectral radii up to "
+        f"1 + {violation.worst_spectral_radius - 1.0:.2g}; {softer}"
     )
 
 

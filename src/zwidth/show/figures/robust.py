@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import isnan
+from textwrap import wrap
 from typing import Any, Final
 
 import numpy as np
@@ -14,21 +15,25 @@ from matplotlib.patches import Polygon
 from zwidth.chart.robust import RobustChart
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import GREY, LINES, STABLE, legend_above
+from zwidth.study.robust_family import in_words
 
 NAMED: Final = len(LINES) - 1  # binding members with a line of their own; the last line is for the rest
 DRAWN: Final = 200  # members' outlines at most
 LIGHT: Final = "#B8B8B8"
-LONGEST: Final = 62  # signs in a line of the legend
+LONGEST: Final = 60  # signs in a line of the legend
+SHORTEST: Final = 0.02  # share of the window that a named member binds
+NO_BREAK: Final = "\u00a0"
 
 
 def draw_robust(
     ax: Axes, chart: RobustChart, members: Sequence[Mapping[str, Any]] = (), window: Window | None = None
 ) -> None:
-    """The robust set filled, its edge by binding member, and all members' outlines behind it, the best one's dashed.
+    """The robust set filled, its edge by binding member; behind it all members' outlines, the best one's dashed.
 
     members  path -> value of each, for the legend
     window   what to show; left out: the box of all outlines' part with K >= 0 and B >= 0, and 5 %
     """
+    seen = window or _box(chart)
     outlines = [outline for index in list(chart.outlines)[:DRAWN] for outline in chart.outlines[index]]
     ax.add_collection(LineCollection(outlines, colors=LIGHT, linewidths=0.4, zorder=1.2, label="a member's edge"))
     for n, ring in enumerate(chart.regions):
@@ -37,46 +42,51 @@ def draw_robust(
     for n, outline in enumerate(chart.outlines[chart.best_by_area]):
         text = "" if n else f"best member by area: {_words(members, chart.best_by_area)}"
         ax.plot(*outline.T, color=GREY, linewidth=1.1, linestyle=(0, (3, 2)), label=text, zorder=1.4)
-    _draw_edge(ax, chart, members)
-    frame(ax, window or _box(chart), empty=not chart.regions)
+    _draw_edge(ax, chart, members, seen)
+    frame(ax, seen, empty=not chart.regions)
     legend_above(ax)
 
 
-def _draw_edge(ax: Axes, chart: RobustChart, members: Sequence[Mapping[str, Any]]) -> None:
-    lengths: dict[int, int] = {}
+def _draw_edge(ax: Axes, chart: RobustChart, members: Sequence[Mapping[str, Any]], seen: Window) -> None:
+    """The edge's arcs; those who bind most of what is seen are named."""
+    K0, K1, B0, B1 = seen
+    lengths: dict[int, float] = {}
     for arc in chart.boundary:
-        lengths[arc.member] = lengths.get(arc.member, 0) + len(arc.stiffness)
+        x, y = (arc.stiffness - K0) / (K1 - K0), (arc.damping - B0) / (B1 - B0)
+        inside = (x > 0.0) & (x < 1.0) & (y > 0.0) & (y < 1.0)
+        length = float(np.sum(np.hypot(np.diff(x), np.diff(y))[inside[1:] & inside[:-1]]))
+        lengths[arc.member] = lengths.get(arc.member, 0.0) + length
     ranked = sorted(lengths, key=lambda member: -lengths[member])
-    own = ranked[: NAMED + (len(ranked) == NAMED + 1)]
-    for n, member in enumerate(ranked):
-        named = member in own
-        colour, dashes = LINES[min(n, NAMED)]
-        text = f"bind elsewhere: {len(ranked) - NAMED} more members"
-        text = f"binds: {_words(members, member)}" if named else text
-        if not named and n > NAMED:
-            text = ""
-        for k, arc in enumerate(arc for arc in chart.boundary if arc.member == member):
-            ax.plot(
-                arc.stiffness,
-                arc.damping,
-                color=colour,
-                linestyle=dashes,
-                linewidth=2.0,
-                label="" if k else text,
-                zorder=3.0,
-            )
+    named = [member for member in ranked if lengths[member] > SHORTEST][:NAMED]
+    drawn: set[str] = set()
+    for arc in chart.boundary:
+        place = named.index(arc.member) if arc.member in named else NAMED
+        colour, dashes = LINES[place]
+        text = f"binds: {_words(members, arc.member)}" if place < NAMED else "others bind"
+        ax.plot(
+            arc.stiffness,
+            arc.damping,
+            color=colour,
+            linestyle=dashes,
+            linewidth=2.0,
+            label="" if text in drawn or lengths[arc.member] == 0.0 else text,
+            zorder=3.0,
+        )
+        drawn |= {text} if lengths[arc.member] > 0.0 else set()
 
 
 def _words(members: Sequence[Mapping[str, Any]], index: int) -> str:
-    """A member's values in words: the last step of each path is enough where it is clear."""
+    """A member's values in words, on two lines at most: the last step of each path, where that is clear."""
     if index >= len(members) or not members[index]:
         return f"member {index}"
     values = members[index]
     last = [path.rsplit(".", 1)[-1] for path in values]
     names = [name if last.count(name) == 1 else path for name, path in zip(last, values, strict=True)]
     pairs = zip(names, values.values(), strict=True)
-    text = ", ".join(f"{name} = {v}" if isinstance(v, str) else f"{name} = {v:.4g}" for name, v in pairs)
-    return text if len(text) <= LONGEST else f"member {index}: {text[: LONGEST - 15]}…"
+    lines = wrap(", ".join(f"{name} = {in_words(value)}".replace(" ", NO_BREAK) for name, value in pairs), LONGEST)
+    if len(lines) > 2:
+        lines = [lines[0], f"{lines[1]} … (member {index})"]
+    return "\n".join(lines)
 
 
 def _box(chart: RobustChart) -> Window:
@@ -87,4 +97,4 @@ def _box(chart: RobustChart) -> Window:
     reach = np.vstack(chart.regions).max(axis=0)
     # a member that allows many times more would press the robust set into a corner
     K1, B1 = min(K, 2.5 * reach[0]), min(B, 2.5 * reach[1])
-    return -0.05 * float(K1), 1.05 * float(K1), -0.05 * float(B1), 1.05 * float(B1)
+    return -0.04 * float(K1), 1.05 * float(K1), -0.05 * float(B1), 1.05 * float(B1)
