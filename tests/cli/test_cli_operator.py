@@ -125,6 +125,27 @@ def test_sensitivities_reach_his_numbers():
     assert {"operator.arm_mass_kg", "operator.grasp_stiffness_N_per_m"} <= paths
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--operator", "thesis-arm"), "an operator is not supported over several directions"),
+        (("--set", "loop.encoder.at=link"), "an encoder on the link is not supported"),
+        (
+            tuple(
+                word
+                for key in ("winding_resistance_ohm=2.0", "damping_resistance_ohm=0.0")
+                for word in ("--set", f"drives.motor-left.{key}")
+            ),
+            "electrical damping is not supported",
+        ),
+    ],
+)
+@pytest.mark.parametrize("command", [("polar",), ("chart", "--with-direction", "1,0")], ids=["polar", "chart"])
+def test_directions_together_leave_nothing_out_in_silence(command, words, said):
+    (line,) = refused(command[0], MECHANISM, *command[1:], *words)
+    assert said in line
+
+
 def test_the_heading_names_him_and_what_the_computer_does():
     settings = ["loop.velocity.method=windowed-difference", "loop.velocity.samples=3"]
     settings += ["loop.actuator.time_constant_s=0.0002", "loop.force.filter.type=first-order"]
