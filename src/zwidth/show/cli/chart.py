@@ -87,6 +87,8 @@ def chart(
         )
     if device.response is not None:
         return measured.answer_chart(question, device, path, window, as_json)
+    if others:
+        question.of_several_directions(device)
     along = [device.direction(direction) for direction in (question.direction, *others)] if others else []
     facts = question.facts(device) | ({"directions": along} if along else {})
     try:
