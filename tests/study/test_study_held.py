@@ -52,6 +52,14 @@ def test_a_model_that_the_device_is_already_is_seen_to_be(device, variants):
     assert find(variants, "model-two-mass").reason == "the device as described is this model"
 
 
+def test_a_kalman_filter_that_half_the_period_would_blind_is_left_out_with_the_reason():
+    velocity = {"method": "kalman", "acceleration_noise_m_per_s2": 9.0, "position_noise_m": 1.0}
+    device = load("hapkit-course", [("loop.velocity", velocity)])
+    left_out = find(what_if(device), "half-period")
+    assert left_out.chart is None
+    assert "too little motion within a period of 0.0005 s" in left_out.reason
+
+
 def test_windings_that_brake_are_damping_to_leave_out():
     settings = [("plant.electrical_damping", [{"force_constant_N_per_A": 2.0, "resistance_ohm": 4.0,
                                                "inductance_H": 0.01}])]  # fmt: skip

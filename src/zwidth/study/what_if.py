@@ -153,7 +153,8 @@ def _changes(device: Device, plant: Plant, alone: Plant, reduce: Reduce) -> Iter
     rigid = only(flexible, f"its {'drives are' if device.mechanism is not None else 'structure is'} rigid already")
     name = "rigid drives" if device.mechanism is not None else "rigid structure"
     yield "rigid-drives", name, rigid, lambda: Loop(reduce("rigid"), controller)
-    yield "half-period", "half the sampling period", "", lambda: Loop(plant, half_period(device))
+    faster = half_period(device)
+    yield "half-period", "half the sampling period", _no_estimate(faster), lambda: Loop(plant, faster)
     yield "no-delay", "no delay", only(delay != 0.0, "the device has no delay"), computed(delay=0.0)
     late = only(delay != 1.0, "the device has one sample of delay")
     yield "one-sample", "one sample of delay", late, computed(delay=1.0)
@@ -211,6 +212,15 @@ def _models(device: Device, reduce: Reduce) -> Iterator[Step]:
     yield "model-motor-mass-undamped", "motor mass without damping", undamped_only, of("motor-mass", lossless=True)
     rigid = "" if damped else same("rigid")
     yield "model-rigid-undamped", "rigid without damping", rigid, of("rigid", lossless=True)
+
+
+def _no_estimate(controller: Controller) -> str:
+    """Why the velocity cannot be estimated at this sampling period, as a Kalman filter's may not; "" if it can."""
+    try:
+        controller.velocity.estimator(controller.sampling_period)
+    except ValueError as error:
+        return str(error)
+    return ""
 
 
 def half_period(device: Device) -> Controller:
