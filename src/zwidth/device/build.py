@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -76,6 +77,8 @@ def plant(section: PlantSection) -> Plant:
         handle=None if handle is None else np.array(handle),
         names=tuple(f"coordinate {i}" for i in range(n)),
     )
+    if section.loss_factor:
+        bare = replace(bare, hysteresis=section.loss_factor * bare.stiffness)
     motors = [
         LaggedDamper(
             along=actuator if motor.along is None else np.array(motor.along),

@@ -64,6 +64,12 @@ class Device:
     encoders: Encoders
     document: dict[str, Any]
 
+    @property
+    def by_response(self) -> bool:
+        """Is the device charted by its frequency response: a measured one, or that of a loss factor?"""
+        hysteretic = self.given_plant is not None and self.given_plant.hysteresis is not None
+        return self.response is not None or hysteretic
+
     def posture(self, at: Sequence[float] | None = None, assembly: str | None = None) -> Posture:
         """The mechanism with its handle at a position, in a named assembly (left out: those of the file).
 

@@ -25,6 +25,10 @@ class UnmovedError(ValueError):
     """A plant of which the wall moves nothing that the sensor reads."""
 
 
+class HysteresisError(ValueError):
+    """A plant with a loss factor, which speaks of steady vibration and not of motion in time."""
+
+
 @dataclass(frozen=True)
 class Sections:
     """The sampled plant, one row per observed pair of poles, and the names of what was cancelled.
@@ -45,8 +49,14 @@ def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: fl
     """The plant's rows for a sampling period T [s], the fractional part f of the delay [samples] and the time
     constant of the actuator [s].
 
-    Raises UnmovedError where no mode is both moved by the wall force and read by the sensor.
+    Raises UnmovedError where no mode is both moved by the wall force and read by the sensor; HysteresisError for a
+    plant with a loss factor.
     """
+    if plant.hysteresis is not None:
+        raise HysteresisError(
+            "a loss factor describes steady vibration, not motion in time: the chart and its checks can be given, "
+            "nothing else; describe the damping by damping_Ns_per_m instead"
+        )
     modes = real_modes(plant)
     if modes is not None:
         sections = _modal_sections(modes, period, fraction, lag)

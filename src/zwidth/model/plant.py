@@ -41,6 +41,9 @@ class Plant:
     handle     (n,)    where the operator holds it; None: not known
     names      (n,)    coordinates, for people
     lagged_dampers     electrical damping and the like
+    hysteresis (n, n)  imaginary part of the stiffness at positive frequencies, K (1 + i eta) for a loss factor eta
+                       [N/m]; it speaks of steady vibration only, so that such a plant has no transition matrix
+                       (see `chart.hysteretic`); None: none
     """
 
     mass: Floats
@@ -51,6 +54,7 @@ class Plant:
     handle: Floats | None = None
     names: tuple[str, ...] = ()
     lagged_dampers: tuple[LaggedDamper, ...] = ()
+    hysteresis: Floats | None = None
 
     @property
     def size(self) -> int:

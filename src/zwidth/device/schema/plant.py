@@ -5,6 +5,7 @@ from __future__ import annotations
 from zwidth.device.schema.numbers import (
     DampingMatrix,
     Inductance,
+    LossFactor,
     MassMatrix,
     Name,
     Number,
@@ -46,6 +47,12 @@ class PlantSection(Section):
     )
     handle: Vector | None = quantity(
         "where the operator holds the device, n numbers; omitted for n = 1, or where no operator is wanted",
+        "1",
+        default=None,
+    )
+    loss_factor: LossFactor | None = quantity(
+        "hysteretic damping, stiffness K (1 + i eta) in steady vibration; for zwidth chart and check only; "
+        "omitted: none",
         "1",
         default=None,
     )

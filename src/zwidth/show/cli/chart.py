@@ -85,7 +85,7 @@ def chart(
         raise BadInput(
             f"{question.name}: has no [mechanism], and so one direction only; leave out --with-direction"
         )
-    if device.response is not None:
+    if device.by_response:
         return measured.answer_chart(question, device, path, window, as_json)
     if others:
         question.of_several_directions(device)

@@ -64,7 +64,7 @@ def check(
 
 def _judged(question: Question, device: Device, walls: Walls) -> list[dict[str, Any]]:
     """One entry per wall: the wall, its verdict, spectral radius and frequency."""
-    if device.response is not None:
+    if device.by_response:
         return measured.judged(question, device, walls)
     from zwidth.chart.verdict import judge
     from zwidth.loop.loop import Loop

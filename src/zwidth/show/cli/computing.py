@@ -31,7 +31,7 @@ def computing(question: Question) -> Iterator[None]:
             BadInput  where the model, or the loop, does not fit the device
     """
     from zwidth.chart.region import ChartError
-    from zwidth.loop.sections import UnmovedError
+    from zwidth.loop.sections import HysteresisError, UnmovedError
     from zwidth.model.posture import PostureError
     from zwidth.model.reduction import DirectionError, ModelError
     from zwidth.model.response import ResponseError
@@ -49,5 +49,5 @@ def computing(question: Question) -> Iterator[None]:
         raise BadInput(f"{question.name}: {model}{error}") from None
     except ResponseError as error:
         raise BadInput(f"{question.name}: response: {error}") from None
-    except UnmovedError as error:
+    except (UnmovedError, HysteresisError) as error:
         raise BadInput(f"{question.name}: {error}") from None

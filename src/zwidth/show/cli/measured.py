@@ -57,10 +57,15 @@ def answer_chart(
 
 
 def _charted(question: Question, device: Device) -> MeasuredChart:
+    if device.response is None:
+        from zwidth.chart.hysteretic import hysteretic_chart
+        from zwidth.loop.loop import Loop
+
+        with computing(question):
+            return hysteretic_chart(Loop(question.plant(device), device.controller))
     from zwidth.chart.measured import measured_chart
 
     question.as_measured(device)
-    assert device.response is not None
     with computing(question):
         return measured_chart(device.response, device.controller)
 
@@ -138,7 +143,7 @@ def more_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
     response = chart.loop.response
     kept, given = len(chart.loop.angles), len(response.frequency)
     measured = f"{kept} of {given} frequencies used, {chart.integrators} integrators"
-    yield "measured", f"{measured}; {response.note}" if response.note else measured
+    yield "response", f"{measured}; {response.note}" if response.note else measured
     for stretch in chart.unusable[:SHOWN]:
         yield "not to be relied on", told(stretch)
     if len(chart.unusable) > SHOWN:
