@@ -15,7 +15,7 @@ Complexes = NDArray[np.complex128]
 
 # Ratio of rates from which what rounding leaves of fast motions can spoil the slow ones.
 MUCH_SLOWER = 0.3
-SLOW = 1e-3  # rates below this share of the sampling rate creep all alike
+SLOW = 0.03  # rates below this share of the sampling rate creep all alike
 
 
 @dataclass(frozen=True)
