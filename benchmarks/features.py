@@ -1,7 +1,7 @@
 """What each part of a loop costs: the exact chart with one feature at a time, beside the plain one.
 
-The published two-mass plant, whole chart with all its numbers, from plant and controller on. Beside each
-stands a grid of walls judged by batched eigenvalues of the same loop, in the same run, scaled from a coarse grid to a
+The published two-mass plant, whole chart with all its numbers, from plant and controller on. Beside each stands
+a grid of walls judged by batched eigenvalues of the same loop, in the same run, scaled from a coarse grid to a
 million walls; both must give the same largest stiffness within the grid's step.
 
 Run `python benchmarks/features.py`.
