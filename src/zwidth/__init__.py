@@ -18,16 +18,29 @@ if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart as StabilityChart
     from zwidth.chart.chart import largest_stiffness as largest_stiffness
     from zwidth.chart.chart import stability_chart as stability_chart
+    from zwidth.chart.eigenloci import MultiChart as MultiChart
+    from zwidth.chart.eigenloci import multi_chart as multi_chart
+    from zwidth.chart.hysteretic import hysteretic_chart as hysteretic_chart
+    from zwidth.chart.measured import MeasuredChart as MeasuredChart
+    from zwidth.chart.measured import measured_chart as measured_chart
+    from zwidth.chart.polar import largest_stiffness_by_direction as largest_stiffness_by_direction
     from zwidth.chart.region import ChartError as ChartError
+    from zwidth.chart.robust import RobustChart as RobustChart
+    from zwidth.chart.robust import robust_chart as robust_chart
     from zwidth.chart.verdict import eigenvalues as eigenvalues
     from zwidth.chart.verdict import judge as judge
     from zwidth.chart.verdict import spectral_radius as spectral_radius
+    from zwidth.conditions.bound import Bound as Bound
+    from zwidth.conditions.registry import compare as compare
     from zwidth.device.device import Device as Device
     from zwidth.device.faults import DeviceError as DeviceError
     from zwidth.device.load import from_document as from_document
     from zwidth.device.load import load as load
     from zwidth.device.load import schema as schema
     from zwidth.device.read import bundled as bundled
+    from zwidth.guarantees.nested import nested as nested
+    from zwidth.guarantees.passive import passive_region as passive_region
+    from zwidth.guarantees.springs import spring_stable_region as spring_stable_region
     from zwidth.loop.controller import Butterworth as Butterworth
     from zwidth.loop.controller import Controller as Controller
     from zwidth.loop.controller import FirstOrder as FirstOrder
@@ -39,28 +52,55 @@ if TYPE_CHECKING:
     from zwidth.loop.estimators import SavitzkyGolay as SavitzkyGolay
     from zwidth.loop.estimators import WindowedDifference as WindowedDifference
     from zwidth.loop.loop import Loop as Loop
+    from zwidth.loop.multi import MultiLoop as MultiLoop
     from zwidth.measures.dexterity import dynamic_manipulability as dynamic_manipulability
     from zwidth.measures.dexterity import isotropy as isotropy
     from zwidth.measures.dexterity import manipulability as manipulability
+    from zwidth.measures.felt import felt_impedance as felt_impedance
+    from zwidth.measures.felt import static_stiffness as static_stiffness
+    from zwidth.measures.felt_chart import felt_chart as felt_chart
+    from zwidth.model.directions import MultiPlant as MultiPlant
+    from zwidth.model.directions import reduce_directions as reduce_directions
     from zwidth.model.effective import effective_parameters as effective_parameters
     from zwidth.model.modes import natural_frequencies as natural_frequencies
+    from zwidth.model.operator import Operator as Operator
+    from zwidth.model.operator import OperatorError as OperatorError
+    from zwidth.model.operator import attach as attach
+    from zwidth.model.plant import LaggedDamper as LaggedDamper
     from zwidth.model.plant import Plant as Plant
     from zwidth.model.posture import PostureError as PostureError
     from zwidth.model.posture import solve_posture as solve_posture
     from zwidth.model.reduction import ModelError as ModelError
     from zwidth.model.reduction import reduce_mechanism as reduce_mechanism
     from zwidth.model.reduction import reduce_plant as reduce_plant
+    from zwidth.model.response import Response as Response
+    from zwidth.model.response import ResponseError as ResponseError
+    from zwidth.model.sweep import sweep_response as sweep_response
+    from zwidth.study.robust import RobustError as RobustError
+    from zwidth.study.robust import robust_study as robust_study
+    from zwidth.study.sensitivity import sensitivities as sensitivities
+    from zwidth.study.validity import validity as validity
 
 __version__ = "0.1.0"
 
 _HOME = {
     "chart.chart": ("BoundaryArc", "StabilityChart", "largest_stiffness", "stability_chart"),
+    "chart.eigenloci": ("MultiChart", "multi_chart"),
+    "chart.hysteretic": ("hysteretic_chart",),
+    "chart.measured": ("MeasuredChart", "measured_chart"),
+    "chart.polar": ("largest_stiffness_by_direction",),
     "chart.region": ("ChartError",),
+    "chart.robust": ("RobustChart", "robust_chart"),
     "chart.verdict": ("eigenvalues", "judge", "spectral_radius"),
+    "conditions.bound": ("Bound",),
+    "conditions.registry": ("compare",),
     "device.device": ("Device",),
     "device.faults": ("DeviceError",),
     "device.load": ("from_document", "load", "schema"),
     "device.read": ("bundled",),
+    "guarantees.nested": ("nested",),
+    "guarantees.passive": ("passive_region",),
+    "guarantees.springs": ("spring_stable_region",),
     "loop.controller": ("Butterworth", "Controller", "FirstOrder"),
     "loop.estimators": (
         "AlphaBeta",
@@ -72,12 +112,22 @@ _HOME = {
         "WindowedDifference",
     ),
     "loop.loop": ("Loop",),
+    "loop.multi": ("MultiLoop",),
     "measures.dexterity": ("dynamic_manipulability", "isotropy", "manipulability"),
+    "measures.felt": ("felt_impedance", "static_stiffness"),
+    "measures.felt_chart": ("felt_chart",),
+    "model.directions": ("MultiPlant", "reduce_directions"),
     "model.effective": ("effective_parameters",),
     "model.modes": ("natural_frequencies",),
-    "model.plant": ("Plant",),
+    "model.operator": ("Operator", "OperatorError", "attach"),
+    "model.plant": ("LaggedDamper", "Plant"),
     "model.posture": ("PostureError", "solve_posture"),
     "model.reduction": ("ModelError", "reduce_mechanism", "reduce_plant"),
+    "model.response": ("Response", "ResponseError"),
+    "model.sweep": ("sweep_response",),
+    "study.robust": ("RobustError", "robust_study"),
+    "study.sensitivity": ("sensitivities",),
+    "study.validity": ("validity",),
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
