@@ -182,7 +182,8 @@ def _point(
     point = origin[link] + rotation[link] @ local
     for j in _ancestors(mechanism, link):
         if mechanism.links.joint[j] == REVOLUTE:
-            J[:, j] = np.cross(axis[j], point - origin[j])
+            (ax, ay, az), (x, y, z) = axis[j], point - origin[j]
+            J[:, j] = ay * z - az * y, az * x - ax * z, ax * y - ay * x  # numpy's cross is for many
     return point, J
 
 

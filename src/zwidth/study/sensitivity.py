@@ -237,7 +237,7 @@ class _Answer:
         held, seen = self.held, dict[int, tuple[int, bool]]()
 
         def stiffness(changed: float) -> float:
-            loop = self.loop_of(from_document(change(changed)))
+            loop = self.loop_of(from_document(change(changed), put_together=True))
             seen[int(np.sign(changed - at))] = (loop.whole_delay, loop.fractional_delay > 0.0)
             return held.moves(loop) / held.peak.stiffness
 
