@@ -145,7 +145,9 @@ def _label(squared: float, decay: float) -> str:
 
 
 def _pole_label(pole: complex) -> str:
-    """The same for a motion with a pole of its own."""
+    """The same for a motion with a pole of its own; a braked free motion stays where it is left, at 0 Hz."""
+    if pole == 0.0:
+        return _label(0.0, 0.0)
     if pole.imag != 0.0:
         return f"mode at {abs(pole) / (2.0 * np.pi):.4g} Hz (coupled damping)"
     return "overdamped motion"
