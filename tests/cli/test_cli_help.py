@@ -29,6 +29,7 @@ def test_the_commands_are_those_promised():
         "sensitivity",
         "felt",
         "guarantees",
+        "robust",
         "bounds",
     }
 

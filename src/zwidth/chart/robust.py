@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 class RobustArc:
     """A piece of the robust set's edge: walls at which one member begins to vibrate.
 
-    member                         index of the loop that binds there; where several do, the first
+    member                         index of the loop that binds there; of several the one of the smallest set
     stiffness, damping, frequency  (k,)  [N/m], [N s/m], [Hz]; 0 or 1/(2T) for a real root
     """
 
@@ -123,7 +123,7 @@ def robust_of(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart
     unit = max(member.tracer.period for member in charted.values())
     shapes = {index: polygons(member.outlines, unit) for index, member in charted.items()}
     shape, cutters = common(list(charted.values()), shapes, unit)
-    rings, blur = pieces(shape, sorted(cutters, key=lambda member: member.index), unit)
+    rings, blur = pieces(shape, cutters, unit)
     samples = [[sample_arc(piece.member.tracer, piece.arc) for piece in ring] for ring in rings]
     peak = robust_stiffest(rings)
     if _passed_over(samples, list(charted.values()), unit):
@@ -167,7 +167,7 @@ def _passed_over(samples: Samples, members: list[Member], unit: float) -> bool:
         for k in {len(middles) // 4, len(middles) // 2, 3 * len(middles) // 4} - {0, len(middles) - 1}:
             along, start = middles[k + 1] - middles[k - 1], middles[k]
             inside = start + depth * np.array([-along[1], along[0]]) / max(np.hypot(*along), 1e-300)
-            if any(member.verdict(inside[0] / unit, inside[1]) < 0 for member in members):
+            if any(member.unstable(float(inside[0] / unit), float(inside[1])) for member in members):
                 return True
     return False
 

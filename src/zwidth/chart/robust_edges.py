@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
 
 import numpy as np
 import shapely
@@ -100,17 +99,26 @@ def _runs(points: Floats, members: Sequence[Member], segments: _Segments, near: 
     """The walk round a polygon (k, 2), grouped by arc; it begins where one arc gives way to another."""
     found = _nearest_segments(points, segments, near)
     own = segments.origin[found]
-    changes = np.flatnonzero(np.any(own != np.roll(own, 1, axis=0), axis=1))
-    start = int(changes[0]) if len(changes) else 0
-    order = np.roll(np.arange(len(found)), -start)
+    angles = np.array([[_angle(segments, k, point) for point in points[i : i + 2]] for i, k in enumerate(found)])
+    changes = np.any(own != np.roll(own, 1, axis=0), axis=1)
+    for i in np.flatnonzero(~changes):  # an arc that ends where it begins: past its own corner it is another run
+        number, ring, place = own[i]
+        changes[i] = _starts_anew(members[number].rings[ring][place], angles[i - 1, 1], angles[i, 0])
+    starts = np.flatnonzero(changes) if changes.any() else np.array([0])
     runs = []
-    for _, group in groupby(order, key=lambda i: tuple(own[i].tolist())):
-        edges = list(group)
+    for one, following in zip(starts, np.append(starts[1:], starts[0] + len(found)), strict=True):
+        edges = np.arange(one, following) % len(found)
         number, ring, place = (int(part) for part in own[edges[0]])
         first, last = points[edges[0]], points[edges[-1] + 1]
-        angles = (_angle(segments, found[edges[0]], first), _angle(segments, found[edges[-1]], last))
-        runs.append(Run(members[number], ring, place, first, last, angles))
+        ends = (float(angles[edges[0], 0]), float(angles[edges[-1], 1]))
+        runs.append(Run(members[number], ring, place, first, last, ends))
     return runs
+
+
+def _starts_anew(arc: Arc, before: float, after: float) -> bool:
+    """Whether a walk along an arc has passed from its end to its beginning."""
+    ahead = (after - before) * np.sign(arc.end - arc.start)
+    return bool(ahead < -0.5 * abs(arc.end - arc.start))
 
 
 def _nearest_segments(points: Floats, segments: _Segments, near: float) -> NDArray[np.int64]:
@@ -167,20 +175,24 @@ def _confirmed(runs: list[Run], members: Sequence[Member], unit: float, depth: f
     kept = []
     for run in runs:
         K, B = (run.middle(unit) + depth * run.inwards(unit)) / (unit, 1.0)
-        if all(other is run.member or other.verdict(float(K), float(B)) >= 0 for other in members):
+        if not any(other is not run.member and other.unstable(float(K), float(B)) for other in members):
             kept.append(run)
     return kept or runs
+
+
+def _continues(one: Run, two: Run) -> bool:
+    return one.same_arc(two) and not _starts_anew(one.whole, one.angles[1], two.angles[0])
 
 
 def _merged(runs: list[Run]) -> list[Run]:
     """Runs with successive ones on one arc joined."""
     out = runs[:1]
     for run in runs[1:]:
-        if run.same_arc(out[-1]):
+        if _continues(out[-1], run):
             out[-1] = out[-1].joined(run)
         else:
             out.append(run)
-    if len(out) > 1 and out[-1].same_arc(out[0]):
+    if len(out) > 1 and _continues(out[-1], out[0]):
         out[0] = out.pop().joined(out[0])
     return out
 

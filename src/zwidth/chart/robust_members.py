@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 ROUNDING_AREA = 1e-12
 # An arc is looked at but for this share of its first and last chord, where it touches its neighbours.
 TRIM = 1e-7
+# An eigenvalue this far outside the circle is outside.
+BEYOND_DOUBT = 1e-11
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,12 @@ class Member:
     outlines: tuple[Floats, ...]
     peak: Peak | None
 
-    def verdict(self, K: float, B: float) -> int:
-        """Whether a wall is stable: 1 yes, -1 no, 0 lost in rounding."""
-        return int(is_stable(self.tracer.polynomials, K, B, working_room(self.tracer.degree)))
+    def unstable(self, K: float, B: float) -> bool:
+        """Whether a wall is unstable beyond doubt: by its polynomial, and by its eigenvalues, too."""
+        if is_stable(self.tracer.polynomials, K, B, working_room(self.tracer.degree)) >= 0:
+            return False
+        radius = np.abs(np.linalg.eigvals(self.tracer.loop.transition_matrix(K, B))).max()
+        return bool(radius > 1.0 + BEYOND_DOUBT)
 
     def arcs(self) -> Iterator[tuple[int, int, Arc]]:
         """Ring, place in it, arc."""
@@ -85,9 +90,10 @@ def polygons(outlines: Sequence[Floats], unit: float) -> shapely.MultiPolygon:
     holes = [outline for outline in scaled if _signed_area(outline) < 0.0]
     found: list[shapely.Polygon] = []
     for outline in solid:
-        shell = shapely.Polygon(outline)
-        cell = shapely.Polygon(outline, [hole for hole in holes if shapely.contains_xy(shell, *hole[0])])
-        found += polygonal(cell if cell.is_valid else shapely.make_valid(cell))
+        cell = shapely.Polygon(outline)
+        inside = [hole for hole in holes if shapely.contains_xy(cell, *hole[0])]
+        cell = shapely.Polygon(outline, inside) if inside else cell
+        found += [cell] if cell.is_valid else polygonal(shapely.make_valid(cell))
     return shapely.MultiPolygon(found)
 
 

@@ -27,6 +27,7 @@ from zwidth.chart.robust_members import Member, chart_member
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.device.faults import DeviceError
+from zwidth.loop.loop import Loop
 from zwidth.study.robust_family import Family, Point
 
 Floats = NDArray[np.float64]
@@ -71,7 +72,7 @@ class RobustStudy:
     rounds     of the search
     moved      share of the area by which the last round moved the edge; 0 if it found nobody
     settled    whether the search ended because nobody it found moves the edge by more than the tolerance
-    violation  None for a list without ranges: all its members are in the chart
+    violation  None for a list without ranges, all of whose members are in the chart, and where no wall is stable
     """
 
     chart: RobustChart
@@ -138,7 +139,7 @@ def robust_study(
         rounds=rounds,
         moved=moved,
         settled=settled,
-        violation=_violation(found, chart, unseen, seed) if family.free else None,
+        violation=_violation(found, chart, unseen, seed) if family.free and chart.regions else None,
     )
 
 
@@ -150,6 +151,7 @@ class _Members:
         self.points: list[Point] = []
         self.charted: dict[int, Member] = {}
         self.failed: dict[int, str] = {}
+        self.seen: dict[Point, Loop | None] = {}
 
     def add(self, points: list[Point], stage: str) -> None:
         """Build and chart more members; those for whom that fails are remembered with the reason."""
@@ -172,11 +174,13 @@ class _Members:
 
     def radius(self, point: Point, K: float, B: float) -> float:
         """Spectral radius of a wall for a member; -1 for one that cannot be built."""
-        try:
-            loop = self.family.loop(point)
-        except (ValueError, np.linalg.LinAlgError):
-            return -1.0
-        return float(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max())
+        if point not in self.seen:
+            try:
+                self.seen[point] = self.family.loop(point)
+            except (ValueError, np.linalg.LinAlgError):
+                self.seen[point] = None
+        loop = self.seen[point]
+        return -1.0 if loop is None else float(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max())
 
 
 def _sample(family: Family, members: int, seed: int) -> Iterator[Point]:
@@ -277,7 +281,7 @@ def _violation(found: _Members, chart: RobustChart, unseen: int, seed: int) -> V
         except (ValueError, np.linalg.LinAlgError):
             continue
         asked += 1
-        bad = np.flatnonzero(unstable(tracer.polynomials, *walls.T)) if len(walls) else np.empty(0, dtype=int)
+        bad = np.flatnonzero(unstable(tracer.polynomials, walls[:, 0].copy(), walls[:, 1].copy()))
         bad_radius = spectral_radius(tracer.loop, *walls[bad].T) if len(bad) else np.empty(0)
         bad = bad[bad_radius > 1.0 + BAND]
         if not len(bad):
@@ -288,9 +292,9 @@ def _violation(found: _Members, chart: RobustChart, unseen: int, seed: int) -> V
             share, worst = max(max(softer), share), family.values(point)
         radius = max(radius, float(bad_radius.max()))
     found.progress("unseen members", unseen, unseen)
-    if radius < 0.0 and len(walls):
+    if radius < 0.0:
         radius = float(max(np.max(spectral_radius(chart.members[k], *walls.T)) for k in chart.binding))
-    return Violation(asked, violating, radius if len(walls) else float("nan"), share, worst)
+    return Violation(asked, violating, radius, share, worst)
 
 
 def _share(tracer: Tracer, K: float, B: float, stiffness_max: float) -> float:
