@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.chart import _cut as cut
+from zwidth.chart.cells import cut
 from zwidth.chart.measured_cells import Cells, edges_stable_set
 from zwidth.chart.measured_loop import MeasuredLoop
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from shapely.geometry.polygon import orient
 
 from zwidth.chart.arcs import Rings
+from zwidth.chart.cells import Samples, cells, outline
 from zwidth.chart.decay import FastestDecay, fastest_decay
 from zwidth.chart.outline import quadrant_area, sample_arc
 from zwidth.chart.peak import Peak, largest_damping, stiffest
@@ -19,8 +19,6 @@ from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
-# Angles, K and B along every arc of every ring.
-Samples = list[list[tuple[Floats, Floats, Floats]]]
 
 
 @dataclass(frozen=True)
@@ -102,14 +100,14 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     (0.686292, 2.0)
     """
     tracer = Tracer.of(loop, radius)
-    rings, blur, samples, outlines = _traced(tracer)
-    width = _width(outlines)
+    rings, blur, samples, outlines = traced(tracer)
+    width = widest(outlines)
     peak = stiffest(tracer, rings, width)
     in_hertz = 1.0 / (2.0 * np.pi * loop.period)
     return StabilityChart(
         loop=loop,
         radius=radius,
-        regions=_cells(outlines),
+        regions=cells(outlines),
         boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for arcs in samples for thetas, K, B in arcs),
         stiffness_max=peak.stiffness if peak else float("nan"),
         damping_at_stiffness_max=peak.damping if peak else float("nan"),
@@ -124,8 +122,8 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
 def largest_stiffness(loop: Loop) -> Peak | None:
     """Only the stiffest stable wall with K > 0, B >= 0; None if there is none."""
     tracer = Tracer.of(loop)
-    rings, _, _, outlines = _traced(tracer)
-    return stiffest(tracer, rings, _width(outlines))
+    rings, _, _, outlines = traced(tracer)
+    return stiffest(tracer, rings, widest(outlines))
 
 
 def boundary_points(
@@ -137,7 +135,7 @@ def boundary_points(
     return K, B, thetas / (2.0 * np.pi * loop.period), edge
 
 
-def _traced(tracer: Tracer) -> tuple[Rings, float, Samples, list[Floats]]:
+def traced(tracer: Tracer) -> tuple[Rings, float, Samples, list[Floats]]:
     """The rings, how far corners are known, angles, K and B along every arc, and each ring's outline.
 
     An outline that crosses itself has passed a small loop of the curve between two samples: then the curve is
@@ -147,54 +145,13 @@ def _traced(tracer: Tracer) -> tuple[Rings, float, Samples, list[Floats]]:
     for _ in range(2):
         rings, blur = closed_rings(tracer, seen)
         samples = [[sample_arc(tracer, arc) for arc in ring] for ring in rings]
-        outlines = [_outline(arcs) for arcs in samples]
+        outlines = [outline(arcs) for arcs in samples]
         if all(shapely.Polygon(outline).is_valid for outline in outlines):
             break
         seen = np.concatenate([thetas[1:-1] for arcs in samples for thetas, _, _ in arcs])
     return rings, blur, samples, outlines
 
 
-def _width(outlines: list[Floats]) -> float:
+def widest(outlines: list[Floats]) -> float:
     """Largest |K| on any outline; 0 if there is none."""
     return max((float(np.max(np.abs(outline[:, 0]))) for outline in outlines), default=0.0)
-
-
-def _outline(arcs: list[tuple[Floats, Floats, Floats]]) -> Floats:
-    """A ring's arcs as one closed walk of points (k, 2)."""
-    points = np.vstack([np.column_stack([K[:-1], B[:-1]]) for _, K, B in arcs])
-    return np.vstack([points, points[:1]])
-
-
-def _signed_area(ring: Floats) -> float:
-    """Positive where a closed ring runs counter-clockwise."""
-    x, y = ring[:, 0] - ring[0, 0], ring[:, 1] - ring[0, 1]
-    return float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) / 2.0)
-
-
-def _cells(outlines: list[Floats]) -> tuple[Floats, ...]:
-    """Outlines as simple counter-clockwise rings; a cell with holes is cut through each of them."""
-    holes = [outline for outline in outlines if _signed_area(outline) < 0.0]
-    solid = [outline for outline in outlines if _signed_area(outline) > 0.0]
-    cells: list[Floats] = []
-    for outline in solid:
-        inside = [hole for hole in holes if shapely.contains_xy(shapely.Polygon(outline), *hole[0])]
-        cell = shapely.Polygon(outline, inside)
-        if not inside and cell.is_valid:
-            cells.append(outline)
-            continue
-        # Rounding can cross two chords in a corner of many branches: loops of no area, which are dropped
-        parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(cell)))  # a collection may hold collections
-        real = [part for part in parts if isinstance(part, shapely.Polygon) and part.area > 1e-12 * cell.area]
-        cells += [np.array(orient(piece).exterior.coords) for part in real for piece in _cut(part)]
-    return tuple(cells)
-
-
-def _cut(cell: shapely.Polygon) -> list[shapely.Polygon]:
-    """A polygon with holes as polygons without, cut upright through each hole's middle."""
-    if not cell.interiors:
-        return [cell]
-    left, low, right, high = cell.bounds
-    middle = shapely.Polygon(cell.interiors[0]).centroid.x
-    halves = (shapely.box(left, low, middle, high), shapely.box(middle, low, right, high))
-    parts = [part for half in halves for part in shapely.get_parts(shapely.intersection(cell, half))]
-    return [piece for part in parts if isinstance(part, shapely.Polygon) for piece in _cut(part)]

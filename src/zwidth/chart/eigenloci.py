@@ -9,7 +9,8 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.polygon import orient
 
-from zwidth.chart.chart import BoundaryArc, _cells, _outline
+from zwidth.chart.cells import cells, outline
+from zwidth.chart.chart import BoundaryArc
 from zwidth.chart.loci import Loci, refine_loci, trace_loci, with_angles
 from zwidth.chart.loci_arcs import ring_arcs, sample_arc
 from zwidth.chart.loci_cells import Line, cut_lines, reach, real_root_lines, stable_polygons
@@ -143,7 +144,7 @@ def _measured(loop: MultiLoop, loci: Loci, lines: list[Line], polygons: list[sha
     peak = stiffest(loci, rings, width)
     return MultiChart(
         loop=loop,
-        regions=_cells([_outline(arcs) for arcs in samples]),
+        regions=cells([outline(arcs) for arcs in samples]),
         boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for arcs in samples for thetas, K, B in arcs),
         stiffness_max=peak.stiffness if peak else np.nan,
         damping_at_stiffness_max=peak.damping if peak else np.nan,

@@ -11,7 +11,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.band import Band, uncertainty
-from zwidth.chart.chart import _cut
+from zwidth.chart.cells import cut
 from zwidth.chart.measured_cells import Cells, cells_within, edges_stable_set, window
 from zwidth.chart.measured_curve import Boundary, Box, boundary, coarse, real_root
 from zwidth.chart.measured_loop import MeasuredLoop
@@ -230,7 +230,7 @@ def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
     return MeasuredChart(
         loop=loop,
         edge=cells.edge,
-        regions=tuple(np.array(piece.exterior.coords) for cell in cells.polygons for piece in _cut(cell)),
+        regions=tuple(np.array(piece.exterior.coords) for cell in cells.polygons for piece in cut(cell)),
         boundary=arcs,
         stiffness_max=peak[0],
         damping_at_stiffness_max=peak[1],

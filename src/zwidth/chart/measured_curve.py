@@ -162,8 +162,8 @@ def real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float]:
         h = 0.0 if loop.integrators else float(loop.h(near)[0].real)
         return h, 0.0 if abs(loop.w(near)[0]) * loop.period < 2.0 * near[0] else float(loop.w(near)[0].real)
     end = np.array([np.pi])
-    h = complex(loop.h(end)[0])
-    return h.real if np.isfinite(h) else np.inf, float(loop.w(end)[0].real)
+    at_end = complex(loop.h(end)[0])
+    return at_end.real if np.isfinite(at_end) else np.inf, float(loop.w(end)[0].real)
 
 
 def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[Floats, Whole, Whole]:

@@ -1,0 +1,53 @@
+"""From walks along the edge to simple rings: the cells of a stable set."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.polygon import orient
+
+Floats = NDArray[np.float64]
+# Angles, K and B along every arc of every ring.
+Samples = list[list[tuple[Floats, Floats, Floats]]]
+
+
+def outline(arcs: list[tuple[Floats, Floats, Floats]]) -> Floats:
+    """A ring's arcs as one closed walk of points (k, 2)."""
+    points = np.vstack([np.column_stack([K[:-1], B[:-1]]) for _, K, B in arcs])
+    return np.vstack([points, points[:1]])
+
+
+def signed_area(ring: Floats) -> float:
+    """Positive where a closed ring runs counter-clockwise."""
+    x, y = ring[:, 0] - ring[0, 0], ring[:, 1] - ring[0, 1]
+    return float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) / 2.0)
+
+
+def cells(outlines: list[Floats]) -> tuple[Floats, ...]:
+    """Outlines as simple counter-clockwise rings; a cell with holes is cut through each of them."""
+    holes = [outline for outline in outlines if signed_area(outline) < 0.0]
+    solid = [outline for outline in outlines if signed_area(outline) > 0.0]
+    rings: list[Floats] = []
+    for outline in solid:
+        inside = [hole for hole in holes if shapely.contains_xy(shapely.Polygon(outline), *hole[0])]
+        cell = shapely.Polygon(outline, inside)
+        if not inside and cell.is_valid:
+            rings.append(outline)
+            continue
+        # Rounding can cross two chords in a corner of many branches: loops of no area, which are dropped
+        parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(cell)))  # a collection may hold collections
+        real = [part for part in parts if isinstance(part, shapely.Polygon) and part.area > 1e-12 * cell.area]
+        rings += [np.array(orient(piece).exterior.coords) for part in real for piece in cut(part)]
+    return tuple(rings)
+
+
+def cut(cell: shapely.Polygon) -> list[shapely.Polygon]:
+    """A polygon with holes as polygons without, cut upright through each hole's middle."""
+    if not cell.interiors:
+        return [cell]
+    left, low, right, high = cell.bounds
+    middle = shapely.Polygon(cell.interiors[0]).centroid.x
+    halves = (shapely.box(left, low, middle, high), shapely.box(middle, low, right, high))
+    parts = [part for half in halves for part in shapely.get_parts(shapely.intersection(cell, half))]
+    return [piece for part in parts if isinstance(part, shapely.Polygon) for piece in cut(part)]
