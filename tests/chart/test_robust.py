@@ -230,3 +230,26 @@ def test_near_twins_are_told_apart_where_chords_are_not():
     assert chart.stiffness_max == pytest.approx(stiffest, rel=1e-6)
     radius = [judge(loop, chart.stiffness_max, chart.damping_at_stiffness_max).spectral_radius for loop in loops]
     assert max(radius) < 1.0 + 1e-6
+
+
+def test_a_straight_edge_alone_can_cut():
+    """The line of a root at z = 1 of a heavy, well damped member; its curves run far outside what is left."""
+    light, heavy = Loop(mass(0.01, 0.0, 1000.0), Controller(0.001)), Loop(mass(10.0, 50.0, 1.0), Controller(0.001))
+    assert min(ring[:, 0].min() for ring in robust_chart([light]).regions) < -500.0
+    chart = robust_chart([light, heavy])
+    assert min(ring[:, 0].min() for ring in chart.regions) == pytest.approx(-1.0, rel=1e-9)
+    assert chart.binding == (0, 1)
+
+
+def test_curves_nearer_than_chords_cross_once():
+    arm = two_mass(0.2616, 0.0254, 15620.0, 1.8744)
+    rng = np.random.default_rng(0)
+    loops = []
+    for _ in range(1000):
+        numbers = (rng.uniform(0.3, 3.0), 10 ** rng.uniform(2, 3.3), rng.uniform(2, 20), 10 ** rng.uniform(3, 4.5))
+        loops.append(Operator(*numbers, rng.uniform(1, 50)))
+    chosen = [Loop(attach(arm, loops[k]), Controller(0.00125)) for k in (53, 254, 827, 883)]
+    chart = robust_chart(chosen)
+    assert [arc.member for arc in chart.boundary].count(2) == 1
+    assert len(chart.boundary) == 5
+    assert chart.corner_blur == 0.0
