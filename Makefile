@@ -50,7 +50,7 @@ bench: $(VENV)/.installed-test
 	@$(DROP_KERNELS)
 	@set -e; for script in benchmarks/[!_]*.py; do echo "== $$script"; $(BIN)/python "$$script"; done
 
-docs: $(VENV)/.installed
+docs: $(VENV)/.installed-test
 	@set -e; for script in docs/[!_]*.py; do echo "== $$script"; $(BIN)/python "$$script"; done
 
 clean:

@@ -1,4 +1,4 @@
-"""Chapter 3: the device, the bilateral wall, the filter."""
+"""Chapter 3: the device, the bilateral wall, the filter, the operator."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from gallery import fig_3_7_bilateral_wall as wall
 from gallery import fig_3_8_frequencies as vibration
 from gallery import fig_3_9_no_damping as undamped
 from gallery import fig_3_11_filter as low_pass
+from gallery import fig_3_12_operator as hand
 from gallery import table_3_4 as device
 from gallery.brute_force import Judge, butterworth
 from zwidth.chart.chart import StabilityChart
@@ -282,6 +283,58 @@ def figure_3_11() -> list[Row]:
     ]
 
 
+def figure_3_12() -> list[Row]:
+    """The operator."""
+    judge = hand.judge_of(hand.ASSUMED)
+    K, B, f = judge.largest_stiffness(20000.0, 60.0)
+    held, alone = hand.chart, hand.alone
+    return [
+        Number(
+            "Fig. 3.12", "in the operator's hand: largest stiffness", held.stiffness_max, "N/m", judge=K, digits=9
+        ),
+        Number("Fig. 3.12", "damping there", held.damping_at_stiffness_max, "N s/m", judge=B, within=1e-5),
+        Number("Fig. 3.12", "frequency there", held.frequencies_at_stiffness_max[0], "Hz", judge=f, within=1e-5),
+        Claim(
+            "3.3",
+            "what the passive operator (3.23)–(3.24) does",
+            "a relatively small effect",
+            f"{hand.gain_by_operator:.1%} more stiffness, {hand.area_by_operator:.1%} more area",
+            0.0 < hand.gain_by_operator < 0.05 and 0.0 < hand.area_by_operator < 0.5 * hand.area_by_damping,
+        ),
+        Claim(
+            "3.3",
+            "what the larger stable domain comes from",
+            "mainly the consequence of the assumed increased structural dissipation",
+            f"7.5 % in place of 5 % adds {hand.gain_by_damping:.0%} of stiffness and "
+            f"{hand.area_by_damping:.0%} of area",
+            hand.gain_by_damping > 10.0 * hand.gain_by_operator and hand.area_by_damping > hand.area_by_operator,
+        ),
+        Claim(
+            "3.3",
+            "low virtual damping",
+            "for low virtual damping values the difference is significant",
+            f"walls down to {hand.lowest_damping:.2f} N s/m, undamped ones up to "
+            f"{hand.stiffest_undamped / 1000.0:.2f} kN/m; alone none with B ≤ 0",
+            hand.lowest_damping < -1.0 and bool(np.all(hand.edge(alone)[1] >= -1e-9)),
+        ),
+        Claim(
+            "3.3",
+            "the operator's stiffness",
+            "slightly reduces the physically meaningful (positive) domain",
+            f"with k_h = 580 N/m the positive area is that with k_h = 0, to 1e-7; the static edge is at "
+            f"K = {hand.static_edge:.1f} N/m",
+            hand.area_by_arm_stiffness < -1e-7,
+            Misprint(
+                "the spring moves the static edge to K = −1/(1/k_e + 1/k_c + 1/k_h) = "
+                f"{hand.static_edge_by_hand:.1f} N/m, which takes nothing from K > 0",
+                abs(hand.area_by_arm_stiffness) < 1e-7
+                and abs(hand.static_edge / hand.static_edge_by_hand - 1.0) < 1e-9,
+                kind="not found",
+            ),
+        ),
+    ]
+
+
 def rows() -> list[Row]:
     """All of the chapter."""
-    return [*table_3_4(), *figure_3_7(), *figure_3_8(), *figure_3_9(), *figure_3_11()]
+    return [*table_3_4(), *figure_3_7(), *figure_3_8(), *figure_3_9(), *figure_3_11(), *figure_3_12()]

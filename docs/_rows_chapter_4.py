@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from docs._row import Claim, Misprint, Number, Row
+from gallery import chapter_4_completed as completed
 from gallery import fig_4_1_rigid as rigid
 from gallery import fig_4_2_delay as delay
 from gallery import fig_4_3_mass_spring as spring
 from gallery import fig_4_4_models as models
 from gallery import optimal_mass as optimum
+from gallery import which_model_where as where
 from gallery.brute_force import Judge
 
 
@@ -120,10 +122,62 @@ def figure_4_2() -> list[Row]:
             ),
         ),
     ]
-    for l in delay.DELAYS:
-        p, d, _ = Judge(1.0, 0.0, 0.0, 1.0, 1.0, delay=l).largest_stiffness(1.0, 2.0)
-        rows.append(Number("(4.26)", f"l = {l}: largest p", delay.largest_p[l], judge=p))
-        rows.append(Number("(4.26)", f"l = {l}: its d", delay.d_at_largest_p[l], judge=d, within=1e-6))
+    for l, (largest_p, its_d) in completed.delayed.items():
+        p, d = completed.judged_late(l)
+        rows.append(Number("(4.26)", f"l = {l}: largest p", largest_p, judge=p))
+        rows.append(Number("(4.26)", f"l = {l}: its d", its_d, judge=d, within=1e-6))
+    rows.append(
+        Claim(
+            "(4.26)",
+            "any whole delay in closed form",
+            "solved for l = 0 (4.29) and l = 1 (4.32)",
+            "(l + 1) sin t tan((l + 1) t) = 2 at the tip, on the unit circle; charts agree to 1e-9, "
+            f"l = 0 to {max(completed.DELAYS)}",
+            completed.error_of_delayed < 1e-9,
+        )
+    )
+    return rows
+
+
+def completed_4_9() -> list[Row]:
+    """The damped rigid wall with the root that (4.9) leaves out."""
+    tried = ", ".join(f"{beta:g}" for beta in completed.FRICTIONS)
+    rows: list[Row] = [
+        Claim(
+            "(4.9)",
+            "completed by the root z = −1",
+            "–",
+            f"with p + 2 d < 2 β/(1 − tanh(β/2)/(β/2)) as well, largest p and its d agree with charts to 1e-9 at "
+            f"β = {tried}",
+            completed.error_of_completed < 1e-9,
+        ),
+        Claim(
+            "(4.9)",
+            "completed: where no wall damping is best",
+            "–",
+            f"from β = {completed.beta_on_the_axis:.4f} on the stiffest wall has d = 0",
+            completed.on_the_axis[0] > 0.0 == completed.on_the_axis[1],
+        ),
+    ]
+    for beta in completed.FRICTIONS[-2:]:
+        p, d = completed.judged(beta)
+        rows.append(Number("(4.9)", f"completed, β = {beta:g}: largest p", completed.completed[beta][0], judge=p))
+        (its_p, its_d), tip = completed.completed[beta], completed.printed[beta]
+        rows.append(
+            Claim(
+                "(4.10)",
+                f"largest p at β = {beta:g}",
+                f"the formula gives {tip[0]:.4f}",
+                f"{its_p:.4f} at d = {its_d:.4f}",
+                abs(tip[0] / p - 1.0) < 1e-5,
+                Misprint(
+                    "its tip lies beyond the root z = −1; brute force has "
+                    f"{p:.4f} at d = {d:.4f}, as the completed form",
+                    abs(p / its_p - 1.0) < 1e-7 and abs(d - its_d) < 1e-6 and tip[0] > p,
+                    kind="incomplete",
+                ),
+            )
+        )
     return rows
 
 
@@ -249,6 +303,36 @@ def figure_4_4() -> list[Row]:
             f"area {bare.stable_area:.0f} against {full.stable_area:.0f} N² s/m²",
             bare.stable_area < full.stable_area,
         ),
+        *which_model_where(),
+    ]
+
+
+def which_model_where() -> list[Row]:
+    """4.3 by the frequency along the edge."""
+    share = where.rigid_below / where.natural
+    return [
+        Claim(
+            "4.3",
+            "rigid model",
+            "approximates well where the dominant frequency is far below the first natural frequency",
+            f"within 10 % of two masses below {where.rigid_below:.2f} Hz, {share:.0%} of {where.natural:.1f} Hz",
+            where.rigid == ((where.lowest, where.rigid_below),) and where.rigid_below < 0.5 * where.natural,
+        ),
+        Claim(
+            "4.3",
+            "motor's mass on its spring, damped",
+            "gives good representation at high dominant frequencies",
+            f"within 10 % above {where.motor_above:.1f} Hz, up to the edge's highest, {where.highest:.1f} Hz",
+            where.motor == ((where.motor_above, where.highest),) and where.motor_above > where.rigid_below,
+        ),
+        Claim(
+            "4.3",
+            "between them",
+            "structural flexibility has to be considered",
+            f"from {where.rigid_below:.2f} to {where.motor_above:.1f} Hz neither is within 10 %; the motor's mass "
+            "without damping nowhere is",
+            where.rigid_below < where.motor_above and not where.motor_undamped,
+        ),
     ]
 
 
@@ -290,4 +374,4 @@ def optimal_spectral_radius() -> list[Row]:
 
 def rows() -> list[Row]:
     """All of the chapter, and what chapter 5 has of it."""
-    return [*figure_4_1(), *figure_4_2(), *figure_4_3(), *figure_4_4()]
+    return [*figure_4_1(), *completed_4_9(), *figure_4_2(), *figure_4_3(), *figure_4_4()]

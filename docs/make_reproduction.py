@@ -11,9 +11,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from docs import _rows_algebra as algebra
 from docs import _rows_chapter_3 as chapter_3
 from docs import _rows_chapter_4 as chapter_4
 from docs import _rows_chapter_5 as chapter_5
+from docs import _rows_chapters_1_2 as chapters_1_2
 from docs._row import Row
 
 Sections = list[tuple[str, list[Row]]]
@@ -38,8 +40,10 @@ by a script of the [gallery](../gallery) when this page was written, and so was 
 """
 
 SECTIONS = (
+    ("Chapters 1 and 2: what is compared with, several directions", chapters_1_2.rows),
     ("Chapter 3: the device and its walls", chapter_3.rows),
     ("Chapter 4: closed forms", chapter_4.rows),
+    ("Chapter 4 and Appendix A: by computer algebra", algebra.rows),
     ("Chapter 5: measures and design", chapter_5.rows),
 )
 
@@ -49,11 +53,12 @@ NOT_COVERED = """## Not covered yet
   points A to D of Fig. 3.10, the Coulomb friction and the encoder's step of 3.2.5. None is invented.
 - Fig. 3.6: measured frequency responses.
 - Fig. 3.10: responses at its points (only the fastest-decaying wall, E, is here).
-- Fig. 3.12, (3.23)-(3.24): the human operator.
+- Fig. 3.12: the measured points; only the model's curve is here.
 - Figs. 5.1-5.4, 5.6-5.9: measures over the workspace and over designs. Of Fig. 5.5 only the rigid model's factor
   is here. Fig. 5.8's minimum at L1 = 0.146 m has not been looked into.
 - Figs. 5.10-5.14: trajectories of eigenvalues and responses (of 5.3.2 the optimal masses are here).
-- 1.1: two-port networks, virtual couplings and time-domain passivity are not compared with.
+- 1.1: two-port networks and virtual couplings are computed ([Guarantees](guarantees.md)), but the thesis gives no
+  number to compare with; time-domain passivity is not covered.
 """
 
 

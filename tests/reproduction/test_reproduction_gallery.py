@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gallery import chapter_4_algebra as algebra
+from gallery import chapter_4_completed as completed
 from gallery import fig_3_7_bilateral_wall as wall
 from gallery import fig_3_8_frequencies as vibration
 from gallery import fig_3_9_no_damping as undamped
@@ -16,6 +18,9 @@ from gallery import fig_4_3_mass_spring as spring
 from gallery import fig_4_4_models as models
 from gallery import fig_5_5_base_distance as base
 from gallery import optimal_mass, table_3_4
+from gallery import rendered_directions as plane
+from gallery import spring_stability as worst
+from gallery import which_model_where as where
 from gallery.brute_force import Judge, butterworth
 
 # Transition matrix by matrix exponential, eigenvalues: largest stiffness, its damping and frequency, largest
@@ -164,6 +169,57 @@ def test_the_models_of_figure_4_4():
     assert models.motor_mass_undamped.stiffness_max == pytest.approx(models.closed_form, rel=1e-11)
     assert models.low_edge_rigid == pytest.approx(models.low_edge, rel=0.05)
     assert models.high_edge_motor_mass == pytest.approx(models.high_edge, rel=0.01)
+
+
+def test_the_damped_rigid_wall_completed():
+    assert completed.error_of_completed < 1e-12
+    assert completed.beta_on_the_axis == pytest.approx(3.7208, abs=5e-5)
+    for beta in completed.FRICTIONS:
+        p, d = completed.judged(beta)
+        assert completed.completed[beta][0] == pytest.approx(p, rel=1e-10)
+        assert completed.completed[beta][1] == pytest.approx(d, abs=1e-6)
+        assert (completed.printed[beta][0] > 1.0001 * p) == (beta > 3.659)
+
+
+def test_delays_in_closed_form():
+    assert completed.error_of_delayed < 1e-12
+    assert completed.delayed[4] == pytest.approx((0.022162, 0.179944), abs=5e-7)
+    assert completed.delayed[5] == pytest.approx((0.015354, 0.151154), abs=5e-7)
+
+
+def test_chapter_4_by_algebra():
+    assert (str(algebra.limit_of_eps), str(algebra.limit_of_rest), str(algebra.limit_of_slope)) == (
+        "1",
+        "1/2",
+        "1/2",
+    )
+    assert all((algebra.as_4_26, algebra.as_4_27, algebra.as_4_28, algebra.as_4_30, algebra.as_4_31))
+    assert algebra.as_A_2
+    assert algebra.as_A_3
+    assert algebra.by_roots == {"stable": 994, "unstable": 2006, "wrong": 0}
+    assert not algebra.same(algebra.no_delay[1], algebra.one_sample[1])
+
+
+def test_several_directions():
+    assert plane.coupling < 1e-10
+    assert plane.outside < 1e-7
+    assert max(plane.error_of_2_28, plane.error_of_2_34) < 1e-13
+    assert plane.frequencies_of_masses == pytest.approx(plane.frequencies_of_full, rel=1e-10)
+    assert plane.frequencies_of_masses == pytest.approx(table_3_4.frequencies, rel=1e-8)
+
+
+def test_spring_stability():
+    assert worst.largest_p_on_the_spring == pytest.approx(worst.judged_on_the_spring, rel=1e-10)
+    assert worst.largest_p == pytest.approx(worst.judged_at_its_d, rel=1e-10)
+    assert worst.passive_p < worst.largest_p < worst.largest_p_on_the_spring < worst.stable_p
+    assert 0.99 < worst.worst_radius_inside < 1.0
+
+
+def test_which_model_where():
+    assert where.natural == pytest.approx(130.7272, abs=5e-5)
+    assert (where.rigid_below, where.motor_above) == pytest.approx((20.29, 144.9), abs=0.05)
+    assert len(where.rigid) == len(where.motor) == 1
+    assert where.motor_undamped == ()
 
 
 def test_chapter_5():
