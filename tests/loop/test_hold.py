@@ -110,3 +110,19 @@ def test_a_coupled_pair_at_critical_damping_keeps_its_digits(detuning):
     z = np.array([1.3 + 0.2j, 0.7j, np.exp(0.1j)])
     got = rows_response(sampled_sections(plant, 0.1, 0.4).rows, True, z)
     assert got == pytest.approx(sampled_response(plant, 0.1, 0.4, z), rel=1e-11)
+
+
+def test_where_two_braked_motions_come_to_rest_is_one_pole():
+    """Two free, coupled coordinates with friction: what the sensor reads of where they stop is one number."""
+    M = np.array([[0.2, 0.12], [0.12, 0.3]])
+    z = np.array([1.3 + 0.2j, 0.7j, np.exp(0.1j)])
+    for B in (np.eye(2), np.array([[1.0, 0.3], [0.3, 0.5]])):
+        for sensor in (np.array([1.0, 0.0]), np.array([0.3, -1.0])):
+            plant = Plant(M, B, np.zeros((2, 2)), np.array([1.0, 0.0]), sensor)
+            sections = sampled_sections(plant, 0.01, 0.4)
+            assert rows_response(sections.rows, True, z) == pytest.approx(
+                sampled_response(plant, 0.01, 0.4, z), rel=1e-11
+            )
+            at_one = np.count_nonzero(np.abs(sections.rows[:, 1]) < 1e-14)
+            assert at_one == 1
+            assert sections.unobserved == ("rigid motion (0 Hz)",)

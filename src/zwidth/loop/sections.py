@@ -58,7 +58,8 @@ def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: fl
             "nothing else; describe the damping by damping_Ns_per_m instead"
         )
     modes = real_modes(plant)
-    if modes is not None:
+    # two motions that are braked only come to rest somewhere: where, is one pole at z = 1 that both share
+    if modes is not None and np.count_nonzero((modes.frequency_squared == 0.0) & (modes.decay != 0.0)) < 2:
         sections = _modal_sections(modes, period, fraction, lag)
     else:
         sections = _chained_sections(first_order_form(plant, period), period, fraction, lag)

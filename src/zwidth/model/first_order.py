@@ -16,6 +16,7 @@ Complexes = NDArray[np.complex128]
 # A pole whose left and right vectors are this near to orthogonal shares its motion with a neighbour.
 SHARED = 1e-3
 ZERO = 1e-13  # a pole below this share of the largest is a rounded zero
+UNREAD = 1e-12  # share of a sensor's reading that is rounding
 ROUNDING = 1e-13  # of a residue, in shares of the terms that it is summed from
 
 
@@ -46,18 +47,22 @@ def first_order_form(plant: Plant, period: float) -> FirstOrderForm:
     """The plant's first-order form on coordinates, velocities [m per period] and forces of lagged dampers.
 
     Motions with neither stiffness nor damping are split off: they are M-orthogonal to the rest, and their double
-    pole at 0 is known exactly. Hidden is a pole that moves the reading within a period T [s] by no
-    more than rounding.
+    pole at 0 is known exactly. Where motions that are braked only have come to is told by what of it the sensor
+    reads, one state for all of them. Hidden is a pole that moves the reading within a period T [s] by no more than
+    rounding.
     """
-    free, kept = _free_motions(plant)
-    A, source, reading = _assembled(plant, kept, period)
+    free, braked, elastic = _motions(plant)
+    kept = np.hstack([braked, elastic])
+    A, source, reading = _assembled(plant, braked, kept, period)
     ends = np.abs(np.hstack([free, kept]).T @ np.stack([plant.actuator, plant.sensor], axis=1))
     together = float(np.prod(ends.sum(axis=0)))
     poles, hidden = _poles(A, source, reading, period, together * period**2)
     inertia = float((free.T @ plant.sensor) @ (free.T @ plant.actuator))
     if abs(inertia) <= UNOBSERVED_UNDAMPED * together:
         inertia = 0.0
-    return FirstOrderForm(A, source, reading, poles[~hidden], poles[hidden], inertia, int(free.shape[1]))
+    unread = np.zeros(2 * kept.shape[1] + len(plant.lagged_dampers) - len(A), dtype=complex)
+    left_out = np.concatenate([poles[hidden], unread])
+    return FirstOrderForm(A, source, reading, poles[~hidden], left_out, inertia, int(free.shape[1]))
 
 
 def _drag(plant: Plant) -> Floats:
@@ -66,32 +71,43 @@ def _drag(plant: Plant) -> Floats:
     return np.asarray(plant.damping + sum(lagged, np.zeros_like(plant.damping)))
 
 
-def _free_motions(plant: Plant) -> tuple[Floats, Floats]:
-    """Mass-normalised motions (n, f) with neither stiffness nor damping, and the others (n, k)."""
+def _motions(plant: Plant) -> tuple[Floats, Floats, Floats]:
+    """Mass-normalised motions: free of stiffness and damping (n, f), braked but free of stiffness (n, b), and
+    elastic (n, e)."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     drag = _drag(plant)
     rigid, elastic = shapes[:, squared == 0.0], shapes[:, squared != 0.0]
-    braked, axes = np.linalg.eigh(rigid.T @ drag @ rigid)
+    brakes, axes = np.linalg.eigh(rigid.T @ drag @ rigid)
     level = 1e-13 * max(float(np.max(np.abs(shapes.T @ drag @ shapes))), np.finfo(float).tiny)
-    slides = np.abs(braked) <= level
-    return rigid @ axes[:, slides], np.hstack([rigid @ axes[:, ~slides], elastic])
+    slides = np.abs(brakes) <= level
+    return rigid @ axes[:, slides], rigid @ axes[:, ~slides], elastic
 
 
-def _assembled(plant: Plant, kept: Floats, period: float) -> tuple[Floats, Floats, Floats]:
-    """A, input and output on the motions kept."""
-    k, lags = kept.shape[1], plant.lagged_dampers
-    n = 2 * k + len(lags)
-    A = np.zeros((n, n))
-    A[:k, k : 2 * k] = np.eye(k) / period
-    A[k : 2 * k, :k] = -(kept.T @ plant.stiffness @ kept) * period
-    A[k : 2 * k, k : 2 * k] = -(kept.T @ plant.damping @ kept)
+def _assembled(plant: Plant, braked: Floats, kept: Floats, period: float) -> tuple[Floats, Floats, Floats]:
+    """A, input and output on [what is read of the braked motions, elastic coordinates, velocities of both, forces
+    of the lagged dampers]."""
+    k, b, lags = kept.shape[1], braked.shape[1], plant.lagged_dampers
+    elastic = kept[:, b:]
+    read = braked.T @ plant.sensor
+    size = float(np.linalg.norm(read))
+    if size <= UNREAD * float(np.linalg.norm(kept.T @ plant.sensor)):
+        read, size = read[:0], 0.0
+    x = int(size > 0.0) + k - b  # coordinates come first, then k velocities
+    n = x + k + len(lags)
+    A, source, reading = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    if size > 0.0:
+        A[0, x : x + b], reading[0] = read / size / period, size
+    at = slice(x - (k - b), x)
+    A[at, x + b : x + k] = np.eye(k - b) / period
+    A[x : x + k, at] = -(kept.T @ plant.stiffness @ elastic) * period
+    A[x : x + k, x : x + k] = -(kept.T @ plant.damping @ kept)
     for i, damper in enumerate(lags):
-        along = kept.T @ damper.along
-        A[k : 2 * k, 2 * k + i] = -damper.damping * along
-        A[2 * k + i, k : 2 * k] = along / damper.time_constant
-        A[2 * k + i, 2 * k + i] = -1.0 / damper.time_constant
-    source = np.concatenate([np.zeros(k), kept.T @ plant.actuator * period, np.zeros(len(lags))])
-    reading = np.concatenate([kept.T @ plant.sensor, np.zeros(k + len(lags))])
+        along, own = kept.T @ damper.along, x + k + i
+        A[x : x + k, own] = -damper.damping * along
+        A[own, x : x + k] = along / damper.time_constant
+        A[own, own] = -1.0 / damper.time_constant
+    source[x : x + k] = kept.T @ plant.actuator * period
+    reading[at] = elastic.T @ plant.sensor
     return A, source, reading
 
 
