@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.chart.chart import Samples, _cells, _outline
+from zwidth.chart.cells import Samples, cells, outline
 from zwidth.chart.outline import CHORD, quadrant_area, sample_arc
 from zwidth.chart.region import ChartError
 from zwidth.chart.robust_common import Shapes, common, excluding
@@ -134,7 +134,7 @@ def robust_of(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart
     return RobustChart(
         members={index: member.tracer.loop for index, member in charted.items()},
         failed=failed,
-        regions=_cells([_outline(arcs) for arcs in samples]),
+        regions=cells([outline(arcs) for arcs in samples]),
         boundary=tuple(
             RobustArc(piece.member.index, K, B, thetas / (2.0 * np.pi * piece.member.tracer.period))
             for ring, arcs in zip(rings, samples, strict=True)

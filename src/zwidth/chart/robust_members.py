@@ -10,7 +10,8 @@ import shapely
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import Arc, Rings
-from zwidth.chart.chart import Samples, _signed_area, _traced, _width
+from zwidth.chart.cells import Samples, signed_area
+from zwidth.chart.chart import traced, widest
 from zwidth.chart.hurwitz import is_stable, working_room
 from zwidth.chart.peak import Peak, stiffest
 from zwidth.chart.region import ChartError
@@ -76,8 +77,8 @@ def chart_members(loops: Sequence[Loop]) -> tuple[dict[int, Member], dict[int, s
 def chart_member(index: int, loop: Loop) -> Member:
     """One loop's arcs, outlines and stiffest wall. Raises ChartError."""
     tracer = Tracer.of(loop)
-    rings, _, samples, outlines = _traced(tracer)
-    return Member(index, tracer, rings, samples, tuple(outlines), stiffest(tracer, rings, _width(outlines)))
+    rings, _, samples, outlines = traced(tracer)
+    return Member(index, tracer, rings, samples, tuple(outlines), stiffest(tracer, rings, widest(outlines)))
 
 
 def polygons(outlines: Sequence[Floats], unit: float) -> shapely.MultiPolygon:
@@ -86,8 +87,8 @@ def polygons(outlines: Sequence[Floats], unit: float) -> shapely.MultiPolygon:
     unit  seconds: K T and B have one unit, in which distances between walls are taken
     """
     scaled = [outline * (unit, 1.0) for outline in outlines]
-    solid = [outline for outline in scaled if _signed_area(outline) > 0.0]
-    holes = [outline for outline in scaled if _signed_area(outline) < 0.0]
+    solid = [outline for outline in scaled if signed_area(outline) > 0.0]
+    holes = [outline for outline in scaled if signed_area(outline) < 0.0]
     found: list[shapely.Polygon] = []
     for outline in solid:
         cell = shapely.Polygon(outline)
