@@ -46,7 +46,7 @@ def chain(form: FirstOrderForm, period: float, fraction: float = 0.0, lag: float
     """
     T, rest = period, (1.0 - fraction) * period
     E, P, Q = _step(form, T, lag)
-    _, _, Q_new = _step(form, rest, lag)
+    Q_new = _step(form, rest, lag)[2] if fraction > 0.0 else Q
     s, s_new = lag_share(T, lag), lag_share(rest, lag)
     if lag > 0.0:
         new = s_new * P + s * Q_new + E @ Q_new

@@ -111,12 +111,15 @@ def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag:
         alone.append([*row, 0.0])
     unobserved = [_label(0.0, 0.0)] * (form.free_count - len(alone))
     unobserved += [_pole_label(pole) for pole in form.hidden if pole.imag >= 0.0]
-    rows = chain_rows(form, chain(form, period, fraction, lag), period)
+    sampled = chain(form, period, fraction, lag)
+    rows = chain_rows(form, sampled, period)
     m = len(rows)
     while m and _repeats(rows[m - 1], rows[: m - 1]):
         m -= 1
     unobserved += ["motion that decays as another one does"] * (len(rows) - m)
-    states = chain(seen(form), period, fraction, lag) if m == len(rows) else None
+    if len(form.hidden):
+        sampled = chain(seen(form), period, fraction, lag)
+    states = sampled if m == len(rows) else None
     chained = np.column_stack([rows[:m], np.arange(m) > 0])
     return Sections(np.vstack([np.array(alone).reshape(-1, 9), chained]), tuple(unobserved), states)
 
