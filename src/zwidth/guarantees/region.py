@@ -22,12 +22,14 @@ class Region:
     stiffness_max  supremum of K over its walls with K > 0, B >= 0 [N/m]; nan if there is none
     damping_at_stiffness_max  [N s/m]; nan if there is none
     reason         why there is no wall with K > 0, B >= 0; None if there is one
+    warning        what the guarantee lacks; None if nothing
     """
 
     rings: tuple[Floats, ...]
     stiffness_max: float
     damping_at_stiffness_max: float
     reason: str | None = None
+    warning: str | None = None
 
     @property
     def polygon(self) -> Any:

@@ -1,0 +1,162 @@
+"""The edge that a continuum of springs leaves: the envelope of their curves.
+
+The curve of walls with a root on the circle, W(theta, s), moves as the spring s does. What it sweeps over is not
+stable with every spring. Where the sweep ends, the curve of one spring turns back: its motion runs along itself,
+
+    dK/dtheta dB/ds - dB/dtheta dK/ds = 0
+
+and there it touches the envelope. A few touching points and their tangents, joined by cubics, follow it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from zwidth.chart.curve import wall_at
+from zwidth.compiled import compiled
+from zwidth.guarantees.port import Floats
+from zwidth.guarantees.spring_family import Springs
+from zwidth.loop.evaluate import Factors, velocity_response
+
+# Largest distance of a touching point from the cubic through its neighbours, and of chords from the cubic, in
+# shares of the set's size.
+CUBIC, CHORD = 2e-7, 1e-8
+# A stretch is halved at most so often; one this short needs no look.
+HALVINGS, SHORT = 9, 1e-7
+# A tangent steeper than this against the chord is too far away to join to.
+STEEPEST = 0.7
+# Pieces of curve between which its turning is looked for.
+PIECES = 24
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Where the curve of one spring touches the envelope.
+
+    share, theta  spring and angle
+    wall          [K unit, B]
+    along         tangent, of length 1, the stable side on its left
+    """
+
+    share: float
+    theta: float
+    wall: Floats
+    along: Floats
+
+
+@compiled
+def _turning(own: Factors, beside: Factors, theta: float) -> float:
+    """Determinant of the derivatives by theta and by the spring, its scale aside."""
+    K, B, dK, dB = wall_at(own, 1.0, theta)
+    K1, B1, _, _ = wall_at(beside, 1.0, theta)
+    turning: float = dK * (B1 - B) - dB * (K1 - K)
+    return turning
+
+
+@compiled
+def _touches(own: Factors, beside: Factors, first: float, last: float, pieces: int) -> Floats:
+    """Angles between two others at which the curve turns back, poles left out."""
+    out, n = np.empty(pieces), 0
+    step = (last - first) / pieces
+    before = _turning(own, beside, first)
+    for i in range(pieces):
+        a, b = first + i * step, first + (i + 1) * step
+        after = _turning(own, beside, b)
+        if (before > 0.0) != (after > 0.0):
+            ends = min(abs(before), abs(after))
+            for _ in range(50):
+                middle = 0.5 * (a + b)
+                at = _turning(own, beside, middle)
+                if (at > 0.0) == (before > 0.0):
+                    a = middle
+                else:
+                    b = middle
+            if abs(_turning(own, beside, 0.5 * (a + b))) <= ends:
+                out[n] = 0.5 * (a + b)
+                n += 1
+        before = after
+    return out[:n]
+
+
+def touches(springs: Springs, share: float, first: float, last: float, pieces: int = PIECES) -> list[Touch]:
+    """All touching points of a spring between two angles."""
+    pair = springs.beside(share)
+    if pair is None:
+        return []
+    own, beside = pair[0].factors, pair[1].factors
+    first, last = max(min(first, last), 1e-7), min(max(first, last), np.pi - 1e-7)
+    found = []
+    for theta in _touches(own, beside, first, last, pieces):
+        K, B, dK, dB = wall_at(own, 1.0, float(theta))
+        unit = springs.unit
+        z = complex(np.exp(1j * theta))
+        left = 1.0 if velocity_response(own, z, z - 1.0)[0].imag > 0.0 else -1.0
+        along = left * np.array([dK * unit, dB])
+        found.append(Touch(share, float(theta), np.array([K * unit, B]), along / max(np.hypot(*along), 1e-300)))
+    return found
+
+
+def nearest_touch(springs: Springs, share: float, theta: float, reach: float) -> Touch | None:
+    """The touching point of a spring nearest to an angle, within reach of it."""
+    for wide in (0.25 * reach, reach):
+        found = touches(springs, share, theta - wide, theta + wide, 8)
+        if found:
+            return min(found, key=lambda touch: abs(touch.theta - theta))
+    return None
+
+
+def stretch(
+    springs: Springs, one: Touch, other: Touch, shape: shapely.Geometry, size: float, depth: int = HALVINGS
+) -> list[Floats]:
+    """The envelope between two touching points as walks (n, 2), the stable side on their left, where it is near a
+    shape; nothing where it does not join them."""
+    length = float(np.hypot(*(other.wall - one.wall)))
+    if shapely.distance(shape, shapely.LineString([one.wall, other.wall])) > length:
+        return []
+    if length < SHORT * size:
+        return [np.array([one.wall, other.wall])[:: _way(one, other)]]
+    share = 0.5 * (one.share + other.share)
+    reach = 0.75 * abs(other.theta - one.theta) + 1e-9
+    middle = nearest_touch(springs, share, 0.5 * (one.theta + other.theta), reach)
+    if middle is None:
+        return []
+    halves = _cubic(one, middle, size), _cubic(middle, other, size)
+    whole = _cubic(one, other, size)
+    if whole is not None and halves[0] is not None and halves[1] is not None:
+        off = shapely.distance(shapely.LineString(whole), shapely.Point(middle.wall))
+        if off < CUBIC * size:
+            return [np.vstack([halves[0], halves[1][1:]])[:: _way(one, other)]]
+    if depth == 0:
+        return []
+    first = stretch(springs, one, middle, shape, size, depth - 1)
+    return first + stretch(springs, middle, other, shape, size, depth - 1)
+
+
+def _way(one: Touch, other: Touch) -> int:
+    """1 if the stable side is on the left from one to the other, -1 if on the right."""
+    return 1 if float((other.wall - one.wall) @ one.along) >= 0.0 else -1
+
+
+def _cubic(one: Touch, other: Touch, size: float) -> Floats | None:
+    """The cubic over the chord of two touching points with their tangents, as points; None if it is steep."""
+    gap = other.wall - one.wall
+    length = float(np.hypot(*gap))
+    if length == 0.0:
+        return np.array([one.wall, other.wall])
+    ahead = gap / length
+    aside = np.array([-ahead[1], ahead[0]])
+    slopes = []
+    if _way(one, other) != -_way(other, one):
+        return None  # a cusp
+    for touch in (one, other):
+        run, rise = float(touch.along @ ahead), float(touch.along @ aside)
+        if abs(rise) > STEEPEST * abs(run):
+            return None
+        slopes.append(rise / run)
+    sag = length * max(abs(slopes[0]), abs(slopes[1])) / 4.0
+    x = np.linspace(0.0, 1.0, int(np.clip(np.sqrt(sag / (CHORD * size)), 1, 100)) + 1)
+    y = length * (slopes[0] * x * (1.0 - x) ** 2 - slopes[1] * x * x * (1.0 - x))
+    return np.asarray(one.wall + np.outer(x * length, ahead) + np.outer(y, aside))

@@ -1,0 +1,131 @@
+"""A loop with a spring at its handle, for springs from none to one that holds it fixed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from zwidth.chart.robust_members import Member, chart_member, polygons
+from zwidth.chart.tracer import Tracer
+from zwidth.guarantees.port import Floats, fixed
+from zwidth.loop.loop import Loop
+from zwidth.loop.sections import UnmovedError
+from zwidth.model.modes import undamped_modes
+from zwidth.model.plant import Plant
+
+# Derivatives by the share are taken across this part of s (1 - s), and across this at the ends.
+STEP, STEP_AT_ENDS = 1e-6, 1e-8
+
+
+def with_spring(plant: Plant, stiffness: float) -> Plant:
+    """The plant with a spring from its handle to the ground [N/m]; inf holds the handle fixed.
+
+    >>> one = np.ones(1)
+    >>> free = Plant(np.array([[0.1]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one, one)
+    >>> with_spring(free, 500.0).stiffness.tolist()
+    [[500.0]]
+    """
+    handle = handle_of(plant)
+    if np.isinf(stiffness):
+        return fixed(plant, handle)
+    return replace(plant, stiffness=plant.stiffness + stiffness * np.outer(handle, handle))
+
+
+def handle_of(plant: Plant) -> Floats:
+    """The plant's handle. Raises ValueError if it has none."""
+    if plant.handle is None:
+        raise ValueError("the plant has no handle for a spring to act at")
+    return plant.handle
+
+
+def spring_for(plant: Plant, frequency: Floats) -> Floats:
+    """The spring at the handle that puts an undamped mode at frequencies (k,) [rad/s]; negative: none does.
+
+    k = -1/G_hh(jw),      G_hh the undamped compliance at the handle
+    """
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    part = (shapes.T @ handle_of(plant)) ** 2
+    with np.errstate(divide="ignore"):
+        compliance = np.sum(part / (squared - np.asarray(frequency)[:, None] ** 2), axis=-1)
+        return np.asarray(-1.0 / compliance)
+
+
+@dataclass(frozen=True)
+class Springs:
+    """All springs of one loop, by their share  s = k/(k + k0),  0 for none and 1 for a fixed handle.
+
+    loop  without motions that nobody reaches
+    k0    a spring whose mode is near the Nyquist frequency [N/m]
+    """
+
+    loop: Loop
+    k0: float
+    _tracers: dict[float, Tracer | None] = field(default_factory=dict, repr=False)
+    _beside: dict[float, Tracer | None] = field(default_factory=dict, repr=False)
+    _members: dict[float, Member] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, loop: Loop) -> Springs:
+        """The springs of a loop whose plant has a handle."""
+        w = np.pi / loop.period * np.linspace(0.5, 1.5, 11)
+        k = np.abs(spring_for(loop.plant, w))
+        return cls(loop, float(np.median(k[np.isfinite(k) & (k > 0.0)])))
+
+    @cached_property
+    def unit(self) -> float:
+        """Seconds by which K is multiplied to be of the size of B over the walls in question, for distances."""
+        T = self.loop.period
+        some = [polygons(m.outlines, T) for share in (0.0, 0.5, 1.0) if (m := self.member(share)) is not None]
+        left, low, right, high = shapely.intersection_all(some).bounds if some else (np.nan,) * 4
+        return float(T * (high - low) / (right - left)) if right > left else T
+
+    def stiffness(self, share: float) -> float:
+        """k [N/m]."""
+        return self.k0 * share / (1.0 - share) if share < 1.0 else float("inf")
+
+    def shares(self, stiffness: Floats) -> Floats:
+        """s of springs k (n,)."""
+        with np.errstate(invalid="ignore"):
+            return np.where(np.isinf(stiffness), 1.0, stiffness / (stiffness + self.k0))
+
+    def tracer(self, share: float) -> Tracer | None:
+        """The loop with that spring; None where the wall then moves nothing, which is stable."""
+        if share not in self._tracers:
+            self._tracers[share] = self._traced(share)
+        return self._tracers[share]
+
+    def _traced(self, share: float) -> Tracer | None:
+        plant = with_spring(self.loop.plant, self.stiffness(share))
+        if plant.size == 0:
+            return None
+        found = Loop(plant, self.loop.controller)
+        try:
+            return Tracer.of(found) if len(found.sections.rows) else None
+        except UnmovedError:
+            return None
+
+    def beside(self, share: float) -> tuple[Tracer, Tracer] | None:
+        """The loop with that spring and with a slightly stiffer one, softer at the end of all."""
+        if share not in self._beside:
+            step = STEP * share * (1.0 - share) or (STEP_AT_ENDS if share == 0.0 else -STEP_AT_ENDS)
+            self._beside[share] = self._traced(share + step)
+        one, other = self.tracer(share), self._beside[share]
+        return None if one is None or other is None else (one, other)
+
+    def member(self, share: float) -> Member | None:
+        """Its chart; None where every wall is stable. Raises ChartError."""
+        tracer = self.tracer(share)
+        if tracer is None:
+            return None
+        if share not in self._members:
+            self._members[share] = chart_member(len(self._members), tracer.loop)
+        return self._members[share]
+
+
+def parts(shape: shapely.Geometry) -> list[shapely.Polygon]:
+    """The polygons of a geometry."""
+    found = shapely.get_parts(shapely.get_parts(shape))
+    return [part for part in found if isinstance(part, shapely.Polygon) and part.area > 0.0]

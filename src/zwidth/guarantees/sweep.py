@@ -1,0 +1,115 @@
+"""What the springs between those charted sweep over, along the edge of the charted ones' common set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from zwidth.chart.robust_edges import Piece
+from zwidth.guarantees.envelope import Touch, nearest_touch, stretch, touches
+from zwidth.guarantees.port import Floats
+from zwidth.guarantees.spring_family import Springs
+
+# In shares of the set's size: touching points further away do not matter, nor do sweeps wider than this.
+NEAR, WIDEST = 0.05, 0.05
+# From its touching points an envelope is followed to the next spring charted by these parts of the way (nothing is
+# known at first of how the angle moves), ...
+STEPS = (0.02, 0.15, 0.5, 1.0)
+# ... and there it is an envelope found already if its touching point is this near.
+SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What has been found swept so far; walls are [K unit, B].
+
+    found   touching points of each spring
+    strips  between the envelope and the arcs that it touches
+    done    stretches that have been looked at
+    """
+
+    springs: Springs
+    found: dict[float, list[Touch]] = field(default_factory=dict)
+    strips: list[shapely.Polygon] = field(default_factory=list)
+    done: set[tuple[float, float, float, float]] = field(default_factory=set)
+
+    def cut(self, shape: shapely.Geometry, edge: list[tuple[float, Piece]], shares: Floats) -> shapely.Geometry:
+        """A shape without what springs between sweep over.
+
+        edge    of the shape in pieces, each with the share of its spring
+        shares  (n,) of the springs charted, ascending
+        """
+        low, bottom, right, top = shape.bounds
+        size = max(right - low, top - bottom)
+        shapely.prepare(shape)
+        for share in dict.fromkeys(share for share, _ in edge):
+            if share not in self.found:
+                self.found[share] = self._touching(share)
+        binding = {share for share, _ in edge}
+        for one, other in self._neighbours(binding, shares, shape, NEAR * size):
+            self.strips.extend(_strips(self.springs, one, other, shape, size))
+        return shapely.difference(shape, shapely.union_all(self.strips))
+
+    def _touching(self, share: float) -> list[Touch]:
+        """Touching points on the edge of one spring's chart."""
+        member, found = self.springs.member(share), []
+        for _, _, arc in member.arcs() if member else ():
+            if arc.kind == "pair":
+                found += touches(self.springs, share, arc.start, arc.end)
+        return found
+
+    def _neighbours(
+        self, binding: set[float], shares: Floats, shape: shapely.Geometry, near: float
+    ) -> Iterator[tuple[Touch, Touch]]:
+        """Touching points of neighbouring springs on one envelope, each couple once."""
+        for share in sorted(binding):
+            at = int(np.searchsorted(shares, share))
+            for touch in self.found[share]:
+                if shapely.distance(shape, shapely.Point(touch.wall)) > near:
+                    continue
+                for place in (at - 1, at + 1):
+                    if not 0 <= place < len(shares):
+                        continue
+                    other = self._followed(touch, float(shares[place]))
+                    first, last = sorted((touch, other), key=lambda end: end.share)
+                    key = (first.share, round(first.theta, 6), last.share, round(last.theta, 6))
+                    if first.share < last.share and key not in self.done:
+                        self.done.add(key)
+                        yield first, last
+
+    def _followed(self, start: Touch, share: float) -> Touch:
+        """The envelope's touching point towards another spring: with it, or as near to it as the envelope goes."""
+        before, now = start, start
+        for part in STEPS:
+            at = start.share + (share - start.share) * part if part < 1.0 else share
+            drift = 0.0
+            if now.share != before.share:
+                drift = (now.theta - before.theta) / (now.share - before.share) * (at - now.share)
+            after = nearest_touch(self.springs, at, now.theta + drift, max(abs(drift), 0.05))
+            if after is None:
+                break
+            before, now = now, after
+        known = [t for t in self.found.get(share, []) if now.share == share and abs(t.theta - now.theta) < SAME]
+        return known[0] if known else now
+
+
+def _strips(
+    springs: Springs, one: Touch, other: Touch, shape: shapely.Geometry, size: float
+) -> list[shapely.Polygon]:
+    """Strips outside the envelope between two touching points, wide enough for all that their arcs leave."""
+    gap = other.wall - one.wall
+    length = float(np.hypot(*gap))
+    if length == 0.0:
+        return []
+    aside = max(abs(end.along[0] * gap[1] - end.along[1] * gap[0]) for end in (one, other))
+    wide = min(2.0 * aside + 1e-4 * length, WIDEST * size)
+    strips = []
+    for walk in stretch(springs, one, other, shape, size):
+        along = np.gradient(walk, axis=0)
+        along /= np.maximum(np.hypot(*along.T), 1e-300)[:, None]
+        outwards = np.column_stack([along[:, 1], -along[:, 0]])
+        strips.append(shapely.make_valid(shapely.Polygon(np.vstack([walk, (walk + wide * outwards)[::-1]]))))
+    return strips
