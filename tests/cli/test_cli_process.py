@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import pytest
 from tests.cli.cli_run import TWO_MASS, strict
 
 ZWIDTH = Path(sys.executable).with_name("zwidth")
-HELP_WITHIN = 0.3  # seconds
+HELP_WITHIN = 0.3  # seconds of a processor, which other work on the machine does not lengthen
 HEAVY = {"numpy", "numba", "scipy", "matplotlib", "pydantic", "jinja2", "shapely"}
 
 
@@ -25,13 +26,18 @@ def zwidth(*words: object, **options) -> subprocess.CompletedProcess[str]:
     )
 
 
+def processor_time():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 @pytest.mark.parametrize("words", [("--help",), ("devices",)])
 def test_the_command_starts_quickly(words):
     times = []
     for _ in range(5):
-        start = time.perf_counter()
+        before = processor_time()
         assert zwidth(*words).returncode == 0
-        times.append(time.perf_counter() - start)
+        times.append(processor_time() - before)
     assert min(times) < HELP_WITHIN
 
 
