@@ -6,8 +6,10 @@ import shapely
 
 from tests.systems import mass, random_loop, second_matrix
 from zwidth.chart.chart import boundary_points, stability_chart
+from zwidth.chart.hurwitz import QUOTIENT, hurwitz, working_room
 from zwidth.chart.region import ChartError
-from zwidth.loop.controller import Controller
+from zwidth.loop.controller import Controller, FirstOrder
+from zwidth.loop.estimators import CentralDifference
 from zwidth.loop.loop import Loop
 
 # Damping of real structures; loops with undamped modes have a set of their own, since an undamped mode that the
@@ -140,3 +142,23 @@ def test_an_outline_that_crosses_itself_within_rounding_is_still_a_cell():
     assert shapely.unary_union([shapely.Polygon(ring) for ring in chart.regions]).area == pytest.approx(
         252.55, abs=0.01
     )
+
+
+@pytest.mark.parametrize("friction", [0.0, 1e-12, 1e-9])
+@pytest.mark.parametrize("time_constant", [3e-4, 2e-3, 1e-2])
+def test_walls_at_infinity_edge_nothing(friction, time_constant):
+    """Plant and estimate both vanish at half the sampling rate, and the estimate is in phase somewhere: there the
+    curve passes through infinity, where nothing is stable."""
+    low_pass = FirstOrder(time_constant)
+    loop = Loop(mass(0.03, friction), Controller(0.001, 0.0, low_pass, CentralDifference()))
+    chart = stability_chart(loop, decay=False)
+    K, B = chart.stiffness_max, chart.damping_at_stiffness_max
+    inside, outside = (np.abs(np.linalg.eigvals(second_matrix(loop, s * K, B))).max() for s in (0.999, 1.001))
+    assert inside < 1.0 < outside
+
+
+def test_a_polynomial_with_a_negative_coefficient_is_not_hurwitz_whatever_rounding_hides_of_another():
+    room = working_room(3)
+    room[QUOTIENT, :4] = [3.4e13, 6.7, -3.4e13, 6.7]
+    room[QUOTIENT + 1, :4] = [3.4e13, 8.1e13, 3.4e13, 6.7]
+    assert hurwitz(room, QUOTIENT, 3) == -1

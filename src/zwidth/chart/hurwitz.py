@@ -119,9 +119,14 @@ def hurwitz(room: Floats, row: int, degree: int) -> int:
     if plainly != 0:
         return plainly
     sign = 1.0 if room[row, degree] > 0.0 else -1.0
+    hidden = False
     for i in range(degree + 1):
-        if abs(room[row, i]) <= ROUNDING * room[row + 1, i]:
-            return 0
+        value, terms = sign * room[row, i], ROUNDING * room[row + 1, i]
+        if value < -terms:
+            return -1
+        hidden = hidden or not value > terms
+    if hidden:
+        return 0
     _start(room, row, degree, sign)
     for i in range(degree // 2 + 2):
         j = degree - 2 * i
