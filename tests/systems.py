@@ -136,10 +136,10 @@ def random_loop(rng, ratios=RATIOS, kind="chain", features=()):
     if "lag" in features:
         controller = replace(controller, actuator_time_constant=10.0 ** rng.uniform(-2.0, 1.0) / rate)
     if "estimator" in features:
-        controller = replace(controller, velocity=random_method(rng, rate), velocity_filter=None)
+        controller = replace(controller, velocity=random_method(rng, rate))
     if "force-filter" in features:
         low_pass = Butterworth(int(rng.integers(1, 4)), rng.uniform(0.1, 0.9) * rate / 2.0)
-        controller = replace(controller, force_filter=low_pass, velocity_filter=None)
+        controller = replace(controller, force_filter=low_pass)
     if "electrical" in features:
         plant = with_lagged_dampers(rng, plant, rate)
     if "operator" in features:
