@@ -31,7 +31,6 @@ def test_a_paddle_has_its_guarantees_and_couplings(tmp_path):
     assert path.stat().st_size > 1000
 
 
-@pytest.mark.slow  # springs leave undamped modes, whose charts take long
 def test_a_device_that_dissipates_nothing_has_only_its_chart():
     ran = zwidth("guarantees", ONE_MASS, "--set", "plant.damping_Ns_per_m=0", "--json")
     assert ran.code == 0  # some wall is stable with a free hand

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+import shapely
 from numpy.testing import assert_allclose
+from scipy.optimize import minimize_scalar
 
+from tests.guarantees.test_guarantees_passive import random_device, random_operator
 from tests.systems import mass, published
+from zwidth.chart.region import ChartError
+from zwidth.chart.robust_check import unstable
 from zwidth.chart.verdict import spectral_radius
 from zwidth.guarantees.coupling import coupling_angles, coupling_region, couplings, softest_limit
 from zwidth.guarantees.nested import nested
-from zwidth.guarantees.springs import nyquist_spring, with_spring
+from zwidth.guarantees.spring_family import Springs
+from zwidth.guarantees.springs import nyquist_spring, spring_stable_region
 from zwidth.guarantees.two_port import allows, llewellyn_demand, sampled_demand
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
@@ -42,15 +50,93 @@ def test_each_guarantee_lies_within_the_next(found):
         assert inner.difference(outer).area < 2e-4 * inner.area
 
 
+def scaled(rings, unit):
+    """Rings of [K, B] as a geometry of [K unit, B]."""
+    return shapely.union_all([shapely.make_valid(shapely.Polygon(ring * (unit, 1.0))) for ring in rings])
+
+
+def inside(region, depth):
+    """Walls [K, B] that lie inside a region's edge by a share of its size, K and B scaled to one size."""
+    K, B = np.ptp(np.vstack(region.rings), axis=0)
+    shape = scaled(region.rings, B / K).buffer(-depth * B, join_style="mitre")
+    return shapely.get_coordinates(shape) / (B / K, 1.0)
+
+
+def growing(springs, region, count, depth, rng):
+    """How many of so many random springs make a wall inside the edge unstable."""
+    walls = inside(region, depth)
+    K, B = np.ascontiguousarray(walls[:: max(len(walls) // 200, 1)].T)
+    k = springs.k0 * 10.0 ** rng.uniform(-3.0, 3.0, count)
+    tracers = (springs.tracer(share) for share in springs.shares(k).tolist())
+    return sum(bool(unstable(tracer.polynomials, K, B).any()) for tracer in tracers)
+
+
 def test_unseen_springs_leave_spring_stable_walls_stable(found):
-    rng = np.random.default_rng(1)
-    loop, region = found.loop, found["spring-stable"].region
-    ring = region.rings[0]
-    centre = np.array(region.polygon.representative_point().coords[0])
-    walls = centre + 0.99 * (ring[:: max(len(ring) // 30, 1)] - centre)
-    for k in 10.0 ** rng.uniform(0.0, 7.5, 200):
-        sprung = Loop(with_spring(loop.plant, k), loop.controller)
-        assert spectral_radius(sprung, *walls.T).max() < 1.0
+    springs = Springs.of(found.loop)
+    region = found["spring-stable"].region
+    depth = 1e-5 if springs.loop.plant.size == 1 else 5e-5  # narrow bites of lightly damped modes
+    assert growing(springs, region, 2000, depth, np.random.default_rng(1)) == 0
+    assert growing(springs, region, 200, -3e-3, np.random.default_rng(1)) > 0  # and the edge is not far
+
+
+@pytest.mark.parametrize("depth", [-1e-6, 1e-6])
+def test_a_spring_decides_at_the_stiffest_spring_stable_wall(found, depth):
+    """The most unstable spring of the peak, a millionth softer or stiffer, by eigenvalues."""
+    region, springs = found["spring-stable"].region, Springs.of(found.loop)
+    wall = region.stiffness_max * (1.0 + depth), region.damping_at_stiffness_max
+
+    def growth(share):
+        tracer = springs.tracer(float(share))
+        if tracer is None:
+            return -1.0
+        L = tracer.loop.transition_matrix(*wall)
+        return float(np.abs(np.linalg.eigvals(L)).max()) - 1.0
+
+    shares = np.linspace(0.0, 1.0, 401)
+    at = int(np.argmax([growth(share) for share in shares]))
+    ends = shares[max(at - 1, 0)], shares[min(at + 1, 400)]
+    best = minimize_scalar(lambda share: -growth(share), bounds=ends, method="bounded", options={"xatol": 1e-11})
+    assert np.sign(max(-best.fun, growth(shares[at]))) == np.sign(depth)
+
+
+def check_inclusions(seed):
+    loop = random_device(np.random.default_rng(seed))
+    try:
+        found = nested(loop)
+    except ChartError:
+        return
+    order = [found[name].region for name in ("passive", "spring-stable", "stable")]
+    for inner, outer in pairwise(order):
+        if inner.rings and outer.reason is None:
+            K, B = np.ptp(np.vstack(inner.rings), axis=0)
+            core = scaled(inner.rings, B / K).buffer(-1e-4 * B)
+            assert core.difference(scaled(outer.rings, B / K)).area < 1e-9 * core.area
+    # masses, dampers and springs at random: what all of them leave stable holds every passive wall
+    rng = np.random.default_rng(seed)
+    if order[0].rings:
+        walls = inside(order[0], 1e-3)
+        walls = walls[:: max(len(walls) // 40, 1)]
+        for _ in range(10):
+            held = Loop(random_operator(rng, loop.plant, loop.period), loop.controller)
+            assert spectral_radius(held, *walls.T).max() < 1.0 + 1e-9
+
+
+# those left out have walls of 1e9 N/m and more, or no chart
+@pytest.mark.parametrize("seed", [3, 9, 10, 14, 17])
+def test_guarantees_of_random_devices_lie_within_one_another(seed):
+    check_inclusions(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(200, 260))
+def test_guarantees_of_many_random_devices_lie_within_one_another(seed):
+    check_inclusions(seed)
+
+
+def test_a_mass_that_nothing_damps_has_no_spring_stable_wall():
+    region = spring_stable_region(Loop(mass(0.03), Controller(T)))
+    assert not region.rings
+    assert "no wall" in region.reason
 
 
 def test_couplings_of_a_damped_mass_have_closed_forms(paddle):

@@ -150,19 +150,19 @@ def test_aliases_add_up_to_the_sampled_response():
 def test_no_passive_operator_makes_a_passive_wall_vibrate():
     rng = np.random.default_rng(3)
     tried = 0
-    for _ in range(6):
+    for _ in range(4):
         loop = random_device(rng)
         region = passive_region(loop)
         if not region.stiffness_max > 0.0:
             continue
         ring = region.rings[0]
-        walls = 0.999 * ring[:: max(len(ring) // 25, 1)]
+        walls = 0.999 * ring[:: max(len(ring) // 15, 1)]
         walls = walls[np.abs(walls[:, 0]) > 1e-6 * region.stiffness_max]
-        for _ in range(15):
+        for _ in range(6):
             held = Loop(random_operator(rng, loop.plant, loop.period), loop.controller)
             assert spectral_radius(held, *walls.T).max() < 1.0 + 1e-9
             tried += len(walls)
-    assert tried > 1000
+    assert tried > 100
 
 
 def test_just_outside_a_passive_operator_makes_it_vibrate():

@@ -30,6 +30,9 @@ HALVINGS, SHORT = 9, 1e-7
 STEEPEST = 0.7
 # Pieces of curve between which its turning is looked for.
 PIECES = 24
+# The touching point nearest to an angle is looked for within these parts of the reach, one after the other: light
+# modes have several close together.
+WINDOWS = np.array([0.002, 0.02, 0.2, 1.0])
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,7 @@ def touches(springs: Springs, share: float, first: float, last: float, pieces: i
 
 def nearest_touch(springs: Springs, share: float, theta: float, reach: float) -> Touch | None:
     """The touching point of a spring nearest to an angle, within reach of it."""
-    for wide in (0.25 * reach, reach):
+    for wide in reach * WINDOWS:
         found = touches(springs, share, theta - wide, theta + wide, 8)
         if found:
             return min(found, key=lambda touch: abs(touch.theta - theta))
@@ -109,10 +112,16 @@ def nearest_touch(springs: Springs, share: float, theta: float, reach: float) ->
 
 
 def stretch(
-    springs: Springs, one: Touch, other: Touch, shape: shapely.Geometry, size: float, depth: int = HALVINGS
+    springs: Springs,
+    one: Touch,
+    other: Touch,
+    shape: shapely.Geometry,
+    size: float,
+    lost: list[float],
+    depth: int = HALVINGS,
 ) -> list[Floats]:
     """The envelope between two touching points as walks (n, 2), the stable side on their left, where it is near a
-    shape; nothing where it does not join them."""
+    shape. Where it does not join them there is nothing, and a spring between joins the lost ones."""
     length = float(np.hypot(*(other.wall - one.wall)))
     if shapely.distance(shape, shapely.LineString([one.wall, other.wall])) > length:
         return []
@@ -122,6 +131,7 @@ def stretch(
     reach = 0.75 * abs(other.theta - one.theta) + 1e-9
     middle = nearest_touch(springs, share, 0.5 * (one.theta + other.theta), reach)
     if middle is None:
+        lost.append(share)
         return []
     halves = _cubic(one, middle, size), _cubic(middle, other, size)
     whole = _cubic(one, other, size)
@@ -130,9 +140,10 @@ def stretch(
         if off < CUBIC * size:
             return [np.vstack([halves[0], halves[1][1:]])[:: _way(one, other)]]
     if depth == 0:
+        lost.append(share)
         return []
-    first = stretch(springs, one, middle, shape, size, depth - 1)
-    return first + stretch(springs, middle, other, shape, size, depth - 1)
+    first = stretch(springs, one, middle, shape, size, lost, depth - 1)
+    return first + stretch(springs, middle, other, shape, size, lost, depth - 1)
 
 
 def _way(one: Touch, other: Touch) -> int:

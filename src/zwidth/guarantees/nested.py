@@ -59,6 +59,14 @@ def nested(loop: Loop, robust: Sequence[Floats] | None = None) -> Guarantees:
 
     Names: `passive-at-actuator` (where the handle is elsewhere), `passive`, `spring-stable`, `nyquist-spring`,
     `robust` (if given), `stable`. Without a handle only the first and the last are known.
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> paddle = Plant(np.array([[0.03]]), np.array([[1.0]]), np.zeros((1, 1)), one, one, one)
+    >>> found = nested(Loop(paddle, Controller(sampling_period=0.001)))
+    >>> [guarantee.name for guarantee in found.guarantees]
+    ['passive', 'spring-stable', 'nyquist-spring', 'stable']
     """
     plant = loop.plant
     found = []

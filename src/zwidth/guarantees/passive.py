@@ -40,6 +40,13 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
 
     loop  the bare device; an operator attached to the plant counts as a part of it
     held  (n,) where the operator holds it; left out: the plant's handle
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> paddle = Plant(np.array([[0.03]]), np.array([[1.0]]), np.zeros((1, 1)), one, one)
+    >>> round(passive_region(Loop(paddle, Controller(sampling_period=0.001)), one).stiffness_max, 4)   # 2 b/T
+    2000.0
     """
     held = loop.plant.handle if held is None else held
     if held is None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from zwidth.chart.robust_check import unstable
 from zwidth.chart.robust_common import common
@@ -21,12 +22,17 @@ from zwidth.loop.loop import Loop
 # Springs charted first, by the frequency of the mode they make: so many, up to so many times Nyquist's.
 SPRINGS, BEYOND = 27, 6.0
 # Springs that walls at the edge are tried with, how many walls, and rounds of charting the springs that fail.
-TRIED, WALLS, ROUNDS = 90, 120, 10
+TRIED, WALLS, ROUNDS = 90, 600, 10
 # Springs whose mode looks, sampled, like the vibration at the edge are tried too: to so many times the sampling
 # rate, and this far beside it.
 ALIASES, BESIDE, VIBRATIONS = 2, np.array([-0.003, -0.0003, 0.0003, 0.003]), 12
+# Springs between those that bind are tried too, at these parts of the way.
+BETWEEN = np.arange(1, 6) / 6.0
 # Places of the edge are chosen anew each round, by the golden section, and so many rounds must find nothing.
 GOLDEN, CLEAN = 0.6180339887, 2
+# Springs near a multiple of Nyquist's are looked at between these parts of its frequency; a mode so much stronger
+# there than at these is not damped.
+AROUND, DOUBLE, FAR = np.array([0.95, 1.05]), 1e-5, 1e200
 # How far inside the edge walls are tried, in shares of the set's size; and the most springs that join in a round.
 INSIDE, JOINING = 3e-6, 12
 # A cell smaller than this share of the whole is a crumb that strips have left between them.
@@ -34,6 +40,7 @@ CRUMB = 1e-6
 NOTHING = "no wall at all is stable with every spring at the handle"
 NO_SPRING = "no wall with K > 0 and B >= 0 is stable with every spring at the handle"
 UNSETTLED = "{} springs of those tried make walls just inside the edge unstable: modes are damped too lightly"
+UNDAMPED = "this is undecided: nothing damps the mode that the Nyquist spring makes"
 NO_NYQUIST = "no wall with K > 0 and B >= 0 is stable with the Nyquist spring"
 Edge = list[tuple[float, Piece]]
 
@@ -56,7 +63,11 @@ def nyquist_region(loop: Loop) -> Region:
     if not np.isfinite(k):
         return empty("no spring at the handle puts a mode at the Nyquist frequency")
     springs = Springs.of(Loop(reached(loop.plant), loop.controller))
-    member = springs.member(float(springs.shares(np.array([k]))[0]))
+    share, *beside = springs.shares(k * np.array([1.0, 0.9, 1.1])).tolist()
+    poles = [abs(float(t.line("minus")[0])) for one in (share, *beside) if (t := springs.tracer(one)) is not None]
+    if poles and poles[0] < DOUBLE**2 * max(poles):  # a double root at -1 that takes long to chart
+        return empty(UNDAMPED)
+    member = springs.member(share)
     rings = () if member is None else rings_of(polygons(member.outlines, springs.unit))
     if not rings:
         return empty(f"nothing is stable with the Nyquist spring of {k:.6g} N/m")
@@ -69,7 +80,8 @@ def spring_stable_region(loop: Loop) -> Region:
     The charts of some springs are intersected, and what the springs between them sweep over is cut off along its
     envelope (see `envelope`). Walls 3e-6 of the set's size inside the edge are then tried with more springs, those
     among them whose mode looks, sampled, like the vibration at the edge; springs that fail are charted too, and
-    their neighbours' sweep is cut off, until none fails. The edge is known to about 1e-5 of the set's size so.
+    their neighbours' sweep is cut off, until none fails. The edge is known to about 1e-5 of the set's size, with
+    light modes to 5e-5; where springs fail to the last the region has a warning.
 
     Raises  ValueError  if the plant has no handle
             ChartError  if the chart of one of the springs cannot be closed
@@ -83,7 +95,7 @@ def spring_stable_region(loop: Loop) -> Region:
     True
     """
     springs = Springs.of(Loop(reached(loop.plant), loop.controller))
-    new = _spread(springs.shares(_grid(springs.loop, SPRINGS)))
+    new = _spread(np.union1d(springs.shares(_grid(springs.loop, SPRINGS)), _alternating(springs)))
     tried = springs.shares(_grid(springs.loop, TRIED))
     members: dict[float, Member] = {}
     sweep = Sweep(springs)
@@ -94,7 +106,9 @@ def spring_stable_region(loop: Loop) -> Region:
             return empty(NOTHING)
         edge = _edge(springs, members)
         left = sweep.cut(left, edge, np.array(sorted(members)))
-        tried = np.union1d(tried, _alike(springs, edge, turn))
+        tried = np.unique(
+            np.concatenate([tried, _alike(springs, edge, turn), _between(members, edge), sweep.lost])
+        )
         left = _confirmed(springs, left, tried)
         if left.is_empty:
             return empty(NOTHING)
@@ -117,8 +131,40 @@ def _grid(loop: Loop, count: int) -> Floats:
     """Ascending springs from 0 to inf, spread by the frequency of the mode that each makes."""
     nyquist = np.pi / loop.period
     frequency = np.concatenate([np.geomspace(1e-3, 0.5, count // 3), np.linspace(0.5, BEYOND, count)]) * nyquist
-    k = spring_for(loop.plant, np.concatenate([frequency, nyquist * np.arange(1.0, BEYOND + 1.0)]))
+    # not at the multiples of Nyquist's: an undamped mode there is a double root at -1, whose chart takes long
+    k = spring_for(loop.plant, np.concatenate([frequency * 0.9997, nyquist * np.arange(0.9999, BEYOND + 1.0)]))
     return np.unique(np.concatenate([[0.0], k[np.isfinite(k) & (k > 0.0)], [np.inf]]))
+
+
+def _alternating(springs: Springs) -> Floats:
+    """Shares of the springs that bring the line of a root at -1 nearest.
+
+    These lines, K + B w(-1) = -1/P(-1), are parallel: they have no envelope, but one of them binds. It belongs to
+    a mode near a multiple of the Nyquist frequency.
+    """
+    nyquist = np.pi / springs.loop.period
+    multiples = nyquist * np.arange(1.0, ALIASES + 2.0)
+    found = []
+    around = springs.shares(spring_for(springs.loop.plant, np.outer(multiples, AROUND).ravel())).reshape(-1, 2)
+    for ends in np.sort(around):
+        if 0.0 < ends[0] < ends[1] < 1.0:
+            best = minimize_scalar(
+                lambda share: _distance(springs, float(share)),
+                bounds=(ends[0], ends[1]),
+                method="bounded",
+                options={"xatol": 1e-9},
+            )
+            # the double root that an undamped mode has there takes long to chart, and its neighbours tell as much
+            if best.fun > DOUBLE * min(_distance(springs, float(end)) for end in ends):
+                found.append(float(best.x))
+    return np.array(found)
+
+
+def _distance(springs: Springs, share: float) -> float:
+    """Stiffness at which a root comes to -1 without damping, |1/P(-1)| [N/m]."""
+    tracer = springs.tracer(share)
+    a, s, _ = (1.0, 0.0, 0.0) if tracer is None else tracer.line("minus")
+    return abs(float(a / s)) if s else FAR
 
 
 def _spread(shares: Floats) -> Floats:
@@ -193,6 +239,15 @@ def _along(ring: Floats) -> Floats:
     along = np.append(0.0, np.cumsum(np.hypot(*(np.diff(ring, axis=0) / size).T)))
     picked = np.searchsorted(along, np.linspace(0.0, along[-1], WALLS, endpoint=False))
     return np.asarray(ring[np.union1d(picked, [np.argmax(ring[:, 0])])])
+
+
+def _between(members: dict[float, Member], edge: Edge) -> Floats:
+    """Shares of springs between those that bind and their neighbours."""
+    shares = np.array(sorted(members))
+    at = np.unique(np.searchsorted(shares, sorted({share for share, _ in edge})))
+    first = np.unique(np.clip(np.concatenate([at - 1, at]), 0, len(shares) - 2))
+    gaps = shares[first + 1] - shares[first]
+    return np.asarray((shares[first, None] + gaps[:, None] * BETWEEN).ravel())
 
 
 def _alike(springs: Springs, edge: Edge, turn: int) -> Floats:

@@ -28,12 +28,14 @@ class Sweep:
 
     found   touching points of each spring
     strips  between the envelope and the arcs that it touches
+    lost    springs between which an envelope was lost
     done    stretches that have been looked at
     """
 
     springs: Springs
     found: dict[float, list[Touch]] = field(default_factory=dict)
     strips: list[shapely.Polygon] = field(default_factory=list)
+    lost: list[float] = field(default_factory=list)
     done: set[tuple[float, float, float, float]] = field(default_factory=set)
 
     def cut(self, shape: shapely.Geometry, edge: list[tuple[float, Piece]], shares: Floats) -> shapely.Geometry:
@@ -50,7 +52,7 @@ class Sweep:
                 self.found[share] = self._touching(share)
         binding = {share for share, _ in edge}
         for one, other in self._neighbours(binding, shares, shape, NEAR * size):
-            self.strips.extend(_strips(self.springs, one, other, shape, size))
+            self.strips.extend(_strips(self.springs, one, other, shape, size, self.lost))
         return shapely.difference(shape, shapely.union_all(self.strips))
 
     def _touching(self, share: float) -> list[Touch]:
@@ -97,7 +99,7 @@ class Sweep:
 
 
 def _strips(
-    springs: Springs, one: Touch, other: Touch, shape: shapely.Geometry, size: float
+    springs: Springs, one: Touch, other: Touch, shape: shapely.Geometry, size: float, lost: list[float]
 ) -> list[shapely.Polygon]:
     """Strips outside the envelope between two touching points, wide enough for all that their arcs leave."""
     gap = other.wall - one.wall
@@ -107,7 +109,7 @@ def _strips(
     aside = max(abs(end.along[0] * gap[1] - end.along[1] * gap[0]) for end in (one, other))
     wide = min(2.0 * aside + 1e-4 * length, WIDEST * size)
     strips = []
-    for walk in stretch(springs, one, other, shape, size):
+    for walk in stretch(springs, one, other, shape, size, lost):
         along = np.gradient(walk, axis=0)
         along /= np.maximum(np.hypot(*along.T), 1e-300)[:, None]
         outwards = np.column_stack([along[:, 1], -along[:, 0]])

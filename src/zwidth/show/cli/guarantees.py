@@ -107,7 +107,8 @@ def numbers(found: Guarantees) -> list[dict[str, Any]]:
             "damping_at_stiffness_max_Ns_per_m": region.damping_at_stiffness_max,
             "source": guarantee.source,
         }
-        entries.append(entry | ({} if region.reason is None else {"reason": region.reason}))
+        notes = {"reason": region.reason, "warning": region.warning}
+        entries.append(entry | {key: note for key, note in notes.items() if note is not None})
     return entries
 
 
@@ -159,7 +160,8 @@ def _largest(entry: dict[str, Any]) -> str:
     if "reason" in entry:
         return f"none: {entry['reason']}"
     K, B = entry["stiffness_max_N_per_m"], entry["damping_at_stiffness_max_Ns_per_m"]
-    return f"{amount(K, 'N/m')} at {amount(B, 'Ns/m')}"
+    lacking = f"; {entry['warning']}" if "warning" in entry else ""
+    return f"{amount(K, 'N/m')} at {amount(B, 'Ns/m')}{lacking}"
 
 
 def _limit(limit: dict[str, Any]) -> str:
