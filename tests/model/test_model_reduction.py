@@ -373,3 +373,12 @@ def test_a_single_mass_is_its_own_rigid_model_and_has_no_sides():
     found = plant_effective_parameters(plant)
     assert found.rigid_mass == pytest.approx(0.05)
     assert np.isnan([found.link_side_mass, found.motor_side_mass, found.stiffness]).all()
+
+
+@pytest.mark.parametrize("model", ["two-mass", "motor-mass", "rigid"])
+def test_a_loss_factor_is_left_out_of_no_model(model):
+    plain = single(15.0)
+    lossy = replace(plain, hysteresis=0.1 * plain.stiffness)
+    assert reduce_plant(lossy, "full") is lossy
+    with pytest.raises(ModelError, match="a loss factor is charted on the full model only"):
+        reduce_plant(lossy, model)

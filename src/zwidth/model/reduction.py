@@ -109,9 +109,11 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
     Sensor and lagged dampers are what these motions move them by: W^T sensor, W^T along.
 
     Returns  Plant; `full` gives the plant itself, and so does the model it already is
-    Raises   ModelError  where the model does not apply, with the reason
+    Raises   ModelError  where the model does not apply, with the reason; for hysteresis all but `full`
     """
     _check_model(model)
+    if model != "full" and plant.hysteresis is not None:
+        raise ModelError("a loss factor is charted on the full model only; leave --model out")
     if model == "full" or (model == "two-mass" and _is_two_mass(plant)):
         return plant
     if model == "rigid":
