@@ -201,6 +201,7 @@ FAULTS = [
     (with_velocity("kallman", samples=4), "loop.velocity.method", "did you mean 'kalman'?"),
     (with_velocity(3), "loop.velocity.method", "give 'alpha-beta' or"),
     (with_velocity("foaw"), "loop.velocity.method", "is not supported yet"),
+    (with_velocity("foaw", samples=5, window=3), "loop.velocity.method", "is not supported yet"),
     (with_velocity("alpha-beta", alpha=1.5, beta=1.5), "loop.velocity", "2 alpha + beta must be below 4"),
     (with_velocity("alpha-beta", alpha=1e-9, beta=1.5), "loop.velocity", "would remember for too long"),
     (with_velocity("alpha-beta", alpha=0.0, beta=1.5), "loop.velocity.alpha", "must be greater than 0"),
@@ -213,6 +214,11 @@ FAULTS = [
         with_velocity("kalman", acceleration_noise_m_per_s2=1e-9, position_noise_m=1.0),
         "loop.velocity",
         "too little motion",
+    ),
+    (
+        with_velocity("kalman", acceleration_noise_m_per_s2=1e30, position_noise_m=1e-30),
+        "loop.velocity",
+        "too much motion",
     ),
     (changed(PLANT, loop__encoder={"at": "link"}), "loop.encoder.at", "give plant.sensor"),
     (

@@ -10,6 +10,7 @@ from zwidth.device.faults import Path
 from zwidth.device.plain import number, rows, table, tables
 from zwidth.device.schema.bounds import STRONGEST_DAMPING
 from zwidth.device.schema.loop import LONGEST_DELAY
+from zwidth.device.schema.numbers import LARGEST
 from zwidth.loop.estimators import Kalman
 
 Found = Iterator[tuple[Path, str]]
@@ -116,7 +117,7 @@ def _kalman(loop: dict[str, Any], T: float) -> Found:
         )
         return
     given = [value for value in (motion, noise, step) if value is not None]
-    if motion is None or math.isnan(T) or not all(number(v) and 0 < v < 1e30 for v in given):
+    if motion is None or math.isnan(T) or not all(number(v) and 0 < v <= LARGEST for v in given):
         return
     try:
         method = Kalman(motion, noise) if noise is not None else Kalman.of_encoder(motion, step or 0.0)

@@ -56,6 +56,12 @@ def _sources(document: dict[str, Any]) -> Found:
 
 
 def _plant(plant: dict[str, Any]) -> Found:
+    loss = plant.get("loss_factor")
+    if number(loss) and loss > 0 and _springless(plant.get("stiffness_N_per_m")):
+        yield (
+            ("plant", "loss_factor"),
+            "is a share of the stiffness, and there is none; give stiffness_N_per_m, or remove this",
+        )
     size = rows(plant.get("mass_kg"))
     if size is None:
         return
@@ -70,6 +76,13 @@ def _plant(plant: dict[str, Any]) -> Found:
             yield ("plant", key), f"has {length} numbers, but mass_kg has {size} rows; give {size} numbers"
         elif value is None and size > 1 and key != "handle":
             yield ("plant", key), f"is missing; with {size} coordinates give {size} numbers"
+
+
+def _springless(stiffness: Any) -> bool:
+    """Is a stiffness left out, or zero throughout?"""
+    if isinstance(stiffness, list):
+        return all(map(_springless, stiffness))
+    return stiffness is None or (number(stiffness) and stiffness == 0)
 
 
 def operator_relations(document: dict[str, Any]) -> Found:

@@ -17,10 +17,11 @@ KEYS: Final[dict[tuple[str, ...], str]] = {
 }
 """Key -> how a sentence calls it; * stands for any list element."""
 
-VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str]]] = {
+VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str, frozenset[str] | None]]] = {
     ("loop", "velocity", "method"): (
         frozenset({"foaw", "measured"}),
         "backward-difference",
+        frozenset({"filter"}),
     ),
     ("mechanism", "links", "*", "joint"): (
         frozenset(
@@ -37,9 +38,11 @@ VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str]]] = {
             }
         ),
         "revolute",
+        None,
     ),
 }
-"""Key -> the values to refuse so, and the supported one that stands for them while the rest is checked."""
+"""Key -> the values to refuse so, the supported one that stands for them while the rest is checked, and the keys
+beside it that are checked with it (None: all); what is left out are parameters of the refused value."""
 
 
 def refuse(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[Path, str]]]:
@@ -50,10 +53,12 @@ def refuse(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[Path, s
         for path, table in list(_places(document, pattern)):
             del table[pattern[-1]]
             refused.append((path, f"{what} is not supported yet; remove it"))
-    for pattern, (names, stand_in) in VALUES.items():
+    for pattern, (names, stand_in, beside) in VALUES.items():
         for path, table in _places(document, pattern):
             value = table[pattern[-1]]
             if isinstance(value, str) and value.lower() in names:
+                for key in [] if beside is None else table.keys() - beside:
+                    del table[key]
                 table[pattern[-1]] = stand_in
                 refused.append((path, f"{pattern[-1]} '{value}' is not supported yet; use '{stand_in}'"))
     return document, refused
