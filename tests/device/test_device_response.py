@@ -125,7 +125,14 @@ def test_a_fault_of_the_file_is_one_line(write, spectrum, change, fault):
 
 
 def test_many_faults_are_told_together_and_not_without_end(write, spectrum):
-    assert len(faults(write([spectrum[0], *("a,b,c" for _ in spectrum[1:])]))) == 21
+    found = faults(write([spectrum[0], *("a,b,c" for _ in spectrum[1:])]))
+    assert len(found) == 3 * 4
+    assert found[3] == "sweep.csv: frequency_Hz: and 97 more lines, the last of them line 101"
+    backward = faults(write([spectrum[0], *reversed(spectrum[1:5])]))
+    assert [line.split(": ")[1] for line in backward] == ["line 3", "line 4", "line 5"]
+    assert faults(write([spectrum[0], *reversed(spectrum[1:6])]))[3].endswith(
+        "and 1 more line, the last of them line 6"
+    )
 
 
 def test_a_file_that_is_not_there_or_not_text(write, spectrum, tmp_path):

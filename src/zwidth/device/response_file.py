@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -19,13 +18,16 @@ from zwidth.model.sweep import sweep_response
 
 Floats = NDArray[np.float64]
 Table = dict[str, Floats]  # columns, with the line of each row under LINE
+Cause = tuple[
+    str, list[tuple[int, str]]
+]  # what is wrong with a column ("": with the row): every line, and a sentence
 
 SPECTRUM: Final = ("frequency_Hz", "real_m_per_N", "imag_m_per_N")
 RECORD: Final = ("time_s", "force_command_N", "position_m")
 OPTIONAL: Final = ("coherence", "sweep")
 LINE: Final = ""
 LARGEST_FILE: Final = 200_000_000  # bytes
-MOST_FAULTS: Final = 20
+MOST_LINES: Final = 3  # told of one cause
 UNEVEN: Final = 0.05  # of the sampling period, by which time stamps may jitter
 OFF: Final = 1e-3  # relative, by which their mean may differ from it
 
@@ -85,27 +87,28 @@ def _spectrum(path: Path, table: Table, section: ResponseSection, period: float)
     """A response as it stands, its frequencies checked."""
     f, lines = table["frequency_Hz"], table[LINE].astype(int)
     half = 0.5 / period
-    found = [
-        (i, "must be greater than 0, got {:.10g}; leave the static value out") for i in np.flatnonzero(f <= 0.0)
-    ]
-    found += [(i + 1, "{:.10g} is there twice; keep one of them") for i in np.flatnonzero(np.diff(f) == 0.0)]
-    found += [
-        (i + 1, f"{{:.10g}} follows {f[i]:.10g}; sort the lines by rising frequency")
-        for i in np.flatnonzero(np.diff(f) < 0.0)
-    ]
-    above = np.flatnonzero(f > half * (1.0 + 1e-9))[:1]
-    found += [
-        (i, f"{{:.10g}} is above half the sampling rate, {half:.10g}; leave it out, or correct sampling_period_s")
-        for i in above
+    low, twice, falling = f <= 0.0, np.diff(f) == 0.0, np.diff(f) < 0.0
+    above = np.flatnonzero(f > half * (1.0 + 1e-9))
+    causes: list[Cause] = [
+        ("frequency_Hz", [(lines[i], text.format(f[i], f[i - 1])) for i in found])
+        for found, text in (
+            (np.flatnonzero(low), "must be greater than 0, got {:.10g}; leave the static value out"),
+            (np.flatnonzero(twice) + 1, "{:.10g} is there twice; keep one of them"),
+            (np.flatnonzero(falling) + 1, "{:.10g} follows {:.10g}; sort the lines by rising frequency"),
+            (
+                above[:1],
+                f"{{:.10g}} is above half the sampling rate, {half:.10g}; leave it out, or correct "
+                "sampling_period_s",
+            ),
+        )
     ]
     coherence = table.get("coherence")
-    faults = [Fault(str(path), f"line {lines[i]}: frequency_Hz", text.format(f[i])) for i, text in sorted(found)]
     if coherence is not None:
-        faults += [
-            Fault(str(path), f"line {lines[i]}: coherence", f"must be from 0 to 1, got {coherence[i]:.10g}")
-            for i in np.flatnonzero((coherence < 0.0) | (coherence > 1.0))
-        ]
-    _raise(path, faults)
+        outside = np.flatnonzero((coherence < 0.0) | (coherence > 1.0))
+        causes.append(
+            ("coherence", [(lines[i], f"must be from 0 to 1, got {coherence[i]:.10g}") for i in outside])
+        )
+    _raise(path, causes)
     if len(f) < 6:
         raise fail(str(path), "", f"has {len(f)} frequencies; at least 6 are needed, some hundreds to be exact")
     value = table["real_m_per_N"] + 1j * table["imag_m_per_N"]
@@ -121,9 +124,16 @@ def _recorded(path: Path, table: Table, section: ResponseSection, period: float)
     if len(steps) == 0:
         raise fail(str(path), "", "has one line only; record a sweep")
     mean = float(np.median(steps))
-    uneven = np.flatnonzero(np.abs(steps - mean) > UNEVEN * abs(mean))
-    if mean <= 0.0 or len(uneven):
-        i = int(uneven[0]) if len(uneven) else 0
+    if mean <= 0.0:
+        raise fail(
+            str(path),
+            f"line {lines[1]}: time_s",
+            f"does not rise: the time falls or stands still, by {mean:.6g} s from most lines to the next; sort the "
+            "lines by rising time",
+        )
+    uneven = np.flatnonzero(np.abs(steps - mean) > UNEVEN * mean)
+    if len(uneven):
+        i = int(uneven[0])
         raise fail(
             str(path),
             f"line {lines[i + 1]}: time_s",
@@ -151,34 +161,27 @@ def _table(path: Path) -> Table:
     rows = csv.reader(_text(path).splitlines(), strict=True)
     values: list[list[float]] = []
     lines: list[int] = []
-    faults: list[Fault] = []
+    uneven: list[tuple[int, str]] = []
     try:
         header = [name.strip() for name in next(_filled(rows), [])]
         columns = _columns(path, header)
         places = [header.index(name) for name in columns]
+        wrong: dict[str, list[tuple[int, str]]] = {name: [] for name in columns}
         for row in _filled(rows):
             if len(row) > len(header):
-                faults.append(
-                    Fault(
-                        str(path),
-                        f"line {rows.line_num}",
-                        f"has {len(row)} cells, but the header names {len(header)} columns; write a decimal "
-                        "point, not a comma",
-                    )
-                )
+                told = f"has {len(row)} cells, but the header names {len(header)} columns"
+                uneven.append((rows.line_num, f"{told}; write a decimal point, not a comma"))
                 continue
             cells = [row[place].strip() if place < len(row) else "" for place in places]
             numbers = [_number(cell) for cell in cells]
-            faults += [
-                Fault(str(path), f"line {rows.line_num}: {name}", f"must be a finite number, {_got(cell)}")
-                for name, cell, number in zip(columns, cells, numbers, strict=True)
-                if not np.isfinite(number)
-            ]
+            for name, cell, number in zip(columns, cells, numbers, strict=True):
+                if not np.isfinite(number):
+                    wrong[name].append((rows.line_num, f"must be a finite number, {_got(cell)}"))
             values.append(numbers)
             lines.append(rows.line_num)
     except csv.Error as error:
         raise fail(str(path), f"line {rows.line_num}", f"is not CSV: {error}") from None
-    _raise(path, faults)
+    _raise(path, [("", uneven), *wrong.items()])
     if not values:
         raise fail(str(path), "", f"holds no numbers; give lines with {', '.join(columns)}")
     table = np.array(values).T
@@ -206,10 +209,20 @@ def _columns(path: Path, header: list[str]) -> list[str]:
     return used
 
 
-def _raise(path: Path, faults: list[Fault]) -> None:
+def _raise(path: Path, causes: Iterable[Cause]) -> None:
+    """Raise DeviceError with the first lines of every cause, and how many more there are of it."""
+    faults = []
+    for column, places in causes:
+        faults += [
+            Fault(str(path), f"line {line}: {column}" if column else f"line {line}", message)
+            for line, message in places[:MOST_LINES]
+        ]
+        more = len(places) - MOST_LINES
+        if more > 0:
+            told = f"and {more} more line{'s' if more > 1 else ''}, the last of them line {places[-1][0]}"
+            faults.append(Fault(str(path), column, told))
     if faults:
-        more = [Fault(str(path), "", f"and {len(faults) - MOST_FAULTS} more faults")] * (len(faults) > MOST_FAULTS)
-        raise DeviceError([*islice(faults, MOST_FAULTS), *more])
+        raise DeviceError(faults)
 
 
 def _filled(rows: Iterator[list[str]]) -> Iterator[list[str]]:
