@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from tests import systems
 from tests.cli.cli_run import MECHANISM, TWO_MASS, found, refused, zwidth
+from zwidth.chart.verdict import judge
 
 HEAD = "stiffness_N_per_m,damping_Ns_per_m\n"
 
@@ -142,3 +144,24 @@ def test_a_posture_out_of_reach_has_no_verdicts():
     assert ran.code == 1
     assert ran.document["points"] is None
     assert "cannot reach" in ran.document["reason"]
+
+
+def test_walls_that_no_device_renders_are_refused(tmp_path):
+    file = tmp_path / "walls.csv"
+    file.write_text(HEAD + "1e308,1e308\n1e15,-1e15\n")
+    lines = refused("check", TWO_MASS, "--points", file)
+    assert len(lines) == 2
+    assert "line 2: stiffness_N_per_m: must be from -1e+15 to 1e+15, got '1e308'" in lines[0]
+    for command in ("check", "felt"):
+        (line,) = refused(command, TWO_MASS, "--stiffness", "1e308", "--damping", "5")
+        assert "'--stiffness': must be from -1e+15 to 1e+15, got '1e308'" in line
+    (point,) = found("check", TWO_MASS, "--stiffness", "1e15", "--damping", "1e15")["points"]
+    assert point["verdict"] == "unstable"
+
+
+def test_a_wall_whose_transition_matrix_overflows_is_undecided():
+    loop = systems.published()
+    verdicts = judge(loop, [1e308, 4000.0], [1e308, 10.0])
+    assert verdicts.names == ["undecided", "stable"]
+    assert np.isnan(verdicts.spectral_radius[0])
+    assert np.isnan(verdicts.frequency[0])

@@ -55,11 +55,14 @@ def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Ver
 
     stable: |z| < 1 - u for all roots; unstable: |z| > 1 + u for one; undecided between, where u is 1e-9 or the
     rounding error of the dominant eigenvalue (from its condition number), whichever is larger. A wall that is not
-    finite is undecided, with nan.
+    finite, or so large that its transition matrix is not, is undecided, with nan.
     """
     K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
     finite = np.isfinite(K) & np.isfinite(B)
-    L = loop.transition_matrix(np.where(finite, K, 0.0), np.where(finite, B, 0.0))
+    with np.errstate(over="ignore", invalid="ignore"):
+        L = loop.transition_matrix(np.where(finite, K, 0.0), np.where(finite, B, 0.0))
+    finite &= np.all(np.isfinite(L), axis=(-2, -1))
+    L = np.where(finite[..., None, None], L, 0.0)
     z = np.linalg.eigvals(L)
     dominant = np.argmax(np.abs(z), axis=-1)
     top = np.take_along_axis(z, dominant[..., None], axis=-1)[..., 0]

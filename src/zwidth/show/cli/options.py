@@ -20,6 +20,7 @@ else:
 
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
 AS_GIVEN: Final = "as given"
+LARGEST_WALL: Final = 1e15  # N/m, N s/m; beyond, rounding would give the verdicts
 
 Command = Callable[..., int]
 
@@ -116,18 +117,28 @@ class Numbers(ParamType):
         return numbers
 
 
+def wall_number(text: str) -> tuple[float, str]:
+    """A wall's stiffness or damping, and what is wrong with it ("" if nothing)."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        return number, "must be a finite number, " + (f"got {text[:60]!r}" if text else "but it is missing")
+    if abs(number) > LARGEST_WALL:
+        return number, f"must be from {-LARGEST_WALL:g} to {LARGEST_WALL:g}, got {text[:60]!r}; is the unit right?"
+    return number, ""
+
+
 class Finite(ParamType):
-    """One finite number."""
+    """One number of a wall."""
 
     name = "number"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            self.fail(f"must be a finite number, got {value!r}", param, ctx)
+        number, fault = wall_number(str(value))
+        if fault:
+            self.fail(fault, param, ctx)
         return number
 
 

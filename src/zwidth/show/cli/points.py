@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Iterator
 from itertools import islice
 from typing import Final
 
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.options import wall_number
 
 COLUMNS: Final = ("stiffness_N_per_m", "damping_Ns_per_m")
 MOST_FAULTS: Final = 20
@@ -37,10 +37,10 @@ def read_walls(file: str) -> Walls:
                 continue
             wall = []
             for name, place in zip(COLUMNS, places, strict=True):
-                value, fault = _number(row[place].strip() if place < len(row) else "")
+                value, fault = wall_number(row[place].strip() if place < len(row) else "")
                 wall.append(value)
                 if fault:
-                    faults.append(f"{file}: line {rows.line_num}: {name}: must be a finite number, {fault}")
+                    faults.append(f"{file}: line {rows.line_num}: {name}: {fault}")
             walls.append((wall[0], wall[1]))
     except csv.Error as error:
         raise BadInput(f"{file}: line {rows.line_num}: is not CSV: {error}") from None
@@ -68,17 +68,6 @@ def _places(file: str, header: list[str]) -> list[int]:
     if faults:
         raise BadInput(*faults)
     return [header.index(name) for name in COLUMNS]
-
-
-def _number(text: str) -> tuple[float, str]:
-    """The number, and what is wrong with it."""
-    if not text:
-        return math.nan, "but it is missing"
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    return value, "" if math.isfinite(value) else f"got {text[:60]!r}"
 
 
 def _text(file: str) -> str:
