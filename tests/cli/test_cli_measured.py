@@ -23,6 +23,19 @@ sampling_period_s = 0.00125
 [loop.velocity]
 filter = {{ type = "butterworth", order = 2, cutoff_Hz = 100.0 }}
 """
+LOSSY = """
+name = "two masses with a loss factor"
+[plant]
+mass_kg = [[0.2616, 0.0], [0.0, 0.0254]]
+stiffness_N_per_m = [[15620.0, -15620.0], [-15620.0, 15620.0]]
+loss_factor = 0.15
+actuator = [0.0, 1.0]
+sensor = [0.0, 1.0]
+handle = [1.0, 0.0]
+[loop]
+sampling_period_s = 0.00125
+"""
+DAMPER = "plant.damping_Ns_per_m=[[1.0, -1.0], [-1.0, 1.0]]"
 LOOP = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
 
 
@@ -139,3 +152,103 @@ def test_options_that_need_a_model_and_faults_of_the_file_are_refused(device, tm
     spectrum(tmp_path / "sweep.csv", response.frequency, 1j * np.conj(response.value))
     (line,) = refused("chart", device)
     assert "are columns swapped" in line
+
+
+@pytest.fixture
+def lossy(tmp_path):
+    """Two masses joined by a spring with a loss factor of 0.15."""
+    (tmp_path / "lossy.toml").write_text(LOSSY)
+    return tmp_path / "lossy.toml"
+
+
+def test_a_loss_factor_is_charted_and_checked_on_the_full_model_only(lossy):
+    wall = ("--stiffness", "100", "--damping", "1")
+    for model in ("two-mass", "motor-mass", "rigid"):
+        for command in (("chart", lossy), ("check", lossy, *wall)):
+            (line,) = refused(*command, "--model", model)
+            assert line.endswith(
+                f"model {model}: a loss factor is charted on the full model only; leave --model out"
+            )
+    assert found("check", lossy, *wall, "--model", "full")["points"][0]["verdict"] == "stable"
+
+
+def test_half_a_loss_factor_is_shown_as_damping(lossy):
+    rigid, flexible = found("show", lossy)["damping_ratios"]
+    assert rigid is None
+    assert flexible == pytest.approx(0.075, rel=1e-12)
+    viscous = found("show", lossy, "--set", "plant.loss_factor=unset", "--set", DAMPER)["damping_ratios"][1]
+    both = found("show", lossy, "--set", DAMPER)["damping_ratios"][1]
+    assert both == pytest.approx(viscous + 0.075, rel=1e-12)
+
+
+def test_a_loss_factor_needs_a_stiffness(lossy):
+    for change in ("unset", "[[0.0, 0.0], [0.0, 0.0]]"):
+        (line,) = refused("chart", lossy, "--set", f"plant.stiffness_N_per_m={change}")
+        assert "plant.loss_factor: is a share of the stiffness, and there is none" in line
+
+
+def test_people_are_told_what_frequency_stands_beside_a_verdict(lossy, device):
+    wall = ("--stiffness", "100", "--damping", "1")
+    for file, column in ((lossy, "nearest edge at"), (device, "nearest edge at"), ("five-bar", "its frequency")):
+        assert column in zwidth("check", file, *wall).out
+
+
+# --- what is not seen, and what cannot be asked ----------------------------------------------------------
+
+
+def cut_short(tmp_path, highest):
+    response, _ = measured(LOOP, np.linspace(1.0, highest, 400))
+    spectrum(tmp_path / "short.csv", response.frequency, response.value)
+    (tmp_path / "short.toml").write_text(DEVICE.format('file = "short.csv"'))
+    return tmp_path / "short.toml"
+
+
+def test_a_response_cut_short_warns_above_the_numbers(tmp_path):
+    short = cut_short(tmp_path, 300.0)
+    chart, text = found("chart", short), zwidth("chart", short).out
+    assert chart["measured_up_to_share"] == pytest.approx(0.75)
+    assert chart["warning"].startswith("measured up to 300 Hz, 75 % of half the sampling rate (400 Hz)")
+    assert "walls that fail above are not seen" in chart["warning"]
+    assert text.index("warning: measured up to 300 Hz") < text.index("largest stiffness")
+
+
+@pytest.mark.parametrize(("highest", "share"), [(380.0, 0.95), (400.0, 1.0)])
+def test_a_response_that_nearly_reaches_half_the_sampling_rate_does_not_warn(tmp_path, highest, share):
+    chart = found("chart", cut_short(tmp_path, highest))
+    assert (chart["measured_up_to_share"], chart["warning"]) == (pytest.approx(share), None)
+
+
+def test_the_band_of_two_equal_sweeps_holds_the_largest_stiffness(tmp_path):
+    response, _ = measured(LOOP, np.linspace(1.0, 400.0, 400))
+    for name in ("one.csv", "two.csv"):
+        spectrum(tmp_path / name, response.frequency, response.value)
+    (tmp_path / "device.toml").write_text(DEVICE.format('files = ["one.csv", "two.csv"]'))
+    chart = found("chart", tmp_path / "device.toml")
+    band = chart["band"]
+    assert band["stiffness_low_N_per_m"] <= chart["stiffness_max_N_per_m"] <= band["stiffness_high_N_per_m"]
+
+
+@pytest.mark.parametrize(
+    ("command", "key"),
+    [
+        (("felt", "--stiffness", 1, "--damping", 1), "static_stiffness_N_per_m"),
+        (("sensitivity",), "sensitivities"),
+        (("guarantees",), "guarantees"),
+        (("bounds",), "bounds"),
+        (("robust",), "stiffness_max_N_per_m"),
+        (("show",), "link_side_mass_kg"),
+        (("report",), "file"),
+    ],
+)
+def test_what_needs_a_model_has_no_answer_for_a_response(device, command, key):
+    ran = zwidth(command[0], device, *command[1:], "--json")
+    assert ran.code == 1
+    assert ran.document[key] is None
+    assert "no masses, stiffnesses, modes or postures" in ran.document["reason"]
+
+
+def test_a_sweep_whose_time_falls_is_told_so(tmp_path):
+    lines = [f"{0.00125 * (50 - n)},{n % 3},0.0" for n in range(50)]
+    (tmp_path / "back.csv").write_text("\n".join(["time_s,force_command_N,position_m", *lines]) + "\n")
+    (tmp_path / "device.toml").write_text(DEVICE.format('file = "back.csv"'))
+    assert "the time falls" in refused("chart", tmp_path / "device.toml")[0]

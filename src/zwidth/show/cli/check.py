@@ -116,7 +116,8 @@ def _pages(question: Question, device: Device, document: dict[str, Any]) -> Sequ
         for point in points[:SHOWN]
     ]
     pages: list[Any] = [heading(question, device)]
-    pages.append(table(["stiffness", "damping", "verdict", "spectral radius", "its frequency"], rows))
+    frequency = "nearest edge at" if device.by_response else "its frequency"
+    pages.append(table(["stiffness", "damping", "verdict", "spectral radius", frequency], rows))
     if len(points) > SHOWN:
         pages.append(f"and {len(points) - SHOWN} more; --json or --output holds them all")
     if "file" in document:

@@ -9,7 +9,7 @@ import click
 
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
 from zwidth.show.cli.computing import NoAnswer, computing
-from zwidth.show.cli.measured import NO_MODEL
+from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, destination, plain, write_data
@@ -51,9 +51,7 @@ def show(question: Question, output: str | None, as_json: bool) -> int:
     path = None if output is None else destination(output, DATA)
     device = question.device()
     if device.response is not None:
-        question.as_measured(device)
-        unanswered = question.facts(device) | dict.fromkeys(KEYS) | {"sources": device.sources}
-        return deliver(Answer(unanswered, reason=NO_MODEL), as_json)
+        return without_model(question, device, dict.fromkeys(KEYS) | {"sources": device.sources}, as_json)
     try:
         with computing(question):
             plant = question.plant(device, held=False)
@@ -133,14 +131,21 @@ def _dexterity(mechanism: Mechanism, posture: Posture) -> dict[str, Any]:
 
 
 def _damping_ratios(plant: Plant) -> list[float | None] | None:
-    """Damping ratio a/w of each natural frequency, None for rigid ones; None where damping couples modes."""
+    """Damping ratio a/w of each natural frequency, None for rigid ones; None where damping couples modes.
+
+    Hysteresis L adds what it loses per cycle at that frequency: x^T L x / (2 w^2), half the loss factor.
+    """
+    import numpy as np
+
     from zwidth.model.modes import real_modes
 
     modes = real_modes(plant)
     if modes is None:
         return None
-    pairs = zip(modes.decay.tolist(), modes.frequency_squared.tolist(), strict=True)
-    return [a / squared**0.5 if squared > 0.0 else None for a, squared in pairs]
+    L = np.zeros_like(plant.stiffness) if plant.hysteresis is None else plant.hysteresis
+    loss = np.einsum("ij,ik,kj->j", modes.shapes, L, modes.shapes)
+    each = zip(modes.decay.tolist(), loss.tolist(), modes.frequency_squared.tolist(), strict=True)
+    return [a / squared**0.5 + lost / (2.0 * squared) if squared > 0.0 else None for a, lost, squared in each]
 
 
 def _pages(question: Question, device: Device, document: Mapping[str, Any]) -> Iterator[Any]:
