@@ -34,7 +34,7 @@ GOLDEN, CLEAN = 0.6180339887, 2
 # there than at these is not damped.
 AROUND, DOUBLE, FAR = np.array([0.95, 1.05]), 1e-5, 1e200
 # How far inside the edge walls are tried, in shares of the set's size; and the most springs that join in a round.
-INSIDE, JOINING = 3e-6, 12
+INSIDE, JOINING = 1e-5, 12
 # A cell smaller than this share of the whole is a crumb that strips have left between them.
 CRUMB = 1e-6
 NOTHING = "no wall at all is stable with every spring at the handle"
@@ -78,7 +78,7 @@ def spring_stable_region(loop: Loop) -> Region:
     """The walls that are stable with every spring 0 <= k <= inf at the handle.
 
     The charts of some springs are intersected, and what the springs between them sweep over is cut off along its
-    envelope (see `envelope`). Walls 3e-6 of the set's size inside the edge are then tried with more springs, those
+    envelope (see `envelope`). Walls 1e-5 of the set's size inside the edge are then tried with more springs, those
     among them whose mode looks, sampled, like the vibration at the edge; springs that fail are charted too, and
     their neighbours' sweep is cut off, until none fails. The edge is known to about 1e-5 of the set's size, with
     light modes to 5e-5; where springs fail to the last the region has a warning.

@@ -29,7 +29,7 @@ class Sweep:
     found   touching points of each spring
     strips  between the envelope and the arcs that it touches
     lost    springs between which an envelope was lost
-    done    stretches that have been looked at
+    done    stretches and ways that have been looked at
     """
 
     springs: Springs
@@ -75,6 +75,10 @@ class Sweep:
                 for place in (at - 1, at + 1):
                     if not 0 <= place < len(shares):
                         continue
+                    way = (share, touch.theta, float(shares[place]), 0.0)
+                    if way in self.done:
+                        continue
+                    self.done.add(way)
                     other = self._followed(touch, float(shares[place]))
                     first, last = sorted((touch, other), key=lambda end: end.share)
                     key = (first.share, round(first.theta, 6), last.share, round(last.theta, 6))
