@@ -231,7 +231,7 @@ def test_a_direction_without_an_answer_is_data():
     found = largest_stiffness_by_direction(
         device.mechanism, device.posture(), np.eye(3), device.controller, "full", device.damping
     )
-    assert found.status == ("ok", "ok", "the handle cannot move along the direction")
+    assert found.status == ("ok", "ok", "out of motion: the handle cannot move along the direction")
     assert np.isnan(found.stiffness[2])
     assert np.isfinite(found.stiffness[:2]).all()
 

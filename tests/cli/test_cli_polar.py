@@ -27,7 +27,16 @@ def test_each_direction_is_the_chart_of_its_own():
 def test_directions_that_cannot_be_moved_along_are_null_with_a_status():
     document = zwidth("polar", MECHANISM, "--count", 4, "--plane", "xz", "--json").document
     assert [value is None for value in document["stiffness_max_N_per_m"]] == [False, True, False, True]
-    assert document["status"][1] == "the handle cannot move along the direction"
+    assert document["status"][1] == "out of motion: the handle cannot move along the direction"
+
+
+def test_a_direction_that_leaves_the_plane_of_motion_is_not_the_stiffest():
+    document = zwidth("polar", "five-bar", "--count", 12, "--plane", "xz", "--json").document
+    answered = [k for k, value in enumerate(document["stiffness_max_N_per_m"]) if value is not None]
+    assert answered == [0, 6]  # x and its opposite; 1/cos^2 of it is what the others would have said
+    assert {document["status"][k] for k in range(12) if k not in answered} == {
+        "out of motion: the handle cannot move along the direction"
+    }
 
 
 def test_no_stable_wall_anywhere_is_no_answer():

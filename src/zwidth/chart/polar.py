@@ -23,6 +23,8 @@ from zwidth.model.reduction import DirectionError, Model, ModelError, reduce_mec
 Floats = NDArray[np.float64]
 
 OK, NO_WALL = "ok", "no stable wall"
+OUT_OF_MOTION = "out of motion: the handle cannot move along the direction"
+OFF = 1e-6  # of a direction, outside what the handle can do
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class ByDirection:
     stiffness   (k,)    largest K with K > 0, B >= 0 [N/m]; nan where there is none
     damping     (k,)    B there [N s/m]
     frequency   (k,)    of the vibration there, the lower one at a corner [Hz]
-    status      (k,)    "ok", "no stable wall", or why the direction has no answer
+    status      (k,)    "ok", "no stable wall", "out of motion: ...", or why the direction has no answer
     """
 
     directions: Floats
@@ -65,7 +67,9 @@ def largest_stiffness_by_direction(
     """The largest stiffness along each direction, each traced exactly as `largest_stiffness` does.
 
     A direction and its opposite render the same walls: actuator and sensor both change sign, the loop does not.
-    Each such pair is computed once. A direction that has no answer is data: nan, and a status that says why.
+    Each such pair is computed once. A direction that has no answer is data: nan, and a status that says why. One
+    that leaves the motions of the handle, the range of its Jacobian, has none: only its shadow within them could
+    be rendered, whose stiffness 1/cos^2 would let appear as large as one likes.
 
     posture     a single one, OK
     directions  (k, 3)  of any length but zero
@@ -77,12 +81,15 @@ def largest_stiffness_by_direction(
         raise ValueError("directions must be an array (k, 3) of vectors that have a length")
     units = given / length
     plant = _plants(mechanism, posture, model, damping)
+    moving = _motions(posture)
     results: dict[tuple[float, ...], tuple[float, float, float, str]] = {}
     rows = []
     for unit in units:
         key = _either_way(unit)
         if key not in results:
-            results[key] = _stiffest(plant, unit, controller)
+            off = np.linalg.norm(unit - moving.T @ (moving @ unit)) > OFF
+            none = float("nan")
+            results[key] = (none, none, none, OUT_OF_MOTION) if off else _stiffest(plant, unit, controller)
         rows.append(results[key])
     stiffness, damper, frequency, status = zip(*rows, strict=True)
     return ByDirection(units, np.array(stiffness), np.array(damper), np.array(frequency), status)
@@ -95,20 +102,19 @@ def _either_way(unit: Floats) -> tuple[float, ...]:
     return tuple((rounded * np.sign(lead) + 0.0).tolist())
 
 
+def _motions(posture: Posture) -> Floats:
+    """Orthonormal directions (m, 3) that span all along which the handle can move."""
+    basis, size, _ = np.linalg.svd(posture.jacobian)
+    return np.asarray(basis.T[: len(size)][size > DEPENDENT * size[0]])
+
+
 def _plants(mechanism: Mechanism, posture: Posture, model: Model, damping: Damping) -> Callable[[Floats], Plant]:
     """The plant along a unit vector. Directions share the full model's matrices and differ in their actuator."""
     if model != "full":
         return lambda unit: reduce_mechanism(mechanism, posture, unit, model, damping)
-    basis, size, _ = np.linalg.svd(posture.jacobian)
-    axes = basis.T[: len(size)][size > DEPENDENT * size[0]]
+    axes = _motions(posture)
     everywhere = reduce_directions(mechanism, posture, axes, "full", damping)
-
-    def along(unit: Floats) -> Plant:
-        if not np.linalg.norm(posture.jacobian.T @ unit) > 1e-12 * np.linalg.norm(posture.jacobian):
-            raise DirectionError("the handle cannot move along the direction")
-        return everywhere.along(axes @ unit)
-
-    return along
+    return lambda unit: everywhere.along(axes @ unit)
 
 
 def _stiffest(
@@ -120,7 +126,7 @@ def _stiffest(
         loop = Loop(plant(unit), controller)
         peak = largest_stiffness(loop)
     except (DirectionError, UnmovedError):
-        return none, none, none, "the handle cannot move along the direction"
+        return none, none, none, OUT_OF_MOTION
     except ModelError as error:
         return none, none, none, str(error)
     except ChartError as error:
