@@ -13,6 +13,7 @@ from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import HysteresisError
 from zwidth.model.operator import Operator, attach
+from zwidth.model.plant import Plant
 
 
 def with_loss(plant, factor):
@@ -93,3 +94,12 @@ def test_a_loss_factor_has_no_transition_matrix():
     loop = Loop(with_loss(mass(0.1, 0.0, 100.0), 0.1), published().controller)
     with pytest.raises(HysteresisError, match="steady vibration"):
         loop.transition_matrix(1.0, 1.0)
+
+
+@pytest.mark.parametrize("eta", [1e-12, 1e-8, 1e-6])
+def test_a_loss_factor_too_small_to_chart_is_named(eta):
+    one = np.ones(1)
+    spring = np.array([[4000.0]])
+    plant = Plant(one[None], 0.0 * spring, spring, one, one, hysteresis=eta * spring)
+    with pytest.raises(HysteresisError, match="the loss factor is below 1e-05, too small"):
+        hysteretic_chart(Loop(plant, Controller(0.001)))

@@ -26,9 +26,10 @@ from zwidth.chart.tracer import Tracer
 from zwidth.loop.filters import force_path
 from zwidth.loop.loop import Loop
 from zwidth.loop.response import product
+from zwidth.loop.sections import HysteresisError
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
-from zwidth.model.response import Response
+from zwidth.model.response import Response, ResponseError
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -37,13 +38,15 @@ Complexes = NDArray[np.complex128]
 ALIASES = 400
 # Sampling step in shares of the distance to the nearest singularity of the viscous plant, and nearer the tip.
 STEP, FINER = 0.04, 0.004
+TOO_SMALL = "too small for this loop to be charted; leave it out (0), give a larger one, or give damping"
+LEAST = 1e-5  # of the stiffness: with less the response turns too fast to be followed along the circle
 
 
 def hysteretic_chart(loop: Loop) -> MeasuredChart:
     """The stable walls of a loop whose plant has a loss factor (`Plant.hysteresis`).
 
     Returns  MeasuredChart; what it calls measured is computed here, to 1e-8, at as many frequencies as it takes
-    Raises   ResponseError where no chart can be drawn
+    Raises   HysteresisError  where the loss factor is below 1e-5, or too small for this loop to be charted
 
     >>> one = np.ones(1)
     >>> spring = np.array([[4000.0]])
@@ -52,6 +55,20 @@ def hysteretic_chart(loop: Loop) -> MeasuredChart:
     >>> hysteretic_chart(Loop(plant, Controller(0.001))).stiffness_max > 0.0
     True
     """
+    assert loop.plant.hysteresis is not None
+    if np.max(np.abs(loop.plant.hysteresis)) < LEAST * (1.0 - 1e-9) * np.max(np.abs(loop.plant.stiffness)):
+        raise HysteresisError(f"the loss factor is below {LEAST:.0e}, {TOO_SMALL}")
+    try:
+        chart = _charted(loop)
+    except ResponseError:
+        raise HysteresisError(f"the loss factor is {TOO_SMALL}") from None
+    if chart.open:
+        raise HysteresisError(f"the loss factor is {TOO_SMALL}")
+    return chart
+
+
+def _charted(loop: Loop) -> MeasuredChart:
+    """The chart by the response at the angles of the viscous one, and more of them near the stiffest wall."""
     reference = Loop(viscous(loop.plant), loop.controller)
     tracer = Tracer.of(reference)
     thetas = np.append(angles(tracer.features(), 1.0, STEP, tracer.longest_step / 4.0), np.pi)

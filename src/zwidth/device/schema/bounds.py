@@ -27,6 +27,8 @@ LEAST_RESISTANCE: Final = 1e-9  # ohm
 LARGEST_RESISTANCE: Final = 1e12  # ohm
 LEAST_INDUCTANCE: Final = 1e-15  # H
 LARGEST_INDUCTANCE: Final = 1e6  # H
+LEAST_LOSS: Final = 1e-5  # of the stiffness, of a loss factor there is
+LARGEST_LOSS: Final = 10.0
 LEAST_SHARE: Final = 1e-9  # of a coordinate in what is driven or read
 LARGEST_SHARE: Final = 1e9  # of a coordinate in what is driven or read
 

@@ -174,7 +174,11 @@ RotorInertia = Annotated[
 Ratio = Annotated[Number, bounds.within(bounds.LEAST_RATIO, bounds.LARGEST_RATIO, "motor turns per joint turn")]
 Damper = Annotated[Number, bounds.within(0.0, bounds.STRONGEST_DAMPING, "N m s/rad")]
 Resistance = Annotated[Number, bounds.within(bounds.LEAST_RESISTANCE, bounds.LARGEST_RESISTANCE, "ohm", "0 or ")]
-LossFactor = Annotated[Number, Field(ge=0.0, le=10.0)]
+LossFactor = Annotated[
+    Number,
+    Field(ge=0.0, le=bounds.LARGEST_LOSS),
+    bounds.within(bounds.LEAST_LOSS, bounds.LARGEST_LOSS, "of the stiffness", "0 (none) or "),
+]
 Inductance = Annotated[Number, bounds.within(bounds.LEAST_INDUCTANCE, bounds.LARGEST_INDUCTANCE, "H", "0 or ")]
 NumberOrInfinity = Annotated[float, Strict(), AfterValidator(_not_nan), AfterValidator(_thinkable)]
 Spring = Annotated[NumberOrInfinity, bounds.within(bounds.SOFTEST, bounds.STIFFEST, "N m/rad", "inf (rigid) or ")]
