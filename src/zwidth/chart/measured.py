@@ -239,12 +239,21 @@ def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
         stable_area=nan if opened else float(sum(cell.area for cell in quadrant)),
         interpolation_error=float(np.max(errors, initial=0.0) / peak[0]) + ZOOMED,
         measured_stiffness_max=max((K for K, B in points if K > 0.0 and B >= 0.0), default=nan),
-        band=None if opened else uncertainty(loop, cells),
+        band=None if opened else _holding(uncertainty(loop, cells), peak[0]),
         stiffness_max_of_sweeps=(),
         unusable=tuple(_told(loop, cells)),
         open=opened,
         window=cells.box,
     )
+
+
+def _holding(band: Band | None, stiffest: float) -> Band | None:
+    """The band with the largest stiffness in it: that is found by a closer look than the band's ellipses."""
+    if band is None or isnan(stiffest):
+        return band
+    # where no wall is stable beyond doubt, nan stays
+    low = band.stiffness_low if isnan(band.stiffness_low) else min(band.stiffness_low, stiffest)
+    return replace(band, stiffness_low=low, stiffness_high=float(np.fmax(band.stiffness_high, stiffest)))
 
 
 def _in_quadrant(cell: shapely.Geometry) -> shapely.Geometry:

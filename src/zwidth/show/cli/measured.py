@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from zwidth.show.cli.points import Walls
 
 SHOWN: Final = 6  # stretches named on a terminal
+MOST_UNMEASURED: Final = 0.1  # of the frequencies up to half the sampling rate, before the heading says so
 OPEN: Final = (
     "the measured edge does not close round the stable walls: frequencies are missing; measure up to half the "
     "sampling rate"
@@ -51,9 +52,20 @@ def answer_chart(
         _write(path, found, document | ({} if reason is None else {"reason": reason}), window)
 
     def pages() -> list[Any]:
-        return [heading(question, device), sheet([*rows(common), *more_rows(found)]), *written]
+        warnings = [f"warning: {text}" for text in [warning(found)] if text]
+        return [heading(question, device), *warnings, sheet([*rows(common), *more_rows(found)]), *written]
 
     return deliver(Answer(document, pages, reason), as_json)
+
+
+def without_model(question: Question, device: Device, unanswered: Mapping[str, Any], as_json: bool) -> int:
+    """The answer of a command that needs a model, for a device with a [response]: none, and why.
+
+    unanswered  what the command's document holds besides the facts where it has no answer
+    Raises      DeviceError  for a posture, direction, assembly or model, which such a device does not have
+    """
+    question.as_measured(device)
+    return deliver(Answer(question.facts(device) | dict(unanswered), reason=NO_MODEL), as_json)
 
 
 def _charted(question: Question, device: Device) -> MeasuredChart:
@@ -103,7 +115,27 @@ def more_numbers(chart: MeasuredChart) -> dict[str, Any]:
             {"low_Hz": s.low, "high_Hz": s.high, "reason": s.reason, "on_edge": s.on_edge} for s in chart.unusable
         ],
         "closed": not chart.open,
+        "measured_up_to_share": measured_up_to(chart),
+        "warning": warning(chart),
     }
+
+
+def measured_up_to(chart: MeasuredChart) -> float:
+    """Where the data end, as a share of half the sampling rate; 1 where they reach it."""
+    half = 0.5 / chart.loop.period
+    beyond = [stretch.low for stretch in chart.unusable if stretch.high >= half * (1.0 - 1e-9)]
+    return min([*(low / half for low in beyond), 1.0])
+
+
+def warning(chart: MeasuredChart) -> str | None:
+    """What a response cut short leaves unseen; None where it reaches nearly up to half the sampling rate."""
+    share, half = measured_up_to(chart), 0.5 / chart.loop.period
+    if share >= 1.0 - MOST_UNMEASURED:
+        return None
+    return (
+        f"measured up to {share * half:.6g} Hz, {100.0 * share:.3g} % of half the sampling rate ({half:.6g} Hz); "
+        "walls that fail above are not seen"
+    )
 
 
 def arcs(chart: MeasuredChart) -> list[dict[str, Any]]:
