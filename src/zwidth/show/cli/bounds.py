@@ -11,6 +11,7 @@ import click
 
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
 from zwidth.show.cli.computing import NoAnswer, computing
+from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
@@ -87,6 +88,8 @@ def bounds(question: Question, damping: float | None, output: str | None, as_jso
     """Compare published conditions on DEVICE with the exact answer, and say which assumptions it does not meet."""
     path = None if output is None else destination(output, FIGURES + DATA)
     device = question.device()
+    if device.response is not None:
+        return without_model(question, device, dict.fromkeys(KEYS) | {"decided": True}, as_json)
     try:
         with computing(question):
             found = _compared(question, device, damping)

@@ -12,6 +12,7 @@ import click
 from zwidth.show.cli.answer import Answer, deliver, sheet
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
@@ -73,7 +74,10 @@ def felt(question: Question, stiffness: float, damping: float, output: str | Non
     """Find what the hand feels of a wall that DEVICE renders: the impedance at the handle, and at rest."""
     path = None if output is None else destination(output, FIGURES + DATA)
     device = question.device()
-    facts = question.facts(device) | {"wall_stiffness_N_per_m": stiffness, "wall_damping_Ns_per_m": damping}
+    wall = {"wall_stiffness_N_per_m": stiffness, "wall_damping_Ns_per_m": damping}
+    if device.response is not None:
+        return without_model(question, device, wall | dict.fromkeys(KEYS), as_json)
+    facts = question.facts(device) | wall
     try:
         with computing(question):
             found = _computed(question, device, stiffness, damping)

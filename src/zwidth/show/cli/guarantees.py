@@ -10,6 +10,7 @@ import click
 
 from zwidth.show.cli.answer import Answer, deliver, table
 from zwidth.show.cli.computing import NoAnswer, computing
+from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
@@ -53,6 +54,8 @@ def guarantees(
     path = None if output is None else destination(output, FIGURES + DATA)
     wall = _wall(coupling, stiffness, damping)
     device = question.device()
+    if device.response is not None:
+        return without_model(question, device, {"operator": None, "guarantees": None}, as_json)
     facts = question.facts(device) | {"operator": None}
     try:
         with computing(question):

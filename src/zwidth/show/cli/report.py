@@ -9,7 +9,7 @@ import click
 
 from zwidth.show.cli.answer import Answer, deliver
 from zwidth.show.cli.computing import NoAnswer, computing
-from zwidth.show.cli.measured import NO_MODEL
+from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.output import destination
 from zwidth.show.units import typed
@@ -32,9 +32,7 @@ def report(question: Question, output: str | None, as_json: bool) -> int:
     path = destination(output or default_name(question.name), PAGE)
     device = question.device()
     if device.response is not None:
-        question.as_measured(device)
-        unanswered = question.facts(device) | {"file": None, "decided": True}
-        return deliver(Answer(unanswered, reason=NO_MODEL), as_json)
+        return without_model(question, device, {"file": None, "decided": True}, as_json)
     try:
         with computing(question):
             question.plant(device)  # whether it can be meant, before the heavy parts are imported

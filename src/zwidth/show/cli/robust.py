@@ -13,6 +13,7 @@ import click
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, named, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.motions import counted
@@ -99,9 +100,11 @@ def robust(
     path = None if output is None else destination(output, FIGURES + DATA)
     held_by = _operators(question, operators, operator_list)
     varied = _ranges(ranges)
+    device = question.device()
+    if device.response is not None:
+        return without_model(question, device, dict.fromkeys(KEYS) | {"decided": True}, as_json)
     if not varied and not held_by:
         raise BadInput(f"{question.name}: nothing varies; give --range PATH=LOW,HIGH or --operators A,B,C")
-    device = question.device()
     try:
         with computing(question), _progress() as progress:
             found = _computed(question, device, varied, held_by, (members, unseen, seed), progress)
@@ -187,7 +190,6 @@ def _computed(
     from zwidth.study.robust import robust_study
     from zwidth.study.robust_family import Family
 
-    question.as_measured(device)
     family = Family(device, ranges, operators, lambda one, held: question.plant(one, held=held))
     members, unseen, seed = counts
     return robust_study(family, members, unseen, seed, progress=progress)

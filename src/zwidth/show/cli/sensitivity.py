@@ -10,6 +10,7 @@ import click
 
 from zwidth.show.cli.answer import Answer, deliver, table
 from zwidth.show.cli.computing import NoAnswer, computing
+from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
@@ -47,6 +48,8 @@ def sensitivity(question: Question, top: int, output: str | None, as_json: bool)
     """Find what of DEVICE to change first: how the largest stiffness answers to each of its numbers."""
     path = None if output is None else destination(output, FIGURES + DATA)
     device = question.device()
+    if device.response is not None:
+        return without_model(question, device, dict.fromkeys(KEYS) | {"decided": True}, as_json)
     try:
         with computing(question):
             found = _computed(question, device)
