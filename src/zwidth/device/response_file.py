@@ -128,8 +128,8 @@ def _recorded(path: Path, table: Table, section: ResponseSection, period: float)
         raise fail(
             str(path),
             f"line {lines[1]}: time_s",
-            f"does not rise: the time falls or stands still, by {mean:.6g} s from most lines to the next; sort the "
-            "lines by rising time",
+            f"does not rise: the time falls or stands still, by {mean:.6g} s from most lines to the next; sort "
+            "the lines by rising time",
         )
     uneven = np.flatnonzero(np.abs(steps - mean) > UNEVEN * mean)
     if len(uneven):
