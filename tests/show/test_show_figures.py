@@ -293,3 +293,18 @@ def test_nothing_touches_pyplot():
     program = "import sys, zwidth.show.report.report; print('matplotlib.pyplot' in sys.modules)"
     found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "False"
+
+
+def test_broken_conditions_are_grey_under_one_entry_and_every_condition_is_named():
+    from zwidth.conditions import compare
+    from zwidth.show.figures.bounds import draw_bounds
+
+    loop = loop_of("published-two-mass")
+    bounds = compare(loop)
+    ax = Figure().add_subplot()
+    draw_bounds(ax, bounds, stability_chart(loop, decay=False))
+    said = " ".join(legend_text(ax)).replace("\n", " ")
+    spoken = [bound for bound in bounds if not bound.lacking]
+    assert all(bound.name in said for bound in spoken)
+    assert any(not bound.holds for bound in spoken)
+    assert said.count("assumptions broken") == 1

@@ -20,10 +20,11 @@ def test_every_guarantee_is_in_the_legend_with_its_largest_stiffness():
     assert "every spring: 2.2" in words
 
 
-def test_hatches_and_shades_tell_the_sets_apart_in_grey():
+def test_shades_tell_the_sets_apart_in_grey_and_edges_where_they_coincide():
     def lightness(colour):
         return sum(int(colour[i : i + 2], 16) for i in (1, 3, 5))
 
-    shades = [lightness(fill) for fill, _, _ in AREAS.values()]
+    shades = [lightness(fill) for fill, *_ in AREAS.values()]
     assert all(a - b > 40 for a, b in pairwise(shades))
-    assert len({hatch for _, hatch, _ in AREAS.values()}) == len(AREAS)
+    upwards = sorted(AREAS.values(), key=lambda look: look[3])
+    assert all(below[2] > 1.3 * above[2] for below, above in pairwise(upwards))

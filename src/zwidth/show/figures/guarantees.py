@@ -1,4 +1,4 @@
-"""Nested guarantees on one chart: shades and hatches that survive a grey print."""
+"""Nested guarantees on one chart: shades that survive a grey print, and edges that show where they coincide."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import BLACK, BLUE, GREEN, PURPLE, VERMILION, label, legend_above
 from zwidth.show.units import quantity
 
-# Fill, hatch and edge of the nested sets; they get darker inwards.
+# Fill, edge, and the edge's width and place above the fills; the sets get darker inwards. The narrower edge lies
+# on the wider, so that both are seen where two sets share it.
 AREAS: Final = {
-    "stable": ("#E8EFF5", "", BLACK),
-    "robust": ("#D2DEE9", "....", GREEN),
-    "spring-stable": ("#AFC6DA", "////", BLUE),
-    "passive": ("#6F93B3", "\\\\\\\\", VERMILION),
+    "stable": ("#EEF3F7", BLACK, 0.8, 2.3),
+    "robust": ("#D8E3EC", GREEN, 4.8, 2.0),
+    "spring-stable": ("#BFD1E0", BLUE, 3.4, 2.1),
+    "passive": ("#A0BAD0", VERMILION, 1.5, 2.2),
 }
 # Sets that lie across the others are outlines only.
 LINES: Final = {"nyquist-spring": (PURPLE, (0, (5, 1.5))), "passive-at-actuator": (BLACK, (0, (1.2, 1.2)))}
@@ -41,9 +42,9 @@ def draw_guarantees(ax: Axes, found: Guarantees, window: Window | None = None) -
     window  what to show; left out: the box of the part of the chart with K and B above 0, and 5 %
     """
     by_name = {guarantee.name: guarantee for guarantee in found.guarantees}
-    for depth, (name, (fill, hatch, edge)) in enumerate(AREAS.items()):
+    for depth, (name, look) in enumerate(AREAS.items()):
         if name in by_name:
-            _area(ax, by_name[name], fill, hatch, edge, 1.0 + 0.1 * depth)
+            _area(ax, by_name[name], look, 1.0 + 0.1 * depth)
     for name, (colour, dashes) in LINES.items():
         if name in by_name:
             guarantee = by_name[name]
@@ -73,8 +74,18 @@ def draw_couplings(ax: Axes, found: Couplings) -> None:
     legend_above(ax, columns=1)
 
 
-def _area(ax: Axes, guarantee: Guarantee, fill: str, hatch: str, edge: str, zorder: float) -> None:
-    _patch(ax, guarantee.region, _words(guarantee), (fill, hatch, edge), zorder)
+def _area(ax: Axes, guarantee: Guarantee, look: tuple[str, str, float, float], zorder: float) -> None:
+    fill, edge, width, above = look
+    rings, text = guarantee.region.rings, _words(guarantee)
+    if not rings:
+        ax.plot([], [], color="none", label=text)
+        return
+    whole = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
+    ax.add_patch(PathPatch(whole, facecolor=fill, edgecolor="none", zorder=zorder))
+    ax.add_patch(PathPatch(whole, fill=False, edgecolor=edge, linewidth=width, zorder=above))
+    ax.add_patch(
+        Polygon([[np.nan, np.nan]], facecolor=fill, edgecolor=edge, linewidth=min(width, 2.5), label=text)
+    )
 
 
 def _patch(ax: Axes, region: Region, text: str, look: tuple[str, str, str], zorder: float) -> None:
