@@ -177,7 +177,7 @@ def test_the_data_as_columns(tmp_path):
         (("--damping", "abc"), "must be a finite number, got 'abc'"),
         (("--damping", "nan"), "must be a finite number, got 'nan'"),
         (("--damping", "inf"), "must be a finite number, got 'inf'"),
-        (("--damping", ""), "must be a finite number, got ''"),
+        (("--damping", ""), "must be a finite number, but it is missing"),
         (("--damping",), "requires an argument"),
         (("--output", "bounds.txt"), "must end in"),
         (("--output", "no/such/folder.csv"), "there is no folder"),

@@ -121,7 +121,7 @@ def check_inclusions(seed):
             assert spectral_radius(held, *walls.T).max() < 1.0 + 1e-9
 
 
-# some other seeds take long, have no chart, or hardly move what they read: there the sets meet within rounding only
+# some other seeds take long, have no chart, or hardly move what they read: there sets meet within rounding only
 @pytest.mark.parametrize("seed", [3, 9, 10, 14, 17])
 def test_guarantees_of_random_devices_lie_within_one_another(seed):
     check_inclusions(seed)
