@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from zwidth.chart.grid import angles
 from zwidth.chart.measured import MeasuredChart, measured_chart
 from zwidth.chart.tracer import Tracer
-from zwidth.loop.filters import force_path
+from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.loop.response import product
 from zwidth.loop.sections import HysteresisError
@@ -111,7 +111,7 @@ def sampled_response(loop: Loop, reference: Loop, thetas: Floats) -> Complexes:
     s, z = 1j * w, np.exp(1j * thetas)
     lag = loop.controller.actuator_time_constant * s + 1.0
     hold = np.exp(-s * loop.controller.delay * T) * -np.expm1(-1j * thetas)[:, None] / (s * lag)
-    low_pass = force_path(replace(loop.controller, actuator_time_constant=0.0))
+    low_pass = force_filter(loop.controller)
     passed = product(low_pass.numerator, low_pass.denominator, z - 1.0)
     return np.asarray(reference.plant_response(z) + passed * np.sum(extra * hold, axis=1) / T)
 

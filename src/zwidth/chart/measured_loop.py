@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from zwidth.chart.between import FEWEST, Between, around_one, between
 from zwidth.chart.trust import Stretch, reaches_the_end, stretches, usable
 from zwidth.loop.controller import Controller
-from zwidth.loop.filters import force_path, velocity_estimator
+from zwidth.loop.filters import force_filter, velocity_estimator
 from zwidth.loop.response import product, window_response
 from zwidth.model.response import Response, ResponseError, integrators_of, relative_error
 
@@ -94,7 +94,7 @@ class MeasuredLoop:
 
     def h(self, theta: Floats) -> Complexes:
         """h = -1/P (...) at angles in (0, pi], software delay and force filter in P; inf where P is 0."""
-        delay, force = round(self.controller.delay), force_path(self.controller)
+        delay, force = round(self.controller.delay), force_filter(self.controller)
         with np.errstate(divide="ignore", invalid="ignore"):
             passed = product(force.numerator, force.denominator, around_one(theta))
             return np.asarray(-self.between.inverse(theta) * np.exp(1j * theta * delay) / passed)

@@ -12,7 +12,7 @@ so that the passive walls are a convex set, an intersection of half planes, one 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isfinite, nan
 
 import numpy as np
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.conditions.assumptions import COLLOCATED, PROMPT, RESISTIVE, RIGID, WHOLE, Case
 from zwidth.conditions.bound import Bound
-from zwidth.loop.filters import force_path
+from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.loop.response import product, window_response
 
@@ -79,7 +79,7 @@ def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
     t, l, T = ANGLES, loop.whole_delay, loop.period
     sine = np.sin(t / 2.0)
     d = 2.0 * sine * (1j * np.cos(t / 2.0) - sine)  # e^jt - 1 without cancellation
-    force, own, z = force_path(replace(loop.controller, actuator_time_constant=0.0)), loop.estimator, 1.0 + d
+    force, own, z = force_filter(loop.controller), loop.estimator, 1.0 + d
     w = product(own.numerator, own.denominator, d) * window_response(own.window, z)
     late = d * np.exp(-1j * (l + 1) * t) * product(force.numerator, force.denominator, d) * T / (4.0 * sine**2)
     return PassiveSet(device_damping, np.real(late), np.real(late * w))

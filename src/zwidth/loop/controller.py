@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import floor
 from typing import Literal
 
 from zwidth.loop.estimators import BackwardDifference, VelocityMethod
@@ -44,3 +45,13 @@ class Controller:
     velocity: VelocityMethod = field(default_factory=BackwardDifference)
     force_filter: FirstOrder | Butterworth | None = None
     actuator_time_constant: float = 0.0
+
+    @property
+    def whole_delay(self) -> int:
+        """Whole samples l of the delay."""
+        return floor(self.delay + 1e-12)
+
+    @property
+    def fractional_delay(self) -> float:
+        """Remaining part f of the delay, 0 <= f < 1 [samples]."""
+        return max(self.delay - self.whole_delay, 0.0)

@@ -68,13 +68,19 @@ def _stacked(rows: Rows) -> Floats:
     return np.array(rows, dtype=float).reshape(-1, 3)
 
 
+def force_filter(controller: Controller) -> Filter:
+    """What the computer does to the whole force, F(z)."""
+    top, bottom = low_pass_factors(controller.force_filter, controller.sampling_period)
+    return Filter(_stacked(top), _stacked(bottom))
+
+
 def force_path(controller: Controller) -> Filter:
     """The force filter, then the actuator's lag 1/(d + s), whose numerators `loop.hold` has."""
-    T, lag = controller.sampling_period, controller.actuator_time_constant
-    top, bottom = low_pass_factors(controller.force_filter, T)
-    if lag > 0.0:
-        top, bottom = [*top, [0.0, 0.0, 1.0]], [*bottom, [0.0, 1.0, lag_share(T, lag)]]
-    return Filter(_stacked(top), _stacked(bottom))
+    own, lag = force_filter(controller), controller.actuator_time_constant
+    if not lag > 0.0:
+        return own
+    share = lag_share(controller.sampling_period, lag)
+    return Filter(np.vstack([own.numerator, [[0.0, 0.0, 1.0]]]), np.vstack([own.denominator, [[0.0, 1.0, share]]]))
 
 
 def velocity_estimator(controller: Controller) -> Estimator:

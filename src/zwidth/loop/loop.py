@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import floor
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,20 +38,15 @@ class Loop:
         """Sampling period T [s]."""
         return self.controller.sampling_period
 
-    @cached_property
-    def _delay(self) -> tuple[int, float]:
-        whole = floor(self.controller.delay + 1e-12)
-        return whole, max(self.controller.delay - whole, 0.0)
-
     @property
     def whole_delay(self) -> int:
         """Whole samples l of the delay."""
-        return self._delay[0]
+        return self.controller.whole_delay
 
     @property
     def fractional_delay(self) -> float:
         """Remaining part f of the delay, 0 <= f < 1 [samples]."""
-        return self._delay[1]
+        return self.controller.fractional_delay
 
     @cached_property
     def sections(self) -> Sections:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from math import floor
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.loop.filters import force_filter, velocity_estimator
 from zwidth.loop.multi_hold import Held, Motion, hold, moved
 from zwidth.loop.sections import UnmovedError
 from zwidth.loop.series import Series, series
 from zwidth.model.directions import MultiPlant
-from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -47,12 +45,12 @@ class MultiLoop:
     @property
     def whole_delay(self) -> int:
         """Whole samples l of the delay."""
-        return floor(self.controller.delay + 1e-12)
+        return self.controller.whole_delay
 
     @property
     def fractional_delay(self) -> float:
         """Remaining part f of the delay, 0 <= f < 1 [samples]."""
-        return max(self.controller.delay - self.whole_delay, 0.0)
+        return self.controller.fractional_delay
 
     @cached_property
     def motion(self) -> Motion:
@@ -76,14 +74,13 @@ class MultiLoop:
     @cached_property
     def estimator(self) -> Series:
         """The velocity estimate w(z), the same along each direction."""
-        own = _stand_in(self.controller).estimator
+        own = velocity_estimator(self.controller)
         return series(own.numerator, own.denominator, own.window)
 
     @cached_property
     def force_filter(self) -> Series:
         """F(z), what the force of each direction passes before the hold."""
-        without = Controller(self.period, force_filter=self.controller.force_filter)
-        own = _stand_in(without).force_path
+        own = force_filter(self.controller)
         return series(own.numerator, own.denominator, np.ones(1))
 
     def plant_response(self, z: ArrayLike) -> Complexes:
@@ -172,9 +169,3 @@ class MultiLoop:
         open_, enters, position, velocity = self.affine
         feedback = K[..., None, None] * position + B[..., None, None] * velocity
         return np.asarray(open_ - enters @ feedback)
-
-
-def _stand_in(controller: Controller) -> Loop:
-    """A loop of one mass under the same controller, for what does not depend on the plant."""
-    one = np.ones(1)
-    return Loop(Plant(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), one, one), controller)

@@ -16,21 +16,18 @@ An actuator lag tau f' + f = u adds m states f to A before the exponential is ta
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from zwidth.loop.motions import motion_name, pole_name
 from zwidth.model.directions import MultiPlant
-from zwidth.model.modes import REPEATED, undamped_modes
+from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED, undamped_modes
 
 Floats = NDArray[np.float64]
 
-# Shares of all residues below which a motion is one that no wall moves; for undamped ones the wall would move the
-# poles by less than the band in which stability is left undecided.
-UNMOVED, UNMOVED_UNDAMPED = 1e-11, 1e-9
 # Condition of damped modes beyond which their residues say nothing.
 DEFECTIVE = 1e7
 
@@ -133,12 +130,12 @@ def _equal_poles(
     """Modes of one pair of poles: as many as the rank of their residue, by its singular values."""
     period, decay = sampling[0], drag / 2.0
     left, strength, right = np.linalg.svd(outputs @ inputs)
-    level = total * (UNMOVED_UNDAMPED if abs(decay) * period < 1e-9 else UNMOVED)
+    level = total * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)
     rank = int(np.sum(strength[: len(inputs)] * _reach(squared, drag, *sampling) > level))
     root = np.sqrt(strength[:rank])
     enters, leaves = root[:, None] * right[:rank], left[:, :rank] * root
     found = _pairs(np.full(rank, squared), drag * np.eye(rank), enters, leaves, period)
-    return Motion(found.A, found.B, found.C, (_label(squared, decay),) * (len(inputs) - rank))
+    return Motion(found.A, found.B, found.C, (motion_name(squared, decay),) * (len(inputs) - rank))
 
 
 def _reach(squared: float, drag: float, period: float, fraction: float) -> float:
@@ -160,10 +157,10 @@ def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, 
     seen = whole.C @ right
     reach = np.abs(np.expm1(poles * period) / np.where(poles == 0.0, 1.0, poles)) + period * (poles == 0.0)
     strength = np.linalg.norm(source, axis=1) * np.linalg.norm(seen, axis=0) * reach
-    keep = strength > UNMOVED * float(np.sum(strength))
+    keep = strength > UNOBSERVED * float(np.sum(strength))
     if keep.all():
         return whole
-    names = [_damped_label(poles[k]) for k in np.flatnonzero(~keep & (poles.imag >= 0.0))]
+    names = [pole_name(poles[k]) for k in np.flatnonzero(~keep & (poles.imag >= 0.0))]
     chosen = np.flatnonzero(keep & (poles.imag >= 0.0))
     # real and imaginary parts of the kept eigenvectors span what stays
     basis = np.hstack([np.column_stack([right[:, k].real, right[:, k].imag]) for k in chosen])
@@ -173,20 +170,6 @@ def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, 
     real = np.concatenate([[poles[k].imag == 0.0] * 2 for k in chosen])
     rows = np.where(real[:, None], rows / 2.0, rows)[~(real & (np.arange(len(rows)) % 2 == 1))]
     return Motion(rows @ whole.A @ basis, rows @ whole.B, whole.C @ basis, tuple(names))
-
-
-def _label(squared: float, decay: float) -> str:
-    """A motion's name for people."""
-    if squared <= 0.0:
-        return "rigid motion (0 Hz)" if squared == 0.0 else "unstable motion (negative stiffness)"
-    rate = sqrt(squared)
-    return f"mode at {rate / (2.0 * np.pi):.4g} Hz (damping ratio {decay / rate:.3g})"
-
-
-def _damped_label(pole: complex) -> str:
-    if pole.imag == 0.0:
-        return "overdamped motion"
-    return f"mode at {abs(pole) / (2.0 * np.pi):.4g} Hz (coupled damping)"
 
 
 def hold(motion: Motion, period: float, fraction: float, lag: float) -> Held:

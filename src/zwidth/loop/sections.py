@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.chain import Chain, chain, chain_rows
 from zwidth.loop.hold import modal_row
+from zwidth.loop.motions import motion_name, pole_name
 from zwidth.model.first_order import FirstOrderForm, first_order_form, seen
 from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes
 from zwidth.model.plant import Plant
@@ -80,7 +80,7 @@ def _modal_sections(modes: RealModes, period: float, fraction: float, lag: float
         # What counts is the sampled residue: a mode at a multiple of the sampling rate is not reached by a hold
         level = total * period**2 * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)
         observed = bool(np.max(np.abs(row[2:])) > level)
-        unobserved += [_label(squared, decay)] * (len(group) - observed)
+        unobserved += [motion_name(squared, decay)] * (len(group) - observed)
         if observed:
             rows.append([*row, 0.0])
     return Sections(np.array(rows).reshape(-1, 9), tuple(unobserved))
@@ -109,8 +109,8 @@ def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag:
         row = modal_row(0.0, 0.0, period, fraction, lag)
         row[2:] *= form.free
         alone.append([*row, 0.0])
-    unobserved = [_label(0.0, 0.0)] * (form.free_count - len(alone))
-    unobserved += [_pole_label(pole) for pole in form.hidden if pole.imag >= 0.0]
+    unobserved = [motion_name(0.0, 0.0)] * (form.free_count - len(alone))
+    unobserved += [pole_name(pole) for pole in form.hidden if pole.imag >= 0.0]
     sampled = chain(form, period, fraction, lag)
     rows = chain_rows(form, sampled, period)
     m = len(rows)
@@ -138,20 +138,3 @@ def _repeats(row: Floats, earlier: Floats) -> bool:
         if max(apart) <= SAME_POLES and size(row) <= SAME_POLES * rate**2 * size(other):
             return True
     return False
-
-
-def _label(squared: float, decay: float) -> str:
-    """A motion's name for people."""
-    if squared <= 0.0:
-        return "rigid motion (0 Hz)" if squared == 0.0 else "unstable motion (negative stiffness)"
-    rate = sqrt(squared)
-    return f"mode at {rate / (2.0 * np.pi):.4g} Hz (damping ratio {decay / rate:.3g})"
-
-
-def _pole_label(pole: complex) -> str:
-    """The same for a motion with a pole of its own; a braked free motion stays where it is left, at 0 Hz."""
-    if pole == 0.0:
-        return _label(0.0, 0.0)
-    if pole.imag != 0.0:
-        return f"mode at {abs(pole) / (2.0 * np.pi):.4g} Hz (coupled damping)"
-    return "overdamped motion"
