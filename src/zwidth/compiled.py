@@ -13,6 +13,7 @@ import numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 UNCOUNTED: Final[dict[str, Any]] = {"_nrt": False}  # numba takes this flag, its type stubs do not name it
+INLINED: Final[dict[str, Any]] = {**UNCOUNTED, "forceinline": True}
 
 
 def compiled(function: Function) -> Function:
@@ -31,6 +32,15 @@ def compiled_lean(function: Function) -> Function:
     such a kernel cannot allocate: numba refuses to compile it, it never computes something else.
     """
     return cast(Function, numba.njit(cache=True, error_model="numpy", **UNCOUNTED)(function))
+
+
+def compiled_inline(function: Function) -> Function:
+    """Like `compiled_lean`, for the innermost steps of a hot loop: built into whatever calls them.
+
+    Left to itself the compiler stops building them in once the loop around them has grown, and the calls then
+    cost as much as the algebra.
+    """
+    return cast(Function, numba.njit(cache=True, error_model="numpy", **INLINED)(function))
 
 
 def compiled_parallel(function: Function) -> Function:

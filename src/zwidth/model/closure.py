@@ -150,6 +150,27 @@ def passive_rates(mech: Arrays, work: Work) -> float:
 
 
 @compiled_lean
+def loop_step(mech: Arrays, work: Work) -> float:
+    """Step of the passive joints alone that closes the loops, from the basis `passive_rates` left; its
+    largest turn.
+
+    The orthogonal basis and the triangle still stand, so that only the new right-hand side is worked through.
+    """
+    passive, rows = mech.joint.size - mech.driven, 3 * mech.a.size
+    Q, R, x = work.basis, work.triangle, work.solution
+    for j in range(passive):
+        x[0, j] = 0.0
+        for r in range(rows):
+            x[0, j] += Q[j, r] * work.gaps[r] / R[j, j]
+    most = 0.0
+    for j in range(passive - 1, -1, -1):
+        for i in range(j + 1, passive):
+            x[0, j] -= R[j, i] * x[0, i]
+        most = max(most, abs(x[0, j]))
+    return most
+
+
+@compiled_lean
 def orientation(start: Floats, rows: Floats, G: Floats, unknowns: int, count: int) -> float:
     """det(start^T rows) over the first unknowns and `count` equations, G (m, m) being scratch: it changes
     sign across a singularity.

@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from zwidth.model.carried import seen_by
 from zwidth.model.mechanism import Drives, Floats
 from zwidth.model.plant import LaggedDamper, Plant
-
-ROUNDING = 1e-12  # share of a motion that is none
 
 
 def with_dampers(plant: Plant, dampers: Sequence[LaggedDamper]) -> Plant:
@@ -51,10 +50,3 @@ def carried(dampers: Sequence[LaggedDamper], motions: Floats) -> list[LaggedDamp
     motions  (n, m)  a motion in each column; a reduced plant's coordinates say how much of each there is
     """
     return [replace(d, along=seen_by(d.along, motions)) for d in dampers]
-
-
-def seen_by(vector: Floats, motions: Floats) -> Floats:
-    """vector . motion for each motion (m,), rounding set to 0."""
-    seen = vector @ motions
-    inside = np.abs(vector) @ np.abs(motions)
-    return np.asarray(np.where(np.abs(seen) > ROUNDING * inside, seen, 0.0))

@@ -118,7 +118,8 @@ def reduce_directions(
 
     Modal damping puts its ratio on each flexible mode of the 2m coordinates; motor-mass keeps the motor side's
     block of that matrix. Dampers given beside the drives are moved as the drives deflect: C_e = X^T C X, with
-    X = K^-1 J^T K_e.
+    X = K^-1 J^T K_e. What is not linear, dry friction and encoder steps among it, is left out: several directions
+    are charted only.
 
     posture     a single one, OK
     directions  (m, 3)  unit vectors in the base frame, independent of each other; not necessarily orthogonal

@@ -1,14 +1,11 @@
-"""Mass matrix, handle Jacobian and nonlinear inertia terms in the driven coordinates, compiled."""
+"""Mass matrix and handle Jacobian in the driven coordinates, compiled."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from zwidth.compiled import compiled, compiled_lean
+from zwidth.compiled import compiled_lean
 from zwidth.model.arrays import Arrays
-from zwidth.model.closure import equations, least_squares, passive_rates
-from zwidth.model.mechanism import Floats, Ints
-from zwidth.model.tree import Work, place, point, workspace
+from zwidth.model.mechanism import Floats
+from zwidth.model.tree import Work, point
 
 
 @compiled_lean
@@ -89,107 +86,3 @@ def mass_matrix(mech: Arrays, design: int, work: Work, out: Floats, index: int) 
     for s in range(d):
         for t in range(s):
             out[index, t, s] = out[index, s, t]
-
-
-@compiled
-def accelerate(
-    mech: Arrays, work: Work, rates: Floats, turning: Floats, w: Floats, alpha: Floats, acceleration: Floats
-) -> None:
-    """Velocity-dependent accelerations: spin w, its derivative alpha and the acceleration of each origin (n,
-    3).
-
-    rates    (m,)  q' of all unknowns;   turning  (m,)  q''
-    alpha_i = alpha_p + z_i q'' + w_p x z_i q',   a_i = a_p + alpha_p x r + w_p x (w_p x r),  r = o_i - o_p
-    """
-    zero = np.zeros(3)
-    for i in range(mech.parent.size):
-        p, u = mech.parent[i], mech.column[i]
-        rate = rates[u] if u >= 0 else 0.0
-        change = turning[u] if u >= 0 else 0.0
-        z = work.axis[i]
-        wp = w[p] if p >= 0 else zero
-        ap = alpha[p] if p >= 0 else zero
-        w[i] = wp + rate * z
-        alpha[i] = ap + change * z + rate * cross(wp, z)
-        if p >= 0:
-            r = work.origin[i] - work.origin[p]
-            acceleration[i] = acceleration[p] + cross(ap, r) + cross(wp, cross(wp, r))
-        else:
-            acceleration[i] = zero
-
-
-@compiled
-def cross(a: Floats, b: Floats) -> Floats:
-    """a x b"""
-    product: Floats = np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-    return product
-
-
-@compiled
-def point_acceleration(
-    work: Work,
-    link: int,
-    local: Floats,
-    design: int,
-    index: int,
-    w: Floats,
-    alpha: Floats,
-    acceleration: Floats,
-) -> Floats:
-    """Acceleration of the link's point local[design, index]; of the base's: none."""
-    if link < 0:
-        return np.zeros(3)
-    p = point(work.rotation, work.origin, link, local, design, index)
-    r = np.array([p[0], p[1], p[2]]) - work.origin[link]
-    total: Floats = acceleration[link] + cross(alpha[link], r) + cross(w[link], cross(w[link], r))
-    return total
-
-
-@compiled
-def nonlinear_terms(mech: Arrays, design: int, work: Work, driven_rates: Floats, out: Floats) -> None:
-    """c(q, p') = B^T (c_q + M B' p') of the links (thesis eq. B.19), with the links placed and `rates`
-    filled.
-
-    The passive joints' q'' at p'' = 0 follow from the closures' accelerations, A_p q_p'' = -(a_a - a_b); then
-    every link's inertia force and moment is projected on the unit motions of the drives.
-    """
-    n, m, d, k = mech.parent.size, mech.joint.size, mech.driven, mech.a.size
-    passive, rows = m - d, 3 * k
-    rates, turning = np.zeros(m), np.zeros(m)
-    for s in range(d):
-        rates += driven_rates[s] * work.rates[s]
-    w, alpha, a = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
-    accelerate(mech, work, rates, turning, w, alpha, a)
-    for c in range(k):
-        gap = point_acceleration(work, mech.b[c], mech.point_b, design, c, w, alpha, a)
-        gap -= point_acceleration(work, mech.a[c], mech.point_a, design, c, w, alpha, a)
-        work.sides[0, 3 * c : 3 * c + 3] = gap
-    for u in range(passive):
-        work.basis[u, :rows] = work.rows[u, :rows]
-    least_squares(work.basis, work.triangle, work.sides, work.solution, passive, rows, 1)
-    turning[:passive] = work.solution[0, :passive]
-    accelerate(mech, work, rates, turning, w, alpha, a)
-
-    unit_motions(mech, work)
-    center = mech.center_of_mass
-    out[:] = 0.0
-    for i in range(n):
-        R = work.rotation[i]
-        inertia = R @ mech.inertia[design, i] @ R.T
-        force = mech.mass[design, i] * point_acceleration(work, i, center, design, i, w, alpha, a)
-        p = point(work.rotation, work.origin, i, center, design, i)
-        r = np.array([p[0], p[1], p[2]]) - work.origin[i]
-        moment = inertia @ alpha[i] + cross(w[i], inertia @ w[i]) + cross(r, force)
-        for s in range(d):
-            out[s] += np.sum(force * work.speed[s, i]) + np.sum(moment * work.spin[s, i])
-
-
-@compiled
-def nonlinear_batch(mech: Arrays, design: Ints, angles: Floats, driven_rates: Floats, out: Floats) -> None:
-    """`nonlinear_terms` for each posture: design (N,), angles (N, n), driven_rates and out (N, d)."""
-    work = workspace(mech)
-    for i in range(design.size):
-        place(mech, design[i], angles[i], work)
-        equations(mech, design[i], work.goal, work)
-        passive_rates(mech, work)
-        nonlinear_terms(mech, design[i], work, driven_rates[i], out[i])

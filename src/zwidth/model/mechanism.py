@@ -12,6 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.nonlinear import FrictionModel
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -63,6 +65,36 @@ class Closures:
 
 
 @dataclass(frozen=True)
+class DriveNonlinearity:
+    """What of the drives is not linear, all at the motor; 0, or nan where said so, is none of it.
+
+    coulomb             (..., d)  dry friction between rotor and housing [N m]
+    friction_model      of all of it, as in `nonlinear.Friction`
+    breakaway           (..., d)  its static level [N m], of lugre; nan: that of `coulomb`
+    bristle_stiffness   of dahl and lugre [N m/rad]
+    bristle_damping     of lugre [N m s/rad]
+    stribeck_velocity   of lugre [rad/s]
+    hardening           (..., d)  k_3 of the transmission's torque k d + k_3 d^3 [N m/rad^3]
+    backward_stiffness  (..., d)  its stiffness where the motor lags behind the joint [N m/rad]; nan: the same
+    brake_damping       (..., d)  largest damping of a programmable brake on the rotor [N m s/rad]
+    brake_time_constant (..., d)  [s]
+    encoder_noise       (..., d)  standard deviation of the motor's angle before it is counted [rad]
+    """
+
+    coulomb: Floats
+    friction_model: FrictionModel
+    breakaway: Floats
+    bristle_stiffness: float
+    bristle_damping: float
+    stribeck_velocity: float
+    hardening: Floats
+    backward_stiffness: Floats
+    brake_damping: Floats
+    brake_time_constant: Floats
+    encoder_noise: Floats
+
+
+@dataclass(frozen=True)
 class Drives:
     """The d drives, each on one revolute joint; their order is the order of the driven coordinates.
 
@@ -76,6 +108,7 @@ class Drives:
     encoder_counts   (..., d)  per motor revolution after quadrature, nan if not known
     winding_damping  (..., d)  k_t^2/R of a winding closed through a resistor, at the motor [N m s/rad]; None: none
     winding_time_constant  (..., d)  its L/R [s]
+    nonlinearity     friction, springs that are not straight, brakes; None: none
     """
 
     names: tuple[str, ...]
@@ -89,6 +122,7 @@ class Drives:
     encoder_counts: Floats
     winding_damping: Floats | None = None
     winding_time_constant: Floats | None = None
+    nonlinearity: DriveNonlinearity | None = None
 
 
 @dataclass(frozen=True)

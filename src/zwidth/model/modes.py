@@ -61,6 +61,20 @@ def natural_frequencies(plant: Plant) -> Floats:
     return np.sqrt(np.where(squared < 0.0, np.nan, squared)) / (2.0 * np.pi)
 
 
+def undeformed(plant: Plant) -> Floats:
+    """The motion (n,) of one metre at the sensor that deforms the plant least: the rigid one where the sensor
+    reads it, else the static deflection under a force at the sensor."""
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    rigid = shapes[:, squared == 0.0]
+    seen = rigid.T @ plant.sensor
+    if np.linalg.norm(seen) > 1e-9 * np.linalg.norm(shapes.T @ plant.sensor):
+        motion = rigid @ seen
+    else:
+        elastic = squared != 0.0
+        motion = shapes[:, elastic] @ ((shapes[:, elastic].T @ plant.sensor) / squared[elastic])
+    return np.asarray(motion / (plant.sensor @ motion))
+
+
 def clusters(values: Floats, tolerance: float) -> list[slice]:
     """Runs of ascending values that lie within the tolerance of their neighbour."""
     starts = [0, *(int(i) + 1 for i in np.flatnonzero(np.diff(values) > tolerance)), len(values)]

@@ -77,4 +77,5 @@ def attach(plant: Plant, operator: Operator) -> Plant:
         names=(*plant.names, "arm") if plant.names else (),
         lagged_dampers=tuple(replace(d, along=np.append(d.along, 0.0)) for d in plant.lagged_dampers),
         hysteresis=None if plant.hysteresis is None else np.pad(plant.hysteresis, (0, 1)),
+        nonlinear=plant.nonlinear.padded(1),
     )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
+from zwidth.model.nonlinear import Nonlinear
 
 Floats = NDArray[np.float64]
 
@@ -44,6 +46,7 @@ class Plant:
     hysteresis (n, n)  imaginary part of the stiffness at positive frequencies, K (1 + i eta) for a loss factor eta
                        [N/m]; it speaks of steady vibration only, so that such a plant has no transition matrix
                        (see `chart.hysteretic`); None: none
+    nonlinear          friction, encoder steps and the like: what only `contact` knows of
     """
 
     mass: Floats
@@ -55,6 +58,7 @@ class Plant:
     names: tuple[str, ...] = ()
     lagged_dampers: tuple[LaggedDamper, ...] = ()
     hysteresis: Floats | None = None
+    nonlinear: Nonlinear = field(default_factory=Nonlinear)
 
     @property
     def size(self) -> int:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.compiled import compiled
 from zwidth.model.arrays import Arrays, design_shape, pack, per_design
 from zwidth.model.batch import nowhere, solve
+from zwidth.model.bias import bias_batch
 from zwidth.model.continuation import ASSEMBLED, OK, OUT_OF_REACH, SINGULAR, assemble_batch
-from zwidth.model.inertia import nonlinear_batch
 from zwidth.model.mechanism import Floats, Ints, Mechanism
 from zwidth.model.mobility import check_mobility
 from zwidth.model.tree import place, workspace
@@ -155,7 +155,8 @@ def inertia_terms(mechanism: Mechanism, posture: Posture, driven_rates: ArrayLik
     flat = np.broadcast_to(rates, (*shape, mech.driven)).reshape(-1, mech.driven)
     design = np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
     out = np.empty(flat.shape)
-    nonlinear_batch(mech, design, np.ascontiguousarray(angles), np.ascontiguousarray(flat), out)
+    still = np.zeros(3)
+    bias_batch(mech, design, np.ascontiguousarray(angles), np.ascontiguousarray(flat), still, out)
     return out.reshape(*shape, mech.driven)
 
 

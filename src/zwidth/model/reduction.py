@@ -6,8 +6,8 @@ handle is the joint torques h f. The wall's force acts through the motors, which
 read the motors, whose reading of the handle is h . theta: actuator = sensor = [0; h], handle = [h; 0] on
 [phi; theta]. Encoders behind the drives read the links instead: sensor = [h; 0].
 
-A reduced model's coordinates are shares of motions of the full one. Sensor and electrical dampers are carried
-over by what these motions move them by.
+A reduced model's coordinates are shares of motions of the full one. Sensor, electrical dampers and what is not
+linear (dry friction, encoders, brakes) are carried over by what these motions move them by.
 """
 
 from __future__ import annotations
@@ -19,11 +19,14 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from zwidth.model.dampers import carried, seen_by, winding_dampers, with_dampers
+from zwidth.model.carried import seen_by
+from zwidth.model.dampers import carried, winding_dampers, with_dampers
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
+from zwidth.model.drive_parts import of_drives
 from zwidth.model.effective import EffectiveParameters, effective_parameters, unit_direction
 from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.modes import undamped_modes
+from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.posture import OK, Posture
 
@@ -87,10 +90,11 @@ def reduce_mechanism(
         raise ModelError(
             f"model {model!r} needs a flexible drive in this direction and all are rigid; use 'rigid'"
         )
-    if encoders == "motor" and not electrical:
+    if encoders == "motor" and not electrical and not full.nonlinear:
         return reduced
     motions = _motions(full, model)
-    return with_dampers(_read(reduced, full, motions), carried(electrical, motions))
+    read = replace(_read(reduced, full, motions), nonlinear=full.nonlinear.seen(motions))
+    return with_dampers(read, carried(electrical, motions))
 
 
 def reduce_plant(plant: Plant, model: Model) -> Plant:
@@ -106,7 +110,7 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
     rigid       1/(a^T Z (Z^T M Z)^-1 Z^T a), damper x^T B x of the rigid motion x of one metre at
                 the actuator
 
-    Sensor and lagged dampers are what these motions move them by: W^T sensor, W^T along.
+    Sensor, lagged dampers and what is not linear are what these motions move them by: W^T sensor, W^T along.
 
     Returns  Plant; `full` gives the plant itself, and so does the model it already is
     Raises   ModelError  where the model does not apply, with the reason; for hysteresis all but `full`
@@ -186,7 +190,10 @@ def _full(
     sensor = actuator.copy() if encoders == "motor" else handle.copy()
     motors = np.eye(d, d + f)
     motors[flexible] = np.eye(d + f)[d:]
-    return Plant(M, B, K, actuator, sensor, handle, tuple(names)), winding_dampers(drives, motors)
+    links = np.eye(d, d + f)
+    parts = of_drives(drives, h, links, motors, motors if encoders == "motor" else links)
+    plant = Plant(M, B, K, actuator, sensor, handle, tuple(names), nonlinear=parts)
+    return plant, winding_dampers(drives, motors)
 
 
 def _full_damping(M: Floats, K: Floats, D: Floats, damper: Floats, damping: Damping) -> Floats:
@@ -316,11 +323,25 @@ def _motions(plant: Plant, model: Model) -> Floats:
 
 
 def _carried(reduced: Plant, plant: Plant, model: Model) -> Plant:
-    """The reduced plant with the sensor and the lagged dampers of the one it stands for."""
-    if not plant.lagged_dampers and np.array_equal(plant.sensor, plant.actuator):
+    """The reduced plant with the sensor, the lagged dampers and what is not linear of the one it stands for."""
+    if not plant.lagged_dampers and not plant.nonlinear and np.array_equal(plant.sensor, plant.actuator):
         return reduced
     motions = _motions(plant, model)
-    return with_dampers(_read(reduced, plant, motions), carried(plant.lagged_dampers, motions))
+    read = _read(reduced, plant, motions)
+    parts = _parts(read, plant, motions)
+    return with_dampers(replace(read, nonlinear=parts), carried(plant.lagged_dampers, motions))
+
+
+def _parts(reduced: Plant, plant: Plant, motions: Floats) -> Nonlinear:
+    """What is not linear, as the motions move it. A single counter, of the whole reading, counts the reduced
+    sensor, which is known where springs tie the plant to the ground, too; what several count there is not."""
+    found, counters = plant.nonlinear.seen(motions), plant.nonlinear.counters
+    if len(counters) == 1 and np.array_equal(counters[0].weight * counters[0].along, plant.sensor):
+        return replace(found, counters=(replace(counters[0], along=reduced.sensor / counters[0].weight),))
+    told = sum((part.weight * part.along for part in found.counters), np.zeros(reduced.size))
+    if counters and not np.allclose(told, reduced.sensor, rtol=0.0, atol=TOGETHER * np.max(np.abs(told))):
+        raise ModelError("the plant is tied to the ground, and what encoders count of two masses is not known")
+    return found
 
 
 def _held(reduced: Plant, plant: Plant, motion: Floats) -> Plant:

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.arrays import Arrays
-from zwidth.model.closure import equations, newton_step, orientation, passive_rates
+from zwidth.model.closure import equations, loop_step, newton_step, orientation, passive_rates
 from zwidth.model.continuation import CONTRACTION, LARGEST_TURN, SINGULAR_CONDITION, largest
 from zwidth.model.mechanism import Floats, Ints
 from zwidth.model.tree import Work, place, point, workspace
@@ -111,7 +111,7 @@ def close(mech: Arrays, angles: Floats, work: Work) -> bool:
         if condition < SINGULAR_CONDITION:
             return False
         # the step -A_p^+ gap, with the drives at rest: the same solve with the gaps as right-hand side
-        size = _loop_step(mech, work)
+        size = loop_step(mech, work)
         moved += size
         if not moved < LARGEST_TURN or (iteration > 0 and size > CONTRACTION * last):
             return bool(largest(work.gaps, loops) < 1e-13 * mech.size[0])
@@ -121,27 +121,6 @@ def close(mech: Arrays, angles: Floats, work: Work) -> bool:
             return True
         last = size
     return False
-
-
-@compiled_lean
-def _loop_step(mech: Arrays, work: Work) -> float:
-    """Step of the passive joints alone that closes the loops, from the basis `passive_rates` left; its
-    largest turn.
-
-    The orthogonal basis and the triangle still stand, so that only the new right-hand side is worked through.
-    """
-    passive, rows = mech.joint.size - mech.driven, 3 * mech.a.size
-    Q, R, x = work.basis, work.triangle, work.solution
-    for j in range(passive):
-        x[0, j] = 0.0
-        for r in range(rows):
-            x[0, j] += Q[j, r] * work.gaps[r] / R[j, j]
-    most = 0.0
-    for j in range(passive - 1, -1, -1):
-        for i in range(j + 1, passive):
-            x[0, j] -= R[j, i] * x[0, i]
-        most = max(most, abs(x[0, j]))
-    return most
 
 
 @compiled_lean

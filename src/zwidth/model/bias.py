@@ -1,0 +1,176 @@
+"""Forces of velocity and gravity in the driven coordinates, compiled and without allocation."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.model.arrays import Arrays
+from zwidth.model.closure import equations, loop_step, passive_rates
+from zwidth.model.inertia import unit_motions
+from zwidth.model.mechanism import Floats, Ints
+from zwidth.model.tree import Work, place, point, workspace
+
+
+class Flow(NamedTuple):
+    """Memory for the links' velocities and accelerations at given rates.
+
+    rates, turning       (m,)    q' and q'' of all unknowns
+    spin, spin_up, speed_up  (n, 3)  angular velocity, its derivative, acceleration of the origin less gravity
+    """
+
+    rates: Floats
+    turning: Floats
+    spin: Floats
+    spin_up: Floats
+    speed_up: Floats
+
+
+@compiled
+def flow_of(mech: Arrays) -> Flow:
+    """Fresh memory."""
+    n, m = mech.parent.size, mech.joint.size
+    return Flow(np.zeros(m), np.zeros(m), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
+
+
+@compiled_lean
+def accelerate(mech: Arrays, work: Work, gravity: Floats, flow: Flow) -> None:
+    """Fill spin, spin_up and speed_up from the rates and their derivatives, parents first.
+
+    w_i = w_p + z_i q',   alpha_i = alpha_p + z_i q'' + w_p x z_i q',
+    a_i = a_p + alpha_p x r + w_p x (w_p x r),   r = o_i - o_p;   the base falls upwards, a = -gravity
+    """
+    w, alpha, a, rates, turning = flow.spin, flow.spin_up, flow.speed_up, flow.rates, flow.turning
+    o, z, parent, column = work.origin, work.axis, mech.parent, mech.column
+    gx, gy, gz = gravity[0], gravity[1], gravity[2]
+    for i in range(parent.size):
+        p, u = parent[i], column[i]
+        rate, change = 0.0, 0.0
+        if u >= 0:
+            rate, change = rates[u], turning[u]
+        zx, zy, zz = z[i, 0], z[i, 1], z[i, 2]
+        if p < 0:
+            w[i, 0], w[i, 1], w[i, 2] = rate * zx, rate * zy, rate * zz
+            alpha[i, 0], alpha[i, 1], alpha[i, 2] = change * zx, change * zy, change * zz
+            a[i, 0], a[i, 1], a[i, 2] = -gx, -gy, -gz
+            continue
+        wx, wy, wz = w[p, 0], w[p, 1], w[p, 2]
+        bx, by, bz = alpha[p, 0], alpha[p, 1], alpha[p, 2]
+        rx, ry, rz = o[i, 0] - o[p, 0], o[i, 1] - o[p, 1], o[i, 2] - o[p, 2]
+        # w x (w x r) = w (w . r) - r (w . w)
+        along, square = wx * rx + wy * ry + wz * rz, wx * wx + wy * wy + wz * wz
+        a[i, 0] = a[p, 0] + by * rz - bz * ry + wx * along - rx * square
+        a[i, 1] = a[p, 1] + bz * rx - bx * rz + wy * along - ry * square
+        a[i, 2] = a[p, 2] + bx * ry - by * rx + wz * along - rz * square
+        alpha[i, 0] = bx + change * zx + rate * (wy * zz - wz * zy)
+        alpha[i, 1] = by + change * zy + rate * (wz * zx - wx * zz)
+        alpha[i, 2] = bz + change * zz + rate * (wx * zy - wy * zx)
+        w[i, 0], w[i, 1], w[i, 2] = wx + rate * zx, wy + rate * zy, wz + rate * zz
+
+
+@compiled_lean
+def point_acceleration(
+    work: Work, flow: Flow, gravity: Floats, link: int, local: Floats, design: int, index: int
+) -> tuple[float, float, float]:
+    """Acceleration of the link's point local[design, index], less gravity [m/s^2]."""
+    if link < 0:
+        return -gravity[0], -gravity[1], -gravity[2]
+    w, b, a, o = flow.spin, flow.spin_up, flow.speed_up, work.origin
+    p = point(work.rotation, o, link, local, design, index)
+    wx, wy, wz = w[link, 0], w[link, 1], w[link, 2]
+    bx, by, bz = b[link, 0], b[link, 1], b[link, 2]
+    rx, ry, rz = p[0] - o[link, 0], p[1] - o[link, 1], p[2] - o[link, 2]
+    along, square = wx * rx + wy * ry + wz * rz, wx * wx + wy * wy + wz * wz
+    return (
+        a[link, 0] + by * rz - bz * ry + wx * along - rx * square,
+        a[link, 1] + bz * rx - bx * rz + wy * along - ry * square,
+        a[link, 2] + bx * ry - by * rx + wz * along - rz * square,
+    )
+
+
+@compiled_lean
+def bias(
+    mech: Arrays, design: int, work: Work, flow: Flow, driven_rates: Floats, gravity: Floats, out: Floats
+) -> None:
+    """c(q, p') - B^T g_q in the driven coordinates, (d,) into `out` [N m]: what is left of M p'' at p'' = 0.
+
+        c = B^T (c_q + M B' p')                                            (thesis eq. B.19)
+
+    The links are placed, `passive_rates` is what was solved last, and `unit_motions` is done; `gaps` are
+    overwritten. The passive joints' q'' at p'' = 0 follow from the closures' accelerations,
+    A_p q_p'' = -(a_a - a_b); then every link's inertia force and moment is projected on the unit motions of the
+    drives. Gravity is the base falling upwards.
+    """
+    rates, turning, per_drive = flow.rates, flow.turning, work.rates
+    m, d, k = rates.size, mech.driven, mech.a.size
+    passive = m - d
+    for u in range(m):
+        total = 0.0
+        for s in range(d):
+            total += driven_rates[s] * per_drive[s, u]
+        rates[u] = total
+        turning[u] = 0.0
+    accelerate(mech, work, gravity, flow)
+    if k > 0:
+        gaps, solution = work.gaps, work.solution
+        a, b, point_a, point_b = mech.a, mech.b, mech.point_a, mech.point_b
+        for c in range(k):
+            pa = point_acceleration(work, flow, gravity, a[c], point_a, design, c)
+            pb = point_acceleration(work, flow, gravity, b[c], point_b, design, c)
+            for x in range(3):
+                gaps[3 * c + x] = pb[x] - pa[x]
+        loop_step(mech, work)
+        for u in range(passive):
+            turning[u] = solution[0, u]
+        accelerate(mech, work, gravity, flow)
+    _project(mech, design, work, flow, gravity, out)
+
+
+@compiled_lean
+def _project(mech: Arrays, design: int, work: Work, flow: Flow, gravity: Floats, out: Floats) -> None:
+    """Each link's inertia force m a and moment I alpha + w x I w on the unit motions of the drives."""
+    R, o, spin, speed = work.rotation, work.origin, work.spin, work.speed
+    w, b = flow.spin, flow.spin_up
+    mass, center, I, k = mech.mass, mech.center_of_mass, mech.inertia, design
+    for s in range(out.size):
+        out[s] = 0.0
+    for i in range(mass.shape[1]):
+        p = point(R, o, i, center, k, i)
+        a = point_acceleration(work, flow, gravity, i, center, k, i)
+        rx, ry, rz = p[0] - o[i, 0], p[1] - o[i, 1], p[2] - o[i, 2]
+        fx, fy, fz = mass[k, i] * a[0], mass[k, i] * a[1], mass[k, i] * a[2]
+        # in the link's frame, where the inertia is constant
+        wx = R[i, 0, 0] * w[i, 0] + R[i, 1, 0] * w[i, 1] + R[i, 2, 0] * w[i, 2]
+        wy = R[i, 0, 1] * w[i, 0] + R[i, 1, 1] * w[i, 1] + R[i, 2, 1] * w[i, 2]
+        wz = R[i, 0, 2] * w[i, 0] + R[i, 1, 2] * w[i, 1] + R[i, 2, 2] * w[i, 2]
+        bx = R[i, 0, 0] * b[i, 0] + R[i, 1, 0] * b[i, 1] + R[i, 2, 0] * b[i, 2]
+        by = R[i, 0, 1] * b[i, 0] + R[i, 1, 1] * b[i, 1] + R[i, 2, 1] * b[i, 2]
+        bz = R[i, 0, 2] * b[i, 0] + R[i, 1, 2] * b[i, 1] + R[i, 2, 2] * b[i, 2]
+        hx = I[k, i, 0, 0] * wx + I[k, i, 0, 1] * wy + I[k, i, 0, 2] * wz
+        hy = I[k, i, 1, 0] * wx + I[k, i, 1, 1] * wy + I[k, i, 1, 2] * wz
+        hz = I[k, i, 2, 0] * wx + I[k, i, 2, 1] * wy + I[k, i, 2, 2] * wz
+        mx = I[k, i, 0, 0] * bx + I[k, i, 0, 1] * by + I[k, i, 0, 2] * bz + wy * hz - wz * hy
+        my = I[k, i, 1, 0] * bx + I[k, i, 1, 1] * by + I[k, i, 1, 2] * bz + wz * hx - wx * hz
+        mz = I[k, i, 2, 0] * bx + I[k, i, 2, 1] * by + I[k, i, 2, 2] * bz + wx * hy - wy * hx
+        tx = R[i, 0, 0] * mx + R[i, 0, 1] * my + R[i, 0, 2] * mz + ry * fz - rz * fy
+        ty = R[i, 1, 0] * mx + R[i, 1, 1] * my + R[i, 1, 2] * mz + rz * fx - rx * fz
+        tz = R[i, 2, 0] * mx + R[i, 2, 1] * my + R[i, 2, 2] * mz + rx * fy - ry * fx
+        for s in range(out.size):
+            out[s] += fx * speed[s, i, 0] + fy * speed[s, i, 1] + fz * speed[s, i, 2]
+            out[s] += tx * spin[s, i, 0] + ty * spin[s, i, 1] + tz * spin[s, i, 2]
+
+
+@compiled
+def bias_batch(
+    mech: Arrays, design: Ints, angles: Floats, driven_rates: Floats, gravity: Floats, out: Floats
+) -> None:
+    """`bias` for each posture: design (N,), angles (N, n), driven_rates and out (N, d)."""
+    work, flow = workspace(mech), flow_of(mech)
+    for i in range(design.size):
+        place(mech, design[i], angles[i], work)
+        equations(mech, design[i], work.goal, work)
+        passive_rates(mech, work)
+        unit_motions(mech, work)
+        bias(mech, design[i], work, flow, driven_rates[i], gravity, out[i])
