@@ -11,7 +11,7 @@ from tests.systems import mass, random_loop
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.verdict import STABLE, UNSTABLE, judge
 from zwidth.loop.controller import Controller
-from zwidth.loop.estimators import METHODS, LeastSquaresSlope, SavitzkyGolay, WindowedDifference
+from zwidth.loop.estimators import LINEAR_METHODS, LeastSquaresSlope, SavitzkyGolay, WindowedDifference
 from zwidth.loop.estimators.response import relative_response
 from zwidth.loop.loop import Loop
 
@@ -21,12 +21,12 @@ def loops_of(name, rng, count, longest=16):
     while count:
         loop = random_loop(rng, DAMPED, str(rng.choice(["chain", "dense", "coupled", "apart"])))
         method = random_method(rng, loop.period, longest)
-        if isinstance(method, METHODS[name]):
+        if isinstance(method, LINEAR_METHODS[name]):
             count -= 1
             yield Loop(loop.plant, replace(loop.controller, velocity=method))
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", LINEAR_METHODS)
 def test_the_regions_agree_with_eigenvalues(name):
     rng = np.random.default_rng(20)
     for loop in loops_of(name, rng, 12):
@@ -34,14 +34,14 @@ def test_the_regions_agree_with_eigenvalues(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", LINEAR_METHODS)
 def test_the_regions_agree_with_eigenvalues_over_many_loops(name):
     rng = np.random.default_rng(21)
     for loop in loops_of(name, rng, 300, longest=40):
         assert disagreements(rng, loop, 20) == 0, loop.controller
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", LINEAR_METHODS)
 def test_verdicts_agree_with_eigenvalues(name):
     rng = np.random.default_rng(22)
     for loop in loops_of(name, rng, 12):
@@ -54,7 +54,7 @@ def test_verdicts_agree_with_eigenvalues(name):
         np.testing.assert_array_equal(said[clear], np.where(radius < 1.0, STABLE, UNSTABLE)[clear])
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", LINEAR_METHODS)
 def test_the_loops_velocity_is_the_methods(name):
     rng = np.random.default_rng(23)
     for loop in loops_of(name, rng, 5):

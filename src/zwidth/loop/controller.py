@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import floor
+from math import floor, inf
 from typing import Literal
 
 from zwidth.loop.estimators import BackwardDifference, VelocityMethod
@@ -37,6 +37,7 @@ class Controller:
     velocity                how the velocity is estimated
     force_filter            F, acts on the whole force; None: none
     actuator_time_constant  tau of the actuator, tau a' + a = held force [s]; 0: none
+    saturation              largest force that is commanded [N]; charts know nothing of it
     """
 
     sampling_period: float
@@ -45,6 +46,7 @@ class Controller:
     velocity: VelocityMethod = field(default_factory=BackwardDifference)
     force_filter: FirstOrder | Butterworth | None = None
     actuator_time_constant: float = 0.0
+    saturation: float = inf
 
     @property
     def whole_delay(self) -> int:

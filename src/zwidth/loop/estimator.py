@@ -25,3 +25,15 @@ class Estimator:
     numerator: Floats
     denominator: Floats
     window: Floats = field(default_factory=lambda: np.ones(1))
+
+
+class NonlinearError(ValueError):
+    """An estimate that is not linear was asked for w(z), which it does not have."""
+
+
+def no_chart(what: str) -> NonlinearError:
+    """The error of an estimate, called `what`, that is not linear."""
+    return NonlinearError(
+        f"{what} is not linear: it has no chart; ask zwidth simulate or zwidth experiment, or chart another "
+        "estimate with --set loop.velocity.method=backward-difference"
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ from zwidth.loop.filters import Filter, force_path, velocity_estimator
 from zwidth.loop.realisation import StateSpace, realise
 from zwidth.loop.response import product, rows_response, window_response
 from zwidth.loop.sections import Sections, sampled_sections
+from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -47,6 +48,13 @@ class Loop:
     def fractional_delay(self) -> float:
         """Remaining part f of the delay, 0 <= f < 1 [samples]."""
         return self.controller.fractional_delay
+
+    @property
+    def nonlinear(self) -> Nonlinear:
+        """What of plant and computer is not linear, a nonlinear estimate apart; its force limit is the smaller of
+        the actuator's and the computer's."""
+        own = self.plant.nonlinear
+        return replace(own, force_limit=min(own.force_limit, self.controller.saturation))
 
     @cached_property
     def sections(self) -> Sections:

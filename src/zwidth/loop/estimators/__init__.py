@@ -1,19 +1,24 @@
-"""How the velocity is estimated from positions: one method per file, each a discrete transfer function w(z).
+"""How the velocity is estimated from positions: one method per file, most a discrete transfer function w(z).
 
-Every method has `estimator(period)`, its factors at a sampling period; `delay(period)`, how late it is at low
-frequencies; and `noise_gain(period)`, how much of the position's white noise it passes. None takes or keeps a unit
-but metres and seconds. Their frequency responses are in `zwidth.loop.estimators.response`.
+Every linear method has `estimator(period)`, its factors at a sampling period; `delay(period)`, how late it is at
+low frequencies; and `noise_gain(period)`, how much of the position's white noise it passes. None takes or keeps a
+unit but metres and seconds. Their frequency responses are in `zwidth.loop.estimators.response`.
+
+Two methods are not linear, `Foaw` and `Levant`: they have no w(z), `estimator` raises NonlinearError, and a loop
+with them is simulated instead. `zwidth.loop.estimators.running` runs any method over recorded positions.
 """
 
 from zwidth.loop.estimators.alpha_beta import AlphaBeta
 from zwidth.loop.estimators.backward_difference import BackwardDifference
 from zwidth.loop.estimators.central_difference import CentralDifference
+from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.estimators.kalman import Kalman
 from zwidth.loop.estimators.least_squares_slope import LeastSquaresSlope
+from zwidth.loop.estimators.levant import Levant
 from zwidth.loop.estimators.savitzky_golay import SavitzkyGolay
 from zwidth.loop.estimators.windowed_difference import WindowedDifference
 
-VelocityMethod = (
+LinearMethod = (
     BackwardDifference
     | WindowedDifference
     | LeastSquaresSlope
@@ -22,9 +27,10 @@ VelocityMethod = (
     | AlphaBeta
     | Kalman
 )
+VelocityMethod = LinearMethod | Foaw | Levant
 
 # By the names of device files.
-METHODS: dict[str, type[VelocityMethod]] = {
+LINEAR_METHODS: dict[str, type[LinearMethod]] = {
     "backward-difference": BackwardDifference,
     "windowed-difference": WindowedDifference,
     "least-squares-slope": LeastSquaresSlope,
@@ -33,14 +39,19 @@ METHODS: dict[str, type[VelocityMethod]] = {
     "alpha-beta": AlphaBeta,
     "kalman": Kalman,
 }
+METHODS: dict[str, type[VelocityMethod]] = {**LINEAR_METHODS, "foaw": Foaw, "levant": Levant}
 
 __all__ = [
+    "LINEAR_METHODS",
     "METHODS",
     "AlphaBeta",
     "BackwardDifference",
     "CentralDifference",
+    "Foaw",
     "Kalman",
     "LeastSquaresSlope",
+    "Levant",
+    "LinearMethod",
     "SavitzkyGolay",
     "VelocityMethod",
     "WindowedDifference",

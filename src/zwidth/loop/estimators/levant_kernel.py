@@ -1,0 +1,41 @@
+"""The step of Levant's differentiator to the next reading, compiled apart: device files are read without numba."""
+
+from __future__ import annotations
+
+from math import copysign, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.compiled import compiled
+from zwidth.loop.estimators.levant import COUNT, ORIGIN, POSITION, VELOCITY
+
+Floats = NDArray[np.float64]
+
+
+@compiled
+def levant_estimate(memory: Floats, parameters: Floats, reading: float, period: float) -> float:
+    """The velocity at a new reading; `Levant` has the formulas.
+
+    memory      (memory_size,)  zeros at first, changed in place; positions are counted from the first reading
+    parameters  (2,)            `Levant.parameters`
+    reading     position [m]
+    period      T [s]
+    Returns     z1 [m/s], 0 at the first reading
+    """
+    if memory[COUNT] == 0.0:
+        memory[ORIGIN] = reading
+    memory[COUNT] += 1.0
+    position = reading - memory[ORIGIN]
+    brake, turn = period * parameters[0], period * parameters[1]
+    ahead = memory[POSITION] + period * memory[VELOCITY] - position
+    excess = abs(ahead) - period * turn
+    if excess <= 0.0:
+        memory[VELOCITY] = (position - memory[POSITION]) / period
+        memory[POSITION] = position
+    else:
+        root = 2.0 * excess / (brake + sqrt(brake * brake + 4.0 * excess))
+        memory[VELOCITY] -= copysign(turn, ahead)
+        memory[POSITION] = position + copysign(root * root, ahead)
+    velocity: float = memory[VELOCITY]
+    return velocity
