@@ -28,12 +28,10 @@ CASES = [
     (PLANT, {"colour": "red"}, "colour", "is not a key of a device file; allowed: "),
     (PLANT, {"lop": {}}, "lop", "did you mean 'loop'?"),
     # not supported yet
-    (PLANT, {"friction": {"coulomb_N": [0, 1]}}, "friction", "is not supported yet"),
     (PLANT, {"plant": GONE, "response": {}, "loop__delay_samples": GONE}, "response", "names no file"),
-    (PLANT, {"loop__saturation__force_N": INF}, "loop.saturation", "is not supported yet"),
     (
         PLANT,
-        {"loop__velocity__method": "foaw"},
+        {"loop__velocity__method": "measured"},
         "loop.velocity.method",
         "is not supported yet",
     ),
@@ -44,7 +42,6 @@ CASES = [
         "mechanism.links.upper.joint",
         "'prismatic' is not sup",
     ),
-    (ARM, {"mechanism__drives__0__coulomb_Nm": 0.1}, "mechanism.drives.shoulder.coulomb_Nm", "not supported"),
     # the plant
     (PLANT, {"plant__mass_kg": GONE}, "plant.mass_kg", "is missing"),
     (PLANT, {"plant__mass_kg": GONE, "plant__mas_kg": 1.0}, "plant.mas_kg", "did you mean 'mass_kg'?"),
@@ -274,7 +271,7 @@ def test_all_faults_are_reported_together_in_the_order_of_the_file():
         plant__actuator=[1.0, 2.0, 3.0],
         loop__sampling_period_s=800,
         loop__delay_samples=-1,
-        loop__saturation={"force_N": 3.0},
+        loop__saturation={"force_N": -3.0},
         loop__velocity__filter__order="two",
     )
     assert [fault.key for fault in faults(document)] == [
@@ -284,6 +281,6 @@ def test_all_faults_are_reported_together_in_the_order_of_the_file():
         "loop.sampling_period_s",
         "loop.delay_samples",
         "loop.velocity.filter.order",
-        "loop.saturation",
+        "loop.saturation.force_N",
         "colour",
     ]

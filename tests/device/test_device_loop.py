@@ -20,8 +20,10 @@ from zwidth.loop.estimators import (
     AlphaBeta,
     BackwardDifference,
     CentralDifference,
+    Foaw,
     Kalman,
     LeastSquaresSlope,
+    Levant,
     SavitzkyGolay,
     WindowedDifference,
 )
@@ -38,6 +40,8 @@ VELOCITIES = {
     "savitzky-golay": ({"samples": 7, "order": 2, "centred": True}, SavitzkyGolay(7, 2, True)),
     "alpha-beta": ({"alpha": 0.4, "beta": 0.1}, AlphaBeta(0.4, 0.1)),
     "kalman": ({"acceleration_noise_m_per_s2": 10.0, "position_noise_m": 3e-6}, Kalman(10.0, 3e-6)),
+    "foaw": ({"samples": 9, "position_noise_m": 3e-6, "fit": "best-fit"}, Foaw(9, 3e-6, "best-fit")),
+    "levant": ({"acceleration_max_m_per_s2": 10.0}, Levant(10.0)),
 }
 
 
@@ -59,6 +63,14 @@ def test_a_kalman_filter_takes_its_noise_from_the_encoder():
     document = with_velocity("kalman", acceleration_noise_m_per_s2=10.0)
     document["loop"]["encoder"] = {"resolution_m": 1e-5}
     assert from_document(document).controller.velocity == Kalman.of_encoder(10.0, 1e-5)
+
+
+def test_an_adaptive_window_takes_half_a_step_of_the_encoder():
+    document = with_velocity("foaw", samples=9)
+    document["loop"]["encoder"] = {"resolution_m": 1e-5}
+    assert from_document(document).controller.velocity == Foaw(9, 0.5e-5)
+    document["loop"]["velocity"]["position_noise_m"] = 1e-5
+    assert from_document(document).controller.velocity == Foaw(9, 1e-5)
 
 
 # what is put into the file of the two masses, and the plant and controller that it stands for
@@ -200,15 +212,34 @@ FAULTS = [
     ),
     (with_velocity("kallman", samples=4), "loop.velocity.method", "did you mean 'kalman'?"),
     (with_velocity(3), "loop.velocity.method", "give 'alpha-beta' or"),
-    (with_velocity("foaw"), "loop.velocity.method", "is not supported yet"),
-    (with_velocity("foaw", samples=5, window=3), "loop.velocity.method", "is not supported yet"),
+    (with_velocity([3]), "loop.velocity.method", "give 'alpha-beta' or"),
+    (with_velocity("measured", samples=5, window=3), "loop.velocity.method", "is not supported yet"),
+    (with_velocity("foaw", position_noise_m=1e-6), "loop.velocity.samples", "is missing"),
+    (with_velocity("foaw", samples=101, position_noise_m=1e-6), "loop.velocity.samples", "at most 100, got 101"),
+    (with_velocity("foaw", samples=9), "loop.velocity.position_noise_m", "give the encoder's largest error, or"),
+    (
+        with_velocity("foaw", samples=9, position_noise_m=1e-6, fit="mid-fit"),
+        "loop.velocity.fit",
+        "must be 'end-fit' or 'best-fit'",
+    ),
+    (with_velocity("levant"), "loop.velocity.acceleration_max_m_per_s2", "is missing"),
+    (
+        with_velocity("levant", acceleration_max_m_per_s2=0.0),
+        "loop.velocity.acceleration_max_m_per_s2",
+        "must be greater than 0",
+    ),
+    (
+        with_velocity("levant", acceleration_max_m_per_s2=1.0, samples=3),
+        "loop.velocity.samples",
+        'is not read with method = "levant"',
+    ),
     (with_velocity("alpha-beta", alpha=1.5, beta=1.5), "loop.velocity", "2 alpha + beta must be below 4"),
     (with_velocity("alpha-beta", alpha=1e-9, beta=1.5), "loop.velocity", "would remember for too long"),
     (with_velocity("alpha-beta", alpha=0.0, beta=1.5), "loop.velocity.alpha", "must be greater than 0"),
     (
         with_velocity("kalman", acceleration_noise_m_per_s2=10.0),
         "loop.velocity.position_noise_m",
-        "or loop.encoder.resolution_m",
+        "or for a [plant] loop.encoder.resolution_m",
     ),
     (
         with_velocity("kalman", acceleration_noise_m_per_s2=1e-9, position_noise_m=1.0),
@@ -221,11 +252,6 @@ FAULTS = [
         "too much motion",
     ),
     (changed(PLANT, loop__encoder={"at": "link"}), "loop.encoder.at", "give plant.sensor"),
-    (
-        changed(PLANT, loop__encoder={"resolution_m": 1e-6}),
-        "loop.encoder.resolution_m",
-        'velocity.method = "kalman"',
-    ),
     (changed(ARM, loop__encoder={"at": "tip"}), "loop.encoder.at", "must be 'motor', 'link' or 'handle'"),
     (changed(ARM, loop__encoder={"resolution_m": 1e-6}), "loop.encoder.resolution_m", "is for a [plant]"),
     (changed(PLANT, loop__actuator={"time_constant_s": -1.0}), "loop.actuator.time_constant_s", "at least 0"),

@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from typing import Any, Final
 
-from zwidth.device import unsupported
 from zwidth.device.faults import DeviceError, Fault, Path, dotted, fail, listed, nearest, quote
 from zwidth.device.read import within_depth
 from zwidth.device.schema import file as schema
@@ -178,7 +177,7 @@ def resolve(document: dict[str, Any], path: str) -> Path:
 def _split(document: dict[str, Any], path: str) -> list[str]:
     """The path's steps, with `mechanism` before them where the first is no key of the file."""
     parts = path.split(".")
-    if parts[0] not in schema.keys(()) and not unsupported.sentence(tuple(parts)) and "mechanism" in document:
+    if parts[0] not in schema.keys(()) and "mechanism" in document:
         return ["mechanism", *parts]
     return parts
 
@@ -186,9 +185,6 @@ def _split(document: dict[str, Any], path: str) -> list[str]:
 def _unknown(
     document: dict[str, Any], path: str, steps: list[str | int], parts: list[str], depth: int, place: Any
 ) -> DeviceError:
-    refused = unsupported.sentence((*steps, *parts[depth:]))
-    if refused:
-        return fail(OPTION, path, f"{refused}; leave it out")
     first, *rest = path.split(".")
     if steps in ([], ["mechanism"]) and parts[depth:] == [first, *rest]:
         return fail(OPTION, path, f"is no key of a device file; {_from_the_top(document, first, rest)}")
@@ -207,7 +203,7 @@ def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
     if near:
         right = [near] if near in schema.keys(()) else ["mechanism", near]
         return f"did you mean '{'.'.join([*right, *rest])}'?"
-    for section in ("loop", "plant", "mechanism", "operator"):
+    for section in ("loop", "plant", "mechanism", "operator", "friction"):
         near = nearest(first, schema.keys((section,))) if section in document else None
         if near:
             return f"did you mean '{'.'.join([section, near, *rest])}'?"

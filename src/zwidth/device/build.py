@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from zwidth.device.schema.loop import LoopSection
+from zwidth.device import parts
+from zwidth.device.schema.friction import FrictionSection
+from zwidth.device.schema.loop import EncoderSection, LoopSection
 from zwidth.device.schema.mechanism import (
     DampingSection,
     DriveSection,
@@ -21,9 +23,9 @@ from zwidth.device.schema.mechanism import (
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.plant import PlantSection
 from zwidth.device.schema.response import ResponseSection
-from zwidth.device.schema.velocity import ButterworthFilter, FirstOrderFilter, KalmanSection
+from zwidth.device.schema.velocity import ButterworthFilter, FirstOrderFilter, FoawSection, KalmanSection
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import METHODS, Kalman, VelocityMethod
+from zwidth.loop.estimators import METHODS, Foaw, Kalman, VelocityMethod
 from zwidth.model.dampers import with_dampers
 from zwidth.model.mechanism import FIXED, REVOLUTE, Closures, Drives, Floats, Links, Mechanism
 from zwidth.model.operator import Operator
@@ -45,6 +47,7 @@ def controller(loop: LoopSection) -> Controller:
         velocity=_velocity(loop),
         force_filter=_low_pass(loop.force.filter),
         actuator_time_constant=loop.actuator.time_constant_s,
+        saturation=math.inf if loop.saturation is None else loop.saturation.force_N,
     )
 
 
@@ -56,12 +59,17 @@ def _low_pass(given: FirstOrderFilter | ButterworthFilter | None) -> FirstOrder 
 
 def _velocity(loop: LoopSection) -> VelocityMethod:
     section, own = loop.velocity, loop.velocity.parameters()
-    if isinstance(section, KalmanSection) and loop.encoder.resolution_m is not None:
-        return Kalman.of_encoder(section.acceleration_noise_m_per_s2, loop.encoder.resolution_m)
+    step = loop.encoder.resolution_m
+    if isinstance(section, KalmanSection) and section.position_noise_m is None and step:
+        return Kalman.of_encoder(section.acceleration_noise_m_per_s2, step)
+    if isinstance(section, FoawSection) and section.position_noise_m is None and step:
+        return Foaw.of_encoder(section.samples, step, section.fit)
     return METHODS[section.method](**own)
 
 
-def plant(section: PlantSection) -> Plant:
+def plant(
+    section: PlantSection, friction: FrictionSection | None = None, encoder: EncoderSection | None = None
+) -> Plant:
     """The plant; matrices are made symmetric to the last bit, and one coordinate is driven, read and held."""
     M = np.array(section.mass_kg)
     n = len(M)
@@ -77,6 +85,7 @@ def plant(section: PlantSection) -> Plant:
         handle=None if handle is None else np.array(handle),
         names=tuple(f"coordinate {i}" for i in range(n)),
     )
+    bare = replace(bare, nonlinear=parts.of_plant(bare, section, friction, encoder))
     if section.loss_factor:
         bare = replace(bare, hysteresis=section.loss_factor * bare.stiffness)
     motors = [
@@ -131,7 +140,7 @@ def mechanism(section: MechanismSection) -> Mechanism:
     return Mechanism(
         links=_links(links, index, tips),
         closures=_closures(section.loops, index, tips),
-        drives=_drives(section.drives, index),
+        drives=_drives(section, index),
         handle_link=index[handle.link],
         handle_point=tips[handle.link] if handle.point_m is None else np.array(handle.point_m),
         assemblies={
@@ -196,10 +205,11 @@ def _closures(loops: Sequence[LoopClosure], index: dict[str, int], tips: dict[st
     )
 
 
-def _drives(drives: Sequence[DriveSection], index: dict[str, int]) -> Drives:
+def _drives(section: MechanismSection, index: dict[str, int]) -> Drives:
+    drives = section.drives
+
     def column(key: str, omitted: float) -> Floats:
-        values = [getattr(drive, key) for drive in drives]
-        return np.array([omitted if value is None else value for value in values], dtype=np.float64)
+        return parts.column(drives, key, omitted)
 
     windings = [_winding(drive) for drive in drives]
     return Drives(
@@ -214,6 +224,7 @@ def _drives(drives: Sequence[DriveSection], index: dict[str, int]) -> Drives:
         encoder_counts=column("encoder_counts_per_rev", math.nan),
         winding_damping=np.array([damping for damping, _ in windings]),
         winding_time_constant=np.array([lag for _, lag in windings]),
+        nonlinearity=parts.of_drives(drives, section.friction),
     )
 
 

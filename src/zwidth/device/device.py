@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -12,7 +12,9 @@ import numpy as np
 from zwidth.device.build import in_space
 from zwidth.device.faults import DeviceError, fail, quote, suggestion
 from zwidth.loop.controller import Controller
+from zwidth.model.drive_parts import of_drives
 from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response
 
@@ -69,6 +71,30 @@ class Device:
         """Is the device charted by its frequency response: a measured one, or that of a loss factor?"""
         hysteretic = self.given_plant is not None and self.given_plant.hysteresis is not None
         return self.response is not None or hysteretic
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What of the device a linear answer leaves out, in words; () if it leaves out nothing."""
+        found = Nonlinear() if self.given_plant is None else self.given_plant.nonlinear
+        if self.mechanism is not None:
+            drives = self.mechanism.drives
+            each = np.eye(len(drives.names))
+            found = of_drives(drives, np.ones(len(each)), 0.0 * each, each, each)
+        limit = min(found.force_limit, self.controller.saturation)
+        return replace(found, force_limit=limit).left_out
+
+    @property
+    def friction_known(self) -> bool:
+        """Does the file tell the dry friction, be it 0?"""
+        mechanism = self.document.get("mechanism", {})
+        return "friction" in self.document or any("coulomb_Nm" in d for d in mechanism.get("drives", ()))
+
+    @property
+    def steps_known(self) -> bool:
+        """Does the file tell the encoders' steps, be they 0? Of a mechanism it has to tell them all."""
+        if self.mechanism is not None:
+            return bool(np.isfinite(self.mechanism.drives.encoder_counts).all())
+        return self.document.get("loop", {}).get("encoder", {}).get("resolution_m") is not None
 
     def posture(self, at: Sequence[float] | None = None, assembly: str | None = None) -> Posture:
         """The mechanism with its handle at a position, in a named assembly (left out: those of the file).

@@ -76,7 +76,7 @@ def _device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device
         sources=dict(checked.sources),
         label=label,
         mechanism=build.mechanism(section) if section else None,
-        given_plant=build.plant(checked.plant) if checked.plant else None,
+        given_plant=build.plant(checked.plant, checked.friction, checked.loop.encoder) if checked.plant else None,
         response=build.response(checked.response, label, controller.sampling_period) if checked.response else None,
         controller=controller,
         damping=build.damping(section.damping if section else None),

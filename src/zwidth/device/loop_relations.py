@@ -28,10 +28,11 @@ def loop_relations(document: dict[str, Any]) -> Found:
     yield from _delay(loop, T)
     for section in ("velocity", "force"):
         yield from _cutoff((section, "filter"), table(table(loop, section), "filter"), T)
-    tau = table(loop, "actuator").get("time_constant_s")
-    if number(tau) and _no_lag(tau, T):
-        yield ("loop", "actuator", "time_constant_s"), f"must be 0 (no lag) or {_lags(T)}, got {tau:.10g}"
+    yield from lag_fault(
+        ("loop", "actuator", "time_constant_s"), table(loop, "actuator").get("time_constant_s"), T
+    )
     yield from _encoder(document, loop)
+    yield from _noise(loop)
     yield from _kalman(loop, T)
 
 
@@ -39,6 +40,12 @@ def _period(loop: dict[str, Any]) -> float:
     """The sampling period; nan, with which every comparison is false, where there is none."""
     period = loop.get("sampling_period_s")
     return period if number(period) and 0 < period <= 1 else math.nan
+
+
+def lag_fault(place: Path, tau: Any, T: float) -> Found:
+    """A time constant is 0, or one that rounding does not drown and a device may have."""
+    if number(tau) and _no_lag(tau, T):
+        yield place, f"must be 0 (no lag) or {_lags(T)}, got {tau:.10g}"
 
 
 def _no_lag(tau: float, T: float) -> bool:
@@ -79,29 +86,26 @@ def _cutoff(place: Path, low_pass: dict[str, Any], T: float) -> Found:
 
 
 def _encoder(document: dict[str, Any], loop: dict[str, Any]) -> Found:
-    """An encoder's place belongs to a mechanism; its step is read by one way of estimating velocities only."""
-    encoder = table(loop, "encoder")
-    if "at" in encoder and "mechanism" not in document:
+    """An encoder's place belongs to a mechanism."""
+    if "at" in table(loop, "encoder") and "mechanism" not in document:
         kind = "[plant]: give plant.sensor, what the encoder reads," if "plant" in document else "[response]"
         yield ("loop", "encoder", "at"), f"does not apply to a device given by its {kind} and remove this"
-    if "resolution_m" not in encoder:
-        return
-    place = ("loop", "encoder", "resolution_m")
-    velocity = table(loop, "velocity")
-    if "mechanism" in document:
-        yield place, "is for a [plant]; the reading of a mechanism has no step of its own: give position_noise_m"
-    elif velocity.get("method") != "kalman":
+
+
+def _noise(loop: dict[str, Any]) -> Found:
+    """A method that counts on the encoder's error is told how large it is."""
+    velocity, encoder = table(loop, "velocity"), table(loop, "encoder")
+    named = {"kalman": "the standard deviation of the encoder's error", "foaw": "the encoder's largest error"}
+    method = next((name for name in named if name == velocity.get("method")), None)
+    if method and velocity.get("position_noise_m") is None and not encoder.get("resolution_m"):
         yield (
-            place,
-            'is read only with velocity.method = "kalman": what steps do to stability is not supported yet; '
-            "remove it",
+            ("loop", "velocity", "position_noise_m"),
+            f"is missing; give {named[method]}, or for a [plant] loop.encoder.resolution_m",
         )
-    elif "position_noise_m" in velocity:
-        yield place, "stands beside velocity.position_noise_m; only one of them is allowed: remove the other"
 
 
 def _kalman(loop: dict[str, Any], T: float) -> Found:
-    """Noise figures that there are, and that make a filter at this sampling period."""
+    """Noise figures that make a filter at this sampling period."""
     velocity, encoder = table(loop, "velocity"), table(loop, "encoder")
     if velocity.get("method") != "kalman":
         return
@@ -110,13 +114,7 @@ def _kalman(loop: dict[str, Any], T: float) -> Found:
         velocity.get("position_noise_m"),
         encoder.get("resolution_m"),
     )
-    if noise is None and step is None:
-        yield (
-            ("loop", "velocity", "position_noise_m"),
-            "is missing; give the standard deviation of the encoder's error, or loop.encoder.resolution_m",
-        )
-        return
-    given = [value for value in (motion, noise, step) if value is not None]
+    given = [motion, step if noise is None else noise]
     if motion is None or math.isnan(T) or not all(number(v) and 0 < v <= LARGEST for v in given):
         return
     try:
@@ -126,6 +124,13 @@ def _kalman(loop: dict[str, Any], T: float) -> Found:
         yield ("loop", "velocity"), str(error)
 
 
+def along_fault(place: Path, along: Any, size: int | None) -> Found:
+    """A vector over the plant's coordinates has as many numbers as there are coordinates."""
+    length = 1 if number(along) else len(along) if isinstance(along, list) else None
+    if size is not None and length is not None and length != size:
+        yield place, f"has {length} numbers, but mass_kg has {size} rows; give {size} numbers"
+
+
 def electrical_relations(document: dict[str, Any]) -> Found:
     """Path and sentence of every disagreement about windings: of a plant's motors, of a mechanism's drives."""
     T = _period(table(document, "loop"))
@@ -133,10 +138,7 @@ def electrical_relations(document: dict[str, Any]) -> Found:
     size = rows(plant.get("mass_kg"))
     for index, damper in tables(plant, "electrical_damping"):
         place: Path = ("plant", "electrical_damping", index)
-        along = damper.get("along")
-        length = 1 if number(along) else len(along) if isinstance(along, list) else None
-        if size is not None and length is not None and length != size:
-            yield (*place, "along"), f"has {length} numbers, but mass_kg has {size} rows; give {size} numbers"
+        yield from along_fault((*place, "along"), damper.get("along"), size)
         constant, R, L = (damper.get(key) for key in ("force_constant_N_per_A", "resistance_ohm", "inductance_H"))
         yield from _winding(place, "inductance_H", constant, R, L, T)
     for index, drive in tables(table(document, "mechanism"), "drives"):

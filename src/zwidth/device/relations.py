@@ -13,6 +13,7 @@ from typing import Any, Final
 from zwidth.device.address import allowed, exists
 from zwidth.device.faults import Path, listed, quote, suggestion
 from zwidth.device.loop_relations import electrical_relations, loop_relations
+from zwidth.device.nonlinear_relations import nonlinear_relations
 from zwidth.device.plain import number, rows, table, tables
 from zwidth.device.schema.file import flat_sources
 
@@ -27,6 +28,7 @@ def relations(document: dict[str, Any], original: dict[str, Any]) -> Found:
     yield from _sources(document)
     yield from _plant(table(document, "plant"))
     yield from loop_relations(document)
+    yield from nonlinear_relations(document)
     yield from _response(original)
     yield from electrical_relations(document)
     yield from operator_relations(document)

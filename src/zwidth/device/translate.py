@@ -120,7 +120,9 @@ def _unknown(path: Path, document: dict[str, Any]) -> str:
         return f'is not read with {tag} = "{kind}"; remove it, or set {tag} = {others}'
     if nearest(key, allowed) is None:
         elsewhere = [
-            section for section in ("loop", "plant", "mechanism", "operator") if key in schema.keys((section,))
+            section
+            for section in ("loop", "plant", "mechanism", "operator", "friction")
+            if key in schema.keys((section,))
         ]
         if elsewhere and table != (elsewhere[0],):
             return f"is not a key here; it belongs into [{elsewhere[0]}]"

@@ -1,4 +1,4 @@
-"""Keys and values that device files may hold one day, refused until then: never ignored."""
+"""Values that device files may hold one day, refused until then: never ignored."""
 
 from __future__ import annotations
 
@@ -8,18 +8,9 @@ from typing import Any, Final
 
 from zwidth.device.faults import Path
 
-KEYS: Final[dict[tuple[str, ...], str]] = {
-    ("friction",): "[friction]",
-    ("loop", "saturation"): "a limit of the force, [loop.saturation],",
-    ("mechanism", "drives", "*", "coulomb_Nm"): "friction of the drives (coulomb_Nm)",
-    ("mechanism", "drives", "*", "coulomb"): "friction of the drives (coulomb)",
-    ("mechanism", "friction"): "friction in a mechanism, [mechanism.friction],",
-}
-"""Key -> how a sentence calls it; * stands for any list element."""
-
 VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str, frozenset[str] | None]]] = {
     ("loop", "velocity", "method"): (
-        frozenset({"foaw", "measured"}),
+        frozenset({"measured"}),
         "backward-difference",
         frozenset({"filter"}),
     ),
@@ -49,10 +40,6 @@ def refuse(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[Path, s
     """The document without what is not supported yet, and a sentence for each thing taken out."""
     document = deepcopy(document)
     refused: list[tuple[Path, str]] = []
-    for pattern, what in KEYS.items():
-        for path, table in list(_places(document, pattern)):
-            del table[pattern[-1]]
-            refused.append((path, f"{what} is not supported yet; remove it"))
     for pattern, (names, stand_in, beside) in VALUES.items():
         for path, table in _places(document, pattern):
             value = table[pattern[-1]]
@@ -62,15 +49,6 @@ def refuse(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[Path, s
                 table[pattern[-1]] = stand_in
                 refused.append((path, f"{pattern[-1]} '{value}' is not supported yet; use '{stand_in}'"))
     return document, refused
-
-
-def sentence(path: Path) -> str | None:
-    """Why a key at or below this path is refused, None if it is not one of those."""
-    for pattern, what in KEYS.items():
-        head = path[: len(pattern)]
-        if len(head) == len(pattern) and all(p in ("*", h) for p, h in zip(pattern, head, strict=True)):
-            return f"{what} is not supported yet"
-    return None
 
 
 def _places(document: Any, pattern: tuple[str, ...], path: Path = ()) -> Iterator[tuple[Path, dict[str, Any]]]:

@@ -5,6 +5,7 @@
     velocity   [loop.velocity], and the low passes
     loop       [loop]
     operator   [operator]
+    friction   [friction] of a plant and of drives
     mechanism  [mechanism]
     file       the whole file, and its JSON Schema
 

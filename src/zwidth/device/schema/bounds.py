@@ -29,6 +29,14 @@ LEAST_INDUCTANCE: Final = 1e-15  # H
 LARGEST_INDUCTANCE: Final = 1e6  # H
 LEAST_LOSS: Final = 1e-5  # of the stiffness, of a loss factor there is
 LARGEST_LOSS: Final = 10.0
+LEAST_FRICTION: Final = 1e-12  # N or N m, of dry friction there is
+LARGEST_FRICTION: Final = 1e12  # N or N m
+SLOWEST: Final = 1e-12  # m/s or rad/s, of a Stribeck velocity
+FASTEST: Final = 1e12  # m/s or rad/s, of a Stribeck velocity
+FINEST: Final = 1e-15  # m or rad, of an encoder's step or noise there is
+COARSEST: Final = 1e3  # m or rad, of an encoder's step or noise there is
+MOST_COUNTS: Final = 1e12  # per revolution
+HARDEST: Final = 1e30  # N/m^3 or N m/rad^3, in either sign
 LEAST_SHARE: Final = 1e-9  # of a coordinate in what is driven or read
 LARGEST_SHARE: Final = 1e9  # of a coordinate in what is driven or read
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, ConfigDict
 
+from zwidth.device.schema.friction import FrictionSection
 from zwidth.device.schema.loop import LoopSection
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.device.schema.numbers import Section, Text, quantity
@@ -52,6 +53,7 @@ class DeviceFile(Section):
     plant: PlantSection | None = quantity("the rendered direction's dynamics; or [mechanism]", default=None)
     response: ResponseSection | None = quantity("a measured response, in place of either", default=None)
     loop: LoopSection = quantity("what the computer does")
+    friction: FrictionSection | None = quantity("dry friction of a [plant]; omitted: none", default=None)
     operator: OperatorSection | None = quantity("the arm and grasp at the handle; omitted: nobody", default=None)
 
 

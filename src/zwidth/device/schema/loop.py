@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BeforeValidator
 
 from zwidth.device.faults import quote
-from zwidth.device.schema.numbers import Number, Section, quantity
+from zwidth.device.schema.numbers import Number, NumberOrInfinity, Section, Step, quantity
 from zwidth.device.schema.velocity import BackwardDifferenceSection, LowPass, VelocitySection
 
 SHORTEST_PERIOD: Final = 1e-7  # s; 10 MHz, far beyond any loop round a motor
@@ -52,13 +52,20 @@ class EncoderSection(Section):
         "which are the same with rigid links; a [plant] says it by `sensor`",
         default=None,
     )
-    resolution_m: Number | None = quantity(
-        'step of the reading, for a [plant] with method = "kalman", whose position_noise_m it replaces by '
-        "step/sqrt(12); the chart itself is linear and knows no steps",
+    resolution_m: Step | None = quantity(
+        "step of the reading, for a [plant]; 0: as fine as you like; a mechanism gives encoder_counts_per_rev",
         "m",
-        gt=0,
         default=None,
     )
+    noise_m: Step | None = quantity(
+        "standard deviation of the reading before it is rounded, for a [plant]; omitted: 0", "m", default=None
+    )
+
+
+class SaturationSection(Section):
+    """The largest force that the computer commands."""
+
+    force_N: NumberOrInfinity = quantity("largest force that is commanded; inf: no limit", "N", gt=0)
 
 
 class LoopSection(Section):
@@ -83,5 +90,6 @@ class LoopSection(Section):
     force: ForceSection = quantity("what the force passes", default=ForceSection(filter=None))
     actuator: ActuatorSection = quantity("how the force follows", default=ActuatorSection(time_constant_s=0.0))
     encoder: EncoderSection = quantity(
-        "where the encoder sits", default=EncoderSection(at=None, resolution_m=None)
+        "where the encoder sits, and its step", default=EncoderSection(at=None, resolution_m=None, noise_m=None)
     )
+    saturation: SaturationSection | None = quantity("the largest force; omitted: no limit", default=None)

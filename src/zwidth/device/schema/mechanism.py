@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from typing import Literal
 
+from zwidth.device.schema.friction import DriveFrictionSection
 from zwidth.device.schema.numbers import (
     Axis,
     Bounds,
+    Counts,
     Damper,
     Direction,
+    DryFriction,
+    Hardening,
     Inductance,
     Inertia,
     Mass,
@@ -22,6 +26,8 @@ from zwidth.device.schema.numbers import (
     RotorInertia,
     Section,
     Spring,
+    Step,
+    Stiffness,
     Triple,
     quantity,
 )
@@ -142,8 +148,35 @@ class DriveSection(Section):
     torque_limit_Nm: NumberOrInfinity | None = quantity(
         "largest torque at the motor; omitted or inf: no limit", "N m", gt=0, default=None
     )
-    encoder_counts_per_rev: Number | None = quantity(
-        "encoder counts per motor revolution, after quadrature; omitted: not known", "1", gt=0, default=None
+    encoder_counts_per_rev: Counts | None = quantity(
+        "encoder counts per motor revolution, after quadrature; omitted: not known", "1", default=None
+    )
+    encoder_noise_rad: Step | None = quantity(
+        "standard deviation of the motor's angle before it is counted; omitted: 0", "rad", default=None
+    )
+    coulomb_Nm: DryFriction | None = quantity("dry friction at the motor; omitted: none", "N m", default=None)
+    breakaway_Nm: DryFriction | None = quantity(
+        'its static level, at least coulomb_Nm; with mechanism.friction.model = "lugre"; omitted: coulomb_Nm',
+        "N m",
+        default=None,
+    )
+    hardening_Nm_per_rad3: Hardening | None = quantity(
+        "k_3 of the transmission's torque k d + k_3 d^3 at the motor shaft; negative: it softens; omitted: 0",
+        "N m/rad^3",
+        default=None,
+    )
+    backward_stiffness_Nm_per_rad: Stiffness | None = quantity(
+        "stiffness of the transmission where the motor lags behind the joint and pulls it back; "
+        "stiffness_Nm_per_rad then is that of the other direction; omitted: the same",
+        "N m/rad",
+        gt=0,
+        default=None,
+    )
+    brake_damping_max_Nms_per_rad: Damper | None = quantity(
+        "largest damping of a programmable brake on the rotor; omitted: no brake", "N m s/rad", ge=0, default=None
+    )
+    brake_time_constant_s: Number | None = quantity(
+        "lag of the brake's damping; omitted: none", "s", ge=0, default=None
     )
 
 
@@ -177,3 +210,12 @@ class MechanismSection(Section):
     workspace: WorkspaceSection | None = quantity("bounds of the handle's position; omitted: none", default=None)
     drives: tuple[DriveSection, ...] = quantity("the drives, in the order of the driven coordinates", min_length=1)
     damping: DampingSection = quantity("structural damping, one of the three ways")
+    friction: DriveFrictionSection = quantity(
+        "how the dry friction of the drives, coulomb_Nm, grips",
+        default=DriveFrictionSection(
+            model="coulomb",
+            bristle_stiffness_Nm_per_rad=None,
+            bristle_damping_Nms_per_rad=None,
+            stribeck_velocity_rad_per_s=None,
+        ),
+    )

@@ -86,6 +86,14 @@ def _as_vector(value: Any) -> Any:
     return [value] if _is_number(value) else value
 
 
+def _few(value: Any) -> Any:
+    """One number or a list of them, as a list that may hold zeros."""
+    value = _as_vector(value)
+    if not value:
+        raise ValueError("must not be empty; give a number for each coordinate")
+    return value
+
+
 def _as_matrix(value: Any) -> Any:
     if isinstance(value, list) and value and all(map(_is_number, value)):
         raise ValueError(f"must be a list of rows, got {quote(value)}; write [[...], [...]]")
@@ -182,6 +190,17 @@ LossFactor = Annotated[
 Inductance = Annotated[Number, bounds.within(bounds.LEAST_INDUCTANCE, bounds.LARGEST_INDUCTANCE, "H", "0 or ")]
 NumberOrInfinity = Annotated[float, Strict(), AfterValidator(_not_nan), AfterValidator(_thinkable)]
 Spring = Annotated[NumberOrInfinity, bounds.within(bounds.SOFTEST, bounds.STIFFEST, "N m/rad", "inf (rigid) or ")]
+Stiffness = Annotated[Number, bounds.within(bounds.SOFTEST, bounds.STIFFEST, "N m/rad")]
+DryFriction = Annotated[
+    Number, Field(ge=0.0), bounds.within(bounds.LEAST_FRICTION, bounds.LARGEST_FRICTION, "", "0 (none) or ")
+]
+StribeckVelocity = Annotated[Number, Field(gt=0.0), bounds.within(bounds.SLOWEST, bounds.FASTEST, "")]
+Bristle = Annotated[Number, Field(gt=0.0), bounds.within(bounds.SOFTEST, bounds.STIFFEST, "")]
+BristleDamper = Annotated[Number, Field(ge=0.0), bounds.within(0.0, bounds.STRONGEST_DAMPING, "")]
+Step = Annotated[Number, Field(ge=0.0), bounds.within(bounds.FINEST, bounds.COARSEST, "", "0 (none) or ")]
+Hardening = Annotated[Number, Field(ge=-bounds.HARDEST, le=bounds.HARDEST)]
+Excess = Annotated[Number, Field(ge=-bounds.STIFFEST, le=bounds.STIFFEST)]
+Counts = Annotated[Number, Field(gt=0.0), bounds.within(1e-3, bounds.MOST_COUNTS, "per revolution")]
 WholeNumber = Annotated[int, Strict()]
 Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=NAME_PATTERN)]
@@ -200,6 +219,7 @@ Vector = Annotated[
     bounds.largest_share_within(bounds.LEAST_SHARE, bounds.LARGEST_SHARE),
     WithJsonSchema({"anyOf": [_NUMBER, _LIST]}),
 ]
+Frictions = Annotated[tuple[DryFriction, ...], BeforeValidator(_few), WithJsonSchema({"anyOf": [_NUMBER, _LIST]})]
 SymmetricMatrix = Annotated[
     tuple[tuple[Number, ...], ...],
     BeforeValidator(_as_matrix),

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from zwidth.device.schema.numbers import (
+    BristleDamper,
     DampingMatrix,
+    Excess,
+    Hardening,
     Inductance,
     LossFactor,
     MassMatrix,
@@ -27,6 +30,30 @@ class ElectricalDampingSection(Section):
     along: Vector | None = quantity(
         "the coordinates that move the motor, n numbers; omitted: those of the actuator", "1", default=None
     )
+
+
+class SpringSection(Section):
+    """What a spring of the plant has beyond its share of the stiffness matrix."""
+
+    name: Name | None = quantity("the spring's name: letters, digits, - and _; omitted: none", default=None)
+    along: Vector | None = quantity(
+        "its deflection d as a sum over the coordinates, n numbers; omitted only for n = 1", "1", default=None
+    )
+    hardening_N_per_m3: Hardening = quantity(
+        "k_3 of the force k_3 d^3 beside the linear one; negative: it softens", "N/m^3", default=0.0
+    )
+    backward_excess_N_per_m: Excess = quantity("how much stiffer it is where d is negative", "N/m", default=0.0)
+
+
+class BrakeSection(Section):
+    """A programmable brake: a damper whose strength the computer sets."""
+
+    name: Name | None = quantity("the brake's name: letters, digits, - and _; omitted: none", default=None)
+    along: Vector | None = quantity(
+        "the coordinates that move the brake, n numbers; omitted: those of the actuator", "1", default=None
+    )
+    damping_max_Ns_per_m: BristleDamper = quantity("largest damping that can be commanded", "N s/m")
+    time_constant_s: Number = quantity("lag of its damping; 0: none", "s", ge=0, default=0.0)
 
 
 class PlantSection(Section):
@@ -59,3 +86,5 @@ class PlantSection(Section):
     electrical_damping: tuple[ElectricalDampingSection, ...] = quantity(
         "motors whose windings are closed through a resistor", default=()
     )
+    spring: tuple[SpringSection, ...] = quantity("springs that are not straight", default=())
+    brake: tuple[BrakeSection, ...] = quantity("programmable brakes", default=())

@@ -38,7 +38,11 @@ LowPass = Annotated[FirstOrderFilter | ButterworthFilter, Field(discriminator="t
 _METHOD: Final = "estimator of the velocity: " + ", ".join(f'"{name}"' for name in METHODS)
 _SAMPLES: Final = (
     'n: of "windowed-difference" the periods between its two positions, of "least-squares-slope" and '
-    '"savitzky-golay" the positions used; a whole number up to 100'
+    '"savitzky-golay" the positions used, of "foaw" the most periods in its window; a whole number up to 100'
+)
+_NOISE: Final = (
+    'of the encoder\'s error, "kalman" the standard deviation, "foaw" the largest, half a step; '
+    "or loop.encoder.resolution_m"
 )
 
 
@@ -129,12 +133,26 @@ class KalmanSection(_Method):
     acceleration_noise_m_per_s2: Number = quantity(
         '"kalman": standard deviation of the accelerations to expect', "m/s^2", gt=0
     )
-    position_noise_m: Number | None = quantity(
-        '"kalman": standard deviation of the encoder\'s error; or loop.encoder.resolution_m',
-        "m",
-        gt=0,
-        default=None,
+    position_noise_m: Number | None = quantity(_NOISE, "m", gt=0, default=None)
+
+
+class FoawSection(_Method):
+    """Slope of the longest window that a line fits within the noise; it has no chart."""
+
+    method: Literal["foaw"] = quantity(_METHOD)
+    samples: WholeNumber = quantity(_SAMPLES, "1", ge=1, le=LONGEST_WINDOW)
+    position_noise_m: Number | None = quantity(_NOISE, "m", gt=0, default=None)
+    fit: Literal["end-fit", "best-fit"] = quantity(
+        '"foaw": "end-fit", the line through the ends of the window, or "best-fit", the least-squares line',
+        default="end-fit",
     )
+
+
+class LevantSection(_Method):
+    """The tracker that is exact for accelerations up to a bound; it has no chart."""
+
+    method: Literal["levant"] = quantity(_METHOD)
+    acceleration_max_m_per_s2: Number = quantity('"levant": largest acceleration to expect', "m/s^2", gt=0)
 
 
 def _method(table: Any) -> Any:
@@ -149,6 +167,8 @@ VelocitySection = Annotated[
     | Annotated[CentralDifferenceSection, Tag("central-difference")]
     | Annotated[SavitzkyGolaySection, Tag("savitzky-golay")]
     | Annotated[AlphaBetaSection, Tag("alpha-beta")]
-    | Annotated[KalmanSection, Tag("kalman")],
+    | Annotated[KalmanSection, Tag("kalman")]
+    | Annotated[FoawSection, Tag("foaw")]
+    | Annotated[LevantSection, Tag("levant")],
     Discriminator(_method),
 ]
