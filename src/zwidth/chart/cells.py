@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -10,6 +12,20 @@ from shapely.geometry.polygon import orient
 Floats = NDArray[np.float64]
 # Angles, K and B along every arc of every ring.
 Samples = list[list[tuple[Floats, Floats, Floats]]]
+
+
+Box = tuple[float, float, float, float]  # KMIN, KMAX, BMIN, BMAX
+
+
+def box_of(regions: Sequence[Floats]) -> Box:
+    """KMIN, KMAX, BMIN, BMAX of rings and 5 %; (0, 1, 0, 1) where there are none."""
+    if not regions:
+        return 0.0, 1.0, 0.0, 1.0
+    walls = np.vstack(regions)
+    low, high = walls.min(axis=0), walls.max(axis=0)
+    margin = 0.05 * (high - low)
+    (K0, B0), (K1, B1) = low - margin, high + margin
+    return float(K0), float(K1), float(B0), float(B1)
 
 
 def outline(arcs: list[tuple[Floats, Floats, Floats]]) -> Floats:

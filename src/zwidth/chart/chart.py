@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arcs import Rings
-from zwidth.chart.cells import Samples, cells, outline
+from zwidth.chart.cells import Box, Samples, box_of, cells, outline
 from zwidth.chart.decay import FastestDecay, fastest_decay
 from zwidth.chart.outline import quadrant_area, sample_arc
 from zwidth.chart.peak import Peak, largest_damping, stiffest
@@ -68,15 +68,9 @@ class StabilityChart:
         return self.loop.unobserved_modes
 
     @property
-    def box(self) -> tuple[float, float, float, float]:
+    def box(self) -> Box:
         """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
-        if not self.regions:
-            return 0.0, 1.0, 0.0, 1.0
-        walls = np.vstack(self.regions)
-        low, high = walls.min(axis=0), walls.max(axis=0)
-        margin = 0.05 * (high - low)
-        (K0, B0), (K1, B1) = low - margin, high + margin
-        return float(K0), float(K1), float(B0), float(B1)
+        return box_of(self.regions)
 
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
         """Verdicts on single walls by eigenvalues, whatever the regions say."""

@@ -34,8 +34,8 @@ def on_circle(theta: float, radius: float) -> tuple[complex, complex]:
 
 
 @compiled_lean
-def wall_at(factors: Factors, radius: float, theta: float) -> tuple[float, float, float, float]:
-    """K, B of the wall with a root at rho exp(i theta), and dK/dtheta, dB/dtheta."""
+def plant_on_circle(factors: Factors, radius: float, theta: float) -> tuple[complex, complex, complex, complex]:
+    """z, d = z - 1, P and dP/dz at rho exp(i theta)."""
     z, d = on_circle(theta, radius)
     P, dP = plant_response(factors, z, d)
     aside = 4e-16
@@ -43,6 +43,13 @@ def wall_at(factors: Factors, radius: float, theta: float) -> tuple[float, float
         z, d = on_circle(theta * (1.0 + aside), radius)
         P, dP = plant_response(factors, z, d)
         aside *= 10.0
+    return z, d, P, dP
+
+
+@compiled_lean
+def wall_at(factors: Factors, radius: float, theta: float) -> tuple[float, float, float, float]:
+    """K, B of the wall with a root at rho exp(i theta), and dK/dtheta, dB/dtheta."""
+    z, d, P, dP = plant_on_circle(factors, radius, theta)
     w, dw = velocity_response(factors, z, d)
     turn = 1j * z
     h = divide(-1.0 + 0.0j, P)

@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.polygon import orient
 
-from zwidth.chart.cells import cells, outline
+from zwidth.chart.cells import Box, box_of, cells, outline
 from zwidth.chart.chart import BoundaryArc
 from zwidth.chart.loci import Loci, refine_loci, trace_loci, with_angles
 from zwidth.chart.loci_arcs import ring_arcs, sample_arc
@@ -63,14 +63,9 @@ class MultiChart:
         return None
 
     @property
-    def box(self) -> tuple[float, float, float, float]:
+    def box(self) -> Box:
         """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
-        if not self.regions:
-            return 0.0, 1.0, 0.0, 1.0
-        walls = np.vstack(self.regions)
-        low, high = walls.min(axis=0), walls.max(axis=0)
-        (K0, B0), (K1, B1) = low - 0.05 * (high - low), high + 0.05 * (high - low)
-        return float(K0), float(K1), float(B0), float(B1)
+        return box_of(self.regions)
 
     def spectral_radius(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
         """Largest |z| of walls K, B (...) that broadcast, by the eigenvalues of the transition matrix."""

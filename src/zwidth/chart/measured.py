@@ -11,9 +11,9 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.band import Band, uncertainty
-from zwidth.chart.cells import cut
+from zwidth.chart.cells import Box, box_of, cut
 from zwidth.chart.measured_cells import Cells, cells_within, edges_stable_set, window
-from zwidth.chart.measured_curve import Boundary, Box, boundary, coarse, real_root
+from zwidth.chart.measured_curve import Boundary, boundary, coarse, real_root
 from zwidth.chart.measured_loop import MeasuredLoop
 from zwidth.chart.measured_verdict import MeasuredVerdicts, NearestEdge, judge_measured
 from zwidth.chart.trust import Stretch
@@ -90,10 +90,7 @@ class MeasuredChart:
             return 0.0, 1.0, 0.0, 1.0
         inner = [arc for arc in self.boundary if 0.0 < arc.frequency[0] < 0.5 / self.loop.period]
         points = np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in inner])
-        walls = points if self.open else np.vstack(self.regions)
-        low, high = walls.min(axis=0), walls.max(axis=0)
-        (K0, B0), (K1, B1) = low - 0.05 * (high - low), high + 0.05 * (high - low)
-        return float(K0), float(K1), float(B0), float(B1)
+        return box_of([points] if self.open else self.regions)
 
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> MeasuredVerdicts:
         """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, by the count of their roots."""

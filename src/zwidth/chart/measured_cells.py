@@ -9,7 +9,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
-from zwidth.chart.measured_curve import Boundary, Box, boundary, real_root, refine, sizes
+from zwidth.chart.cells import Box
+from zwidth.chart.measured_curve import Boundary, boundary, real_root, refine, sizes
 from zwidth.chart.measured_loop import MeasuredLoop
 
 Floats = NDArray[np.float64]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.chart.cells import Box
 from zwidth.chart.count import curve_segments, roots_outside
 from zwidth.chart.measured_loop import MeasuredLoop
 from zwidth.model.response import ResponseError
@@ -15,7 +16,6 @@ from zwidth.model.response import ResponseError
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Whole = NDArray[np.int64]
-Box = tuple[float, float, float, float]  # KMIN, KMAX, BMIN, BMAX
 
 NEAREST = 1e-5  # to an end of the curve or an asymptote, of the spacing there
 FAR = 1e9  # how far lines are drawn, in `sizes`

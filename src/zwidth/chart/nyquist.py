@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.curve import on_circle
+from zwidth.chart.curve import plant_on_circle
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.loop.evaluate import Factors, plant_response, velocity_response
+from zwidth.loop.evaluate import Factors, velocity_response
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -29,13 +29,7 @@ CLEAR = 0.2  # how far from a whole number of half turns the phase may end
 @compiled_lean
 def terms_at(factors: Factors, radius: float, theta: float) -> tuple[complex, complex, complex]:
     """A, A P and A P w at one angle in (0, pi), scaled alike so that the largest is of size 1."""
-    z, d = on_circle(theta, radius)
-    P, _ = plant_response(factors, z, d)
-    aside = 4e-16
-    while not np.isfinite(P.real + P.imag) and aside < 1e-12:  # on an undamped pole: step aside by a rounding
-        z, d = on_circle(theta * (1.0 + aside), radius)
-        P, _ = plant_response(factors, z, d)
-        aside *= 10.0
+    z, d, P, _ = plant_on_circle(factors, radius, theta)
     w, _ = velocity_response(factors, z, d)
     A = 1.0 + 0.0j
     for k in range(factors.rows.shape[0]):
