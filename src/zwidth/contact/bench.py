@@ -1,0 +1,212 @@
+"""A virtual bench: put up a wall, disturb the device, watch it, and say whether it stays stable.
+
+That is all an experimenter has. Nothing here knows the exact edge of stability.
+
+How long to watch is decided by what is seen. First 1024 samples (four periods of the device's slowest vibration,
+half a second where somebody holds it), then four and sixteen times as long, until
+
+    a linear device   has come to rest, or has left its bounds; in the end the sign of its rate decides
+    any other         has come to rest, moves less than is visible, dies away with nothing left to break it off,
+                      or has left its bounds; in the end whatever still moves visibly and does not die away is
+                      unstable
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import ceil, isfinite
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.contact.environments.one_sided_wall import one_sided_wall
+from zwidth.contact.environments.wall import wall
+from zwidth.contact.hand import Hand
+from zwidth.contact.response import TimeResponse
+from zwidth.contact.simulate import SUBSTEPS, Run, simulate_batch
+from zwidth.contact.verdict import STEADY, Behaviour, Judgement, judge_response
+from zwidth.loop.estimators.foaw import Foaw
+from zwidth.loop.estimators.levant import Levant
+from zwidth.loop.loop import Loop
+from zwidth.model.modes import natural_frequencies, undeformed
+from zwidth.model.nonlinear import Nonlinear
+from zwidth.model.operator import attach
+
+Floats = NDArray[np.float64]
+
+WATCHED: Final = 1024  # samples at first
+PERIODS, MOST_PERIODS = 4.0, 4096  # of the slowest vibration; samples
+HELD: Final = 0.5  # s; arms are slow, whatever the sampling
+LONGER: Final = 4
+LEVELS: Final = 3  # how often it is watched, at most
+GIVEN_UP: Final = 1e3  # times the disturbance
+AT_ONCE: Final = 1_500_000  # samples kept at a time
+
+
+class BenchError(ValueError):
+    """An experiment that cannot be meant; the text says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What is on the table.
+
+    loop         the device and its computer, without an operator
+    hand         who holds it and pushes
+    one_sided    touch a one-sided wall under the hand's push, from its surface; else a two-sided wall
+    disturbance  two-sided: the device is displaced by it, undeformed, and let go [m]
+    speed        of the handle at the start, towards the inside [m/s]
+    visible      amplitude of the handle up to which a vibration that does not die away counts as none [m]
+    seed         of the noise
+    substeps     between samples, for what is not linear
+    Raises       BenchError  for numbers that cannot be meant
+    """
+
+    loop: Loop
+    hand: Hand = field(default_factory=Hand)
+    one_sided: bool = False
+    disturbance: float = 1e-3
+    speed: float = 0.0
+    visible: float = 0.0
+    seed: int = 0
+    substeps: int = SUBSTEPS
+
+    def __post_init__(self) -> None:
+        for name, value in (("disturbance", self.disturbance), ("visible", self.visible), ("speed", self.speed)):
+            if not isfinite(value) or (name != "speed" and value < 0.0):
+                raise BenchError(f"{name} must be finite{' and not negative' * (name != 'speed')}, got {value!r}")
+        if self.one_sided:
+            if not self.hand.push > 0.0:
+                raise BenchError(
+                    f"push must be positive [N] for a one-sided wall, got {self.hand.push!r}; without it the "
+                    "device leaves the wall"
+                )
+        elif not self.disturbance > max(self.visible, 0.0):
+            raise BenchError(
+                f"disturbance must be larger than what counts as visible, {self.visible!r} m, got "
+                f"{self.disturbance!r} m; give a larger one"
+            )
+
+    @property
+    def smooth(self) -> bool:
+        """Is nothing nonlinear but the wall?"""
+        linear_estimate = not isinstance(self.loop.controller.velocity, Foaw | Levant)
+        return not self.loop.nonlinear and linear_estimate
+
+    @property
+    def linear(self) -> bool:
+        """Is nothing nonlinear at all?"""
+        return self.smooth and not self.one_sided and self.hand.reflex is None and self.hand.tremor is None
+
+    @cached_property
+    def watched(self) -> int:
+        """Samples watched at first: four periods of the slowest vibration that the device has by itself."""
+        own = natural_frequencies(self.loop.plant)
+        slow = PERIODS / float(own[own > 0.0].min(initial=np.inf)) / self.loop.period
+        held = self.one_sided or self.hand.operator is not None
+        return max(WATCHED, min(ceil(slow), MOST_PERIODS), ceil(HELD / self.loop.period) if held else 0)
+
+    def linearised(self) -> Bench:
+        """The same table with what is linear of the device only, and a two-sided wall."""
+        plain = replace(self.loop.plant, nonlinear=Nonlinear())
+        computer = replace(self.loop.controller, saturation=float("inf"))
+        hand = replace(self.hand, push=0.0, reflex=None, tremor=None, reach=None)
+        return replace(self, loop=Loop(plain, computer), hand=hand, one_sided=False, speed=0.0, visible=0.0)
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What was seen of one wall.
+
+    stable     the motion died away inside the wall, or is too small to be seen
+    behaviour  as `verdict` names it
+    amplitude  of the handle in the end [m]
+    frequency  dominant [Hz]; nan where nothing moves
+    """
+
+    stable: bool
+    behaviour: Behaviour
+    amplitude: float
+    frequency: float
+
+
+def observe(bench: Bench, walls: ArrayLike, levels: int | None = None) -> list[Observation]:
+    """Disturb and watch at each of the walls (k, 2) of [stiffness, damping], all at once.
+
+    levels   at most so many looks, each four times as long as the one before; None: as long as it takes
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> mass = Plant(np.array([[0.1]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
+    >>> bench = Bench(Loop(mass, Controller(0.001)))
+    >>> [seen.stable for seen in observe(bench, [[1000.0, 0.4], [1000.0, 0.6]])]    # B > K T/2, roughly
+    [False, True]
+    """
+    walls = np.asarray(walls, dtype=float).reshape(-1, 2)
+    most = levels or LEVELS
+    seen: list[Observation | None] = [None] * len(walls)
+    for level in range(most):
+        samples = bench.watched * LONGER**level
+        open_ones = [i for i, found in enumerate(seen) if found is None]
+        at_once = max(AT_ONCE // samples, 1)
+        for start in range(0, len(open_ones), at_once):
+            some = open_ones[start : start + at_once]
+            for i, response in zip(some, _responses(bench, walls[some], samples), strict=True):
+                judged = judge_response(response)
+                stable = _verdict(bench, response, judged, level, last=level + 1 == most)
+                if stable is not None:
+                    seen[i] = Observation(stable, judged.behaviour, judged.amplitude, judged.frequency)
+    return [found for found in seen if found is not None]
+
+
+def _responses(bench: Bench, walls: Floats, samples: int) -> list[TimeResponse]:
+    environment = one_sided_wall if bench.one_sided else wall
+    plant, operator = bench.loop.plant, bench.hand.operator
+    shape = undeformed(plant if operator is None else attach(plant, operator))
+    start = (0.0 if bench.one_sided else bench.disturbance) * shape, bench.speed * shape
+    runs = [
+        Run(
+            bench.loop,
+            environment.values(stiffness=float(K), damping=float(B)),
+            hand=bench.hand,
+            start=start,
+            seed=bench.seed,
+            bound=_bound(bench, float(K)),
+        )
+        for K, B in walls
+    ]
+    # the first sample is at time 0
+    return simulate_batch(runs, environment, duration=(samples - 1) * bench.loop.period, substeps=bench.substeps)
+
+
+def _bound(bench: Bench, stiffness: float) -> float:
+    """Beyond it nobody would go on watching [m]: many times what the disturbance and the push move."""
+    pushed = abs(bench.hand.push) / max(abs(stiffness), 1e-300)
+    thrown = abs(bench.speed) * 1024 * bench.loop.period
+    return float(GIVEN_UP * (bench.disturbance + thrown) + 20.0 * pushed)
+
+
+def _verdict(bench: Bench, response: TimeResponse, judged: Judgement, level: int, *, last: bool) -> bool | None:
+    """Stable, unstable, or watch on."""
+    if response.given_up or not np.all(np.isfinite(response.truth)):
+        return False
+    growth = judged.growth
+    still = np.isnan(growth)
+    if bench.linear:
+        if still:
+            return True
+        return bool(growth < 0.0) if last else None
+    if level == 0 and not last:
+        return None  # what bounces at first may well come to rest
+    if bench.one_sided and judged.contact < 1.0:
+        return False if last or judged.behaviour == "lost contact" else None
+    if judged.behaviour == "converged" or still or judged.amplitude <= bench.visible:
+        return True
+    if judged.behaviour == "decaying" and bench.smooth:
+        return True
+    if not last:
+        return None
+    return bool(growth < 0.0) if bench.smooth else bool(growth * (len(response.time) // 4) < -STEADY)

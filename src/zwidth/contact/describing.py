@@ -1,0 +1,145 @@
+"""Describing functions: what passes of a sinus at its own frequency, of one nonlinearity each.
+
+For an input c + A sin(theta) and a nonlinearity f that gives no other output for rising than for falling input
+
+    N(A, c) = 1/(pi A) Integral_0^2pi f(c + A sin theta) sin theta d theta,     real: it shifts no phase
+
+(Gelb and Vander Velde 1968, ch. 2, whose table of it was seen; each function here is integrated from this
+definition). A loop that passes little of the harmonics vibrates about as if f were a gain of N.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+
+def _positive(**values: ArrayLike) -> None:
+    """Raise ValueError where a value is not positive; inf passes."""
+    for name, value in values.items():
+        if not np.all(np.asarray(value, dtype=float) > 0.0):
+            raise ValueError(f"{name.replace('_', ' ')} must be positive, got {value!r}")
+
+
+def quantiser(amplitude: ArrayLike, step: ArrayLike, offset: ArrayLike = 0.0) -> Floats:
+    """Gain of an encoder that rounds to the nearest step:  step * round(x / step).
+
+    The staircase rises by Delta at each threshold t = (k + 1/2) Delta. A sinus crosses t upwards and downwards at
+    sin theta = (t - c)/A, and such a step alone gives 2 Delta cos(theta)/(pi A), so that
+
+        N(A, c) = 2 Delta/(pi A) sum over |t - c| < A of sqrt(1 - ((t - c)/A)^2)
+
+    On a count, c = 0, it is 0 up to A = Delta/2 and nowhere above 4/pi, at A = Delta/sqrt 2. Centred between
+    two counts, c = Delta/2, the encoder is a relay to small motions, 2 Delta/(pi A) without bound. It tends to 1.
+
+    amplitude  (...)  A [m], positive
+    step       (...)  Delta [m], not negative; 0: no steps, 1
+    offset     (...)  c, the middle of the motion [m], a constant push's doing; only c modulo Delta matters
+    Returns    (...)  N, all broadcast
+    Raises     ValueError   for an amplitude that is not positive, a negative step
+
+    >>> quantiser([0.4, 0.5**0.5, 100.0], 1.0).round(4).tolist(), float(quantiser(0.1, 1.0, 0.5).round(4))
+    ([0.0, 1.2732, 1.0001], 6.3662)
+    """
+    A, step, c = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in (amplitude, step, offset)))
+    _positive(amplitude=A)
+    if not np.all(step >= 0.0):
+        raise ValueError(f"step must not be negative, got {np.min(step)!r}")
+    gain = np.ones(A.shape)
+    for index in np.argwhere(step > 0.0):
+        at = tuple(index)
+        gain[at] = _quantiser(float(A[at] / step[at]), float(c[at] / step[at]))
+    return gain
+
+
+# From here on the gain is 1 to 1e-6 (it swings about 1 like a^-3/2), and its sum longer than it is worth.
+MANY_STEPS = 1e4
+
+
+def _quantiser(a: float, c: float) -> float:
+    """The gain with step 1."""
+    if a > MANY_STEPS:
+        return 1.0
+    c -= round(c)
+    t = np.arange(np.floor(c - a), np.ceil(c + a) + 1.0) + 0.5 - c
+    return float(2.0 / (np.pi * a) * np.sum(np.sqrt(np.maximum(1.0 - (t / a) ** 2, 0.0))))
+
+
+def quantiser_mean(amplitude: ArrayLike, step: float, offset: ArrayLike) -> Floats:
+    """Mean reading of a motion c + A sin(theta) by an encoder: what a constant push is held by, over K.
+
+        c_mean = c_count + Delta sum over thresholds t of (1/2 - sgn(t)/2 - asin((t - c)/A)/pi),    |t - c| < A
+
+    with whole steps for the thresholds that the motion does not cross.
+
+    amplitude  (...)  A [m], positive
+    step              Delta [m], positive
+    offset     (...)  c [m]
+
+    >>> quantiser_mean([0.2, 0.2, 5.0], 1.0, [0.1, 0.5, 3.2]).round(3).tolist()
+    [0.0, 0.5, 3.177]
+    """
+    A, c = np.broadcast_arrays(np.asarray(amplitude, dtype=float), np.asarray(offset, dtype=float))
+    _positive(amplitude=A, step=step)
+    mean = np.empty(A.shape)
+    for index in np.ndindex(A.shape):
+        a, middle = float(A[index] / step), float(c[index] / step)
+        # the count below all thresholds that are crossed, and each threshold's share of the time
+        first = np.floor(middle - a + 0.5)
+        t = first + 0.5 + np.arange(np.ceil(2.0 * a) + 1.0)
+        share = 0.5 - np.arcsin(np.clip((t - middle) / a, -1.0, 1.0)) / np.pi
+        mean[index] = step * (first + np.sum(share))
+    return mean
+
+
+def coulomb_damper(coulomb: ArrayLike, velocity_amplitude: ArrayLike) -> Floats:
+    """Viscous damping that takes as much of a vibration as dry friction does [N s/m].
+
+        b = 4 C/(pi V)                 C sign v for v = V sin theta: 4 C/pi at the vibration's own frequency
+
+    The energy of a cycle is the same: 4 C X of friction, pi b omega X^2 of the damper, X = V/omega. Motion without
+    rests is assumed; a stuck phase in each cycle needs another function.
+
+    coulomb             (...)  C [N]
+    velocity_amplitude  (...)  V [m/s], positive
+
+    >>> round(float(coulomb_damper(0.1, 0.02)), 3)
+    6.366
+    """
+    _positive(velocity_amplitude=velocity_amplitude)
+    return np.asarray(4.0 * np.asarray(coulomb, float) / (np.pi * np.asarray(velocity_amplitude, float)))
+
+
+def saturation(amplitude: ArrayLike, limit: ArrayLike) -> Floats:
+    """Gain of a force that is cut off at +-limit, without a mean.
+
+        N = (2/pi) (asin s + s sqrt(1 - s^2)),     s = limit/A;        1 for A <= limit
+
+    amplitude  (...)  A of the force that is asked for [N], positive
+    limit      (...)  [N], positive; inf: 1
+
+    >>> saturation([1.0, 2.0, 100.0], 1.0).round(4).tolist()
+    [1.0, 0.609, 0.0127]
+    """
+    _positive(amplitude=amplitude, limit=limit)
+    s = np.minimum(np.asarray(limit, float) / np.asarray(amplitude, float), 1.0)
+    return np.asarray(2.0 / np.pi * (np.arcsin(s) + s * np.sqrt(1.0 - s * s)))
+
+
+def bent_spring(amplitude: ArrayLike, cubic: ArrayLike = 0.0, backward_excess: ArrayLike = 0.0) -> Floats:
+    """Stiffness that a bent spring has beyond its linear one, for a vibration about 0 [N/m].
+
+        N = (3/4) cubic A^2 + backward_excess/2
+
+    amplitude        (...)  A of its deflection [m]
+    cubic            (...)  [N/m^3]
+    backward_excess  (...)  what it is stiffer by for negative deflections [N/m]; they also push the mean, what is
+                            left out
+
+    >>> float(bent_spring(0.1, cubic=400.0))
+    3.0
+    """
+    A = np.asarray(amplitude, dtype=float)
+    return np.asarray(0.75 * np.asarray(cubic, float) * A * A + 0.5 * np.asarray(backward_excess, float))

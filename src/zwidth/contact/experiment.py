@@ -1,0 +1,343 @@
+"""A stability boundary measured on the virtual device, the way it is measured on a real one (thesis, 3.2.2, 3.3).
+
+For each stiffness the device is disturbed and watched, and the damping is bisected between a wall that was stable
+and one that was not: a lower and an upper edge. Near the tip it is the stiffness that is bisected, for chosen
+dampings.
+
+Where to look is found in the same way. Walls on a raster of powers of ten are tried, coarsely, on what is linear
+of the device under a two-sided wall; the largest connected patch of stable ones is the place. From inside it the
+bench itself marches outwards in growing steps until something is unstable. So only the cell of stable walls that
+begins at small stiffness is measured, and islands in it and tongues of it narrower than a step are missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.contact.along import Found, Lines, bisect, holds_beyond, lowest_change, march
+from zwidth.contact.bench import LEVELS, Bench, BenchError, Observation, observe
+from zwidth.model.modes import undeformed
+from zwidth.model.operator import attach
+from zwidth.model.plant import Plant
+
+Floats = NDArray[np.float64]
+Edge = Literal["lower", "upper", "tip"]
+Progress = Callable[[int, int], None]  # done, of how many
+
+PER_DECADE: Final = 3  # of the raster
+SOFTEST, LEAST_DAMPED = 1e-6, 1e-6  # of the raster, relative to its largest
+COARSE: Final = 2  # looks at a wall while only the place is sought
+COLUMNS: Final = 12  # dampings at which the raster's stiffness is measured
+WORTH: Final = 0.2  # columns that reach less of the largest stiffness are left alone, but for those beside others
+ZOOMS, ZOOMED = 4, 7  # rounds that close in on the tip, and dampings in each
+FIRST_ZOOM: Final = 3e-4  # share of the stiffness to which the first round measures it
+BESIDE: Final = 0.93  # share of the largest stiffness from which on the tip is measured
+HALVED: Final = 5  # times the start of a tip is lowered
+ACCURACY: Final = 1e-4  # of the range of stable dampings, or of the stiffness
+
+
+class NothingStable(ValueError):
+    """No stable wall was found."""
+
+
+class Box(NamedTuple):
+    """Where to look: stiffnesses [N/m] and dampings [N s/m]."""
+
+    stiffness: tuple[float, float]
+    damping: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the stable walls are, as found by trying.
+
+    stiffness, damping  of the tip, the stiffest wall found stable [N/m], [N s/m]
+    reach               the largest damping found stable [N s/m]
+    bounded             False where no unstable stiffness was found above the tip
+    """
+
+    stiffness: float
+    damping: float
+    reach: float
+    bounded: bool
+
+
+@dataclass(frozen=True)
+class EdgePoint:
+    """One point of the boundary, half way between the last stable wall and the first unstable one.
+
+    edge       lower and upper: damping was bisected at this stiffness; tip: stiffness at this damping
+    beyond     what the device does at that first unstable wall; None: no unstable wall was found, and the point
+               has nan for what was bisected
+    amplitude, frequency   of that [m], [Hz]
+    unsure     tip of what is not linear: the verdict changes more than once along the stiffness; this is the
+               lowest change
+    """
+
+    stiffness: float
+    damping: float
+    edge: Edge
+    beyond: str | None
+    amplitude: float
+    frequency: float
+    unsure: bool = False
+
+
+def find_place(bench: Bench, box: Box | None = None, progress: Progress | None = None) -> Place:
+    """Where the stable walls are.
+
+    progress  told how many of the six steps are done
+    box     look here only; None: everywhere between millionths and all of what the device's mass allows
+    Raises  NothingStable  where no stable wall with K > 0 is found
+    """
+    _check(box)
+    tell = progress or (lambda done, of: None)
+    tell(0, ZOOMS + 2)
+    patch = _patch(bench, box)
+    tell(1, ZOOMS + 2)
+    columns = _columns(bench, patch, box)
+    tell(2, ZOOMS + 2)
+    if not columns:
+        raise NothingStable(_none(box))
+    reach = max(B for B, _, _ in columns)
+    best = max(columns, key=lambda column: column[1])
+    within = _within(box)
+    # powers pass a peak between them
+    between = np.linspace(0.0, 1.3 * reach, COLUMNS + 1)[1:] if box is None else np.empty(0)
+    tops = np.interp(between, [B for B, _, _ in columns], [K for _, K, _ in columns])
+    more = _measured(bench, between, 0.5 * tops, FIRST_ZOOM, within, levels=COARSE)
+    columns = sorted({*columns, *(column for column in more if column[1] > 0.0)})
+    reach, best = max(B for B, _, _ in columns), max(columns, key=lambda column: column[1])
+    zoom = 0
+    while zoom < ZOOMS and best[2]:
+        index = columns.index(best)
+        low, high = columns[max(index - 1, 0)], columns[min(index + 1, len(columns) - 1)]
+        between = np.linspace(low[0], high[0], ZOOMED + 2)[1:-1]
+        B = np.unique(np.append(between, best[0]))
+        start = np.full(len(B), 0.9 * min(column[1] for column in (low, best, high)))
+        # dampings four times as close differ by a sixteenth in stiffness
+        tolerance = max(FIRST_ZOOM / 16.0**zoom, 0.01 * ACCURACY)
+        fresh = [c for c in _measured(bench, B, start, tolerance, within, best[1] - start) if c[1] > 0.0]
+        if not fresh:  # seen for longer, nothing there is stable
+            columns.remove(best)
+            if not columns:
+                raise NothingStable(_none(box))
+            best = max(columns, key=lambda column: column[1])
+            continue
+        best = max(fresh, key=lambda column: column[1])
+        columns = sorted({low, *fresh, high})
+        zoom += 1
+        tell(zoom + 2, ZOOMS + 2)
+    return Place(best[1], best[0], reach, best[2])
+
+
+# damping, largest stable stiffness, whether an unstable one was found
+_Column = tuple[float, float, bool]
+
+
+def _check(box: Box | None) -> None:
+    if box is None:
+        return
+    for name, unit, span in zip(("stiffness", "damping"), ("N/m", "N s/m"), box, strict=True):
+        if not all(map(isfinite, span)) or not span[0] < span[1]:
+            raise BenchError(f"{name} must be a range LOW < HIGH [{unit}], got {span[0]:g} to {span[1]:g}")
+    if not box.stiffness[1] > 0.0:
+        raise BenchError(f"stiffness must reach above 0 [N/m], got {box.stiffness[0]:g} to {box.stiffness[1]:g}")
+
+
+def _within(box: Box | None) -> tuple[float, float]:
+    """The softest and the stiffest wall to be looked at [N/m]."""
+    return (0.0, np.inf) if box is None else (max(box.stiffness[0], 0.0), box.stiffness[1])
+
+
+def _none(box: Box | None) -> str:
+    where = (
+        ""
+        if box is None
+        else (
+            f" with stiffness from {box.stiffness[0]:g} to {box.stiffness[1]:g} N/m and damping from "
+            f"{box.damping[0]:g} to {box.damping[1]:g} N s/m"
+        )
+    )
+    return f"no stable wall was found{where}: the disturbed device did not come to rest inside any of those tried"
+
+
+def _patch(bench: Bench, box: Box | None) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Stiffnesses (k,), dampings (b,), and which walls (k, b) belong to the largest connected stable patch."""
+    from scipy.ndimage import label
+
+    if box is None:
+        plant = bench.loop.plant if bench.hand.operator is None else attach(bench.loop.plant, bench.hand.operator)
+        light, heavy = _masses(plant)
+        T = bench.loop.period
+        K = _powers(4.0 * heavy / T**2, SOFTEST * light / heavy)
+        B = _powers(4.0 * heavy / T, LEAST_DAMPED * light / heavy)
+    else:
+        low = max(box.stiffness[0], 1e-3 * box.stiffness[1])
+        K = np.geomspace(low, box.stiffness[1], 20)
+        B = np.linspace(*box.damping, 24)
+    walls = np.stack(np.meshgrid(K, B, indexing="ij"), axis=-1).reshape(-1, 2)
+    for levels in range(1, LEVELS + 1):
+        stable = np.array([seen.stable for seen in observe(bench.linearised(), walls, levels)])
+        if stable.any():
+            break
+    else:
+        raise NothingStable(_none(box))
+    names, _ = label(stable.reshape(len(K), len(B)))
+    sizes = np.bincount(names.ravel())[1:]
+    return K, B, np.asarray(names == 1 + int(np.argmax(sizes)))
+
+
+def _powers(largest: float, least: float) -> Floats:
+    count = int(np.ceil(-PER_DECADE * np.log10(least)))
+    return np.asarray(largest * 10.0 ** (np.arange(-count, 1) / PER_DECADE))
+
+
+def _masses(plant: Plant) -> tuple[float, float]:
+    """What a sudden force at the wall accelerates, and what a steady one does [kg]."""
+    inverse = np.linalg.inv(plant.mass)
+    a, s, shape = plant.actuator, plant.sensor, undeformed(plant)
+    light = 1.0 / float(np.sqrt((a @ inverse @ a) * (s @ inverse @ s)))
+    return light, max(float(shape @ plant.mass @ shape), light)
+
+
+def _columns(bench: Bench, patch: tuple[Floats, Floats, NDArray[np.bool_]], box: Box | None) -> list[_Column]:
+    """The largest stable stiffness at some of the patch's dampings, on the bench itself."""
+    K, B, inside = patch
+    tops = np.array([K[column].max(initial=0.0) for column in inside.T])
+    worth = np.flatnonzero(tops > WORTH * tops.max())
+    filled = np.flatnonzero(tops > 0.0)
+    filled = filled[(filled >= worth[0] - 1) & (filled <= worth[-1] + 1)]
+    some = filled[np.unique(np.linspace(0, len(filled) - 1, min(COLUMNS, len(filled))).astype(int))]
+    top = np.array([K[np.flatnonzero(inside[:, b])[-1]] for b in some])
+    least = np.array([K[np.flatnonzero(inside[:, b])[0]] for b in some])
+    within = _within(box)
+    found = dict[int, _Column]()
+    for start in (0.5 * top, 0.1 * top, least):
+        lanes = [i for i in range(len(some)) if i not in found]
+        columns = _measured(bench, B[some[lanes]], start[lanes], 0.05, within, levels=COARSE)
+        for i, column in zip(lanes, columns, strict=True):
+            if column[1] > 0.0:
+                found[i] = column
+    return sorted(found.values())
+
+
+def _measured(
+    bench: Bench,
+    B: Floats,
+    start: Floats,
+    tolerance: float,
+    within: tuple[float, float],
+    step: Floats | None = None,
+    levels: int | None = None,
+) -> list[_Column]:
+    """The largest stable stiffness at dampings B (m,), from a start that should be stable; 0 where it is not.
+
+    Of what is not linear the lowest change counts, whatever `levels` says.
+    """
+    least, most = within
+    m = len(B)
+    begins = np.array([seen.stable for seen in observe(bench, np.column_stack([start, B]), levels)], dtype=bool)
+    lines = Lines(np.column_stack([start, B]), np.tile([1.0, 0.0], (m, 1)))
+    farthest = np.where(begins, np.minimum(most, 1e6 * start) - start, 0.0)
+    found = march(bench, lines, 0.5 * start if step is None else step, np.maximum(farthest, 0.0), levels)
+    found = bisect(bench, lines, found, tolerance * start, levels)
+    found = Found(np.where(begins, start + found.stable, 0.0), start + found.unstable, found.beyond)
+    if not bench.linear:
+        found = lowest_change(bench, B, found, least, tolerance * np.minimum(start, found.stable))
+    return list(zip(B.tolist(), found.stable.tolist(), np.isfinite(found.unstable).tolist(), strict=True))
+
+
+def measure_edges(bench: Bench, stiffness: Floats, place: Place, box: Box | None = None) -> list[EdgePoint]:
+    """Lower and upper edge at each stiffness (k,), from the damping of the tip outwards.
+
+    Returns  lower edges first; a stiffness at which that damping is not stable has none
+    """
+    k = len(stiffness)
+    inside = np.full(k, place.damping)
+    begins = np.array([seen.stable for seen in observe(bench, np.column_stack([stiffness, inside]))], dtype=bool)
+    stiffness, inside, k = stiffness[begins], inside[begins], int(begins.sum())
+    if not k:
+        return []
+    starts = np.column_stack([np.tile(stiffness, 2), np.tile(inside, 2)])
+    sign = np.repeat([-1.0, 1.0], k)
+    lines = Lines(starts, np.column_stack([np.zeros(2 * k), sign]))
+    scale = max(abs(place.damping), 0.1 * abs(place.reach))
+    low, high = (-np.inf, np.inf) if box is None else box.damping
+    farthest = np.where(sign < 0.0, starts[:, 1] - low, high - starts[:, 1])
+    farthest = np.minimum(np.maximum(farthest, 0.0), 1e3 * scale)
+    found = march(bench, lines, np.full(2 * k, 0.25 * scale), farthest)
+    width = np.nan_to_num(found.unstable, nan=scale).reshape(2, k).sum(axis=0)
+    found = bisect(bench, lines, found, np.tile(ACCURACY * width, 2))
+    middle = lines.at(0.5 * (found.stable + found.unstable))[:, 1]
+    kinds: tuple[Edge, Edge] = ("lower", "upper")
+    edges = [kind for kind in kinds for _ in range(k)]
+    return [
+        _point(float(K), float(B), edge, seen)
+        for (K, _), B, edge, seen in zip(starts, middle, edges, found.beyond, strict=True)
+    ]
+
+
+def measure_tips(bench: Bench, damping: Floats, place: Place, box: Box | None = None) -> list[EdgePoint]:
+    """The largest stable stiffness at each damping (k,), from a stiffness somewhat below the tip's upwards.
+
+    Of what is not linear: from a lower one where that is not stable, and the lowest change of the verdict.
+    """
+    least, most = _within(box)
+    start = np.full(len(damping), (BESIDE - 0.03) * place.stiffness)
+    start = _lowered(bench, damping, start, least)
+    B, start = damping[start > 0.0], start[start > 0.0]
+    lines = Lines(np.column_stack([start, B]), np.tile([1.0, 0.0], (len(B), 1)))
+    most = min(most, 1e3 * place.stiffness)
+    found = march(bench, lines, (1.0 / (BESIDE - 0.03) - 1.0) * start, np.maximum(most - start, 0.0))
+    tolerance = np.full(len(B), 0.1 * ACCURACY * place.stiffness)
+    found = bisect(bench, lines, found, tolerance)
+    found = Found(start + found.stable, start + found.unstable, found.beyond)
+    unsure = np.zeros(len(B), dtype=bool)
+    if not bench.linear:
+        lower = lowest_change(bench, B, found, least, tolerance)
+        unsure = (lower.stable < found.stable) | holds_beyond(bench, B, lower.unstable)
+        found = lower
+    middle = np.where(found.stable > 0.0, 0.5 * (found.stable + found.unstable), np.nan)
+    ends = zip(middle.tolist(), B.tolist(), found.beyond, unsure.tolist(), strict=True)
+    return [_point(K, b, "tip", seen if isfinite(K) else None, doubt) for K, b, seen, doubt in ends]
+
+
+def _lowered(bench: Bench, damping: Floats, start: Floats, least: float) -> Floats:
+    """Stiffnesses halved until their walls are stable, for what is not linear; 0 where none is."""
+    start = start.copy()
+    lanes = np.arange(len(damping))
+    for _ in range(1 if bench.linear else HALVED):
+        looks = observe(bench, np.column_stack([start[lanes], damping[lanes]]))
+        lanes = lanes[[not seen.stable for seen in looks]]
+        if not len(lanes):
+            break
+        start[lanes] = least + 0.5 * (start[lanes] - least)
+    start[lanes] = 0.0
+    return start
+
+
+def _point(K: float, B: float, edge: Edge, seen: Observation | None, unsure: bool = False) -> EdgePoint:
+    if seen is None:
+        return EdgePoint(K, B, edge, None, float("nan"), float("nan"), unsure)
+    return EdgePoint(K, B, edge, seen.behaviour, seen.amplitude, seen.frequency, unsure)
+
+
+def tip_dampings(edges: list[EdgePoint], place: Place, count: int) -> Floats:
+    """Dampings at which to measure the tip: the tip's own, and others between the two edges just below it."""
+    at = BESIDE * place.stiffness
+    ends = []
+    for edge in ("lower", "upper"):
+        own = [p for p in edges if p.edge == edge and isfinite(p.damping)]
+        if not own:
+            return np.array([place.damping])[:count]
+        K, B = (np.array(values) for values in zip(*sorted((p.stiffness, p.damping) for p in own), strict=True))
+        ends.append(float(np.interp(at, K, B)))
+    spread = np.linspace(ends[0], ends[1], count + 1)[1:-1]  # none for a count of 1
+    return np.asarray(np.sort(np.append(spread, place.damping)))

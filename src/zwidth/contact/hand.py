@@ -1,0 +1,216 @@
+"""The operator in time: how he pushes, trembles and reaches, and the reflex that stiffens his arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, inf, isfinite, pi, sin
+from typing import Final
+
+import numpy as np
+
+from zwidth.compiled import compiled_lean
+from zwidth.contact.elements import VARYING
+from zwidth.contact.machine import Devices
+from zwidth.model.mechanism import Floats
+from zwidth.model.operator import Operator
+
+# What stands in the first number of an element that varies.
+BRAKE: Final = 0.0
+ARM: Final = 1.0
+GRASP: Final = 2.0
+
+PUSH_NUMBERS: Final = 9
+REFLEX_NUMBERS: Final = 7
+
+
+@dataclass(frozen=True)
+class Reach:
+    """A reaching movement: the arm's rest position moves by minimum jerk (Flash and Hogan 1985).
+
+        x_0(t) = distance (10 s^3 - 15 s^4 + 6 s^5),   s = (t - start)/duration
+
+    distance [m], start [s], duration [s]
+    Raises    ValueError  for a distance that is not finite, a negative start, a duration that is not positive
+    """
+
+    distance: float
+    start: float = 0.0
+    duration: float = 0.5
+
+    def __post_init__(self) -> None:
+        _check("distance", self.distance, "m", -inf)
+        _check("start", self.start, "s", 0.0)
+        _check("duration", self.duration, "s", 0.0, open_end=True)
+
+
+@dataclass(frozen=True)
+class Tremor:
+    """A force amplitude sin(2 pi f t + phase); physiological tremor has 8 to 12 Hz.
+
+    amplitude [N], frequency [Hz], phase [rad]
+    Raises    ValueError  for a negative amplitude or frequency, or one that is not finite
+    """
+
+    amplitude: float
+    frequency: float = 10.0
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check("amplitude", self.amplitude, "N", 0.0)
+        _check("frequency", self.frequency, "Hz", 0.0)
+        _check("phase", self.phase, "rad", -inf)
+
+
+@dataclass(frozen=True)
+class Reflex:
+    """A hand that stiffens: once the device's force has exceeded a threshold, stiffness and damping of arm and
+    grasp grow after the latency towards their extra amounts, 1 - exp(-t/rise), about where the hand then is.
+
+    threshold        [N]
+    latency, rise    [s]; spinal reflexes take 20 to 50 ms, voluntary ones more than 100
+    arm_stiffness, arm_damping      more of it, in the end [N/m], [N s/m]
+    grasp_stiffness, grasp_damping  the same for the grasp
+    Raises           ValueError  for numbers that are negative or not finite
+    """
+
+    threshold: float
+    latency: float = 0.05
+    rise: float = 0.05
+    arm_stiffness: float = 0.0
+    arm_damping: float = 0.0
+    grasp_stiffness: float = 0.0
+    grasp_damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check("threshold", self.threshold, "N", 0.0)
+        _check("latency", self.latency, "s", 0.0)
+        _check("rise", self.rise, "s", 0.0)
+        for name in ("arm_stiffness", "grasp_stiffness"):
+            _check(name, getattr(self, name), "N/m", 0.0)
+        for name in ("arm_damping", "grasp_damping"):
+            _check(name, getattr(self, name), "N s/m", 0.0)
+
+
+@dataclass(frozen=True)
+class Hand:
+    """Who holds the handle, and what he does.
+
+    operator   his passive arm and grasp; None: nobody, or the loop's plant has him already
+    push       a constant force towards the wall [N], on the arm behind an elastic grasp, else on the handle
+    ramp       time in which the push grows to it [s]
+    reach, tremor, reflex   None: none
+    Raises     ValueError  for a reflex or a reach without an operator
+    """
+
+    operator: Operator | None = None
+    push: float = 0.0
+    ramp: float = 0.0
+    reach: Reach | None = None
+    tremor: Tremor | None = None
+    reflex: Reflex | None = None
+
+    def __post_init__(self) -> None:
+        _check("push", self.push, "N", -inf)
+        _check("ramp", self.ramp, "s", 0.0)
+        if self.operator is None and (self.reach is not None or self.reflex is not None):
+            what = "reach" if self.reach is not None else "reflex"
+            raise ValueError(f"a {what} needs an arm; give the hand an operator")
+
+    @property
+    def push_numbers(self) -> Floats:
+        """What `hand_force` takes."""
+        numbers = np.zeros(PUSH_NUMBERS)
+        numbers[:2] = self.push, self.ramp
+        if self.reach is not None and self.operator is not None:
+            distance = self.reach.distance
+            numbers[2:4] = distance * self.operator.arm_stiffness, distance * self.operator.arm_damping
+            numbers[4:6] = self.reach.start, self.reach.duration
+        if self.tremor is not None:
+            numbers[6:] = self.tremor.amplitude, 2.0 * pi * self.tremor.frequency, self.tremor.phase
+        return numbers
+
+    @property
+    def reflex_numbers(self) -> Floats:
+        """What `set_varying` takes; an infinite threshold for none."""
+        own = self.reflex
+        if own is None:
+            return np.array([inf, *np.zeros(REFLEX_NUMBERS - 1)])
+        amounts = (own.arm_stiffness, own.arm_damping, own.grasp_stiffness, own.grasp_damping)
+        return np.array([own.threshold, own.latency, own.rise, *amounts])
+
+
+def _check(name: str, value: float, unit: str, least: float, *, open_end: bool = False) -> None:
+    if not isfinite(value) or value < least or (open_end and value == least):
+        allowed = "finite" if least == -inf else "positive" if open_end else "finite and not negative"
+        raise ValueError(f"{name} must be {allowed} [{unit}], got {value!r}")
+
+
+@compiled_lean
+def hand_force(numbers: Floats, m: int, time: float) -> float:
+    """Push, reach and tremor of run m at a time [N]."""
+    push, ramp = numbers[m, 0], numbers[m, 1]
+    force = float(push * min(time / ramp, 1.0) if ramp > 0.0 else push)
+    if numbers[m, 5] > 0.0 and time > numbers[m, 4]:
+        s = min((time - numbers[m, 4]) / numbers[m, 5], 1.0)
+        force += numbers[m, 2] * s * s * s * (10.0 + s * (6.0 * s - 15.0))
+        force += numbers[m, 3] * 30.0 * s * s * (1.0 - s) * (1.0 - s) / numbers[m, 5]
+    if numbers[m, 6] != 0.0:
+        force += numbers[m, 6] * sin(numbers[m, 7] * time + numbers[m, 8])
+    return force
+
+
+@compiled_lean
+def set_varying(
+    devices: Devices,
+    d: int,
+    reflex: Floats,
+    time: float,
+    period: float,
+    force: float,
+    states: Floats,
+    memory: Floats,
+) -> None:
+    """At a sample: what brakes and reflexes are to become, into memory (E, 4).
+
+    memory  of a brake: -, damping now, damping commanded, damping after the substep; it is on while the
+            environment asks for a force
+            of a reflex: stiffness, damping now, rest position, and the time of its onset plus one period, so that
+            0 says not yet; negative once it acts, which begins at a sample
+    """
+    n = devices.size[d]
+    for e in range(devices.kind.shape[1]):
+        if devices.kind[d, e] != VARYING:
+            continue
+        if devices.numbers[d, e, 0] == BRAKE:
+            memory[e, 2] = devices.numbers[d, e, 1] if force != 0.0 else 0.0
+            continue
+        if memory[e, 3] == 0.0 and abs(force) > reflex[0]:
+            memory[e, 3] = time + period + reflex[1]
+        if memory[e, 3] > 0.0 and time + period >= memory[e, 3]:
+            memory[e, 3] = -memory[e, 3]
+            rest = 0.0
+            for k in range(n):
+                rest += devices.along[d, e, k] * states[k]
+            memory[e, 2] = rest
+
+
+@compiled_lean
+def follow_varying(
+    devices: Devices, d: int, reflex: Floats, m: int, time: float, h: float, period: float, memory: Floats
+) -> None:
+    """Over a substep from `time` on: what brakes and reflexes of run m are worth on the average."""
+    for e in range(devices.kind.shape[1]):
+        if devices.kind[d, e] != VARYING:
+            continue
+        role = devices.numbers[d, e, 0]
+        if role == BRAKE:
+            wanted, lag, now = memory[e, 2], devices.numbers[d, e, 2], memory[e, 3]
+            fade = exp(-h / lag) if lag > 0.0 else 0.0
+            memory[e, 1] = wanted + (now - wanted) * ((1.0 - fade) * lag / h)
+            memory[e, 3] = wanted + (now - wanted) * fade
+        elif memory[e, 3] < 0.0:
+            since = time + 0.5 * h + memory[e, 3] + period
+            grasp = 2 if role == GRASP else 0
+            level = 1.0 - exp(-since / reflex[m, 2]) if reflex[m, 2] > 0.0 else 1.0
+            memory[e, 0] = reflex[m, 3 + grasp] * level
+            memory[e, 1] = reflex[m, 4 + grasp] * level

@@ -1,0 +1,138 @@
+"""A limit cycle of a limited force with its harmonics: what a sinus alone misses deep in saturation.
+
+The limit acts on the samples of the force that is asked for, so that with theta = omega T j + a phase
+
+    w(theta) = sum over odd n of Re(W_n exp(i n theta)),     W_n = G(exp(i n omega T)) U_n
+
+where U_n are the harmonics of the limited w(theta) and G is the loop cut at the limit, from the force that acts to
+the one asked for. One equation for each harmonic, solved by Newton's method from the first one, which is the
+describing function's answer. With all harmonics this is exact for vibrations that are not locked to the samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.contact.equivalent import equivalent_loop
+from zwidth.contact.limit_cycles import LimitCycle
+from zwidth.loop.loop import Loop
+from zwidth.model.nonlinear import Nonlinear
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+COUNTS = (1, 2, 4, 8, 16)  # of odd harmonics, each solution the start of the next
+PHASES = 512
+SOLVED = 1e-8  # what is left of the equations, relative to the first harmonic
+FAR = 4.0  # times: a step to another cycle is none
+
+
+def with_harmonics(
+    loop: Loop, wall_stiffness: float, wall_damping: float, cycle: LimitCycle, saturation: float | None = None
+) -> LimitCycle:
+    """The same limit cycle with up to 16 odd harmonics: amplitude, frequency and force are half peak to peak.
+
+    Only the limit of the force is taken for nonlinear. Where Newton's method fails the cycle of the harmonics that
+    it could follow is returned, of the first alone the one that was given.
+
+    cycle       by `limit_cycles` of a loop without dry friction, counters and bent springs that act
+    saturation  largest force [N]; None: the smaller of the controller's and the actuator's limits
+    Raises      ValueError   where nothing limits the force
+
+    >>> from zwidth.contact.limit_cycles import limit_cycles
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> plant = Plant(0.1 * one[:, None], 0.1 * one[:, None], np.zeros((1, 1)), one, one)
+    >>> loop = Loop(plant, Controller(0.001))
+    >>> [first] = limit_cycles(loop, 400.0, 0.05, saturation=1.0)
+    >>> full = with_harmonics(loop, 400.0, 0.05, first, saturation=1.0)
+    >>> round(full.amplitude / first.amplitude, 3), round(full.frequency_Hz / first.frequency_Hz, 3)
+    (1.04, 0.975)
+    """
+    limit = loop.nonlinear.force_limit if saturation is None else saturation
+    if not 0.0 < limit < np.inf:
+        raise ValueError(f"harmonics are those of a limited force, and its limit is {limit} N")
+    transition, gain, command = equivalent_loop(loop, wall_stiffness, wall_damping, Nonlinear()).opened()
+    sensor = np.zeros(len(gain))
+    sensor[: loop.plant.size] = loop.plant.sensor
+    cut = _Cut(transition, gain, np.stack([command, sensor]))
+    T, found = loop.period, cycle
+    start = np.array([np.log(cycle.force_amplitude / limit), np.log(2.0 * np.pi * cycle.frequency_Hz * T)])
+    for count in COUNTS:
+        solution = cut.solved(_longer(start, count), count)
+        if solution is None or np.max(np.abs(solution[:2] - start[:2])) > np.log(FAR):
+            break
+        start = solution
+        force, position, angle = cut.vibration(solution, count)
+        found = replace(
+            cycle,
+            amplitude=position * limit,
+            force_amplitude=force * limit,
+            frequency_Hz=angle / (2.0 * np.pi * T),
+        )
+    return found
+
+
+def _longer(start: Floats, count: int) -> Floats:
+    """A solution with more harmonics, which are 0: logarithms of the first and of its angle, then the others'
+    real and imaginary parts."""
+    before = len(start) // 2
+    more = np.zeros(count - before)
+    return np.concatenate([start[: before + 1], more, start[before + 1 :], more])
+
+
+class _Cut:
+    """The loop cut at its limit, forces in units of it."""
+
+    def __init__(self, transition: Floats, force: Floats, rows: Floats) -> None:
+        self.transition, self.force, self.rows = transition, force, rows
+        self.phases = 2.0 * np.pi * np.arange(PHASES) / PHASES
+
+    def solved(self, start: Floats, count: int) -> Floats | None:
+        """Newton's method from a start; None where it fails."""
+        from scipy.optimize import root
+
+        def left(unknown: Floats) -> Floats:
+            W, angle = _parts(unknown, count)
+            rest = (self._passed(angle, count)[0] * self._limited(W) - W) / abs(W[0])
+            return np.concatenate([rest.real, rest.imag])
+
+        with np.errstate(all="ignore"):
+            found = root(left, start, tol=1e-12)
+            good = np.all(np.isfinite(found.x)) and np.max(np.abs(left(found.x))) < SOLVED
+        return np.asarray(found.x) if good else None
+
+    def vibration(self, solution: Floats, count: int) -> tuple[float, float, float]:
+        """Half of peak to peak of the force that is asked for and of the position, and the angle per sample."""
+        W, angle = _parts(solution, count)
+        position = self._passed(angle, count)[1] * self._limited(W)
+        force, place = (0.5 * float(np.ptp(self._over_phases(part))) for part in (W, position))
+        return force, place, angle
+
+    def _passed(self, angle: float, count: int) -> Complexes:
+        """(2, h) the force that is asked for, and the sensor's motion, by the force that acts."""
+        size, orders = len(self.transition), np.arange(1, 2 * count, 2)
+        z = np.exp(1j * angle * orders)[:, None, None]
+        inner = np.linalg.solve(z * np.eye(size) - self.transition, self.force[:, None].astype(complex))[..., 0]
+        return np.asarray(self.rows @ inner.T)
+
+    def _over_phases(self, W: Complexes) -> Floats:
+        orders = np.arange(1, 2 * len(W), 2)
+        return np.asarray((W @ np.exp(1j * np.outer(orders, self.phases))).real)
+
+    def _limited(self, W: Complexes) -> Complexes:
+        """Harmonics of what the limit lets pass."""
+        passed = np.clip(self._over_phases(W), -1.0, 1.0)
+        orders = np.arange(1, 2 * len(W), 2)
+        return np.asarray(2.0 / PHASES * np.exp(-1j * np.outer(orders, self.phases)) @ passed)
+
+
+def _parts(unknown: Floats, count: int) -> tuple[Complexes, float]:
+    """The harmonics, the first one real, and the angle per sample."""
+    first = np.exp(unknown[0])
+    others = unknown[2 : count + 1] + 1j * unknown[count + 1 :]
+    return first * np.concatenate([[1.0 + 0.0j], others]), float(np.exp(unknown[1]))

@@ -1,0 +1,300 @@
+"""Limit cycles of the sampled loop by harmonic balance: which vibrations keep themselves up, and are they met?
+
+Dry friction, encoder steps and saturation are replaced by what they do to a sinus of amplitude A
+(`contact.describing`). Where the linear loop so made (`contact.equivalent`) has its root on the unit circle, a
+vibration of that amplitude neither grows nor dies. It is stable, and so seen, where smaller ones grow and larger
+ones die; an unstable one is the edge of what the loop recovers from.
+
+This is an approximation, of vibrations that are nearly sinusoidal and not locked to the samples. What it is worth
+is measured in docs/limit-cycles.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.contact.equivalent import EquivalentLoop, Measure, Swing, amplitude_of, equivalent_loop, velocity_of
+from zwidth.loop.loop import Loop
+from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+
+Floats = NDArray[np.float64]
+
+PER_DECADE = 24
+STEPS_RESOLVED = 12  # encoder steps up to which each hump of the quantiser's gain gets points of its own
+# The amplitudes looked at, in units of the smallest and largest of the loop's own; between counts an encoder is
+# a relay, which sees the smallest motions.
+BELOW, BELOW_RELAY, ABOVE = 1e-3, 1e-6, 1e4
+ON_CIRCLE = 1e-7
+ROUGHLY = 1e-6  # agreement of shape and gains while only signs of growth are looked for
+SEEDED, ANGLES = 12, (0.05, 0.3, 0.9)  # every so many amplitudes vibrations are looked for anew, at parts of pi
+FOLDED = 40  # steps by a fifth in velocity
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """A vibration that keeps itself up.
+
+    amplitude            of the sensor's motion, before rounding [m]
+    frequency_Hz
+    stable               do smaller vibrations grow into it, and larger ones shrink?
+    force_amplitude      of the force that is asked for, before saturation [N]
+    velocity_amplitudes  (f,)  at each dry friction [m/s]
+    """
+
+    amplitude: float
+    frequency_Hz: float
+    stable: bool
+    force_amplitude: float
+    velocity_amplitudes: Floats
+
+
+@dataclass(frozen=True)
+class HarmonicBalance:
+    """What happens to vibrations of each amplitude.
+
+    amplitude     (p,)  of the sensor's motion [m], ascending
+    growth        (p,)  rate at which the fastest growing vibration of that amplitude grows [1/s]; -inf where
+                        nothing swings
+    frequency_Hz  (p,)  its frequency; nan where nothing swings
+    cycles        limit cycles by amplitude
+    """
+
+    amplitude: Floats
+    growth: Floats
+    frequency_Hz: Floats
+    cycles: tuple[LimitCycle, ...]
+
+
+def limit_cycles(
+    loop: Loop,
+    wall_stiffness: float,
+    wall_damping: float,
+    *,
+    coulomb_friction: ArrayLike | None = None,
+    resolution: float | None = None,
+    saturation: float | None = None,
+    offset: float = 0.0,
+) -> list[LimitCycle]:
+    """Limit cycles on a two-sided wall, by amplitude; see `harmonic_balance` for the arguments.
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> free_mass = Plant(0.1 * one[:, None], 0.1 * one[:, None], np.zeros((1, 1)), one, one)
+    >>> loop = Loop(free_mass, Controller(0.001))
+    >>> limit_cycles(loop, 150.0, 0.0)
+    []
+    >>> [grows] = limit_cycles(loop, 400.0, 0.0, coulomb_friction=0.01)
+    >>> f"{grows.amplitude * 1e3:.2f} mm at {grows.frequency_Hz:.2f} Hz, stable: {grows.stable}"
+    '2.02 mm at 10.06 Hz, stable: False'
+    """
+    found = harmonic_balance(
+        loop,
+        wall_stiffness,
+        wall_damping,
+        coulomb_friction=coulomb_friction,
+        resolution=resolution,
+        saturation=saturation,
+        offset=offset,
+    )
+    return list(found.cycles)
+
+
+def harmonic_balance(
+    loop: Loop,
+    wall_stiffness: float,
+    wall_damping: float,
+    *,
+    coulomb_friction: ArrayLike | None = None,
+    resolution: float | None = None,
+    saturation: float | None = None,
+    offset: float = 0.0,
+    amplitudes: tuple[float, float] | None = None,
+) -> HarmonicBalance:
+    """Growth of vibrations over their amplitude, and where it changes sign: the limit cycles.
+
+    What is not linear is that of the loop's plant and controller; three arguments replace parts of it. Dahl's and
+    LuGre's frictions count as Coulomb's, brakes are left out.
+
+    wall_stiffness, wall_damping  K [N/m] and B [N s/m]
+    coulomb_friction  C [N], along the sensor's motion, or (n,), of each coordinate; None: the plant's frictions
+    resolution        step of the sensor's reading [m]; None: the plant's encoders
+    saturation        largest force [N]; None: the smaller of the controller's and the actuator's limits
+    offset            middle of the vibration as a share of each encoder's step: 0 on a count, 0.5 between two, the
+                      worst that a constant push can do
+    amplitudes        lowest and highest to look at [m]; None: well beyond what the nonlinear parts suggest
+    Raises            ValueError   for a wall that is not finite, negative friction or resolution, a saturation
+                                   that is not positive, an empty range of amplitudes
+    """
+    parts, limit = _parts(loop, coulomb_friction, resolution, saturation)
+    if not (np.isfinite(wall_stiffness) and np.isfinite(wall_damping)):
+        raise ValueError(f"the wall must be finite, got K = {wall_stiffness} N/m, B = {wall_damping} N s/m")
+    own = equivalent_loop(loop, wall_stiffness, wall_damping, parts, saturation=limit, offset=offset)
+    if not (own.parts.friction or own.parts.counters or own.parts.springs or np.isfinite(limit)):
+        return _nothing()
+    at = _amplitudes(own, amplitudes)
+    if not len(at):
+        return _nothing()
+    swings = _followed(own, at)
+    return HarmonicBalance(
+        at,
+        np.array([_growth(own, swing) for swing in swings]),
+        np.array([_frequency(own, swing) if swing else np.nan for swing in swings]),
+        tuple(_crossings(own, at, swings)),
+    )
+
+
+def _nothing() -> HarmonicBalance:
+    """Of a loop in which nothing depends on the amplitude."""
+    return HarmonicBalance(np.zeros(0), np.zeros(0), np.zeros(0), ())
+
+
+def _parts(
+    loop: Loop, coulomb_friction: ArrayLike | None, resolution: float | None, saturation: float | None
+) -> tuple[Nonlinear, float]:
+    """What is not linear of the loop, with what replaces it, and the smallest limit on the force."""
+    plant, parts = loop.plant, loop.plant.nonlinear
+    if coulomb_friction is not None:
+        C = np.asarray(coulomb_friction, dtype=float)
+        if C.ndim and C.shape != (plant.size,):
+            raise ValueError(f"coulomb_friction must be one number or {plant.size}, one per coordinate, got {C}")
+        if not np.all(C >= 0.0):
+            raise ValueError(f"coulomb_friction must not be negative, got {coulomb_friction} N")
+        rows = np.eye(plant.size) if C.ndim else plant.sensor[None]
+        friction = tuple(Friction(row, float(c)) for row, c in zip(rows, np.atleast_1d(C), strict=True))
+        parts = replace(parts, friction=friction)
+    if resolution is not None:
+        if not resolution >= 0.0:
+            raise ValueError(f"resolution must not be negative, got {resolution} m")
+        parts = replace(parts, counters=(Counter(plant.sensor, resolution),))
+    limit = loop.nonlinear.force_limit if saturation is None else saturation
+    if not limit > 0.0:
+        raise ValueError(f"saturation must be positive, got {limit} N; inf means none")
+    return parts, limit
+
+
+def _amplitudes(own: EquivalentLoop, bounds: tuple[float, float] | None) -> Floats:
+    """Amplitudes to look at: even in the logarithm, and denser where the quantiser's gain has its humps."""
+    T, parts = own.loop.period, own.parts
+    stiffness = abs(own.wall_stiffness) + abs(own.wall_damping) / T
+    steps = [abs(part.weight) * part.step for part in parts.counters if part.step > 0.0]
+    scales = list(steps)
+    if stiffness > 0.0:
+        scales += [part.coulomb / stiffness for part in parts.friction]
+        scales += [own.limit / stiffness] if np.isfinite(own.limit) else []
+    scales += [np.sqrt(stiffness / abs(part.cubic)) for part in parts.springs if part.cubic and stiffness]
+    if not scales and bounds is None:
+        return np.zeros(0)
+    middle = abs(own.offset - round(own.offset))
+    below = BELOW_RELAY if steps and middle > 0.0 else BELOW
+    low, high = bounds if bounds else (below * min(scales), ABOVE * max(scales))
+    if not 0.0 < low < high < np.inf:
+        raise ValueError(f"amplitudes must be two positive numbers, the lower first, got {low}, {high} m")
+    grid = np.geomspace(low, high, max(2, int(PER_DECADE * np.log10(high / low)) + 1))
+    for step in steps:
+        for k in range(STEPS_RESOLVED):
+            for edge in (k + 0.5 - middle, k + 0.5 + middle):
+                inside = np.concatenate([[1e-9, 1e-4, 1e-2], np.linspace(0.04, 0.98, 12)])
+                grid = np.append(grid, step * (edge + inside))
+    grid = np.unique(grid)
+    return grid[(grid >= low) & (grid <= high)]
+
+
+def _followed(own: EquivalentLoop, amplitudes: Floats) -> list[Swing | None]:
+    """The fastest growing vibration at each amplitude, followed downwards and upwards.
+
+    More than one kind of vibration may agree with the gains that it makes itself, so both ways count.
+    """
+    last = own.first_guess(float(amplitudes[-1]))
+    down: list[Swing | None] = []
+    for amplitude in amplitudes[::-1]:
+        down.append(own.swing(float(amplitude), last, same=ROUGHLY))
+        last = down[-1] or last
+    swings: list[Swing | None] = []
+    for k, (amplitude, other) in enumerate(zip(amplitudes, down[::-1], strict=True)):
+        starts = [] if other is not None and abs(other.root - last.root) < ROUGHLY else [last]
+        if k % SEEDED == 0:
+            starts += [own.seed(float(amplitude), angle * np.pi) for angle in ANGLES]
+        for start in starts:
+            other = _faster(other, own.swing(float(amplitude), start, same=ROUGHLY))
+        swings.append(other)
+        last = other or last
+    return swings
+
+
+def _faster(one: Swing | None, other: Swing | None) -> Swing | None:
+    """The one that grows faster."""
+    known = [swing for swing in (one, other) if swing is not None]
+    return max(known, key=lambda swing: abs(swing.root), default=None)
+
+
+def _growth(own: EquivalentLoop, swing: Swing | None) -> float:
+    return float(np.log(abs(swing.root)) / own.loop.period) if swing else -np.inf
+
+
+def _frequency(own: EquivalentLoop, swing: Swing) -> float:
+    return float(np.angle(swing.root) / (2.0 * np.pi * own.loop.period))
+
+
+def _crossings(own: EquivalentLoop, at: Floats, swings: list[Swing | None]) -> list[LimitCycle]:
+    """Where growth changes sign, and by which way."""
+    found = []
+    for one, two in pairwise(swings):
+        if two is None or (one is None and abs(two.root) <= 1.0):
+            continue
+        if one is not None and (abs(one.root) > 1.0) == (abs(two.root) > 1.0):
+            continue
+        root = _bisected(own, one, two, amplitude_of) if one is not None else None
+        if root is None and abs(two.root) > 1.0 and own.parts.friction:
+            root = _folded(own, two)
+        if root is not None:
+            stable = one is not None and abs(one.root) > 1.0
+            found.append(LimitCycle(root.amplitude, _frequency(own, root), stable, root.force, root.velocities))
+    return sorted(found, key=lambda cycle: cycle.amplitude)
+
+
+def _bisected(own: EquivalentLoop, low: Swing, high: Swing, measure: Measure) -> Swing | None:
+    """The vibration of growth 0 between two; None where growth jumps over it."""
+    from scipy.optimize import brentq
+
+    known = [low, high]
+
+    def grown(logarithm: float) -> Swing | None:
+        size = float(np.exp(logarithm))
+        below = max((swing for swing in known if measure(swing) <= size), key=measure, default=low)
+        above = min((swing for swing in known if measure(swing) > size), key=measure, default=high)
+        found = _faster(own.swing(size, below, measure), own.swing(size, above, measure))
+        known.extend([found] if found else [])
+        return found
+
+    def growth(logarithm: float) -> float:
+        found = grown(logarithm)
+        return float(np.log(abs(found.root))) if found else -1.0
+
+    ends = np.log([measure(low), measure(high)])
+    if growth(ends[0]) * growth(ends[1]) > 0.0:
+        return None
+    where = brentq(growth, *ends, xtol=1e-13, rtol=1e-13)
+    found = grown(where)
+    return found if found is not None and abs(abs(found.root) - 1.0) < ON_CIRCLE else None
+
+
+def _folded(own: EquivalentLoop, start: Swing) -> Swing | None:
+    """The limit cycle below a vibration that grows, where dry friction lets no smaller amplitude at the sensor be.
+
+    The more a vibration shrinks the more friction holds it, until less velocity goes with more amplitude; there
+    the velocity says how large it is.
+    """
+    high = start
+    for _ in range(FOLDED):
+        low = own.swing(velocity_of(high) * 0.8, high, velocity_of)
+        if low is None:
+            return None
+        if abs(low.root) <= 1.0:
+            return _bisected(own, low, high, velocity_of)
+        high = low
+    return None

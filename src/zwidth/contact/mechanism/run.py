@@ -1,0 +1,222 @@
+"""The loop over the samples of one motion, compiled."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.contact.mechanism.acceleration import configure
+from zwidth.contact.mechanism.computer import Desk, command, desk_of, estimate, look
+from zwidth.contact.mechanism.law import Law
+from zwidth.contact.mechanism.stepping import linearise, prepare, step, turned
+from zwidth.contact.mechanism.surfaces import penetration
+from zwidth.contact.mechanism.system import Memory, System, memory_of
+from zwidth.model.arrays import Arrays
+from zwidth.model.closure import equations, orientation, passive_rates
+from zwidth.model.mechanism import Floats
+from zwidth.model.tree import Work, place, point
+
+DONE: Final = 0
+SINGULAR: Final = 1
+LOOP_LOST: Final = 2
+DIVERGED: Final = 3
+NEAR_SINGULAR: Final = (
+    1e-3  # reciprocal condition of the loops below which the drives hardly hold the other joints
+)
+
+
+class Trace(NamedTuple):
+    """What is kept of each sample, k of them.
+
+    state (k, N);   position, seen, force (k, 3);   torque (k, d) at the joints;   depth (k,)
+    energy (k, 3)  kinetic, elastic, gravitational [J];   work (k, 3)  by the hand, by the motors, against friction
+    """
+
+    state: Floats
+    position: Floats
+    seen: Floats
+    force: Floats
+    torque: Floats
+    depth: Floats
+    energy: Floats
+    work: Floats
+
+
+@compiled
+def run(
+    system: System,
+    law: Law,
+    start: Floats,
+    angles: Floats,
+    push: Floats,
+    noise: Floats,
+    period: float,
+    fraction: float,
+    substeps: int,
+    trace: Trace,
+) -> tuple[int, int]:
+    """Fill the trace sample by sample; the status, and how many samples were reached.
+
+    start (N,) first state, angles (links,) near its posture;   push (1 or samples, 3) at the handle
+    noise (0 or samples + 1, d) of the encoders;   fraction  of the delay that is no whole sample
+    """
+    memory, desk = memory_of(system), desk_of(system.mech, law)
+    d, samples = system.mech.driven, trace.depth.size - 1
+    x, trial, hand = start.copy(), np.zeros(start.size), np.zeros(3)
+    friction, resting, work = np.zeros(d), np.zeros(d), np.zeros(3)
+    lengths = np.array([fraction * period, (1.0 - fraction) * period])
+    counts = np.array([0, substeps])
+    if fraction > 0.0:
+        counts[0] = max(1, int(np.ceil(fraction * substeps)))
+        counts[1] = max(1, int(np.ceil((1.0 - fraction) * substeps)))
+    for i in range(angles.size):
+        memory.angles[i], desk.angles[i] = angles[i], angles[i]
+    ready(system.mech, memory.angles, memory.work)
+    ready(system.mech, desk.angles, desk.work)
+    for j in range(samples + 1):
+        status = judge(system, memory, x, configure(system, memory, x))
+        if status != DONE:
+            return status, j
+        observe(system, memory, law, x, hand, work, trace, j)
+        if not look(system, law, desk, x, noise, j):
+            return LOOP_LOST, j
+        estimate(law, desk, j)
+        command(law, desk)
+        note(desk, trace, j)
+        if j == samples:
+            break
+        if j == 0 or turned(memory, x):
+            linearise(system, memory, x)
+            for part in range(2):
+                if counts[part] > 0:
+                    prepare(system, memory, lengths[part] / counts[part], part)
+        row = j if push.shape[0] > 1 else 0
+        for k in range(3):
+            hand[k] = push[row, k]
+        configured = True
+        for part in range(2):
+            if counts[part] == 0:
+                continue
+            hold(system, memory, desk.torque, law.whole + 1 - part)
+            work[1] -= exchanged(system, memory, x)
+            for _ in range(counts[part]):
+                if not configured and configure(system, memory, x) < 0.0:
+                    return LOOP_LOST, j + 1
+                lost = step(system, memory, x, lengths[part] / counts[part], part, hand, trial, friction, resting)
+                if not np.isfinite(lost):
+                    return LOOP_LOST, j + 1
+                work[2] += lost
+                configured = False
+            work[1] += exchanged(system, memory, x)
+    return DONE, samples + 1
+
+
+@compiled_lean
+def ready(mech: Arrays, angles: Floats, work: Work) -> None:
+    """The passive joints' rates at the first posture, from which Newton starts, and its side of singularities."""
+    place(mech, 0, angles, work)
+    equations(mech, 0, work.goal, work)
+    passive_rates(mech, work)
+    _remember(work)
+
+
+@compiled_lean
+def _remember(work: Work) -> None:
+    start, rows = work.start, work.rows
+    for u in range(rows.shape[0]):
+        for r in range(rows.shape[1]):
+            start[u, r] = rows[u, r]
+
+
+@compiled_lean
+def judge(system: System, memory: Memory, x: Floats, condition: float) -> int:
+    """Is the state a posture to go on from? Its loops are compared with those one sample before."""
+    work, mech = memory.work, system.mech
+    for i in range(x.size):
+        if not np.isfinite(x[i]):
+            return DIVERGED
+    if condition < 0.0:
+        return LOOP_LOST
+    if condition < NEAR_SINGULAR:
+        return SINGULAR
+    passive, loops = mech.joint.size - mech.driven, 3 * mech.a.size
+    # in its own memory: the factors of the closures stand in `work` until the accelerations are known
+    if passive > 0 and not orientation(work.start, work.rows, memory.square, passive, loops) > 0.0:
+        return SINGULAR
+    _remember(work)
+    return DONE
+
+
+@compiled_lean
+def observe(
+    system: System, memory: Memory, law: Law, x: Floats, hand: Floats, work: Floats, trace: Trace, j: int
+) -> None:
+    """Note a configured state, its energy and what the hand has done since the sample before."""
+    mech, links, M = system.mech, memory.work, memory.mass
+    motor, rotor, spring = system.motor, system.rotor, system.spring
+    state, position, energy, done = trace.state, trace.position, trace.energy, trace.work
+    d, n = mech.driven, system.damping.shape[0]
+    for i in range(x.size):
+        state[j, i] = x[i]
+    h = point(links.rotation, links.origin, mech.handle_link, mech.handle, 0, 0)
+    for k in range(3):
+        position[j, k] = h[k]
+        if j > 0:
+            work[0] += hand[k] * (h[k] - position[j - 1, k])
+    trace.depth[j] = penetration(law.surface, h[0], h[1], h[2])[0]
+    kinetic, elastic, height = 0.0, 0.0, 0.0
+    for i in range(d):
+        kinetic += 0.5 * rotor[i] * x[n + motor[i]] ** 2
+        for k in range(d):
+            kinetic += 0.5 * x[n + i] * M[0, i, k] * x[n + k]
+        if motor[i] != i:
+            bent = x[motor[i]] - x[i]
+            elastic += 0.5 * spring[i] * bent**2 + 0.25 * system.cubic[i] * bent**4
+            if bent < 0.0:
+                elastic += 0.5 * system.excess[i] * bent**2
+    for i in range(mech.parent.size):
+        c = point(links.rotation, links.origin, i, mech.center_of_mass, 0, i)
+        for k in range(3):
+            height -= mech.mass[0, i] * system.gravity[k] * c[k]
+    energy[j, 0], energy[j, 1], energy[j, 2] = kinetic, elastic, height
+    for k in range(3):
+        done[j, k] = work[k]
+
+
+@compiled_lean
+def note(desk: Desk, trace: Trace, j: int) -> None:
+    """What the computer sees and commands."""
+    seen, force, torque = trace.seen, trace.force, trace.torque
+    for k in range(3):
+        seen[j, k] = desk.seen[k]
+        force[j, k] = desk.force[k]
+    for i in range(torque.shape[1]):
+        torque[j, i] = desk.torque[0, i]
+
+
+@compiled_lean
+def hold(system: System, memory: Memory, torque: Floats, late: int) -> None:
+    """Let the motors take the command of `late` - whole samples ago: at once, or through their lag."""
+    held, follow, motor, lagging = memory.hold, memory.command, system.motor, system.lag_command
+    for i in range(held.size):
+        held[i] = 0.0
+    straight = True
+    for k in range(lagging.size):
+        follow[k] = 0.0
+        if lagging[k] >= 0:
+            follow[k] = torque[late, lagging[k]]
+            straight = False
+    if straight:
+        for i in range(motor.size):
+            held[motor[i]] = torque[late, i]
+
+
+@compiled_lean
+def exchanged(system: System, memory: Memory, x: Floats) -> float:
+    """Held torques times the motors' angles: its change is the work that the motors do."""
+    held, motor, total = memory.hold, system.motor, 0.0
+    for i in range(motor.size):
+        total += held[motor[i]] * x[motor[i]]
+    return total

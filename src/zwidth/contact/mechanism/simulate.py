@@ -1,0 +1,233 @@
+"""The motion of a whole mechanism held by a computer at a surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from zwidth.contact.mechanism import run as kernel
+from zwidth.contact.mechanism.checks import MotionError, check_choice, check_wall, motion_inputs, start_rates
+from zwidth.contact.mechanism.law import law_of
+from zwidth.contact.mechanism.reach import check_reach
+from zwidth.contact.mechanism.surfaces import Surface, packed
+from zwidth.contact.mechanism.system import System, system_of
+from zwidth.loop.controller import Controller
+from zwidth.model.arrays import design_shape, pack
+from zwidth.model.damping import Damping
+from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.posture import Posture, solve_posture
+from zwidth.model.reduction import reduce_mechanism
+
+REASONS = {
+    kernel.DONE: ("done", ""),
+    kernel.SINGULAR: ("singular", "the drives no longer hold the other joints: it is a singularity"),
+    kernel.LOOP_LOST: (
+        "loop lost",
+        "the loops no longer close: a singularity is passed, or the steps are too long",
+    ),
+    kernel.DIVERGED: ("diverged", "the motion has grown beyond all numbers"),
+}
+
+
+@dataclass(frozen=True)
+class SurfaceWall:
+    """What the computer renders at a surface: f = (K depth + B depth') normal.
+
+    stiffness K [N/m];   damping B [N s/m], of either sign
+    no_pull   True: the wall never pulls the handle in
+    """
+
+    stiffness: float
+    damping: float = 0.0
+    no_pull: bool = False
+
+
+@dataclass(frozen=True)
+class MechanismMotion:
+    """A motion sampled by the computer, k samples from the start on.
+
+    time             (k,) [s]
+    position         (k, 3)  where the handle is [m]
+    counted_position (k, 3)  where the computer sees it, the kinematics of the counted angles [m]
+    depth            (k,)    how deep it truly is in the wall, negative outside; -inf without a surface [m]
+    joints, motors   (k, d)  driven joints' angles, and the motors' at the joint [rad]
+    joint_rates, motor_rates (k, d)  [rad/s]
+    force            (k, 3)  on the handle, as commanded [N]
+    torque           (k, d)  as commanded, at the joint [N m]
+    kinetic, elastic, gravitational (k,)  energies [J]; the last against the base frame's origin
+    hand_work, motor_work, friction_loss (k,)  since the start [J]; motor_work is nan with a lagging actuator
+    status           "done", or why the motion stops: "singular", "loop lost", "diverged"; reason in words
+    started_inside   was the handle inside the wall at the start?
+    """
+
+    time: Floats
+    position: Floats
+    counted_position: Floats
+    depth: Floats
+    joints: Floats
+    motors: Floats
+    joint_rates: Floats
+    motor_rates: Floats
+    force: Floats
+    torque: Floats
+    kinetic: Floats
+    elastic: Floats
+    gravitational: Floats
+    hand_work: Floats
+    motor_work: Floats
+    friction_loss: Floats
+    status: str
+    reason: str
+    started_inside: bool
+
+
+def simulate_mechanism(
+    mechanism: Mechanism,
+    damping: Damping,
+    controller: Controller,
+    wall: SurfaceWall | None = None,
+    surface: Surface | None = None,
+    *,
+    at: ArrayLike | None = None,
+    assembly: str | None = None,
+    duration: float,
+    start_velocity: ArrayLike | None = None,
+    push: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    substeps: int = 4,
+    counted: bool = True,
+    encoders: Literal["motor", "link"] = "motor",
+    torque_limits: Literal["each", "together"] = "each",
+    seed: int = 0,
+) -> MechanismMotion:
+    """How a mechanism moves on its flexible drives, with all that large motions bring, at a surface of any shape.
+
+    In each period the computer reads the encoders, places the handle by the kinematics of the counted angles,
+    estimates its velocity, and sends to the motors the torques J^T f of the wall's force. Between samples the
+    links' inertia, velocity forces and gravity act in full; the loops are closed exactly at every evaluation.
+
+    damping         the mechanism's; its matrix is that of the linear full model at the start, kept in the
+                    coordinates of joints and motors
+    wall, surface   both or neither; neither: the motors stay without current
+    at              (2,) or (3,)  handle at the start [m]; None: the reference position. No drive is bent there
+    duration        [s]
+    start_velocity  (2,) or (3,)  of the handle [m/s]; joints and motors move with it
+    push            (3,) force at the handle [N], or (samples, 3), each held for one period
+    gravity         (3,) [m/s^2]; None: none
+    substeps        steps per sampling period; each is of fourth order
+    counted         False: the encoders are read as finely as you like
+    torque_limits   "each": every motor's torque is cut at its own limit; "together": all are scaled alike, so that
+                    the force keeps its direction
+    seed            of the encoders' noise
+    Returns  MechanismMotion; a motion that meets a singularity ends there, and says so
+    Raises   SurfaceOutOfReach  (a ValueError) for a surface that the handle never touches in this assembly
+             MotionError  (a ValueError) for inputs that cannot be meant
+             PostureError (a ValueError) where the handle cannot be at the start
+             TooLarge     (a ValueError) for more samples than the machine has memory for
+
+    >>> import zwidth
+    >>> from zwidth.contact.mechanism.surfaces import Sphere
+    >>> devices = (zwidth.load(name) for name, *_ in zwidth.bundled())
+    >>> device = next(device for device in devices if device.mechanism)
+    >>> hollow = Sphere(device.reference_position, radius=0.01, hollow=True)
+    >>> scene = (device.mechanism, device.damping, device.controller, SurfaceWall(500.0, 2.0), hollow)
+    >>> simulate_mechanism(*scene, duration=0.1, start_velocity=device.direction()).status
+    'done'
+    """
+    if design_shape(mechanism):
+        raise MotionError(f"one design is simulated at a time, got a set of shape {design_shape(mechanism)}")
+    check_choice("encoders", encoders, ("motor", "link"))
+    check_choice("torque_limits", torque_limits, ("each", "together"))
+    if (wall is None) != (surface is None):
+        raise MotionError("a wall needs a surface and a surface a wall; give both, or neither for a free device")
+    if wall is not None and surface is not None:
+        check_wall(wall.stiffness, wall.damping, surface)
+    position = mechanism.reference_position if at is None else at
+    posture = solve_posture(mechanism, position, assembly)
+    period = controller.sampling_period
+    inputs = motion_inputs(mechanism, controller, duration, push, gravity, substeps, len(posture.jacobian[0]))
+    rates = start_rates(posture, start_velocity)
+    shape, mech = packed(surface), pack(mechanism)
+    if surface is not None:
+        check_reach(mechanism, mech, posture, surface)
+    # any direction that the handle can move along will do: matrices and drives are the same for all
+    along = np.linalg.svd(posture.jacobian)[0][:, 0]
+    plant = reduce_mechanism(mechanism, posture, along, "full", damping, encoders)
+    system = system_of(mech, mechanism.drives, plant, inputs.gravity, controller.actuator_time_constant)
+    start = _start(mechanism, posture, system, rates)
+    trace = _room(inputs.samples + 1, len(start), len(system.motor))
+    gains = (0.0, 0.0, False) if wall is None else (float(wall.stiffness), float(wall.damping), wall.no_pull)
+    read = system.motor if encoders == "motor" else np.arange(len(system.motor))
+    law = law_of(mechanism.drives, controller, shape, gains, read, counted, torque_limits == "together")
+    noise = _noise(mechanism, inputs.samples + 1, seed, counted)
+    status, reached = kernel.run(
+        system, law, start, posture.angles.copy(), inputs.push, noise, period, controller.fractional_delay,
+        substeps, trace,
+    )  # fmt: skip
+    return _motion(system, trace, status, reached, period)
+
+
+def _start(mechanism: Mechanism, posture: Posture, system: System, rates: Floats) -> Floats:
+    """The first state: joints and motors together, no drive bent."""
+    d, n = len(system.motor), len(system.damping)
+    start = np.zeros(2 * n + len(system.lag_time))
+    start[:d], start[n : n + d] = posture.angles[mechanism.drives.joint], rates
+    start[system.motor], start[n + system.motor] = start[:d], rates
+    return start
+
+
+def _room(samples: int, states: int, drives: int) -> kernel.Trace:
+    k = samples
+    return kernel.Trace(
+        state=np.empty((k, states)),
+        position=np.empty((k, 3)),
+        seen=np.empty((k, 3)),
+        force=np.empty((k, 3)),
+        torque=np.empty((k, drives)),
+        depth=np.empty(k),
+        energy=np.empty((k, 3)),
+        work=np.empty((k, 3)),
+    )
+
+
+def _noise(mechanism: Mechanism, samples: int, seed: int, counted: bool) -> Floats:
+    """Noise of the encoders at the joints, (samples, d), or (0, d) where there is none."""
+    drives = mechanism.drives
+    parts = drives.nonlinearity
+    if not counted or parts is None or not np.any(parts.encoder_noise > 0.0):
+        return np.zeros((0, len(drives.names)))
+    spread = parts.encoder_noise / drives.transmission
+    return np.random.default_rng(seed).normal(size=(samples, len(spread))) * spread
+
+
+def _motion(system: System, trace: kernel.Trace, status: int, reached: int, period: float) -> MechanismMotion:
+    d, n, motor = len(system.motor), len(system.damping), system.motor
+    state, energy, work = trace.state[:reached], trace.energy[:reached], trace.work[:reached]
+    name, reason = REASONS[status]
+    if reason:
+        reason = f"after {max(reached - 1, 0) * period:.6g} s {reason}"
+    lagging = np.any(system.lag_command >= 0)
+    return MechanismMotion(
+        time=np.arange(reached, dtype=np.float64) * period,
+        position=trace.position[:reached],
+        counted_position=trace.seen[:reached],
+        depth=trace.depth[:reached],
+        joints=state[:, :d].copy(),
+        motors=state[:, motor].copy(),
+        joint_rates=state[:, n : n + d].copy(),
+        motor_rates=state[:, n + motor].copy(),
+        force=trace.force[:reached],
+        torque=trace.torque[:reached],
+        kinetic=energy[:, 0],
+        elastic=energy[:, 1],
+        gravitational=energy[:, 2],
+        hand_work=work[:, 0],
+        motor_work=np.full(reached, np.nan) if lagging else work[:, 1],
+        friction_loss=work[:, 2],
+        status=name,
+        reason=reason,
+        started_inside=bool(reached and trace.depth[0] > 0.0),
+    )

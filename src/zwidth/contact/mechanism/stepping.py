@@ -1,0 +1,347 @@
+"""One substep: the drives' linear part exactly, what changes with the posture to fourth order.
+
+About a state x_0 with x' = F there, the motion y = x - x_0 follows y' = F + A y + R(y), with A the drives' and
+dampers' linear part and R what is left: the posture's change of M and J, the velocity forces. In the frame that
+turns with A, the classical Runge-Kutta method steps R alone (Lawson 1967, at second hand); R(0) = 0:
+
+    y_2 = G F                  y_3 = G F + h/2 R(y_2)            E = exp(A h/2),  G = its integral
+    y_4 = (G + E G) F + h E R(y_3)
+    y   = (G + E G) F + h/6 (2 E (R(y_2) + R(y_3)) + R(y_4))
+
+So the stiffness of the drives sets no limit to the step, constant forces are integrated exactly, and a mechanism
+that does not move far is stepped as exactly as a linear plant. The order is four whatever A is; A is taken anew
+when the joints have turned.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.contact.friction import bristle_force, coulomb_force
+from zwidth.contact.mechanism.acceleration import accelerate, configure, solve
+from zwidth.contact.mechanism.system import BRISTLES, DRY, Memory, System
+from zwidth.model.mechanism import Floats
+
+TERMS: Final = 12  # of the exponential's series, for arguments up to SMALL
+SMALL: Final = 0.25
+TURNED: Final = 0.03  # turn of a joint after which A is taken anew [rad]
+AT_REST: Final = 1e-12  # share of a substep's change of velocity that is rounding
+SWEEPS: Final = 20  # of the drives' frictions against each other
+
+
+@compiled_lean
+def turned(memory: Memory, x: Floats) -> bool:
+    """Have the joints turned so far since A was taken that it is worth taking anew?"""
+    base = memory.base
+    most = 0.0
+    for i in range(base.size):
+        most = max(most, abs(x[i] - base[i]))
+    return most > TURNED
+
+
+@compiled_lean
+def linearise(system: System, memory: Memory, x: Floats) -> None:
+    """Fill A at a configured state."""
+    A, rest, base = memory.linear, memory.rest, memory.base
+    motor, spring, B, along = system.motor, system.spring, system.damping, system.lag_along
+    n, lags = B.shape[0], system.lag_time.size
+    for i in range(A.shape[0]):
+        for j in range(A.shape[0]):
+            A[i, j] = 0.0
+    for i in range(base.size):
+        base[i] = x[i]
+    for i in range(n):
+        A[i, n + i] = 1.0
+    for j in range(A.shape[0]):
+        for i in range(n):
+            rest[i] = 0.0
+            if n <= j < 2 * n:
+                rest[i] = -B[i, j - n]
+            elif j >= 2 * n:
+                rest[i] = along[j - 2 * n, i]
+        if j < n:
+            for i in range(motor.size):
+                if motor[i] != i and (j == i or j == motor[i]):
+                    torque = spring[i] if j == motor[i] else -spring[i]
+                    rest[i] += torque
+                    rest[motor[i]] -= torque
+        solve(system, memory, rest, 0)
+        for i in range(n):
+            A[n + i, j] = rest[i]
+    for k in range(lags):
+        A[2 * n + k, 2 * n + k] = -1.0 / system.lag_time[k]
+        for i in range(n):
+            A[2 * n + k, n + i] = -system.lag_damping[k] * along[k, i] / system.lag_time[k]
+
+
+@compiled_lean
+def multiply(a: Floats, b: Floats, out: Floats) -> None:
+    """out = a b"""
+    N = a.shape[0]
+    for i in range(N):
+        for j in range(N):
+            out[i, j] = 0.0
+        for k in range(N):
+            value = a[i, k]
+            if value != 0.0:
+                for j in range(N):
+                    out[i, j] += value * b[k, j]
+
+
+@compiled
+def exponential(memory: Memory, n: int, h: float, part: int) -> None:
+    """Fill `half` and `gain` of one part: exp(A h/2) and its integral, by the series and doubling.
+
+    Velocities are measured in units that balance A, which changes no term of the series; so the size of h A is
+    that of the frequencies, and not of their squares.
+    """
+    A, E, G = memory.linear, memory.half[part], memory.gain[part]
+    step, series, product = memory.scratch[0], memory.scratch[1], memory.scratch[2]
+    N = A.shape[0]
+    stiff, fast = 0.0, 0.0
+    for i in range(n, N):
+        to_places, to_rates = 0.0, 0.0
+        for j in range(N):
+            if j < n:
+                to_places += abs(A[i, j])
+            elif i < 2 * n or j >= 2 * n:
+                to_rates += abs(A[i, j]) if (j < 2 * n or i >= 2 * n) else 0.0
+        stiff, fast = max(stiff, to_places), max(fast, to_rates)
+    # a lagged torque and the rate it works on couple as a spring of strength c/tau does
+    for k in range(2 * n, N):
+        for i in range(n, 2 * n):
+            stiff = max(stiff, abs(A[i, k] * A[k, i]))
+    size = (np.sqrt(stiff) + fast) * 0.5 * h
+    doublings = 0
+    while size > SMALL and doublings < 60:
+        size *= 0.5
+        doublings += 1
+    tau = 0.5 * h / 2.0**doublings
+    for i in range(N):
+        for j in range(N):
+            step[i, j] = tau * A[i, j]
+            series[i, j] = 0.0
+        series[i, i] = 1.0
+    for term in range(TERMS, 0, -1):  # 1 + X/2 (1 + X/3 (1 + ...)) is the mean of exp over the interval
+        multiply(step, series, product)
+        for i in range(N):
+            for j in range(N):
+                series[i, j] = product[i, j] / (term + 1.0)
+            series[i, i] += 1.0
+    multiply(step, series, E)
+    for i in range(N):
+        E[i, i] += 1.0
+        for j in range(N):
+            G[i, j] = tau * series[i, j]
+    for _ in range(doublings):
+        multiply(E, G, product)
+        for i in range(N):
+            for j in range(N):
+                G[i, j] += product[i, j]
+                series[i, j] = E[i, j]
+        multiply(series, series, E)
+
+
+@compiled
+def prepare(system: System, memory: Memory, h: float, part: int) -> None:
+    """All that a substep of length h of one part of the sample needs, about the base just taken."""
+    n, motor, mobility = system.damping.shape[0], system.motor, memory.mobility
+    if h <= 0.0:
+        return
+    exponential(memory, n, h, part)
+    E, G, rest, stages = memory.half[part], memory.gain[part], memory.rest, memory.stages
+    N = E.shape[0]
+    for j in range(motor.size):
+        for i in range(n):
+            rest[i] = 1.0 if i == motor[j] else 0.0
+        solve(system, memory, rest, 0)
+        for i in range(N):
+            stages[0, i] = 0.0
+            for k in range(n):
+                stages[0, i] += G[i, n + k] * rest[k]
+        for i in range(motor.size):
+            total = stages[0, n + motor[i]]
+            for k in range(N):
+                total += E[n + motor[i], k] * stages[0, k]
+            mobility[part, i, j] = total
+
+
+@compiled_lean
+def carry(matrix: Floats, stages: Floats, source: int, target: int) -> None:
+    """stages[target] = matrix stages[source]"""
+    for i in range(matrix.shape[0]):
+        total = 0.0
+        for j in range(matrix.shape[0]):
+            total += matrix[i, j] * stages[source, j]
+        stages[target, i] = total
+
+
+@compiled_lean
+def remainder(
+    system: System, memory: Memory, x: Floats, at: int, out: int, hand: Floats, rate: int, trial: Floats
+) -> bool:
+    """stages[out] = R(y) at y = stages[at]; False where the loops do not close there.
+
+    stages[rate] is F, and `trial` (N,) room for x + y.
+    """
+    stages, A, found = memory.stages, memory.linear, memory.rate
+    N, n = x.size, system.damping.shape[0]
+    for i in range(N):
+        trial[i] = x[i] + stages[at, i]
+    if configure(system, memory, trial) < 0.0:
+        return False
+    accelerate(system, memory, trial, hand)
+    for i in range(N):
+        stages[out, i] = 0.0
+    for i in range(n, 2 * n):
+        total = found[i] - stages[rate, i]
+        for j in range(N):
+            total -= A[i, j] * stages[at, j]
+        stages[out, i] = total
+    return True
+
+
+@compiled_lean
+def without_its_own(system: System, memory: Memory, x: Floats, part: int, i: int, friction: Floats) -> float:
+    """Velocity of motor i at the end of the substep under all frictions but its own."""
+    motor, stages = system.motor, memory.stages
+    at = system.damping.shape[0] + motor[i]
+    velocity = x[at] + stages[1, at]
+    for j in range(motor.size):
+        if j != i:
+            velocity += memory.mobility[part, i, j] * friction[j]
+    return float(velocity)
+
+
+@compiled_lean
+def law_of_bristles(system: System, i: int) -> tuple[float, float, float, float, float]:
+    """C, F_s, v_s, sigma_0 and sigma_1 of motor i."""
+    numbers = system.friction
+    return numbers[i, 0], numbers[i, 1], numbers[i, 2], numbers[i, 3], numbers[i, 4]
+
+
+@compiled
+def resist(
+    system: System, memory: Memory, x: Floats, part: int, h: float, resting: Floats, friction: Floats
+) -> None:
+    """The drives' frictions (d,) held over the substep, from the motors' velocities without them at its end.
+
+    stages[0] is F without friction, stages[1] the linear motion that follows. The drives move each other, so their
+    frictions are found in turn until they stay. resting (d,): 1 where a motor ends the substep at rest.
+    """
+    mobility, motor, bristles = memory.mobility, system.motor, memory.bristles
+    model, numbers = system.friction_model, system.friction
+    n, d = system.damping.shape[0], motor.size
+    for i in range(d):
+        friction[i] = 0.0
+        resting[i] = 0.0
+    for _ in range(SWEEPS):
+        change, most = 0.0, 0.0
+        for i in range(d):
+            if model[i] == 0:
+                continue
+            v0, w = x[n + motor[i]], without_its_own(system, memory, x, part, i, friction)
+            before, m = friction[i], mobility[part, i, i]
+            if model[i] == DRY:
+                friction[i] = coulomb_force(numbers[i, 0], v0, w, m)
+                resting[i] = 1.0 if abs(w + m * friction[i]) <= AT_REST * (abs(w) + abs(v0)) else 0.0
+            else:
+                friction[i], _after = bristle_force(bristles[i], law_of_bristles(system, i), v0, w, m, h)
+            change, most = max(change, abs(friction[i] - before)), max(most, abs(friction[i]))
+        if change <= 1e-14 * most:
+            break
+    for i in range(d):
+        if model[i] == BRISTLES:
+            v0, w = x[n + motor[i]], without_its_own(system, memory, x, part, i, friction)
+            law, m = law_of_bristles(system, i), mobility[part, i, i]
+            _force, bristles[i] = bristle_force(bristles[i], law, v0, w, m, h)
+
+
+@compiled
+def rub(system: System, memory: Memory, x: Floats, part: int, h: float, resting: Floats, friction: Floats) -> None:
+    """Find the frictions, let them act over the substep, and add what they do to F in stages[0]."""
+    stages, E, G, rest = memory.stages, memory.half[part], memory.gain[part], memory.rest
+    motor, n = system.motor, system.damping.shape[0]
+    carry(G, stages, 0, 2)
+    carry(E, stages, 2, 1)
+    for i in range(x.size):
+        stages[1, i] += stages[2, i]
+    resist(system, memory, x, part, h, resting, friction)
+    for i in range(n):
+        rest[i] = 0.0
+    for i in range(motor.size):
+        rest[motor[i]] = friction[i]
+        memory.hold[motor[i]] += friction[i]
+    solve(system, memory, rest, 0)
+    for i in range(n):
+        stages[0, n + i] += rest[i]
+
+
+@compiled_lean
+def release(system: System, memory: Memory, x: Floats, trial: Floats, resting: Floats, friction: Floats) -> float:
+    """End the substep from x to `trial`: motors that rest do so exactly. The work against friction [J]."""
+    motor, n, work = system.motor, system.damping.shape[0], 0.0
+    for i in range(motor.size):
+        at = motor[i]
+        memory.hold[at] -= friction[i]
+        if resting[i] == 1.0:
+            trial[n + at] = 0.0
+            if x[n + at] == 0.0:
+                trial[at] = x[at]
+        work -= friction[i] * (trial[at] - x[at])
+    return work
+
+
+@compiled
+def step(
+    system: System,
+    memory: Memory,
+    x: Floats,
+    h: float,
+    part: int,
+    hand: Floats,
+    trial: Floats,
+    friction: Floats,
+    resting: Floats,
+) -> float:
+    """One substep of length h, x (N,) in place, from a configured state; the work done against friction [J], nan
+    where the loops do not close.
+
+    hand  (3,) force at the handle over the substep [N];   `memory.hold` holds the motors' torques
+    """
+    stages, E, G = memory.stages, memory.half[part], memory.gain[part]
+    rate, N = memory.rate, x.size
+    accelerate(system, memory, x, hand)
+    for i in range(N):
+        stages[0, i] = rate[i]
+    rough = False
+    for i in range(system.friction_model.size):
+        rough = rough or system.friction_model[i] != 0
+    if rough:
+        rub(system, memory, x, part, h, resting, friction)
+    carry(G, stages, 0, 1)  # y_2
+    carry(E, stages, 1, 2)
+    for i in range(N):
+        stages[2, i] += stages[1, i]  # (G + E G) F
+    for stage in range(3):
+        if not remainder(system, memory, x, 1, 3, hand, 0, trial):
+            return np.nan
+        if stage == 0:
+            for i in range(N):
+                stages[5, i] = stages[3, i]
+                stages[1, i] += 0.5 * h * stages[3, i]  # y_3
+        elif stage == 1:
+            carry(E, stages, 3, 4)
+            for i in range(N):
+                stages[5, i] += stages[3, i]
+                stages[1, i] = stages[2, i] + h * stages[4, i]  # y_4
+    carry(E, stages, 5, 4)
+    for i in range(N):
+        trial[i] = x[i] + stages[2, i] + h / 6.0 * (2.0 * stages[4, i] + stages[3, i])
+    work = release(system, memory, x, trial, resting, friction) if rough else 0.0
+    for i in range(N):
+        x[i] = trial[i]
+    return work

@@ -1,0 +1,175 @@
+"""A mechanism in one assembly as the equations of its motion, packed for the kernels.
+
+The state is x = [q; q'; s]: q = [phi; theta] with the driven joints' angles phi and, at the joint, those of the
+motors of flexible drives theta; s are the torques that follow with a lag.
+
+    M_phi(phi) phi'' + c(phi, phi') - B_q^T g = T(theta - phi) + J^T f - (B q')_phi + along^T s
+    n^2 I theta''                             = -T(theta - phi) + torque - (B q')_theta + along^T s
+    tau s' + s                                = command - c along . q'
+
+T is n^2 k d, with what a bent spring adds. A rigid drive has no theta: its rotor turns with its joint.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from zwidth.compiled import compiled
+from zwidth.model.arrays import Arrays
+from zwidth.model.bias import Flow, flow_of
+from zwidth.model.mechanism import Drives, Floats, Ints
+from zwidth.model.plant import Plant
+from zwidth.model.tree import Work, workspace
+
+DRY: Final = 1  # friction: Coulomb's
+BRISTLES: Final = 2  # friction: Dahl's or LuGre's
+
+
+class System(NamedTuple):
+    """What does not change during a motion; n coordinates, l lagged torques, N = 2 n + l states.
+
+    mech     the links
+    motor    (d,)    coordinate of each motor; i itself where drive i is rigid
+    rotor    (d,)    n^2 I [kg m^2];   spring (d,)  n^2 k [N m/rad], 0 where rigid
+    cubic, excess  (d,)  of a bent spring [N m/rad^3], [N m/rad]
+    damping  (n, n)  B [N m s/rad]
+    gravity  (3,)    [m/s^2]
+    lag_along (l, n), lag_damping (l,), lag_time (l,), lag_command (l,)  lagged torques; the motor whose command
+                     a lagged torque follows, -1 for a damper's
+    friction (d, 5)  C, F_s, v_s, sigma_0, sigma_1 at the joint;   friction_model (d,)  0, DRY or BRISTLES
+    """
+
+    mech: Arrays
+    motor: Ints
+    rotor: Floats
+    spring: Floats
+    cubic: Floats
+    excess: Floats
+    damping: Floats
+    gravity: Floats
+    lag_along: Floats
+    lag_damping: Floats
+    lag_time: Floats
+    lag_command: Ints
+    friction: Floats
+    friction_model: Ints
+
+
+class Memory(NamedTuple):
+    """What the kernels work in.
+
+    work, flow        of the links;   angles (links,)  their present joint angles
+    mass (1, d, d), jacobian (1, 3, d), bias (d,), factor (d, d)  at the present place; factor: Cholesky's of M
+    speeds            (d,)     the driven joints' rates
+    hold              (n,)     generalised forces held over a substep: motors and friction
+    command           (l,)     what the lagged torques follow
+    rest, rate        (n,), (N,)  right-hand side; x' at the present place
+    half, gain        (2, N, N)  exp(A h/2) and its integral, for both parts of a sample
+    mobility          (2, d, d)  velocity of motor i per constant force on motor j, at the end of a substep
+    scratch           (3, N, N);   square (m, m), of the unknowns
+    linear            (N, N)   A: x' = A x about the base
+    base              (d,)     joint angles at which A was taken
+    stages            (6, N)   of a step
+    bristles          (d,)     deflections [rad]
+    """
+
+    work: Work
+    flow: Flow
+    angles: Floats
+    mass: Floats
+    jacobian: Floats
+    bias: Floats
+    factor: Floats
+    speeds: Floats
+    hold: Floats
+    command: Floats
+    rest: Floats
+    rate: Floats
+    half: Floats
+    gain: Floats
+    mobility: Floats
+    scratch: Floats
+    square: Floats
+    linear: Floats
+    base: Floats
+    stages: Floats
+    bristles: Floats
+
+
+def system_of(mech: Arrays, drives: Drives, plant: Plant, gravity: Floats, actuator_lag: float) -> System:
+    """The equations of one design.
+
+    plant  its full model at the start: damping and lagged dampers are taken from it and kept, in the coordinates
+           of joints and motors
+    """
+    d, n = len(drives.names), plant.size
+    n2 = drives.transmission**2
+    flexible = np.isfinite(drives.stiffness)
+    motor = np.arange(d)
+    motor[flexible] = np.arange(d, n)
+    along = [damper.along for damper in plant.lagged_dampers]
+    strength = [damper.damping for damper in plant.lagged_dampers]
+    lag = [damper.time_constant for damper in plant.lagged_dampers]
+    command = [-1] * len(along)
+    if actuator_lag > 0.0:
+        along += list(np.eye(n)[motor])
+        strength, lag, command = strength + [0.0] * d, lag + [actuator_lag] * d, command + list(range(d))
+    cubic, excess, friction, kind = np.zeros(d), np.zeros(d), np.zeros((d, 5)), np.zeros(d, np.int64)
+    for spring in plant.nonlinear.springs:
+        i = int(np.flatnonzero(spring.along[motor] > 0.0)[0])
+        cubic[i], excess[i] = spring.cubic, spring.backward_excess
+    for part in plant.nonlinear.friction:
+        i = int(np.flatnonzero(part.along[motor])[0])
+        bristles = part.bristles
+        if bristles is None:
+            kind[i], friction[i, 0] = DRY, part.coulomb
+        else:
+            kind[i], friction[i] = BRISTLES, bristles
+    return System(
+        mech=mech,
+        motor=motor.astype(np.int64),
+        rotor=n2 * drives.motor_inertia,
+        spring=np.where(flexible, n2 * np.where(flexible, drives.stiffness, 0.0), 0.0),
+        cubic=cubic,
+        excess=excess,
+        damping=np.ascontiguousarray(plant.damping),
+        gravity=gravity.copy(),
+        lag_along=np.array(along, dtype=np.float64).reshape(-1, n),
+        lag_damping=np.array(strength, dtype=np.float64),
+        lag_time=np.array(lag, dtype=np.float64),
+        lag_command=np.array(command, dtype=np.int64),
+        friction=friction,
+        friction_model=kind,
+    )
+
+
+@compiled
+def memory_of(system: System) -> Memory:
+    """Fresh memory for one thread."""
+    mech = system.mech
+    d, n, N = mech.driven, system.damping.shape[0], 2 * system.damping.shape[0] + system.lag_time.size
+    return Memory(
+        workspace(mech),
+        flow_of(mech),
+        np.zeros(mech.parent.size),
+        np.zeros((1, d, d)),
+        np.zeros((1, 3, d)),
+        np.zeros(d),
+        np.zeros((d, d)),
+        np.zeros(d),
+        np.zeros(n),
+        np.zeros(N - 2 * n),
+        np.zeros(n),
+        np.zeros(N),
+        np.zeros((2, N, N)),
+        np.zeros((2, N, N)),
+        np.zeros((2, d, d)),
+        np.zeros((3, N, N)),
+        np.zeros((mech.joint.size, mech.joint.size)),
+        np.zeros((N, N)),
+        np.zeros(d),
+        np.zeros((6, N)),
+        np.zeros(d),
+    )

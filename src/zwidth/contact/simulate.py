@@ -1,0 +1,219 @@
+"""What happens on contact: one loop, or many at once, against an environment, sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import ceil, inf, isfinite, isinf
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.conditions.dry import reading_noise, reading_step
+from zwidth.contact.assemble import Apparatus, computers, devices, motions_of
+from zwidth.contact.engine import run_batch
+from zwidth.contact.environments.environment import Environment
+from zwidth.contact.hand import PUSH_NUMBERS, REFLEX_NUMBERS, Hand
+from zwidth.contact.machine import ENTRIES, TRACES, Devices, Members, Records
+from zwidth.contact.passivity import PassivityController
+from zwidth.contact.response import Plan, TimeResponse
+from zwidth.contact.room import check_room
+from zwidth.loop.estimators import Foaw, Levant
+from zwidth.loop.loop import Loop
+
+Floats = NDArray[np.float64]
+
+SUBSTEPS = 20
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a batch; what differs from run to run.
+
+    loop            plant and computer; one object may serve many runs, and is then prepared once
+    values          of the environment, as `Environment.values` gives them
+    hand            who holds the handle and pushes
+    start_position  of the reading, the device undeformed [m];   start_velocity  the same [m/s]
+    start           (n,), (n,) coordinates and velocities of the plant (with the operator), instead of the two
+    wall_position   where the environment begins, on the axis of the reading [m]
+    seed            of the noise
+    passivity       a passivity controller; None: none
+    bound           distance of the reading from the wall at which the run is given up [m]
+    """
+
+    loop: Loop
+    values: Floats
+    hand: Hand = field(default_factory=Hand)
+    start_position: float = 0.0
+    start_velocity: float = 0.0
+    start: tuple[Floats, Floats] | None = None
+    wall_position: float = 0.0
+    seed: int = 0
+    passivity: PassivityController | None = None
+    bound: float = inf
+
+
+def simulate(
+    loop: Loop,
+    environment: Environment,
+    values: ArrayLike,
+    *,
+    duration: float,
+    substeps: int = SUBSTEPS,
+    trail: bool = True,
+    ledger: bool = True,
+    **circumstances: object,
+) -> TimeResponse:
+    """One run in full: what a device does on contact, sample by sample.
+
+    environment    what is touched;   values (P,) of its parameters, as `Environment.values` gives them
+    duration       [s]
+    substeps       between samples, for what is not linear; a linear plant is exact with any
+    trail          keep the handle's position after each substep
+    ledger         keep the energies
+    circumstances  hand, start_position [m], wall_position [m] and so on: see `Run`
+    Raises         as `simulate_batch`
+
+    >>> from zwidth.contact.environments import wall
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> loop = Loop(Plant(0.1 * one[:, None], *np.zeros((2, 1, 1)), one, one), Controller(0.001))
+    >>> values = wall.values(stiffness=1000.0, damping=2.0)
+    >>> response = simulate(loop, wall, values, duration=1.0, start_position=1e-3)
+    >>> [round(1e3 * x, 3) for x in response.reading[[0, 10, 20]].tolist()]
+    [1.0, 0.556, -0.308]
+    """
+    run = Run(loop, np.asarray(values, dtype=float), **circumstances)  # type: ignore[arg-type]
+    return simulate_batch([run], environment, duration=duration, substeps=substeps, trail=trail, ledger=ledger)[0]
+
+
+def simulate_batch(
+    runs: Sequence[Run],
+    environment: Environment,
+    *,
+    duration: float | Sequence[float],
+    substeps: int = SUBSTEPS,
+    trail: bool = False,
+    ledger: bool = False,
+) -> list[TimeResponse]:
+    """Many runs at once, spread over the cores; each comes out as if it were alone.
+
+    runs      of any loops, hands and starts;   environment  the one thing that all of them touch
+    duration  of all runs, or of each [s]
+    substeps  between samples, for what is not linear; a linear plant is exact with any
+    Returns   one response for each run, in their order
+    Raises    ValueError  for a duration or a number of substeps that cannot be meant, starts of a wrong shape
+              TooLarge    where the result would not fit into memory
+              HysteresisError, UnmovedError  for plants that cannot move in time, or not by the wall
+    """
+    lengths = np.broadcast_to(np.asarray(duration, dtype=float), (len(runs),))
+    _check(lengths, substeps)
+    rigs, index = _apparatus(runs)
+    period = np.array([rig.loop.period for rig in rigs])[index]
+    samples = np.array([1 + ceil(length / T * (1.0 - 1e-12)) for length, T in zip(lengths, period, strict=True)])
+    m, S = len(runs), int(samples.max())
+    if not trail and not ledger and not any(rig.elements for rig in rigs):
+        substeps = 1
+    fine = S * max(substeps, 2) if trail else 0
+    check_room(
+        m * float(S * (TRACES + (ENTRIES if ledger else 0)) + fine),
+        f"{m} run{'s' * (m > 1)} of {S} samples",
+        "simulate a shorter time, or fewer runs at once",
+    )
+    plants, own = devices(rigs, substeps), computers(rigs)
+    records = Records(
+        np.zeros(m, dtype=np.int64),
+        np.full((m, S, TRACES), np.nan),
+        np.full((m, fine), np.nan),
+        np.zeros((m, S if ledger else 0, ENTRIES)),
+    )
+    members = _members(runs, rigs, index, plants)
+    run_batch(plants, own, members, samples, environment.address, records)
+    return [
+        TimeResponse.of(_plan(run, rigs[index[i]], plants, index[i], int(samples[i]), environment), records, i)
+        for i, run in enumerate(runs)
+    ]
+
+
+def _plan(run: Run, rig: Apparatus, plants: Devices, d: int, samples: int, environment: Environment) -> Plan:
+    """What was asked for of one run."""
+    counters = rig.counters
+    plain = not rig.elements and run.passivity is None and isinf(rig.limit)
+    plain = plain and not isinstance(rig.loop.controller.velocity, Foaw | Levant)
+    exact = all(counter.step == 0.0 and counter.noise == 0.0 for counter in counters)
+    steady = run.hand.tremor is None and run.hand.reach is None
+    return Plan(
+        samples=samples,
+        offsets=_offsets(plants, d),
+        period=rig.loop.period,
+        wall_position=run.wall_position,
+        quantum=reading_step(rig.plant),
+        noise=reading_noise(rig.plant),
+        linear=plain and exact and steady and environment.linear,
+        surface=environment.surface,
+        held=bool(np.any(run.hand.push_numbers)) or run.hand.operator is not None,
+    )
+
+
+def _offsets(plants: Devices, d: int) -> Floats:
+    """Ends of the substeps after a sample [s]."""
+    (early, late), (first, second) = plants.substeps[d], plants.length[d]
+    return np.concatenate([first * np.arange(1, early + 1), early * first + second * np.arange(1, late + 1)])
+
+
+def _check(lengths: Floats, substeps: int) -> None:
+    for length in lengths:
+        if not (isfinite(length) and length > 0.0):
+            raise ValueError(f"duration must be positive and finite [s], got {float(length)!r}")
+    if not 1 <= substeps <= 100_000:
+        raise ValueError(f"substeps must be from 1 to 100000, got {substeps!r}")
+
+
+def _apparatus(runs: Sequence[Run]) -> tuple[list[Apparatus], NDArray[np.int64]]:
+    """One apparatus for runs with the same loop and arm, and which run has which."""
+    found: dict[tuple[object, ...], int] = {}
+    rigs: list[Apparatus] = []
+    index = []
+    for run in runs:
+        key = (id(run.loop), run.hand.operator, run.hand.reflex is not None)
+        if key not in found:
+            found[key] = len(rigs)
+            _ = run.loop.sections  # refuses plants that cannot be moved, or not in time
+            rigs.append(Apparatus(run.loop, run.hand))
+        index.append(found[key])
+    return rigs, np.array(index, dtype=np.int64)
+
+
+def _members(runs: Sequence[Run], rigs: list[Apparatus], index: NDArray[np.int64], plants: Devices) -> Members:
+    m, (R, N) = len(runs), plants.transition.shape[-2:]
+    start = np.zeros((m, R))
+    for i, run in enumerate(runs):
+        rig = rigs[index[i]]
+        n = rig.given.size
+        x, v = _start(rig, run)
+        start[i, :n], start[i, n : 2 * n] = rig.modal(x), rig.modal(v)
+        start[i, N:] = motions_of(plants, int(index[i]), N) @ start[i, :N]
+    watched = [np.array([np.nan]) if run.passivity is None else run.passivity.parameters for run in runs]
+    width = max(len(numbers) for numbers in watched)
+    return Members(
+        device=index,
+        start=start,
+        wall=np.array([run.wall_position for run in runs], dtype=float),
+        values=np.stack([run.values for run in runs]),
+        push=np.stack([run.hand.push_numbers for run in runs]).reshape(m, PUSH_NUMBERS),
+        reflex=np.stack([run.hand.reflex_numbers for run in runs]).reshape(m, REFLEX_NUMBERS),
+        observer=np.stack([np.pad(numbers, (0, width - len(numbers))) for numbers in watched]),
+        seed=np.array([run.seed for run in runs], dtype=np.uint64),
+        bound=np.array([run.bound for run in runs], dtype=float),
+    )
+
+
+def _start(rig: Apparatus, run: Run) -> tuple[Floats, Floats]:
+    n = rig.given.size
+    if run.start is None:
+        return run.start_position * rig.undeformed, run.start_velocity * rig.undeformed
+    x, v = (np.asarray(part, dtype=float) for part in run.start)
+    if x.shape != (n,) or v.shape != (n,):
+        raise ValueError(f"start must be two arrays of {n} numbers, got shapes {x.shape} and {v.shape}")
+    return x, v
