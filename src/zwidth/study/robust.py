@@ -27,6 +27,7 @@ from zwidth.chart.robust_members import Member, chart_member
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.device.faults import DeviceError
+from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.loop import Loop
 from zwidth.study.robust_family import Family, Point
 
@@ -102,8 +103,9 @@ def robust_study(
     unseen     random members asked afterwards (see `Violation`)
     seed       of everything random: equal seeds give equal answers
     tolerance  share of the area; a round of the search that moves the edge by less is the last
-    Raises     DeviceError  for ranges that cannot be meant
-               RobustError  if not one member can be built or charted
+    Raises     DeviceError     for ranges that cannot be meant
+               RobustError     if not one member can be built or charted
+               NonlinearError  for a velocity estimate that is not linear
 
     >>> from zwidth.device.load import from_document
     >>> from zwidth.study.robust_family import Family, Range
@@ -161,6 +163,8 @@ class _Members:
             self.points.append(point)
             try:
                 self.charted[index] = chart_member(index, self.family.loop(point))
+            except NonlinearError:  # of every member, whatever else varies
+                raise
             except (ValueError, ChartError, np.linalg.LinAlgError) as error:
                 self.failed[index] = str(error)
         self.progress(stage, len(points), len(points))

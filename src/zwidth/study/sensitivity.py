@@ -23,6 +23,7 @@ from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Path, dotted
 from zwidth.device.load import from_document
+from zwidth.device.parts import outside_linear
 from zwidth.device.schema import file as schema
 from zwidth.loop.loop import Loop
 from zwidth.study.optimum import Kind, Optimum, OptimumError, optimum
@@ -280,6 +281,8 @@ def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, Path, float]]:
 
 
 def _no_property(steps: Path) -> str:
+    if what := outside_linear(steps):
+        return f"{what}, which the chart leaves out: it is linear"
     return NO_PROPERTY.get(str(steps[1]), "") if steps[0] == "mechanism" and len(steps) > 1 else ""
 
 

@@ -1,0 +1,63 @@
+"""Where the exact edge of a chart lies beside a measured point."""
+
+from __future__ import annotations
+
+from math import nan
+
+import numpy as np
+
+from zwidth.chart.chart import StabilityChart
+from zwidth.chart.verdict import spectral_radius
+from zwidth.contact.experiment import Edge
+
+
+def exact_edge(chart: StabilityChart, stiffness: float, damping: float, edge: Edge | None = None) -> float:
+    """The damping of the chart's edge at this stiffness that lies nearest to this damping; for a tip, the
+    stiffness at this damping nearest to this stiffness. nan where the chart has no edge there.
+
+    edge     lower or upper: only edges with stable walls above them, or below
+    Returns  [N s/m]; [N/m] for a tip, the stable walls being softer
+    """
+    place, at, across = (stiffness, damping, 0) if edge != "tip" else (damping, stiffness, 1)
+    best = nan
+    for arc in chart.boundary:
+        pair = (arc.stiffness, arc.damping)
+        x, y = pair[across], pair[1 - across]
+        k = np.flatnonzero((x[:-1] - place) * (x[1:] - place) <= 0.0)
+        k = k[x[k] != x[k + 1]]
+        for value in y[k] + (place - x[k]) * (y[k + 1] - y[k]) / (x[k + 1] - x[k]):
+            if _faces(chart, place, float(value), edge) and not abs(value - at) >= abs(best - at):
+                best = float(value)
+    return _refined(chart, place, best, edge)
+
+
+def _excess(chart: StabilityChart, place: float, value: float, edge: Edge | None) -> float:
+    """Spectral radius less 1, a hidden mode's share being cancelled already."""
+    K, B = (place, value) if edge != "tip" else (value, place)
+    return float(spectral_radius(chart.loop, K, B)) - 1.0
+
+
+def _span(chart: StabilityChart, edge: Edge | None) -> float:
+    K0, K1, B0, B1 = chart.box
+    return 1e-3 * (K1 - K0 if edge == "tip" else B1 - B0)
+
+
+def _faces(chart: StabilityChart, place: float, value: float, edge: Edge | None) -> bool:
+    """Do the stable walls lie on that side?"""
+    if edge is None:
+        return True
+    step = _span(chart, edge) * (1.0 if edge == "lower" else -1.0)
+    return _excess(chart, place, value + step, edge) < _excess(chart, place, value - step, edge)
+
+
+def _refined(chart: StabilityChart, place: float, value: float, edge: Edge | None) -> float:
+    """The value on the chord, brought to the edge."""
+    from scipy.optimize import brentq
+
+    if not np.isfinite(value):
+        return nan
+    span = _span(chart, edge)
+    low, high = value - span, value + span
+    if not _excess(chart, place, low, edge) * _excess(chart, place, high, edge) <= 0.0:
+        return value
+    return float(brentq(lambda at: _excess(chart, place, at, edge), low, high, xtol=1e-13 * span, rtol=1e-15))

@@ -1,0 +1,113 @@
+"""Results of a long run, kept on disk line by line, so that a run that was stopped goes on where it was.
+
+The first line says which question they answer; a journal of another question is begun anew. Numbers come back with
+all their bits. A line cut short, by a crash or a full disk, is dropped and computed again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def fingerprint(*parts: object) -> str:
+    """What a question is known by: equal for equal numbers, dataclasses, arrays and containers of them.
+
+    Raises  TypeError  for anything whose value cannot be told
+
+    >>> fingerprint(1.0, np.arange(3)) == fingerprint(1.0, np.arange(3)) != fingerprint(1.0, np.arange(4))
+    True
+    """
+    return hashlib.sha256(json.dumps([_plain(part) for part in parts]).encode()).hexdigest()
+
+
+def _plain(part: object) -> Any:
+    """The value as nested lists of strings, no two alike for different values."""
+    if isinstance(part, float | np.floating):
+        return ["float", float(part).hex()]
+    if part is None or isinstance(part, bool | int | str):
+        return [type(part).__name__, repr(part)]
+    if isinstance(part, np.ndarray):
+        return ["array", str(part.dtype), list(part.shape), part.tobytes().hex()]
+    if isinstance(part, dict):
+        return ["dict", sorted([[str(key), _plain(value)] for key, value in part.items()])]
+    if isinstance(part, list | tuple):
+        return ["list", [_plain(value) for value in part]]
+    if is_dataclass(part) and not isinstance(part, type):
+        return [type(part).__name__, [[field.name, _plain(getattr(part, field.name))] for field in fields(part)]]
+    raise TypeError(f"a question cannot hold {part!r}")
+
+
+class JournalError(ValueError):
+    """A file that holds something else, and is left alone."""
+
+
+class Journal:
+    """What has been computed so far, by name.
+
+    path      where it is kept; None: in memory only
+    question  see `fingerprint`
+    Raises    JournalError  for a file that is no journal
+              OSError       where it cannot be read or written
+
+    >>> journal = Journal(None, fingerprint("how much?"))
+    >>> journal.ask("first", lambda: [1.5]), journal.ask("first", lambda: [2.5]), journal.kept
+    ([1.5], [1.5], 0)
+    """
+
+    def __init__(self, path: Path | None, question: str) -> None:
+        self.path = path
+        self.known: dict[str, Any] = {}
+        if path is None:
+            self.kept = 0
+            return
+        data = path.read_bytes() if path.exists() else b""
+        whole = _read(path, data.split(b"\n")[:-1], data != b"", question)
+        self.known = {entry["name"]: entry["value"] for entry in map(json.loads, whole[1:])}
+        if (text := b"".join(line + b"\n" for line in whole)) != data:
+            path.write_bytes(text)
+        self.kept = len(self.known)  # how many were found there
+
+    def ask(self, name: str, compute: Callable[[], Any]) -> Any:
+        """The value under this name, computed and kept where it is not yet known.
+
+        compute  returns what JSON holds: numbers (inf and nan, too), text, lists, dictionaries with text as keys
+        """
+        if name not in self.known:
+            value = compute()
+            if self.path is not None:
+                with open(self.path, "ab") as stream:
+                    stream.write(json.dumps({"name": name, "value": value}).encode() + b"\n")
+                    stream.flush()
+                    os.fsync(stream.fileno())
+            self.known[name] = value
+        return self.known[name]
+
+
+def _read(path: Path, lines: list[bytes], there: bool, question: str) -> list[bytes]:
+    """The lines up to the first that is damaged; a first line only where they answer another question."""
+    first = json.dumps({"question": question}).encode()
+    known = _entry(lines[0]) if lines else {}
+    if there and not isinstance(known.get("question"), str):
+        raise JournalError(f"{path.name}: is not the journal of a run; name another file, or remove it")
+    if known.get("question") != question:
+        return [first]
+    count = 1
+    while count < len(lines) and _entry(lines[count]).keys() >= {"name", "value"}:
+        count += 1
+    return lines[:count]
+
+
+def _entry(line: bytes) -> dict[str, Any]:
+    try:
+        found = json.loads(line)
+    except ValueError:
+        found = {}
+    return found if isinstance(found, dict) else {}
