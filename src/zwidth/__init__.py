@@ -32,6 +32,29 @@ if TYPE_CHECKING:
     from zwidth.chart.verdict import spectral_radius as spectral_radius
     from zwidth.conditions.bound import Bound as Bound
     from zwidth.conditions.registry import compare as compare
+    from zwidth.contact.environments import ENVIRONMENTS as ENVIRONMENTS
+    from zwidth.contact.environments import load_environment as load_environment
+    from zwidth.contact.environments.environment import Environment as Environment
+    from zwidth.contact.environments.environment import Parameter as Parameter
+    from zwidth.contact.environments.environment import environment as environment
+    from zwidth.contact.hand import Hand as Hand
+    from zwidth.contact.hand import Reach as Reach
+    from zwidth.contact.hand import Reflex as Reflex
+    from zwidth.contact.hand import Tremor as Tremor
+    from zwidth.contact.limit_cycles import limit_cycles as limit_cycles
+    from zwidth.contact.mechanism.reach import SurfaceOutOfReach as SurfaceOutOfReach
+    from zwidth.contact.mechanism.simulate import MechanismMotion as MechanismMotion
+    from zwidth.contact.mechanism.simulate import SurfaceWall as SurfaceWall
+    from zwidth.contact.mechanism.simulate import simulate_mechanism as simulate_mechanism
+    from zwidth.contact.mechanism.surfaces import Box as Box
+    from zwidth.contact.mechanism.surfaces import Plane as Plane
+    from zwidth.contact.mechanism.surfaces import Sphere as Sphere
+    from zwidth.contact.passivity import PassivityController as PassivityController
+    from zwidth.contact.response import TimeResponse as TimeResponse
+    from zwidth.contact.simulate import Run as Run
+    from zwidth.contact.simulate import simulate as simulate
+    from zwidth.contact.simulate import simulate_batch as simulate_batch
+    from zwidth.contact.verdict import judge_response as judge_response
     from zwidth.device.device import Device as Device
     from zwidth.device.faults import DeviceError as DeviceError
     from zwidth.device.load import from_document as from_document
@@ -47,10 +70,13 @@ if TYPE_CHECKING:
     from zwidth.loop.estimators import AlphaBeta as AlphaBeta
     from zwidth.loop.estimators import BackwardDifference as BackwardDifference
     from zwidth.loop.estimators import CentralDifference as CentralDifference
+    from zwidth.loop.estimators import Foaw as Foaw
     from zwidth.loop.estimators import Kalman as Kalman
     from zwidth.loop.estimators import LeastSquaresSlope as LeastSquaresSlope
+    from zwidth.loop.estimators import Levant as Levant
     from zwidth.loop.estimators import SavitzkyGolay as SavitzkyGolay
     from zwidth.loop.estimators import WindowedDifference as WindowedDifference
+    from zwidth.loop.estimators.running import velocity_of as velocity_of
     from zwidth.loop.loop import Loop as Loop
     from zwidth.loop.multi import MultiLoop as MultiLoop
     from zwidth.measures.dexterity import dynamic_manipulability as dynamic_manipulability
@@ -63,6 +89,11 @@ if TYPE_CHECKING:
     from zwidth.model.directions import reduce_directions as reduce_directions
     from zwidth.model.effective import effective_parameters as effective_parameters
     from zwidth.model.modes import natural_frequencies as natural_frequencies
+    from zwidth.model.nonlinear import Brake as Brake
+    from zwidth.model.nonlinear import Counter as Counter
+    from zwidth.model.nonlinear import Friction as Friction
+    from zwidth.model.nonlinear import Nonlinear as Nonlinear
+    from zwidth.model.nonlinear import Spring as Spring
     from zwidth.model.operator import Operator as Operator
     from zwidth.model.operator import OperatorError as OperatorError
     from zwidth.model.operator import attach as attach
@@ -84,48 +115,149 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
-    "chart.chart": ("BoundaryArc", "StabilityChart", "largest_stiffness", "stability_chart"),
-    "chart.eigenloci": ("MultiChart", "multi_chart"),
+    "chart.chart": (
+        "BoundaryArc",
+        "StabilityChart",
+        "largest_stiffness",
+        "stability_chart",
+    ),
+    "chart.eigenloci": (
+        "MultiChart",
+        "multi_chart",
+    ),
     "chart.hysteretic": ("hysteretic_chart",),
-    "chart.measured": ("MeasuredChart", "measured_chart"),
+    "chart.measured": (
+        "MeasuredChart",
+        "measured_chart",
+    ),
     "chart.polar": ("largest_stiffness_by_direction",),
     "chart.region": ("ChartError",),
-    "chart.robust": ("RobustChart", "robust_chart"),
-    "chart.verdict": ("eigenvalues", "judge", "spectral_radius"),
+    "chart.robust": (
+        "RobustChart",
+        "robust_chart",
+    ),
+    "chart.verdict": (
+        "eigenvalues",
+        "judge",
+        "spectral_radius",
+    ),
     "conditions.bound": ("Bound",),
     "conditions.registry": ("compare",),
+    "contact.environments": (
+        "ENVIRONMENTS",
+        "load_environment",
+    ),
+    "contact.environments.environment": (
+        "Environment",
+        "Parameter",
+        "environment",
+    ),
+    "contact.hand": (
+        "Hand",
+        "Reach",
+        "Reflex",
+        "Tremor",
+    ),
+    "contact.limit_cycles": ("limit_cycles",),
+    "contact.mechanism.reach": ("SurfaceOutOfReach",),
+    "contact.mechanism.simulate": (
+        "MechanismMotion",
+        "SurfaceWall",
+        "simulate_mechanism",
+    ),
+    "contact.mechanism.surfaces": (
+        "Box",
+        "Plane",
+        "Sphere",
+    ),
+    "contact.passivity": ("PassivityController",),
+    "contact.response": ("TimeResponse",),
+    "contact.simulate": (
+        "Run",
+        "simulate",
+        "simulate_batch",
+    ),
+    "contact.verdict": ("judge_response",),
     "device.device": ("Device",),
     "device.faults": ("DeviceError",),
-    "device.load": ("from_document", "load", "schema"),
+    "device.load": (
+        "from_document",
+        "load",
+        "schema",
+    ),
     "device.read": ("bundled",),
     "guarantees.nested": ("nested",),
     "guarantees.passive": ("passive_region",),
     "guarantees.springs": ("spring_stable_region",),
-    "loop.controller": ("Butterworth", "Controller", "FirstOrder"),
+    "loop.controller": (
+        "Butterworth",
+        "Controller",
+        "FirstOrder",
+    ),
     "loop.estimators": (
         "AlphaBeta",
         "BackwardDifference",
         "CentralDifference",
+        "Foaw",
         "Kalman",
         "LeastSquaresSlope",
+        "Levant",
         "SavitzkyGolay",
         "WindowedDifference",
     ),
+    "loop.estimators.running": ("velocity_of",),
     "loop.loop": ("Loop",),
     "loop.multi": ("MultiLoop",),
-    "measures.dexterity": ("dynamic_manipulability", "isotropy", "manipulability"),
-    "measures.felt": ("felt_impedance", "static_stiffness"),
+    "measures.dexterity": (
+        "dynamic_manipulability",
+        "isotropy",
+        "manipulability",
+    ),
+    "measures.felt": (
+        "felt_impedance",
+        "static_stiffness",
+    ),
     "measures.felt_chart": ("felt_chart",),
-    "model.directions": ("MultiPlant", "reduce_directions"),
+    "model.directions": (
+        "MultiPlant",
+        "reduce_directions",
+    ),
     "model.effective": ("effective_parameters",),
     "model.modes": ("natural_frequencies",),
-    "model.operator": ("Operator", "OperatorError", "attach"),
-    "model.plant": ("LaggedDamper", "Plant"),
-    "model.posture": ("PostureError", "solve_posture"),
-    "model.reduction": ("ModelError", "reduce_mechanism", "reduce_plant"),
-    "model.response": ("Response", "ResponseError"),
+    "model.nonlinear": (
+        "Brake",
+        "Counter",
+        "Friction",
+        "Nonlinear",
+        "Spring",
+    ),
+    "model.operator": (
+        "Operator",
+        "OperatorError",
+        "attach",
+    ),
+    "model.plant": (
+        "LaggedDamper",
+        "Plant",
+    ),
+    "model.posture": (
+        "PostureError",
+        "solve_posture",
+    ),
+    "model.reduction": (
+        "ModelError",
+        "reduce_mechanism",
+        "reduce_plant",
+    ),
+    "model.response": (
+        "Response",
+        "ResponseError",
+    ),
     "model.sweep": ("sweep_response",),
-    "study.robust": ("RobustError", "robust_study"),
+    "study.robust": (
+        "RobustError",
+        "robust_study",
+    ),
     "study.sensitivity": ("sensitivities",),
     "study.validity": ("validity",),
 }

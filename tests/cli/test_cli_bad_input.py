@@ -31,7 +31,11 @@ FILES = {
         "sampling_periods",
         [("loop.sampling_periods", "did you mean 'sampling_period_s'?")],
     ),
-    "not supported yet": ("[loop]", "[friction]\ncoulomb_N = 0.1\n[loop]", [("friction", "not supported yet")]),
+    "friction pushes": (
+        "[loop]",
+        "[friction]\ncoulomb_N = [0, -0.1]\n[loop]",
+        [("friction.coulomb_N.1", "at least 0")],
+    ),
     "text for a number": ("0.001", '"fast"', [("loop.sampling_period_s", "must be a number")]),
     "nan": ("0.001", "nan", [("loop.sampling_period_s", "must be finite, got nan")]),
     "infinite": ("0.02]]", "inf]]", [("plant.mass_kg.1.1", "must be finite, got inf")]),
@@ -133,7 +137,7 @@ LINES = [
     (("chart", TWO_MASS, "--set", "a=1", "--set", "b=2"), ["--set: a: is no key", "--set: b: is no key"]),
     (("chart", TWO_MASS, "--set", "plant.mass_kg.5.5=1"), ["plant.mass_kg.5.5"]),
     (("chart", TWO_MASS, "--set", "loop.sampling_period_s=-1"), ["loop.sampling_period_s: must be"]),
-    (("chart", TWO_MASS, "--set", "friction.coulomb_N=[0, 1]"), ["not supported yet"]),
+    (("chart", TWO_MASS, "--set", "friction.coulomb_N=[0, -1]"), ["friction.coulomb_N.1: must be at least 0"]),
     (("chart", TWO_MASS, "--window", "0,1,2"), ["'--window': must be 4 finite numbers"]),
     (("chart", TWO_MASS, "--window", "1,0,0,1"), ["'--window': needs KMIN < KMAX"]),
     (

@@ -85,6 +85,10 @@ def test_the_keys_that_come_out_are_those_explained(folder):
     assert set(document) - asked == {"points"}
     assert set(document["points"][0]) | {"points"} >= keys("check")
     assert set(found("devices")) == keys("devices")
+    document = found("move", MECHANISM, "--duration", 0.01)
+    assert set(document) - asked == keys("move") - asked
+    document = found("experiment", TWO_MASS, "--stiffnesses", 1, "--tips", 0)
+    assert set(document) - asked == keys("experiment")
     report = found("report", TWO_MASS, "--output", "report.html")
     assert set(report) >= {"file", "summary", "stiffness_max_N_per_m", *(asked - {"reason"})}
 

@@ -31,6 +31,10 @@ def test_the_commands_are_those_promised():
         "guarantees",
         "robust",
         "bounds",
+        "simulate",
+        "experiment",
+        "limit-cycles",
+        "move",
     }
 
 

@@ -385,3 +385,14 @@ def test_a_model_that_fits_everywhere_between_or_not_at_all():
     assert said().endswith(f"None of the simpler models is {ALIKE}, at any frequency.")
     assert "natural" not in said((low, 5.0), natural=np.nan)
     assert said((low, 5.0), natural=np.nan).endswith("rigid below 5.00 Hz.")
+
+
+def test_what_is_not_linear_is_said_to_be_left_out():
+    assert sentences.left_out(facts("hapkit-course")) == ""
+    rubbing = facts("hapkit-course", "friction.coulomb_N=0.1")
+    assert sentences.left_out(rubbing) == (
+        "All of this is linear and leaves out dry friction; zwidth simulate has them."
+    )
+    both = facts("hapkit-course", "friction.coulomb_N=0.1", "loop.saturation.force_N=5")
+    assert "leaves out dry friction and the force limit;" in sentences.left_out(both)
+    assert sentences.summary(both)[-1] == sentences.left_out(both)

@@ -14,7 +14,7 @@ from typing import Final
 PREFIXES: Final = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Prefixes, as powers of ten, that a unit may take; one that is not named takes none: kg has a prefix already, one
 # before a square would be squared with it, and mNs/m reads as a metre-newton.
-_TAKES: Final = {"N/m": (0, 3, 6), **dict.fromkeys(("Hz", "s", "m", "N"), tuple(PREFIXES))}
+_TAKES: Final = {"N/m": (0, 3, 6), **dict.fromkeys(("Hz", "s", "m", "N", "J"), tuple(PREFIXES))}
 SPACE: Final = "\u00a0"
 MINUS: Final = "\u2212"
 THIN: Final = "\u2009"

@@ -31,6 +31,7 @@ def computing(question: Question) -> Iterator[None]:
             BadInput  where the model, or the loop, does not fit the device
     """
     from zwidth.chart.region import ChartError
+    from zwidth.loop.estimator import NonlinearError
     from zwidth.loop.sections import HysteresisError, UnmovedError
     from zwidth.model.posture import PostureError
     from zwidth.model.reduction import DirectionError, ModelError
@@ -49,5 +50,5 @@ def computing(question: Question) -> Iterator[None]:
         raise BadInput(f"{question.name}: {model}{error}") from None
     except ResponseError as error:
         raise BadInput(f"{question.name}: response: {error}") from None
-    except (UnmovedError, HysteresisError) as error:
+    except (UnmovedError, HysteresisError, NonlinearError) as error:
         raise BadInput(f"{question.name}: {error}") from None

@@ -13,14 +13,18 @@ from zwidth.show.cli.bounds import bounds
 from zwidth.show.cli.chart import chart
 from zwidth.show.cli.check import check
 from zwidth.show.cli.devices import devices
+from zwidth.show.cli.experiment import experiment
 from zwidth.show.cli.felt import felt
 from zwidth.show.cli.guarantees import guarantees
+from zwidth.show.cli.limit_cycles import limit_cycles
+from zwidth.show.cli.move import move
 from zwidth.show.cli.polar import polar
 from zwidth.show.cli.report import report
 from zwidth.show.cli.robust import robust
 from zwidth.show.cli.schema import schema
 from zwidth.show.cli.sensitivity import sensitivity
 from zwidth.show.cli.show import show
+from zwidth.show.cli.simulate import simulate
 
 EPILOG = """\b
 Example:
@@ -43,7 +47,25 @@ def zwidth(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (devices, schema, show, chart, check, polar, report, sensitivity, felt, bounds, guarantees, robust):
+COMMANDS = (
+    devices,
+    schema,
+    show,
+    chart,
+    check,
+    polar,
+    report,
+    sensitivity,
+    felt,
+    bounds,
+    guarantees,
+    robust,
+    simulate,
+    experiment,
+    limit_cycles,
+    move,
+)
+for command in COMMANDS:
     zwidth.add_command(command)
 
 

@@ -78,6 +78,10 @@ class Question:
         return None if self.model == "motor-mass" else device.operator_name
 
     def facts(self, device: Device) -> dict[str, Any]:
+        """What a linear result states first: its circumstances, and what of the device it leaves out."""
+        return self.circumstances(device) | {"left_out": list(device.left_out)}
+
+    def circumstances(self, device: Device) -> dict[str, Any]:
         """Name, place and sampling as a result states them; null where inapplicable."""
         mechanism = device.mechanism is not None
         return {

@@ -13,16 +13,33 @@ if TYPE_CHECKING:
     from zwidth.show.cli.options import Question
 
 
-def heading(question: Question, device: Device) -> str:
-    """One line, or two: the device and its posture; the computer."""
+def heading(question: Question, device: Device, *, linear: bool = True) -> str:
+    """Two lines: the device and its posture; the computer. And where something is left out, one that says what.
+
+    linear  does the answer leave out what is not linear?
+    """
     facts = question.facts(device)
     kind = "[response]" if device.response is not None else "[plant]"
     place = f"model {facts['model']}" if device.mechanism else f"{kind} {facts['model']}"
     if device.mechanism:
         where = f"along {vector(facts['direction'])} at {vector(facts['position_m'], 'm')}"
         place = f"{where}, assembly {facts['assembly']}, {place}"
-    held = f", held by {shown(facts['operator'])}" if facts["operator"] else ""
-    return f"{shown(device.name)}: {place}{held}\n{computer(device.controller)}"
+    held = f", held by {_operator(facts['operator'])}" if facts["operator"] else ""
+    lines = [f"{shown(device.name)}: {place}{held}", computer(device.controller)]
+    return "\n".join(lines + ([omission(device)] if linear and device.left_out else []))
+
+
+def _operator(name: str) -> str:
+    """Its name; one without is the file's own."""
+    from zwidth.show.cli.options import AS_GIVEN
+
+    return "the operator of the file" if name == AS_GIVEN else shown(name)
+
+
+def omission(device: Device) -> str:
+    """What of a device a linear answer leaves out."""
+    simulated = "" if device.response is not None else "; `zwidth simulate` has them"
+    return f"linear: leaves out {', '.join(device.left_out)}{simulated}"
 
 
 def computer(controller: Controller) -> str:
@@ -37,7 +54,7 @@ def computer(controller: Controller) -> str:
     if not isinstance(controller.velocity, BackwardDifference):
         name = next(name for name, method in METHODS.items() if isinstance(controller.velocity, method))
         own = ", ".join(
-            key if value is True else f"{key.replace('_', ' ')} {value:.6g}"
+            key if value is True else value if isinstance(value, str) else f"{key.replace('_', ' ')} {value:.6g}"
             for key, value in vars(controller.velocity).items()
             if value is not False
         )

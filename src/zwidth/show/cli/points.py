@@ -1,20 +1,31 @@
-"""Walls from a CSV file, every fault with its line."""
+"""Walls, and points of a boundary, from a CSV file; every fault with its line."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
 from itertools import islice
-from typing import Final
+from math import nan
+from typing import Any, Final
 
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import wall_number
 
 COLUMNS: Final = ("stiffness_N_per_m", "damping_Ns_per_m")
+SPREADS: Final = (
+    "damping_low_Ns_per_m",
+    "damping_high_Ns_per_m",
+    "stiffness_low_N_per_m",
+    "stiffness_high_N_per_m",
+)
+EDGES: Final = ("lower", "upper", "tip", "")
 MOST_FAULTS: Final = 20
 LARGEST_FILE: Final = 200_000_000  # bytes; some millions of walls
 
 Walls = list[tuple[float, float]]
+# from a cell to its value, and what is wrong with it ("" if nothing)
+Reader = Callable[[str], tuple[Any, str]]
 
 
 def read_walls(file: str) -> Walls:
@@ -22,12 +33,72 @@ def read_walls(file: str) -> Walls:
 
     Raises BadInput  if it cannot be read, lacks a column or holds no wall, or with every line that is wrong
     """
+    return [(row[COLUMNS[0]], row[COLUMNS[1]]) for row in _read(file, {})]
+
+
+@dataclass(frozen=True)
+class PointFromBench:
+    """A point of a boundary that somebody measured; nan, "" and 1 for what was left out.
+
+    damping_low, damping_high   [N s/m];   stiffness_low, stiffness_high  [N/m]
+    edge     lower, upper, tip or ""
+    trials   how many it is the mean of
+    """
+
+    stiffness: float
+    damping: float
+    edge: str
+    damping_low: float
+    damping_high: float
+    stiffness_low: float
+    stiffness_high: float
+    trials: int
+
+
+def read_measured(file: str) -> list[PointFromBench]:
+    """Measured points: a CSV file as for `read_walls`, with columns that may be left out, and cells left empty.
+
+    Raises BadInput  as `read_walls`
+    """
+    optional = {"edge": _edge, **dict.fromkeys(SPREADS, _spread), "trials": _trials}
+    return [
+        PointFromBench(
+            stiffness=row["stiffness_N_per_m"],
+            damping=row["damping_Ns_per_m"],
+            edge=row.get("edge", ""),
+            damping_low=row.get("damping_low_Ns_per_m", nan),
+            damping_high=row.get("damping_high_Ns_per_m", nan),
+            stiffness_low=row.get("stiffness_low_N_per_m", nan),
+            stiffness_high=row.get("stiffness_high_N_per_m", nan),
+            trials=row.get("trials", 1),
+        )
+        for row in _read(file, optional)
+    ]
+
+
+def _edge(text: str) -> tuple[str, str]:
+    return text, "" if text in EDGES else f"must be {', '.join(EDGES[:-1])} or nothing, got {text[:60]!r}"
+
+
+def _spread(text: str) -> tuple[float, str]:
+    return wall_number(text) if text else (nan, "")
+
+
+def _trials(text: str) -> tuple[int, str]:
+    if not text or (text.isdecimal() and int(text) > 0):
+        return int(text or 1), ""
+    return 1, f"must be a whole number from 1 on, got {text[:60]!r}"
+
+
+def _read(file: str, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
+    """The rows by column; of the optional ones those that are there."""
     rows = csv.reader(_text(file).splitlines(), strict=True)
     faults: list[str] = []
-    walls: Walls = []
+    found: list[dict[str, Any]] = []
     try:
         header = [name.strip() for name in next(_filled(rows), [])]
-        places = _places(file, header)
+        places = _places(file, header, optional)
+        readers: dict[str, Reader] = {**dict.fromkeys(COLUMNS, wall_number), **optional}
         for row in _filled(rows):
             if len(row) > len(header):
                 faults.append(
@@ -35,39 +106,46 @@ def read_walls(file: str) -> Walls:
                     "columns; write a decimal point, not a comma, or name every column"
                 )
                 continue
-            wall = []
-            for name, place in zip(COLUMNS, places, strict=True):
-                value, fault = wall_number(row[place].strip() if place < len(row) else "")
-                wall.append(value)
+            cells = {}
+            for name, place in places.items():
+                cells[name], fault = readers[name](row[place].strip() if place < len(row) else "")
                 if fault:
                     faults.append(f"{file}: line {rows.line_num}: {name}: {fault}")
-            walls.append((wall[0], wall[1]))
+            faults += [f"{file}: line {rows.line_num}: {fault}" for fault in _turned_round(cells)]
+            found.append(cells)
     except csv.Error as error:
         raise BadInput(f"{file}: line {rows.line_num}: is not CSV: {error}") from None
     if faults:
         more = [f"{file}: and {len(faults) - MOST_FAULTS} more faults"] if len(faults) > MOST_FAULTS else []
         raise BadInput(*islice(faults, MOST_FAULTS), *more)
-    if not walls:
+    if not found:
         raise BadInput(f"{file}: holds no walls; give a line with {' and '.join(COLUMNS)} for each")
-    return walls
+    return found
+
+
+def _turned_round(cells: dict[str, Any]) -> Iterator[str]:
+    """Spreads whose low end is above their high one."""
+    for low, high in (SPREADS[:2], SPREADS[2:]):
+        if cells.get(low, nan) > cells.get(high, nan):  # nan: left out
+            yield f"{low}: must be at most {high} = {cells[high]:g}, got {cells[low]:g}"
 
 
 def _filled(rows: Iterator[list[str]]) -> Iterator[list[str]]:
     return (row for row in rows if any(cell.strip() for cell in row))
 
 
-def _places(file: str, header: list[str]) -> list[int]:
-    """Index of each column wanted."""
+def _places(file: str, header: list[str], optional: Collection[str]) -> dict[str, int]:
+    """Index of each column wanted, and of the optional ones that are there."""
     if not header:
         raise BadInput(f"{file}: is empty; its first line must name the columns {', '.join(COLUMNS)}")
     faults = []
-    for name in COLUMNS:
-        if header.count(name) != 1:
+    for name in (*COLUMNS, *optional):
+        if header.count(name) != 1 and not (name in optional and name not in header):
             trouble = "is missing" if name not in header else "is there more than once"
             faults.append(f"{file}: line 1: column {name} {trouble}; the columns are {', '.join(header)[:200]}")
     if faults:
         raise BadInput(*faults)
-    return [header.index(name) for name in COLUMNS]
+    return {name: header.index(name) for name in (*COLUMNS, *optional) if name in header}
 
 
 def _text(file: str) -> str:

@@ -79,8 +79,9 @@ def polar(question: Question, plane: str | None, count: int, output: str | None,
 def _heading(question: Question, device: Device) -> str:
     """Which device, where, sampled how; no direction is meant more than another."""
     facts = question.facts(device)
+    _, rest = heading(question, device).split("\n", 1)
     where = f"at {vector(facts['position_m'], 'm')}, assembly {facts['assembly']}, model {facts['model']}"
-    return f"{shown(device.name)}: {where}\n{heading(question, device).splitlines()[-1]}"
+    return f"{shown(device.name)}: {where}\n{rest}"
 
 
 def _facts(question: Question, device: Device) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -16,6 +15,7 @@ from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, named, output_option
 from zwidth.show.cli.place import heading
+from zwidth.show.cli.progress import progress_told
 from zwidth.show.motions import counted
 from zwidth.show.output import DATA, FIGURES, destination, replacing, shown, write_data
 from zwidth.show.units import amount
@@ -106,7 +106,7 @@ def robust(
     if not varied and not held_by:
         raise BadInput(f"{question.name}: nothing varies; give --range PATH=LOW,HIGH or --operators A,B,C")
     try:
-        with computing(question), _progress() as progress:
+        with computing(question), progress_told() as progress:
             found = _computed(question, device, varied, held_by, (members, unseen, seed), progress)
     except (NoAnswer, RobustError) as none:
         unanswered = question.facts(device) | dict.fromkeys(KEYS) | {"decided": getattr(none, "decided", True)}
@@ -160,23 +160,6 @@ def _operators(question: Question, names: str | None, file: str | None) -> tuple
     if not found or "" in found:
         raise BadInput(f"--operators: must be names with commas between them, got {names or file!r}")
     return found
-
-
-@contextmanager
-def _progress() -> Iterator[Progress]:
-    """A bar on standard error where somebody watches."""
-    from rich.console import Console
-    from rich.progress import Progress as Bar
-
-    with Bar(console=Console(stderr=True), transient=True, disable=not Console(stderr=True).is_terminal) as bar:
-        tasks: dict[str, Any] = {}
-
-        def progress(stage: str, done: int, of: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=of)
-            bar.update(tasks[stage], completed=done, total=of)
-
-        yield progress
 
 
 def _computed(

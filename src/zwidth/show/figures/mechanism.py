@@ -33,9 +33,9 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
         raise ValueError(f"{device.label} is given by its [plant] and has no mechanism to draw")
     mechanism = device.mechanism
     placed = link_points(mechanism, posture)
-    strokes = [_stroke(mechanism, placed, i) for i in range(len(mechanism.links.names))]
+    strokes = [link_stroke(mechanism, placed, i) for i in range(len(mechanism.links.names))]
     everything = np.vstack([np.zeros((1, 3)), *strokes, posture.position[None]])
-    flat = _view(everything)
+    flat = flattest(everything)
     size = max(float(np.max(np.ptp(everything[:, flat], axis=0))), 1e-9)
     for n, stroke in enumerate(strokes):
         _link(ax, stroke[:, flat], mechanism.links.names[n], n)
@@ -51,13 +51,13 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
     legend_beside(ax)
 
 
-def _view(points: Floats) -> list[int]:
+def flattest(points: Floats) -> list[int]:
     """The two coordinates in which the points spread most, in the order x, y, z; x and y where it is a tie."""
     spread = np.ptp(points, axis=0) + np.array([2.0, 2.0, 0.0]) * 1e-12
     return sorted(np.argsort(-spread, kind="stable")[:2].tolist())
 
 
-def _stroke(mechanism: Mechanism, placed: LinkPoints, link: int) -> Floats:
+def link_stroke(mechanism: Mechanism, placed: LinkPoints, link: int) -> Floats:
     """The points that a link joins, (k, 3), from its joint to where other things hang on it."""
     links, closures = mechanism.links, mechanism.closures
     start = placed.origin[link]
@@ -86,9 +86,6 @@ def _joints(
 ) -> None:
     """Base, joints and loop closures; driven joints filled, with the names of their drives."""
     links, closures, drives = mechanism.links, mechanism.closures, mechanism.drives
-    turning = np.flatnonzero(links.joint == REVOLUTE)
-    meeting = [placed.of(int(a), p) if a >= 0 else p for a, p in zip(closures.a, closures.point_a, strict=True)]
-    pins = np.array([*placed.origin[turning], *meeting]).reshape(-1, 3)[:, flat]
     base = placed.origin[links.parent < 0][:, flat]
     grounded = [p for a, p in zip(closures.a, closures.point_a, strict=True) if a < 0]
     grounded += [p for b, p in zip(closures.b, closures.point_b, strict=True) if b < 0]
@@ -96,7 +93,7 @@ def _joints(
     below = base - np.array([0.0, 0.035 * size])
     ax.plot(*below.T, marker="^", markersize=13.0, color="#B8B8B8", linestyle="none", zorder=1.5, label="base")
     circle: dict[str, Any] = {"marker": "o", "markersize": 7.0, "linestyle": "none", "markeredgecolor": BLACK}
-    ax.plot(*pins.T, markerfacecolor="white", zorder=3.0, label="joint", **circle)
+    ax.plot(*pins(mechanism, placed)[:, flat].T, markerfacecolor="white", zorder=3.0, label="joint", **circle)
     driven = placed.origin[drives.joint][:, flat]
     if len(driven):
         ax.plot(*driven.T, markerfacecolor=BLUE, zorder=3.1, label="driven joint", **circle)
@@ -116,6 +113,14 @@ def _joints(
             path_effects=[withStroke(linewidth=3.0, foreground="white")],
             zorder=5.0,
         )
+
+
+def pins(mechanism: Mechanism, placed: LinkPoints) -> Floats:
+    """Where joints turn and loops meet, (k, 3)."""
+    closures = mechanism.closures
+    turning = np.flatnonzero(mechanism.links.joint == REVOLUTE)
+    meeting = [placed.of(int(a), p) if a >= 0 else p for a, p in zip(closures.a, closures.point_a, strict=True)]
+    return np.array([*placed.origin[turning], *meeting]).reshape(-1, 3)
 
 
 def _free_side(place: Floats, strokes: list[Floats], near: float) -> Floats:

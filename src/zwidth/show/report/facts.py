@@ -18,6 +18,7 @@ from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import plant_effective_parameters
+from zwidth.show.friction import told_of
 from zwidth.study.hidden import hidden_instability
 from zwidth.study.sensitivity import Sensitivities, sensitivities
 from zwidth.study.validity import Validity, validity
@@ -125,7 +126,7 @@ def gather(
         variants=tuple(variants),
         effective=effective,
         natural=natural_frequencies(device.plant(at, direction, assembly, model, held=False)),
-        bounds=tuple(compare(loop)),
+        bounds=tuple(compare(loop, **told_of(device, loop.plant))),
         runs_away=hidden_instability(loop),
         asked={"at": at, "direction": direction, "assembly": assembly},
     )

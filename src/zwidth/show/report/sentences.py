@@ -23,7 +23,7 @@ NO_WALL: Final = "no wall with positive stiffness and without negative damping i
 def summary(facts: Facts) -> list[str]:
     """What a reader in a hurry wants to know, in at most a handful of sentences."""
     found = [warning(facts), renders(facts), limit(facts), vibration(facts), next_best(facts), regions(facts)]
-    found += [unobserved(facts)]
+    found += [unobserved(facts), left_out(facts)]
     return [sentence for sentence in found if sentence]
 
 
@@ -168,6 +168,14 @@ def unobserved(facts: Facts) -> str:
         return ""
     the = "" if names[0][0].isdigit() else "the "
     return f"No wall moves {the}{listed(names)}: left out of what is called stable here."
+
+
+def left_out(facts: Facts) -> str:
+    """What of the device all of this leaves out; "" where it leaves out nothing."""
+    words = facts.device.left_out
+    if not words:
+        return ""
+    return f"All of this is linear and leaves out {listed(words)}; zwidth simulate has them."
 
 
 def outside(facts: Facts) -> str:

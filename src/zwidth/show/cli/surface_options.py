@@ -1,0 +1,235 @@
+"""What is asked of a whole mechanism's motion: the surface that it meets, and what drives it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from zwidth.show.cli.contact_options import LARGEST_FORCE, LARGEST_SEED, Bounded, gathered, usage
+from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.options import LARGEST_WALL, Finite, Numbers
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from zwidth.contact.mechanism.simulate import SurfaceWall
+    from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, Surface
+    from zwidth.device.device import Device
+    from zwidth.show.cli.options import Question
+
+    Floats = NDArray[Any]
+
+Command = Callable[..., int]
+
+SURFACES: Final = ("plane", "sphere", "box")
+OF_A_WALL: Final = ("stiffness", "damping", "no_pull", "two_sided", "hollow")
+LONGEST: Final = 1e9  # s
+FASTEST: Final = 1e3  # m/s
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion as typed; None where left out. Metres, newtons, seconds."""
+
+    plane: tuple[float, ...] | None
+    sphere: tuple[float, ...] | None
+    box: tuple[float, ...] | None
+    two_sided: bool
+    hollow: bool
+    stiffness: float | None
+    damping: float | None
+    no_pull: bool
+    push: tuple[float, ...] | None
+    start_velocity: tuple[float, ...] | None
+    gravity: tuple[float, ...] | None
+    duration: float
+    substeps: int
+    seed: int
+    exact: bool
+    torque_limits: str
+
+    def check(self, question: Question) -> None:
+        """Raises click.UsageError for options that cannot stand together."""
+        given = [f"--{name}" for name in SURFACES if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise usage(f"{' and '.join(given)} exclude each other: a motion meets one surface")
+        self._check_wall(given)
+        self._check_sizes()
+        self._check_question(question)
+
+    def _check_wall(self, given: Sequence[str]) -> None:
+        if not given:
+            alone = [name for name in OF_A_WALL if getattr(self, name) not in (None, False)]
+            if alone:
+                raise usage(f"{_option(alone[0])} says what a surface does; add --plane, --sphere or --box")
+            return
+        missing = [f"--{name}" for name in ("stiffness", "damping") if getattr(self, name) is None]
+        if missing:
+            raise usage(f"{given[0]} needs --stiffness and --damping; missing: {' and '.join(missing)}")
+        if self.two_sided and self.plane is None:
+            raise usage("--two-sided goes with --plane; a sphere and a box have one side, or --hollow the other")
+        if self.hollow and self.plane is not None:
+            raise usage("--hollow goes with --sphere or --box; turn a plane round by its normal")
+        if self.two_sided and self.no_pull:
+            raise usage("a two-sided plane pulls by its nature; leave --no-pull or --two-sided out")
+
+    def _check_sizes(self) -> None:
+        for name, most, unit in (("push", LARGEST_FORCE, "N"), ("start_velocity", FASTEST, "m/s")):
+            value = getattr(self, name) or ()
+            if any(abs(part) > most for part in value):
+                told = ",".join(f"{part:g}" for part in value)
+                raise usage(f"{_option(name)}: must lie from -{most:g} to {most:g} {unit}, got {told}")
+
+    def _check_question(self, question: Question) -> None:
+        if question.model not in (None, "full"):
+            raise usage(
+                f"the whole mechanism moves, so that --model {question.model} does not apply; leave it out"
+            )
+        if question.operator not in (None, "none"):
+            raise usage("no arm holds a mechanism that moves; leave --operator out and give a --push")
+        along = [self.push, self.start_velocity]
+        if question.direction is not None and not any(value is not None and len(value) == 1 for value in along):
+            one = "a --push or --start-velocity given as one number"
+            raise usage(f"--direction is that of {one}; give one, or leave it out")
+
+    @property
+    def option(self) -> str:
+        """The option that gave the surface."""
+        return next((f"--{name}" for name in SURFACES if getattr(self, name) is not None), "")
+
+    def surface(self, device: Device) -> Surface | None:
+        """What the handle meets. Numbers in a plane lie at the height of the device's reference.
+
+        Raises  BadInput  for numbers that describe none
+        """
+        from zwidth.contact.mechanism.surfaces import packed
+
+        height = 0.0 if device.reference_position is None else float(device.reference_position[2])
+        surface = self._surface(height)
+        try:
+            packed(surface)
+        except ValueError as error:
+            raise BadInput(f"{self.option}: {error}") from None
+        return surface
+
+    def _surface(self, height: float) -> Plane | Sphere | Box | None:
+        from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere
+
+        if self.plane is not None:
+            half = len(self.plane) // 2
+            return Plane(_raised(self.plane[:half], height), self.plane[half:], two_sided=self.two_sided)
+        if self.sphere is not None:
+            return Sphere(_raised(self.sphere[:-1], height), self.sphere[-1], hollow=self.hollow)
+        if self.box is not None:
+            half = len(self.box) // 2
+            return Box(_raised(self.box[:half], height), self.box[half:], hollow=self.hollow)
+        return None
+
+    def wall(self) -> SurfaceWall | None:
+        """What the computer renders at the surface."""
+        from zwidth.contact.mechanism.simulate import SurfaceWall
+
+        if self.stiffness is None or self.damping is None:
+            return None
+        return SurfaceWall(self.stiffness, self.damping, self.no_pull)
+
+
+def along(value: tuple[float, ...] | None, direction: Floats) -> Floats:
+    """(3,) of one number along the direction, or of two or three components; 0 where left out."""
+    import numpy as np
+
+    if value is None:
+        return np.zeros(3)
+    if len(value) == 1:
+        return np.asarray(value[0] * direction)
+    return np.append(value, np.zeros(3 - len(value)))
+
+
+def about_a_motion(command: Command) -> Command:
+    """Give a command the options that say what a mechanism meets and what drives it, as one `Motion`."""
+    options = [*_of_surfaces(), *_of_drives(), *_of_the_run()]
+    return gathered(command, "motion", Motion, options, Motion.check)
+
+
+def _of_surfaces() -> list[Callable[..., Any]]:
+    return [
+        click.option(
+            "--plane",
+            type=Numbers("X,Y[,Z],NX,NY[,NZ]", (4, 6), "0,0.28,0,-1"),
+            help="A wall behind a plane: a point of it [m], and the direction out of the wall.",
+        ),
+        click.option(
+            "--sphere", type=Numbers("X,Y[,Z],R", (3, 4), "0,0.3,0.05"), help="A ball: its centre and radius [m]."
+        ),
+        click.option(
+            "--box",
+            type=Numbers("X,Y[,Z],HX,HY[,HZ]", (4, 6), "0,0.3,0.05,0.02"),
+            help="A box along the axes: its centre and half sizes [m]; with two it has no end along z.",
+        ),
+        click.option("--two-sided", is_flag=True, help="The plane holds the handle from both sides."),
+        click.option("--hollow", is_flag=True, help="The sphere or box keeps the handle in, not out."),
+        click.option(
+            "--stiffness", metavar="K", type=Bounded("N/m", 0.0, LARGEST_WALL), help="Of the wall [N/m]."
+        ),
+        click.option("--damping", metavar="B", type=Finite(), help="Of the wall [Ns/m]."),
+        click.option("--no-pull", is_flag=True, help="The wall never pulls the handle in."),
+    ]
+
+
+def _of_drives() -> list[Callable[..., Any]]:
+    return [
+        click.option(
+            "--push",
+            type=Numbers("F|FX,FY[,FZ]", (1, 2, 3), "2 or 0,2"),
+            help="The hand's force [N]; one number is along the direction. Default: none.",
+        ),
+        click.option(
+            "--start-velocity",
+            type=Numbers("V|VX,VY[,VZ]", (1, 2, 3), "0.1 or 0,0.1"),
+            help="Of the handle [m/s]; one number is along the direction. Default: at rest.",
+        ),
+        click.option(
+            "--gravity", type=Numbers("GX,GY[,GZ]", (2, 3), "0,-9.81"), help="Gravity [m/s²]. Default: none."
+        ),
+        click.option(
+            "--torque-limits",
+            type=click.Choice(("each", "together")),
+            default="each",
+            help="Is every motor cut at its own limit, or are all scaled alike, so that the force keeps its "
+            "direction? Default: each.",
+        ),
+    ]
+
+
+def _of_the_run() -> list[Callable[..., Any]]:
+    return [
+        click.option(
+            "--duration",
+            metavar="S",
+            type=Bounded("s", 0.0, LONGEST, above=True),
+            default=1.0,
+            help="How long [s]. Default: 1.",
+        ),
+        click.option(
+            "--substeps", type=click.IntRange(1, 100_000), default=4, help="Steps between samples. Default: 4."
+        ),
+        click.option(
+            "--seed",
+            type=click.IntRange(0, LARGEST_SEED),
+            default=0,
+            help="Another noise of the encoders. Default: 0.",
+        ),
+        click.option("--exact", is_flag=True, help="Read the encoders as finely as you like, without noise."),
+    ]
+
+
+def _raised(numbers: Sequence[float], height: float) -> tuple[float, ...]:
+    """A point with its height; one in a plane has that of the device."""
+    return (*numbers, height) if len(numbers) == 2 else tuple(numbers)
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"

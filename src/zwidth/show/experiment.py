@@ -1,0 +1,226 @@
+"""A measured boundary in numbers, rows and sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import isnan, nan
+from typing import TYPE_CHECKING, Any, Final
+
+from zwidth.show.units import amount
+
+if TYPE_CHECKING:
+    from zwidth.show.cli.points import PointFromBench
+    from zwidth.study.experiment import Cause, Experiment, MeasuredPoint
+
+MATTERS: Final = 0.01  # of the range of stable dampings: what moves an edge by less is not named
+AGREES: Final = 1e-3
+BEYOND: Final = {
+    "growing": "a vibration that grows",
+    "limit cycle": "a vibration that keeps its size",
+    "bouncing": "bouncing",
+    "lost contact": "the device leaving the wall",
+    "decaying": "a vibration that dies too slowly",
+    "undecided": "a vibration that hardly grows",
+    "converged": "a motion that stays visible",
+}
+
+
+def numbers(found: Experiment, own: Sequence[PointFromBench]) -> dict[str, Any]:
+    """The experiment under the keys of --json."""
+    tips = [p for p in found.points if p.edge == "tip"]
+    best = max(tips or found.points, key=lambda p: p.stiffness, default=None)
+    chart = found.chart
+    return {
+        "points": [_entry(point) for point in found.points],
+        "lost": found.lost,
+        "stiffness_max_N_per_m": None if best is None else best.stiffness,
+        "damping_at_stiffness_max_Ns_per_m": None if best is None else best.damping,
+        "exact_stiffness_max_N_per_m": None if chart is None else chart.stiffness_max,
+        "visible_m": found.plan.visible,
+        "subjects": [None if subject is None else vars(subject) for subject in found.subjects],
+        "explanation": explanation(found),
+        "measured": deviations(found, own),
+    }
+
+
+def _entry(point: MeasuredPoint) -> dict[str, Any]:
+    tip = point.edge == "tip"
+    return {
+        "stiffness_N_per_m": point.stiffness,
+        "damping_Ns_per_m": point.damping,
+        "edge": point.edge,
+        "stiffness_low_N_per_m": point.low if tip else point.stiffness,
+        "stiffness_high_N_per_m": point.high if tip else point.stiffness,
+        "damping_low_Ns_per_m": point.damping if tip else point.low,
+        "damping_high_Ns_per_m": point.damping if tip else point.high,
+        "trials": point.trials,
+        "exact_stiffness_N_per_m": point.exact if tip else point.stiffness,
+        "exact_damping_Ns_per_m": point.damping if tip else point.exact,
+        "beyond": point.beyond,
+        "amplitude_m": point.amplitude,
+        "frequency_Hz": point.frequency,
+        "unsure": point.unsure,
+    }
+
+
+def point_table(document: dict[str, Any]) -> dict[str, list[Any]]:
+    """The points as columns; they can be read again as measured ones."""
+    points = document["points"]
+    return {key: [point[key] for point in points] for key in (points[0] if points else ())}
+
+
+def point_rows(found: Experiment) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows for people."""
+    many = any(p.trials > 1 for p in found.points)
+    rows = []
+    for p in found.points:
+        unit = "N/m" if p.edge == "tip" else "Ns/m"
+        rows.append(
+            [
+                p.edge,
+                amount(p.stiffness, "N/m"),
+                amount(p.damping, "Ns/m"),
+                *([f"{amount(p.low, unit)} to {amount(p.high, unit)}", str(p.trials)] if many else []),
+                amount(p.exact, unit),
+                str(p.beyond),
+                amount(p.frequency, "Hz"),
+            ]
+        )
+    spread = ["lowest to highest", "trials"] if many else []
+    return ["edge", "stiffness", "damping", *spread, "exact, linear", "beyond it", "at"], rows
+
+
+def deviations(found: Experiment, own: Sequence[PointFromBench]) -> list[dict[str, Any]] | None:
+    """How far somebody's points are from the exact edge nearest to them; None without points."""
+    if not own:
+        return None
+    return [_deviation(found, point) for point in own]
+
+
+def _deviation(found: Experiment, point: PointFromBench) -> dict[str, Any]:
+    from zwidth.study.exact_edge import exact_edge
+
+    edge: Any = point.edge or None
+    exact = nan if found.chart is None else exact_edge(found.chart, point.stiffness, point.damping, edge)
+    tip = point.edge == "tip"
+    return {
+        "stiffness_N_per_m": point.stiffness,
+        "damping_Ns_per_m": point.damping,
+        "edge": point.edge or None,
+        "trials": point.trials,
+        "exact_stiffness_N_per_m": exact if tip else point.stiffness,
+        "exact_damping_Ns_per_m": point.damping if tip else exact,
+        "deviation_N_per_m": point.stiffness - exact if tip else 0.0,
+        "deviation_Ns_per_m": 0.0 if tip else point.damping - exact,
+    }
+
+
+def sentences(found: Experiment, measured: list[dict[str, Any]] | None) -> Iterator[tuple[str, str]]:
+    """What to say below the points: labels and values."""
+    tips = [p for p in found.points if p.edge == "tip"]
+    if tips:
+        best = max(tips, key=lambda p: p.stiffness)
+        yield "stiffest", f"{amount(best.stiffness, 'N/m')} at {amount(best.damping, 'Ns/m')}"
+    if found.plan.visible:
+        yield "visible", f"vibrations above {amount(found.plan.visible, 'm')}"
+    if found.lost:
+        yield "not found", f"{found.lost} of the points sought: no unstable wall, or no stable one, was met there"
+    doubtful = sum(p.unsure for p in found.points)
+    if doubtful:
+        yield "unsure", _doubt(doubtful, single=len(found.subjects) * found.plan.trials == 1)
+    for n, text in enumerate(explanation(found)):
+        yield "" if n else "difference", text
+    if measured:
+        for n, text in enumerate(_own_words(measured)):
+            yield "" if n else "your points", text
+
+
+def _doubt(points: int, *, single: bool) -> str:
+    which = "1 tip" if points == 1 else f"{points} tips"
+    text = f"at {which} the verdict changes more than once as the stiffness grows; the lowest change is given"
+    return text + "; a single trial does not say how far it scatters, --trials 8 does" * single
+
+
+def _own_words(measured: list[dict[str, Any]]) -> Iterator[str]:
+    beside = [p for p in measured if p["edge"] != "tip"]
+    apart = [p["deviation_Ns_per_m"] for p in beside if not isnan(p["deviation_Ns_per_m"])]
+    if apart:
+        worst = max(apart, key=abs)
+        mean = sum(map(abs, apart)) / len(apart)
+        yield (
+            f"{amount(mean, 'Ns/m')} from the exact edge on average over {len(apart)}, at most "
+            f"{amount(worst, 'Ns/m')}"
+        )
+    tips = [p["deviation_N_per_m"] for p in measured if p["edge"] == "tip" and not isnan(p["deviation_N_per_m"])]
+    if tips:
+        yield f"the tip is {amount(max(tips, key=abs), 'N/m')} from the exact one at most"
+    nowhere = len(measured) - len(apart) - len(tips)
+    if nowhere:
+        yield f"{nowhere} where the exact chart has no edge"
+
+
+def explanation(found: Experiment) -> list[str]:
+    """What the measured edges have to do with the exact linear ones, and which part of the device is why."""
+    width = _width(found)
+    told = [_difference(found, width)] if found.chart is not None else []
+    return told + [_cause(cause, width) for cause in found.causes]
+
+
+def _width(found: Experiment) -> float:
+    """The widest range of stable dampings that was measured [N s/m]."""
+    upper = {p.stiffness: p.damping for p in found.points if p.edge == "upper"}
+    both = [upper[p.stiffness] - p.damping for p in found.points if p.edge == "lower" and p.stiffness in upper]
+    return max(both, default=nan)
+
+
+def _difference(found: Experiment, width: float) -> str:
+    """The largest distance from the exact edge, and what happens beyond: of the range of dampings, or of a tip."""
+    apart = [(abs(p.bisected - p.exact) / (abs(p.exact) if p.edge == "tip" else width), p) for p in found.points]
+    apart = [(share, p) for share, p in apart if not isnan(share)]
+    if not apart:
+        return "no measured edge has an exact one beside it"
+    share, worst = max(apart, key=lambda pair: pair[0])
+    if share <= AGREES:
+        return f"measured and exact linear edges agree: {_gaps([p for _, p in apart])} apart"
+    tip = worst.edge == "tip"
+    larger = (worst.bisected > worst.exact) == (worst.edge != "lower")
+    at = amount(worst.damping, "Ns/m") if tip else amount(worst.stiffness, "N/m")
+    unit = "N/m" if tip else "Ns/m"
+    return (
+        f"farthest from the exact linear edge is the {worst.edge}{'' if tip else ' one'} at {at}: "
+        f"measured {amount(worst.bisected, unit)}, exact {amount(worst.exact, unit)}, "
+        f"{'more' if larger else 'less'} is stable; beyond it {BEYOND[str(worst.beyond)]}, of "
+        f"{amount(worst.amplitude, 'm')} at {amount(worst.frequency, 'Hz')}"
+    )
+
+
+def _gaps(points: list[MeasuredPoint]) -> str:
+    """The largest distances of edges and of tips."""
+    edges = [abs(p.damping - p.exact) for p in points if p.edge != "tip"]
+    tips = [abs(p.stiffness - p.exact) for p in points if p.edge == "tip"]
+    told = [amount(max(edges), "Ns/m")] if edges else []
+    told += [f"{amount(max(tips), 'N/m')}{' at the tips' if edges else ''}"] if tips else []
+    return "at most " + " and ".join(told)
+
+
+def _cause(cause: Cause, width: float) -> str:
+    """What one part does: where the edge goes without it."""
+    pairs = [
+        (point, other)
+        for point, other in zip(cause.points, cause.without, strict=True)
+        if not (isnan(point.damping) or isnan(other))
+    ]
+    both = zip(cause.points, cause.without, strict=True)
+    vanished = [point for point, other in both if isnan(point.damping) != isnan(other)]
+    if not pairs or isnan(width):
+        return f"without {cause.name} no edge could be compared"
+    point, other = max(pairs, key=lambda pair: abs(pair[0].damping - pair[1]))
+    if abs(point.damping - other) <= MATTERS * width:
+        if vanished:
+            return f"without {cause.name} {len(vanished)} of the edges tried appear or vanish"
+        return f"without {cause.name} no edge tried moves by more than {100 * MATTERS:g} % of the range"
+    holds = (point.damping > other) == (point.edge == "upper")
+    return (
+        f"without {cause.name} {'fewer' if holds else 'more'} walls are stable: the {point.edge} edge at "
+        f"{amount(point.stiffness, 'N/m')} moves from {amount(point.damping, 'Ns/m')} to {amount(other, 'Ns/m')}"
+    )

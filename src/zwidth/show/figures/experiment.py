@@ -1,0 +1,97 @@
+"""Measured points of a stability boundary over the exact chart (thesis Figs. 3.7, 3.12)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
+
+from zwidth.chart.chart import StabilityChart
+from zwidth.show.figures.stability import Window, frame
+from zwidth.show.figures.style import BLACK, BLUE, GREEN, STABLE, VERMILION, legend_above
+
+LOOKS = {"lower": (VERMILION, "o"), "upper": (BLUE, "s"), "tip": (GREEN, "^")}
+TITLES = {
+    "lower": "lower edge, damping bisected",
+    "upper": "upper edge, damping bisected",
+    "tip": "tip, stiffness bisected",
+}
+
+
+class Barred(NamedTuple):
+    """A point to draw: its wall, its edge, and lowest and highest along what was bisected; nan: no bar."""
+
+    stiffness: float
+    damping: float
+    edge: str
+    low: float
+    high: float
+
+
+def draw_experiment(
+    ax: Axes,
+    points: Sequence[Barred],
+    chart: StabilityChart | None,
+    others: Sequence[Barred] = (),
+    window: Window | None = None,
+) -> None:
+    """The exact chart filled, with the measured points and their bars over it.
+
+    others  points of somebody's own, drawn in black
+    window  what to show; None: chart and points for K > 0, and 5 %
+    """
+    for n, ring in enumerate(() if chart is None else chart.regions):
+        title = "" if n else "stable, exact and linear"
+        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label=title))
+    for arc in () if chart is None else chart.boundary:
+        ax.plot(arc.stiffness, arc.damping, color=BLACK, linewidth=1.0, solid_capstyle="round")
+    for edge, (colour, marker) in LOOKS.items():
+        _draw(ax, [p for p in points if p.edge == edge], colour, marker, TITLES[edge], filled=False)
+    _draw(ax, others, BLACK, "D", "your points", filled=True)
+    frame(ax, window or _window(points, others, chart), empty=False)
+    legend_above(ax, columns=2)
+
+
+def _draw(ax: Axes, points: Sequence[Barred], colour: str, marker: str, title: str, *, filled: bool) -> None:
+    if not points:
+        return
+    for upright in (True, False):
+        some = [p for p in points if (p.edge != "tip") == upright and p.high > p.low]
+        if some:
+            places = np.array([(p.stiffness, p.damping) for p in some])
+            at = places[:, 1 if upright else 0]
+            ends = np.abs(np.array([(p.low, p.high) for p in some]).T - at)
+            x, y = places.T
+            up, across = (ends, None) if upright else (None, ends)
+            ax.errorbar(x, y, up, across, fmt="none", ecolor=colour, elinewidth=1.0, capsize=2.2, zorder=4.0)
+    ax.plot(
+        [p.stiffness for p in points],
+        [p.damping for p in points],
+        marker=marker,
+        markersize=4.5,
+        markerfacecolor=colour if filled else "white",
+        markeredgecolor=colour,
+        markeredgewidth=1.2,
+        linestyle="none",
+        zorder=5.0,
+        label=title,
+    )
+
+
+def _window(points: Sequence[Barred], others: Sequence[Barred], chart: StabilityChart | None) -> Window:
+    """From K = 0 on: the points with their bars, and what of the chart lies there."""
+    K, B = [0.0], [0.0]
+    for p in (*points, *others):
+        ends = [end for end in (p.low, p.high) if np.isfinite(end)]
+        K += [p.stiffness, *(ends if p.edge == "tip" else [])]
+        B += [p.damping, *([] if p.edge == "tip" else ends)]
+    if chart is not None and chart.regions:
+        # a chart that reaches many times farther would press the points into a corner
+        _, K1, B0, B1 = chart.box
+        K.append(min(K1, 2.5 * max(K)) if max(K) > 0.0 else K1)
+        B += [max(B0, 2.5 * min(B) - max(B)), min(B1, 2.5 * max(B)) if max(B) > 0.0 else B1]
+    spread = max(K) or 1.0, (max(B) - min(B)) or 1.0
+    return -0.04 * spread[0], max(K) + 0.05 * spread[0], min(B) - 0.05 * spread[1], max(B) + 0.05 * spread[1]

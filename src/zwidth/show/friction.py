@@ -1,0 +1,25 @@
+"""The dry friction and the encoder's step that published conditions are told of a device."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import TypedDict
+
+from zwidth.conditions.dry import ground_friction, reading_step
+from zwidth.device.device import Device
+from zwidth.model.plant import Plant
+
+
+class Dry(TypedDict):
+    """Arguments of `conditions.compare`."""
+
+    coulomb_friction: float
+    resolution: float
+
+
+def told_of(device: Device, plant: Plant) -> Dry:
+    """Both numbers of a device's plant; nan where its file does not tell."""
+    return {
+        "coulomb_friction": ground_friction(plant) if device.friction_known else nan,
+        "resolution": reading_step(plant) if device.steps_known else nan,
+    }

@@ -1,0 +1,268 @@
+"""`zwidth experiment`: points, files, subjects, somebody's own points, interruptions, and what cannot be meant."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from tests.cli.cli_run import TWO_MASS, found, refused, zwidth
+from tests.systems import published
+from zwidth.contact.experiment import Place
+from zwidth.show.experiment import numbers, sentences
+from zwidth.study.experiment import Experiment, MeasuredPoint, Plan
+
+FEW = ("--stiffnesses", 2, "--tips", 1)
+DRY = """
+name = "dry"
+[plant]
+mass_kg = 0.1
+[friction]
+coulomb_N = {friction}
+[loop]
+sampling_period_s = 0.001
+[loop.encoder]
+resolution_m = {step}
+"""
+OWN = """stiffness_N_per_m,damping_Ns_per_m,edge,trials
+4000,2.6,lower,4
+4000,20.7,upper,
+7000,9.9748,tip,5
+3000,3,,
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def dry(folder, friction=0.02, step=0.0):
+    (folder / "dry.toml").write_text(DRY.format(friction=friction, step=step))
+    return "dry.toml"
+
+
+def test_points_lie_on_the_exact_boundary_and_can_be_read_again(folder):
+    document = found("experiment", TWO_MASS, *FEW, "--output", "points.csv")
+    points = document["points"]
+    assert [point["edge"] for point in points] == ["lower", "lower", "upper", "upper", "tip"]
+    for point in points:
+        assert point["damping_Ns_per_m"] == pytest.approx(point["exact_damping_Ns_per_m"], abs=3e-3)
+        assert point["stiffness_N_per_m"] == pytest.approx(point["exact_stiffness_N_per_m"], rel=1e-4)
+    assert document["stiffness_max_N_per_m"] == pytest.approx(7133.869, rel=1e-4)
+    assert document["left_out"] == []
+    assert "agree" in document["explanation"][0]
+    assert sorted(os.listdir()) == ["points.csv"]  # the journal is gone
+    with open("points.csv", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["damping_Ns_per_m"]) for row in rows] == [point["damping_Ns_per_m"] for point in points]
+    again = found("experiment", TWO_MASS, *FEW, "--measured", "points.csv")["measured"]
+    assert max(abs(p["deviation_Ns_per_m"]) for p in again) < 3e-3
+
+
+def eigenvalue_edge(low, high):
+    """The damping of the published plant's edge at 4000 N/m, by eigenvalues."""
+    matrix = published().transition_matrix
+    return brentq(lambda B: np.abs(np.linalg.eigvals(matrix(4000.0, B))).max() - 1.0, low, high, xtol=1e-12)
+
+
+def test_own_points_are_held_against_the_exact_edge(folder):
+    Path("own.csv").write_text(OWN)
+    document = found("experiment", TWO_MASS, *FEW, "--measured", "own.csv", "--output", "own.svg")
+    lower, upper, tip, free = document["measured"]
+    assert lower["deviation_Ns_per_m"] == pytest.approx(2.6 - eigenvalue_edge(2.0, 3.0), abs=1e-6)
+    assert upper["deviation_Ns_per_m"] == pytest.approx(20.7 - eigenvalue_edge(21.0, 22.0), abs=1e-6)
+    assert tip["deviation_N_per_m"] == pytest.approx(7000.0 - 7133.869, abs=1e-2)
+    assert free["edge"] is None
+    assert free["deviation_Ns_per_m"] > 0.0
+    assert (lower["trials"], upper["trials"]) == (4, 1)
+    assert Path("own.svg").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("friction", "step", "says", "says_not"),
+    [
+        (2.0, 0.0, "without dry friction fewer walls are stable", "encoder"),
+        (2.0, 1e-8, "without encoder steps no edge tried moves", "agree"),
+        (0.0, 0.0, "agree", "friction"),
+    ],
+)
+def test_the_difference_is_explained_by_what_makes_it(folder, friction, step, says, says_not):
+    document = found("experiment", dry(folder, friction, step), *FEW)
+    text = " ".join(document["explanation"])
+    assert says in text
+    assert says_not not in text
+    people = zwidth("experiment", dry(folder, friction, step), *FEW)
+    assert says in " ".join(people.out.split())
+
+
+def test_a_tip_far_off_is_named_before_edges_that_are_near_and_doubts_are_told():
+    def point(K, B, edge, exact, unsure=False):
+        value = K if edge == "tip" else B
+        seen = ("limit cycle", 1e-4, 90.0, unsure)
+        return MeasuredPoint(K, B, edge, value, value, 1, (value,), exact, *seen)
+
+    edges = (point(2e3, 1.0, "lower", 1.1), point(2e3, 11.0, "upper", 11.0))
+    place = Place(4e3, 5.0, 11.0, True)
+    chart = SimpleNamespace(stiffness_max=4e3)
+
+    def told(*tips):
+        run = Experiment(Plan(), place, (*edges, *tips), 0, (None,), chart, (), 0)
+        return dict(sentences(run, None)), numbers(run, [])["points"]
+
+    far, points = told(point(5e3, 5.0, "tip", 4e3, True))
+    assert far["difference"].startswith("farthest from the exact linear edge is the tip at 5.000 Ns/m")
+    assert "measured 5.000 kN/m, exact 4.000 kN/m, more is stable" in far["difference"]
+    assert far["unsure"].startswith("at 1 tip the verdict changes more than once")
+    assert "--trials" in far["unsure"]
+    assert [p["unsure"] for p in points] == [False, False, True]
+    near, _ = told(point(4.001e3, 5.0, "tip", 4e3))
+    assert near["difference"].startswith("farthest from the exact linear edge is the lower one")
+    assert "unsure" not in near
+
+
+def test_a_run_that_takes_its_time_says_what_it_does(folder, monkeypatch):
+    monkeypatch.setattr("zwidth.show.cli.progress.PATIENCE", 0.0)
+    ran = zwidth("experiment", TWO_MASS, *FEW)
+    assert "looking for stable walls" in ran.err
+    assert "looking" not in ran.out
+
+
+def test_subjects_and_trials_give_bars(folder):
+    asked = ("experiment", TWO_MASS, "--operator", "thesis-arm", "--wall", "one-sided", "--stiffnesses", 1)
+    many = (*asked, "--tips", 0, "--subjects", 2, "--trials", 2, "--spread", 0.5)
+    document = found(*many)
+    lower, upper = document["points"]
+    assert lower["trials"] == 4
+    assert lower["damping_low_Ns_per_m"] < lower["damping_Ns_per_m"] < lower["damping_high_Ns_per_m"]
+    assert len({tuple(subject.values()) for subject in document["subjects"]}) == 2
+    assert found(*many, "--seed", 2)["points"] != document["points"] == found(*many)["points"]
+    assert upper["damping_Ns_per_m"] > 10.0
+
+
+def test_an_interrupted_run_goes_on_where_it_was(folder):
+    """Stopped by ctrl-C once something is on disk; the rest gives the same points bit for bit."""
+    words = ["experiment", TWO_MASS, "--operator", "thesis-arm", "--stiffnesses", "1", "--tips", "0"]
+    words += ["--subjects", "6", "--trials", "3", "--output", "points.csv"]
+    journal, command = folder / "points.csv.progress", [Path(sys.executable).with_name("zwidth"), *words]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    give_up = time.monotonic() + 120.0
+    while time.monotonic() < give_up and not (journal.is_file() and journal.read_bytes().count(b"\n") > 4):
+        time.sleep(0.01)
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=60)
+    assert running.returncode == 130
+    assert "points.csv.progress keeps what is done" in err
+    assert not (folder / "points.csv").exists()
+    kept = journal.read_bytes()
+    assert 4 < kept.count(b"\n") < 38
+    assert zwidth(*words).code == 0
+    assert not journal.exists()
+    resumed = (folder / "points.csv").read_bytes()
+    assert zwidth(*words).code == 0
+    assert (folder / "points.csv").read_bytes() == resumed
+
+
+def test_a_journal_of_ones_own_is_kept_and_a_changed_question_begins_anew(folder):
+    asked = ("experiment", TWO_MASS, *FEW, "--resume", "run.progress")
+    first = found(*asked)["points"]
+    kept = Path("run.progress").read_bytes()
+    start = time.perf_counter()
+    assert found(*asked)["points"] == first
+    assert time.perf_counter() - start < 1.5
+    assert Path("run.progress").read_bytes() == kept
+    assert found(*asked, "--disturbance", 0.002)["points"]
+    assert Path("run.progress").read_bytes() != kept
+
+
+def test_no_stable_wall_is_an_answer(folder):
+    ran = zwidth("experiment", TWO_MASS, *FEW, "--stiffness", "8000,9000", "--damping", "0,30", "--json")
+    assert ran.code == 1
+    assert ran.document["points"] is None
+    assert "no stable wall was found" in ran.document["reason"]
+
+
+def test_a_measured_response_has_nothing_to_disturb(folder):
+    Path("sweep.csv").write_text(
+        "frequency_Hz,real_m_per_N,imag_m_per_N\n" + "".join(f"{f},{-1 / f**2},0\n" for f in range(1, 400))
+    )
+    Path("swept.toml").write_text(
+        'name = "swept"\n[response]\nfile = "sweep.csv"\n[loop]\nsampling_period_s = 0.00125\n'
+    )
+    ran = zwidth("experiment", "swept.toml", "--json")
+    assert ran.code == 1
+    assert ran.document["points"] is None
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("--stiffness", "8000,1000", "--damping", "0,30"), "needs LOW < HIGH"),
+        (("--stiffness", "0,8000"), "give both, or none"),
+        (("--subjects", 0), "subjects"),
+        (("--subjects", 2), "give an operator"),
+        (("--reflex",), "give an operator"),
+        (("--spread", -0.1), "spread"),
+        (("--trials", "many"), "trials"),
+        (("--disturbance", 0), "--disturbance: must be larger"),
+        (("--disturbance", "nan"), "--disturbance: must be finite"),
+        (("--disturbance", 1.5), "--disturbance: must be 1 m or less, got 1.5"),
+        (("--disturbance", 0.01, "--wall", "one-sided"), "--disturbance: is of a two-sided wall"),
+        (("--speed", -200), "--speed: must be 100 m/s or less, got -200"),
+        (("--visible", -1), "--visible: must be finite"),
+        (("--wall", "one-sided", "--push", 0), "--push: must be positive"),
+        (("--push", "inf"), "--push: must be finite"),
+        (("--output", "points.txt"), "must end in"),
+        (("--resume", "notes.txt"), "is not the journal of a run"),
+        (("--resume", "nowhere/run.progress"), "cannot be written"),
+    ],
+)
+def test_what_cannot_be_meant_is_one_line(folder, words, line):
+    Path("notes.txt").write_text("my notes\n")
+    (said,) = refused("experiment", TWO_MASS, *words)
+    assert line in said
+    assert Path("notes.txt").read_text() == "my notes\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("", "is empty"),
+        ("K,B\n1,2\n", "column stiffness_N_per_m is missing"),
+        ("stiffness_N_per_m,damping_Ns_per_m\n", "holds no walls"),
+        ("stiffness_N_per_m,damping_Ns_per_m\n1,nan\n", "line 2: damping_Ns_per_m: must be a finite number"),
+        ("stiffness_N_per_m,damping_Ns_per_m,edge\n1,2,left\n", "edge: must be lower, upper, tip or nothing"),
+        ("stiffness_N_per_m,damping_Ns_per_m,trials\n1,2,0\n", "trials: must be a whole number from 1 on"),
+        (
+            "stiffness_N_per_m,damping_Ns_per_m,damping_low_Ns_per_m\n1,2,x\n",
+            "damping_low_Ns_per_m: must be a finite",
+        ),
+        ("stiffness_N_per_m,damping_Ns_per_m,edge,edge\n1,2,,\n", "column edge is there more than once"),
+        (
+            "stiffness_N_per_m,damping_Ns_per_m,damping_low_Ns_per_m,damping_high_Ns_per_m\n1,5,8,2\n",
+            "damping_low_Ns_per_m: must be at most damping_high_Ns_per_m = 2, got 8",
+        ),
+    ],
+)
+def test_somebody_s_points_are_checked(folder, text, line):
+    Path("own.csv").write_text(text)
+    said = refused("experiment", TWO_MASS, "--measured", "own.csv")
+    assert line in said[0]
+
+
+def test_the_page_s_example_runs(capsys):
+    page = (Path(__file__).parents[2] / "docs" / "experiment.md").read_text(encoding="utf-8")
+    ((program, printed),) = re.findall(r"^```python\n(.*?)^```\n\n```\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    exec(compile(program, "experiment.md", "exec"), {})
+    assert capsys.readouterr().out == printed

@@ -1,0 +1,142 @@
+"""`zwidth limit-cycles`: what is predicted, what the simulation finds there, and when there is no answer."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, refused, strict, zwidth
+from tests.cli.test_cli_docs import PAGE, keys
+from zwidth.contact.limit_cycles import limit_cycles
+from zwidth.device.load import load
+from zwidth.loop.loop import Loop
+
+LIMITED = ("--set", "loop.saturation.force_N=5")
+WALL = ("--stiffness", "8000", "--damping", "10")
+ROUGH = ("--set", "loop.encoder.resolution_m=2e-5", "--set", "friction.coulomb_N=0.03")
+SLIPPERY = ("--set", "friction.coulomb_N=0.01")
+BOTH = (*ROUGH, *LIMITED, "--stiffness", "2600", "--damping", "0")
+
+
+def test_a_limited_force_holds_a_growing_vibration_as_predicted():
+    document = found("limit-cycles", TWO_MASS, *WALL, *LIMITED)
+    assert (document["verdict"], document["nonlinear"]) == ("unstable", ["the force limit"])
+    (cycle,) = document["limit_cycles"]
+    assert cycle["stable"] is True
+    assert cycle["force_N"] > 5.0
+    assert cycle["velocity_m_per_s"] == pytest.approx(6.283185307 * cycle["frequency_Hz"] * cycle["amplitude_m"])
+    met = cycle["simulated"]
+    assert met["behaviour"] == "limit cycle"
+    assert met["amplitude_m"] == pytest.approx(cycle["amplitude_m"], rel=0.01)
+    assert met["frequency_Hz"] == pytest.approx(cycle["frequency_Hz"], rel=0.002)
+    assert "16 odd harmonics" in document["predicted_by"]
+    assert document["resting_limit_N_per_m"] is None
+
+
+def test_the_numbers_are_those_of_the_package():
+    document = found("limit-cycles", ONE_MASS, *BOTH, "--no-simulation")
+    settings = [word for word in (*ROUGH, *LIMITED) if word != "--set"]
+    device = load(ONE_MASS, settings)
+    expected = limit_cycles(Loop(device.plant(), device.controller), 2600.0, 0.0)
+    told = document["limit_cycles"]
+    assert [cycle["amplitude_m"] for cycle in told] == pytest.approx([cycle.amplitude for cycle in expected])
+    assert [cycle["stable"] for cycle in told] == [False, True]
+    assert [cycle["simulated"] for cycle in told] == [None, None]
+    assert document["resting_limit_N_per_m"] == pytest.approx(2.0 * 0.03 / 2e-5)
+    assert document["quiet_limit_N_per_m"] == pytest.approx(2.0 * 0.03 / 2e-5)
+    assert len(document["growth"]["amplitude_m"]) == len(document["growth"]["growth_per_s"])
+
+
+def test_people_read_the_same():
+    out = " ".join(zwidth("limit-cycles", ONE_MASS, *BOTH).out.split())
+    assert "2.600 kN/m, 0 Ns/m: unstable if linear" in out
+    assert "not linear dry friction, encoder steps, the force limit" in out
+    assert "rests under every push on walls up to 3.000 kN/m" in out
+    assert "450.8 µm 46.51 Hz" in out
+    assert "stable: what is seen limit cycle, 2.778 mm" in out
+    assert "leaves out" not in out
+
+
+def test_between_two_counts_beyond_the_resting_limit_it_hunts():
+    document = found(
+        "limit-cycles", ONE_MASS, *ROUGH, "--stiffness", 4500, "--damping", 0, "--offset", 0.5, *SLIPPERY
+    )
+    assert document["offset_steps"] == 0.5
+    (cycle,) = [cycle for cycle in document["limit_cycles"] if cycle["stable"]]
+    assert cycle["simulated"]["behaviour"] == "limit cycle"
+    assert 0.5 < cycle["simulated"]["amplitude_m"] / cycle["amplitude_m"] < 2.0
+
+
+def test_where_nothing_is_predicted_a_start_some_counts_off_is_simulated():
+    document = found("limit-cycles", ONE_MASS, *ROUGH, "--stiffness", 500, "--damping", 1)
+    assert document["limit_cycles"] == []
+    assert document["otherwise"]["behaviour"] == "converged"
+    assert document["otherwise"]["start_m"] == pytest.approx(1e-4)
+    assert (
+        "no limit cycle is predicted"
+        in zwidth("limit-cycles", ONE_MASS, *ROUGH, "--stiffness", 500, "--damping", 1, "--no-simulation").out
+    )
+
+
+def test_a_linear_device_has_no_answer_and_hears_what_to_add(tmp_path):
+    file = tmp_path / "cycles.csv"
+    ran = zwidth("limit-cycles", TWO_MASS, *WALL, "--json", "--output", file)
+    assert ran.code == 1
+    document = strict(ran.out)
+    assert document["limit_cycles"] is None
+    for key in ("friction.coulomb_N", "loop.encoder.resolution_m", "loop.saturation.force_N"):
+        assert key in document["reason"]
+    assert not file.exists()
+    assert "mechanism.drives.*.coulomb_Nm" in zwidth("limit-cycles", MECHANISM, *WALL).err
+    assert zwidth("limit-cycles", MECHANISM, *WALL, *LIMITED, "--at", "5,5").code == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--offset", "0.5"), "no encoder steps"),
+        (("--offset", "2"), "from -0.5 up to 0.5"),
+        (("--plane", "plane.png"), "no encoder steps"),
+        (("--plane", "plane.csv"), "plane.csv"),
+        ((*ROUGH[:2], "--plane", "plane.png", "--stiffness", "-1"), "positive stiffness"),
+        (("--plane", "same.png", "--output", "same.png"), "name another"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_in_one_line(words, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (line,) = refused("limit-cycles", TWO_MASS, *WALL, *LIMITED, *words)
+    assert said in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_simulation_that_vibrates_otherwise_is_said_to():
+    """Far beyond the edge the slow vibration wins, which a sinus that grows fastest does not show."""
+    ran = zwidth(
+        "limit-cycles", TWO_MASS, *LIMITED, "--set", "loop.delay_samples=0.5", "--stiffness", 7000, "--damping", 10
+    )
+    assert "vibrates otherwise than predicted" in ran.out
+    assert "otherwise" not in zwidth("limit-cycles", TWO_MASS, *WALL, *LIMITED).out
+
+
+def test_files(tmp_path):
+    table, figure, plane = tmp_path / "cycles.csv", tmp_path / "growth.svg", tmp_path / "plane.svg"
+    words = ("limit-cycles", ONE_MASS, *BOTH, "--no-simulation")
+    document = found(*words, "--output", table, "--plane", plane)
+    assert document["plane_file"] == str(plane)
+    with table.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["amplitude_m"]) for row in rows] == [
+        cycle["amplitude_m"] for cycle in document["limit_cycles"]
+    ]
+    assert [row["stable"] for row in rows] == ["false", "true"]
+    found(*words, "--output", figure)
+    assert "<svg" in figure.read_text()
+    assert "<svg" in plane.read_text()
+
+
+def test_the_keys_that_come_out_are_those_explained():
+    document = found("limit-cycles", ONE_MASS, *BOTH)
+    last = document["limit_cycles"][-1]
+    assert {*document, *last, "plane_file"} - keys("What comes out") == keys("limit-cycles")
+    assert all(f"`{key}`" in PAGE for key in (*last["simulated"], *document["growth"]))

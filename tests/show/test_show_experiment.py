@@ -1,0 +1,56 @@
+"""The figure of a measured boundary: points, bars along what was bisected, the exact chart, labelled axes."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.collections import LineCollection
+
+from tests.systems import published
+from zwidth.chart.chart import stability_chart
+from zwidth.show.figures.experiment import Barred, draw_experiment
+from zwidth.show.figures.style import figure
+
+POINTS = [
+    Barred(4000.0, 2.4, "lower", 2.2, 2.7),
+    Barred(4000.0, 21.7, "upper", 21.7, 21.7),
+    Barred(7100.0, 10.0, "tip", 6900.0, 7300.0),
+]
+OWN = [Barred(3000.0, 25.0, "upper", np.nan, np.nan)]
+
+
+def drawn(chart=None, own=()):
+    made, ax = figure()
+    draw_experiment(ax, POINTS, chart, own)
+    made.canvas.draw()
+    return ax
+
+
+def test_bars_run_along_what_was_bisected_and_only_where_trials_differ():
+    bars = [c.get_segments()[0] for c in drawn().collections if isinstance(c, LineCollection)]
+    assert sorted(np.round(bar, 6).tolist() for bar in bars) == [
+        [[4000.0, 2.2], [4000.0, 2.7]],
+        [[6900.0, 10.0], [7300.0, 10.0]],
+    ]
+
+
+def test_axes_legend_and_window():
+    ax = drawn(stability_chart(published(), decay=False), OWN)
+    assert ax.get_xlabel() == "Virtual stiffness K [kN/m]"
+    assert ax.get_ylabel() == "Virtual damping B [Ns/m]"
+    told = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert told == [
+        "stable, exact and linear",
+        "lower edge, damping bisected",
+        "upper edge, damping bisected",
+        "tip, stiffness bisected",
+        "your points",
+    ]
+    assert ax.get_xlim()[1] > 7300.0
+    assert ax.get_ylim()[0] < 0.0 < 28.5 < ax.get_ylim()[1]
+    assert ax.get_legend().get_window_extent().x1 <= ax.figure.bbox.x1
+
+
+def test_a_device_without_a_chart_shows_its_points():
+    ax = drawn()
+    assert not ax.patches
+    assert [line.get_label() for line in ax.lines if not line.get_label().startswith("_")] != []

@@ -1,0 +1,68 @@
+"""Figures of limit cycles and of the friction-quantisation plane: what stands on the axes is what was computed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.show.test_show_felt import texts
+from tests.systems import mass
+from zwidth.contact.limit_cycles import harmonic_balance
+from zwidth.contact.plane import device_plane
+from zwidth.loop.controller import Controller
+from zwidth.loop.loop import Loop
+from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+from zwidth.show.figures.limit_cycles import draw_balance, draw_plane
+from zwidth.show.figures.style import figure
+
+LOOP = Loop(mass(0.1, 0.1), Controller(0.001))
+ROUGH = Nonlinear((Friction(np.ones(1), 0.02),), (Counter(np.ones(1), 2e-5),))
+
+
+def test_growth_is_seen_on_both_sides_of_zero_and_cycles_are_named():
+    found = harmonic_balance(LOOP, 400.0, 0.0, coulomb_friction=0.01, saturation=1.0)
+    made, ax = figure()
+    draw_balance(ax, found)
+    swings = np.isfinite(found.growth)
+    assert ax.lines[0].get_ydata()[swings] == pytest.approx(found.growth[swings])
+    small, large = (cycle.amplitude for cycle in found.cycles)
+    assert texts(ax)[1].startswith("larger ones grow, smaller ones die: 2.02 mm, 10.1 Hz")
+    assert texts(ax)[2].startswith("stable limit cycle: ")
+    left, right = ax.get_xlim()
+    assert left <= small / 50.0 < 50.0 * large <= right
+    low, high = ax.get_ylim()
+    assert low < 0.0 < np.max(found.growth) < high
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("Amplitude [m]", "Growth rate [1/s]")
+    made.draw_without_rendering()
+
+
+def test_without_a_cycle_all_amplitudes_are_drawn():
+    found = harmonic_balance(LOOP, 100.0, 0.0, saturation=1.0)
+    assert found.cycles == ()
+    made, ax = figure()
+    draw_balance(ax, found)
+    swings = found.amplitude[np.isfinite(found.growth)]
+    assert ax.get_xlim() == (swings[0], swings[-1])
+    assert texts(ax)[-1] == "no limit cycle"
+    assert ax.get_ylim()[0] < np.nanmin(found.growth[np.isfinite(found.growth)]) < 0.0 < ax.get_ylim()[1]
+    made.draw_without_rendering()
+
+
+@pytest.mark.parametrize(
+    ("damping", "said"), [(0.1, "the device, by wall stiffness"), (0.0, "the device has no viscous friction")]
+)
+def test_the_device_stands_in_the_plane_where_it_is(damping, said):
+    loop = Loop(replace(mass(0.1, damping), nonlinear=ROUGH), Controller(0.001))
+    found = device_plane(loop, [100.0, 200.0, 1000.0])
+    made, ax = figure()
+    draw_plane(ax, found)
+    assert texts(ax)[0].startswith(said)
+    device = ax.lines[-1]
+    assert device.get_ydata() == pytest.approx(found.sigma)
+    assert device.get_xdata() == pytest.approx(np.maximum(found.beta, ax.get_xlim()[0]))
+    named = [text.get_text().replace("\u00a0", " ") for text in ax.texts]
+    assert named[-3:] == ["100 N/m", "200 N/m", "1.00 kN/m"]
+    assert {"passive", "small vibrations", "large vibrations"} < set(named)
+    made.draw_without_rendering()
