@@ -55,6 +55,19 @@ def write_figure(draw: Callable[..., None], name: str) -> None:
     print(save(made, folder / f"{name}.png"))
 
 
+def write_page(draw: Callable[..., None], name: str, width: float, height: float) -> None:
+    """The same for `draw(figure)`, which places its own axes; width and height in inches."""
+    from zwidth.show.figures.style import context, figure, save
+
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+    folder.mkdir(parents=True, exist_ok=True)
+    made, ax = figure(width, height)
+    ax.remove()
+    with context():
+        draw(made)
+    print(save(made, folder / f"{name}.png"))
+
+
 def label_dimensionless(ax) -> None:
     """p and d on the axes instead of N/m and N s/m."""
     from matplotlib.ticker import ScalarFormatter

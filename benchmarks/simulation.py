@@ -1,0 +1,114 @@
+"""Simulation against real time: the published two masses at a wall, with friction, encoder and force limit.
+
+Ours on one core, MuJoCo at the same step, and an ODE solver that locates every change between sticking and
+sliding. All three must agree on the size of the motion. Then a thousand walls on all cores, and what
+`simulation_mechanism.py` and `simulation_experiment.py` print.
+
+Run `python benchmarks/simulation.py`.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+import numba
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from benchmarks._simulators import Bench, by_events, by_mujoco
+from benchmarks._timing import machine, print_table, seconds
+from zwidth.contact.environments import wall
+from zwidth.contact.simulate import Run, simulate_batch
+from zwidth.device.load import load
+from zwidth.loop.loop import Loop
+from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+
+STIFFNESS, DAMPING, START, SUBSTEPS = 6000.0, 12.0, 0.003, 20
+FRICTION, STEP, LIMIT = 0.1, 1e-5, 20.0
+
+
+def prepared() -> tuple[Loop, Bench]:
+    """The device for us and for the others."""
+    device = load("published-two-mass")
+    plant, controller = device.plant(), device.controller
+    own = Nonlinear((Friction(plant.actuator, FRICTION),), (Counter(plant.sensor, STEP),), force_limit=LIMIT)
+    masses, stiffness = np.diag(plant.mass), -plant.stiffness[0, 1]
+    motor = int(np.argmax(plant.actuator))
+    damping = -plant.damping[0, 1]
+    numbers = (masses[1 - motor], masses[motor], stiffness, damping, FRICTION, STEP, LIMIT)
+    return Loop(replace(plant, nonlinear=own), controller), Bench(*map(float, numbers), controller.sampling_period)
+
+
+def ours(loop: Loop, duration: float, walls: int = 1, repeats: int = 7):
+    """Readings of the first run, and the median seconds."""
+    values = [wall.values(stiffness=K, damping=DAMPING) for K in np.linspace(STIFFNESS, 0.5 * STIFFNESS, walls)]
+    runs = [Run(loop, own, start_position=START) for own in values]
+    times = []
+    for _ in range(repeats + 1):
+        begun = perf_counter()
+        found = simulate_batch(runs, wall, duration=duration, substeps=SUBSTEPS)
+        times.append(perf_counter() - begun)
+    return found[0].truth, median(times[1:])
+
+
+def swing(readings: np.ndarray, period: float) -> str:
+    """Root mean square from 0.05 s to 0.25 s, in micrometres."""
+    part = readings[round(0.05 / period) : round(0.25 / period)]
+    return f"{1e6 * np.sqrt(np.mean(part**2)):.4g} µm"
+
+
+def simulators() -> tuple[list[tuple[str, ...]], list[str]]:
+    """Rows of the table, and what follows from it."""
+    loop, bench = prepared()
+    T = bench.period
+    numba.set_num_threads(1)
+    fine, own = ours(loop, 60.0)
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    readings, muj = by_mujoco(bench, STIFFNESS, DAMPING, START, round(4.0 / T), SUBSTEPS)
+    located, ode = by_events(bench, STIFFNESS, DAMPING, START, round(0.5 / T))
+    _, batch = ours(loop, 2.0, 1000, 3)
+    cores = numba.get_num_threads()
+    found = [
+        ("zwidth, one core", 60.0, own, swing(fine, T)),
+        ("MuJoCo, the same step", 4.0, muj, swing(readings, T)),
+        ("solve_ivp with events", 0.5, ode, swing(located, T)),
+        (f"zwidth, 1000 walls, {cores} core{'s' * (cores > 1)}", 2000.0, batch, ""),
+    ]
+    rows = [
+        (
+            name,
+            f"{length:g} s",
+            seconds(took),
+            f"{length / took:.4g}",
+            f"{(took / length) / (own / 60.0):.3g}",
+            size,
+        )
+        for name, length, took, size in found
+    ]
+    ratio = (muj / 4.0) / (own / 60.0)
+    says = [
+        f"times real time on one core, {SUBSTEPS} substeps: {60.0 / own:.0f} (at least 2000 wanted)",
+        f"faster than MuJoCo at the same step: {ratio:.1f} (at least 50 wanted)",
+    ]
+    return rows, says
+
+
+def main() -> None:
+    print(machine("numpy", "numba", "scipy", "mujoco"))
+    rows, says = simulators()
+    head = ("simulator", "simulated", "took", "times real time", "time to ours", "rms motion, 0.05 to 0.25 s")
+    print_table(head, rows)
+    print("\n".join(says))
+    for name in ("simulation_mechanism", "simulation_experiment"):
+        if (Path(__file__).parent / f"{name}.py").is_file():
+            import_module(f"benchmarks.{name}").main()
+
+
+if __name__ == "__main__":
+    main()

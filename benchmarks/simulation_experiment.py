@@ -1,0 +1,47 @@
+"""How long a measured stability boundary takes: 40 points of the published two-mass plant, and how right they are.
+
+Run `python benchmarks/simulation_experiment.py`.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from time import perf_counter
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from benchmarks._timing import machine, print_table, seconds
+from zwidth.contact.bench import Bench, observe
+from zwidth.device.load import load
+from zwidth.loop.loop import Loop
+from zwidth.study.experiment import measure
+
+TARGET = 10.0  # s
+
+
+def experiment() -> list[tuple[str, ...]]:
+    """Rows: what, time, the largest distance from the exact edge in shares of the widest range."""
+    device = load("published-two-mass")
+    loop = Loop(device.plant(held=False), device.controller)
+    observe(Bench(loop), [[1000.0, 5.0]])  # compiles
+    start = perf_counter()
+    found = measure(loop)
+    taken = perf_counter() - start
+    assert len(found.points) == 40
+    edges = [point for point in found.points if point.edge != "tip"]
+    width = max(p.damping for p in edges) - min(p.damping for p in edges)
+    worst = max(abs(p.damping - p.exact) for p in edges) / width
+    tip = max(abs(p.stiffness / p.exact - 1.0) for p in found.points if p.edge == "tip")
+    assert taken <= TARGET, f"{taken:.1f} s"
+    return [("40 boundary points, two-sided", seconds(taken), f"{worst:.1e} of the range; tips {tip:.1e}")]
+
+
+def main() -> None:
+    print(machine("numpy", "numba"))
+    print_table(("virtual experiment", "time", "from the exact edge"), experiment())
+    print(f"target: {TARGET:g} s on two cores")
+
+
+if __name__ == "__main__":
+    main()
