@@ -15,7 +15,7 @@ from zwidth.model.posture import Posture
 
 @dataclass(frozen=True)
 class EffectiveParameters:
-    """Along one direction u, with h = J^T u; all with the posture's leading axes, nan where it is not OK.
+    """Along one direction u, with h = J^T u; all with the leading axes of posture and direction, nan where not OK.
 
     link_side_mass   (...)  1 / (h^T M_phi^-1 h): links with the drives cut          (thesis eq. 2.28) [kg]
     motor_side_mass  (...)  1 / (h^T M_theta^-1 h): rotors with the drives cut       (thesis eq. 2.28) [kg]
@@ -34,35 +34,46 @@ class EffectiveParameters:
 def effective_parameters(mechanism: Mechanism, posture: Posture, direction: ArrayLike) -> EffectiveParameters:
     """Effective masses and stiffness of a mechanism along a direction.
 
-    direction  (3,)  unit vector in the base frame
-    Raises     ValueError  if the direction is not of unit length
+    direction  (..., 3)  unit vectors in the base frame, broadcasting with the posture
+    Raises     ValueError  if a direction is not of unit length
     """
-    u = unit_direction(direction)
+    u = unit_directions(direction)
     drives = mechanism.drives
     ratio = per_design(mechanism, drives.transmission, 1)
     rotor = ratio**2 * per_design(mechanism, drives.motor_inertia, 1)
     spring = ratio**2 * per_design(mechanism, drives.stiffness, 1)
-    shape = posture.status.shape
+    shape = np.broadcast_shapes(posture.status.shape, u.shape[:-1])
     design = (
         np.broadcast_to(np.arange(len(rotor)).reshape(design_shape(mechanism)), shape).ravel().astype(np.int64)
     )
     d = rotor.shape[1]
-    M, J = posture.mass_matrix.reshape(-1, d, d), posture.jacobian.reshape(-1, 3, d)
+    M = np.broadcast_to(posture.mass_matrix, (*shape, d, d)).reshape(-1, d, d)
+    J = np.broadcast_to(posture.jacobian, (*shape, 3, d)).reshape(-1, 3, d)
     out = np.empty((4, len(M)))
-    _effective_batch(design, M, J, u, rotor, spring, out)
+    _effective_batch(design, M, J, np.array(np.broadcast_to(u, (*shape, 3)).reshape(-1, 3)), rotor, spring, out)
     return EffectiveParameters(*(row.reshape(shape) for row in out))
 
 
 def unit_direction(direction: ArrayLike) -> Floats:
     """The direction as an array (3,), checked to be of unit length."""
-    u = np.asarray(direction, dtype=np.float64)
+    u = unit_directions(direction)
     if u.shape != (3,):
         raise ValueError(f"a rendered direction has three components, got an array of shape {u.shape}")
-    length = float(np.linalg.norm(u))
-    if not length > 0.0:
-        raise ValueError(f"the rendered direction {u.tolist()} has no length; give it at least one component")
-    if abs(length - 1.0) > 1e-9:
-        raise ValueError(f"the rendered direction {u.tolist()} has length {length:.6g}; divide it by its length")
+    return u
+
+
+def unit_directions(directions: ArrayLike) -> Floats:
+    """Directions as an array (..., 3), each checked to be of unit length."""
+    u = np.asarray(directions, dtype=np.float64)
+    if u.ndim == 0 or u.shape[-1] != 3:
+        raise ValueError(f"a rendered direction has three components, got an array of shape {u.shape}")
+    length = np.linalg.norm(u, axis=-1)
+    wrong = np.argwhere(~(np.abs(length - 1.0) <= 1e-9))
+    if len(wrong):
+        first, size = u[tuple(wrong[0])].tolist(), float(length[tuple(wrong[0])])
+        if not size > 0.0:
+            raise ValueError(f"the rendered direction {first} has no length; give it at least one component")
+        raise ValueError(f"the rendered direction {first} has length {size:.6g}; divide it by its length")
     return u
 
 
@@ -92,7 +103,7 @@ def _effective_batch(
         p = design[i]
         motor, compliance = 0.0, 0.0
         for s in range(d):
-            h[s] = u[0] * J[i, 0, s] + u[1] * J[i, 1, s] + u[2] * J[i, 2, s]
+            h[s] = u[i, 0] * J[i, 0, s] + u[i, 1] * J[i, 1, s] + u[i, 2] * J[i, 2, s]
             motor += h[s] * h[s] / rotor[p, s]
             compliance += h[s] * h[s] / spring[p, s]
         for both in range(2):

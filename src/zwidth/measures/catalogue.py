@@ -1,0 +1,220 @@
+"""All measures by name. What computes them is imported when it is first asked."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Final
+
+from zwidth.measures.measure import Better, Measure
+
+_BINDINGS: Final = "zwidth.measures.bindings"
+
+
+def _of(
+    file: str,
+    name: str,
+    title: str,
+    unit: str,
+    better: Better | None,
+    source: str,
+    *,
+    each: bool = False,
+    along: bool = True,
+) -> Measure:
+    return Measure(name, title, unit, better, source, f"{_BINDINGS}.{file}:{name}", each, along)
+
+
+_YOSHIKAWA = "Yoshikawa 1985"
+_MEASURES: Final = (
+    # what the mechanism is
+    _of(
+        "dexterity",
+        "manipulability",
+        "Manipulability",
+        "m^r/rad^r",
+        "higher",
+        f"{_YOSHIKAWA}; thesis eq. 5.1",
+        along=False,
+    ),
+    _of(
+        "dexterity",
+        "isotropy",
+        "Condition number of the Jacobian",
+        "",
+        "lower",
+        "Salisbury and Craig 1982; thesis eq. 5.2",
+        along=False,
+    ),
+    _of(
+        "dexterity",
+        "isotropy_frobenius",
+        "Condition number of the Jacobian, Frobenius",
+        "",
+        "lower",
+        "thesis eq. 5.2, Frobenius norm",
+        along=False,
+    ),
+    _of(
+        "dexterity",
+        "dynamic_manipulability",
+        "Dynamic manipulability",
+        "1/(kg m)^r",
+        "higher",
+        f"{_YOSHIKAWA}; thesis eq. 5.3",
+        along=False,
+    ),
+    _of(
+        "dexterity",
+        "dynamic_isotropy",
+        "Condition number of the inertia matrix",
+        "",
+        "lower",
+        "Ma and Angeles 1993; thesis 5.1",
+        along=False,
+    ),
+    _of("dexterity", "link_side_mass", "Link-side mass", "kg", None, "thesis eq. 2.28"),
+    _of("dexterity", "motor_side_mass", "Motor-side mass", "kg", None, "thesis eq. 2.28"),
+    _of("dexterity", "rigid_mass", "Rigid mass of links and rotors", "kg", None, "Khatib 1987; thesis eq. 2.18"),
+    _of("dexterity", "stiffness", "Structural stiffness", "N/m", "higher", "thesis eq. 2.34"),
+    # which walls it can render
+    _of("impedance", "stiffness_max", "Largest virtual stiffness", "N/m", "higher", "exact, by D-decomposition"),
+    _of(
+        "impedance",
+        "damping_max",
+        "Largest virtual damping",
+        "N s/m",
+        "higher",
+        "exact, by D-decomposition",
+        each=True,
+    ),
+    _of(
+        "impedance",
+        "stable_area",
+        "Area of stable walls",
+        "N^2 s/m^2",
+        "higher",
+        "exact, by D-decomposition",
+        each=True,
+    ),
+    _of(
+        "impedance",
+        "fastest_decay",
+        "Smallest spectral radius of all walls",
+        "",
+        "lower",
+        "exact, by D-decomposition",
+        each=True,
+    ),
+    _of(
+        "impedance",
+        "stiffness_max_closed_form",
+        "Largest virtual stiffness, closed form",
+        "N/m",
+        "higher",
+        "thesis eq. 5.4, 5.6, 5.7",
+    ),
+    _of(
+        "impedance",
+        "damping_max_closed_form",
+        "Largest virtual damping, closed form",
+        "N s/m",
+        "higher",
+        "thesis eq. 5.4, 5.6, 5.7",
+    ),
+    _of(
+        "impedance",
+        "stable_area_closed_form",
+        "Area of stable walls, closed form",
+        "N^2 s/m^2",
+        "higher",
+        "thesis eq. 5.5, 5.8",
+    ),
+    # how a wanted wall feels
+    _of("fidelity", "optimal_spectral_radius", "Optimal spectral radius", "", "lower", "thesis eq. 5.15"),
+    _of("fidelity", "optimal_motor_side_mass", "Optimal motor-side mass", "kg", None, "thesis eq. 5.14"),
+    _of(
+        "fidelity",
+        "spectral_radius",
+        "Spectral radius at the wanted wall",
+        "",
+        "lower",
+        "thesis eq. 2.40",
+        each=True,
+    ),
+    _of(
+        "fidelity",
+        "decay_time",
+        "Time in which vibration at the wanted wall decays to 1/e",
+        "s",
+        "lower",
+        "T / -ln of the spectral radius",
+        each=True,
+    ),
+    _of(
+        "fidelity",
+        "structural_distortion",
+        "Structural deformation ratio",
+        "",
+        "lower",
+        "Moreyra and Hannaford 1998",
+    ),
+    _of(
+        "fidelity",
+        "felt_stiffness",
+        "Stiffness felt at the wanted wall",
+        "N/m",
+        "higher",
+        "docs/felt.md",
+        each=True,
+    ),
+    _of(
+        "fidelity",
+        "free_motion_force",
+        "Force per velocity felt in free motion",
+        "N s/m",
+        "lower",
+        "docs/felt.md",
+        each=True,
+    ),
+    # what its motors and encoders give
+    _of("forces", "peak_force", "Peak force", "N", "higher", "J^T f within the drives' torque limits"),
+    _of(
+        "forces",
+        "continuous_force",
+        "Continuous force",
+        "N",
+        "higher",
+        "J^T f within the drives' continuous torques",
+    ),
+    _of(
+        "forces",
+        "acceleration_max",
+        "Largest acceleration",
+        "m/s^2",
+        "higher",
+        "J M^-1 tau within the drives' torque limits",
+    ),
+    _of(
+        "forces",
+        "position_resolution",
+        "Position resolution",
+        "m",
+        "lower",
+        "sum of |u^T J_i| over the encoders' steps",
+    ),
+)
+
+MEASURES: Final = {measure.name: measure for measure in _MEASURES}
+
+
+def find_measure(name: str) -> Measure:
+    """The measure of that name. Raises ValueError, naming the nearest, if there is none.
+
+    >>> find_measure("stiffness_max").unit
+    'N/m'
+    """
+    if name in MEASURES:
+        return MEASURES[name]
+    near = get_close_matches(name, MEASURES, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(MEASURES)}"
+    raise ValueError(f"no measure is named {name!r}; {hint}")

@@ -1,0 +1,106 @@
+"""Measures over places: values where there are any, and what became of the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.region import ChartError
+from zwidth.loop.estimator import NonlinearError
+from zwidth.loop.sections import HysteresisError, UnmovedError
+from zwidth.measures.measure import (
+    FAILED,
+    NO_VALUE,
+    OK,
+    UNDECIDED,
+    Measure,
+    Measured,
+    MeasureError,
+    Note,
+    NoValueError,
+)
+from zwidth.measures.place import Place
+from zwidth.model.reduction import ModelError
+
+NONE = (NoValueError, ModelError, UnmovedError, HysteresisError, NonlinearError)
+
+
+def evaluate(measure: Measure, place: Place) -> Measured:
+    """A measure's values in all places, nan with a status where it has none.
+
+    What a measure raises, or returns in another shape, in one place is that place's status FAILED with a note: the
+    others keep their values.
+    Raises  MeasureError  where it cannot be asked of this device at all
+    """
+    if measure.each:
+        return _one_by_one(measure, place)
+    try:
+        found = measure.compute(place)
+    except MeasureError:
+        raise
+    except Exception as error:  # of a user's own measure, too
+        return _everywhere(place, FAILED, _said(error))
+    if isinstance(found, Measured):
+        return found
+    values = np.asarray(found, dtype=np.float64)
+    if values.shape != place.shape:
+        return _everywhere(place, FAILED, f"returned an array of shape {values.shape} for places of {place.shape}")
+    return _with_status(values, place.status)
+
+
+def _with_status(values: NDArray[np.float64], status: NDArray[np.uint8]) -> Measured:
+    none = (status == OK) & np.isnan(values)
+    status = np.where(none, NO_VALUE, status).astype(np.uint8)
+    notes = (_note(none, NO_VALUE, "has no value here"),) if none.any() else ()
+    return Measured(np.where(status == OK, values, np.nan), status, notes)
+
+
+def _everywhere(place: Place, status: int, reason: str) -> Measured:
+    failed = place.status == OK
+    told = (_note(failed, status, reason),) if failed.any() else ()
+    return Measured(np.full(place.shape, np.nan), np.where(failed, status, place.status).astype(np.uint8), told)
+
+
+def _note(places: NDArray[np.bool_], status: int, reason: str) -> Note:
+    return Note(status, reason, int(places.sum()), tuple(int(i) for i in np.argwhere(places)[0]))
+
+
+def _one_by_one(measure: Measure, place: Place) -> Measured:
+    values, status = np.full(place.shape, np.nan), place.status.copy()
+    seen: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
+    for index in np.ndindex(place.shape):
+        if status[index] != OK:
+            continue
+        values[index], status[index], reason = answered(lambda: measure.compute(place.at(*index)))  # noqa: B023
+        if reason:
+            key = (int(status[index]), reason)
+            count, first = seen.get(key, (0, index))
+            seen[key] = (count + 1, first)
+    return Measured(values, status, tuple(Note(*key, *rest) for key, rest in seen.items()))
+
+
+def answered(ask: Callable[[], Any]) -> tuple[float, int, str]:
+    """Value, status and reason of one question; only a MeasureError is raised."""
+    try:
+        found = ask()
+        value = np.asarray(found, dtype=np.float64)
+    except MeasureError:
+        raise
+    except NONE as error:
+        return float("nan"), NO_VALUE, str(error)
+    except ChartError as error:
+        return float("nan"), UNDECIDED, str(error)
+    except Exception as error:
+        return float("nan"), FAILED, _said(error)
+    if value.shape != ():
+        return float("nan"), FAILED, f"returned an array of shape {value.shape} instead of one number"
+    if np.isnan(value):
+        return float("nan"), NO_VALUE, "has no value here"
+    return float(value), OK, ""
+
+
+def _said(error: Exception) -> str:
+    return f"raised {type(error).__name__}: {str(error).splitlines()[0] if str(error) else 'without a word'}"
