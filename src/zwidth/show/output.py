@@ -13,7 +13,7 @@ from typing import Any, Final
 
 DATA: Final = (".csv", ".json")
 FIGURES: Final = (".png", ".svg", ".pdf")
-LATER: Final = (".nc", ".mat")
+ARRAYS: Final = (".nc", ".mat")  # what `dataset.write_dataset` writes: maps and sweeps
 
 
 class OutputError(Exception):
@@ -68,8 +68,8 @@ def destination(file: str | os.PathLike[str], kinds: Collection[str]) -> Path:
     name = os.fspath(file)
     ending = Path(name).suffix.lower()
     if ending not in kinds:
-        later = f"{ending} is not supported yet: the name " if ending in LATER else ""
-        raise OutputError(f"{shown(name)}: {later}must end in {' or '.join(kinds)}")
+        other = f"{ending} is for maps and sweeps: the name " if ending in ARRAYS else ""
+        raise OutputError(f"{shown(name)}: {other}must end in {' or '.join(kinds)}")
     try:
         path = Path(os.path.realpath(name))
         _check_place(path, name)
