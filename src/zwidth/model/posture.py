@@ -14,6 +14,7 @@ from zwidth.model.bias import bias_batch
 from zwidth.model.continuation import ASSEMBLED, OK, OUT_OF_REACH, SINGULAR, assemble_batch
 from zwidth.model.mechanism import Floats, Ints, Mechanism
 from zwidth.model.mobility import check_mobility
+from zwidth.model.roadmap import roadmap
 from zwidth.model.tree import place, workspace
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "Singular",
     "inertia_terms",
     "link_points",
+    "reachable_positions",
     "solve_posture",
 ]
 
@@ -119,10 +121,7 @@ def solve_posture(mechanism: Mechanism, position: ArrayLike, assembly: str | Non
     closed = np.flatnonzero(gaps.max(axis=1, initial=0.0) <= ASSEMBLED * mech.size)
     uncontrolled = check_mobility(mechanism, mech, int(closed[0]), reference[closed[0]]) if len(closed) else None
     if uncontrolled and not shape:
-        raise Singular(
-            f"assembly {name!r} of the mechanism is singular wherever its handle is: {uncontrolled}; choose "
-            "another assembly, or change the places of joints that make it so"
-        )
+        raise _throughout(name, uncontrolled)
     singular = uncontrolled and not designs  # of several designs another may be in control
     solved = nowhere(mech, len(goals)) if singular else solve(mech, design, reference, goals)
     n, d = mech.parent.size, mech.driven
@@ -138,6 +137,26 @@ def solve_posture(mechanism: Mechanism, position: ArrayLike, assembly: str | Non
     if not shape:
         _check_single(posture, mechanism.reference_position)
     return posture
+
+
+def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Floats:
+    """Handle positions all over what an assembly reaches without passing a singularity, (K, 3) [m].
+
+    The nodes of its roadmap: a few degrees of a drive from one to the next, and as much away from the edge.
+    Raises    LoopOpen    if the loops do not close near the assembly's angles
+              Singular    where the assembly is singular throughout
+              ValueError  for an unknown assembly, or a batch of designs
+    """
+    name = _assembly_name(mechanism, assembly)
+    if design_shape(mechanism):
+        raise ValueError("what can be reached is asked of one design at a time")
+    mech = pack(mechanism)
+    reference, gaps = _references(mechanism, mech, name)
+    _check_loops(mechanism, mech, name, gaps[0])
+    uncontrolled = check_mobility(mechanism, mech, 0, reference[0])
+    if uncontrolled:
+        raise _throughout(name, uncontrolled)
+    return roadmap(mech, 0, reference[0]).position
 
 
 def inertia_terms(mechanism: Mechanism, posture: Posture, driven_rates: ArrayLike) -> Floats:
@@ -196,6 +215,13 @@ def _references(mechanism: Mechanism, mech: Arrays, name: str) -> tuple[Floats, 
         assemble_batch(mech, missed, goals[missed], False, freed, left)
         reference[missed], gaps[missed] = freed, left
     return reference, gaps
+
+
+def _throughout(name: str, uncontrolled: str) -> Singular:
+    return Singular(
+        f"assembly {name!r} of the mechanism is singular wherever its handle is: {uncontrolled}; choose "
+        "another assembly, or change the places of joints that make it so"
+    )
 
 
 def _assembly_name(mechanism: Mechanism, assembly: str | None) -> str:

@@ -1,0 +1,216 @@
+"""A plane of the workspace with a grid over it: where a map asks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.device import Device
+from zwidth.model.mechanism import Mechanism
+from zwidth.model.posture import reachable_positions
+
+Floats = NDArray[np.float64]
+
+AXES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+LONG_SIDE: Final = 81  # points along the longer side where nothing is said
+FLAT: Final = 1e-9  # share of its spread below which what a handle reaches is flat
+PARALLEL: Final = 1e-6  # sine of the angle below which two axes are one
+
+
+class PlaneError(ValueError):
+    """A plane on which no map can be drawn; the text says why, and what can be reached."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A grid of positions on a plane.
+
+    A position's coordinates are its components along the axes: on xy they are the base frame's own x and y.
+
+    first, second  (3,)   orthonormal axes
+    through        (3,)   the plane's point with coordinates (0, 0) [m]
+    x, y           (nx,), (ny,)  coordinates of the grid's lines, ascending [m]
+    names          what the axes are called: "x" and "z", or "u" and "v" where they are the plane's own
+    """
+
+    first: Floats
+    second: Floats
+    through: Floats
+    x: Floats
+    y: Floats
+    names: tuple[str, str]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(ny, nx): rows are lines of equal y."""
+        return len(self.y), len(self.x)
+
+    @property
+    def normal(self) -> Floats:
+        """Unit vector (3,) out of the plane."""
+        return np.cross(self.first, self.second)
+
+    @property
+    def positions(self) -> Floats:
+        """Positions (ny, nx, 3) of the grid's points [m]."""
+        return np.asarray(self.through + self.x[None, :, None] * self.first + self.y[:, None, None] * self.second)
+
+    def coordinates(self, positions: Floats) -> Floats:
+        """Coordinates (..., 2) of positions (..., 3), seen along the normal [m]."""
+        return np.stack([positions @ self.first, positions @ self.second], axis=-1)
+
+
+def plane_of(
+    device: Device,
+    axes: str | Sequence[float] | None = None,
+    through: Sequence[float] | None = None,
+    x: Sequence[float] | None = None,
+    y: Sequence[float] | None = None,
+    cells: Sequence[int] | None = None,
+    assembly: str | None = None,
+) -> Plane:
+    """A plane of a device's workspace, with a grid.
+
+    axes      "xy", "xz", "yz", or six numbers: two vectors in it, of which the second is made orthogonal to the
+              first; left out: the plane that the handle cannot leave, or xy
+    through   a point of it, x, y or x, y, z [m]; left out: the device's reference position
+    x, y      lowest and highest coordinate along both axes [m]; left out: the file's workspace, or the box of what
+              is reached
+    cells     points along both; left out: 81 along the longer side, as many to the metre along the other
+    Raises    PlaneError   for parallel axes, an empty range, fewer than two points, a plane that the handle meets
+                           in a line at most
+              DeviceError  for a device without a mechanism, or a point that is none
+              PostureError where the assembly is singular throughout, or does not close
+    """
+    point = device.position(through)
+    mechanism = device.mechanism
+    assert mechanism is not None
+    reach = reachable_positions(mechanism, assembly or device.reference_assembly)
+    if len(mechanism.drives.names) < 2:
+        raise PlaneError("the handle has one drive and moves along a curve; a map needs a device with two drives")
+    own = _own_normal(reach)
+    first, second, names = _axes(axes, own)
+    _check_met(np.cross(first, second), point, own, reach)
+    sides = (("x", x, first), ("y", y, second))
+    ranges = [_range(name, given, axis, mechanism, reach) for name, given, axis in sides]
+    nx, ny = _counts(cells, ranges)
+    normal = np.cross(first, second)
+    return Plane(first, second, (point @ normal) * normal, _line(*ranges[0], nx), _line(*ranges[1], ny), names)
+
+
+def reached(reach: Floats) -> str:
+    """What a handle reaches, for people: the box of positions (K, 3)."""
+    low, high = reach.min(axis=0), reach.max(axis=0)
+    return ", ".join(
+        f"{axis} from {a:.3g} to {b:.3g} m" if b - a > FLAT else f"{axis} = {_short(a)} m"
+        for axis, a, b in zip("xyz", low, high, strict=True)
+    )
+
+
+def _short(value: float) -> str:
+    return f"{round(value, 9) + 0.0:.4g}"
+
+
+def _own_normal(reach: Floats) -> Floats | None:
+    """Normal (3,) of the plane that all positions lie in; None if they lie in none."""
+    _, spread, axes = np.linalg.svd(reach - reach.mean(axis=0), full_matrices=False)
+    if len(spread) < 3 or spread[2] > FLAT * spread[0]:
+        return None
+    return np.asarray(axes[2])
+
+
+def _axes(asked: str | Sequence[float] | None, own: Floats | None) -> tuple[Floats, Floats, tuple[str, str]]:
+    unit = np.eye(3)
+    if asked is None:
+        for name, (a, b) in AXES.items():
+            if own is None or np.linalg.norm(np.cross(np.cross(unit[a], unit[b]), own)) < PARALLEL:
+                return unit[a], unit[b], (name[0], name[1])
+        assert own is not None
+        # along whichever base axis lies flattest in it
+        along = unit[int(np.argmin(np.abs(own)))]
+        first = along - (along @ own) * own
+        first /= np.linalg.norm(first)
+        return first, np.cross(own, first), ("u", "v")
+    if isinstance(asked, str):
+        if asked not in AXES:
+            raise PlaneError(f"the plane must be xy, xz, yz or six numbers, got '{asked}'")
+        a, b = AXES[asked]
+        return unit[a], unit[b], (asked[0], asked[1])
+    vectors = np.asarray(asked, dtype=np.float64)
+    if vectors.shape != (6,) or not np.isfinite(vectors).all():
+        raise PlaneError(f"the plane's axes must be six finite numbers, two vectors, got {list(asked)}")
+    return *_orthonormal(vectors[:3], vectors[3:]), ("u", "v")
+
+
+def _orthonormal(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    lengths = [float(np.linalg.norm(v / (np.abs(v).max() or 1.0))) for v in (a, b)]
+    if not all(lengths):
+        raise PlaneError(f"an axis of the plane has no length: {_vector(a)} and {_vector(b)}")
+    first, other = (v / np.abs(v).max() / length for v, length in zip((a, b), lengths, strict=True))
+    second = other - (first @ other) * first
+    across = float(np.linalg.norm(second))
+    if across < PARALLEL:
+        raise PlaneError(f"the plane's axes {_vector(a)} and {_vector(b)} are parallel; give two that span it")
+    return first, second / across
+
+
+def _vector(v: Floats) -> str:
+    return "(" + ", ".join(f"{c:.6g}" for c in v) + ")"
+
+
+def _check_met(normal: Floats, point: Floats, own: Floats | None, reach: Floats) -> None:
+    """Raises PlaneError where a handle that cannot leave its own plane meets this one in a line or nowhere."""
+    if own is None:
+        return
+    k = int(np.argmax(np.abs(own)))
+    aligned = bool(abs(own[k]) > 1.0 - PARALLEL**2)
+    plane = next((n for n, axes in AXES.items() if aligned and k not in axes), "")
+    where = f"the plane {'xyz'[k]} = {_short(reach[0, k])} m" if aligned else f"the plane across {_vector(own)}"
+    if np.linalg.norm(np.cross(normal, own)) > PARALLEL:
+        hint = f"ask for --plane {plane}" if plane else "leave --plane out"
+        raise PlaneError(f"the handle cannot leave {where}, and meets the plane asked for in a line; {hint}")
+    off = float(abs((point - reach[0]) @ own))
+    if off > FLAT * float(np.ptp(reach, axis=0).max()):
+        raise PlaneError(
+            f"the handle cannot leave {where}, and the plane asked for lies {off:.4g} m beside it; it reaches "
+            f"{reached(reach)}"
+        )
+
+
+def _range(
+    name: str, given: Sequence[float] | None, axis: Floats, mechanism: Mechanism, reach: Floats
+) -> tuple[float, float]:
+    if given is not None:
+        low, high = (float(value) for value in given)
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise PlaneError(f"the range along {name} must be LOW,HIGH with LOW < HIGH, got {low:.6g},{high:.6g}")
+        return low, high
+    bounds = mechanism.workspace
+    if np.isnan(bounds[axis != 0.0]).any():
+        along = reach @ axis
+        return float(along.min()), float(along.max())
+    ends = np.where(axis[:, None] != 0.0, axis[:, None] * bounds, 0.0)
+    return float(ends.min(axis=1).sum()), float(ends.max(axis=1).sum())
+
+
+def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) -> tuple[int, int]:
+    if cells is None:
+        lengths = [high - low for low, high in ranges]
+        if not min(lengths) > 0.0:
+            raise PlaneError("what the handle reaches has no extent along an axis; give its range and --cells")
+        nx, ny = (max(2, round((LONG_SIDE - 1) * length / max(lengths)) + 1) for length in lengths)
+        return nx, ny
+    nx, ny = (int(count) for count in cells)
+    if min(nx, ny) < 2:
+        raise PlaneError(f"a map has at least two points along each axis, got {nx},{ny}")
+    return nx, ny
+
+
+def _line(low: float, high: float, count: int) -> Floats:
+    """Equidistant points, as symmetric about 0 as their ends are, to the last bit."""
+    k = np.arange(count)
+    return np.asarray((low * k[::-1] + high * k) / (count - 1))
