@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.curve import wall_at, zero_between
+from zwidth.chart.curve import wall_alone, wall_at, zero_between
 from zwidth.chart.hurwitz import edges_stable_set, working_room
 from zwidth.chart.tracer import ROOTS, RealRoot, Tracer, Wall
 from zwidth.compiled import compiled
@@ -22,7 +22,7 @@ def _bisect_flag(factors: Factors, polynomials: Floats, radius: float, on: float
         middle = 0.5 * (on + off)
         if middle in (on, off):
             break
-        K, B, _, _ = wall_at(factors, radius, middle)
+        K, B = wall_alone(factors, radius, middle)
         if edges_stable_set(polynomials, middle, K, B, room) > 0:
             on = middle
         else:
@@ -31,7 +31,7 @@ def _bisect_flag(factors: Factors, polynomials: Floats, radius: float, on: float
 
 
 @compiled
-def _meet(factors: Factors, radius: float, one: float, other: float) -> tuple[float, float, bool]:
+def meet(factors: Factors, radius: float, one: float, other: float) -> tuple[float, float, bool]:
     """Newton for wall(one) = wall(other), from close by; False if it wanders off or does not settle."""
     a, b = one, other
     settled = False
@@ -93,7 +93,7 @@ def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, f
     wall = tracer.wall(theta)[:2]
     partner = _partner(tracer, theta, wall)
     if 0.0 < partner < np.pi:
-        one, other, found = _meet(tracer.factors, tracer.radius, theta, partner)
+        one, other, found = meet(tracer.factors, tracer.radius, theta, partner)
         if found and abs(one - theta) <= 1e-5 * theta:
             return one, tracer.wall(one)[:2], other
     return theta, wall, partner

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.curve import OF_B, OF_K, on_circle, wall_at, zero_between
-from zwidth.compiled import compiled
-from zwidth.loop.evaluate import Factors, characteristic, velocity_response
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.loop.evaluate import Factors, plant_numerator, velocity_response
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -24,26 +24,22 @@ Complexes = NDArray[np.complex128]
 NEAREST = 1e-3
 FIRST = 1e-3
 LONGEST_STEP = 0.05
-NO_FACTORS = np.empty((0, 3))
+MOST_ANGLES = 20000
 
 
 def singular_points(factors: Factors, radius: float) -> Complexes:
     """Poles and zeros of P without its delay, poles of w and real w on the circle; Im z >= 0, z plane."""
-    bare = factors._replace(
-        whole=0,
-        shared_top=NO_FACTORS,
-        shared_bottom=NO_FACTORS,
-        top=NO_FACTORS,
-        bottom=NO_FACTORS,
-        window=np.ones(1),
-    )
-    s = _roots(characteristic(bare, radius)[1])
+    s = _roots(plant_numerator(factors, radius))
     with np.errstate(divide="ignore", invalid="ignore"):
         zeros = radius * (1.0 + s) / (1.0 - s)
+    points = np.concatenate([1.0 + _pairs(factors.rows[:, 0], factors.rows[:, 1]), zeros[np.isfinite(zeros)]])
+    return np.concatenate([points[points.imag >= -1e-12], computer_points(factors, radius)])
+
+
+def computer_points(factors: Factors, radius: float) -> Complexes:
+    """Those of them that the computer has, whatever the plant."""
     points = np.concatenate(
         [
-            1.0 + _pairs(factors.rows[:, 0], factors.rows[:, 1]),
-            zeros[np.isfinite(zeros)],
             _factor_roots(factors.shared_bottom),
             _factor_roots(factors.shared_top),
             _factor_roots(factors.bottom),
@@ -96,8 +92,20 @@ def _roots(ascending: Floats) -> Complexes:
 @compiled
 def angles(points: Complexes, radius: float, share: float, longest: float) -> Floats:
     """Angles in (0, pi) whose steps are `share` of the distance to the nearest point, and at most `longest`."""
+    out = np.empty(MOST_ANGLES)
+    return out[: angles_among(points, radius, share, longest, FIRST, np.empty(len(points)), out)].copy()
+
+
+@compiled_lean
+def angles_among(
+    points: Complexes, radius: float, share: float, longest: float, near_end: float, floors: Floats, out: Floats
+) -> int:
+    """The same into `out`, as many as it holds; returns their number.
+
+    near_end  how near to the ends 0 and pi to begin and end, in shares of the distance of the nearest point there
+    floors    working room (len(points),)
+    """
     first, last = 1.0, 1.0
-    floors = np.empty(len(points))
     for k in range(len(points)):
         from_one, from_minus_one = abs(points[k] - radius), abs(points[k] + radius)
         apart = from_one if from_one > 1e-12 else 1.0
@@ -105,23 +113,23 @@ def angles(points: Complexes, radius: float, share: float, longest: float) -> Fl
             distance = abs(points[k] - points[j])
             if distance > 1e-12:
                 apart = min(apart, distance)
-        floors[k] = NEAREST * apart
+        floors[k] = (NEAREST * apart) ** 2
         # a point at z = +-rho itself is no feature: the curve is even about its ends
         if from_one > 1e-9:
             first = min(first, from_one)
         if from_minus_one > 1e-9:
             last = min(last, from_minus_one)
-    out = np.empty(20000)
-    theta, n = FIRST * first, 0
-    while theta < np.pi - FIRST * last and n < len(out):
+    theta, n = near_end * first, 0
+    while theta < np.pi - near_end * last and n < len(out):
         out[n] = theta
         n += 1
-        z = radius * complex(np.cos(theta), np.sin(theta))
-        near = min(theta, np.pi - theta)
+        x, y = radius * np.cos(theta), radius * np.sin(theta)
+        near = min(theta, np.pi - theta) ** 2
         for k in range(len(points)):
-            near = min(near, max(abs(z - points[k]), floors[k]))
-        theta += min(share * max(near, 1e-11), longest)
-    return out[:n].copy()
+            dx, dy = x - points[k].real, y - points[k].imag
+            near = min(near, max(dx * dx + dy * dy, floors[k]))
+        theta += min(share * max(np.sqrt(near), 1e-11), longest)
+    return n
 
 
 @compiled

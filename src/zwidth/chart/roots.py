@@ -23,8 +23,8 @@ def spread_roots(roots: Complexes) -> None:
 
 
 @compiled
-def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
-    """Largest |z| over the roots of p(s), ascending coefficients, by Aberth's iteration.
+def find_roots(p: Floats, roots: Complexes) -> None:
+    """The roots of p(s), ascending coefficients, by Aberth's iteration.
 
     roots  (N,) starting values in the s plane, replaced by the roots; warm starts take a few rounds
     """
@@ -58,7 +58,13 @@ def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
             largest = max(largest, (abs(step.real) + abs(step.imag)) / (abs(s.real) + abs(s.imag) + 1e-300))
         if largest < 1e-9:
             break
-    out = 0.0
-    for i in range(N):
+
+
+@compiled
+def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
+    """Largest |z| over the roots of p(s), see `find_roots`; 1e300 where it is no number."""
+    find_roots(p, roots)
+    one, out = complex(1.0, 0.0), 0.0
+    for i in range(len(p) - 1):
         out = max(out, abs(divide(radius * (one + roots[i]), one - roots[i])))
     return out if out == out else 1e300

@@ -16,7 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.compiled import compiled, compiled_lean
+from zwidth.compiled import compiled, compiled_inline, compiled_lean
+from zwidth.loop.controller import Controller
+from zwidth.loop.filters import force_path, velocity_estimator
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
@@ -44,11 +46,16 @@ class Factors(NamedTuple):
 
 def factor_arrays(loop: Loop) -> Factors:
     """The loop's factors."""
-    force, estimator = loop.force_path, loop.estimator
+    return computer_factors(loop.controller)._replace(rows=loop.sections.rows)
+
+
+def computer_factors(controller: Controller) -> Factors:
+    """The factors that all loops of one computer share; without rows."""
+    force, estimator = force_path(controller), velocity_estimator(controller)
     return Factors(
-        loop.sections.rows,
-        loop.whole_delay,
-        int(loop.fractional_delay > 0.0),
+        np.empty((0, 9)),
+        controller.whole_delay,
+        int(controller.fractional_delay > 0.0),
         force.numerator,
         force.denominator,
         estimator.numerator,
@@ -57,14 +64,14 @@ def factor_arrays(loop: Loop) -> Factors:
     )
 
 
-@compiled_lean
+@compiled_inline
 def divide(a: complex, b: complex) -> complex:
     """a / b, inf or nan where b is 0: plain arithmetic, several times faster than guarded complex division."""
     scale = 1.0 / (b.real * b.real + b.imag * b.imag)
     return complex((a.real * b.real + a.imag * b.imag) * scale, (a.imag * b.real - a.real * b.imag) * scale)
 
 
-@compiled_lean
+@compiled_inline
 def product(top: Floats, bottom: Floats, d: complex, value: complex, slope: complex) -> tuple[complex, complex]:
     """A function's value and slope times factors top/bottom, each c2 d^2 + c1 d + c0."""
     for k in range(top.shape[0]):
@@ -79,7 +86,7 @@ def product(top: Floats, bottom: Floats, d: complex, value: complex, slope: comp
     return value, slope
 
 
-@compiled_lean
+@compiled_inline
 def plant_response(factors: Factors, z: complex, d: complex) -> tuple[complex, complex]:
     """P(z) and dP/dz, from force command to reading: delay, force filter, actuator lag and hold included."""
     rows = factors.rows
@@ -110,7 +117,7 @@ def plant_response(factors: Factors, z: complex, d: complex) -> tuple[complex, c
     return product(factors.shared_top, factors.shared_bottom, d, P, slope)
 
 
-@compiled_lean
+@compiled_inline
 def velocity_response(factors: Factors, z: complex, d: complex) -> tuple[complex, complex]:
     """w(z) and dw/dz."""
     window = factors.window
@@ -234,6 +241,15 @@ def _plant_numerator(factors: Factors, N: int, radius: float, total: Floats, los
     for i in range(degree + 1):
         lost[i] -= abs(total[i])
     return degree
+
+
+@compiled
+def plant_numerator(factors: Factors, radius: float) -> Floats:
+    """Coefficients (ascending powers of s) whose roots are the zeros of P without its delay and force path."""
+    N = degree_of_loop(factors)
+    total, lost, spare = np.zeros(N + 3), np.zeros(N + 3), np.zeros(N + 3)
+    degree = _plant_numerator(factors, N, radius, total, lost, spare)
+    return total[: degree + 1].copy()
 
 
 @compiled

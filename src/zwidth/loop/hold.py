@@ -17,9 +17,12 @@ from math import cos, exp, expm1, sin, sinh, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.compiled import compiled_lean
+
 Floats = NDArray[np.float64]
 
 
+@compiled_lean
 def step_response(decay: float, squared: float, time: float) -> tuple[float, float]:
     """Position and velocity after a unit force has acted for `time` on xi'' + 2 a xi' + w^2 xi = 1, from rest.
 
@@ -65,6 +68,7 @@ def lag_share(period: float, lag: float) -> float:
     return -expm1(-period / lag) if lag > 0.0 else 1.0
 
 
+@compiled_lean
 def denominator(decay: float, squared: float, period: float) -> tuple[float, float]:
     """d1, d0 of a mode's sampled poles, d = z - 1."""
     a, T = decay, period
@@ -81,33 +85,43 @@ def denominator(decay: float, squared: float, period: float) -> tuple[float, flo
     return -(first + second), first * second
 
 
-def modal_row(decay: float, squared: float, period: float, fraction: float = 0.0, lag: float = 0.0) -> Floats:
-    """One second-order mode xi'' + 2 a xi' + w^2 xi = f of unit participation as a row (8,)."""
-    a, T, rest = decay, period, (1.0 - fraction) * period
-    d1, d0 = denominator(a, squared, T)
-    position, velocity = step_response(a, squared, T)
+Row = tuple[float, float, float, float, float, float, float, float]
+
+
+@compiled_lean
+def held_row(decay: float, squared: float, period: float, fraction: float) -> Row:
+    """One second-order mode xi'' + 2 a xi' + w^2 xi = f of unit participation as a row, without actuator lag."""
+    d1, d0 = denominator(decay, squared, period)
+    position, velocity = step_response(decay, squared, period)
     # Phi_12 = g'(T) and 1 - Phi_22 = 1 - g''(T), read off the mode's own equation
-    back = 2.0 * a * velocity + squared * position
-    if lag > 0.0:
-        p, q, q_new = _lagged_responses(a, squared, T, rest, lag)
-        s = lag_share(T, lag)
+    back = 2.0 * decay * velocity + squared * position
+    x, v = step_response(decay, squared, (1.0 - fraction) * period)
+    new1, new0 = x, back * x + velocity * v
+    return d1, d0, 0.0, new1, new0, 0.0, position - new1, back * position + velocity * velocity - new0
 
-        def numerator(response: Floats, share: float) -> Floats:
-            drift = back * response[0] + velocity * response[1]
-            return np.array(
-                [
-                    response[0],
-                    s * response[0] + drift + share * p[0],
-                    s * drift + share * (back * p[0] + velocity * p[1]),
-                ]
-            )
 
-        new, whole = numerator(q_new, lag_share(rest, lag)), numerator(q, s)
-    else:
-        q_new = np.array(step_response(a, squared, rest))
-        new = np.array([0.0, q_new[0], back * q_new[0] + velocity * q_new[1]])
-        whole = np.array([0.0, position, back * position + velocity * velocity])
-    return np.array([d1, d0, *new, *(whole - new)])
+def modal_row(decay: float, squared: float, period: float, fraction: float = 0.0, lag: float = 0.0) -> Floats:
+    """The same as an array (8,), with or without actuator lag."""
+    if lag == 0.0:
+        return np.array(held_row(decay, squared, period, fraction))
+    T, rest = period, (1.0 - fraction) * period
+    position, velocity = step_response(decay, squared, T)
+    back = 2.0 * decay * velocity + squared * position
+    p, q, q_new = _lagged_responses(decay, squared, T, rest, lag)
+    s = lag_share(T, lag)
+
+    def numerator(response: Floats, share: float) -> Floats:
+        drift = back * response[0] + velocity * response[1]
+        return np.array(
+            [
+                response[0],
+                s * response[0] + drift + share * p[0],
+                s * drift + share * (back * p[0] + velocity * p[1]),
+            ]
+        )
+
+    new, whole = numerator(q_new, lag_share(rest, lag)), numerator(q, s)
+    return np.array([*denominator(decay, squared, T), *new, *(whole - new)])
 
 
 def _lagged_responses(

@@ -25,6 +25,7 @@ from zwidth.measures.measure import (
 from zwidth.measures.place import Place
 from zwidth.model.reduction import ModelError
 
+NUMBERS = "biuf"  # kinds of arrays that are numbers: bool, signed, unsigned, floating
 NONE = (NoValueError, ModelError, UnmovedError, HysteresisError, NonlinearError)
 
 
@@ -36,7 +37,7 @@ def evaluate(measure: Measure, place: Place) -> Measured:
     Raises  MeasureError  where it cannot be asked of this device at all
     """
     if measure.each:
-        return _one_by_one(measure, place)
+        return one_by_one(measure.compute, place)
     try:
         found = measure.compute(place)
     except MeasureError:
@@ -45,9 +46,12 @@ def evaluate(measure: Measure, place: Place) -> Measured:
         return _everywhere(place, FAILED, _said(error))
     if isinstance(found, Measured):
         return found
-    values = np.asarray(found, dtype=np.float64)
+    values = np.asarray(found)
     if values.shape != place.shape:
         return _everywhere(place, FAILED, f"returned an array of shape {values.shape} for places of {place.shape}")
+    if values.dtype.kind not in NUMBERS:
+        return _everywhere(place, FAILED, f"returned {values.dtype} instead of numbers")
+    values = values.astype(np.float64)
     return _with_status(values, place.status)
 
 
@@ -68,25 +72,32 @@ def _note(places: NDArray[np.bool_], status: int, reason: str) -> Note:
     return Note(status, reason, int(places.sum()), tuple(int(i) for i in np.argwhere(places)[0]))
 
 
-def _one_by_one(measure: Measure, place: Place) -> Measured:
+def one_by_one(ask: Callable[[Place], Any], place: Place) -> Measured:
+    """What is asked of one place at a time, in all places."""
     values, status = np.full(place.shape, np.nan), place.status.copy()
-    seen: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
+    why: dict[tuple[int, ...], tuple[int, str]] = {}
     for index in np.ndindex(place.shape):
-        if status[index] != OK:
-            continue
-        values[index], status[index], reason = answered(lambda: measure.compute(place.at(*index)))  # noqa: B023
-        if reason:
-            key = (int(status[index]), reason)
-            count, first = seen.get(key, (0, index))
-            seen[key] = (count + 1, first)
-    return Measured(values, status, tuple(Note(*key, *rest) for key, rest in seen.items()))
+        if status[index] == OK:
+            values[index], status[index], reason = answered(lambda: ask(place.at(*index)))  # noqa: B023
+            if reason:
+                why[index] = (int(status[index]), reason)
+    return Measured(values, status, reasons(why))
+
+
+def reasons(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, ...]:
+    """Notes from the status and reason of each place without value, in the order of the places."""
+    seen: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
+    for index, key in why.items():
+        count, first = seen.get(key, (0, index))
+        seen[key] = (count + 1, first)
+    return tuple(Note(*key, *rest) for key, rest in seen.items())
 
 
 def answered(ask: Callable[[], Any]) -> tuple[float, int, str]:
     """Value, status and reason of one question; only a MeasureError is raised."""
     try:
         found = ask()
-        value = np.asarray(found, dtype=np.float64)
+        value = np.asarray(found)
     except MeasureError:
         raise
     except NONE as error:
@@ -97,6 +108,8 @@ def answered(ask: Callable[[], Any]) -> tuple[float, int, str]:
         return float("nan"), FAILED, _said(error)
     if value.shape != ():
         return float("nan"), FAILED, f"returned an array of shape {value.shape} instead of one number"
+    if value.dtype.kind not in NUMBERS:
+        return float("nan"), FAILED, f"returned {str(found)[:60]!r} instead of a number"
     if np.isnan(value):
         return float("nan"), NO_VALUE, "has no value here"
     return float(value), OK, ""
