@@ -1,0 +1,176 @@
+"""Computing a job's cells: here as long as it is short, else in several processes; whatever is done is kept.
+
+    run(job, Store(path, job), progress)
+
+Cells are computed in batches of consecutive ones. Results do not depend on how they are cut, nor on who computes
+them: each lands where it belongs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
+from time import perf_counter
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from zwidth.contact.room import check_room
+from zwidth.measures.measure import MISSING, Note
+from zwidth.study.job import Cells, Job
+from zwidth.study.workers import Range, Workers, cores, packed
+
+if TYPE_CHECKING:
+    from zwidth.study.store import Store
+
+Progress = Callable[[str, int, int], None]
+
+PATIENCE: Final = 10.0  # s: what takes longer is worth starting processes for, which takes them some seconds
+BATCH: Final = 0.25  # s that a batch should take: long beside what handing it out and storing it take
+TRIAL: Final = 0.01  # s over which the time per cell is told
+SHARES: Final = 16  # batches at least, so that nobody waits long for the last one
+GOLDEN: Final = 0.6180339887498949
+MOST_NOTES: Final = 100  # per measure; a reason that holds a number may be another one in each cell
+MORE: Final = "further reasons, each in few cells"
+
+
+def run(
+    job: Job,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+    *,
+    batch: int | None = None,
+    stage: str = "computing",
+    patience: float = PATIENCE,
+) -> Cells:
+    """All cells of a job.
+
+    store     keeps what is done, and knows what was done before
+    progress  is called with `stage`, cells done, cells of all
+    workers   processes at most; left out: as many as there are cores. 1: everything here
+    batch     cells at a time; left out: as many as take a quarter of a second (a store begun before has its own)
+    patience  where the rest is estimated to take longer than this, processes are started [s]
+    Raises    TooLarge    where the cells would not fit into memory
+              StoreError  where they would not fit on the disk
+              WorkerLost  where a process ended before it was done; what was done is kept
+              whatever the job raises
+
+    >>> class Squares:
+    ...     count, measures, question = 3, ("square",), "squares"
+    ...     def compute(self, first, last):
+    ...         n = np.arange(first, last, dtype=float)[:, None]
+    ...         return Cells(n**2, np.zeros(n.shape, dtype=np.uint8), ((),))
+    >>> run(Squares()).values.ravel().tolist()
+    [0.0, 1.0, 4.0]
+    """
+    of = job.count
+    room = 2.0 * of * len(job.measures) * 9 / 8  # values and status, and once more while they are put together
+    check_room(room, f"{of} cells of {len(job.measures)} measures", "ask for fewer")
+    number = workers or cores()
+    found = _Found(job)
+    if store is not None and store.batch is not None:
+        size = store.batch
+        for first, cells in store.kept():
+            found.put(first, cells)
+    else:
+        size = batch or _batch(job, number)
+        if store is not None:
+            store.begin(size)
+    whole = [(first, min(first + size, of)) for first in range(0, of, size)]
+    ranges = [piece for piece in whole if found.status[piece[0], 0] == MISSING]
+    done = of - sum(last - first for first, last in ranges)
+    if progress is not None:
+        progress(stage, done, of)
+    with closing(_computed(job, ranges, number, patience)) as computed:
+        for (first, last), cells in computed:
+            if store is not None:
+                store.keep(first, cells)
+            found.put(first, cells)
+            done += last - first
+            if progress is not None:
+                progress(stage, done, of)
+    return found.cells()
+
+
+class _Found:
+    """What is known so far, each cell in its place."""
+
+    def __init__(self, job: Job) -> None:
+        shape = job.count, len(job.measures)
+        self.values = np.full(shape, np.nan)
+        self.status = np.full(shape, MISSING, dtype=np.uint8)
+        self.notes: list[tuple[tuple[Note, ...], ...]] = []
+
+    def put(self, first: int, cells: Cells) -> None:
+        last = first + len(cells.values)
+        self.values[first:last], self.status[first:last] = cells.values, cells.status
+        self.notes.append(cells.notes)
+
+    def cells(self) -> Cells:
+        each = [merged(note for notes in self.notes for note in notes[m]) for m in range(self.values.shape[1])]
+        return Cells(self.values, self.status, tuple(each))
+
+
+def merged(notes: Iterable[Note], most: int = MOST_NOTES) -> tuple[Note, ...]:
+    """Notes of the same reason as one, in the order of their first cells, whatever order they came in.
+
+    most  of them at most; the rest are counted in one more for each status
+
+    >>> merged([Note(5, "no", 2, (7,)), Note(5, "no", 1, (3,))])
+    (Note(status=5, reason='no', count=3, first=(3,)),)
+    """
+    found: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
+    for note in notes:
+        count, first = found.get((note.status, note.reason), (0, note.first))
+        found[note.status, note.reason] = (count + note.count, min(first, note.first))
+    told = [Note(*key, *rest) for key, rest in found.items()]
+    told.sort(key=lambda note: (note.first, note.status, note.reason))
+    if len(told) <= most:
+        return tuple(told)
+    rest = [Note(note.status, MORE, note.count, note.first) for note in told[most:]]
+    return (*told[:most], *merged(rest, len(rest)))
+
+
+def _batch(job: Job, workers: int) -> int:
+    """How many cells take about a quarter of a second.
+
+    Some are computed for it, and forgotten: here and there, since the first cells of a study are often its worst,
+    and more and more at a time, since many at once may cost little more than one.
+    """
+    of = job.count
+    most = max(1, of // max(SHARES, 4 * workers))
+    if most == 1:
+        return 1
+    size, place, seconds, tried = 1, 0.0, 0.0, False
+    while size <= most:
+        first = int(place * (of - size))
+        place = (place + GOLDEN) % 1.0
+        began = perf_counter()
+        job.compute(first, first + size)
+        seconds = perf_counter() - began
+        if seconds >= TRIAL and tried:
+            return max(1, min(most, int(BATCH / (seconds / size))))
+        size, tried = size * 2 if seconds < TRIAL else size, seconds >= TRIAL
+    return most
+
+
+def _computed(
+    job: Job, ranges: Sequence[Range], workers: int, patience: float
+) -> Generator[tuple[Range, Cells], None, None]:
+    """Cells of all ranges: those that get done in time here, and then all the rest in processes."""
+    left = sum(last - first for first, last in ranges)
+    sent: bytes | None = None
+    for n, (first, last) in enumerate(ranges):
+        began = perf_counter()
+        cells = job.compute(first, last)
+        seconds = perf_counter() - began
+        yield (first, last), cells
+        left -= last - first
+        # the first one may have compiled something
+        slow = n > 0 and seconds / (last - first) * left > patience
+        if slow and workers > 1 and (sent := packed(job)) is not None:
+            rest = ranges[n + 1 :]
+            with Workers(sent, min(workers, len(rest))) as pool:
+                yield from pool.compute(rest)
+            return

@@ -1,0 +1,152 @@
+"""Cells of a job on disk, in a zarr group, so that a run that was stopped goes on where it was.
+
+    values    (count, measures)  float64; nan where there is none
+    status    (count, measures)  uint8, named by its attributes; 255 = not computed
+    notes                        a journal beside them: why cells have no value
+
+Attributes say which question they answer; a store of another question is begun anew. Chunks are batches: a batch
+is one file of values and one of status, each there wholly or not at all, and the status is written last.
+"""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from zwidth import __version__
+from zwidth.measures.measure import MISSING, OK, STATUS, Note
+from zwidth.study.job import Cells, Job
+from zwidth.study.journal import Journal, JournalError, fingerprint
+
+KIND: Final = "cells"
+NOTES: Final = "notes.jsonl"
+PER_CELL: Final = 9  # bytes of value and status; compressed they take less
+
+
+class StoreError(ValueError):
+    """A store that cannot be used; the text says why, and what to do."""
+
+
+class Store:
+    """What of a job is done, in a folder.
+
+    path     of the folder
+    batch    cells in each batch; None: not begun yet
+    Raises   StoreError  for a folder or file that holds something else (it is left alone), and for cells that
+                         would not fit on the disk
+             OSError     where it cannot be read
+    """
+
+    def __init__(self, path: Path, job: Job) -> None:
+        self.path = path
+        self.measures, self.count = tuple(job.measures), job.count
+        self.question = fingerprint(job.question, self.count, self.measures, __version__)
+        self.batch: int | None = None
+        self._ours = False
+        self._arrays: tuple[Any, Any] | None = None
+        self._notes = Journal(None, self.question)
+        if path.exists() and not (path.is_dir() and not any(path.iterdir())):
+            self._open()
+        if self.batch is None:
+            self._check_disk()
+
+    def begin(self, batch: int) -> None:
+        """Begin anew with batches of this size; a store of another question, or of this one, is emptied."""
+        import zarr
+
+        draft = self.path.with_name(f".{self.path.name[:40]}-{secrets.token_hex(4)}")
+        try:
+            group = zarr.open_group(str(draft), mode="w-", zarr_format=3)
+            shape, chunks = (self.count, len(self.measures)), (min(batch, self.count), len(self.measures))
+            about: dict[str, Any] = {"measures": list(self.measures)}
+            group.create_array(
+                "values", shape=shape, chunks=chunks, dtype="float64", fill_value=np.nan, attributes=about
+            )
+            meanings = [text.replace(" ", "_") for text in STATUS.values()]
+            flags: dict[str, Any] = {"flag_values": list(STATUS), "flag_meanings": " ".join(meanings)}
+            group.create_array(
+                "status", shape=shape, chunks=chunks, dtype="uint8", fill_value=MISSING, attributes=about | flags
+            )
+            group.attrs.update({"zwidth": KIND, "question": self.question, "batch": batch})
+            if self._ours or (self.path.is_dir() and not any(self.path.iterdir())):
+                shutil.rmtree(self.path)
+            draft.replace(self.path)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+        self._open()
+
+    def kept(self) -> Iterator[tuple[int, Cells]]:
+        """First cell and cells of each batch that is done."""
+        values, status = self._opened()
+        assert self.batch is not None
+        for first in range(0, self.count, self.batch):
+            part = slice(first, min(first + self.batch, self.count))
+            with suppress(Exception):  # a file that a crash has damaged: its batch is not done
+                found = Cells(values[part], status[part], self._noted(first))
+                # zarr does not tell a file that has gone from one that holds nan only
+                lost = (found.status == OK) & np.isnan(found.values)
+                if not (lost | (found.status == MISSING)).any():
+                    yield first, found
+
+    def keep(self, first: int, cells: Cells) -> None:
+        """Write a batch. Raises OSError where the disk refuses."""
+        values, status = self._opened()
+        part = slice(first, first + len(cells.values))
+        values[part] = cells.values
+        if any(cells.notes):
+            told = [[[n.status, n.reason, n.count, list(n.first)] for n in notes] for notes in cells.notes]
+            self._notes.ask(str(first), lambda: told)
+        status[part] = cells.status
+
+    def remove(self) -> None:
+        """Remove it from the disk, if it is ours."""
+        if self._ours:
+            shutil.rmtree(self.path, ignore_errors=True)
+
+    def _noted(self, first: int) -> tuple[tuple[Note, ...], ...]:
+        told = self._notes.known.get(str(first), [[] for _ in self.measures])
+        return tuple(tuple(Note(s, reason, n, tuple(at)) for s, reason, n, at in notes) for notes in told)
+
+    def _opened(self) -> tuple[Any, Any]:
+        assert self._arrays is not None, "not begun"
+        return self._arrays
+
+    def _open(self) -> None:
+        """Read what is there: a store of this question, of another one, or something else."""
+        import zarr
+
+        other = StoreError(f"{self.path.name}: is not the store of a study; name another folder, or remove it")
+        try:
+            group = zarr.open_group(str(self.path), mode="r+")
+            kind, question, batch = (group.attrs.get(key) for key in ("zwidth", "question", "batch"))
+        except PermissionError:
+            raise
+        except Exception:  # zarr's own, of many kinds
+            raise other from None
+        if kind != KIND or not isinstance(batch, int):
+            raise other
+        self._ours = True
+        if question != self.question:
+            return
+        try:
+            self._arrays = group["values"], group["status"]
+            self._notes = Journal(self.path / NOTES, self.question)
+        except (KeyError, JournalError):
+            raise StoreError(f"{self.path.name}: is damaged; remove it, or name another folder") from None
+        self.batch = batch
+
+    def _check_disk(self) -> None:
+        place = next((p for p in (self.path, *self.path.absolute().parents) if p.exists()), Path())
+        free, wanted = shutil.disk_usage(place).free, float(PER_CELL) * self.count * len(self.measures)
+        if wanted > free:
+            raise StoreError(
+                f"{self.path.name}: {self.count} cells of {len(self.measures)} measures would take "
+                f"{wanted / 1e9:.3g} GB of disk, of {free / 1e9:.3g} GB that are free; ask for fewer, or name a "
+                "folder on another disk"
+            )

@@ -1,0 +1,203 @@
+"""Processes that compute ranges of a job beside each other.
+
+Each is a fresh interpreter (a forked one would inherit numba's threads, and die of them) with one thread for numba
+and one for linear algebra, fed through pipes. Nothing of the caller's main script runs in them again, so that a
+script or a notebook needs no guard. The keyboard does not reach them: whoever started them ends them, and when he
+is killed himself they read the end of their pipe.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from threading import Lock, Thread
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from zwidth.study.job import Cells, Job
+
+Range = tuple[int, int]
+
+THREADS: Final = ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+START: Final = (
+    "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from zwidth.study.workers import work; work()"
+)
+GRACE: Final = 2.0  # s that a process gets to end
+
+
+class WorkerLost(RuntimeError):
+    """A process that computed ended before it was done: killed, or out of memory."""
+
+
+def cores() -> int:
+    """How many processes can compute at once.
+
+    >>> cores() >= 1
+    True
+    """
+    with suppress(AttributeError, OSError):
+        return len(os.sched_getaffinity(0)) or 1
+    return os.cpu_count() or 1
+
+
+def packed(job: Job) -> bytes | None:
+    """The job as it is sent; None where another process would not understand it.
+
+    That is so for functions typed into a notebook or the main script: they exist in this process only.
+    """
+    if not sys.executable:  # Python inside another program
+        return None
+    try:
+        data = pickle.dumps(job)
+    except Exception:  # whatever the parts of a job raise
+        return None
+    return None if b"__main__" in data else data
+
+
+class Workers:
+    """Processes, from `with` to its end; leaving it ends them, whatever they do.
+
+    job    as `packed` gives it
+    count  how many
+    """
+
+    def __init__(self, job: bytes, count: int) -> None:
+        self.job, self.count = job, count
+        self.processes: list[subprocess.Popen[bytes]] = []
+        self.threads: list[Thread] = []
+
+    def __enter__(self) -> Workers:
+        environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
+        command = [sys.executable, "-c", START, json.dumps(sys.path)]
+        try:
+            for _ in range(self.count):
+                self.processes.append(
+                    subprocess.Popen(
+                        command,
+                        stdin=subprocess.PIPE,
+                        stdout=subprocess.PIPE,
+                        env=environment,
+                        start_new_session=True,  # the terminal's ctrl-C is for this process alone
+                        creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+                    )
+                )
+        except BaseException:
+            self._end()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._end()
+
+    def compute(self, ranges: Sequence[Range]) -> Iterator[tuple[Range, Cells]]:
+        """The ranges' cells, in the order in which they get done.
+
+        Raises  WorkerLost  where a process ended before it was done
+                whatever the job raises
+        """
+        tasks, lock = iter(ranges), Lock()
+        replies: queue.SimpleQueue[tuple[Range, Any]] = queue.SimpleQueue()
+
+        def next_task() -> Range | None:
+            with lock:
+                return next(tasks, None)
+
+        for process in self.processes:
+            self.threads.append(Thread(target=_feed, args=(process, self.job, next_task, replies), daemon=True))
+            self.threads[-1].start()
+        for _ in ranges:
+            task, reply = replies.get()
+            if isinstance(reply, BaseException):
+                raise reply
+            yield task, reply
+
+    def _end(self) -> None:
+        for process in self.processes:
+            process.terminate()
+        for process in self.processes:
+            try:
+                process.wait(GRACE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        for thread in self.threads:
+            thread.join(GRACE)
+        for process in self.processes:
+            for pipe in (process.stdin, process.stdout):
+                with suppress(OSError):
+                    assert pipe is not None
+                    pipe.close()
+
+
+def _feed(process: subprocess.Popen[bytes], job: bytes, next_task: Any, replies: Any) -> None:
+    """Hand one process its tasks, one after the other, and pass on what it replies."""
+    sent, received = process.stdin, process.stdout
+    assert sent is not None
+    assert received is not None
+    task = None
+    try:
+        pickle.dump(job, sent)
+        while (task := next_task()) is not None:
+            pickle.dump(task, sent)
+            sent.flush()
+            replies.put((task, pickle.load(received)))
+        sent.close()
+    except (EOFError, OSError, ValueError, pickle.UnpicklingError):  # ValueError: closed by `_end`
+        replies.put((task, WorkerLost(_how_it_ended(process))))
+    except Exception as error:  # a reply that this process does not understand
+        replies.put((task, error))
+
+
+def _how_it_ended(process: subprocess.Popen[bytes]) -> str:
+    code: int | None = None
+    with suppress(subprocess.TimeoutExpired):
+        code = process.wait(GRACE)
+    how = f"ended with code {code}"
+    if code is not None and code < 0:
+        with suppress(ValueError):
+            how = f"was killed ({signal.Signals(-code).name})"
+    hint = ", perhaps for lack of memory" if "KILL" in how else ""
+    return f"a process that computed {how}{hint}; fewer workers need less memory"
+
+
+def work() -> None:
+    """What such a process does: read a job and ranges from its input, write their cells to its output."""
+    import warnings
+
+    warnings.filterwarnings("ignore", category=RuntimeWarning)  # arithmetic's own, as in the command
+    received, sent = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a user's measure prints must not get between the replies
+    try:
+        job: Any = None
+        packed_job = pickle.load(received)
+        while True:
+            first, last = pickle.load(received)
+            try:
+                job = job or pickle.loads(packed_job)
+                reply = pickle.dumps(job.compute(first, last))
+            except Exception as error:
+                reply = _error(error)
+            sent.write(reply)
+            sent.flush()
+    except (EOFError, BrokenPipeError):
+        os._exit(0)  # whoever asked has gone, or has all he wants; nothing is left to be tidied up
+
+
+def _error(error: Exception) -> bytes:
+    """The error as it is sent; its text where it cannot be."""
+    try:
+        data = pickle.dumps(error)
+        pickle.loads(data)
+    except Exception:
+        return pickle.dumps(RuntimeError(f"{type(error).__name__}: {error}"))
+    return data

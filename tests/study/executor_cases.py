@@ -1,0 +1,91 @@
+"""Jobs with known cells, at a place from which other processes can import them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from zwidth.measures.measure import FAILED, NO_VALUE, OK, MeasureError, Note
+from zwidth.study.job import Cells
+
+LEFT_OUT = "is a multiple of seven"
+
+
+@dataclass
+class Roots:
+    """Square root and reciprocal of the cell's number; every seventh has no root, and each of those its note.
+
+    seconds  per cell
+    """
+
+    count: int
+    seconds: float = 0.0
+    measures: tuple[str, ...] = ("root", "reciprocal")
+    question: str = "roots"
+    asked: list[tuple[int, int]] = field(default_factory=list)
+
+    def compute(self, first, last):
+        self.asked.append((first, last))
+        time.sleep(self.seconds * (last - first))
+        n = np.arange(first, last)
+        none = n % 7 == 0
+        values = np.stack([np.where(none, np.nan, np.sqrt(n)), 1.0 / (n + 0.1)], axis=-1)
+        status = np.stack([np.where(none, NO_VALUE, OK), np.full(n.shape, OK)], axis=-1).astype(np.uint8)
+        told = (Note(NO_VALUE, LEFT_OUT, int(none.sum()), (int(n[none][0]),)),) if none.any() else ()
+        return Cells(values, status, (told, ()))
+
+
+@dataclass
+class Processes(Roots):
+    """The number of the process that computed each cell, and numbers of its threads."""
+
+    def compute(self, first, last):
+        import numba
+
+        found = super().compute(first, last)
+        values = np.tile([float(os.getpid()), float(numba.get_num_threads())], (last - first, 1))
+        return Cells(values, np.full(values.shape, OK, dtype=np.uint8), found.notes)
+
+
+@dataclass
+class Deadly(Roots):
+    """One whose cell 12 kills the process that computes it, if it is not the first."""
+
+    first: int = 0
+
+    def compute(self, first, last):
+        if first <= 12 < last and os.getpid() != self.first:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().compute(first, last)
+
+
+@dataclass
+class Refusing(Roots):
+    def compute(self, first, last):
+        if first <= 12 < last:
+            raise MeasureError("cannot be asked")
+        print("talkative")
+        return super().compute(first, last)
+
+
+@dataclass
+class Odd(Roots):
+    """Each cell fails for a reason of its own."""
+
+    def compute(self, first, last):
+        found = super().compute(first, last)
+        notes = tuple(Note(FAILED, f"cell {n}", 1, (n,)) for n in range(first, last))
+        return Cells(found.values, found.status, ((), notes))
+
+
+def alike(one: Cells, other: Cells) -> bool:
+    """The same bits, and the same notes."""
+    return (
+        one.values.tobytes() == other.values.tobytes()
+        and one.status.tobytes() == other.status.tobytes()
+        and one.notes == other.notes
+    )

@@ -1,0 +1,163 @@
+"""Cells are what the job says, however they are cut, and whoever computes them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from tests.study.executor_cases import LEFT_OUT, Deadly, Odd, Processes, Refusing, Roots, alike
+from zwidth.contact.room import TooLarge
+from zwidth.measures.measure import FAILED, MISSING, NO_VALUE, MeasureError, Note
+from zwidth.study.executor import MORE, merged, run
+from zwidth.study.store import Store
+from zwidth.study.workers import WorkerLost, cores, packed
+
+NOW = -1.0  # patience that is over at once
+
+
+def test_the_cells_are_those_of_the_job():
+    found = run(Roots(100), workers=1)
+    n = np.arange(100.0)
+    assert np.array_equal(found.values[:, 0], np.where(n % 7 == 0, np.nan, np.sqrt(n)), equal_nan=True)
+    assert not (found.status == MISSING).any()
+    assert found.notes == ((Note(NO_VALUE, LEFT_OUT, 15, (0,)),), ())
+
+
+@pytest.mark.parametrize("batch", [1, 3, 99, 100, 1000, None])
+def test_batches_of_any_size_give_the_same(batch):
+    assert alike(run(Roots(100), workers=1, batch=batch), Roots(100).compute(0, 100))
+
+
+def test_processes_give_the_same_and_say_how_far_they_are(capfd):
+    told = []
+    found = run(Roots(60), None, lambda *now: told.append(now), 2, batch=7, patience=NOW, stage="roots")
+    assert alike(found, Roots(60).compute(0, 60))
+    assert told[0] == ("roots", 0, 60)
+    assert told[-1] == ("roots", 60, 60)
+    assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_processes_take_over_once_the_rest_takes_long():
+    job = Processes(40, seconds=0.01)
+    found = run(job, workers=2, batch=5, patience=0.1)
+    mine = found.values[:, 0] == os.getpid()
+    assert mine[:10].all()
+    assert not mine[10:].any()
+    assert 1 <= len(set(found.values[10:, 0])) <= 2
+    assert (found.values[10:, 1] == 1.0).all(), "one thread in each process"
+    quick = run(Processes(40), workers=2, batch=5)
+    assert (quick.values[:, 0] == os.getpid()).all()
+
+
+def test_what_a_job_raises_in_a_process_is_raised(capfd):
+    with pytest.raises(MeasureError, match="cannot be asked"):
+        run(Refusing(40), workers=2, batch=5, patience=NOW)
+    out, err = capfd.readouterr()
+    assert out.count("talkative") <= 10, "what the processes print does not get between the replies"
+    assert "Traceback" not in err
+
+
+def test_a_killed_process_is_one_clear_error_and_what_is_done_is_kept(tmp_path):
+    job, path = Deadly(40, first=os.getpid()), tmp_path / "cells"
+    with pytest.raises(WorkerLost, match=r"was killed .SIGKILL., perhaps for lack of memory; fewer workers"):
+        run(job, Store(path, job), workers=1 + 1, batch=5, patience=NOW)
+    again = Roots(40)
+    kept = [first for first, _ in Store(path, again).kept()]
+    assert kept[:2] == [0, 5]
+    assert 10 not in kept
+    assert alike(run(again, Store(path, again), workers=1), Roots(40).compute(0, 40))
+    assert (0, 5) not in again.asked
+
+
+def test_what_another_process_would_not_understand_stays_here():
+    class Local(Processes):
+        pass
+
+    assert packed(Local(40)) is None
+    found = run(Local(40), workers=2, batch=5, patience=NOW)
+    assert (found.values[:, 0] == os.getpid()).all()
+    Local.__module__, Local.__qualname__ = "__main__", "Local"
+    assert packed(Local(40)) is None
+
+
+def test_a_script_needs_no_guard(tmp_path):
+    """Nothing of the main script runs again in the processes."""
+    script = tmp_path / "study.py"
+    script.write_text(
+        "import sys\n"
+        f"sys.path[:0] = {sys.path!r}\n"
+        "from tests.study.executor_cases import Roots\n"
+        "from zwidth.study.executor import run\n"
+        "print('once', run(Roots(20), workers=2, batch=5, patience=-1.0).values.shape)\n"
+    )
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("once (20, 2)\n", "")
+
+
+ENDLESS = """
+import sys
+from pathlib import Path
+sys.path[:0] = {path!r}
+from tests.study.executor_cases import Roots
+from zwidth.study.executor import run
+from zwidth.study.store import Store
+job = Roots(1000, seconds=0.05)
+def progress(stage, done, of):
+    print(done, flush=True)
+run(job, Store(Path("cells"), job), progress, 2, batch=2, patience=0.1)
+"""
+
+
+def test_ctrl_c_stops_at_once_and_leaves_no_process(tmp_path):
+    command = [sys.executable, "-c", ENDLESS.format(path=sys.path)]
+    running = subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+    )
+    assert running.stdout is not None
+    while int(running.stdout.readline()) < 12:  # the first four are computed before the processes start
+        pass
+    children = subprocess.run(["pgrep", "-P", str(running.pid)], capture_output=True, text=True).stdout.split()
+    assert len(children) == 2
+    os.killpg(running.pid, signal.SIGINT)  # as the terminal does
+    began = time.monotonic()
+    _, err = running.communicate(timeout=20)
+    assert time.monotonic() - began < 2.0
+    assert err.decode().count("KeyboardInterrupt") == 1, "the processes say nothing"
+    for child in children:
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(child), 0)
+    job = Roots(1000)
+    kept = [first for first, _ in Store(tmp_path / "cells", job).kept()]
+    assert len(kept) >= 6
+    assert all(first % 2 == 0 for first in kept)
+
+
+def test_what_does_not_fit_into_memory_is_refused_with_its_size():
+    job = Roots(10**13)
+    with pytest.raises(TooLarge, match=r"10000000000000 cells of 2 measures would take 3\.6e\+05 GB, of .* ask"):
+        run(job)
+    assert job.asked == []
+
+
+def test_notes_are_the_same_in_any_order_and_not_endless():
+    notes = [Note(FAILED, f"cell {n}", 1, (n,)) for n in range(150)]
+    told = merged(notes)
+    assert told == merged(notes[::-1])
+    assert len(told) == 101
+    assert told[-1] == Note(FAILED, MORE, 50, (100,))
+    assert alike(run(Odd(150), workers=1, batch=4), run(Odd(150), workers=1, batch=150))
+
+
+def test_an_empty_job_has_no_cells():
+    assert run(Roots(0)).values.shape == (0, 2)
+
+
+def test_there_is_a_core():
+    assert 1 <= cores() <= (os.cpu_count() or 1)
