@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -94,6 +95,18 @@ class Measure:
     function: Callable[[Place], Any] | str
     each: bool = False
     along: bool = True
+
+    @property
+    def key(self) -> str:
+        """The name with its unit, as the columns of a table carry it; units with a variable power are left out.
+
+        >>> Measure("stable_area", "", "N^2 s/m^2", None, "", "").key
+        'stable_area_N2s_per_m2'
+        """
+        over, _, under = self.unit.replace(" ", "").replace("^", "").partition("/")
+        written = over + (f"_per_{under}" if under else "")
+        plain = re.fullmatch(r"[A-Za-z0-9_]+", written) and "^r" not in self.unit
+        return f"{self.name}_{written}" if plain else self.name
 
     def compute(self, place: Place) -> Any:
         """What the function says; see `evaluate` for values with status."""

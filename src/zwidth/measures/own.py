@@ -1,0 +1,177 @@
+"""Measures of a user's own, from a file.
+
+    from zwidth.measures.own import measure
+
+    @measure(unit="N", title="Force for an acceleration of 10 m/s^2", better="lower")
+    def inertial_force(place):
+        return 10.0 * place.effective.rigid_mass
+
+A function is asked of one `Place` at a time and returns a number; with each=False it is asked of many at once and
+returns an array of their shape.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Final
+from zlib import compress, decompress
+
+from zwidth.measures.catalogue import MEASURES
+from zwidth.measures.measure import Better, Measure
+
+if TYPE_CHECKING:
+    from zwidth.measures.place import Place
+
+Function = Callable[["Place"], Any]
+
+BETTER: Final = ("higher", "lower", None)
+
+
+@dataclass(frozen=True)
+class Own:
+    """A function in a user's file, found again in whatever process asks it.
+
+    file  path
+    text  what the file says: another text is another measure
+    name  the function's
+    """
+
+    file: str
+    text: str
+    name: str
+
+    def __call__(self, place: Place) -> Any:
+        measures = _measures(self.file, self.text)
+        try:
+            return measures[self.name].compute(place)
+        except SystemExit as error:  # a measure that ends the program has failed, and nothing else has
+            raise RuntimeError(f"ends the program ({error})") from None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # a text that speaks of __main__ must not look like a function that only this process has
+        return _unpacked, (self.file, compress(self.text.encode()), self.name)
+
+
+def measure(
+    unit: str = "",
+    title: str = "",
+    better: Better | None = None,
+    *,
+    along: bool = True,
+    each: bool = True,
+    source: str = "",
+) -> Callable[[Function], Measure]:
+    """Make a measure of a function of one place; its name is the function's.
+
+    unit    "" for none
+    title   what it is called in figures; left out: the first line of the function's docstring, or its name
+    better  "higher", "lower", or None where it depends
+    along   False: it does not depend on the rendered direction
+    each    True: asked of one place at a time; False: of many at once, returning an array of their shape
+    source  where its formula stands
+    Raises  ValueError  for another `better`
+
+    >>> @measure(unit="kg")
+    ... def moved_mass(place):
+    ...     "Mass of links and rotors"
+    ...     return place.effective.rigid_mass
+    >>> moved_mass.name, moved_mass.title, moved_mass.unit
+    ('moved_mass', 'Mass of links and rotors', 'kg')
+    """
+    if better not in BETTER:
+        raise ValueError(f"a measure's better must be 'higher', 'lower' or None, got {better!r}")
+
+    def made(function: Function) -> Measure:
+        lines = (function.__doc__ or function.__name__.replace("_", " ")).strip().splitlines()
+        told = title or lines[0].rstrip(".")
+        return Measure(function.__name__, told, unit, better, source or "your own", function, each, along)
+
+    return made
+
+
+def load_measures(path: str) -> dict[str, Measure]:
+    """All measures in a file of one's own, by name; the file is run for it.
+
+    Raises  ValueError  with one sentence: a missing file, one that does not run, one without a measure, a name
+            that is taken
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise ValueError(f"no such file: {path}")
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{file.name}: cannot be read: {error}") from None
+    found = _measures(str(file.resolve()), text)
+    if not found:
+        raise ValueError(f"{file.name} has no measure; put @measure(unit=...) above a function of one place")
+    taken = sorted(MEASURES.keys() & found.keys())
+    if taken:
+        raise ValueError(f"{file.name}: the name {taken[0]} is taken by a measure of ours; rename the function")
+    return {
+        name: replace(one, function=Own(str(file.resolve()), text, name), source=f"your own, {file.name}")
+        for name, one in found.items()
+    }
+
+
+def find_measure(name: str, own: Mapping[str, Measure] | None = None) -> Measure:
+    """The measure of that name, a user's own or ours.
+
+    Raises  ValueError  naming the nearest, if there is none
+
+    >>> find_measure("stiffness_max").unit
+    'N/m'
+    """
+    known = {**MEASURES, **(own or {})}
+    with_unit = {one.key: one for one in known.values()}
+    if name in known or name in with_unit:
+        return known.get(name) or with_unit[name]
+    near = get_close_matches(name, known, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+    raise ValueError(f"no measure is named {name!r}; {hint}")
+
+
+def _unpacked(file: str, text: bytes, name: str) -> Own:
+    return Own(file, decompress(text).decode(), name)
+
+
+@lru_cache(maxsize=8)
+def _measures(file: str, text: str) -> dict[str, Measure]:
+    """The measures of a file that says this, run once in each process."""
+    module = _run(Path(file), text)
+    return {one.name: one for one in vars(module).values() if isinstance(one, Measure) and callable(one.function)}
+
+
+def _run(file: Path, text: str) -> ModuleType:
+    label = f"zwidth_measures_{sha256((str(file) + text).encode()).hexdigest()[:12]}"
+    spec = importlib.util.spec_from_file_location(label, file)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[label] = module  # dataclasses look a function's module up
+    try:
+        exec(compile(text, str(file), "exec"), module.__dict__)
+    except (Exception, SystemExit) as error:
+        del sys.modules[label]
+        line = error.lineno if isinstance(error, SyntaxError) else _line(error, file)
+        place = f"{file.name}:{line}" if line else file.name
+        reason = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
+        raise ValueError(f"{place} does not run: {reason}") from None
+    return module
+
+
+def _line(error: BaseException, file: Path) -> int:
+    """The last line of that file that an error came through; 0 for none."""
+    line, frame = 0, error.__traceback__
+    while frame is not None:
+        if frame.tb_frame.f_code.co_filename == str(file):
+            line = frame.tb_lineno
+        frame = frame.tb_next
+    return line

@@ -1,0 +1,111 @@
+"""The directions in which a handle can move, and a measure asked along many of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.measures.evaluate import evaluate
+from zwidth.measures.measure import OK, Measure, Measured
+from zwidth.measures.place import Place
+from zwidth.model.posture import Posture
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+STILL: Final = 1e-9  # share of the fastest motion below which a direction is none of the handle's
+TRIED: Final = 16  # places in which a direction is asked against its opposite
+SAME: Final = 1e-9  # relative difference that rounding makes
+ROWS: Final = 100_000  # questions asked at once
+
+
+@dataclass(frozen=True)
+class Around:
+    """A measure to be asked along many directions of places that are OK, all of one freedom to move.
+
+    place     flat, of shape (n,), all OK
+    basis     (n, 3, r)  orthonormal, spanning the directions in which the handle can move, r = 1, 2 or 3
+    one_sided along a direction and its opposite the measure says two things
+    """
+
+    measure: Measure
+    place: Place
+    basis: Floats
+    one_sided: bool
+
+    def asked(self, which: Ints, components: Floats) -> Measured:
+        """The measure in places `which` (k,), along directions of these components (k, r) in each one's basis."""
+        parts = []
+        for first in range(0, max(1, len(which)), ROWS):
+            rows = slice(first, first + ROWS)
+            there = taken(self.place, which[rows])
+            parts.append(evaluate(self.measure, there.towards(self.directions(which[rows], components[rows]))))
+        if len(parts) == 1:
+            return parts[0]
+        return Measured(
+            np.concatenate([part.values for part in parts]),
+            np.concatenate([part.status for part in parts]),
+            tuple(note for part in parts for note in part.notes),
+        )
+
+    def directions(self, which: Ints, components: Floats) -> Floats:
+        """Unit vectors (k, 3) in the base frame."""
+        u = np.einsum("kir,kr->ki", self.basis[which], components)
+        return np.asarray(u / np.linalg.norm(u, axis=-1, keepdims=True))
+
+
+def taken(place: Place, which: Ints) -> Place:
+    """Some places of a flat one, in any order and number."""
+    assert place.posture is not None
+    assert place.direction is not None
+    numbers = {name: getattr(place.posture, name)[which] for name in _OF_POSTURE}
+    return replace(
+        place, posture=Posture(place.posture.assembly, **numbers), direction=np.asarray(place.direction)[which]
+    )
+
+
+def flat(place: Place) -> Place:
+    """The places in one row. Raises MeasureError for a device given by its plant: it has one direction only."""
+    posture = place.placed
+    assert place.direction is not None
+    count, axes = posture.status.size, posture.status.ndim
+    numbers = {
+        name: np.asarray(getattr(posture, name)).reshape(count, *getattr(posture, name).shape[axes:])
+        for name in _OF_POSTURE
+    }
+    direction = np.broadcast_to(place.direction, (*posture.status.shape, 3)).reshape(count, 3)
+    return replace(place, posture=Posture(posture.assembly, **numbers), direction=direction)
+
+
+def arounds(measure: Measure, place: Place) -> Iterator[tuple[Ints, Around]]:
+    """Those places of a flat one that are OK, by their freedom to move: which they are, and how to ask there."""
+    ok = np.flatnonzero(place.status == OK)
+    if not len(ok):
+        return
+    left, speeds, _ = np.linalg.svd(place.jacobian[ok])
+    freedom = (speeds > STILL * speeds[:, :1]).sum(axis=1)
+    for r in np.unique(freedom):
+        mine = np.flatnonzero(freedom == r)
+        some = taken(place, ok[mine])
+        basis = left[mine][:, :, :r]
+        yield ok[mine], Around(measure, some, basis, _one_sided(measure, some, basis))
+
+
+def _one_sided(measure: Measure, place: Place, basis: Floats) -> bool:
+    """Does the opposite direction have another value, in some places along a direction like no other?"""
+    n, r = len(basis), basis.shape[2]
+    which = np.unique(np.linspace(0, n - 1, min(n, TRIED)).astype(np.int64))
+    like_no_other = np.broadcast_to(np.array([0.5403, 0.8415, 0.3907])[:r], (len(which), r))
+    around = Around(measure, place, basis, one_sided=False)
+    there = around.asked(which, like_no_other).values
+    back = around.asked(which, -like_no_other).values
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(there - back) > SAME * np.maximum(np.abs(there), np.abs(back))
+    return bool((apart | (np.isnan(there) != np.isnan(back))).any())
+
+
+_OF_POSTURE: Final = ("position", "status", "angles", "mass_matrix", "jacobian", "closure_residual")

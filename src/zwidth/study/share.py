@@ -1,0 +1,151 @@
+"""The share of directions along which a requirement is met.
+
+In the plane the share of the circle's arc, on the sphere that of its surface. On a circle the ends of the arcs
+are bisected between samples. Arcs that lie between two samples are looked for where the parabola of three says
+that the margin changes its sign. The sphere is cut into circles of latitude, weighted by Gauss and Legendre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.measures.measure import Measure
+from zwidth.measures.place import Place
+from zwidth.study.around import Around, Floats, Ints, arounds, flat
+from zwidth.study.requirement import Requirement
+
+Bools = NDArray[np.bool_]
+
+NAME: Final = "share_of_directions"
+SAMPLES: Final = 24  # of a half circle
+HALVINGS: Final = 22  # of 7.5 degrees: 3e-8 rad
+LATITUDES: Final = 16  # of a half sphere
+CHUNK: Final = 2048  # places at once
+
+
+@dataclass(frozen=True)
+class Share:
+    """A function of places: which share of their directions meets a requirement."""
+
+    requirement: Requirement
+
+    def __call__(self, place: Place) -> Floats:
+        return share_of_directions(self.requirement, place)
+
+
+def share_measure(requirement: Requirement) -> Measure:
+    """The share as a measure, "share_of_directions", which is mapped like any other."""
+    measure = requirement.measure
+    return Measure(
+        name=NAME,
+        title=f"Share of directions with {requirement.text}",
+        unit="",
+        better="higher",
+        source=f"{measure.title.lower()} over the directions that the handle can move in; {measure.source}",
+        function=Share(requirement),
+        along=False,
+    )
+
+
+def share_of_directions(requirement: Requirement, place: Place) -> Floats:
+    """Share (...) of the directions, from 0 to 1, along which the requirement is met; nan where not OK.
+
+    Directions are those in which the handle can move, by angle in the plane and by solid angle in space. One along
+    which the measure has no value does not meet it. A measure that does not depend on the direction gives 0 or 1.
+    In the plane the share is good to 1e-7, but for what changes within a few degrees; in space to about 1 %.
+
+    Raises  MeasureError  for a device given by its plant
+    """
+    row = flat(place)
+    share: Floats = np.full(row.shape, np.nan)
+    for which, around in arounds(requirement.measure, row):
+        r = around.basis.shape[2]
+        for first in range(0, len(which), CHUNK):
+            mine = np.arange(first, min(first + CHUNK, len(which)))
+            share[which[mine]] = _SHARES[r](requirement, around, mine)
+    return np.asarray(share.reshape(place.shape))
+
+
+def _of_line(requirement: Requirement, around: Around, mine: Ints) -> Floats:
+    ways = (np.ones((len(mine), 1)), -np.ones((len(mine), 1)))
+    return np.asarray(np.mean([requirement.met(around.asked(mine, way).values) for way in ways], axis=0))
+
+
+def _of_circle(requirement: Requirement, around: Around, mine: Ints) -> Floats:
+    return _of_latitude(requirement, around, mine, 0.0, whole=around.one_sided)
+
+
+def _of_sphere(requirement: Requirement, around: Around, mine: Ints) -> Floats:
+    height, weight = np.polynomial.legendre.leggauss(LATITUDES * (2 if around.one_sided else 1))
+    if not around.one_sided:  # the other half is the same
+        height = 0.5 * (height + 1.0)
+    parts = [_of_latitude(requirement, around, mine, z, whole=True) for z in height.tolist()]
+    return np.asarray(0.5 * weight @ np.array(parts))
+
+
+def _of_latitude(requirement: Requirement, around: Around, mine: Ints, height: float, *, whole: bool) -> Floats:
+    """The share of a circle (or of its half, which the other half repeats) that meets the requirement."""
+    turn, radius = (2.0 * np.pi if whole else np.pi), np.sqrt(1.0 - height * height)
+    count = 2 * SAMPLES if whole else SAMPLES
+    step = turn / count
+    third = (height,) if around.basis.shape[2] == 3 else ()
+
+    def margin(which: Ints, angle: Floats) -> Floats:
+        parts = [radius * np.cos(angle), radius * np.sin(angle), *(np.full(len(angle), z) for z in third)]
+        values = around.asked(mine[which], np.stack(parts, axis=-1)).values
+        return np.where(np.isnan(values), -np.inf, requirement.margin(values))
+
+    n = np.arange(len(mine))
+    angles = step * np.arange(count)
+    m = margin(np.tile(n, count), np.repeat(angles, len(n))).reshape(count, len(n))
+    # two marks for each sample: the sample itself, and what its parabola says lies next to it
+    mark, met = np.repeat(angles, 2)[:, None] * np.ones(len(n)), np.repeat(m >= 0.0, 2, axis=0)
+    sample, where, offset = _hidden(m)
+    hidden = angles[sample] + step * offset
+    there = margin(where, hidden) >= 0.0
+    before = offset < 0.0
+    # the one before its sample stands second in the pair of the sample before
+    slot = np.where(before, (2 * sample - 1) % (2 * count), 2 * sample + 1)
+    mark[slot, where] = np.where(before & (sample == 0), hidden + turn, hidden)
+    met[slot, where] = there
+    return _measured(margin, mark, met, turn)
+
+
+def _hidden(m: Floats) -> tuple[Ints, Ints, Floats]:
+    """Where three neighbours of one sign lie on a parabola of both: sample, place, offset in steps (+-0.5)."""
+    left, right = np.roll(m, 1, axis=0), np.roll(m, -1, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        bend = left - 2.0 * m + right
+        offset = 0.5 * (left - right) / bend
+        peak = m - 0.125 * (left - right) ** 2 / bend
+        one_sign = ((left >= 0.0) == (m >= 0.0)) & ((right >= 0.0) == (m >= 0.0))
+        # generous, since the margin is no parabola
+        turning = (m * bend > 0.0) & (np.abs(offset) <= 0.5) & (peak * np.sign(m) < 0.5 * np.abs(m))
+    sample, where = np.nonzero(one_sign & turning)
+    return sample, where, offset[sample, where]
+
+
+def _measured(margin, mark: Floats, met: Bools, turn: float) -> Floats:  # type: ignore[no-untyped-def]
+    """The share of the turn between marks (s, n) that is met; where it ends between two, that is bisected."""
+    after, after_met = np.roll(mark, -1, axis=0), np.roll(met, -1, axis=0)
+    after[-1] += turn
+    length = np.where(met & after_met, after - mark, 0.0).sum(axis=0)
+    k, where = np.nonzero(met != after_met)
+    inside, outside = (
+        np.where(met[k, where], mark[k, where], after[k, where]),
+        np.where(met[k, where], after[k, where], mark[k, where]),
+    )
+    begin = inside.copy()
+    for _ in range(HALVINGS if len(k) else 0):
+        middle = 0.5 * (inside + outside)
+        good = margin(where, middle) >= 0.0
+        inside, outside = np.where(good, middle, inside), np.where(good, outside, middle)
+    np.add.at(length, where, np.abs(0.5 * (inside + outside) - begin))
+    return np.asarray(length / turn)
+
+
+_SHARES: Final = {1: _of_line, 2: _of_circle, 3: _of_sphere}

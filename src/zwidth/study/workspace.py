@@ -1,0 +1,292 @@
+"""Maps: measures all over a plane of the workspace."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.device import Device
+from zwidth.measures.evaluate import evaluate
+from zwidth.measures.measure import OK, OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note
+from zwidth.measures.own import find_measure
+from zwidth.measures.place import Place, Wanted
+from zwidth.model.posture import reachable_positions
+from zwidth.study.executor import Progress, run
+from zwidth.study.job import Cells
+from zwidth.study.journal import fingerprint
+from zwidth.study.places import place_of
+from zwidth.study.plane import Plane, PlaneError, plane_of, reached
+from zwidth.study.worst import EXTREMES, along_extreme, sense
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from zwidth.study.store import Store
+
+Direction = Sequence[float] | str | None
+COMPONENTS: Final = ("x", "y", "z")
+# Measures asked of all cells at once cost much the same for one cell as for hundreds.
+FEWEST: Final = 512
+BATCHES: Final = 16
+
+
+@dataclass(frozen=True)
+class MapJob:
+    """The cells of a map: rows of the plane's grid one after the other; columns are measures.
+
+    direction  a vector of any length but zero; one of EXTREMES; None: the file's
+    """
+
+    device: Device
+    asked: tuple[Measure, ...]
+    plane: Plane
+    direction: Direction = None
+    assembly: str | None = None
+    model: str | None = None
+    wanted: Wanted = Wanted()  # noqa: RUF009  frozen
+
+    @property
+    def count(self) -> int:
+        """Number of cells."""
+        return len(self.plane.x) * len(self.plane.y)
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Columns: each measure, followed by the components of its extreme direction where it has one."""
+        return tuple(column for measure in self.asked for column in self._columns(measure))
+
+    @property
+    def question(self) -> str:
+        """What its results are known by. Raises TypeError for a measure whose function has no name elsewhere."""
+        direction = self.direction
+        return fingerprint(
+            "map",
+            self.device.document,
+            self.device.operator,
+            self.asked,
+            self.plane,
+            direction if isinstance(direction, str) or direction is None else tuple(map(float, direction)),
+            self.assembly,
+            self.model,
+            self.wanted,
+        )
+
+    @property
+    def batch(self) -> int | None:
+        """Cells to compute at a time; None: as many as take their time, for measures asked one by one."""
+        if any(measure.each for measure in self.asked):
+            return None
+        return max(FEWEST, -(-self.count // BATCHES))
+
+    @cached_property
+    def _positions(self) -> NDArray[np.float64]:
+        return self.plane.positions.reshape(-1, 3)
+
+    def compute(self, first: int, last: int) -> Cells:
+        """Cells first to last - 1, their postures solved together.
+
+        Raises  MeasureError  where a measure cannot be asked of this device, with its name
+        """
+        vector = None if isinstance(self.direction, str) else self.direction
+        place = place_of(self.device, self._positions[first:last], vector, self.assembly, self.model, self.wanted)
+        values, status, notes = [], [], []
+        for measure in self.asked:
+            try:
+                v, s, n = self._column(measure, place)
+            except MeasureError as error:
+                raise MeasureError(f"{measure.name} {error}") from None
+            values.append(v)
+            status += [s] * v.shape[1]
+            here = tuple(Note(a.status, a.reason, a.count, (a.first[0] + first,)) for a in n)
+            notes += [here, *[()] * (v.shape[1] - 1)]
+        return Cells(np.concatenate(values, axis=1), np.stack(status, axis=1), tuple(notes))
+
+    def _columns(self, measure: Measure) -> tuple[str, ...]:
+        directed = isinstance(self.direction, str) and measure.along
+        return (measure.name, *(f"{measure.name}_direction_{c}" for c in COMPONENTS if directed))
+
+    def _column(
+        self, measure: Measure, place: Place
+    ) -> tuple[NDArray[np.float64], NDArray[np.uint8], tuple[Note, ...]]:
+        if not isinstance(self.direction, str) or not measure.along:
+            found = evaluate(measure, place)
+            return found.values[:, None], found.status, found.notes
+        extreme: Any = self.direction
+        directed = along_extreme(measure, place, extreme)
+        found = directed.measured
+        return np.column_stack([found.values, directed.direction]), found.status, found.notes
+
+
+def workspace_map(
+    device: Device,
+    measures: Sequence[str | Measure],
+    plane: Plane | None = None,
+    direction: Direction = None,
+    assembly: str | None = None,
+    model: str | None = None,
+    wanted: Wanted | None = None,
+    *,
+    own: Mapping[str, Measure] | None = None,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> xr.Dataset:
+    """Measures over a plane of a device's workspace.
+
+    measures   names, or measures themselves
+    plane      left out: `plane_of(device)`
+    direction  rendered in every cell; "worst" or "best": in each cell the direction in which the measure is so,
+               "lowest" or "highest": in which it is so; left out: the file's
+    own        measures of a user's own, by name (`measures.own.load_measures`)
+    Returns    a dataset over (y_m, x_m): for each measure NAME its values, nan where there is none, NAME_status,
+               and with an extreme direction NAME_direction (y_m, x_m, component). Why cells have no value stands
+               in the attribute `notes`, a line for each reason
+    Raises     PlaneError    where the handle reaches no cell, and as `plane_of` does
+               ValueError    for an unknown measure, or two of one name
+               MeasureError  for a measure that cannot be asked of this device
+               DeviceError   as `Device.plant` does
+               what `executor.run` raises
+    """
+    job = map_job(device, measures, plane, direction, assembly, model, wanted, own=own)
+    return as_dataset(job, run(job, store, progress, workers, batch=job.batch, stage="mapping"))
+
+
+def map_job(
+    device: Device,
+    measures: Sequence[str | Measure],
+    plane: Plane | None = None,
+    direction: Direction = None,
+    assembly: str | None = None,
+    model: str | None = None,
+    wanted: Wanted | None = None,
+    *,
+    own: Mapping[str, Measure] | None = None,
+) -> MapJob:
+    """The question that `workspace_map` asks, checked, so that a store can be made for it."""
+    asked = tuple(one if isinstance(one, Measure) else find_measure(one, own) for one in measures)
+    names = [one.name for one in asked]
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"a map has measures of different names, got {', '.join(names) or 'none'}")
+    if isinstance(direction, str):
+        if direction not in EXTREMES:
+            raise ValueError(f"the direction must be a vector or one of {', '.join(EXTREMES)}, got {direction!r}")
+        extreme: Any = direction
+        for one in asked:
+            if one.along:
+                try:
+                    sense(one, extreme)
+                except MeasureError as error:
+                    raise MeasureError(f"{one.name} {error}") from None
+    else:
+        device.direction(direction)  # raises what is wrong with it
+    plane = plane or plane_of(device, assembly=assembly)
+    return MapJob(device, asked, plane, direction, assembly, model, wanted or Wanted())
+
+
+def as_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
+    """A map's cells with axes, units and circumstances. Raises PlaneError where the handle reaches none."""
+    import xarray as xr
+
+    plane = job.plane
+    _check_reached(job, cells)
+    data: dict[str, Any] = {}
+    axes = ("y_m", "x_m")
+    column = 0
+    for measure in job.asked:
+        width = len(job._columns(measure))
+        about = {
+            "unit": measure.unit,
+            "units": measure.unit,
+            "title": measure.title,
+            "long_name": measure.title,
+            "source": measure.source,
+            "better": measure.better or "",
+            "key": measure.key,
+            "notes": "\n".join(_sentence(note, plane) for note in cells.notes[column]),
+        }
+        data[measure.name] = (axes, cells.values[:, column].reshape(plane.shape), about)
+        status = cells.status[:, column].reshape(plane.shape)
+        data[f"{measure.name}_status"] = (axes, status, _flags())
+        if width > 1:
+            directions = cells.values[:, column + 1 : column + width].reshape(*plane.shape, 3)
+            told = {"title": f"{str(job.direction).capitalize()} direction of {measure.title.lower()}", "unit": ""}
+            data[f"{measure.name}_direction"] = ((*axes, "component"), directions, told)
+        column += width
+    x, y = (
+        (axis, values, {"units": "m", "long_name": name})
+        for axis, values, name in zip(("x_m", "y_m"), (plane.x, plane.y), plane.names, strict=True)
+    )
+    coordinates: dict[str, Any] = {"x_m": x, "y_m": y}
+    if any("component" in variable[0] for variable in data.values()):
+        coordinates["component"] = list(COMPONENTS)
+    return xr.Dataset(data, coordinates, _circumstances(job))
+
+
+def reachable(dataset: xr.Dataset, name: str) -> NDArray[np.bool_]:
+    """Cells (ny, nx) with a posture, whatever became of the measure in them."""
+    status = dataset[f"{name}_status"].values
+    return np.asarray((status != OUT_OF_REACH) & (status != SINGULAR))
+
+
+def _flags() -> dict[str, Any]:
+    meanings = " ".join(text.replace(" ", "_") for text in STATUS.values())
+    return {"flag_values": np.array(list(STATUS), dtype=np.uint8), "flag_meanings": meanings}
+
+
+def _sentence(note: Note, plane: Plane) -> str:
+    row, column = divmod(note.first[0], len(plane.x))
+    where = f"{plane.names[0]} = {plane.x[column]:.6g} m, {plane.names[1]} = {plane.y[row]:.6g} m"
+    cells = "1 cell" if note.count == 1 else f"{note.count} cells"
+    return f"{cells} {STATUS.get(note.status, 'ok')}: {note.reason}; first at {where}"
+
+
+def _check_reached(job: MapJob, cells: Cells) -> None:
+    if not np.isin(cells.status, (OUT_OF_REACH, SINGULAR)).all():
+        return
+    mechanism = job.device.mechanism
+    assert mechanism is not None
+    assembly = job.assembly or job.device.reference_assembly
+    box = reached(reachable_positions(mechanism, assembly))
+    raise PlaneError(f"the handle reaches no point of this plane in assembly {assembly!r}; it reaches {box}")
+
+
+def _circumstances(job: MapJob) -> dict[str, Any]:
+    """What the map was asked with, as attributes that any file can hold."""
+    from zwidth import __version__
+
+    device, plane, direction = job.device, job.plane, job.direction
+    asked = direction if isinstance(direction, str) else device.direction(direction).tolist()
+    wanted = {
+        "wanted_stiffness_N_per_m": job.wanted.stiffness,
+        "wanted_damping_Ns_per_m": job.wanted.damping,
+        "wanted_frequency_Hz": job.wanted.frequency,
+    }
+    return {
+        "name": device.name,
+        "device": device.label,
+        "assembly": job.assembly or device.reference_assembly or "",
+        "model": job.model or "full",
+        "operator": device.operator_name or "none",
+        "direction": asked,
+        "plane": "".join(plane.names),
+        "plane_axes": [*plane.first.tolist(), *plane.second.tolist()],
+        "plane_through_m": plane.through.tolist(),
+        "sampling_period_s": device.controller.sampling_period,
+        "delay_samples": float(device.controller.delay),
+        "left_out": ", ".join(device.left_out),
+        **{key: value for key, value in wanted.items() if value is not None},
+        "zwidth": __version__,
+    }
+
+
+def failed_everywhere(dataset: xr.Dataset, name: str) -> str | None:
+    """Why no cell has a value; None where one has."""
+    if (dataset[f"{name}_status"].values == OK).any():
+        return None
+    notes = str(dataset[name].attrs["notes"]).splitlines()
+    return f"{name} has no value in any cell" + (f": {notes[0]}" if notes else "")

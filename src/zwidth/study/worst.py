@@ -1,0 +1,274 @@
+"""The worst, or the best, direction of each place.
+
+A measure m(u) of a direction u is asked all round: along the directions that the handle can move in, a line, a
+plane, or space. Between the samples the extreme is refined, by golden sections in the plane and by a compass
+search on the sphere, for all places at once. Where a second extreme comes near the first in the samples, both are
+refined, since the samples do not tell which is the larger.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.measures.evaluate import evaluate
+from zwidth.measures.measure import OK, Measure, Measured, MeasureError, Note
+from zwidth.measures.place import Place
+from zwidth.study.around import Around, Floats, Ints, arounds, flat
+
+Extreme = Literal["worst", "best", "lowest", "highest"]
+EXTREMES: Final = ("worst", "best", "lowest", "highest")
+
+IN_PLANE: Final = 24  # samples of a half circle
+ON_SPHERE: Final = 128  # samples of a half sphere
+GOLDEN: Final = 0.5 * (np.sqrt(5.0) - 1.0)
+SECTIONS: Final = 22  # 2 x 7.5 degrees x 0.618^22 = 7e-6 rad
+COMPASS: Final = 60  # rounds
+FINEST: Final = 3e-6  # rad, where a compass search ends
+NEAR: Final = 0.1  # share of the spread within which a second extreme is refined, too
+CHUNK: Final = 4096  # places at once
+
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Directed:
+    """An extreme over directions.
+
+    measured   its values, with the places' leading axes
+    direction  (..., 3) unit vectors along which they are reached; nan where there is none, or none counts
+    """
+
+    measured: Measured
+    direction: Floats
+
+
+def along_extreme(measure: Measure, place: Place, extreme: Extreme) -> Directed:
+    """A measure along that direction of each place in which it is worst, best, lowest or highest.
+
+    Directions are those in which the handle can move. A direction and its opposite count as one unless the measure
+    tells them apart; then both are asked. Directions along which the measure has no value are left out, and told
+    in a note. The direction is found to 1e-5 rad, and so a smooth measure's extreme to 1e-10 of its curvature.
+
+    Raises  MeasureError  for a device given by its plant, or "worst" and "best" of a measure of which neither more
+                          nor less is better
+    """
+    row = flat(place)
+    if not measure.along:
+        return Directed(evaluate(measure, place), np.full((*place.shape, 3), np.nan))
+    sign = sense(measure, extreme)
+    values, direction = np.full(row.shape, np.nan), np.full((*row.shape, 3), np.nan)
+    status, notes = row.status.copy(), _Notes()
+    for which, around in arounds(measure, row):
+        for first in range(0, len(which), CHUNK):
+            mine = np.arange(first, min(first + CHUNK, len(which)))
+            found = _SEARCH[around.basis.shape[2]](around, mine, sign, notes, which)
+            values[which[mine]], direction[which[mine]], status[which[mine]] = found
+    shape = place.shape
+    told = notes.told(shape)
+    return Directed(Measured(values.reshape(shape), status.reshape(shape), told), direction.reshape((*shape, 3)))
+
+
+def sense(measure: Measure, extreme: Extreme) -> float:
+    """1 where the lowest value is looked for, -1 where the highest. Raises MeasureError where it is not told."""
+    if extreme in ("lowest", "highest"):
+        return 1.0 if extreme == "lowest" else -1.0
+    if measure.better is None:
+        raise MeasureError("is neither better high nor better low; ask for its lowest or highest direction")
+    return 1.0 if (measure.better == "higher") == (extreme == "worst") else -1.0
+
+
+class _Notes:
+    """Reasons why directions have no value, gathered over batches of places."""
+
+    def __init__(self) -> None:
+        self.seen: dict[tuple[int, str], list[int]] = {}
+
+    def tell(self, found: Measured, status: NDArray[np.uint8], which: Ints) -> None:
+        """found: of one batch; status (s, n) of its samples; which (n,) places they are."""
+        reasons = {note.status: note.reason for note in reversed(found.notes)}
+        none = status != OK
+        for bad, label in (
+            (none.all(axis=0), ""),
+            (none.any(axis=0) & ~none.all(axis=0), "along some directions: "),
+        ):
+            for kind in np.unique(status[:, bad][none[:, bad]]):
+                places = which[bad & (status == kind).any(axis=0)]
+                text = label + reasons.get(int(kind), "has no value here")
+                self.seen.setdefault((int(kind), text), []).extend(places.tolist())
+
+    def told(self, shape: tuple[int, ...]) -> tuple[Note, ...]:
+        return tuple(
+            Note(status, reason, len(places), tuple(int(i) for i in np.unravel_index(min(places), shape)))
+            for (status, reason), places in self.seen.items()
+        )
+
+
+Found = tuple[Floats, Floats, NDArray[np.uint8]]
+
+
+def _in_line(around: Around, mine: Ints, sign: float, notes: _Notes, which: Ints) -> Found:
+    components = np.array([[1.0], [-1.0]]) if around.one_sided else np.array([[1.0]])
+    f, status = _sampled(around, mine, components, sign, notes, which)
+    best = f.argmin(axis=0)
+    return _found(around, mine, sign * f.min(axis=0), components[best], status)
+
+
+def _in_plane(around: Around, mine: Ints, sign: float, notes: _Notes, which: Ints) -> Found:
+    count = 2 * IN_PLANE if around.one_sided else IN_PLANE
+    step = np.pi / IN_PLANE
+    angles = step * np.arange(count)
+    f, status = _sampled(around, mine, _turned(angles), sign, notes, which)
+    k, n = f.argmin(axis=0), np.arange(len(mine))
+    lowest = f[k, n]
+    # a local minimum elsewhere, nearly as low
+    other = (f <= np.roll(f, 1, axis=0)) & (f <= np.roll(f, -1, axis=0))
+    for turn in (-1, 0, 1):
+        other[(k + turn) % count, n] = False
+    second = np.where(other, f, np.inf)
+    also = np.flatnonzero(second.min(axis=0) <= lowest + NEAR * _spread(f))
+    start = np.concatenate([angles[k], angles[second.argmin(axis=0)[also]]])
+    place = np.concatenate([n, also])
+    keep = np.isfinite(lowest[place])
+    start, place = start[keep], place[keep]
+
+    def ask(angle: Floats) -> Floats:
+        return _lowered(around.asked(mine[place], _turned(angle)).values, sign)
+
+    angle, value = _golden(ask, start - step, start + step)
+    best_angle: Floats = angles[k]
+    best = lowest.copy()
+    for rows in (slice(0, int(keep[: len(n)].sum())), slice(int(keep[: len(n)].sum()), len(place))):
+        better = value[rows] < best[place[rows]]
+        best[place[rows][better]] = value[rows][better]
+        best_angle[place[rows][better]] = angle[rows][better]
+    return _found(around, mine, sign * best, _turned(best_angle), status)
+
+
+def _golden(ask, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: ignore[no-untyped-def]
+    """Where each function is lowest between its bounds, and its value there."""
+    a, b = low.copy(), high.copy()
+    c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+    at_c, at_d = ask(c), ask(d)
+    for _ in range(SECTIONS):
+        left = at_c < at_d
+        a, b = np.where(left, a, c), np.where(left, d, b)
+        kept, at_kept = np.where(left, c, d), np.where(left, at_c, at_d)
+        new = np.where(left, b - GOLDEN * (b - a), a + GOLDEN * (b - a))
+        at_new = ask(new)
+        c, d = np.where(left, new, kept), np.where(left, kept, new)
+        at_c, at_d = np.where(left, at_new, at_kept), np.where(left, at_kept, at_new)
+    left = at_c < at_d
+    return np.where(left, c, d), np.where(left, at_c, at_d)
+
+
+def _on_sphere(around: Around, mine: Ints, sign: float, notes: _Notes, which: Ints) -> Found:
+    points = sphere(2 * ON_SPHERE)
+    points = points if around.one_sided else points[:ON_SPHERE]
+    reach = float(np.sqrt(2.0 * np.pi / ON_SPHERE))
+    f, status = _sampled(around, mine, points, sign, notes, which)
+    k, n = f.argmin(axis=0), np.arange(len(mine))
+    lowest = f[k, n]
+    cosine = points @ points[k].T
+    near = cosine > np.cos(2.0 * reach) if around.one_sided else np.abs(cosine) > np.cos(2.0 * reach)
+    second = np.where(near, np.inf, f)
+    also = np.flatnonzero(second.min(axis=0) <= lowest + NEAR * _spread(f))
+    start = np.concatenate([points[k], points[second.argmin(axis=0)[also]]])
+    place = np.concatenate([n, also])
+    value = np.concatenate([lowest, second.min(axis=0)[also]])
+    keep = np.isfinite(value)
+    start, place, value = start[keep], place[keep], value[keep]
+    end, value = _compass(around, mine[place], start, value, sign, 0.6 * reach)
+    best, best_point = lowest.copy(), points[k].copy()
+    split = int(keep[: len(n)].sum())
+    for rows in (slice(0, split), slice(split, len(place))):
+        better = value[rows] < best[place[rows]]
+        best[place[rows][better]] = value[rows][better]
+        best_point[place[rows][better]] = end[rows][better]
+    return _found(around, mine, sign * best, best_point, status)
+
+
+def _compass(
+    around: Around, place: Ints, u: Floats, value: Floats, sign: float, reach: float
+) -> tuple[Floats, Floats]:
+    """The lowest of eight directions round each, again and again; nearer ones where none of them is lower."""
+    u, value, step = u.copy(), value.copy(), np.full(len(u), reach)
+    for turn in range(COMPASS):
+        busy = np.flatnonzero(step > FINEST)
+        if not len(busy):
+            break
+        p, q = _across(u[busy])
+        angle = 0.25 * np.pi * np.arange(8) + turn  # no axis is preferred
+        out = np.cos(angle)[:, None, None] * p + np.sin(angle)[:, None, None] * q
+        trial = np.cos(step[busy])[:, None] * u[busy] + np.sin(step[busy])[:, None] * out
+        asked = around.asked(np.tile(place[busy], 8), trial.reshape(-1, 3)).values.reshape(8, -1)
+        f = _lowered(asked, sign)
+        k, n = f.argmin(axis=0), np.arange(len(busy))
+        better = f[k, n] < value[busy]
+        moved = busy[better]
+        u[moved] = trial[k, n][better]
+        value[moved] = f[k, n][better]
+        step[busy[~better]] *= 0.5
+    return u, value
+
+
+def _across(u: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors across each of these (n, 3), and across each other."""
+    axis = np.eye(3)[np.abs(u).argmin(axis=1)]
+    p = np.cross(u, axis)
+    p /= np.linalg.norm(p, axis=1, keepdims=True)
+    return p, np.cross(u, p)
+
+
+def sphere(count: int) -> Floats:
+    """Points (count, 3) spread evenly over the unit sphere, the first half of them over its upper half.
+
+    Fibonacci's spiral: equal steps along the axis, the golden angle round it.
+    """
+    k = np.arange(count)
+    z = 1.0 - (2.0 * k + 1.0) / count
+    angle = 2.0 * np.pi * GOLDEN * k
+    r = np.sqrt(1.0 - z * z)
+    return np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=-1)
+
+
+def _turned(angle: Floats) -> Floats:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def _sampled(
+    around: Around, mine: Ints, components: Floats, sign: float, notes: _Notes, which: Ints
+) -> tuple[Floats, NDArray[np.uint8]]:
+    """What to make small, (s, n), inf where there is no value; and what became of each place, (n,)."""
+    s, n = len(components), len(mine)
+    found = around.asked(np.tile(mine, s), np.repeat(components, n, axis=0))
+    status = found.status.reshape(s, n)
+    if (status != OK).any():
+        notes.tell(found, status, which[mine])
+    some = (status == OK).any(axis=0)
+    return _lowered(found.values.reshape(s, n), sign), np.where(some, OK, status[0]).astype(np.uint8)
+
+
+def _lowered(values: Floats, sign: float) -> Floats:
+    return np.where(np.isnan(values), np.inf, sign * values)
+
+
+def _spread(f: Floats) -> Floats:
+    finite = np.isfinite(f)
+    high, low = np.where(finite, f, -np.inf).max(axis=0), np.where(finite, f, np.inf).min(axis=0)
+    return np.where(finite.any(axis=0), high - low, 0.0)
+
+
+def _found(around: Around, mine: Ints, values: Floats, components: Floats, status: NDArray[np.uint8]) -> Found:
+    u = around.directions(mine, components)
+    if not around.one_sided:  # of a direction and its opposite, the one that points along the first axis it can
+        lead = np.take_along_axis(u, (np.abs(u) > 1e-9).argmax(axis=1)[:, None], axis=1)
+        u = u * np.where(lead < 0.0, -1.0, 1.0)
+    none = status != OK
+    return np.where(none, np.nan, values), np.where(none[:, None], np.nan, u), status
+
+
+_SEARCH: Final = {1: _in_line, 2: _in_plane, 3: _on_sphere}
