@@ -43,6 +43,8 @@ NEAR_END: Final = 0.02
 # Trial walls: stiffer than the stiffest by these factors, with so many dampings each.
 BEYOND: Final = (1.0001, 1.02, 1.3)
 TRIALS: Final = 6
+# A stiffness this small against that of the plant itself, some m/T^2, may be what rounding leaves of none.
+NOTHING: Final = 1e-10
 # What could be the stiffest wall is refined unless it misses the stiffest found by more than this.
 SLACK: Final = 1.01
 
@@ -254,6 +256,8 @@ def stiffest_wall(
         return DOUBTFUL, np.nan, np.nan, np.nan, np.nan
     if best == 0.0:
         return NO_WALL, np.nan, np.nan, np.nan, np.nan
+    if best < NOTHING * np.abs(polynomials[0]).sum() / np.abs(polynomials[1]).sum():
+        return DOUBTFUL, np.nan, np.nan, np.nan, np.nan
     return FOUND, best, damping, at, partner
 
 

@@ -14,6 +14,7 @@ from zwidth.model.arrays import Arrays
 from zwidth.model.continuation import OK, OUT_OF_REACH, SINGULAR, follow, largest
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
 from zwidth.model.mechanism import Floats, Ints
+from zwidth.model.reach import beyond
 from zwidth.model.roadmap import roadmap
 from zwidth.model.tree import workspace
 
@@ -64,7 +65,15 @@ def solve(mech: Arrays, design: Ints, reference: Floats, goals: Floats) -> Solve
 
 
 def by_roadmap(mech: Arrays, design: int, reference: Floats, goals: Floats) -> Solved:
-    """Start each posture at the roadmap's node of its cell; where that fails, at the nearest nodes."""
+    """Start each posture at the roadmap's node of its cell; where that fails, at the nearest nodes.
+
+    What no chain of links can span is not tried.
+    """
+    far = beyond(mech, design, goals)
+    if far.any():
+        solved = nowhere(mech, len(goals), OUT_OF_REACH)
+        solved.put(~far, by_roadmap(mech, design, reference, goals[~far]))
+        return solved
     road = roadmap(mech, design, reference)
     designs = np.full(len(goals), design, dtype=np.int64)
     solved = run(mech, designs, road.angles, road.start(goals), goals)
@@ -88,11 +97,11 @@ def empty(mech: Arrays, count: int) -> Solved:
     )
 
 
-def nowhere(mech: Arrays, count: int) -> Solved:
-    """The answer of an assembly that is singular throughout."""
+def nowhere(mech: Arrays, count: int, status: int = SINGULAR) -> Solved:
+    """No posture at all; left out: the answer of an assembly that is singular throughout."""
     solved = empty(mech, count)
     for numbers in vars(solved).values():
-        numbers.fill(np.nan if numbers.dtype == np.float64 else SINGULAR)
+        numbers.fill(np.nan if numbers.dtype == np.float64 else status)
     return solved
 
 
