@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.measure import OK, Measure, Measured, MeasureError, Note
+from zwidth.measures.measure import MISSING, OK, Measure, Measured, MeasureError, Note
 from zwidth.measures.place import Place
 from zwidth.study.around import Around, Floats, Ints, arounds, flat
 
@@ -50,8 +50,9 @@ def along_extreme(measure: Measure, place: Place, extreme: Extreme) -> Directed:
     """A measure along that direction of each place in which it is worst, best, lowest or highest.
 
     Directions are those in which the handle can move. A direction and its opposite count as one unless the measure
-    tells them apart; then both are asked. Directions along which the measure has no value are left out, and told
-    in a note. The direction is found to 1e-5 rad, and so a smooth measure's extreme to 1e-10 of its curvature.
+    tells them apart; then both are asked. A place in which one direction has no value has no worst one; otherwise
+    such directions are left out. Either is told in a note. The direction is found to 1e-5 rad, and so a smooth
+    measure's extreme to 1e-10 of its curvature.
 
     Raises  MeasureError  for a device given by its plant, or "worst" and "best" of a measure of which neither more
                           nor less is better
@@ -59,16 +60,16 @@ def along_extreme(measure: Measure, place: Place, extreme: Extreme) -> Directed:
     row = flat(place)
     if not measure.along:
         return Directed(evaluate(measure, place), np.full((*place.shape, 3), np.nan))
-    sign = sense(measure, extreme)
+    goal = _Goal(sense(measure, extreme), extreme == "worst")
     values, direction = np.full(row.shape, np.nan), np.full((*row.shape, 3), np.nan)
-    status, notes = row.status.copy(), _Notes()
+    status = row.status.copy()
     for which, around in arounds(measure, row):
         for first in range(0, len(which), CHUNK):
             mine = np.arange(first, min(first + CHUNK, len(which)))
-            found = _SEARCH[around.basis.shape[2]](around, mine, sign, notes, which)
+            found = _SEARCH[around.basis.shape[2]](around, mine, goal, which)
             values[which[mine]], direction[which[mine]], status[which[mine]] = found
     shape = place.shape
-    told = notes.told(shape)
+    told = goal.told(shape)
     return Directed(Measured(values.reshape(shape), status.reshape(shape), told), direction.reshape((*shape, 3)))
 
 
@@ -81,26 +82,44 @@ def sense(measure: Measure, extreme: Extreme) -> float:
     return 1.0 if (measure.better == "higher") == (extreme == "worst") else -1.0
 
 
-class _Notes:
-    """Reasons why directions have no value, gathered over batches of places."""
+class _Goal:
+    """What is looked for, and why it is not found everywhere.
 
-    def __init__(self) -> None:
+    sign    1: the lowest value, -1: the highest
+    strict  one direction without a value leaves its place without one
+    """
+
+    def __init__(self, sign: float, strict: bool) -> None:
+        self.sign, self.strict = sign, strict
         self.seen: dict[tuple[int, str], list[int]] = {}
 
-    def tell(self, found: Measured, status: NDArray[np.uint8], which: Ints) -> None:
-        """found: of one batch; status (s, n) of its samples; which (n,) places they are."""
-        reasons = {note.status: note.reason for note in reversed(found.notes)}
+    def lowered(self, values: Floats) -> Floats:
+        """What to make small; inf where there is no value."""
+        return np.where(np.isnan(values), np.inf, self.sign * values)
+
+    def status(self, found: Measured, status: NDArray[np.uint8], which: Ints) -> NDArray[np.uint8]:
+        """What becomes of places, (n,).
+
+        found   of all samples
+        status  (s, n)  theirs
+        which   (n,)    the places
+        """
         none = status != OK
-        for bad, label in (
-            (none.all(axis=0), ""),
-            (none.any(axis=0) & ~none.all(axis=0), "along some directions: "),
-        ):
-            for kind in np.unique(status[:, bad][none[:, bad]]):
-                places = which[bad & (status == kind).any(axis=0)]
-                text = label + reasons.get(int(kind), "has no value here")
-                self.seen.setdefault((int(kind), text), []).extend(places.tolist())
+        if not none.any():
+            return np.full(len(which), OK, dtype=np.uint8)
+        reasons = {note.status: note.reason for note in reversed(found.notes)}
+        everywhere = none.all(axis=0)
+        # of several kinds the least: a place has no value rather than an undecided one
+        kind = np.where(none, status, MISSING).min(axis=0)
+        some = "along some directions: " if self.strict else "along some directions, which are left out: "
+        for label, here in (("", everywhere), (some, none.any(axis=0) & ~everywhere)):
+            for k in np.unique(kind[here]):
+                reason = label + reasons.get(int(k), "has no value here")
+                self.seen.setdefault((int(k), reason), []).extend(which[here & (kind == k)].tolist())
+        return np.where(none.any(axis=0) if self.strict else everywhere, kind, OK).astype(np.uint8)
 
     def told(self, shape: tuple[int, ...]) -> tuple[Note, ...]:
+        """A note for each reason, with the places' leading axes."""
         return tuple(
             Note(status, reason, len(places), tuple(int(i) for i in np.unravel_index(min(places), shape)))
             for (status, reason), places in self.seen.items()
@@ -110,18 +129,18 @@ class _Notes:
 Found = tuple[Floats, Floats, NDArray[np.uint8]]
 
 
-def _in_line(around: Around, mine: Ints, sign: float, notes: _Notes, which: Ints) -> Found:
+def _in_line(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
     components = np.array([[1.0], [-1.0]]) if around.one_sided else np.array([[1.0]])
-    f, status = _sampled(around, mine, components, sign, notes, which)
+    f, status = _sampled(around, mine, components, goal, which)
     best = f.argmin(axis=0)
-    return _found(around, mine, sign * f.min(axis=0), components[best], status)
+    return _found(around, mine, goal.sign * f.min(axis=0), components[best], status)
 
 
-def _in_plane(around: Around, mine: Ints, sign: float, notes: _Notes, which: Ints) -> Found:
+def _in_plane(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
     count = 2 * IN_PLANE if around.one_sided else IN_PLANE
-    step = np.pi / IN_PLANE
+    step = float(np.pi / IN_PLANE)
     angles = step * np.arange(count)
-    f, status = _sampled(around, mine, _turned(angles), sign, notes, which)
+    f, status = _sampled(around, mine, _turned(angles), goal, which)
     k, n = f.argmin(axis=0), np.arange(len(mine))
     lowest = f[k, n]
     # a local minimum elsewhere, nearly as low
@@ -136,7 +155,7 @@ def _in_plane(around: Around, mine: Ints, sign: float, notes: _Notes, which: Int
     start, place = start[keep], place[keep]
 
     def ask(angle: Floats) -> Floats:
-        return _lowered(around.asked(mine[place], _turned(angle)).values, sign)
+        return goal.lowered(around.asked(mine[place], _turned(angle)).values)
 
     angle, value = _golden(ask, start - step, start + step)
     best_angle: Floats = angles[k]
@@ -145,7 +164,7 @@ def _in_plane(around: Around, mine: Ints, sign: float, notes: _Notes, which: Int
         better = value[rows] < best[place[rows]]
         best[place[rows][better]] = value[rows][better]
         best_angle[place[rows][better]] = angle[rows][better]
-    return _found(around, mine, sign * best, _turned(best_angle), status)
+    return _found(around, mine, goal.sign * best, _turned(best_angle), status)
 
 
 def _golden(ask, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: ignore[no-untyped-def]
@@ -165,11 +184,11 @@ def _golden(ask, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: i
     return np.where(left, c, d), np.where(left, at_c, at_d)
 
 
-def _on_sphere(around: Around, mine: Ints, sign: float, notes: _Notes, which: Ints) -> Found:
+def _on_sphere(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
     points = sphere(2 * ON_SPHERE)
     points = points if around.one_sided else points[:ON_SPHERE]
     reach = float(np.sqrt(2.0 * np.pi / ON_SPHERE))
-    f, status = _sampled(around, mine, points, sign, notes, which)
+    f, status = _sampled(around, mine, points, goal, which)
     k, n = f.argmin(axis=0), np.arange(len(mine))
     lowest = f[k, n]
     cosine = points @ points[k].T
@@ -181,18 +200,18 @@ def _on_sphere(around: Around, mine: Ints, sign: float, notes: _Notes, which: In
     value = np.concatenate([lowest, second.min(axis=0)[also]])
     keep = np.isfinite(value)
     start, place, value = start[keep], place[keep], value[keep]
-    end, value = _compass(around, mine[place], start, value, sign, 0.6 * reach)
+    end, value = _compass(around, mine[place], start, value, goal, 0.6 * reach)
     best, best_point = lowest.copy(), points[k].copy()
     split = int(keep[: len(n)].sum())
     for rows in (slice(0, split), slice(split, len(place))):
         better = value[rows] < best[place[rows]]
         best[place[rows][better]] = value[rows][better]
         best_point[place[rows][better]] = end[rows][better]
-    return _found(around, mine, sign * best, best_point, status)
+    return _found(around, mine, goal.sign * best, best_point, status)
 
 
 def _compass(
-    around: Around, place: Ints, u: Floats, value: Floats, sign: float, reach: float
+    around: Around, place: Ints, u: Floats, value: Floats, goal: _Goal, reach: float
 ) -> tuple[Floats, Floats]:
     """The lowest of eight directions round each, again and again; nearer ones where none of them is lower."""
     u, value, step = u.copy(), value.copy(), np.full(len(u), reach)
@@ -205,7 +224,7 @@ def _compass(
         out = np.cos(angle)[:, None, None] * p + np.sin(angle)[:, None, None] * q
         trial = np.cos(step[busy])[:, None] * u[busy] + np.sin(step[busy])[:, None] * out
         asked = around.asked(np.tile(place[busy], 8), trial.reshape(-1, 3)).values.reshape(8, -1)
-        f = _lowered(asked, sign)
+        f = goal.lowered(asked)
         k, n = f.argmin(axis=0), np.arange(len(busy))
         better = f[k, n] < value[busy]
         moved = busy[better]
@@ -240,20 +259,13 @@ def _turned(angle: Floats) -> Floats:
 
 
 def _sampled(
-    around: Around, mine: Ints, components: Floats, sign: float, notes: _Notes, which: Ints
+    around: Around, mine: Ints, components: Floats, goal: _Goal, which: Ints
 ) -> tuple[Floats, NDArray[np.uint8]]:
     """What to make small, (s, n), inf where there is no value; and what became of each place, (n,)."""
     s, n = len(components), len(mine)
     found = around.asked(np.tile(mine, s), np.repeat(components, n, axis=0))
-    status = found.status.reshape(s, n)
-    if (status != OK).any():
-        notes.tell(found, status, which[mine])
-    some = (status == OK).any(axis=0)
-    return _lowered(found.values.reshape(s, n), sign), np.where(some, OK, status[0]).astype(np.uint8)
-
-
-def _lowered(values: Floats, sign: float) -> Floats:
-    return np.where(np.isnan(values), np.inf, sign * values)
+    status = goal.status(found, found.status.reshape(s, n), which[mine])
+    return goal.lowered(found.values.reshape(s, n)), status
 
 
 def _spread(f: Floats) -> Floats:
