@@ -1,0 +1,113 @@
+"""Where several requirements are met at once (thesis Fig. 5.4), and how large that area is.
+
+Between the cells of a map each margin is interpolated linearly, and its zero line cuts the workspace: an error of
+the second order in the step. A cell without a value takes what touches it out of the region, so that the edge of
+reach is followed in steps and half steps of the grid, an error of the first order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.study.requirement import Requirement
+from zwidth.study.workspace import reachable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = NDArray[np.float64]
+
+ROUNDING: Final = 1e-9  # share of the largest margin that still counts as 0: a bound that is just met is met
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of a plane.
+
+    shape  a shapely polygon or several, in the plane's coordinates [m]
+    area   [m^2]
+    share  of the area that can be reached; nan where nothing can
+    """
+
+    shape: Any
+    area: float
+    share: float
+
+
+@dataclass(frozen=True)
+class CommonArea:
+    """Requirements laid over each other.
+
+    reach    what can be reached
+    regions  where each requirement is met, in their order
+    common   where all are
+    """
+
+    requirements: tuple[Requirement, ...]
+    reach: Region
+    regions: tuple[Region, ...]
+    common: Region
+
+
+def common_area(dataset: xr.Dataset, requirements: Sequence[Requirement]) -> CommonArea:
+    """The regions of a map in which requirements are met, and the region that they have in common.
+
+    dataset  a map (`study.workspace`) that holds the measure of each requirement
+    Raises   ValueError  for no requirement, or one of a measure that the map does not hold
+    """
+    if not requirements:
+        raise ValueError("a common area needs at least one requirement")
+    missing = [r.measure.name for r in requirements if r.measure.name not in dataset]
+    if missing:
+        raise ValueError(f"the map does not hold {missing[0]}; it holds {', '.join(_measures(dataset))}")
+    x, y = dataset["x_m"].values, dataset["y_m"].values
+    reached = filled(x, y, np.where(reachable(dataset, requirements[0].measure.name), 1.0, np.nan))
+    shapes = [filled(x, y, r.margin(dataset[r.measure.name].values)) for r in requirements]
+    common = shapes[0]
+    for shape in shapes[1:]:
+        common = common.intersection(shape)
+    whole = float(reached.area)
+
+    def region(shape: Any) -> Region:
+        area = float(shape.area)
+        return Region(shape, area, area / whole if whole > 0.0 else np.nan)
+
+    return CommonArea(tuple(requirements), region(reached), tuple(map(region, shapes)), region(common))
+
+
+def filled(x: Floats, y: Floats, margin: Floats) -> Any:
+    """Where an interpolated margin is 0 or more, as a shapely geometry.
+
+    x, y    (nx,), (ny,)  ascending
+    margin  (ny, nx)      nan: no value, and no part of the region; infinities lie far on their side
+
+    >>> grid = np.linspace(-1.0, 1.0, 41)
+    >>> round(filled(grid, grid, 0.25 - grid**2 - grid[:, None] ** 2).area, 2)      # pi/4
+    0.78
+    """
+    import contourpy
+    import shapely
+
+    finite = np.abs(margin[np.isfinite(margin)])
+    most = 2.0 * float(finite.max(initial=0.0)) or 1.0
+    z = np.ma.masked_invalid(np.clip(margin, -most, most))  # keeps nan
+    generator = contourpy.contour_generator(
+        x, y, z, name="serial", corner_mask=True, fill_type=contourpy.FillType.OuterOffset
+    )
+    lines: Any = generator.filled(-ROUNDING * most, 2.0 * most)
+    rings, offsets = lines
+    parts = []
+    for points, ends in zip(rings, offsets, strict=True):
+        outer, *holes = (points[a:b] for a, b in pairwise(ends))
+        parts.append(shapely.make_valid(shapely.Polygon(outer, holes)))
+    return shapely.union_all(parts) if parts else shapely.Polygon()
+
+
+def _measures(dataset: xr.Dataset) -> list[str]:
+    return [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
