@@ -50,6 +50,17 @@ def meet(factors: Factors, radius: float, one: float, other: float) -> tuple[flo
     return a, b, settled and a < np.pi and b < np.pi and abs(a - b) > 1e-6 * a
 
 
+@compiled
+def steadier(factors: Factors, radius: float, one: float, other: float) -> float:
+    """Of the two angles of a corner the one on whose branch the wall moves less with the angle's last digits."""
+    _, _, dK, dB = wall_at(factors, radius, one)
+    _, _, eK, eB = wall_at(factors, radius, other)
+    # each in shares of the corner's slopes together, so that K and B count alike
+    first = one * (abs(dK) / (abs(dK) + abs(eK)) + abs(dB) / (abs(dB) + abs(eB)))
+    second = other * (abs(eK) / (abs(dK) + abs(eK)) + abs(eB) / (abs(dB) + abs(eB)))
+    return one if not first > second else other
+
+
 def cross_line(tracer: Tracer, root: RealRoot, low: float, high: float) -> float:
     """The angle in (low, high) where the curve crosses a line of real roots."""
     a, s, v = tracer.line(root).tolist()
@@ -95,5 +106,5 @@ def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, f
     if 0.0 < partner < np.pi:
         one, other, found = meet(tracer.factors, tracer.radius, theta, partner)
         if found and abs(one - theta) <= 1e-5 * theta:
-            return one, tracer.wall(one)[:2], other
+            return one, tracer.wall(steadier(tracer.factors, tracer.radius, one, other))[:2], other
     return theta, wall, partner

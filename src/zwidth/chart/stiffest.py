@@ -1,10 +1,11 @@
 """The largest stiffness of many loops at once, compiled, for maps and studies.
 
-The same curve, the same flags and the same corners as in the chart, but nothing is joined or drawn: the curve is
-sampled, the samples that edge the stable set are told from the others, and what could be the largest stiffness is
-refined: a smooth maximum of K, a corner at the end of a run of edge samples, a crossing of B = 0. What a chart does
-to be sure (walks that close, eigenvalues where rounding hides a root) is not done here. Instead the answer is put to
-the test, and a loop that leaves a doubt is to be asked by itself (`chart.largest_stiffness`):
+The same curve, the same flags and the same corners as in the chart, but nothing is joined or drawn: the curve
+is sampled, the samples that edge the stable set are told from the others, and what could be the largest
+stiffness is refined: a smooth maximum of K, a corner at the end of a run of edge samples, a crossing of B = 0.
+What a chart does to be sure (walks that close, eigenvalues where rounding hides a root) is not done here.
+Instead the answer is put to the test, and a loop that leaves a doubt is to be asked by itself
+(`chart.largest_stiffness`):
 
 - a sample whose flag is lost in rounding, or a corner that does not settle;
 - a straight edge (a real root at z = 1 or -1) whose end may lie beyond the stiffest wall found;
@@ -20,7 +21,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.corner import meet
+from zwidth.chart.corner import meet, steadier
 from zwidth.chart.curve import OF_B, OF_SLOPE, wall_alone, wall_at, zero_between
 from zwidth.chart.grid import LONGEST_STEP, MOST_ANGLES, angles_among, around_crossings, computer_points
 from zwidth.chart.hurwitz import combine, deflate, edges_on_line, edges_stable_set, is_stable, working_room
@@ -237,7 +238,7 @@ def stiffest_wall(
             theta, other, settled = corner_between(factors, polynomials, thetas[i], thetas[j], room)
             if not settled:
                 return DOUBTFUL, np.nan, np.nan, np.nan, np.nan
-            wall = wall_at(factors, 1.0, theta)
+            wall = wall_at(factors, 1.0, steadier(factors, 1.0, theta, other) if 0.0 < other < np.pi else theta)
             if wall[1] < 0.0 <= B[i]:
                 crossing = zero_between(factors, 1.0, OF_B, min(thetas[i], theta), max(thetas[i], theta))
                 stiff = wall_at(factors, 1.0, crossing)[0]
@@ -245,14 +246,14 @@ def stiffest_wall(
                     best, damping, at, partner = stiff, 0.0, crossing, crossing
             elif wall[0] > best and wall[1] >= 0.0:
                 best, damping, at, partner = wall[0], wall[1], theta, other
-            if rise > 0.0 and step * wall[2] < 0.0:
+            if rise > 0.0 and step * wall_at(factors, 1.0, theta)[2] < 0.0:
                 top = zero_between(factors, 1.0, OF_SLOPE, min(thetas[i], theta), max(thetas[i], theta))
                 wall = wall_at(factors, 1.0, top)
                 if wall[0] > best and wall[1] >= 0.0:
                     best, damping, at, partner = wall[0], wall[1], top, top
     if n > 0 and flags[n - 1] > 0 and _end_beyond(polynomials, best):
         return DOUBTFUL, np.nan, np.nan, np.nan, np.nan
-    if unsure > 0.0 and unsure * SLACK > best or _more_beyond(polynomials, best, damping, widest, room):
+    if (unsure > 0.0 and unsure * SLACK > best) or _more_beyond(polynomials, best, damping, widest, room):
         return DOUBTFUL, np.nan, np.nan, np.nan, np.nan
     if best == 0.0:
         return NO_WALL, np.nan, np.nan, np.nan, np.nan
