@@ -95,12 +95,14 @@ def test_a_two_link_arm_by_hand():
         "encoder_counts_per_rev": 1000.0,
         "encoder_noise_rad": 1e-4,
         "torque_limit_Nm": 0.1,
+        "continuous_torque_Nm": 0.04,
         "hardening_Nm_per_rad3": 0.2,
         "backward_stiffness_Nm_per_rad": 0.6,
         "brake_damping_max_Nms_per_rad": 1e-4,
         "brake_time_constant_s": 0.005,
     }
     device = from_document(changed(text, **arm(**keys), mechanism__drives__1__encoder_counts_per_rev=500.0))
+    assert device.mechanism.drives.continuous_torque == pytest.approx([0.04, np.nan], nan_ok=True)
     # shoulder at the origin, elbow at (0.2, 0): the handle's x moves by -0.2 per radian of either
     plant = device.plant()  # phi_1, phi_2, theta_1; the elbow's drive is rigid
     found = plant.nonlinear
@@ -254,11 +256,38 @@ FAULTS = [
         "give brake_damping_max_Nms_per_rad",
     ),
     (
+        changed(ARM, **arm(continuous_torque_Nm=0.0)),
+        "mechanism.drives.shoulder.continuous_torque_Nm",
+        "must be greater than 0",
+    ),
+    (
+        changed(ARM, **arm(continuous_torque_Nm=float("inf"))),
+        "mechanism.drives.shoulder.continuous_torque_Nm",
+        "must be finite, got inf",
+    ),
+    (
+        changed(ARM, **arm(continuous_torque_Nm=1e-13)),
+        "mechanism.drives.shoulder.continuous_torque_Nm",
+        "is the unit right?",
+    ),
+    (
+        changed(ARM, **arm(continuous_torque_Nm=0.2, torque_limit_Nm=0.1)),
+        "mechanism.drives.shoulder.continuous_torque_Nm",
+        "must be at most torque_limit_Nm = 0.1, got 0.2",
+    ),
+    (
         changed(ARM, **arm(encoder_counts_per_rev=0)),
         "mechanism.drives.shoulder.encoder_counts_per_rev",
         "must be greater than 0",
     ),
 ]
+
+
+@pytest.mark.parametrize("limit", [0.1, 0.2, INF])
+def test_a_motor_bears_for_a_moment_what_it_bears_without_end(limit):
+    device = from_document(changed(ARM, **arm(continuous_torque_Nm=0.1, torque_limit_Nm=limit)))
+    assert device.mechanism.drives.torque_limit[0] == limit
+    assert from_document(changed(ARM, **arm(continuous_torque_Nm=0.1))).left_out == ()  # it limits nothing
 
 
 @pytest.mark.parametrize(("document", "key", "words"), FAULTS, ids=[f"{i}-{f[1]}" for i, f in enumerate(FAULTS)])

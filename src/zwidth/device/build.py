@@ -222,6 +222,7 @@ def _drives(section: MechanismSection, index: dict[str, int]) -> Drives:
         torque_constant=column("torque_constant_Nm_per_A", math.nan),
         torque_limit=column("torque_limit_Nm", math.inf),
         encoder_counts=column("encoder_counts_per_rev", math.nan),
+        continuous_torque=column("continuous_torque_Nm", math.nan),
         winding_damping=np.array([damping for damping, _ in windings]),
         winding_time_constant=np.array([lag for _, lag in windings]),
         nonlinearity=parts.of_drives(drives, section.friction),

@@ -181,6 +181,13 @@ def _drive(place: Path, drive: dict[str, Any], T: float) -> Found:
     for key in ("hardening_Nm_per_rad3", "backward_stiffness_Nm_per_rad"):
         if key in drive and number(stiffness) and math.isinf(stiffness):
             yield (*place, key), "needs a flexible transmission; give stiffness_Nm_per_rad, or remove this"
+    continuous, limit = drive.get("continuous_torque_Nm"), drive.get("torque_limit_Nm")
+    if number(continuous) and number(limit) and continuous > limit > 0:
+        yield (
+            (*place, "continuous_torque_Nm"),
+            f"must be at most torque_limit_Nm = {limit:.10g}, got {continuous:.10g}; "
+            "what a motor bears without end it bears for a moment",
+        )
     if "brake_time_constant_s" in drive and "brake_damping_max_Nms_per_rad" not in drive:
         yield (
             (*place, "brake_time_constant_s"),

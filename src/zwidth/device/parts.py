@@ -33,6 +33,7 @@ OUTSIDE: Final[dict[tuple[str, ...], str]] = {
     ("mechanism", "drives", "*", "encoder_counts_per_rev"): "encoder steps",
     ("mechanism", "drives", "*", "encoder_noise_rad"): "noise",
     ("mechanism", "drives", "*", "torque_limit_Nm"): "the force limit",
+    ("mechanism", "drives", "*", "continuous_torque_Nm"): "the force limit",
 }
 """Keys, with * for list elements, that no linear answer reads -> what they belong to, in `Nonlinear.left_out`'s
 words. An encoder's resolution_m is not among them: a Kalman filter reads it."""

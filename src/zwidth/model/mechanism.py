@@ -106,6 +106,7 @@ class Drives:
     torque_constant  (..., d)  [N m/A], nan if not known
     torque_limit     (..., d)  at the motor [N m], inf if none
     encoder_counts   (..., d)  per motor revolution after quadrature, nan if not known
+    continuous_torque (..., d)  what a motor bears without end, at the motor [N m], nan if not known; None: of none
     winding_damping  (..., d)  k_t^2/R of a winding closed through a resistor, at the motor [N m s/rad]; None: none
     winding_time_constant  (..., d)  its L/R [s]
     nonlinearity     friction, springs that are not straight, brakes; None: none
@@ -120,6 +121,7 @@ class Drives:
     torque_constant: Floats
     torque_limit: Floats
     encoder_counts: Floats
+    continuous_torque: Floats | None = None
     winding_damping: Floats | None = None
     winding_time_constant: Floats | None = None
     nonlinearity: DriveNonlinearity | None = None

@@ -28,6 +28,7 @@ from zwidth.device.schema.numbers import (
     Spring,
     Step,
     Stiffness,
+    Torque,
     Triple,
     quantity,
 )
@@ -147,6 +148,12 @@ class DriveSection(Section):
     )
     torque_limit_Nm: NumberOrInfinity | None = quantity(
         "largest torque at the motor; omitted or inf: no limit", "N m", gt=0, default=None
+    )
+    continuous_torque_Nm: Torque | None = quantity(
+        "torque at the motor that it bears without end, its winding no hotter than allowed; omitted: not known",
+        "N m",
+        gt=0,
+        default=None,
     )
     encoder_counts_per_rev: Counts | None = quantity(
         "encoder counts per motor revolution, after quadrature; omitted: not known", "1", default=None

@@ -197,6 +197,7 @@ DryFriction = Annotated[
 StribeckVelocity = Annotated[Number, Field(gt=0.0), bounds.within(bounds.SLOWEST, bounds.FASTEST, "")]
 Bristle = Annotated[Number, Field(gt=0.0), bounds.within(bounds.SOFTEST, bounds.STIFFEST, "")]
 BristleDamper = Annotated[Number, Field(ge=0.0), bounds.within(0.0, bounds.STRONGEST_DAMPING, "")]
+Torque = Annotated[Number, bounds.within(bounds.LEAST_TORQUE, bounds.LARGEST_TORQUE, "N m")]
 Step = Annotated[Number, Field(ge=0.0), bounds.within(bounds.FINEST, bounds.COARSEST, "", "0 (none) or ")]
 Hardening = Annotated[Number, Field(ge=-bounds.HARDEST, le=bounds.HARDEST)]
 Excess = Annotated[Number, Field(ge=-bounds.STIFFEST, le=bounds.STIFFEST)]
