@@ -1,7 +1,23 @@
 """How freely a mechanism moves and accelerates its handle in one posture (thesis section 5.1).
 
-All take the translational Jacobian of the handle in the driven coordinates. Only the rows in which the handle
-can move count: a planar mechanism is judged within its plane.
+All take the translational Jacobian of the handle in the driven coordinates. Only directions in which the handle
+can move count: a planar mechanism is judged within its plane. How many there are is told by `freedoms`, for a
+mechanism of this package the number of its drives; left out, it is read off the rows of the Jacobian that are
+not all zero.
+
+What changes nothing: turning or shifting the base frame, the order of the drives (for all of them), another unit
+of length or all lengths larger, another unit of mass, and other coordinates in place of the joints' angles:
+
+| measure                | frame, order | lengths, unit of mass   | coordinates |
+| manipulability         | yes          | no                      | no          |
+| isotropy, both norms   | yes          | yes                     | no          |
+| dynamic_manipulability | yes          | no                      | no          |
+| dynamic_isotropy       | yes          | yes, inertias alike     | no          |
+| handle_mass_isotropy   | yes          | yes, inertias alike     | yes         |
+
+The frame may be turned where `freedoms` is told, and else where the rows count themselves right: at a singular
+posture, and for a planar mechanism with more than two drives, the rows that are zero depend on the frame. Other
+coordinates are, for instance, the motors' angles, or absolute angles of links in place of those between them.
 """
 
 from __future__ import annotations
@@ -16,7 +32,7 @@ Floats = NDArray[np.float64]
 MOVES: Final = 1e-12  # share of the largest entry below which a row of the Jacobian is rounding
 
 
-def manipulability(jacobian: ArrayLike) -> Floats:
+def manipulability(jacobian: ArrayLike, freedoms: int | None = None) -> Floats:
     """Volume of the ellipsoid of handle velocities for joint rates of unit length.
 
         w = sqrt(det(J J^T))                        (Yoshikawa 1985; thesis eq. 5.1)
@@ -24,52 +40,163 @@ def manipulability(jacobian: ArrayLike) -> Floats:
     with J^T J where there are fewer drives than directions to move in: the product of the singular values.
 
     jacobian  (..., 3, d)  J: handle velocity = J p' [m/rad]
-    Returns   (...)        [m^r/rad^r], r = min(d, rows that move); 0 where singular, nan where J is nan
+    freedoms  directions the handle can move in, 1 to min(3, d); None: as many as rows that are not zero, and two
+              where there are two drives
+    Returns   (...)        [m^r/rad^r], r the freedoms; 0 where singular, nan where J is nan
 
     >>> float(manipulability([[0.0, -0.2], [0.3, 0.0], [0.0, 0.0]]))
     0.06
     """
-    values, used = _singular_values(jacobian)
+    values, used = singular_values(jacobian, freedoms)
     return np.asarray(np.where(used, values, 1.0).prod(axis=-1) * used.any(axis=-1))
 
 
-def dynamic_manipulability(jacobian: ArrayLike, mass_matrix: ArrayLike) -> Floats:
+def dynamic_manipulability(jacobian: ArrayLike, mass_matrix: ArrayLike, freedoms: int | None = None) -> Floats:
     """Volume of the ellipsoid of handle accelerations for drive torques of unit length.
 
         w_d = sqrt(det(J (M^T M)^-1 J^T))           (Yoshikawa 1985; thesis eq. 5.3)
 
     jacobian     (..., 3, d)  J [m/rad]
     mass_matrix  (..., d, d)  M in the same coordinates, links and rotors [kg m^2]
-    Returns      (...)        [1/(kg m)^r], r as for `manipulability`
+    freedoms     as for `manipulability`
+    Returns      (...)        [1/(kg m)^r], r the freedoms
+    Raises       LinAlgError  where M is singular
+
+    >>> J = [[0.0, -0.2], [0.3, 0.0], [0.0, 0.0]]
+    >>> round(float(dynamic_manipulability(J, [[0.02, 0.0], [0.0, 0.01]])), 9)
+    300.0
     """
     J, M = np.asarray(jacobian, dtype=np.float64), np.asarray(mass_matrix, dtype=np.float64)
-    return manipulability(np.swapaxes(np.linalg.solve(np.swapaxes(M, -1, -2), np.swapaxes(J, -1, -2)), -1, -2))
+    accelerations = np.swapaxes(np.linalg.solve(np.swapaxes(M, -1, -2), np.swapaxes(J, -1, -2)), -1, -2)
+    return manipulability(accelerations, freedoms)
 
 
-def isotropy(jacobian: ArrayLike) -> Floats:
+def isotropy(jacobian: ArrayLike, freedoms: int | None = None) -> Floats:
     """Condition number of the Jacobian: largest over smallest singular value.
 
         kappa = |J| |J^-1|, 2-norm                  (Salisbury and Craig 1982; thesis eq. 5.2)
 
     jacobian  (..., 3, d)  J [m/rad]
+    freedoms  as for `manipulability`
     Returns   (...)        1: isotropic; inf where singular or where nothing moves; nan where J is nan
+
+    >>> float(isotropy([[0.0, -0.2], [0.3, 0.0], [0.0, 0.0]]))
+    1.4999999999999998
     """
-    values, used = _singular_values(jacobian)
+    values, used = singular_values(jacobian, freedoms)
     largest = values.max(axis=-1, initial=0.0)
     smallest = np.where(used, values, np.inf).min(axis=-1, initial=np.inf)
+    return _ratio(largest, smallest)
+
+
+def isotropy_frobenius(jacobian: ArrayLike, freedoms: int | None = None) -> Floats:
+    """Condition number of the Jacobian in the Frobenius norm, divided by the freedoms r so that 1 is isotropic.
+
+        kappa_F = |J|_F |J^+|_F / r = sqrt(sum s_i^2  sum 1/s_i^2) / r         (thesis eq. 5.2, Frobenius norm)
+
+    with the singular values s_1 to s_r. The division is that of the norm sqrt(tr(J J^T)/r), in which a unit matrix
+    has length 1 (Gosselin and Angeles 1991; Angeles and Lopez-Cajun 1992, of which the abstract was read). Unlike
+    the 2-norm's it is smooth in the posture wherever J is regular, also where two singular values meet. By the
+    inequality of the means 1 <= kappa_F <= kappa; for r = 2 it is (kappa + 1/kappa)/2.
+
+    jacobian  (..., 3, d)  J [m/rad]
+    freedoms  as for `manipulability`
+    Returns   (...)        1: isotropic; inf where singular or where nothing moves; nan where J is nan
+
+    >>> round(float(isotropy_frobenius([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]])), 12)
+    1.25
+    """
+    values, used = singular_values(jacobian, freedoms)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = largest / np.where(np.isinf(smallest), 0.0, smallest)
-    return np.asarray(np.where((largest == 0.0) & ~np.isnan(values).any(axis=-1), np.inf, ratio))
+        scaled = values / values[..., :1]
+        product = np.where(used, scaled**2, 0.0).sum(axis=-1) * np.where(used, 1.0 / scaled**2, 0.0).sum(axis=-1)
+        ratio = np.sqrt(product) / used.sum(axis=-1)
+    return np.asarray(np.where(values[..., 0] == 0.0, np.inf, ratio))
 
 
-def _singular_values(jacobian: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
-    """Singular values (..., min(3, d)), descending, and which of them belong to rows that move."""
-    J = np.asarray(jacobian, dtype=np.float64)
-    unknown: NDArray[np.bool_] = np.asarray(np.isnan(J).any(axis=(-2, -1)))
-    J = np.where(unknown[..., None, None], 0.0, J)
+def dynamic_isotropy(mass_matrix: ArrayLike) -> Floats:
+    """Condition number of the generalised inertia matrix: largest over smallest eigenvalue.
+
+        kappa(M),   1 where M is a multiple of the unit matrix                 (Ma and Angeles 1993; thesis 5.1)
+
+    A dynamically isotropic mechanism has inertia torques that do not couple its drives, and answers alike to each.
+    The source could only be read second-hand (thesis section 5.1; abstracts).
+
+    mass_matrix  (..., d, d)  M in the driven coordinates, links and rotors [kg m^2]
+    Returns      (...)        inf where a motion has no mass, nan where M is nan
+
+    >>> float(dynamic_isotropy([[0.02, 0.0], [0.0, 0.01]]))
+    2.0
+    """
+    M, unknown = _without_nan(mass_matrix)
+    values: Floats = np.asarray(np.linalg.eigvalsh(M), dtype=np.float64)
+    ratio = _ratio(values[..., -1], np.maximum(values[..., 0], 0.0))
+    return np.asarray(np.where(unknown, np.nan, ratio))
+
+
+def handle_mass_isotropy(jacobian: ArrayLike, mass_matrix: ArrayLike, freedoms: int | None = None) -> Floats:
+    """Largest over smallest mass felt at the handle, of all directions it can move in.
+
+        kappa(W),   W = (J M^-1 J^T)^-1                                  (Khatib 1987; thesis eq. 2.16)
+
+    the condition number of the inertia in the handle's space. The mass felt along u is 1/(u^T W^-1 u): it lies
+    between the eigenvalues of W, and reaches both. With M = A A^T it is the square of the condition number of
+    J A^-T, and is computed so: J M^-1 J^T would lose half of the digits near a singularity.
+
+    jacobian     (..., 3, d)  J [m/rad]
+    mass_matrix  (..., d, d)  M in the same coordinates, links and rotors [kg m^2]
+    freedoms     as for `manipulability`
+    Returns      (...)        inf where singular, or where a motion has no mass; nan where J or M is nan
+
+    >>> round(float(handle_mass_isotropy([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [[0.04, 0.0], [0.0, 0.02]])), 12)
+    2.0
+    """
+    M, unknown = _without_nan(mass_matrix)
+    J = np.where(unknown[..., None, None], np.nan, np.asarray(jacobian, dtype=np.float64))
+    squared, shapes = np.linalg.eigh(M)
+    heavy = squared > 0.0
+    with np.errstate(invalid="ignore"):
+        moved = J @ shapes / np.sqrt(np.where(heavy, squared, 1.0))[..., None, :]
+        ratio = isotropy(moved, freedoms) ** 2
+    return np.asarray(np.where(heavy.all(axis=-1) | np.isnan(ratio), ratio, np.inf))
+
+
+def singular_values(jacobian: ArrayLike, freedoms: int | None = None) -> tuple[Floats, NDArray[np.bool_]]:
+    """Singular values of the Jacobian, descending, and which of them belong to directions the handle can move in.
+
+    jacobian  (..., 3, d)       J [m/rad]
+    freedoms  as for `manipulability`
+    Returns   (..., min(3, d))  values [m/rad], nan where J is nan, and the same shape of marks
+    Raises    ValueError        if there are not so many freedoms
+
+    >>> singular_values([[0.0, -0.2], [0.3, 0.0], [0.0, 0.0]])[0]
+    array([0.3, 0.2])
+    """
+    J, unknown = _without_nan(jacobian)
     values: Floats = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=np.float64)
-    size = np.abs(J).max(axis=-1)
-    rows = (size > MOVES * size.max(axis=-1, keepdims=True)).sum(axis=-1)
-    used = np.arange(values.shape[-1]) < rows[..., None]
-    values = np.where(unknown[..., None], np.nan, values)
-    return values, used | unknown[..., None]
+    count = values.shape[-1]
+    if freedoms is not None and not 1 <= freedoms <= count:
+        raise ValueError(f"freedoms must be a whole number from 1 to {count}, got {freedoms}")
+    if freedoms is None:
+        size = np.abs(J).max(axis=-1)
+        rows = (size > MOVES * size.max(axis=-1, keepdims=True)).sum(axis=-1)
+        # two drives move a handle in a plane: one row alone is an arm stretched along an axis
+        rows = np.maximum(rows, min(2, count))
+    else:
+        rows = np.full(unknown.shape, freedoms)
+    used: NDArray[np.bool_] = np.arange(count) < rows[..., None]
+    return np.where(unknown[..., None], np.nan, values), used | unknown[..., None]
+
+
+def _without_nan(matrix: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+    """A matrix (..., m, n) with zeros where any of it is nan, which LAPACK would not survive, and where (...)."""
+    A = np.asarray(matrix, dtype=np.float64)
+    unknown: NDArray[np.bool_] = np.asarray(np.isnan(A).any(axis=(-2, -1)))
+    return np.where(unknown[..., None, None], 0.0, A), unknown
+
+
+def _ratio(largest: Floats, smallest: Floats) -> Floats:
+    """largest/smallest, inf for 0/0, nan where unknown."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = largest / smallest
+    return np.asarray(np.where((largest == 0.0) & ~np.isnan(smallest), np.inf, ratio))

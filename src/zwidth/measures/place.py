@@ -85,7 +85,8 @@ class Place:
     def whole_mass_matrix(self) -> Floats:
         """M (..., d, d) of links and rotors in the driven coordinates [kg m^2]."""
         drives = self.drives
-        return self.mass_matrix + np.diag(drives.transmission**2 * drives.motor_inertia)
+        rotors = drives.transmission**2 * drives.motor_inertia
+        return self.mass_matrix + rotors[..., None] * np.eye(rotors.shape[-1])
 
     @property
     def placed(self) -> Posture:

@@ -1,0 +1,206 @@
+"""What motors and encoders give the hand: forces, accelerations, steps and friction along a direction.
+
+In the driven coordinates p with the handle's velocity v = J p', a force f at the handle is the torques J^T f of
+the drives, in whatever posture, at rest, without gravity. Numbers of the drives are taken at the joint: a torque
+limit is n tau, an encoder's step 2 pi/(N n), dry friction n C, with n motor turns per joint turn.
+
+All are invariant to the base frame (with the direction turned alike), the order of the drives and the ratio by
+which a coordinate turns faster than another; lengths in other units give the same force, acceleration and step
+in these.
+"""
+
+from __future__ import annotations
+
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.model.effective import unit_directions
+
+Floats = NDArray[np.float64]
+
+OFF: Final = 1e-6  # share of a direction outside what the handle can do, above which it cannot move along it
+
+
+def force_along(jacobian: ArrayLike, direction: ArrayLike, torques: ArrayLike) -> Floats:
+    """Largest force that the drives exert exactly along a direction, none across it.
+
+        f = max { f : |J^T u f|_i <= t_i }  =  min_i t_i/|h_i|,    h = J^T u
+
+    This is what a wall asks for: it pushes along its normal, and a force across it would be felt as friction. The
+    largest component along u of any force is more (`force_component`).
+
+    jacobian   (..., 3, d)  J [m/rad]
+    direction  (..., 3)     u, unit vectors
+    torques    (..., d)     t, each drive's limit at the joint [N m]; inf: none
+    Returns    (...)        [N]; inf where no drive feels the direction: bearings, not drives, hold a force across
+                            a mechanism's plane. nan where J is nan
+    Raises     ValueError   if a direction is not of unit length
+
+    >>> round(float(force_along([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [0.6, 0.8, 0.0], [1.0, 1.0])), 9)
+    3.125
+    """
+    h, t = _felt(jacobian, direction), np.asarray(torques, dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        each = np.where(h == 0.0, np.inf, t / np.abs(h))
+    return np.asarray(each.min(axis=-1))
+
+
+def force_component(jacobian: ArrayLike, direction: ArrayLike, torques: ArrayLike) -> Floats:
+    """Largest component along a direction of all forces that the drives can exert, whatever they do across it.
+
+        max { u^T f : |J^T f|_i <= t_i }  =  sum_i t_i |q_i|,    q = J^+ u
+
+    q are the drives' rates when the handle moves along u with unit speed: every drive pushes with all it has. It
+    is the support function of the polygon (zonotope) of forces, of which `force_along` is the radius: never less
+    than that, and equal where the corner that lies farthest along u lies on u itself.
+
+    jacobian   (..., 3, d)  J [m/rad], of rank d: no more drives than directions to move in
+    direction  (..., 3)     u, unit vectors
+    torques    (..., d)     t, each drive's limit at the joint [N m]
+    Returns    (...)        [N]; inf where the handle cannot move along u, for bearings add what you like; nan
+                            where J is nan
+    Raises     ValueError   if a direction is not of unit length
+
+    >>> round(float(force_component([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [0.6, 0.8, 0.0], [1.0, 1.0])), 9)
+    5.0
+    """
+    q, moves = joint_rates(jacobian, direction)
+    t = np.asarray(torques, dtype=np.float64)
+    return np.asarray(np.where(moves | np.isnan(q[..., 0]), _total(t, q), np.inf))
+
+
+def acceleration_along(
+    jacobian: ArrayLike, mass_matrix: ArrayLike, direction: ArrayLike, torques: ArrayLike
+) -> Floats:
+    """Largest acceleration of the handle exactly along a direction, from rest, without gravity or friction.
+
+        a = min_i t_i/|M q|_i,    q = J^+ u:   p'' = q a takes the torques M q a
+
+    The drives are taken as rigid: behind a flexible one the rotor starts first, and the handle later. Large
+    accelerations make collisions sharp (Lawrence and Chapel 1994; second-hand).
+
+    jacobian     (..., 3, d)  J [m/rad], of rank d
+    mass_matrix  (..., d, d)  M in the same coordinates, links and rotors [kg m^2]
+    direction    (..., 3)     u, unit vectors
+    torques      (..., d)     t, each drive's limit at the joint [N m]; inf: none
+    Returns      (...)        [m/s^2]; 0 where the handle cannot move along u, nan where J or M is nan
+    Raises       ValueError   if a direction is not of unit length
+
+    >>> J, M = [[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [[0.04, 0.0], [0.0, 0.02]]
+    >>> round(float(acceleration_along(J, M, [0.0, 1.0, 0.0], [1.0, 1.0])), 9)
+    10.0
+    """
+    q, moves = joint_rates(jacobian, direction)
+    taken = (np.asarray(mass_matrix, dtype=np.float64) @ q[..., None])[..., 0]
+    t = np.asarray(torques, dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        each = np.where(taken == 0.0, np.inf, t / np.abs(taken))
+    return np.asarray(np.where(moves | np.isnan(q[..., 0]), each.min(axis=-1), 0.0))
+
+
+def resolution_along(jacobian: ArrayLike, direction: ArrayLike, steps: ArrayLike) -> Floats:
+    """How far the reading of the handle's position along a direction steps when all encoders step at once.
+
+        sum_i |u^T J_i| dp_i
+
+    which is the most that they can do together; a single encoder steps by its own summand.
+
+    jacobian   (..., 3, d)  J [m/rad]
+    direction  (..., 3)     u, unit vectors
+    steps      (..., d)     dp, each encoder's step in the driven coordinates [rad]
+    Returns    (...)        [m]; 0 across a mechanism's plane, nan where J is nan
+    Raises     ValueError   if a direction is not of unit length
+
+    >>> round(float(resolution_along([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [0.6, 0.8, 0.0], [1e-3, 1e-3])), 9)
+    0.00044
+    """
+    return _total(np.asarray(steps, dtype=np.float64), _felt(jacobian, direction))
+
+
+def friction_along(jacobian: ArrayLike, direction: ArrayLike, frictions: ArrayLike) -> Floats:
+    """Dry friction felt along a direction by a hand that moves the handle slowly exactly along it.
+
+        sum_i C_i |q_i|,    q = J^+ u
+
+    by the work of a metre: every drive slips by q_i and takes C_i |q_i|. What the hand has to push across the
+    direction to stay on it does no work. The conditions of `zwidth.conditions` ask for the work along the motion
+    that a force makes by itself, M^-1 J^T u, which goes astray and may take less (`dry.ground_friction`).
+
+    jacobian   (..., 3, d)  J [m/rad], of rank d
+    direction  (..., 3)     u, unit vectors
+    frictions  (..., d)     C, each drive's at the joint [N m]
+    Returns    (...)        [N]; nan where the handle cannot move along u, or J is nan
+    Raises     ValueError   if a direction is not of unit length
+
+    >>> round(float(friction_along([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [0.6, 0.8, 0.0], [0.1, 0.1])), 9)
+    0.5
+    """
+    q, moves = joint_rates(jacobian, direction)
+    return np.asarray(np.where(moves, _total(np.asarray(frictions, dtype=np.float64), q), np.nan))
+
+
+def joint_rates(jacobian: ArrayLike, direction: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+    """Rates q = J^+ u of the drives when the handle moves along u with unit speed, and whether it can.
+
+    jacobian   (..., 3, d)  J [m/rad], of rank d
+    direction  (..., 3)     u, unit vectors
+    Returns    (..., d)     [rad/m], nan where J is nan
+               (...)        False where more than a millionth of u is left over, |u - J q| > 1e-6, or J is nan
+    Raises     ValueError   if a direction is not of unit length
+
+    >>> joint_rates([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [0.0, 1.0, 0.0])[0].round(9) + 0.0
+    array([2.5, 0. ])
+    """
+    J, u = np.asarray(jacobian, dtype=np.float64), unit_directions(direction)
+    unknown: NDArray[np.bool_] = np.asarray(np.isnan(J).any(axis=(-2, -1)))
+    known = np.where(unknown[..., None, None], 0.0, J)
+    q = (np.linalg.pinv(known) @ u[..., None])[..., 0]
+    left = np.linalg.norm(u - (known @ q[..., None])[..., 0], axis=-1)
+    return np.where(unknown[..., None], np.nan, q), np.asarray((left <= OFF) & ~unknown)
+
+
+def share_of_directions(
+    values: ArrayLike,
+    requirement: ArrayLike,
+    better: Literal["higher", "lower"] = "higher",
+    weights: ArrayLike | None = None,
+    axis: int = -1,
+) -> Floats:
+    """Share of the directions in which a measure meets a requirement.
+
+    values       (..., k)  the measure by direction; nan where it has no value, which does not meet anything
+    requirement  of it, broadcasting with the values without the axis of directions; met by equality, too
+    better       "higher": at least as much; "lower": at most
+    weights      (k,)      how much of all directions each stands for; None: all alike, as round a circle
+    axis         that of the directions
+    Returns      (...)     0 to 1; nan where no direction has a value
+    Raises       ValueError  for another word, or weights that are negative, all zero or not k
+
+    >>> float(share_of_directions([3.0, 5.0, 7.0, float("nan")], 5.0))
+    0.5
+    """
+    if better not in ("higher", "lower"):
+        raise ValueError(f"better must be 'higher' or 'lower', got {better!r}")
+    by_direction = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
+    k = by_direction.shape[-1]
+    w = np.ones(k) if weights is None else np.asarray(weights, dtype=np.float64)
+    if w.shape != (k,) or not np.all(w >= 0.0) or not 0.0 < w.sum() < np.inf:
+        raise ValueError(f"weights must be {k} numbers, none negative and not all 0, got {w.tolist()}")
+    wanted = np.asarray(requirement, dtype=np.float64)[..., None]
+    met = by_direction >= wanted if better == "higher" else by_direction <= wanted
+    share = (met * w).sum(axis=-1) / w.sum()
+    return np.asarray(np.where(np.isnan(by_direction).all(axis=-1), np.nan, share))
+
+
+def _felt(jacobian: ArrayLike, direction: ArrayLike) -> Floats:
+    """h = J^T u (..., d)."""
+    J, u = np.asarray(jacobian, dtype=np.float64), unit_directions(direction)
+    return np.asarray(np.einsum("...i,...id->...d", u, J))
+
+
+def _total(each: Floats, rates: Floats) -> Floats:
+    """Sum of each times |rate|, where 0 times inf is 0: a drive that stands still takes no part."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(rates == 0.0, 0.0, each * np.abs(rates)).sum(axis=-1))

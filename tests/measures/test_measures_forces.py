@@ -1,0 +1,186 @@
+"""Forces, accelerations, steps and friction along a direction, against linear programs and counting by hand."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import linprog
+
+from tests.model.model_cases import random_rotation
+from zwidth.chart.polar import circle
+from zwidth.measures.forces import (
+    acceleration_along,
+    force_along,
+    force_component,
+    friction_along,
+    joint_rates,
+    resolution_along,
+    share_of_directions,
+)
+
+RNG = np.random.default_rng(5)
+
+
+def random_direction(J):
+    """A unit vector that the handle can move along."""
+    u = J @ RNG.normal(size=J.shape[1])
+    return u / np.linalg.norm(u)
+
+
+def random_case(d):
+    """Jacobian (3, d) of rank d, mass matrix, a direction within it, torques at the joints."""
+    J = random_rotation(RNG) @ np.vstack([RNG.normal(size=(d, d)), np.zeros((3 - d, d))])
+    A = RNG.normal(size=(d, d))
+    return J, A @ A.T + 0.1 * np.eye(d), random_direction(J), RNG.uniform(0.2, 2.0, d)
+
+
+def most(objective, equal, bounds):
+    """Largest objective . x with equal @ x = 0 and |x_i| <= bounds_i."""
+    found = linprog(-objective, A_eq=equal, b_eq=np.zeros(len(equal)), bounds=[(-b, b) for b in bounds])
+    assert found.status == 0
+    return -found.fun
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_against_linear_programs(d):
+    """Unknown torques t within their limits, beside f or a in the direction; forces F in the handle's space."""
+    for _ in range(10):
+        J, M, u, t = random_case(d)
+        free = [1e9]
+        amount = np.append(np.zeros(d), 1.0)
+        statics = np.column_stack([np.eye(d), -J.T @ u])  # t - J^T u f = 0
+        assert_allclose(force_along(J, u, t), most(amount, statics, [*t, *free]), rtol=1e-7)
+        motion = np.column_stack([J @ np.linalg.inv(M), -u])  # J M^-1 t - u a = 0
+        assert_allclose(acceleration_along(J, M, u, t), most(amount, motion, [*t, *free]), rtol=1e-7)
+        # forces within what the drives control, F = J c: their torques are J^T F
+        F = np.column_stack([np.eye(d), -J.T @ J])
+        assert_allclose(
+            force_component(J, u, t), most(np.append(np.zeros(d), J.T @ u), F, [*t, *(d * free)]), rtol=1e-7
+        )
+
+
+def test_a_component_is_at_least_the_force_along_and_equal_towards_the_farthest_corner():
+    for d in (2, 3):
+        J, _, _, t = random_case(d)
+        corners = (t * np.array(list(product((-1, 1), repeat=d)))) @ np.linalg.pinv(J)  # every drive at its limit
+        sizes = np.linalg.norm(corners, axis=1)
+        u = corners / sizes[:, None]
+        assert_allclose(force_along(J, u, t), sizes)
+        assert_allclose(force_component(J, u, t), (u @ corners.T).max(axis=1))
+        assert_allclose(force_component(J, u[sizes.argmax()], t), sizes.max())
+        for _ in range(20):
+            u = random_direction(J)
+            assert force_along(J, u, t) <= force_component(J, u, t) * (1.0 + 1e-12)
+
+
+def test_the_steps_of_all_encoders_together():
+    J, _, u, _ = random_case(3)
+    steps = RNG.uniform(1e-5, 1e-3, 3)
+    reached = [u @ J @ (np.array(signs) * steps) for signs in product((-1, 0, 1), repeat=3)]
+    assert_allclose(resolution_along(J, u, steps), max(reached))
+
+
+def test_friction_is_the_work_of_a_metre():
+    """However the hand moves there: small steps along a straight line, each drive slipping as it must."""
+    for d in (1, 2, 3):
+        J, _, u, friction = random_case(d)
+        pieces = np.diff(np.linspace(0.0, 1.0, 7))[:, None] * u
+        slips = np.linalg.lstsq(J, pieces.T, rcond=None)[0]
+        assert_allclose(friction_along(J, u, friction), np.sum(friction[:, None] * np.abs(slips)))
+        assert friction_along(J, u, 2.0 * friction) == pytest.approx(2.0 * friction_along(J, u, friction))
+
+
+def test_across_the_plane_of_a_mechanism():
+    J = np.array([[0.1, 0.2], [-0.2, 0.1], [0.0, 0.0]])
+    z, t = np.array([0.0, 0.0, 1.0]), np.ones(2)
+    leaning = np.array([0.6, 0.0, 0.8])
+    assert force_along(J, z, t) == force_component(J, z, t) == np.inf  # the bearings hold it
+    assert_allclose(
+        force_along(J, leaning, t), min(1.0 / 0.06, 1.0 / 0.12)
+    )  # its part in the plane is the drives'
+    assert force_component(J, leaning, t) == np.inf
+    assert acceleration_along(J, np.eye(2), z, t) == acceleration_along(J, np.eye(2), leaning, t) == 0.0
+    assert resolution_along(J, z, t) == 0.0
+    assert np.isnan(friction_along(J, z, t))
+    assert not joint_rates(J, leaning)[1]
+
+
+def test_a_drive_without_a_limit_or_without_a_part():
+    J, u = np.array([[0.1, 0.0], [0.0, 0.2], [0.0, 0.0]]), np.array([1.0, 0.0, 0.0])
+    assert_allclose(force_along(J, u, [1.0, np.inf]), 10.0)
+    assert_allclose(force_component(J, u, [1.0, np.inf]), 10.0)  # and not 0 times inf
+    assert_allclose(acceleration_along(J, np.eye(2), u, [1.0, np.inf]), 0.1)
+    assert force_along(J, u, [np.inf, 1.0]) == np.inf
+
+
+def test_a_batch_is_its_postures_side_by_side():
+    cases = [[random_case(2) for _ in range(4)] for _ in range(3)]
+    J, M, u, t = (np.array([[case[i] for case in row] for row in cases]) for i in range(4))
+    J[1, 2] = np.nan
+    for measure in (
+        lambda J, M, u, t: force_along(J, u, t),
+        lambda J, M, u, t: force_component(J, u, t),
+        lambda J, M, u, t: resolution_along(J, u, t),
+        lambda J, M, u, t: friction_along(J, u, t),
+        acceleration_along,
+    ):
+        found = measure(J, M, u, t)
+        assert found.shape == (3, 4)
+        assert np.argwhere(np.isnan(found)).tolist() == [[1, 2]]
+        assert_allclose(found, [[measure(J[i, j], M[i, j], u[i, j], t[i, j]) for j in range(4)] for i in range(3)])
+
+
+def test_a_direction_is_of_unit_length():
+    J, M, _, t = random_case(2)
+    for call in (
+        lambda u: force_along(J, u, t),
+        lambda u: force_component(J, u, t),
+        lambda u: acceleration_along(J, M, u, t),
+        lambda u: resolution_along(J, u, t),
+        lambda u: friction_along(J, u, t),
+    ):
+        with pytest.raises(ValueError, match="has length 2; divide it by its length"):
+            call([0.0, 2.0, 0.0])
+
+
+# --- share of directions ----------------------------------------------------------------------------
+
+
+def test_share_of_directions_of_an_isotropic_device_and_of_a_known_ellipse():
+    """Largest velocity along u of J = diag(a, b): 1/|J^-1 u|, and c at a known angle."""
+    a, b, c = 0.3, 0.1, 0.2
+    directions = circle(20000)
+    radius = 1.0 / np.linalg.norm(directions[:, :2] / [a, b], axis=1)
+    # (cos/a)^2 + (sin/b)^2 = 1/c^2
+    sine = np.sqrt((1.0 / c**2 - 1.0 / a**2) / (1.0 / b**2 - 1.0 / a**2))
+    assert_allclose(share_of_directions(radius, c), 2.0 * np.arcsin(sine) / np.pi, atol=2e-4)
+    assert share_of_directions(radius, b * (1.0 - 1e-12)) == 1.0
+    assert share_of_directions(radius, a * (1.0 + 1e-12)) == 0.0
+    assert_allclose(share_of_directions(radius, c) + share_of_directions(radius, c, "lower"), 1.0, atol=1e-12)
+
+
+def test_share_of_directions_counts_those_without_a_value_as_not_met():
+    values = np.array([[1.0, np.nan, 3.0, 4.0], [np.nan] * 4])
+    for better, share in (("higher", 0.5), ("lower", 0.5)):
+        assert_allclose(share_of_directions(values, 3.0, better), [share, np.nan])
+    assert_allclose(share_of_directions(values, [4.0, 1.0]), [0.25, np.nan])
+    assert_allclose(share_of_directions(values.T, 3.0, axis=0), [0.5, np.nan])
+    assert_allclose(share_of_directions(values[0], 3.0, weights=[1.0, 1.0, 0.0, 2.0]), 0.5)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"better": "more"}, "better must be 'higher' or 'lower', got 'more'"),
+        ({"weights": [1.0, 1.0]}, "weights must be 3 numbers"),
+        ({"weights": [1.0, -1.0, 1.0]}, "none negative"),
+        ({"weights": [0.0, 0.0, 0.0]}, "not all 0"),
+        ({"weights": [1.0, np.nan, 1.0]}, "weights must be"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(more, words):
+    with pytest.raises(ValueError, match=words):
+        share_of_directions([1.0, 2.0, 3.0], 2.0, **more)
