@@ -93,6 +93,19 @@ def test_friction_is_the_work_of_a_metre():
         assert friction_along(J, u, 2.0 * friction) == pytest.approx(2.0 * friction_along(J, u, friction))
 
 
+def test_coordinates_that_turn_faster_change_nothing():
+    """The motors' angles in place of the joints': torques smaller, steps larger by the same ratios."""
+    for d in (2, 3):
+        J, M, u, t = random_case(d)
+        n = RNG.uniform(5.0, 25.0, d)
+        fast, light = J / n, M / np.outer(n, n)
+        assert_allclose(force_along(fast, u, t / n), force_along(J, u, t))
+        assert_allclose(force_component(fast, u, t / n), force_component(J, u, t))
+        assert_allclose(acceleration_along(fast, light, u, t / n), acceleration_along(J, M, u, t))
+        assert_allclose(friction_along(fast, u, t / n), friction_along(J, u, t))
+        assert_allclose(resolution_along(fast, u, t * n), resolution_along(J, u, t))
+
+
 def test_across_the_plane_of_a_mechanism():
     J = np.array([[0.1, 0.2], [-0.2, 0.1], [0.0, 0.0]])
     z, t = np.array([0.0, 0.0, 1.0]), np.ones(2)
