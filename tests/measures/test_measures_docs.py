@@ -40,10 +40,11 @@ def told() -> list[tuple[str, str, Any]]:
 def test_every_number_beside_a_line_is_what_comes_out(told):
     compared = 0
     for line, said, result in told:
-        numbers = re.findall(r"(?<![\w.])\d+\.\d+", said)
-        values = np.concatenate([np.ravel(part) for part in (result if isinstance(result, tuple) else (result,))])
-        if "posture" in said or "joints" in said:  # an explanation
+        if not said[:1].isdigit():  # an explanation
             continue
+        values = np.concatenate([np.ravel(part) for part in (result if isinstance(result, tuple) else (result,))])
+        numbers = re.findall(r"(?<![\w.])\d+\.\d+", said)
+        assert numbers, line
         for number, value in zip(numbers, values[np.isfinite(values)], strict=False):
             assert float(f"{value:.{digits(number)}g}") == float(number), line
             compared += 1
