@@ -61,6 +61,18 @@ def largest_damping(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
     return np.asarray(LARGEST_D * np.asarray(mass) / np.asarray(sampling_period))
 
 
+def stable_area(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
+    """Area of the stable set over K, B >= 0, the integral of (4.32) over 0 < d < 0.828 [N^2 s/m^2], (...).
+
+        ((340 - 208 sqrt 2)/3 + 96 ln((2 + sqrt 2)/4)) m^2/T^3 = 0.0798634 m^2/T^3
+
+    Not in the thesis. Along the edge of `thesis_delays` p and d are rational in cos t, so that the integral of p dd
+    is a polynomial and a logarithm.
+    """
+    number = (340.0 - 208.0 * np.sqrt(2.0)) / 3.0 + 96.0 * np.log((2.0 + np.sqrt(2.0)) / 4.0)
+    return np.asarray(number * np.asarray(mass) ** 2 / np.asarray(sampling_period) ** 3)
+
+
 def condition(case: Case) -> Bound:
     """(4.32) on a loop."""
     m, T = case.traits.rigid_mass, case.loop.period

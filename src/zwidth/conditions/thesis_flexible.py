@@ -114,8 +114,13 @@ def stable_area(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLik
     """
     m, k, T = (np.asarray(value, dtype=float) for value in (mass, stiffness, sampling_period))
     c, s = _cosine_and_bend(m, k, T)
-    c = np.maximum(c, 0.0)
-    return np.asarray(m**2 / T**3 * 2.0 / s**2 * (c**2 / 2.0 + c - (1.0 + c) * np.log1p(c)))
+    return np.asarray(m**2 / T**3 * 2.0 / s**2 * _area_of(np.maximum(c, 0.0)))
+
+
+def _area_of(c: Floats) -> Floats:
+    """c^2/2 + c - (1 + c) ln(1 + c) for 0 <= c <= 1; near 0 by its series, c^3/6 - c^4/12 + ..., where it cancels."""
+    series = sum((-1.0) ** (n + 1) * c**n / (n * (n - 1.0)) for n in range(3, 20))
+    return np.where(c < 0.1, series, c**2 / 2.0 + c - (1.0 + c) * np.log1p(c))
 
 
 def _tip(mass: Floats, stiffness: Floats, period: Floats) -> tuple[Floats, Floats]:

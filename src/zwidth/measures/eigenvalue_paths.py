@@ -1,0 +1,212 @@
+"""How a loop's eigenvalues move as one number changes: a wall's damping, a mass (thesis Figs. 5.10 to 5.14).
+
+Eigenvalue solvers return them in any order. Neighbouring steps are matched so that all together move least (an
+assignment problem), and a step is halved until the match is plain: each eigenvalue moves little, and lands nearer
+to its match than to any other, by a factor of two.
+
+Two real eigenvalues that meet and go on as a conjugate pair move with the square root of the number, and which of
+them is which afterwards is a matter of taste. There halving ends once nothing visible depends on it. Two that pass
+through each other untouched, as only those of uncoupled motions do, may exchange their names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.chart.verdict import BAND
+from zwidth.loop.loop import Loop
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# A step along a path longer than this share of its |z|, or of 1, is halved; one shorter than the second length is
+# not, whatever its neighbours do: nobody sees it.
+LONG: Final = 0.1
+SHORT: Final = 1e-3
+# Halvings of one step at most, where eigenvalues jump.
+HALVINGS: Final = 40
+
+
+class PathError(ValueError):
+    """Eigenvalues that cannot be followed."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A path that crosses the unit circle.
+
+    value       of the number
+    eigenvalue  z there, |z| = 1 to rounding
+    path        which of the paths
+    outwards    whether z leaves the circle's inside as the number grows along the path
+    """
+
+    value: float
+    eigenvalue: complex
+    path: int
+    outwards: bool
+
+
+@dataclass(frozen=True)
+class EigenvaluePaths:
+    """Eigenvalues along a path of one number.
+
+    values       (k,)    the values asked for, in their order, and those that were needed between
+    asked        (k,)    which were asked for
+    eigenvalues  (k, N)  each column one path
+    crossings    of the unit circle, in the order of the values
+    """
+
+    values: Floats
+    asked: NDArray[np.bool_]
+    eigenvalues: Complex
+    crossings: tuple[Crossing, ...]
+
+    @property
+    def spectral_radius(self) -> Floats:
+        """Largest |z| (k,)."""
+        return np.asarray(np.abs(self.eigenvalues).max(axis=1))
+
+
+def eigenvalue_paths(matrix_at: Callable[[float], ArrayLike], values: ArrayLike) -> EigenvaluePaths:
+    """Eigenvalues of matrices (N, N) that depend on a number, followed from value to value.
+
+    matrix_at  value -> matrix, of one size and continuous along the way
+    values     (k,)  at least two, rising or falling
+    Raises     PathError   where the number of eigenvalues changes, or a matrix is not finite
+               ValueError  for values that neither rise nor fall
+
+    >>> found = eigenvalue_paths(lambda a: [[0.0, 1.0], [-a, 1.0]], [0.0, 1.2])    # z^2 - z + a
+    >>> found.spectral_radius[found.asked].round(6).tolist()
+    [1.0, 1.095445]
+    >>> [(round(c.value, 9), c.outwards) for c in found.crossings]                 # both of the pair, at a = 1
+    [(1.0, True), (1.0, True)]
+    """
+    asked = np.asarray(values, dtype=np.float64)
+    steps = np.diff(asked)
+    if asked.ndim != 1 or len(asked) < 2 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        raise ValueError("values must be a row of at least two that rise or fall")
+    walk = _Walk(matrix_at, asked)
+    crossings = [found for path in range(walk.z.shape[1]) for found in walk.crossings(path)]
+    crossings.sort(key=lambda found: (found.value, found.path), reverse=bool(steps[0] < 0.0))
+    return EigenvaluePaths(walk.values, np.isin(walk.values, asked), walk.z, tuple(crossings))
+
+
+def loop_paths(
+    loop_at: Callable[[float], Loop], values: ArrayLike, wall_stiffness: float, wall_damping: float
+) -> EigenvaluePaths:
+    """Eigenvalues of one wall's transition matrix while the loop changes: a mass, a delay, any number of the file.
+
+    loop_at  value -> loop
+    The other arguments and what is raised are those of `eigenvalue_paths`.
+    """
+    return eigenvalue_paths(lambda value: loop_at(value).transition_matrix(wall_stiffness, wall_damping), values)
+
+
+def wall_paths(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> EigenvaluePaths:
+    """Eigenvalues of one loop along a straight line of walls, from the first to the last (thesis Fig. 5.10).
+
+    wall_stiffness  K [N/m], and
+    wall_damping    B [N s/m]: one of them (k,) and rising or falling, the other one number
+    Returns         values are those of K or B
+    Raises          ValueError  unless just one of them is a row, and all are finite
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one, none = np.ones(1), np.zeros((1, 1))
+    >>> free = Loop(Plant(np.array([[1.0]]), none, none, one, one), Controller(1.0))
+    >>> [round(c.value, 6) for c in wall_paths(free, 0.5, np.linspace(0.0, 2.0, 9)).crossings]    # thesis eq. 4.14
+    [0.359612, 0.359612, 1.390388, 1.390388]
+    """
+    K, B = np.asarray(wall_stiffness, dtype=np.float64), np.asarray(wall_damping, dtype=np.float64)
+    if K.ndim + B.ndim != 1:
+        raise ValueError("one of stiffness and damping must be a row of values and the other one number")
+    if not (np.all(np.isfinite(K)) and np.all(np.isfinite(B))):
+        raise ValueError("walls must be finite")
+    if B.ndim:
+        return eigenvalue_paths(lambda value: loop.transition_matrix(K, value), B)
+    return eigenvalue_paths(lambda value: loop.transition_matrix(value, B), K)
+
+
+class _Walk:
+    """Values and matched eigenvalues, in the making."""
+
+    def __init__(self, matrix_at: Callable[[float], ArrayLike], asked: Floats) -> None:
+        self.matrix_at = matrix_at
+        first = float(asked[0])
+        self.walked = [(first, self.at(first))]
+        for end in asked[1:].tolist():
+            self.walk_to(end, self.at(end), HALVINGS)
+        self.values = np.array([value for value, _ in self.walked])
+        self.z: Complex = np.array([z for _, z in self.walked])
+
+    def at(self, value: float) -> Complex:
+        """Eigenvalues in any order."""
+        matrix = np.asarray(self.matrix_at(value), dtype=np.float64)
+        if not np.all(np.isfinite(matrix)):
+            raise PathError(f"the transition matrix at {value:g} is not finite")
+        return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
+
+    def walk_to(self, end: float, unordered: Complex, halvings: int) -> None:
+        """Steps from the last value walked to to `end`."""
+        start, z = self.walked[-1]
+        if len(z) != len(unordered):
+            raise PathError(
+                f"there are {len(z)} eigenvalues at {start:g} and {len(unordered)} at {end:g}: a motion or a "
+                "delayed sample comes or goes between, and paths would begin or end; choose values on one side"
+            )
+        matched, plain = _match(z, unordered)
+        middle = 0.5 * (start + end)
+        if plain or halvings == 0 or middle in (start, end):
+            self.walked.append((end, matched))
+            return
+        self.walk_to(middle, self.at(middle), halvings - 1)
+        self.walk_to(end, unordered, halvings - 1)
+
+    def crossings(self, path: int) -> list[Crossing]:
+        """Where one path goes from inside the circle to its outside or back; what stays near it does neither."""
+        height = np.abs(self.z[:, path]) - 1.0
+        off = np.flatnonzero(np.abs(height) > BAND)
+        found = []
+        for i, j in pairwise(off.tolist()):
+            if height[i] * height[j] < 0.0:
+                # of the steps between, all but one end in the band
+                at = i + int(np.argmax(height[i + 1 : j + 1] * height[j] > 0.0))
+                found.append(self.crossing(path, at, bool(height[j] > 0.0)))
+        return found
+
+    def crossing(self, path: int, at: int, outwards: bool) -> Crossing:
+        """The crossing between step `at` and the next, by Brent's method (1973)."""
+        from scipy.optimize import brentq
+
+        (low, high), (z_low, z_high) = self.values[at : at + 2].tolist(), self.z[at : at + 2, path].tolist()
+
+        def here(value: float) -> complex:
+            # the step is plain: between its ends nothing else is as near to the straight line
+            z = self.at(value)
+            line = z_low + (z_high - z_low) * (value - low) / (high - low)
+            return complex(z[np.argmin(np.abs(z - line))])
+
+        finest = 4.0 * float(np.finfo(float).eps)
+        size = max(abs(low), abs(high))
+        value = brentq(lambda v: abs(here(v)) - 1.0, low, high, xtol=finest * size, rtol=finest)
+        return Crossing(float(value), here(value), path, outwards)
+
+
+def _match(z: Complex, others: Complex) -> tuple[Complex, bool]:
+    """`others` in the order of z, and whether the match is plain."""
+    from scipy.optimize import linear_sum_assignment
+
+    distance = np.abs(z[:, None] - others)
+    own = linear_sum_assignment(distance)
+    moved, rivals = distance[own], distance.copy()
+    rivals[own] = np.inf
+    told = moved <= 0.5 * rivals.min(axis=1, initial=np.inf)
+    plain = (moved <= SHORT) | (told & (moved <= LONG * np.maximum(np.abs(z), 1.0)))
+    return others[own[1]], bool(np.all(plain))
