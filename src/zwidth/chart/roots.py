@@ -23,8 +23,8 @@ def spread_roots(roots: Complexes) -> None:
 
 
 @compiled
-def find_roots(p: Floats, roots: Complexes) -> None:
-    """The roots of p(s), ascending coefficients, by Aberth's iteration.
+def find_roots(p: Floats, roots: Complexes, tolerance: float) -> None:
+    """The roots of p(s), ascending coefficients, by Aberth's iteration until no root moves by more than its share.
 
     roots  (N,) starting values in the s plane, replaced by the roots; warm starts take a few rounds
     """
@@ -56,14 +56,14 @@ def find_roots(p: Floats, roots: Complexes) -> None:
                 step = complex(0.0, 0.0)
             roots[i] = s - step
             largest = max(largest, (abs(step.real) + abs(step.imag)) / (abs(s.real) + abs(s.imag) + 1e-300))
-        if largest < 1e-9:
+        if largest < tolerance:
             break
 
 
 @compiled
 def polynomial_radius(p: Floats, radius: float, roots: Complexes) -> float:
     """Largest |z| over the roots of p(s), see `find_roots`; 1e300 where it is no number."""
-    find_roots(p, roots)
+    find_roots(p, roots, 1e-9)
     one, out = complex(1.0, 0.0), 0.0
     for i in range(len(p) - 1):
         out = max(out, abs(divide(radius * (one + roots[i]), one - roots[i])))

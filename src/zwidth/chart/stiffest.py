@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.corner import meet, steadier
 from zwidth.chart.curve import OF_B, OF_SLOPE, wall_alone, wall_at, zero_between
-from zwidth.chart.grid import LONGEST_STEP, MOST_ANGLES, angles_among, around_crossings, computer_points
+from zwidth.chart.grid import MOST_ANGLES, angles_among, around_crossings, computer_points
 from zwidth.chart.hurwitz import combine, deflate, edges_on_line, edges_stable_set, is_stable, working_room
 from zwidth.chart.roots import find_roots, spread_roots
 from zwidth.chart.tracer import LONG
@@ -39,6 +39,7 @@ DOUBTFUL: Final = 2
 
 # Steps along the curve, in shares of the distance to its nearest feature (`grid.angles`).
 SHARE: Final = 0.3
+LONGEST: Final = 0.1
 # Where the curve begins and ends, in shares of the nearest feature's angle: what is softer is never the stiffest.
 NEAR_END: Final = 0.02
 # Trial walls: stiffer than the stiffest by these factors, with so many dampings each.
@@ -90,7 +91,7 @@ def stiffest_walls(factors: Factors, rows: Floats, used: NDArray[np.int64]) -> S
         used,
         factors,
         computer_points(factors, 1.0),
-        min(LONGEST_STEP, 0.5 / late),
+        min(LONGEST, 0.5 / late),
         blind,
         found.stiffness,
         found.damping,
@@ -164,8 +165,9 @@ def features(factors: Factors, points: Complexes) -> Complexes:
     while top > 0 and abs(numerator[top]) <= 1e-300:
         top -= 1
     roots = np.empty(top, dtype=np.complex128)
+    # from the neighbour's zeros it would be quicker, but answers must not depend on neighbours
     spread_roots(roots)
-    find_roots(numerator[: top + 1], roots)
+    find_roots(numerator[: top + 1], roots, 1e-3)
     out = np.empty(2 * rows.shape[0] + top + len(points), dtype=np.complex128)
     n = 0
     for k in range(rows.shape[0]):
@@ -324,7 +326,7 @@ def corner_between(
     deflate(room, degree, np.tan(0.5 * edge) ** 2)
     roots = np.empty(degree - 2, dtype=np.complex128)
     spread_roots(roots)
-    find_roots(room[2, : degree - 1].copy(), roots)
+    find_roots(room[2, : degree - 1].copy(), roots, 1e-9)
     nearest, partner = np.inf, 0.0
     for root in roots:
         z = divide(1.0 + root, 1.0 - root)
