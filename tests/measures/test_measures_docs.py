@@ -21,19 +21,19 @@ POWERS = str.maketrans({"ʳ": "^r", "²": "^2"})
 @pytest.fixture(scope="module")
 def told() -> list[tuple[str, str, Any]]:
     """Of each line with a comment that shows a value: its text, what the comment says, what comes out."""
-    found, names = [], {}
+    found: list[tuple[str, str, Any]] = []
+    names: dict[str, Any] = {}
     for block in BLOCKS:
         lines = block.splitlines()
         for node in ast.parse(block).body:
             said = lines[node.end_lineno - 1].partition("  # ")[2]
-            if isinstance(node, ast.Expr) or (said and isinstance(node, ast.Assign)):
-                value = node.value
-                result = eval(compile(ast.Expression(value), "measures.md", "eval"), names)
-                if isinstance(node, ast.Assign):
-                    names[node.targets[0].id] = result
+            if isinstance(node, ast.Expr):
+                result = eval(compile(ast.Expression(node.value), "measures.md", "eval"), names)
                 found.append((lines[node.lineno - 1], said, result))
-            else:
-                exec(compile(ast.Module([node], []), "measures.md", "exec"), names)
+                continue
+            exec(compile(ast.Module([node], []), "measures.md", "exec"), names)
+            if said and isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+                found.append((lines[node.lineno - 1], said, names[node.targets[0].id]))
     return found
 
 
@@ -75,7 +75,7 @@ def test_the_tables_have_the_units_of_the_catalogue():
     seen = {}
     for name, rest in rows:
         cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", rest)]
-        if len(cells) == 4 and cells[2] in ("higher", "lower", ""):
+        if name in MEASURES and len(cells) == 4 and cells[2] in ("higher", "lower", ""):
             unit = "" if cells[1] == "1" else cells[1].translate(POWERS)
             assert (unit, cells[2] or None) == (MEASURES[name].unit, MEASURES[name].better), name
             seen[name] = cells
