@@ -25,6 +25,7 @@ def test_the_commands_are_those_promised():
         "chart",
         "check",
         "polar",
+        "map",
         "report",
         "sensitivity",
         "felt",

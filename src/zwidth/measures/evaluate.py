@@ -109,7 +109,7 @@ def answered(ask: Callable[[], Any]) -> tuple[float, int, str]:
     if value.shape != ():
         return float("nan"), FAILED, f"returned an array of shape {value.shape} instead of one number"
     if value.dtype.kind not in NUMBERS:
-        return float("nan"), FAILED, f"returned {str(found)[:60]!r} instead of a number"
+        return float("nan"), FAILED, f"returned {repr(found)[:60]} instead of a number"
     if np.isnan(value):
         return float("nan"), NO_VALUE, "has no value here"
     return float(value), OK, ""

@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 
 AXES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 LONG_SIDE: Final = 81  # points along the longer side where nothing is said
+MOST: Final = 10**8  # points
 FLAT: Final = 1e-9  # share of its spread below which what a handle reaches is flat
 PARALLEL: Final = 1e-6  # sine of the angle below which two axes are one
 
@@ -207,6 +208,8 @@ def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) 
     nx, ny = (int(count) for count in cells)
     if min(nx, ny) < 2:
         raise PlaneError(f"a map has at least two points along each axis, got {nx},{ny}")
+    if nx * ny > MOST:
+        raise PlaneError(f"a map has at most {MOST:.0e} points, got {nx} x {ny}")
     return nx, ny
 
 

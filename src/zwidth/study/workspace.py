@@ -192,16 +192,18 @@ def as_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
     """A map's cells with axes, units and circumstances. Raises PlaneError where the handle reaches none."""
     import xarray as xr
 
-    plane = job.plane
+    plane, mechanism = job.plane, job.device.mechanism
+    assert mechanism is not None
     _check_reached(job, cells)
     data: dict[str, Any] = {}
     axes = ("y_m", "x_m")
     column = 0
     for measure in job.asked:
         width = len(job._columns(measure))
+        unit = measure.unit.replace("^r", f"^{len(mechanism.drives.names)}")
         about = {
-            "unit": measure.unit,
-            "units": measure.unit,
+            "unit": unit,
+            "units": unit,
             "title": measure.title,
             "long_name": measure.title,
             "source": measure.source,

@@ -139,16 +139,16 @@ def _in_line(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
 def _in_plane(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
     count = 2 * IN_PLANE if around.one_sided else IN_PLANE
     step = float(np.pi / IN_PLANE)
-    angles = step * np.arange(count)
+    angles: Floats = np.asarray(step * np.arange(count), dtype=np.float64)
     f, status = _sampled(around, mine, _turned(angles), goal, which)
-    k, n = f.argmin(axis=0), np.arange(len(mine))
+    expected, n = _expected(f), np.arange(len(mine))
+    k = expected.argmin(axis=0)
     lowest = f[k, n]
-    # a local minimum elsewhere, nearly as low
-    other = (f <= np.roll(f, 1, axis=0)) & (f <= np.roll(f, -1, axis=0))
+    # a local minimum elsewhere, expected to be nearly as low
+    second = expected.copy()
     for turn in (-1, 0, 1):
-        other[(k + turn) % count, n] = False
-    second = np.where(other, f, np.inf)
-    also = np.flatnonzero(second.min(axis=0) <= lowest + NEAR * _spread(f))
+        second[(k + turn) % count, n] = np.inf
+    also = np.flatnonzero(second.min(axis=0) <= expected.min(axis=0) + NEAR * _spread(f))
     start = np.concatenate([angles[k], angles[second.argmin(axis=0)[also]]])
     place = np.concatenate([n, also])
     keep = np.isfinite(lowest[place])
@@ -165,6 +165,14 @@ def _in_plane(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
         best[place[rows][better]] = value[rows][better]
         best_angle[place[rows][better]] = angle[rows][better]
     return _found(around, mine, goal.sign * best, _turned(best_angle), status)
+
+
+def _expected(f: Floats) -> Floats:
+    """How low each local minimum (s, n) lies by the parabola through its neighbours; inf where there is none."""
+    left, right = np.roll(f, 1, axis=0), np.roll(f, -1, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        vertex = f - 0.125 * (left - right) ** 2 / (left - 2.0 * f + right)
+    return np.where((f <= left) & (f <= right), np.where(np.isfinite(vertex), vertex, f), np.inf)
 
 
 def _golden(ask, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: ignore[no-untyped-def]

@@ -17,6 +17,7 @@ from zwidth.show.cli.experiment import experiment
 from zwidth.show.cli.felt import felt
 from zwidth.show.cli.guarantees import guarantees
 from zwidth.show.cli.limit_cycles import limit_cycles
+from zwidth.show.cli.map import map_command
 from zwidth.show.cli.move import move
 from zwidth.show.cli.polar import polar
 from zwidth.show.cli.report import report
@@ -54,6 +55,7 @@ COMMANDS = (
     chart,
     check,
     polar,
+    map_command,
     report,
     sensitivity,
     felt,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,6 +19,7 @@ else:
     ParamType = click.ParamType  # generic in newer releases only
 
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
+EXTREMES: Final = ("worst", "best", "lowest", "highest")  # as in study.worst
 AS_GIVEN: Final = "as given"
 LARGEST_WALL: Final = 1e15  # N/m, N s/m; beyond, rounding would give the verdicts
 
@@ -158,19 +159,54 @@ def named(ctx: click.Context, param: click.Parameter, value: str | None) -> str 
     return value
 
 
+class Towards(Numbers):
+    """A direction, or which of all of them."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return value if value in EXTREMES else super().convert(value, param, ctx)
+
+
 def about_a_device(command: Command) -> Command:
     """Give a command DEVICE and the options that say what of it is meant, as one `Question`."""
-    decorators = [
-        click.argument("device", metavar="DEVICE", callback=named),
+    return _asking(
+        command,
         click.option(
             "--at", type=Numbers("X,Y[,Z]", (2, 3), "0.1,0.25"), help="Posture, by the handle's position [m]."
         ),
-        click.option("--assembly", metavar="NAME", help="Way of assembling the mechanism."),
         click.option(
             "--direction",
             type=Numbers("DX,DY[,DZ]", (2, 3), "0,1"),
             help="Rendered direction, of any length.",
         ),
+    )
+
+
+def about_a_workspace(command: Command) -> Command:
+    """The same for a command about all postures, along one direction or the extreme ones; `extreme` is which."""
+
+    @wraps(command)
+    def told(question: Question, **more: Any) -> int:
+        direction: Any = question.direction
+        extreme = direction if isinstance(direction, str) else None
+        return command(replace(question, direction=None if extreme else direction), extreme=extreme, **more)
+
+    choice = "|".join(EXTREMES)
+    return _asking(
+        told,
+        click.option(
+            "--direction",
+            type=Towards(f"DX,DY[,DZ]|{choice}", (2, 3), f"0,1, or one of {', '.join(EXTREMES)}"),
+            help="Rendered direction, of any length; worst: in each cell the one in which the measure is worst.",
+        ),
+    )
+
+
+def _asking(command: Command, *where: Any) -> Command:
+    """DEVICE, the options `where`, and those that every question about a device has."""
+    decorators = [
+        click.argument("device", metavar="DEVICE", callback=named),
+        *where,
+        click.option("--assembly", metavar="NAME", help="Way of assembling the mechanism."),
         click.option(
             "--model",
             type=click.Choice(MODELS),
@@ -196,12 +232,12 @@ def about_a_device(command: Command) -> Command:
     @wraps(command)
     def asked(
         device: str,
-        at: Any,
         assembly: Any,
         direction: Any,
         model: Any,
         operator: Any,
         settings: Any,
+        at: Any = None,
         **more: Any,
     ) -> int:
         return command(Question(device, settings, at, direction, assembly, model, operator), **more)

@@ -1,0 +1,351 @@
+"""A measure over the workspace with the mechanism, and requirements over each other (thesis Figs. 5.1-5.4)."""
+
+from __future__ import annotations
+
+from math import floor, log10
+from typing import TYPE_CHECKING, Any, Final
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FixedLocator, MaxNLocator
+from numpy.typing import NDArray
+
+from zwidth.measures.measure import FAILED, NO_VALUE, OK, SINGULAR, UNDECIDED
+from zwidth.show.figures.mechanism import link_stroke, pins
+from zwidth.show.figures.style import BLACK, GREY, LINES, VERMILION, figure, label
+from zwidth.show.units import MINUS, exponent_of, given, scaled
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from zwidth.device.device import Device
+    from zwidth.study.common_area import CommonArea
+
+Floats = NDArray[np.float64]
+
+COLOURS: Final = "cividis"  # even steps of lightness, the same to every eye
+LEVELS: Final = 10
+WIDE: Final = 6.0  # ratio of the usual values from which on levels are spaced by ratios
+USUAL: Final = (2.0, 98.0)  # per cent of the values that the levels span
+MARKS: Final = {
+    SINGULAR: ("singular", "xxxx"),
+    NO_VALUE: ("no value", "////"),
+    UNDECIDED: ("undecided", "...."),
+    FAILED: ("failed", "\\\\\\\\"),
+}
+HATCHES: Final = ("\\\\", "//", "||", "--", "xx")
+ARROWS: Final = 14  # direction strokes along the longer side
+
+
+def map_figure(
+    dataset: xr.Dataset, name: str, device: Device | None = None, area: CommonArea | None = None
+) -> Figure:
+    """A figure of one measure of a map, as wide as its plane asks for.
+
+    device  whose mechanism is drawn in its reference posture; None: none
+    area    requirements to lay over it
+    """
+    x, y = dataset["x_m"].values, dataset["y_m"].values
+    view = _view(x, y, _mechanism(dataset, device))
+    ratio = (view[3] - view[2]) / (view[1] - view[0])
+    width = 6.2 if ratio < 1.4 else 4.6
+    lines = 1 + (len(area.requirements) + 1 if area is not None else 0)
+    drawing, ax = figure(width, float(np.clip(0.72 * width * ratio, 2.2, 8.0)) + 0.75 + 0.17 * lines)
+    drawing.set_layout_engine("compressed")  # axes of equal scales leave room that the labels need
+    draw_map(ax, dataset, name, device, area)
+    return drawing
+
+
+def draw_map(
+    ax: Axes, dataset: xr.Dataset, name: str, device: Device | None = None, area: CommonArea | None = None
+) -> None:
+    """Filled contours of one measure of a map; white where the handle does not reach, hatched without a value.
+
+    device  as for `map_figure`
+    area    requirements: each region hatched within its outline, what they have in common within a bold dotted one
+    """
+    x, y = dataset["x_m"].values, dataset["y_m"].values
+    about = dataset[name].attrs
+    unit = printed(str(about["unit"]))
+    handles: list[Any] = []
+    if (dataset[f"{name}_status"].values == OK).any():
+        _contours(ax, x, y, dataset[name].values, str(about["title"]), unit, faint=area is not None)
+    handles += _marks(ax, x, y, dataset[f"{name}_status"].values)
+    handles += _strokes(ax, dataset, f"{name}_direction")
+    if area is not None:
+        handles += _areas(ax, dataset, area)
+    mechanism = _mechanism(dataset, device)
+    handles += _draw_mechanism(ax, mechanism, dataset)
+    _frame(
+        ax, _view(x, y, mechanism), str(dataset["x_m"].attrs["long_name"]), str(dataset["y_m"].attrs["long_name"])
+    )
+    if handles:
+        made = ax.legend(
+            handles=handles,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.02),
+            ncols=1 if area is not None else 3,
+            borderaxespad=0.0,
+            handlelength=2.6,
+            handleheight=1.1,
+            columnspacing=1.6,
+            fontsize=8.0,
+            frameon=False,
+            alignment="left",
+        )
+        made.set_zorder(6.0)
+
+
+def printed(unit: str) -> str:
+    """A unit as it is printed: powers raised, products without a blank before s.
+
+    >>> printed("N^2 s/m^2"), printed("m^2/rad^2")
+    ('N²s/m²', 'm²/rad²')
+    """
+    for power, raised in (("^1", ""), ("^2", "²"), ("^3", "³")):
+        unit = unit.replace(power, raised)
+    return unit.replace(" s", "s")
+
+
+def levels_of(values: Floats) -> Floats:
+    """Round levels (k,) over the usual values, ascending; spaced by ratios where those differ much."""
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return np.array([0.0, 1.0])
+    low, high = (float(v) for v in np.percentile(finite, USUAL))
+    least, most = float(finite.min()), float(finite.max())
+    if most - high < 0.5 * (high - low) and low - least < 0.5 * (high - low):
+        low, high = least, most  # no tail to cut
+    if not high - low > 1e-9 * max(abs(low), abs(high)):
+        middle = 0.5 * (low + high)
+        reach = 0.05 * abs(middle) or 1.0
+        return np.array([middle - reach, middle + reach])
+    if low > 0.0 and high / low > WIDE:
+        return _ratios(low, high)
+    found = MaxNLocator(nbins=LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+    return np.asarray(found, dtype=np.float64)
+
+
+def _ratios(low: float, high: float) -> Floats:
+    """1, 2, 5 or finer per decade, just as many as are wanted."""
+    grids = ([1.0], [1.0, 3.0], [1.0, 2.0, 5.0], [1.0, 1.5, 2.0, 3.0, 5.0, 7.0])
+    decades = np.arange(floor(log10(low)) - 1, floor(log10(high)) + 2)
+    best = np.array([low, high])
+    for grid in grids:
+        all_levels = (10.0 ** decades[:, None] * np.array(grid)).ravel()
+        first = max(int(np.searchsorted(all_levels, low, side="right")) - 1, 0)
+        last = int(np.searchsorted(all_levels, high, side="left"))
+        found = all_levels[first : last + 1]
+        if len(found) <= LEVELS + 3:
+            best = found
+    return np.asarray(best)
+
+
+def _contours(ax: Axes, x: Floats, y: Floats, values: Floats, title: str, unit: str, *, faint: bool) -> None:
+    levels = levels_of(values)
+    finite = values[np.isfinite(values)]
+    under = bool((values < levels[0]).any())
+    over = bool((values > levels[-1]).any())
+    extend: Any = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[
+        under, over
+    ]
+    most = 2.0 * max(abs(float(finite.max(initial=0.0))), abs(float(levels[-1])), abs(float(levels[0])))
+    z = np.ma.masked_invalid(np.clip(values, -most, most))
+    bands = len(levels) - 1 + under + over
+    shades = mpl.colormaps[COLOURS](np.linspace(0.0, 1.0, bands))
+    if faint:  # lines and hatches stand out on it
+        shades[:, :3] = 1.0 - 0.45 * (1.0 - shades[:, :3])
+    colours = ListedColormap(shades)
+    norm = BoundaryNorm(levels, bands, extend=extend)
+    ax.contourf(x, y, z, levels=levels, cmap=colours, norm=norm, extend=extend, corner_mask=True, zorder=1.0)
+    ax.contour(x, y, z, levels=levels, colors="white", linewidths=0.4, corner_mask=True, zorder=1.1)
+    assert ax.figure is not None
+    bar = ax.figure.colorbar(
+        ScalarMappable(norm, colours),
+        ax=ax,
+        ticks=FixedLocator(levels.tolist()),
+        spacing="uniform",
+        fraction=0.05,
+        pad=0.02,
+    )
+    bar.minorticks_off()
+    bar.outline.set_linewidth(0.6)
+    _bar_label(bar, title, unit, levels)
+
+
+def _bar_label(bar: Any, title: str, unit: str, levels: Floats) -> None:
+    """Ticks at the levels, under a prefix or a power of ten that they have in common."""
+    largest = float(np.abs(levels).max())
+    exponent = exponent_of(largest)
+    if scaled(exponent, unit).startswith("10") and 0.01 <= largest < 1e4:
+        exponent = 0  # short enough without a power of ten
+    texts = [f"{v / 10.0**exponent:.4g}".replace("-", MINUS) for v in levels.tolist()]
+    bar.ax.set_yticks(levels, labels=texts)
+    bar.ax.tick_params(labelsize=8.0)
+    name = scaled(exponent, unit).strip("\u00a0")
+    bar.set_label(f"{title} [{name}]" if name else title, fontsize=9.0)
+
+
+def _marks(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -> list[Any]:
+    """Hatched where there is no value, apart from where nothing reaches."""
+    handles: list[Any] = []
+    with_hatches: dict[str, Any] = {"colors": "none", "zorder": 1.5}
+    for kind, (text, hatch) in MARKS.items():
+        here = (status == kind).astype(float)
+        if here.any():
+            drawn = ax.contourf(x, y, here, levels=[0.5, 1.5], hatches=[hatch], **with_hatches)
+            drawn.set_edgecolor(GREY)
+            drawn.set_linewidth(0.0)
+            handles.append(Patch(facecolor="white", edgecolor=GREY, hatch=hatch, linewidth=0.5, label=text))
+    return handles
+
+
+def _strokes(ax: Axes, dataset: xr.Dataset, name: str) -> list[Any]:
+    """Short lines along each cell's extreme direction, seen on the plane."""
+    if name not in dataset:
+        return []
+    x, y = dataset["x_m"].values, dataset["y_m"].values
+    apart = max(float(np.ptp(x)), float(np.ptp(y))) / ARROWS
+    columns, rows = _every(x, apart), _every(y, apart)
+    u = dataset[name].values[np.ix_(rows, columns)]
+    axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
+    seen = u @ axes.T
+    length = 0.36 * apart
+    middle = np.stack(np.meshgrid(x[columns], y[rows]), axis=-1)
+    keep = np.isfinite(seen).all(axis=-1)
+    ends = np.stack([middle - length * seen, middle + length * seen], axis=-2)[keep]
+    if not len(ends):
+        return []
+    halo = [withStroke(linewidth=2.4, foreground="white")]
+    drawn = LineCollection(list(ends), colors=BLACK, linewidths=1.1, zorder=2.4, path_effects=halo)
+    drawn.set_label(f"{dataset.attrs['direction']} direction")
+    ax.add_collection(drawn)
+    return [drawn]
+
+
+def _every(x: Floats, apart: float) -> NDArray[np.int64]:
+    """Indices of coordinates about so far apart."""
+    step = max(1, round(apart / float(x[1] - x[0])))
+    return np.arange(min(step // 2, len(x) - 1), len(x), step)
+
+
+def _areas(ax: Axes, dataset: xr.Dataset, area: CommonArea) -> list[Any]:
+    handles: list[Any] = []
+    for n, (requirement, region) in enumerate(zip(area.requirements, area.regions, strict=True)):
+        colour, dashes = LINES[1 + n % (len(LINES) - 1)]
+        hatch = HATCHES[n % len(HATCHES)]
+        measure = requirement.measure
+        sign = "\u2265" if requirement.at_least else "\u2264"
+        bound = given(requirement.value, printed(str(dataset[measure.name].attrs["unit"]))).rstrip("\u00a0")
+        text = f"{measure.title} {sign} {bound}: {_square(region.area)}"
+        style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.3, "linestyle": dashes, "facecolor": "none"}
+        for path in _paths(region.shape):
+            # hatches take the edge's colour: once for them, faint, and once for the outline
+            ax.add_patch(
+                PathPatch(path, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.0, alpha=0.45)
+            )
+            ax.add_patch(PathPatch(path, zorder=2.2, **style))
+        handles.append(Patch(hatch=hatch, label=text, **style))
+    dotted: dict[str, Any] = {"linestyle": (0, (0.1, 1.6)), "linewidth": 3.2}
+    for path in _paths(area.common.shape):
+        ax.add_patch(PathPatch(path, facecolor="none", edgecolor=BLACK, zorder=2.6, capstyle="round", **dotted))
+    share = f"{100.0 * area.common.share:.3g} % of what is reached"
+    text = f"Common area: {_square(area.common.area)}, {share}"
+    handles.append(Line2D([], [], color=BLACK, dash_capstyle="round", label=text, **dotted))
+    return handles
+
+
+def _square(area: float) -> str:
+    return f"{1e4 * area:.4g} cm²" if area < 1.0 else f"{area:.4g} m²"
+
+
+def _paths(shape: Any) -> list[Path]:
+    """The outlines of a shapely geometry's polygons, holes and all."""
+    found = []
+    for part in getattr(shape, "geoms", [shape]):
+        if part.geom_type != "Polygon" or part.is_empty:
+            continue
+        rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
+        found.append(Path.make_compound_path(*(Path(ring, closed=True) for ring in rings)))
+    return found
+
+
+def _mechanism(dataset: xr.Dataset, device: Device | None) -> tuple[list[Floats], Floats, Floats] | None:
+    """Strokes of the links, the joints and the handle in the reference posture, on the plane; None for none."""
+    if device is None or device.mechanism is None:
+        return None
+    from zwidth.model.posture import PostureError, link_points
+
+    try:
+        posture = device.posture(None, str(dataset.attrs["assembly"]) or None)
+    except PostureError:
+        return None
+    mechanism = device.mechanism
+    axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
+    placed = link_points(mechanism, posture)
+    strokes = [link_stroke(mechanism, placed, i) @ axes.T for i in range(len(mechanism.links.names))]
+    return strokes, pins(mechanism, placed) @ axes.T, posture.position @ axes.T
+
+
+def _draw_mechanism(
+    ax: Axes, mechanism: tuple[list[Floats], Floats, Floats] | None, dataset: xr.Dataset
+) -> list[Any]:
+    if mechanism is None:
+        return []
+    strokes, joints, handle = mechanism
+    halo = [withStroke(linewidth=3.4, foreground="white")]
+    for stroke in strokes:
+        ax.plot(*stroke.T, color=BLACK, linewidth=1.6, solid_capstyle="round", path_effects=halo, zorder=3.0)
+    ax.plot(
+        *joints.T, marker="o", markersize=5.0, color="white", markeredgecolor=BLACK, linestyle="none", zorder=3.1
+    )
+    ax.plot(
+        *handle[:, None],
+        marker="D",
+        markersize=6.0,
+        color=VERMILION,
+        markeredgecolor="white",
+        linestyle="none",
+        zorder=3.2,
+    )
+    direction = dataset.attrs["direction"]
+    if not isinstance(direction, str):
+        axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
+        seen = axes @ np.asarray(direction, dtype=float)
+        if np.linalg.norm(seen) > 1e-6:
+            size = 0.13 * float(np.ptp(np.vstack([*strokes, handle[None]]), axis=0).max())
+            ax.annotate(
+                "",
+                xy=tuple(handle + size * seen),
+                xytext=tuple(handle),
+                arrowprops={"arrowstyle": "-|>", "color": VERMILION, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0},
+                zorder=3.3,
+            )
+    return []
+
+
+def _view(x: Floats, y: Floats, mechanism: tuple[list[Floats], Floats, Floats] | None) -> tuple[float, ...]:
+    """What is shown: the map and the mechanism."""
+    low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
+    if mechanism is not None:
+        points = np.vstack([*mechanism[0], mechanism[1], mechanism[2][None]])
+        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+    margin = 0.02 * float((high - low).max())
+    return low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin
+
+
+def _frame(ax: Axes, view: tuple[float, ...], first: str, second: str) -> None:
+    ax.set_xlim(view[0], view[1])
+    ax.set_ylim(view[2], view[3])
+    ax.set_aspect("equal")
+    label(ax.xaxis, first, "m", plain=True)
+    label(ax.yaxis, second, "m", plain=True)

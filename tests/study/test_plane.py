@@ -1,0 +1,143 @@
+"""Planes of the workspace: their grids, their default ranges, and planes that cannot be mapped."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.model.model_cases import random_five_bar, spatial_arm
+from zwidth.device.faults import DeviceError
+from zwidth.device.load import load
+from zwidth.model.posture import Singular, reachable_positions, solve_posture
+from zwidth.study.plane import PlaneError, plane_of
+
+
+@pytest.fixture(scope="module")
+def planar():
+    return load("five-bar")
+
+
+@pytest.fixture(scope="module")
+def spatial(planar):
+    mechanism = spatial_arm(np.random.default_rng(4))
+    return replace(
+        planar,
+        mechanism=mechanism,
+        reference_position=mechanism.reference_position,
+        reference_assembly=next(iter(mechanism.assemblies)),
+    )
+
+
+def unbounded(planar):
+    return load("five-bar", ["mechanism.workspace=unset"])
+
+
+def test_coordinates_are_those_of_the_base_frame(spatial):
+    through = spatial.reference_position
+    for axes, (a, b) in {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}.items():
+        plane = plane_of(spatial, axes, x=(-0.1, 0.2), y=(-0.3, 0.1), cells=(4, 3))
+        assert plane.shape == (3, 4)
+        assert plane.names == (axes[0], axes[1])
+        positions = plane.positions
+        np.testing.assert_allclose(positions[1, 2, [a, b]], [0.1, -0.1], atol=1e-15)
+        other = 3 - a - b
+        np.testing.assert_allclose(positions[..., other], through[other], atol=1e-15)
+
+
+def test_the_second_vector_is_made_orthogonal_to_the_first(spatial):
+    plane = plane_of(spatial, (2e-200, 0, 0, 5.0, 1.0, 1.0), x=(0, 1), y=(0, 1), cells=(2, 2))
+    np.testing.assert_allclose(plane.first, [1, 0, 0])
+    np.testing.assert_allclose(plane.second, np.array([0, 1, 1]) / np.sqrt(2))
+    assert plane.names == ("u", "v")
+    # through the reference position, with coordinates that are components along the axes
+    reference = spatial.reference_position
+    u, v = plane.coordinates(reference)
+    np.testing.assert_allclose(plane.through + u * plane.first + v * plane.second, reference, atol=1e-12)
+
+
+def test_the_file_s_workspace_is_the_default_range(planar):
+    plane = plane_of(planar)
+    assert (plane.x[0], plane.x[-1], plane.y[0], plane.y[-1]) == (-0.3, 0.3, 0.05, 0.35)
+    assert plane.shape == (41, 81)
+    np.testing.assert_array_equal(plane.x, -plane.x[::-1])
+
+
+def test_without_bounds_it_is_the_box_of_what_is_reached(planar):
+    device = unbounded(planar)
+    plane = plane_of(device, cells=(60, 60))
+    span = 0.147 + 0.199  # both arms stretched
+    for line in (plane.x, plane.y):
+        assert -span < line[0] < -0.95 * span
+        assert 0.95 * span < line[-1] < span
+    # what is reached lies in a ring, and nearly all of the ring is reached
+    radius = np.hypot(*np.moveaxis(plane.positions[..., :2], -1, 0))
+    ok = solve_posture(device.mechanism, plane.positions, "elbows-out").status == 0
+    assert not (ok & ((radius > span) | (radius < 0.199 - 0.147))).any()
+    assert ok[(radius < 0.97 * span) & (radius > 0.08)].mean() > 0.99
+
+
+def test_a_tilted_planar_device_gets_its_own_plane(planar):
+    mechanism = random_five_bar(np.random.default_rng(3))
+    c, s = np.cos(0.4), np.sin(0.4)
+    tilt = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    roots = mechanism.links.parent < 0
+    rotation = mechanism.links.rotation.copy()
+    rotation[roots] = tilt @ rotation[roots]
+    tilted = replace(
+        mechanism,
+        links=replace(
+            mechanism.links,
+            rotation=rotation,
+            origin=np.where(roots[:, None], mechanism.links.origin @ tilt.T, mechanism.links.origin),
+        ),
+        reference_position=tilt @ mechanism.reference_position,
+    )
+    device = replace(
+        planar,
+        mechanism=tilted,
+        reference_position=tilted.reference_position,
+        reference_assembly=next(iter(tilted.assemblies)),
+    )
+    plane = plane_of(device, cells=(30, 30))
+    np.testing.assert_allclose(np.abs(plane.normal @ tilt[:, 2]), 1.0, atol=1e-12)
+    straight = solve_posture(mechanism, plane.positions @ tilt, device.reference_assembly)
+    leaning = solve_posture(tilted, plane.positions, device.reference_assembly)
+    assert (straight.status == 0).sum() > 100
+    np.testing.assert_array_equal(straight.status, leaning.status)
+    with pytest.raises(PlaneError, match="in a line; leave --plane out"):
+        plane_of(device, "xy")
+
+
+def test_what_is_reached_is_reached(spatial):
+    reach = reachable_positions(spatial.mechanism, spatial.reference_assembly)
+    some = reach[:: max(1, len(reach) // 200)]
+    assert (solve_posture(spatial.mechanism, some, spatial.reference_assembly).status == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"axes": "xz"}, r"cannot leave the plane z = 0 m, .* ask for --plane xy"),
+        ({"axes": (1, 0, 0, -3, 0, 0)}, "are parallel"),
+        ({"axes": (1, 0, 0, 0, 0, 0)}, "has no length"),
+        ({"axes": (1, 0, 0)}, "six finite numbers"),
+        ({"axes": "zx"}, "must be xy, xz, yz or six numbers"),
+        ({"through": (0, 0.25, 0.1)}, r"lies 0\.1 m beside it; it reaches x from -0\.341 to 0\.341 m"),
+        ({"x": (0.1, 0.1)}, "range along x must be LOW,HIGH"),
+        ({"y": (0.2, float("inf"))}, "range along y"),
+        ({"cells": (1, 9)}, "at least two points"),
+        ({"cells": (10**5, 10**5)}, "at most"),
+    ],
+)
+def test_a_plane_that_cannot_be_mapped(planar, asked, said):
+    with pytest.raises(PlaneError, match=said):
+        plane_of(planar, **asked)
+
+
+def test_devices_without_a_workspace(planar):
+    with pytest.raises(DeviceError, match="no \\[mechanism\\]"):
+        plane_of(load("published-two-mass"))
+    with pytest.raises(Singular, match="singular wherever"):
+        plane_of(planar, assembly="elbows-right")
