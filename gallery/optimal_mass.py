@@ -7,8 +7,8 @@ its discriminant vanishes. With P = K/k_e and D = B/(k_e T),
     rho^2 = 8 D (1 + P) / (4 D^2 + 4 D P + 8 D + P^2)
 
 In the scan the last term under the root reads k_p^2 T, which does not have the unit of the others; k_p^2 T^2 is
-right. The formula holds where B > K T/2 and the remaining real root is at most rho.
-Here the minimum is found by eigenvalues alone.
+right. The formula holds where B > K T/2 and the remaining real root is at most rho; `measures.fidelity` has it,
+and why no mass does better. Beside it the minimum is found by eigenvalues alone.
 
 Run `python -m gallery.optimal_mass` to see the numbers.
 """
@@ -16,12 +16,11 @@ Run `python -m gallery.optimal_mass` to see the numbers.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from gallery.models import published
-from zwidth.chart.verdict import spectral_radius
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
+from zwidth.measures.fidelity import fastest_mass, optimal_mass
 from zwidth.model.plant import Plant
 
 T = published().period
@@ -31,26 +30,16 @@ K_E = float(published().plant.stiffness[0, 0])
 WALLS = {"B": (3000.0, 15.0), "C": (4000.0, 20.0), "D": (5000.0, 25.0), "printed for D": (5000.0, 55.0)}
 
 
-def radius(mass: float, wall: tuple[float, float]) -> float:
-    """Spectral radius of the motor's mass on its spring."""
-    one = np.ones(1)
-    plant = Plant(mass * one[:, None], 0.0 * one[:, None], K_E * one[:, None], one, one.copy())
-    return float(spectral_radius(Loop(plant, Controller(T)), *wall))
-
-
 def fastest(wall: tuple[float, float]) -> tuple[float, float]:
-    """Mass [kg] and spectral radius: a scan, refined round its best."""
-    masses = np.geomspace(0.01, 0.5, 80)
-    best = int(np.argmin([radius(mass, wall) for mass in masses]))
-    bounds = masses[max(best - 1, 0)], masses[min(best + 1, 79)]
-    found = minimize_scalar(lambda m: radius(m, wall), bounds=bounds, method="bounded", options={"xatol": 1e-10})
-    return float(found.x), float(found.fun)
+    """Mass [kg] and spectral radius of the motor's mass on its spring, by eigenvalues."""
+    one = np.ones(1)
+    plant = Plant(one[:, None], 0.0 * one[:, None], K_E * one[:, None], one, one.copy())
+    return fastest_mass(Loop(plant, Controller(T)), *wall, 0.01, 0.5)
 
 
 def right_5_15(wall: tuple[float, float]) -> float:
     """(5.15), right."""
-    P, D = wall[0] / K_E, wall[1] / (K_E * T)
-    return float(np.sqrt(8.0 * D * (1.0 + P) / (4.0 * D**2 + 4.0 * D * P + 8.0 * D + P**2)))
+    return float(optimal_mass(*wall, K_E, T).spectral_radius)
 
 
 def printed_5_15(wall: tuple[float, float]) -> float:

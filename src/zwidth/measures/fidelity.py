@@ -102,7 +102,7 @@ def fastest_mass(
 
     loop             whose plant has its motor-side mass changed (`with_motor_side_mass`)
     lowest, highest  masses between which it is looked for [kg], 0 < lowest < highest; an end may be the answer
-    Returns          mass, to about 1e-8 of itself, and spectral radius there; above 1 if no mass is stable
+    Returns          mass, to about 1e-7 of itself, and spectral radius there; above 1 if no mass is stable
     Raises           ValueError  for masses that are not meant, or a wall that is not finite
     """
     if not 0.0 < lowest < highest < np.inf:
@@ -115,13 +115,12 @@ def fastest_mass(
         changed = replace(loop, plant=with_motor_side_mass(loop.plant, float(np.exp(log_mass))))
         return float(spectral_radius(changed, wall_stiffness, wall_damping))
 
-    ends = np.log([lowest, highest])
-    scale = np.linspace(*ends, max(int(TRIED * (ends[1] - ends[0]) / np.log(10.0)), 8))
+    scale = np.linspace(np.log(lowest), np.log(highest), max(int(TRIED * np.log10(highest / lowest)), 8))
     found = np.array([radius(at) for at in scale])
     best = (float(found.min()), float(scale[np.argmin(found)]))
     padded = np.concatenate([[np.inf], found, [np.inf]])
     lowest_of_three = (found <= padded[:-2]) & (found <= padded[2:])
-    for i in np.flatnonzero(lowest_of_three & (found <= best[0] + NEAR)):
+    for i in np.flatnonzero(lowest_of_three & (found <= best[0] + NEAR)).tolist():
         bounds = scale[max(i - 1, 0)], scale[min(i + 1, len(scale) - 1)]
         refined = minimize_scalar(radius, bounds=bounds, method="bounded", options={"xatol": 1e-10})
         best = min(best, (float(refined.fun), float(refined.x)))

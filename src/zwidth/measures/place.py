@@ -123,7 +123,7 @@ class Place:
             return self
         posture = Posture(
             self.posture.assembly,
-            *(getattr(self.posture, name)[index] for name in _OF_POSTURE),
+            *(np.asarray(getattr(self.posture, name)[index]) for name in _OF_POSTURE),
         )
         assert self.direction is not None
         return replace(self, posture=posture, direction=np.broadcast_to(self.direction, (*self.shape, 3))[index])

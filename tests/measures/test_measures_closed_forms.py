@@ -1,0 +1,235 @@
+"""The catalogue's closed forms and fidelity measures, asked of places: values, refusals and reasons."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import zwidth
+from tests.systems import mass, published, two_mass
+from zwidth.chart.chart import stability_chart
+from zwidth.chart.verdict import spectral_radius
+from zwidth.loop.controller import Controller, FirstOrder
+from zwidth.loop.estimators import WindowedDifference
+from zwidth.loop.loop import Loop
+from zwidth.measures.catalogue import MEASURES
+from zwidth.measures.evaluate import evaluate
+from zwidth.measures.fidelity import optimal_mass
+from zwidth.measures.measure import NO_VALUE, OK, OUT_OF_REACH, MeasureError
+from zwidth.measures.place import Place, Wanted
+from zwidth.measures.structural import structural_distortion
+from zwidth.model.operator import Operator
+from zwidth.study.places import place_of
+
+CLOSED = ("stiffness_max_closed_form", "damping_max_closed_form", "stable_area_closed_form")
+OPTIMAL = ("optimal_spectral_radius", "optimal_motor_side_mass")
+WANTED = Wanted(3000.0, 15.0, 10.0)
+POSITIONS = [
+    [[0.0, 0.25, 0.0], [0.05, 0.2, 0.0]],
+    [[-0.1, 0.22, 0.0], [0.9, 0.9, 0.0]],
+]  # the last is out of reach
+
+
+def five_bar(model="full", wanted=WANTED):
+    return place_of(zwidth.load("five-bar"), POSITIONS, model=model, wanted=wanted)
+
+
+def given(plant, wanted=WANTED, model=None, operator=None, **controller):
+    return Place(Controller(0.00125, **controller), given=plant, model=model, operator=operator, wanted=wanted)
+
+
+def ask(name, place):
+    return evaluate(MEASURES[name], place)
+
+
+def refused(name, place, match):
+    with pytest.raises(MeasureError, match=match):
+        ask(name, place)
+
+
+# --- closed forms of the impedance range ---
+
+
+@pytest.mark.parametrize("model", ["rigid", "motor-mass"])
+def test_they_are_exact_for_the_device_without_damping(model):
+    place = five_bar(model)
+    found = [ask(name, place) for name in CLOSED]
+    for index in ((0, 0), (0, 1), (1, 0)):
+        plant = place.at(*index).plant
+        assert (plant.damping[0, 0] > 0.0) == (model == "motor-mass")
+        chart = stability_chart(Loop(replace(plant, damping=0.0 * plant.damping), place.controller), decay=False)
+        ours = [one.values[index] for one in found]
+        assert_allclose(ours, [chart.stiffness_max, chart.damping_max, chart.stable_area], rtol=1e-7)
+    for one in found:
+        assert one.status.tolist() == [[OK, OK], [OK, OUT_OF_REACH]]
+        assert one.notes == ()
+
+
+@pytest.mark.parametrize("model", ["full", "two-mass"])
+def test_other_models_have_none(model):
+    for name in CLOSED:
+        refused(name, five_bar(model), "two models only; give --model rigid or --model motor-mass")
+    refused(CLOSED[0], given(two_mass(0.26, 0.0254, 15620.0)), "give --model")
+
+
+def test_a_given_plant_is_seen_for_what_it_is():
+    pair = two_mass(0.2616, 0.0254, 15620.0, 1.0)
+    for plant, model, alike in (
+        (mass(0.287, 1.0), None, mass(0.287)),
+        (mass(0.0254, 1.0, 15620.0), None, mass(0.0254, 0.0, 15620.0)),
+        (pair, "rigid", mass(0.287)),
+        (pair, "motor-mass", mass(0.0254, 0.0, 15620.0)),
+    ):
+        chart = stability_chart(Loop(alike, Controller(0.00125)), decay=False)
+        found = [float(ask(name, given(plant, model=model)).values) for name in CLOSED]
+        assert_allclose(found, [chart.stiffness_max, chart.damping_max, chart.stable_area], rtol=1e-7)
+    late = float(ask(CLOSED[0], given(mass(0.287), delay=2.0)).values)
+    exact = stability_chart(Loop(mass(0.287), Controller(0.00125, 2.0)), decay=False).stiffness_max
+    assert late == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"delay": 0.5}, "The delay is a whole number"),
+        ({"velocity_filter": FirstOrder(0.001)}, "The velocity is not filtered"),
+        ({"force_filter": FirstOrder(0.001)}, "The force is not filtered"),
+        ({"velocity": WindowedDifference(2)}, "backward difference"),
+        ({"actuator_time_constant": 0.001}, "The actuator follows at once"),
+    ],
+)
+def test_whatever_else_breaks_an_assumption_is_refused(change, reason):
+    mechanism = five_bar("rigid")
+    for place in (
+        given(mass(0.287), **change),
+        replace(mechanism, controller=replace(mechanism.controller, **change)),
+    ):
+        for name in CLOSED:
+            refused(name, place, reason)
+
+
+def test_what_only_one_of_them_refuses():
+    motors = five_bar("motor-mass")
+    refused(CLOSED[0], replace(motors, controller=replace(motors.controller, delay=1.0)), "without delay")
+    refused(CLOSED[0], replace(motors, encoders="link"), "encoders read the links")
+    hand = Operator(0.8, 580.0, 5.5, 1e4, 5.0)
+    refused(CLOSED[0], replace(five_bar("rigid"), operator=hand), "--operator none")
+    refused(CLOSED[0], given(replace(mass(0.287), sensor=np.array([-1.0]))), "where the encoder reads")
+    assert ask(CLOSED[0], replace(motors, operator=hand)).status[0, 0] == OK  # the link side is held still anyhow
+
+
+def test_where_no_wall_is_stable_they_say_why():
+    place = given(mass(0.01, stiffness=15620.0))  # W = 1.562: just below pi/2, where there is one yet
+    assert ask(CLOSED[0], place).status == OK
+    place = given(mass(0.005, stiffness=15620.0))
+    found = ask(CLOSED[0], place)
+    assert found.status == NO_VALUE
+    assert "no wall of positive stiffness is stable" in found.notes[0].reason
+    assert [float(ask(name, place).values) for name in CLOSED[1:]] == [0.0, 0.0]
+
+
+def test_rigid_drives_have_no_spring():
+    place = five_bar("motor-mass")
+    drives = replace(place.drives, stiffness=np.full(2, np.inf))
+    place = replace(place, mechanism=replace(place.mechanism, drives=drives))
+    for name in (*CLOSED, *OPTIMAL):
+        found = ask(name, place)
+        assert found.status.tolist() == [[NO_VALUE, NO_VALUE], [NO_VALUE, OUT_OF_REACH]]
+        assert found.notes[0].count == 3
+
+
+# --- fidelity ---
+
+
+def test_the_optimum_of_a_mechanism_takes_its_stiffness():
+    place = five_bar()
+    found = optimal_mass(3000.0, 15.0, place.effective.stiffness, place.controller.sampling_period)
+    for name, values in zip(OPTIMAL, (found.spectral_radius, found.mass), strict=True):
+        ours = ask(name, place)
+        assert_allclose(ours.values, values)
+        assert ours.status.tolist() == [[OK, OK], [OK, OUT_OF_REACH]]
+        for model in ("rigid", "two-mass", "motor-mass"):
+            assert_allclose(ask(name, five_bar(model)).values, values)
+    little = ask(OPTIMAL[0], five_bar(wanted=Wanted(3000.0, 1.0)))
+    assert little.status[0, 0] == NO_VALUE
+    assert "B > K T/2" in little.notes[0].reason
+
+
+def test_the_optimum_of_a_given_plant():
+    """Point B of the thesis, on the two-mass plant and on its motor side alone."""
+    for plant in (published().plant, mass(0.0254, 1.9, 15620.0)):
+        assert float(ask(OPTIMAL[0], given(plant)).values) == pytest.approx(0.895606, abs=5e-7)
+        assert float(ask(OPTIMAL[1], given(plant)).values) == pytest.approx(0.0510576, abs=5e-8)
+    refused(OPTIMAL[0], given(mass(0.287)), "stiffness between motors and handle")
+    refused(OPTIMAL[0], given(published().plant, delay=1.0), "without delay")
+    refused(OPTIMAL[0], replace(five_bar(), encoders="link"), "encoders read the links")
+
+
+def test_the_radius_and_decay_of_any_loop():
+    place = five_bar()
+    radius, decay = ask("spectral_radius", place), ask("decay_time", place)
+    for index in ((0, 0), (0, 1), (1, 0)):
+        expected = float(spectral_radius(place.at(*index).loop, 3000.0, 15.0))
+        assert radius.values[index] == expected
+        assert np.exp(-place.controller.sampling_period / decay.values[index]) == pytest.approx(
+            expected, rel=1e-12
+        )
+    assert radius.status[1, 1] == decay.status[1, 1] == OUT_OF_REACH
+    unstable = ask("decay_time", given(published().plant, Wanted(20000.0, 10.0)))
+    assert unstable.status == NO_VALUE
+    assert unstable.notes[0].reason == "the wanted wall is unstable here, so that vibration does not decay"
+    assert float(ask("spectral_radius", given(published().plant, Wanted(20000.0, 10.0))).values) > 1.0
+
+
+def test_felt_at_low_frequency_is_felt_at_rest():
+    """K k/(K + k), and the mass in free motion, jw m."""
+    slow = Wanted(4000.0, 15.0, 0.01)
+    place = given(published().plant, slow)
+    series = 4000.0 * 15620.0 / 19620.0
+    assert float(ask("felt_stiffness", place).values) == pytest.approx(series, rel=1e-5)
+    assert float(ask("free_motion_force", place).values) == pytest.approx(2.0 * np.pi * 0.01 * 0.287, rel=1e-5)
+    for name, wanted in (("felt_stiffness", Wanted(20000.0, 10.0, 1.0)), ("decay_time", Wanted(20000.0, 10.0))):
+        found = ask(name, given(published().plant, wanted))
+        assert found.status == NO_VALUE
+        assert "unstable here" in found.notes[0].reason
+
+
+def test_what_is_felt_and_deforms_is_the_device_without_the_hand():
+    hand = Operator(0.8, 580.0, 5.5, 1e4, 5.0)
+    for name in ("felt_stiffness", "free_motion_force", "structural_distortion"):
+        alone, held = (float(ask(name, given(published().plant, operator=who)).values) for who in (None, hand))
+        assert alone == held
+    assert (
+        ask("spectral_radius", given(published().plant)).values
+        != ask("spectral_radius", given(published().plant, operator=hand)).values
+    )
+
+
+def test_the_distortion_of_a_place():
+    place = five_bar()
+    found = ask("structural_distortion", place)
+    assert found.values[0, 1] == structural_distortion(place.at(0, 1).plant, 10.0)
+    assert float(ask("structural_distortion", five_bar("rigid").at(0, 0)).values) == 0.0
+
+
+@pytest.mark.parametrize("name", [*OPTIMAL, "spectral_radius", "decay_time", "felt_stiffness"])
+def test_a_wall_has_to_be_told(name):
+    for wanted in (Wanted(frequency=1.0), Wanted(100.0, None, 1.0), Wanted(None, 1.0, 1.0)):
+        refused(name, five_bar(wanted=wanted), "needs a wanted wall; give --stiffness and --damping")
+
+
+@pytest.mark.parametrize("name", ["felt_stiffness", "free_motion_force", "structural_distortion"])
+def test_a_frequency_has_to_be_told_and_a_handle_to_be_there(name):
+    refused(name, five_bar(wanted=Wanted(100.0, 1.0)), "needs a frequency .* give --frequency")
+    refused(name, five_bar(wanted=Wanted(100.0, 1.0, -1.0)), "above 0 Hz")
+    refused(name, five_bar("motor-mass"), "needs a handle, and the model motor-mass has none")
+    refused(name, given(replace(published().plant, handle=None)), "needs a handle, and the device has none")
+
+
+def test_only_below_half_the_sampling_frequency_a_wall_is_felt():
+    refused(
+        "felt_stiffness", five_bar(wanted=Wanted(100.0, 1.0, 400.0)), "below half the sampling frequency, 400 Hz"
+    )
