@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.measures.measure import Measure
 from zwidth.measures.own import find_measure
 
-_FORM: Final = re.compile(r"\s*(?P<name>[^<>=\s]*)\s*(?P<sign><=|>=|[<>=]*)\s*(?P<value>.*?)\s*")
+_FORM: Final = re.compile(r"\s*(?P<name>[^<>=\s]*)\s*(?P<sign>[<>=]*)\s*(?P<value>.*?)\s*")
 
 
 @dataclass(frozen=True)

@@ -242,7 +242,8 @@ def _flags() -> dict[str, Any]:
 
 def _sentence(note: Note, plane: Plane) -> str:
     row, column = divmod(note.first[0], len(plane.x))
-    where = f"{plane.names[0]} = {plane.x[column]:.6g} m, {plane.names[1]} = {plane.y[row]:.6g} m"
+    x, y = (round(float(value), 12) + 0.0 for value in (plane.x[column], plane.y[row]))
+    where = f"{plane.names[0]} = {x:.6g} m, {plane.names[1]} = {y:.6g} m"
     cells = "1 cell" if note.count == 1 else f"{note.count} cells"
     return f"{cells} {STATUS.get(note.status, 'ok')}: {note.reason}; first at {where}"
 

@@ -1,0 +1,209 @@
+"""Measures of a user's own: found in a file, asked, and failing in their own cells only."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from zwidth.device.load import load
+from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure
+from zwidth.measures.own import find_measure, load_measures, measure
+from zwidth.study.plane import plane_of
+from zwidth.study.workspace import map_job, workspace_map
+
+GOOD = '''
+from zwidth.measures.own import measure
+
+ACCELERATION = 10.0
+
+@measure(unit="N", title="Force for 10 m/s^2", better="lower")
+def inertial_force(place):
+    return ACCELERATION * place.effective.rigid_mass
+
+@measure(along=False, each=False)
+def height(place):
+    """How high the handle is."""
+    return place.posture.position[..., 1]
+
+def helper(place):
+    return 1.0
+
+if __name__ == "__main__":
+    raise SystemExit("this is no script")
+'''
+
+
+@pytest.fixture
+def write(tmp_path):
+    def writes(text, name="my.py"):
+        path = tmp_path / name
+        path.write_text(text)
+        return str(path)
+
+    return writes
+
+
+def test_all_measures_of_a_file_are_found(write):
+    found = load_measures(write(GOOD))
+    assert set(found) == {"inertial_force", "height"}
+    force, height = found["inertial_force"], found["height"]
+    assert (force.unit, force.title, force.better) == ("N", "Force for 10 m/s^2", "lower")
+    assert (force.each, force.along, force.source) == (True, True, "your own, my.py")
+    assert (height.title, height.unit, height.each, height.along) == ("How high the handle is", "", False, False)
+
+
+def test_they_are_mapped_like_others(write):
+    own = load_measures(write(GOOD))
+    device = load("five-bar")
+    plane = plane_of(device, cells=(9, 5))
+    found = workspace_map(device, ["inertial_force", "height", "rigid_mass"], plane, own=own)
+    np.testing.assert_allclose(found["inertial_force"], 10.0 * found["rigid_mass"])
+    reach = found["rigid_mass_status"].values == OK
+    np.testing.assert_array_equal(found["height"].values[reach], plane.positions[..., 1][reach])
+
+
+def test_they_are_asked_in_other_processes_too(write, tmp_path):
+    own = load_measures(write(GOOD))
+    device = load("five-bar")
+    job = map_job(device, ["inertial_force"], plane_of(device, cells=(4, 3)), own=own)
+    data = pickle.dumps(job)
+    assert b"__main__" not in data  # which would stand for a function that only this process has
+    (tmp_path / "job").write_bytes(data)
+    (tmp_path / "my.py").unlink()  # what was loaded is what is asked
+    program = (
+        "import pickle, sys; job = pickle.load(open(sys.argv[1], 'rb')); print(job.compute(0, 12).values.tolist())"
+    )
+    command = [sys.executable, "-c", program, str(tmp_path / "job")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    values = np.array(eval(done.stdout, {"nan": np.nan}))
+    np.testing.assert_array_equal(values, job.compute(0, 12).values)
+    assert np.isfinite(values).any()
+
+
+def test_another_text_is_another_question(write):
+    device = load("five-bar")
+    plane = plane_of(device, cells=(4, 3))
+    questions = {
+        map_job(device, ["inertial_force"], plane, own=load_measures(write(text))).question
+        for text in (GOOD, GOOD.replace("10.0", "20.0"), GOOD)
+    }
+    assert len(questions) == 2
+
+
+BROKEN = """
+from zwidth.measures.own import measure
+import numpy as np
+
+@measure()
+def fails(place):
+    x, y, _ = place.posture.position
+    if x < -0.1:
+        raise KeyError("no such thing")
+    if x < 0.0:
+        return np.ones(2)
+    if y < 0.15:
+        return "much"
+    if y < 0.2:
+        return None
+    if y < 0.25:
+        return 1j
+    if y < 0.27:
+        raise SystemExit(3)
+    if y < 0.29:
+        return float("nan")
+    return np.float32(2.5)
+
+@measure(each=False)
+def wrong_shape(place):
+    return np.ones((2, 3))
+
+@measure(each=False)
+def raises(place):
+    return 1 / 0
+
+@measure(each=False)
+def texts(place):
+    return np.full(place.shape, "x")
+"""
+
+
+def test_what_fails_fails_in_its_own_cells(write):
+    device = load("five-bar")
+    own = load_measures(write(BROKEN))
+    plane = plane_of(device, x=(-0.15, 0.05), y=(0.12, 0.32), cells=(5, 11))
+    found = workspace_map(device, [*own, "rigid_mass"], plane, own=own)
+    x, y = plane.positions[..., 0], plane.positions[..., 1]
+    reach = found["rigid_mass_status"].values == OK
+    expected = np.where((x < 0.0) | (y < 0.27), FAILED, np.where(y < 0.29, NO_VALUE, OK))
+    np.testing.assert_array_equal(found["fails_status"].values[reach], expected[reach])
+    np.testing.assert_array_equal(found["fails"].values[reach & (expected == OK)], 2.5)
+    notes = found["fails"].attrs["notes"]
+    for said in (
+        "failed: raised KeyError: 'no such thing'",
+        "failed: returned an array of shape (2,) instead of one number",
+        "failed: returned 'much' instead of a number",
+        "failed: returned None instead of a number",
+        "failed: returned 1j instead of a number",
+        "failed: raised RuntimeError: ends the program (3)",
+        "no value: has no value here",
+    ):
+        assert said in notes
+    for name, said in (
+        ("wrong_shape", "returned an array of shape (2, 3)"),
+        ("raises", "raised ZeroDivisionError: division by zero"),
+        ("texts", "instead of numbers"),
+    ):
+        assert (found[f"{name}_status"].values[reach] == FAILED).all()
+        assert said in found[name].attrs["notes"]
+    assert np.isfinite(found["rigid_mass"].values[reach]).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x = 1\nthis is no Python\n", r"my\.py:2 does not run: invalid syntax"),
+        ("def f():\n    return 1 / 0\nf()\n", r"my\.py:2 does not run: ZeroDivisionError: division by zero"),
+        ("import sys\nsys.exit('bye')\n", r"my\.py:2 does not run: SystemExit: bye"),
+        ("import no_such_module\n", r"my\.py:1 does not run: ModuleNotFoundError"),
+        ("def height(place):\n    return 1.0\n", r"my\.py has no measure; put @measure"),
+        (
+            "from zwidth.measures.own import measure\n@measure()\ndef isotropy(place):\n    return 1.0\n",
+            r"the name isotropy is taken .* rename",
+        ),
+        (
+            "from zwidth.measures.own import measure\n@measure(better='more')\ndef mine(place):\n    return 1.0\n",
+            r"my\.py:2 does not run: ValueError: a measure's better must be",
+        ),
+    ],
+)
+def test_a_file_that_cannot_be_used(write, text, said):
+    with pytest.raises(ValueError, match=said):
+        load_measures(write(text))
+
+
+def test_a_missing_file():
+    with pytest.raises(ValueError, match=r"no such file: nowhere/my\.py"):
+        load_measures("nowhere/my.py")
+
+
+def test_the_nearest_name_may_be_a_user_s_own(write):
+    own = load_measures(write(GOOD))
+    assert find_measure("height", own).name == "height"
+    assert find_measure("inertial_force_N", own).name == "inertial_force"
+    with pytest.raises(ValueError, match="did you mean inertial_force"):
+        find_measure("inertia_force", own)
+    with pytest.raises(ValueError, match="no measure is named 'height'"):
+        find_measure("height")
+
+
+def test_the_decorator_makes_a_measure():
+    @measure(unit="m", better="higher")
+    def reach(place):
+        return 1.0
+
+    assert isinstance(reach, Measure)
+    assert (reach.name, reach.title, reach.source) == ("reach", "reach", "your own")
