@@ -87,6 +87,10 @@ def test_the_keys_that_come_out_are_those_explained(folder):
     assert set(found("devices")) == keys("devices")
     document = found("move", MECHANISM, "--duration", 0.01)
     assert set(document) - asked == keys("move") - asked
+    everything = ("--measure", "rigid_mass", "--direction", "lowest", "--require", "isotropy<=2", "--cells", "5,4")
+    document = found("map", MECHANISM, *everything)
+    assert set(document) - asked == keys("map") - asked
+    assert set(document["requirements"][0]) == {"requirement", "area_m2", "share"}
     document = found("experiment", TWO_MASS, "--stiffnesses", 1, "--tips", 0)
     assert set(document) - asked == keys("experiment")
     report = found("report", TWO_MASS, "--output", "report.html")

@@ -1,0 +1,188 @@
+"""Maps drawn: levels, what has no value, requirements, the mechanism, and the same bytes from the same numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgba
+from matplotlib.patches import PathPatch
+
+from zwidth.device.load import load
+from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, SINGULAR, UNDECIDED, Measure, NoValueError
+from zwidth.show.figures.map import COLOURS, MARKS, draw_map, levels_of, map_figure, printed
+from zwidth.show.figures.style import figure, save
+from zwidth.study.common_area import common_area
+from zwidth.study.plane import plane_of
+from zwidth.study.requirement import parse_requirement
+from zwidth.study.workspace import workspace_map
+
+
+@pytest.fixture(scope="module")
+def device():
+    return load("five-bar")
+
+
+@pytest.fixture(scope="module")
+def dataset(device):
+    return workspace_map(
+        device, ["rigid_mass", "isotropy", "manipulability", "stiffness"], plane_of(device, cells=(31, 16))
+    )
+
+
+def legend(ax):
+    made = ax.get_legend()
+    return [] if made is None else [text.get_text() for text in made.get_texts()]
+
+
+@pytest.mark.parametrize("low", [-3.0, 0.0, 0.13, 1.0, 5e-5, 2e6])
+@pytest.mark.parametrize("ratio", [1.001, 1.3, 4.0, 30.0, 1e3, 1e6])
+def test_levels_span_the_values(low, ratio):
+    values = low + (abs(low) or 1.0) * (ratio - 1.0) * np.random.default_rng(0).uniform(size=200)
+    levels = levels_of(values)
+    assert 2 <= len(levels) <= 16
+    assert (np.diff(levels) > 0.0).all()
+    usual = np.percentile(values, [2.0, 98.0])
+    assert levels[0] <= usual[0] * (1 + 1e-12) if usual[0] > 0 else levels[0] <= usual[0] + 1e-12
+    assert levels[-1] >= usual[1] * (1 - 1e-12)
+
+
+def test_levels_of_a_long_tail_leave_it_to_the_arrow():
+    values = np.concatenate([np.linspace(1.0, 2.0, 200), [1e6, np.inf, np.nan]])
+    assert levels_of(values)[-1] < 10.0
+    assert len(levels_of(values)) > 5
+    assert levels_of(np.full(9, 4.0)).tolist() == [3.8, 4.2]
+    assert levels_of(np.array([np.nan])).tolist() == [0.0, 1.0]
+    assert levels_of(np.array([np.inf])).tolist() == [0.0, 1.0]
+
+
+def test_the_colours_get_lighter_step_by_step():
+    """So that a grey print can be read."""
+    import matplotlib as mpl
+
+    shades = mpl.colormaps[COLOURS](np.linspace(0.0, 1.0, 12))[:, :3]
+    lightness = shades @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(lightness) > 0.02).all()
+
+
+def test_units_are_printed_with_their_powers():
+    assert printed("N^2 s/m^2") == "N²s/m²"
+    assert printed("m^1/rad^1") == "m/rad"
+    assert printed("1/(kg m)^2") == "1/(kg m)²"
+
+
+def test_the_bar_names_the_measure_and_its_unit(dataset, device):
+    for name, said in (
+        ("rigid_mass", "Rigid mass of links and rotors [kg]"),
+        ("isotropy", "Condition number of the Jacobian"),
+        ("manipulability", "Manipulability [m²/rad²]"),
+        ("stiffness", "Structural stiffness [kN/m]"),
+    ):
+        drawing = map_figure(dataset, name, device)
+        ax, bar = drawing.axes
+        assert bar.get_ylabel() == said
+        drawing.canvas.draw()
+        assert bar.get_ylabel() == said  # whatever a locator may think
+        assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "y [m]")
+        assert ax.get_aspect() == 1.0
+
+
+def test_the_mechanism_is_in_the_picture(dataset, device):
+    with_it, without = map_figure(dataset, "rigid_mass", device), map_figure(dataset, "rigid_mass")
+    low, high = with_it.axes[0].get_ylim()
+    assert low < 0.0 < 0.35 < high  # the base at y = 0 lies below the map
+    assert without.axes[0].get_ylim()[0] > 0.0
+    (handle,) = [line for line in with_it.axes[0].lines if line.get_marker() == "D"]
+    np.testing.assert_allclose(np.ravel(handle.get_data()), [0.0, 0.25])
+    assert not without.axes[0].lines
+
+
+def test_each_kind_without_a_value_has_its_own_hatch(device):
+    def fails(place):
+        x = place.posture.position[0]
+        if x < -0.1:
+            raise NoValueError("left")
+        if x > 0.1:
+            raise RuntimeError("right")
+        return x
+
+    plane = plane_of(device, x=(-0.2, 0.2), y=(0.15, 0.3), cells=(21, 8))
+    found = workspace_map(device, [Measure("m", "m", "m", None, "", fails, each=True, along=False)], plane)
+    status = found["m_status"].values
+    assert {NO_VALUE, FAILED, OK} <= set(np.unique(status).tolist())
+    ax = map_figure(found, "m", device).axes[0]
+    assert legend(ax) == ["no value", "failed"]
+    status[:, 3], status[:, 4] = SINGULAR, UNDECIDED
+    found["m"].values[:, 3:5] = np.nan
+    ax = map_figure(found, "m", device).axes[0]
+    assert legend(ax) == ["singular", "no value", "undecided", "failed"]
+    hatches = {patch.get_hatch() for patch in ax.get_legend().get_patches()}
+    assert len(hatches) == 4 == len(MARKS)
+    status[:] = OUT_OF_REACH
+    found["m"].values[:] = np.nan
+    assert legend(map_figure(found, "m", device).axes[0]) == []
+
+
+def test_requirements_are_outlined_and_what_they_share_is_dotted(dataset, device):
+    texts = ["rigid_mass>=0.2", "isotropy<=1.3", "manipulability>=0.015"]
+    area = common_area(dataset, [parse_requirement(text) for text in texts])
+    ax = map_figure(dataset, "rigid_mass", device, area).axes[0]
+    said = legend(ax)
+    assert said[0].startswith("Rigid mass of links and rotors ≥ 0.2\u00a0kg: ")
+    assert said[1].startswith("Condition number of the Jacobian ≤ 1.3: ")
+    assert said[2].startswith("Manipulability ≥ 0.015\u00a0m²/rad²: ")
+    assert (
+        said[3]
+        == f"Common area: {1e4 * area.common.area:.4g} cm², {100 * area.common.share:.3g} % of what is reached"
+    )
+    patches = [patch for patch in ax.patches if isinstance(patch, PathPatch)]
+    assert len({patch.get_hatch() for patch in patches} - {None}) == 3
+    bold = [
+        patch for patch in patches if patch.get_edgecolor() == to_rgba("black") and patch.get_linewidth() > 3.0
+    ]
+    outline = np.vstack([patch.get_path().vertices for patch in bold])
+    bounds = area.common.shape.bounds
+    np.testing.assert_allclose([*outline.min(axis=0), *outline.max(axis=0)], bounds)
+
+
+def test_nothing_in_common_is_said(dataset, device):
+    area = common_area(dataset, [parse_requirement("isotropy<=0.5")])
+    assert legend(map_figure(dataset, "isotropy", device, area).axes[0])[-1].startswith("Common area: 0 cm²")
+
+
+def test_extreme_directions_are_strokes(device):
+    found = workspace_map(device, ["stiffness"], plane_of(device, cells=(31, 16)), "worst")
+    ax = map_figure(found, "stiffness", device).axes[0]
+    assert legend(ax) == ["worst direction"]
+    (strokes,) = [c for c in ax.collections if c.get_label() == "worst direction"]
+    segments = np.array(strokes.get_segments())
+    assert 40 < len(segments) < 150
+    middle, along = segments.mean(axis=1), np.diff(segments, axis=1)[:, 0]
+    for k in (0, len(segments) // 2, -1):
+        at = found["stiffness_direction"].sel(x_m=middle[k, 0], y_m=middle[k, 1], method="nearest").values[:2]
+        assert abs(at @ along[k]) == pytest.approx(np.linalg.norm(along[k]), rel=1e-9)
+
+
+def test_infinite_values_are_drawn(device):
+    drives = [f"mechanism.drives.motor-{side}.stiffness_Nm_per_rad=inf" for side in ("left", "right")]
+    rigid = load("five-bar", drives)
+    found = workspace_map(rigid, ["stiffness"], plane_of(rigid, cells=(9, 6)))
+    reached = found["stiffness_status"].values == OK
+    assert np.isinf(found["stiffness"].values[reached]).all()
+    map_figure(found, "stiffness", rigid).canvas.draw()
+    mixed = found.copy(deep=True)
+    mixed["stiffness"].values[:, :4] = np.where(np.isnan(mixed["stiffness"].values[:, :4]), np.nan, 4000.0)
+    map_figure(mixed, "stiffness", rigid).canvas.draw()
+
+
+@pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
+def test_the_same_numbers_give_the_same_bytes(tmp_path, dataset, device, ending):
+    for name in ("a", "b"):
+        save(map_figure(dataset, "isotropy", device), tmp_path / f"{name}{ending}")
+    assert (tmp_path / f"a{ending}").read_bytes() == (tmp_path / f"b{ending}").read_bytes()
+
+
+def test_it_draws_into_given_axes(dataset, device):
+    drawing, ax = figure(5.0, 4.0)
+    draw_map(ax, dataset, "isotropy", device)
+    assert ax.collections
+    assert len(drawing.axes) == 2
