@@ -154,7 +154,7 @@ def _held(plant: Plant) -> _Held:
     """x = x_0 + N y, with a . x_0 = 1 and N the motions that leave the actuator still: N^T D x = 0.
 
     N are these motions' undamped modes, and x_0 the start that deforms least: the device's free motion if it has
-    one. So little is subtracted from little where the structure hardly gives.
+    one. So 1 is not subtracted from 1 where the structure hardly gives.
     """
     a, h = plant.actuator, handle_of(plant)
     still = np.linalg.svd(a[None, :])[2][1:].T
@@ -167,8 +167,6 @@ def _held(plant: Plant) -> _Held:
     start = start - still[:, stiff] @ ((still[:, stiff].T @ plant.stiffness @ start) / rates[stiff])
     loss = np.zeros_like(plant.mass) if plant.hysteresis is None else plant.hysteresis
     push = np.stack([still.T @ matrix @ start for matrix in (plant.mass, plant.damping, plant.stiffness)])
-    # of the stiff ones nothing is left but rounding
-    push[2, stiff] = 0.0
     return _Held(
         rates=rates,
         damping=still.T @ plant.damping @ still,
