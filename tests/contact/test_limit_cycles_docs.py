@@ -6,8 +6,9 @@ import re
 from pathlib import Path
 
 import numpy as np
+from later import Later
 
-from gallery import quantisation_limit as study
+study = Later("gallery.quantisation_limit")
 
 PAGE = (Path(__file__).parents[2] / "docs" / "limit-cycles.md").read_text(encoding="utf-8")
 

@@ -3,14 +3,16 @@
 from dataclasses import replace
 
 import pytest
+from later import Later
 
 from docs._row import UNEXPLAINED
-from docs._rows_contact import section_3_2_5
-from gallery import quantisation_limit as study
+
+page = Later("docs._rows_contact")
+study = Later("gallery.quantisation_limit")
 
 
 def test_every_row_holds_or_is_explained():
-    rows = section_3_2_5()
+    rows = page.section_3_2_5()
     assert len(rows) == 6
     assert [row.verdict for row in rows].count("holds") == 5
     assert rows[1].verdict.startswith("differs: sufficient, no onset")
@@ -19,15 +21,15 @@ def test_every_row_holds_or_is_explained():
 def test_one_wall_that_moves_below_the_limit_would_be_seen(monkeypatch):
     moves = {name: found.copy() for name, found in study.moves.items()}
     moves["from 1 count"][1] = True
-    monkeypatch.setattr(study, "moves", moves)
-    assert section_3_2_5()[0].verdict == UNEXPLAINED
+    monkeypatch.setattr("gallery.quantisation_limit.moves", moves)
+    assert page.section_3_2_5()[0].verdict == UNEXPLAINED
 
 
 def test_an_onset_at_the_limit_would_be_seen(monkeypatch):
     onsets = dict.fromkeys(study.onsets, (0.9 * study.limit, 1.1 * study.limit))
-    monkeypatch.setattr(study, "onsets", onsets)
-    assert "after all" in section_3_2_5()[1].verdict
-    assert section_3_2_5()[2].verdict == UNEXPLAINED
+    monkeypatch.setattr("gallery.quantisation_limit.onsets", onsets)
+    assert "after all" in page.section_3_2_5()[1].verdict
+    assert page.section_3_2_5()[2].verdict == UNEXPLAINED
 
 
 def test_the_push_alone_sets_the_onset():

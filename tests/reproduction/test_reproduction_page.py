@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from later import Later
 
-from docs import make_reproduction
 from docs._row import AGREES, CONFIRMED, UNEXPLAINED, Claim, Misprint, Number, half_a_digit, significant
+
+make_reproduction = Later("docs.make_reproduction")
 
 
 @pytest.fixture(scope="module")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from later import Later
 
-from gallery import fig_3_10_points as regions
-from gallery import fig_3_12_one_sided as touched
-from gallery import fig_5_12_before_and_after as optimised
+regions = Later("gallery.fig_3_10_points")
+touched = Later("gallery.fig_3_12_one_sided")
+optimised = Later("gallery.fig_5_12_before_and_after")
 
 
 @pytest.mark.parametrize("name", "ABCD")
