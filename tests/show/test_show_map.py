@@ -186,3 +186,13 @@ def test_it_draws_into_given_axes(dataset, device):
     draw_map(ax, dataset, "isotropy", device)
     assert ax.collections
     assert len(drawing.axes) == 2
+
+
+def test_the_rendered_direction_is_shown_where_it_matters(dataset, device):
+    def arrows(name):
+        return [text for text in map_figure(dataset, name, device).axes[0].texts if text.arrow_patch is not None]
+
+    (arrow,) = arrows("rigid_mass")
+    start, end = np.array(arrow.get_position()), np.array(arrow.xy)
+    np.testing.assert_allclose((end - start) / np.linalg.norm(end - start), [0.0, 1.0], atol=1e-12)
+    assert not arrows("isotropy")

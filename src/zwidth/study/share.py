@@ -40,9 +40,11 @@ class Share:
 def share_measure(requirement: Requirement) -> Measure:
     """The share as a measure, "share_of_directions", which is mapped like any other."""
     measure = requirement.measure
+    sign = "\u2265" if requirement.at_least else "\u2264"
+    unit = f" {measure.unit}" if measure.unit else ""
     return Measure(
         name=NAME,
-        title=f"Share of directions with {requirement.text}",
+        title=f"Share of directions with {measure.name} {sign} {requirement.value:g}{unit}",
         unit="",
         better="higher",
         source=f"{measure.title.lower()} over the directions that the handle can move in; {measure.source}",

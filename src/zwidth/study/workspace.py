@@ -208,6 +208,7 @@ def as_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
             "long_name": measure.title,
             "source": measure.source,
             "better": measure.better or "",
+            "along": int(measure.along),
             "key": measure.key,
             "notes": "\n".join(_sentence(note, plane) for note in cells.notes[column]),
         }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import floor, log10
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from zwidth.study.common_area import CommonArea
 
 Floats = NDArray[np.float64]
+Drawn = tuple[list[Floats], Floats, Floats]  # strokes of the links, joints, handle
 
 COLOURS: Final = "cividis"  # even steps of lightness, the same to every eye
 LEVELS: Final = 10
@@ -43,6 +45,7 @@ MARKS: Final = {
     FAILED: ("failed", "\\\\\\\\"),
 }
 HATCHES: Final = ("\\\\", "//", "||", "--", "xx")
+LETTERS: Final = 45  # of a line beside the bar
 ARROWS: Final = 14  # direction strokes along the longer side
 
 
@@ -84,7 +87,10 @@ def draw_map(
     if area is not None:
         handles += _areas(ax, dataset, area)
     mechanism = _mechanism(dataset, device)
-    handles += _draw_mechanism(ax, mechanism, dataset)
+    if mechanism is not None:
+        _draw_mechanism(ax, mechanism)
+        if about["along"] and not isinstance(dataset.attrs["direction"], str):
+            _arrow(ax, mechanism, dataset)
     _frame(
         ax, _view(x, y, mechanism), str(dataset["x_m"].attrs["long_name"]), str(dataset["y_m"].attrs["long_name"])
     )
@@ -192,7 +198,8 @@ def _bar_label(bar: Any, title: str, unit: str, levels: Floats) -> None:
     bar.ax.set_yticks(levels, labels=texts)
     bar.ax.tick_params(labelsize=8.0)
     name = scaled(exponent, unit).strip("\u00a0")
-    bar.set_label(f"{title} [{name}]" if name else title, fontsize=9.0)
+    said = f"{title} [{name}]" if name else title
+    bar.set_label("\n".join(wrap(said, LETTERS, break_long_words=False)), fontsize=9.0)
 
 
 def _marks(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -> list[Any]:
@@ -279,7 +286,7 @@ def _paths(shape: Any) -> list[Path]:
     return found
 
 
-def _mechanism(dataset: xr.Dataset, device: Device | None) -> tuple[list[Floats], Floats, Floats] | None:
+def _mechanism(dataset: xr.Dataset, device: Device | None) -> Drawn | None:
     """Strokes of the links, the joints and the handle in the reference posture, on the plane; None for none."""
     if device is None or device.mechanism is None:
         return None
@@ -296,44 +303,30 @@ def _mechanism(dataset: xr.Dataset, device: Device | None) -> tuple[list[Floats]
     return strokes, pins(mechanism, placed) @ axes.T, posture.position @ axes.T
 
 
-def _draw_mechanism(
-    ax: Axes, mechanism: tuple[list[Floats], Floats, Floats] | None, dataset: xr.Dataset
-) -> list[Any]:
-    if mechanism is None:
-        return []
+def _draw_mechanism(ax: Axes, mechanism: Drawn) -> None:
     strokes, joints, handle = mechanism
     halo = [withStroke(linewidth=3.4, foreground="white")]
     for stroke in strokes:
         ax.plot(*stroke.T, color=BLACK, linewidth=1.6, solid_capstyle="round", path_effects=halo, zorder=3.0)
-    ax.plot(
-        *joints.T, marker="o", markersize=5.0, color="white", markeredgecolor=BLACK, linestyle="none", zorder=3.1
-    )
-    ax.plot(
-        *handle[:, None],
-        marker="D",
-        markersize=6.0,
-        color=VERMILION,
-        markeredgecolor="white",
-        linestyle="none",
-        zorder=3.2,
-    )
-    direction = dataset.attrs["direction"]
-    if not isinstance(direction, str):
-        axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
-        seen = axes @ np.asarray(direction, dtype=float)
-        if np.linalg.norm(seen) > 1e-6:
-            size = 0.13 * float(np.ptp(np.vstack([*strokes, handle[None]]), axis=0).max())
-            ax.annotate(
-                "",
-                xy=tuple(handle + size * seen),
-                xytext=tuple(handle),
-                arrowprops={"arrowstyle": "-|>", "color": VERMILION, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0},
-                zorder=3.3,
-            )
-    return []
+    round_: dict[str, Any] = {"marker": "o", "markersize": 5.0, "color": "white", "markeredgecolor": BLACK}
+    ax.plot(*joints.T, linestyle="none", zorder=3.1, **round_)
+    square: dict[str, Any] = {"marker": "D", "markersize": 6.0, "color": VERMILION, "markeredgecolor": "white"}
+    ax.plot(*handle[:, None], linestyle="none", zorder=3.2, **square)
 
 
-def _view(x: Floats, y: Floats, mechanism: tuple[list[Floats], Floats, Floats] | None) -> tuple[float, ...]:
+def _arrow(ax: Axes, mechanism: Drawn, dataset: xr.Dataset) -> None:
+    """Along the rendered direction, from the handle; none where it points at the viewer."""
+    strokes, _, handle = mechanism
+    axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
+    seen = axes @ np.asarray(dataset.attrs["direction"], dtype=float)
+    if not np.linalg.norm(seen) > 1e-6:
+        return
+    size = 0.13 * float(np.ptp(np.vstack([*strokes, handle[None]]), axis=0).max())
+    look = {"arrowstyle": "-|>", "color": VERMILION, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
+    ax.annotate("", xy=tuple(handle + size * seen), xytext=tuple(handle), arrowprops=look, zorder=3.3)
+
+
+def _view(x: Floats, y: Floats, mechanism: Drawn | None) -> tuple[float, ...]:
     """What is shown: the map and the mechanism."""
     low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
     if mechanism is not None:
