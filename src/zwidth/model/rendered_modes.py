@@ -59,7 +59,7 @@ def rendered_modes(
                and readings behind the drives in a reduced model
     """
     drives = mechanism.drives
-    if drives.transmission.ndim > 1 or drives.winding_damping is not None and drives.winding_damping.any():
+    if drives.transmission.ndim > 1 or (drives.winding_damping is not None and drives.winding_damping.any()):
         return None
     # B = r_m M + r_k K and a ratio on every flexible mode: a = (r_m + r_k w^2)/2 + ratio w
     coefficients = _coefficients(drives, damping)
