@@ -111,7 +111,8 @@ def solve_posture(mechanism: Mechanism, position: ArrayLike, assembly: str | Non
     mech, designs = pack(mechanism), design_shape(mechanism)
     target = _in_space(mechanism, position)
     shape = np.broadcast_shapes(designs, target.shape[:-1])
-    goals = np.ascontiguousarray(np.broadcast_to(target, (*shape, 3)).reshape(-1, 3), dtype=np.float64)
+    # a copy that can be written to, as all that is solved for: one that cannot is another type, compiled anew
+    goals = np.array(np.broadcast_to(target, (*shape, 3)).reshape(-1, 3), dtype=np.float64, order="C")
     count = int(np.prod(designs))
     design = np.broadcast_to(np.arange(count).reshape(designs), shape).ravel().astype(np.int64)
 
