@@ -57,12 +57,12 @@ def from_document(document: dict[str, Any], label: str = "device", *, put_togeth
         found += sentences(error, cleaned)
     found += relations(cleaned, document)
     if found or checked is None:
-        raise DeviceError(_faults(found, document, label))
+        raise DeviceError(in_order(found, document, label))
     device = _device(checked, document, label)
     if device.mechanism is not None and checked.mechanism is not None and not put_together:
         found += geometry.disagreements(device.mechanism, checked.mechanism)
     if found:
-        raise DeviceError(_faults(found, document, label))
+        raise DeviceError(in_order(found, document, label))
     return device
 
 
@@ -92,7 +92,7 @@ def _device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device
     )
 
 
-def _faults(found: Iterable[tuple[Path, str]], document: dict[str, Any], label: str) -> list[Fault]:
+def in_order(found: Iterable[tuple[Path, str]], document: dict[str, Any], label: str) -> list[Fault]:
     """The faults in the order of the file's keys; of several about one key, each is kept."""
     order = {path: place for place, path in enumerate(_paths(document))}
     ranked = sorted(found, key=lambda item: _rank(item[0], order))

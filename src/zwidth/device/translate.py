@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from pydantic import ValidationError
@@ -13,8 +13,17 @@ from zwidth.device.schema import file as schema
 from zwidth.device.schema.velocity import DEFAULT
 
 
-def sentences(error: ValidationError, document: dict[str, Any]) -> Iterator[tuple[Path, str]]:
-    """Path and sentence of each fault; a key missing only because it is misspelt is told once."""
+def sentences(
+    error: ValidationError,
+    document: dict[str, Any],
+    description: Callable[[Path], str] = schema.description,
+    unknown: Callable[[Path], str] | None = None,
+) -> Iterator[tuple[Path, str]]:
+    """Path and sentence of each fault; a key missing only because it is misspelt is told once.
+
+    description, unknown  of files that are no device files: what the key at a path means, "" for nothing; and the
+                          sentence on a key that there is not
+    """
     details = error.errors(include_url=False)
     located = [(_where(detail, document), detail) for detail in details]
     missing = {path for path, detail in located if detail["type"] == "missing"}
@@ -27,7 +36,11 @@ def sentences(error: ValidationError, document: dict[str, Any]) -> Iterator[tupl
     for path, detail in located:
         told = detail["type"] == "missing" and path in meant
         if not told and not _long_enough(detail):
-            yield path, _sentence(detail, path, document)
+            if detail["type"] == "extra_forbidden":
+                yield path, unknown(path) if unknown else _unknown(path, document)
+            else:
+                meaning = description(path) if path else ""
+                yield path, _sentence(detail, path, f" ({meaning})" if meaning else "")
 
 
 def _long_enough(detail: ErrorDetails) -> bool:
@@ -55,16 +68,12 @@ def _where(detail: ErrorDetails, document: Any) -> Path:
     return (*path, last) if detail["type"] == "missing" else tuple(path)
 
 
-def _sentence(detail: ErrorDetails, path: Path, document: dict[str, Any]) -> str:
+def _sentence(detail: ErrorDetails, path: Path, about: str) -> str:
     kind, got = detail["type"], detail["input"]
     limits: Mapping[str, Any] = detail.get("ctx", {})
-    meaning = schema.description(path) if path else ""
-    about = f" ({meaning})" if meaning else ""
     match kind:
         case "missing":
             return f"is missing; add it{about}"
-        case "extra_forbidden":
-            return _unknown(path, document)
         case "float_type" if isinstance(got, int) and not isinstance(got, bool):
             return f"must be a finite number, got {quote(got)}{about}"
         case "float_type":

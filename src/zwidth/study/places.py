@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from zwidth.device.device import Device
 from zwidth.measures.place import Place, Wanted
-from zwidth.model.posture import solve_posture
+from zwidth.model.posture import Posture, solve_posture
 from zwidth.model.reduction import Model
 
 
@@ -21,12 +21,14 @@ def place_of(
     assembly: str | None = None,
     model: str | None = None,
     wanted: Wanted | None = None,
+    posture: Posture | None = None,
 ) -> Place:
     """A device with its handle at positions (..., 3), or at one of the file's where they are left out.
 
     positions  (..., 3) [m]; None: at the file's reference, or a device given by its plant
     direction  of any length but zero; left out: the file's
     model      left out: "full" for a mechanism, a given plant as it is
+    posture    that of these positions, where it is known already
     Raises     DeviceError   as `Device.plant` does, for a measured response too
                PostureError  where one posture is asked for and does not exist
     """
@@ -41,8 +43,9 @@ def place_of(
             wanted=asked,
         )
     along = device.direction(direction)
-    posture = device.posture(None, assembly) if positions is None else None
-    if posture is None:
+    if posture is None and positions is None:
+        posture = device.posture(None, assembly)
+    elif posture is None:
         name = assembly or device.reference_assembly
         posture = solve_posture(device.mechanism, np.asarray(positions, dtype=np.float64), name)
     return Place(

@@ -1,0 +1,127 @@
+"""What a study asks of each design: a measure in its place, or over its workspace."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from zwidth.device.faults import listed, nearest
+from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure, Measured, MeasureError
+from zwidth.measures.overall import global_conditioning_index, overall
+from zwidth.measures.own import find_measure
+
+# What is said of it in a figure; does it keep the measure's unit?
+OVER: Final[dict[str, tuple[str, bool]]] = {
+    "average": ("average", True),
+    "worst": ("worst", True),
+    "best": ("best", True),
+    "uniformity": ("least over largest", False),
+    "variation": ("standard deviation over average", False),
+    "share": ("share of the workspace with a value", False),
+    "conditioning_index": ("mean of the reciprocal", False),
+}
+JUDGING: Final = ("worst", "best")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One column of a study.
+
+    name     as written: "stiffness_max", "worst(isotropy)"
+    measure  the one asked cell by cell
+    over     what is made of its values over the workspace; None: asked in one place
+    """
+
+    name: str
+    measure: Measure
+    over: str | None = None
+
+    @property
+    def unit(self) -> str:
+        """Of its values; "" for none."""
+        return self.measure.unit if self.over is None or OVER[self.over][1] else ""
+
+    @property
+    def title(self) -> str:
+        """What it is called in a figure."""
+        return self.measure.title if self.over is None else f"{self.measure.title}, {OVER[self.over][0]}"
+
+    @property
+    def better(self) -> str | None:
+        """What a designer wants: "higher", "lower", or None where that depends."""
+        if self.over is None or OVER[self.over][1]:
+            return self.measure.better
+        return "lower" if self.over == "variation" else "higher"
+
+    @property
+    def key(self) -> str:
+        """The name with its unit, as a table's column carries it.
+
+        >>> asked("worst(stiffness_max)").key
+        'worst_stiffness_max_N_per_m'
+        """
+        if self.over is None:
+            return self.measure.key
+        return f"{self.over}_{self.measure.key if self.unit or not self.measure.unit else self.measure.name}"
+
+    def reduced(self, found: Measured) -> tuple[float, int, str]:
+        """Value, status and reason of this design, from the measure's values over its workspace.
+
+        Cells without a value do not count; where none has one, their commonest status is the design's.
+        """
+        assert self.over is not None
+        try:
+            if self.over == "conditioning_index":
+                value = global_conditioning_index(found.values, found.status)
+            else:
+                value = float(getattr(overall(found.values, found.status, None, self.measure.better), self.over))
+        except ValueError as error:
+            return float("nan"), FAILED, str(error)
+        if not np.isnan(value):
+            return value, OK, ""
+        if (found.status == OK).any():
+            return value, NO_VALUE, f"has no {self.over} here"
+        kinds, counts = np.unique(found.status, return_counts=True)
+        status = int(kinds[np.argmax(counts)])
+        return value, status, next((note.reason for note in found.notes if note.status == status), "")
+
+
+def asked(name: str, own: Mapping[str, Measure] | None = None) -> Asked:
+    """What is asked by a name, such as "isotropy" or "average(isotropy)".
+
+    own     measures of a user's own, by name
+    Raises  ValueError  naming the nearest, where there is none
+
+    >>> asked("average(isotropy)").measure.name
+    'isotropy'
+    """
+    parts = re.fullmatch(r"\s*(\w+)\s*\(\s*([^()]*?)\s*\)\s*", name)
+    if parts is None:
+        measure = find_measure(name.strip(), own)
+        return Asked(measure.name, measure)
+    over, inner = parts.groups()
+    if over not in OVER:
+        near = nearest(over, OVER)
+        hint = f"did you mean {near}({inner})?" if near else f"there are {listed(list(OVER))}"
+        raise ValueError(f"{over} is nothing that is made of a measure over a workspace; {hint}")
+    measure = find_measure(inner, own)
+    if over in JUDGING and measure.better is None:
+        raise ValueError(
+            f"{over}({measure.name}): whether more of it is better depends; ask for average({measure.name})"
+        )
+    return Asked(f"{over}({measure.name})", measure, over)
+
+
+def probe(each: tuple[Asked, ...], ask: Callable[[Measure], Any]) -> dict[str, str]:
+    """Name -> why a measure cannot be asked of this device at all."""
+    refused = {}
+    for one in each:
+        try:
+            ask(one.measure)
+        except MeasureError as error:
+            refused[one.name] = str(error)
+    return refused

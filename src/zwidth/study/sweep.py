@@ -1,0 +1,302 @@
+"""Measures of many designs of one device.
+
+    found = sweep("study.toml")
+    found.dataset()["stiffness_max"]
+
+Each design is the device file with a few numbers changed, checked and built like any other. One that is no device,
+or cannot get where it is asked about, has a status instead of values, and the others keep theirs.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from zwidth.device import address
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError
+from zwidth.device.load import from_document
+from zwidth.measures.evaluate import answered, evaluate
+from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, SINGULAR, MeasureError, Note
+from zwidth.measures.place import Place, Wanted
+from zwidth.model.posture import OutOfReach, PostureError, Singular
+from zwidth.study.asked import Asked, probe
+from zwidth.study.axes import CIRCUMSTANCES, WANTED, Sampling, settings
+from zwidth.study.executor import Progress, run
+from zwidth.study.job import Cells
+from zwidth.study.journal import fingerprint
+from zwidth.study.places import place_of
+from zwidth.study.study_file import Study, read_study
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from zwidth.study.store import Store
+
+NAMES: Final = dict(zip(WANTED, ("stiffness", "damping", "frequency"), strict=True))
+
+
+class _NoPlace(Exception):
+    """A design that cannot be asked anything: its status, and why."""
+
+    def __init__(self, status: int, reason: str = "") -> None:
+        self.status, self.reason = status, reason
+
+
+@dataclass(frozen=True)
+class SweepJob:
+    """The designs of a study as cells; columns are what is asked.
+
+    document   of the device, the study's changes made
+    label      of the device, for messages
+    operators  as in `Study`
+    positions  (..., 3) of the workspace [m]; None where nothing is asked over it
+    fixed      circumstances that no axis sets
+    """
+
+    document: dict[str, Any]
+    label: str
+    operators: dict[str, Any]
+    sampling: Sampling
+    asked: tuple[Asked, ...]
+    positions: NDArray[np.float64] | None
+    fixed: dict[str, Any]
+    _last: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_last": {}}
+
+    @property
+    def count(self) -> int:
+        """Number of designs."""
+        return self.sampling.count
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Columns, as they are written in the study."""
+        return tuple(one.name for one in self.asked)
+
+    @property
+    def question(self) -> str:
+        """What its results are known by. Raises TypeError for a measure whose function has no name elsewhere."""
+        return fingerprint(
+            "sweep", self.document, self.operators, self.sampling, self.asked, self.positions, self.fixed
+        )
+
+    def compute(self, first: int, last: int) -> Cells:
+        """Designs first to last - 1."""
+        shape = last - first, len(self.asked)
+        values, status = np.full(shape, np.nan), np.empty(shape, dtype=np.uint8)
+        seen: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.asked]
+        for row in range(last - first):
+            for column, (value, what, reason) in enumerate(self._row(first + row)):
+                values[row, column], status[row, column] = value, what
+                if reason:
+                    seen[column].setdefault((what, reason), []).append(first + row)
+        notes = [tuple(Note(*key, len(at), (at[0],)) for key, at in kinds.items()) for kinds in seen]
+        return Cells(values, status, tuple(notes))
+
+    def place(self, design: int) -> Place:
+        """Where a design is asked measures. Raises _NoPlace."""
+        return _Design(self, design).place()
+
+    def _row(self, number: int) -> Iterator[tuple[float, int, str]]:
+        """Value, status and reason of each column."""
+        design = _Design(self, number)
+        for one in self.asked:
+            try:
+                place = design.place() if one.over is None else design.workspace()
+            except _NoPlace as none:
+                yield np.nan, none.status, none.reason
+                continue
+            yield _answer(one, place)
+
+    @cached_property
+    def _in_mechanism(self) -> frozenset[str]:
+        """The axes and tied numbers that stand in [mechanism]."""
+        keys = {key for axis in self.sampling.axes for key in (axis.key, *(tie.key for tie in axis.ties))}
+        own = keys - {*CIRCUMSTANCES}
+        return frozenset(key for key in own if address.resolve(self.document, key)[0] == "mechanism")
+
+    def of_mechanism(self, chosen: dict[str, Any]) -> list[tuple[str, Any]]:
+        """What of a design changes the mechanism."""
+        return [(key, value) for key, value in chosen.items() if key in self._in_mechanism]
+
+    def device(self, chosen: dict[str, Any]) -> Device:
+        """The device with its axes' values; kept until another is asked for. Raises DeviceError."""
+        own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
+        key = (chosen.get("operator"), own)
+        if self._last.get("key") != key:
+            document = self.document
+            if "operator" in chosen:
+                operator = self.operators[chosen["operator"]]
+                document = {k: v for k, v in document.items() if k != "operator"}
+                document |= {} if operator is None else {"operator": operator}
+            for path, value in own:
+                document = address.assign(document, path, value)
+            # whether it can be put together shows where its posture is solved, which takes a tenth of the time
+            self._last.update(key=key, device=from_document(document, self.label, put_together=True))
+        return self._last["device"]  # type: ignore[no-any-return]
+
+
+class _Design:
+    """One design; its places are solved once, when they are first asked for."""
+
+    def __init__(self, job: SweepJob, number: int) -> None:
+        self.job = job
+        self.chosen = dict(settings(job.sampling.axes, job.sampling.values(number)))
+        self.known: dict[str, Place | _NoPlace] = {}
+
+    def place(self) -> Place:
+        """The posture asked about."""
+        at = self._circumstance("at")
+        return self._solved("place", lambda device: None if at is None else device.position(at))
+
+    def workspace(self) -> Place:
+        """All postures of the workspace."""
+        return self._solved("workspace", lambda _: self.job.positions)
+
+    def _solved(self, name: str, positions: Any) -> Place:
+        if name not in self.known:
+            try:
+                self.known[name] = self._solve(name, positions)
+            except _NoPlace as none:
+                self.known[name] = none
+        found = self.known[name]
+        if isinstance(found, _NoPlace):
+            raise found
+        return found
+
+    def _solve(self, name: str, positions: Any) -> Place:
+        try:
+            device = self.job.device(self.chosen)
+            at, assembly = positions(device), self._circumstance("assembly")
+            wanted = {NAMES[key]: self._circumstance(key) for key in WANTED}
+            held = self._circumstance("direction"), assembly, self._circumstance("model"), Wanted(**wanted)
+            # what changes the computer or the operator alone leaves the posture as it is
+            same = name, self._circumstance("at"), assembly, self.job.of_mechanism(self.chosen)
+            known = self.job._last.get(name, (None, None))
+            place = place_of(device, at, *held, known[1] if known[0] == same else None)
+            if known[0] != same:
+                if not _moves_mass(place):
+                    from_document(device.document, device.label)  # says what is wrong
+                self.job._last[name] = same, place.posture
+        except OutOfReach as error:
+            raise _NoPlace(OUT_OF_REACH) from error
+        except Singular as error:
+            raise _NoPlace(SINGULAR) from error
+        except (PostureError, DeviceError) as error:
+            raise _NoPlace(FAILED, _said(error)) from error
+        except ValueError as error:
+            raise _NoPlace(FAILED, str(error)) from error
+        return place
+
+    def _circumstance(self, key: str) -> Any:
+        return self.chosen.get(key, self.job.fixed.get(key))
+
+
+def _said(error: Exception) -> str:
+    if not isinstance(error, DeviceError):
+        return str(error)
+    return "; ".join(": ".join(filter(None, (fault.key, fault.message))) for fault in error.faults)
+
+
+def _moves_mass(place: Place) -> bool:
+    """Has every motion a mass, wherever there is a posture?"""
+    if place.posture is None:
+        return True
+    M = place.mass_matrix[place.status == OK]
+    eigenvalues = np.linalg.eigvalsh(M)
+    least = M.shape[-1] * np.finfo(float).eps * eigenvalues[..., -1]
+    return bool((eigenvalues[..., 0] > least).all())
+
+
+def _answer(one: Asked, place: Place) -> tuple[float, int, str]:
+    """Value, status and reason of one column."""
+    try:
+        if one.over is not None:
+            return one.reduced(evaluate(one.measure, place))
+        if one.measure.each:
+            status = int(place.status)
+            return (np.nan, status, "") if status != OK else answered(lambda: one.measure.compute(place))
+        found = evaluate(one.measure, place)
+    except MeasureError as error:
+        return np.nan, NO_VALUE, str(error)
+    return float(found.values), int(found.status), found.notes[0].reason if found.notes else ""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A study and what came of it.
+
+    cells  (designs, columns), in the designs' order
+    """
+
+    study: Study
+    job: SweepJob
+    cells: Cells
+
+    def design(self, number: int) -> dict[str, Any]:
+        """Path -> value of all that makes a design."""
+        sampling = self.job.sampling
+        return dict(settings(sampling.axes, sampling.values(number)))
+
+    def dataset(self) -> xr.Dataset:
+        """The values over the axes, with units and what was asked; see `sweep_data`."""
+        from zwidth.study.sweep_data import as_dataset
+
+        return as_dataset(self)
+
+
+def sweep(
+    study: Study | str | os.PathLike[str],
+    store: Store | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> Sweep:
+    """Compute a study, read by `read_study` or named by its file.
+
+    Raises  DeviceError   with all faults of the study's file and the device's
+            MeasureError  for measures that cannot be asked of this device
+            what `executor.run` raises
+    """
+    study = study if isinstance(study, Study) else read_study(study)
+    job = sweep_job(study)
+    return Sweep(study, job, run(job, store, progress, workers, stage="computing designs"))
+
+
+def sweep_job(study: Study) -> SweepJob:
+    """The question that `sweep` asks, so that a store can be made for it.
+
+    Raises  MeasureError  for measures that cannot be asked of this device, all of them
+    """
+    wanted = {key: getattr(study.wanted, name) for key, name in NAMES.items()}
+    told = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
+    fixed = {key: value for key, value in told.items() if value is not None}
+    positions = None if study.plane is None else study.plane.positions
+    # what a device's numbers come from is told of the study; it need not be read again for each design
+    document = {key: value for key, value in study.device.document.items() if key != "sources"}
+    job = SweepJob(document, study.device.label, study.operators, study.sampling, study.asked, positions, fixed)
+    _check_measures(job)
+    return job
+
+
+def _check_measures(job: SweepJob) -> None:
+    """Raises MeasureError where a measure can be asked of no design, as far as a few of them tell."""
+    refused: list[dict[str, str]] = []
+    for number in sorted({0, job.count // 2, job.count - 1}):
+        try:
+            place = job.place(number)
+        except _NoPlace:
+            continue
+        refused.append(probe(job.asked, lambda measure: evaluate(measure, place)))  # noqa: B023
+    if refused:
+        always = [name for name in refused[0] if all(name in others for others in refused)]
+        if always:
+            raise MeasureError("\n".join(f"{name} {refused[0][name]}" for name in always))

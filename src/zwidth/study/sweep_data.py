@@ -1,0 +1,138 @@
+"""A study's results as labelled arrays, and as rows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from zwidth.measures.measure import STATUS, Note
+from zwidth.study.axes import Axis
+from zwidth.study.study_axes import unit_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from zwidth.study.sweep import Sweep
+
+DESIGN: Final = "design"
+COMPONENTS: Final = "xyz"
+
+
+def as_dataset(found: Sweep) -> xr.Dataset:
+    """A study's values over its axes.
+
+    A grid has a dimension for each axis, called by its key; a Latin hypercube has one, `design`. For each column
+    NAME there are its values, nan where there is none, and NAME_status. Tied numbers, and the components of
+    positions and directions, are further coordinates. Attributes of a column: unit, title, source, what is better,
+    and `notes`, a line for each reason why designs have no value.
+    """
+    import xarray as xr
+
+    sampling = found.job.sampling
+    grid = sampling.size is None
+    dims = tuple(axis.key for axis in sampling.axes) if grid else (DESIGN,)
+    data: dict[str, Any] = {}
+    for n, one in enumerate(found.job.asked):
+        about = {
+            "unit": one.unit,
+            "units": one.unit,
+            "title": one.title,
+            "long_name": one.title,
+            "source": one.measure.source,
+            "better": one.better or "",
+            "key": one.key,
+            "notes": "\n".join(sentence(found, note) for note in found.cells.notes[n]),
+        }
+        data[one.name] = (dims, found.cells.values[:, n].reshape(sampling.shape), about)
+        data[f"{one.name}_status"] = (dims, found.cells.status[:, n].reshape(sampling.shape), _flags())
+    coordinates: dict[str, Any] = {} if grid else {DESIGN: np.arange(sampling.count)}
+    rows = None if grid else [sampling.values(n) for n in range(sampling.count)]
+    for n, axis in enumerate(sampling.axes):
+        values = list(axis.values) if rows is None else [row[n] for row in rows]
+        dim = axis.key if grid else DESIGN
+        coordinates |= {name: (dim, *column) for name, column in _columns(found, axis, values)}
+    return xr.Dataset(data, coordinates, _circumstances(found))
+
+
+def _columns(found: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str, tuple[Any, dict[str, str]]]]:
+    """The axis's coordinates: itself, and what goes with it."""
+    about = {"units": axis.unit, "long_name": axis.key}
+    if values and isinstance(values[0], tuple):
+        yield axis.key, (np.array([label(value) for value in values]), {"units": "", "long_name": axis.key})
+        length = max(len(value) for value in values)
+        padded = np.array([[*value, *[0.0] * (length - len(value))] for value in values])
+        for n in range(length):
+            yield f"{axis.key}_{COMPONENTS[n]}", (padded[:, n], about)
+    else:
+        yield axis.key, (np.array(values), about)
+    for tie in axis.ties:
+        tied = np.array([tie.value(value) for value in values])
+        unit = unit_of(found.study.device.document, tie.key)
+        for place in np.ndindex(tied.shape[1:]):
+            path = ".".join([tie.key, *map(str, place)])
+            yield path, (tied[(slice(None), *place)], {"units": unit, "long_name": path})
+
+
+def label(value: Any) -> str:
+    """An axis's value as a text.
+
+    >>> label((0.0, 0.25)), label("rigid"), label(0.1 + 0.2)
+    ('0, 0.25', 'rigid', '0.3')
+    """
+    if isinstance(value, tuple):
+        return ", ".join(label(part) for part in value)
+    return value if isinstance(value, str) else f"{value:.6g}"
+
+
+def status_texts(found: Sweep) -> list[dict[str, str]]:
+    """What became of each design: column -> as in `measures.measure.STATUS`."""
+    names = found.job.measures
+    return [{name: STATUS[int(s)] for name, s in zip(names, row, strict=True)} for row in found.cells.status]
+
+
+def rows(found: Sweep) -> dict[str, list[Any]]:
+    """Column -> one entry for each design: all that makes it, the values under names with units, the status."""
+    designs = [found.design(n) for n in range(found.job.count)]
+    made = {path: [_cell(design[path]) for design in designs] for path in (designs[0] if designs else {})}
+    columns = {one.key: list(found.cells.values[:, n]) for n, one in enumerate(found.job.asked)}
+    status = {
+        f"{one.name}_status": [STATUS[int(s)] for s in found.cells.status[:, n]]
+        for n, one in enumerate(found.job.asked)
+    }
+    return made | columns | status
+
+
+def _cell(value: Any) -> Any:
+    return json.dumps(value) if isinstance(value, list | tuple) else value
+
+
+def sentence(found: Sweep, note: Note) -> str:
+    """A reason, how many designs it is of, and the first of them."""
+    sampling = found.job.sampling
+    values = sampling.values(note.first[0])
+    where = ", ".join(f"{axis.key} = {label(value)}" for axis, value in zip(sampling.axes, values, strict=True))
+    many = "1 design" if note.count == 1 else f"{note.count} designs"
+    return f"{many} {STATUS.get(note.status, 'ok')}: {note.reason}; first at {where}"
+
+
+def _flags() -> dict[str, Any]:
+    meanings = " ".join(text.replace(" ", "_") for text in STATUS.values())
+    return {"flag_values": np.array(list(STATUS), dtype=np.uint8), "flag_meanings": meanings}
+
+
+def _circumstances(found: Sweep) -> dict[str, Any]:
+    """What was asked, as attributes that any file can hold."""
+    from zwidth import __version__
+
+    device = found.study.device
+    return {
+        "name": device.name,
+        "device": device.label,
+        "study": json.dumps(found.study.document),
+        "device_file": json.dumps(device.document),
+        "operator": device.operator_name or "none",
+        "zwidth": __version__,
+    }
