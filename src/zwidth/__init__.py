@@ -79,12 +79,48 @@ if TYPE_CHECKING:
     from zwidth.loop.estimators.running import velocity_of as velocity_of
     from zwidth.loop.loop import Loop as Loop
     from zwidth.loop.multi import MultiLoop as MultiLoop
+    from zwidth.measures.dexterity import dynamic_isotropy as dynamic_isotropy
     from zwidth.measures.dexterity import dynamic_manipulability as dynamic_manipulability
+    from zwidth.measures.dexterity import handle_mass_isotropy as handle_mass_isotropy
     from zwidth.measures.dexterity import isotropy as isotropy
+    from zwidth.measures.dexterity import isotropy_frobenius as isotropy_frobenius
     from zwidth.measures.dexterity import manipulability as manipulability
+    from zwidth.measures.eigenvalue_paths import EigenvaluePaths as EigenvaluePaths
+    from zwidth.measures.eigenvalue_paths import eigenvalue_paths as eigenvalue_paths
+    from zwidth.measures.eigenvalue_paths import loop_paths as loop_paths
+    from zwidth.measures.eigenvalue_paths import wall_paths as wall_paths
+    from zwidth.measures.evaluate import evaluate as evaluate
     from zwidth.measures.felt import felt_impedance as felt_impedance
     from zwidth.measures.felt import static_stiffness as static_stiffness
     from zwidth.measures.felt_chart import felt_chart as felt_chart
+    from zwidth.measures.fidelity import OptimalMass as OptimalMass
+    from zwidth.measures.fidelity import decay_time as decay_time
+    from zwidth.measures.fidelity import fastest_mass as fastest_mass
+    from zwidth.measures.fidelity import optimal_mass as optimal_mass
+    from zwidth.measures.forces import acceleration_along as acceleration_along
+    from zwidth.measures.forces import force_along as force_along
+    from zwidth.measures.forces import force_component as force_component
+    from zwidth.measures.forces import friction_along as friction_along
+    from zwidth.measures.forces import resolution_along as resolution_along
+    from zwidth.measures.homogeneous import characteristic_length as characteristic_length
+    from zwidth.measures.homogeneous import homogeneous_jacobian as homogeneous_jacobian
+    from zwidth.measures.homogeneous import scaled_jacobian as scaled_jacobian
+    from zwidth.measures.impedance_range import ImpedanceRange as ImpedanceRange
+    from zwidth.measures.impedance_range import rigid_range as rigid_range
+    from zwidth.measures.impedance_range import sprung_range as sprung_range
+    from zwidth.measures.measure import Measure as Measure
+    from zwidth.measures.measure import Measured as Measured
+    from zwidth.measures.measure import MeasureError as MeasureError
+    from zwidth.measures.overall import Overall as Overall
+    from zwidth.measures.overall import global_conditioning_index as global_conditioning_index
+    from zwidth.measures.overall import global_isotropy_index as global_isotropy_index
+    from zwidth.measures.overall import overall as overall
+    from zwidth.measures.own import load_measures as load_measures
+    from zwidth.measures.own import measure as measure
+    from zwidth.measures.place import Place as Place
+    from zwidth.measures.place import Wanted as Wanted
+    from zwidth.measures.structural import deformation_ratio as deformation_ratio
+    from zwidth.measures.structural import structural_distortion as structural_distortion
     from zwidth.model.directions import MultiPlant as MultiPlant
     from zwidth.model.directions import reduce_directions as reduce_directions
     from zwidth.model.effective import effective_parameters as effective_parameters
@@ -107,10 +143,15 @@ if TYPE_CHECKING:
     from zwidth.model.response import Response as Response
     from zwidth.model.response import ResponseError as ResponseError
     from zwidth.model.sweep import sweep_response as sweep_response
+    from zwidth.study.common_area import common_area as common_area
+    from zwidth.study.places import place_of as place_of
+    from zwidth.study.plane import plane_of as plane_of
+    from zwidth.study.requirement import parse_requirement as parse_requirement
     from zwidth.study.robust import RobustError as RobustError
     from zwidth.study.robust import robust_study as robust_study
     from zwidth.study.sensitivity import sensitivities as sensitivities
     from zwidth.study.validity import validity as validity
+    from zwidth.study.workspace import workspace_map as workspace_map
 
 __version__ = "0.1.0"
 
@@ -209,15 +250,71 @@ _HOME = {
     "loop.loop": ("Loop",),
     "loop.multi": ("MultiLoop",),
     "measures.dexterity": (
+        "dynamic_isotropy",
         "dynamic_manipulability",
+        "handle_mass_isotropy",
         "isotropy",
+        "isotropy_frobenius",
         "manipulability",
     ),
+    "measures.eigenvalue_paths": (
+        "EigenvaluePaths",
+        "eigenvalue_paths",
+        "loop_paths",
+        "wall_paths",
+    ),
+    "measures.evaluate": ("evaluate",),
     "measures.felt": (
         "felt_impedance",
         "static_stiffness",
     ),
     "measures.felt_chart": ("felt_chart",),
+    "measures.fidelity": (
+        "OptimalMass",
+        "decay_time",
+        "fastest_mass",
+        "optimal_mass",
+    ),
+    "measures.forces": (
+        "acceleration_along",
+        "force_along",
+        "force_component",
+        "friction_along",
+        "resolution_along",
+    ),
+    "measures.homogeneous": (
+        "characteristic_length",
+        "homogeneous_jacobian",
+        "scaled_jacobian",
+    ),
+    "measures.impedance_range": (
+        "ImpedanceRange",
+        "rigid_range",
+        "sprung_range",
+    ),
+    "measures.measure": (
+        "Measure",
+        "MeasureError",
+        "Measured",
+    ),
+    "measures.overall": (
+        "Overall",
+        "global_conditioning_index",
+        "global_isotropy_index",
+        "overall",
+    ),
+    "measures.own": (
+        "load_measures",
+        "measure",
+    ),
+    "measures.place": (
+        "Place",
+        "Wanted",
+    ),
+    "measures.structural": (
+        "deformation_ratio",
+        "structural_distortion",
+    ),
     "model.directions": (
         "MultiPlant",
         "reduce_directions",
@@ -254,12 +351,17 @@ _HOME = {
         "ResponseError",
     ),
     "model.sweep": ("sweep_response",),
+    "study.common_area": ("common_area",),
+    "study.places": ("place_of",),
+    "study.plane": ("plane_of",),
+    "study.requirement": ("parse_requirement",),
     "study.robust": (
         "RobustError",
         "robust_study",
     ),
     "study.sensitivity": ("sensitivities",),
     "study.validity": ("validity",),
+    "study.workspace": ("workspace_map",),
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
