@@ -16,6 +16,11 @@ BALL = ("--sphere", "0,0.31,0.05", *WALL, "--push", "0.02,1", "--duration", 0.3)
 COURSES = ("kinetic_J", "elastic_J", "gravitational_J", "hand_work_J", "motor_work_J", "friction_loss_J")
 DRIVES = ("motor-right", "motor-left")
 DRIVE = "mechanism.drives."
+WEAK = [
+    word
+    for key in ("torque_limit_Nm", "continuous_torque_Nm")
+    for word in ("--set", f"{DRIVE}motor-right.{key}=0.01")
+]
 
 
 def moved(*words):
@@ -162,7 +167,7 @@ def test_counts_limits_and_friction_of_the_file_take_part(ball):
     noisy = [*BALL, *each("encoder_counts_per_rev", 5000), *each("encoder_noise_rad", 0.01)]
     first, again, other = (moved(*noisy, "--seed", seed)["counted_position_m"] for seed in (1, 1, 2))
     assert first == again != other
-    limited = [*BALL, "--set", f"{DRIVE}motor-right.torque_limit_Nm=0.01"]
+    limited = [*BALL, *WEAK]
     one, all_alike = moved(*limited), moved(*limited, "--torque-limits", "together")
     assert one["torque_limit_share"]["motor-left"] == 0.0 < one["torque_limit_share"]["motor-right"] < 0.5
     assert max(map(abs, one["torque_Nm"]["motor-right"])) == pytest.approx(18.6 * 0.01)
@@ -203,7 +208,7 @@ def test_people_read_how_deep_how_hard_and_remarks(tmp_path):
     out = zwidth("move", MECHANISM, "--plane", "0,0.28,0,-1", *WALL, "--push", "0,1", "--duration", 0.02).out
     assert "the handle never touches the surface" in out
     parts = (*each("coulomb_Nm", 0.001), *each("encoder_counts_per_rev", 500), "--substeps", 2)
-    out = zwidth("move", MECHANISM, *BALL, *parts, "--set", f"{DRIVE}motor-right.torque_limit_Nm=0.01").out
+    out = zwidth("move", MECHANISM, *BALL, *parts, *WEAK).out
     assert "with what a chart leaves out: dry friction, encoder steps" in out
     assert "take --substeps 4 or more" in out
     assert "motor-right reached in" in out
