@@ -176,7 +176,7 @@ def inertia_terms(mechanism: Mechanism, posture: Posture, driven_rates: ArrayLik
     design = np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
     out = np.empty(flat.shape)
     still = np.zeros(3)
-    bias_batch(mech, design, np.ascontiguousarray(angles), np.ascontiguousarray(flat), still, out)
+    bias_batch(mech, design, np.array(angles, order="C"), np.array(flat, order="C"), still, out)
     return out.reshape(*shape, mech.driven)
 
 
@@ -185,7 +185,7 @@ def link_points(mechanism: Mechanism, posture: Posture) -> LinkPoints:
     mech, designs = pack(mechanism), design_shape(mechanism)
     shape = np.broadcast_shapes(designs, posture.status.shape)
     n = mech.parent.size
-    angles = np.ascontiguousarray(np.broadcast_to(posture.angles, (*shape, n)).reshape(-1, n))
+    angles = np.array(np.broadcast_to(posture.angles, (*shape, n)).reshape(-1, n), order="C")
     design = np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
     rotation, origin = np.empty((len(design), n, 3, 3)), np.empty((len(design), n, 3))
     _place_batch(mech, design, angles, rotation, origin)
