@@ -33,7 +33,8 @@ by a script of the [gallery](../gallery) when this page was written, and so was 
 - **agrees to the digits printed**: within half a unit of the last digit printed;
 - **not printed; agrees with brute force**: the thesis only draws it, in a figure that the scan does not hold. The
   number is compared with [a judge](../gallery/brute_force.py) that shares no code with zwidth (matrix exponential,
-  eigenvalues, bisection);
+  eigenvalues, bisection), what is felt of the five-bar with
+  [its two arms written out by hand](../gallery/five_bar.py);
 - **differs**: with the reason, whose numbers are computed too and must bear it out, or else the row would say
   *differs, not explained*.
 
@@ -56,9 +57,8 @@ NOT_COVERED = """## Not covered yet
   simulation needs them, it says that they are ours, or what does not depend on them.
 - Fig. 3.6: measured frequency responses.
 - Fig. 3.12: the measured points; the model's curve and a virtual experiment are here.
-- Figs. 5.1-5.4, 5.6-5.9: measures over the workspace and over designs. Of Fig. 5.5 only the rigid model's factor
-  is here. Fig. 5.8's minimum at L1 = 0.146 m has not been looked into.
-- Figs. 5.10-5.14: trajectories of eigenvalues (responses and optimal masses are here).
+- Figs. 5.5-5.8: the drawings of the assemblies are not in the scan. Which two are "elbow up" and "elbow down" is
+  not known; where it matters all four are here.
 - 1.1: two-port networks and virtual couplings are computed ([Guarantees](guarantees.md)), but the thesis gives no
   number to compare with; time-domain passivity control is there ([Virtual environments](environments.md)), without
   a number of the thesis either.

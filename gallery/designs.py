@@ -28,7 +28,8 @@ REFERENCE = (0.0, 0.25)
 LENGTH = float(device.mechanism.links.tip[RIGHT, 0])
 
 # What becomes of a driven arm's mass and inertia with its length: "kept"; "grown" as a bar of the same section,
-# m ~ L, I ~ L^3, its centre of mass moving along; "as Appendix B", m kept and m L^2/12 added to the inertia.
+# m ~ L, I ~ L^3, its centre of mass moving along; "as Appendix B", m kept and m L^2/12 added to the inertia of all
+# four links.
 LAWS = ("kept", "grown", "as Appendix B")
 
 
@@ -58,8 +59,9 @@ def with_lengths(right: np.ndarray, left: np.ndarray, law: str = "kept") -> Devi
             numbers["mass"][:, arm] *= share
             numbers["center_of_mass"][:, arm] *= share[:, None]
             numbers["inertia"][:, arm] *= share[:, None, None] ** 3
-        elif law == "as Appendix B":
-            numbers["inertia"][:, arm] += (numbers["mass"][:, arm] * length**2 / 12.0)[:, None, None] * np.eye(3)
+    if law == "as Appendix B":
+        lengths = numbers["tip"][..., 0]
+        numbers["inertia"] += (numbers["mass"] * lengths**2 / 12.0)[..., None, None] * np.eye(3)
     mechanism = replace(
         device.mechanism,
         links=replace(links, **numbers),

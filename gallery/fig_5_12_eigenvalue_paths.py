@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from gallery import optimal_mass
 from gallery.brute_force import Judge
@@ -72,6 +73,18 @@ def fast_radius(model: str, name: str, mass: float) -> float:
 at_optimum = {
     name: {model: fast_radius(model, name, optimal_mass.optimum[name][0]) for model in MODELS} for name in WALLS
 }
+
+
+def _fastest_pair(name: str) -> tuple[float, float]:
+    masses = np.geomspace(0.5, 1.5, 31) * optimal_mass.optimum[name][0]
+    best = float(masses[np.nanargmin([fast_radius("two masses", name, mass) for mass in masses])])
+    near = (best / 1.04, best * 1.04)
+    found = minimize_scalar(lambda mass: fast_radius("two masses", name, mass), bounds=near, method="bounded")
+    return float(found.x), float(found.fun)
+
+
+# Mass at which the fast pair of the two masses decays fastest, and its radius there.
+fastest_pair = {name: _fastest_pair(name) for name in WALLS}
 
 
 def judged_stable_from(model: str, name: str) -> float:

@@ -117,4 +117,4 @@ if __name__ == "__main__":
             f"integration), {100 * found.common.share:.1f} % of what is reached"
         )
     print("at the reference:", at_reference, f"{1e3 * distance_from_reference:.1f} mm from the common area")
-    write_page(draw, "fig-5-4-common-area", 6.4, 5.2)
+    write_page(draw, "fig-5-4-common-area", 6.4, 4.8)

@@ -10,7 +10,8 @@ that the arms cross for d < 0. (The thesis shifts its curves by d/2, which is th
 
 The rigid body is symmetric, for so are the masses of the arms. The drives are not equally stiff: that, and nothing
 else, makes the flexible model asymmetric. How much a curve varies depends on how much of it is looked at: "three
-times" is a statement about a range of x.
+times" is a statement about a range of x. With crossed arms the distal links come into one line towards the edge of
+reach: there nothing holds the handle across them, and the flexible model's stiffness falls to zero.
 
 Run `python -m gallery.fig_5_5_base_distance` to draw it.
 """
@@ -22,6 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from gallery import designs
+from gallery.five_bar import bundled
 from gallery.models import write_page
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError
@@ -118,6 +120,9 @@ ratio_of_stiffness = factor(by_distance["rigid"][-0.2], WITHIN)
 factors = {name: {d: factor(v, WITHIN) for d, v in each.items()} for name, each in by_distance.items()}
 factors_of_all = {name: {d: factor(v) for d, v in each.items()} for name, each in by_distance.items()}
 three_within = {name: reach_of_factor(each[-0.2], 3.0) for name, each in by_distance.items()}
+# Of the crossed arms, the sine of the angle between the distal links at the last point that is reached.
+_last = float(x[np.isfinite(by_distance["rigid"][-0.2])][-1])
+between_at_the_edge = abs(float(replace(bundled(), base=(-0.1, 0.1)).at((_last, Y), "elbows-out").between))
 asymmetries = {name: max(asymmetry(v) for v in values) for name, values in found.items()}
 asymmetries_with_equal_drives = {
     name: max(asymmetry(v) for v in values) for name, values in found_with_equal_drives.items()

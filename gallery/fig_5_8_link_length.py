@@ -121,7 +121,8 @@ def value(key: tuple[str, str, str], model: str, at: float) -> float:
     return float(getattr(curves[key], model)[np.argmin(np.abs(length - at))])
 
 
-ALONE, DOWN = ("L1 alone", "kept", "elbows-out"), ("L1 alone", "kept", "elbows-right")
+ALONE, TIED = ("L1 alone", "kept", "elbows-out"), ("L1 = L3", "kept", "elbows-out")
+DOWN = ("L1 alone", "kept", "elbows-right")
 # How far the flexible model falls next to the singularity, as a share of what it has at the lower end.
 fall = value(DOWN, "flexible", LENGTH + 1e-3) / value(DOWN, "flexible", length[0])
 

@@ -70,7 +70,8 @@ class Felt:
     def condition_number(self) -> np.ndarray:
         """(5.2)."""
         values = self.singular_values
-        return values[..., 0] / values[..., 1]
+        with np.errstate(divide="ignore"):
+            return values[..., 0] / values[..., 1]
 
 
 @dataclass(frozen=True)
@@ -97,9 +98,10 @@ class FiveBar:
     def at(self, position, assembly: str) -> Felt:
         """Everything at handle positions (..., 2) [m]."""
         p = np.asarray(position, float)[..., :2]
+        shape = np.broadcast_shapes(p.shape[:-1], *(np.shape(v) for v in (*self.base, *self.driven, *self.distal)))
+        p = np.broadcast_to(p, (*shape, 2))
         arms = [self._arm(p, i, SIDES[assembly][i]) for i in range(2)]
         A = np.stack([arm["along"] for arm in arms], axis=-2)
-        shape = A.shape[:-2]
         b = np.zeros((*shape, 2, 2))
         for i, arm in enumerate(arms):
             b[..., i, i] = (arm["along"] * arm["elbow moves"]).sum(axis=-1)
