@@ -1,7 +1,15 @@
-"""Write the pictures of the documentation: the README's chart."""
+"""Write the pictures of the documentation: the README's chart, and two of the thesis's figures."""
 
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from gallery import fig_5_4_common_area, fig_5_10_eigenvalues
 from zwidth.chart.chart import stability_chart
 from zwidth.device.load import load
 from zwidth.loop.loop import Loop
@@ -19,6 +27,18 @@ def main() -> None:
         made, ax = figure(6.2, 3.7)
         draw_chart(ax, chart)
     print(save(made, IMAGES / "five-bar-chart.svg"))
+    page(fig_5_4_common_area.draw, "fig-5-4-common-area", 6.4, 4.8)
+    page(fig_5_10_eigenvalues.draw, "fig-5-10-eigenvalues", 7.4, 4.6)
+
+
+def page(draw: Callable[..., None], name: str, width: float, height: float) -> None:
+    """A figure of the gallery that places its own axes."""
+    made: Any
+    made, ax = figure(width, height)
+    ax.remove()
+    with context():
+        draw(made)
+    print(save(made, IMAGES / f"{name}.svg"))
 
 
 if __name__ == "__main__":

@@ -41,14 +41,30 @@ by a script of the [gallery](../gallery) when this page was written, and so was 
 `make docs` writes the page again, and a test holds it to what the code gives.
 """
 
+CHAPTER_5 = "Chapter 5: measures and design"
 SECTIONS = (
     ("Chapters 1 and 2: what is compared with, several directions", chapters_1_2.rows),
     ("Chapter 3: the device and its walls", chapter_3.rows),
     ("Chapter 4: closed forms", chapter_4.rows),
     ("Chapter 4 and Appendix A: by computer algebra", algebra.rows),
-    ("Chapter 5: measures and design", chapter_5.rows),
+    (CHAPTER_5, chapter_5.rows),
     ("Chapters 3 and 5: by simulation", contact.rows),
 )
+
+# `docs/make_images.py` draws them.
+PICTURES = {
+    CHAPTER_5: """![Manipulability, condition number and link-side mass required at once over the five-bar's workspace, \
+and their common area](images/fig-5-4-common-area.svg)
+
+*Fig. 5.4: three requirements and their common area, over the largest stiffness of the rigid body.*
+
+![Chart with contours of equal spectral radius, and the eigenvalues in the complex plane along a line of walls\
+](images/fig-5-10-eigenvalues.svg)
+
+*Fig. 5.10: how fast vibration decays, and the eigenvalues along the dotted line; circles are their starts.*
+
+"""
+}
 
 NOT_COVERED = """## Not covered yet
 
@@ -79,7 +95,11 @@ def table(rows: list[Row]) -> str:
 
 def page(content: Sections) -> str:
     """The whole page."""
-    parts = [INTRODUCTION, *(f"## {title}\n\n{table(rows)}\n" for title, rows in content), NOT_COVERED]
+    parts = [
+        INTRODUCTION,
+        *(f"## {title}\n\n{PICTURES.get(title, '')}{table(rows)}\n" for title, rows in content),
+        NOT_COVERED,
+    ]
     return "\n".join(parts)
 
 
