@@ -53,8 +53,8 @@ SECTIONS = (
 
 # `docs/make_images.py` draws them.
 PICTURES = {
-    CHAPTER_5: """![Manipulability, condition number and link-side mass required at once over the five-bar's workspace, \
-and their common area](images/fig-5-4-common-area.svg)
+    CHAPTER_5: """![Manipulability, condition number and link-side mass required at once over the workspace, and \
+their common area](images/fig-5-4-common-area.svg)
 
 *Fig. 5.4: three requirements and their common area, over the largest stiffness of the rigid body.*
 
