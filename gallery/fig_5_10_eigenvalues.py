@@ -67,7 +67,7 @@ def draw(figure) -> None:
 
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 0.95))
     draw_decay_contours(left, loop, RADII, (-2000.0, 8000.0, LOWEST - 1.0, HIGHEST), chart)
-    left.annotate("A", point_A, xytext=(7, 4), textcoords="offset points", fontsize=9.0)
+    left.annotate("A", point_A, xytext=(-22, -3), textcoords="offset points", fontsize=9.0)
     left.plot([K, K], [LOWEST, HIGHEST], color=BLACK, linewidth=0.8, linestyle=(0, (1.0, 1.5)))
     draw_way(right)
 
