@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 import subprocess
+from functools import cache
 from html.parser import HTMLParser
 
 import pytest
@@ -61,12 +62,23 @@ class Page(HTMLParser):
         return re.sub(r"\s+", " ", " ".join(self.texts).replace("\u00a0", " "))
 
 
-@pytest.fixture(scope="module", params=CASES)
-def written(request, tmp_path_factory):
-    name, changes = CASES[request.param]
-    path = tmp_path_factory.mktemp("report") / "report.html"
-    found = write_report(load(name, changes), path)
-    return path, found, path.read_text(encoding="utf-8")
+@pytest.fixture(scope="module")
+def report_of(tmp_path_factory):
+    """Path, numbers and text of a case's report, which is made once."""
+
+    @cache
+    def made(case):
+        name, changes = CASES[case]
+        path = tmp_path_factory.mktemp("report") / "report.html"
+        found = write_report(load(name, changes), path)
+        return path, found, path.read_text(encoding="utf-8")
+
+    return made
+
+
+@pytest.fixture(params=CASES)
+def written(request, report_of):
+    return report_of(request.param)
 
 
 def test_the_page_stands_alone(written):
@@ -113,8 +125,8 @@ def test_all_sections_are_there(written):
         assert entry["label"] in shown or entry["key"] == f"model-{found['model']}"
 
 
-def test_the_numbers_of_the_published_plant(tmp_path):
-    found = write_report(load("published-two-mass"), tmp_path / "a.html")
+def test_the_numbers_of_the_published_plant(report_of):
+    _, found, _ = report_of("two-mass")
     assert found["stiffness_max_N_per_m"] == pytest.approx(7133.86929380, rel=1e-9)
     assert found["damping_at_stiffness_max_Ns_per_m"] == pytest.approx(9.97478812, rel=1e-6)
     assert found["frequencies_at_stiffness_max_Hz"] == pytest.approx([174.547436], rel=1e-6)
@@ -124,8 +136,8 @@ def test_the_numbers_of_the_published_plant(tmp_path):
     assert gains["no-delay"] is None
 
 
-def test_the_numbers_of_what_to_change_is_felt_and_may_be_simplified(tmp_path):
-    found = write_report(load("published-two-mass"), tmp_path / "a.html")
+def test_the_numbers_of_what_to_change_is_felt_and_may_be_simplified(report_of):
+    _, found, text = report_of("two-mass")
     first = found["sensitivities"][0]
     assert first["path"] == "loop.sampling_period_s"
     assert first["d_ln_stiffness_max_d_ln_value"] == pytest.approx(-2.8504059866, abs=1e-8)
@@ -137,15 +149,13 @@ def test_the_numbers_of_what_to_change_is_felt_and_may_be_simplified(tmp_path):
     assert found["models"]["first_natural_frequency_Hz"] == pytest.approx(130.727, abs=1e-3)
     assert models["rigid"]["frequency_ranges_Hz"][0][1] == pytest.approx(20.29, abs=0.01)
     # the figures are there, and only where they say something
-    text = (tmp_path / "a.html").read_text(encoding="utf-8")
     assert all(f'<figure id="{name}">' in text for name in ("felt", "answers", "fits"))
-    write_report(load("hapkit-course"), tmp_path / "a.html")
-    text = (tmp_path / "a.html").read_text(encoding="utf-8")
+    _, _, text = report_of("one mass")
     assert [name for name in ("felt", "answers", "fits") if f'<figure id="{name}">' in text] == ["answers"]
 
 
-def test_nothing_stable_has_a_reason_and_nulls(tmp_path):
-    found = write_report(load("published-two-mass", EMPTY), tmp_path / "a.html")
+def test_nothing_stable_has_a_reason_and_nulls(report_of):
+    _, found, _ = report_of("nothing stable")
     assert found["stiffness_max_N_per_m"] is None
     assert found["damping_at_stiffness_max_Ns_per_m"] is None
     assert found["reason"]
@@ -164,8 +174,8 @@ def test_names_cannot_do_harm(tmp_path):
     assert "{{ 7*7 }}" in text
 
 
-def test_the_same_device_makes_the_same_page():
-    assert page(gather(load("five-bar"))) == page(gather(load("five-bar")))
+def test_the_same_device_makes_the_same_page(report_of):
+    assert page(gather(load("five-bar"))) == report_of("five-bar")[2]
 
 
 def test_questions_reach_the_page(tmp_path):
@@ -221,10 +231,8 @@ def shown_in_browser(folder, page):
 
 
 @needs_browser
-def test_a_browser_has_nothing_to_complain_of(tmp_path):
-    target = tmp_path / "report.html"
-    write_report(load("five-bar"), target)
-    picture, complaints, asked = shown_in_browser(tmp_path, target)
+def test_a_browser_has_nothing_to_complain_of(tmp_path, report_of):
+    picture, complaints, asked = shown_in_browser(tmp_path, report_of("five-bar")[0])
     assert picture.startswith(b"\x89PNG")
     assert len(picture) > 50_000
     assert complaints == []
@@ -241,12 +249,9 @@ def test_a_page_that_asks_elsewhere_would_be_noticed(tmp_path):
 
 
 @needs_browser
-@pytest.mark.parametrize("case", CASES)
-def test_it_prints_on_a4(tmp_path, case):
-    name, changes = CASES[case]
-    target, pdf = tmp_path / "report.html", tmp_path / "report.pdf"
-    write_report(load(name, changes), target)
-    browse(tmp_path, "--no-pdf-header-footer", f"--print-to-pdf={pdf}", target.as_uri())
+def test_it_prints_on_a4(tmp_path, written):
+    pdf = tmp_path / "report.pdf"
+    browse(tmp_path, "--no-pdf-header-footer", f"--print-to-pdf={pdf}", written[0].as_uri())
     written = pdf.read_bytes()
     assert written.startswith(b"%PDF")
     pages = len(re.findall(rb"/Type\s*/Page\b", written))
