@@ -25,6 +25,18 @@ order = 2
 cutoff_Hz = 20.0
 """
 
+STUDY = """
+device = "my-device.toml"
+measures = ["stiffness_max", "fastest_decay"]
+[[axis]]
+key = "plant.mass_kg"
+range = [0.02, 0.1]
+count = 5
+[[axis]]
+key = "loop.delay_samples"
+values = [0, 1]
+"""
+
 
 def blocks(language: str) -> str:
     return "".join(re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL))
@@ -42,6 +54,7 @@ def keys(section: str) -> set[str]:
 def folder(tmp_path, monkeypatch):
     (tmp_path / "my-device.toml").write_text(DEVICE)
     (tmp_path / "walls.csv").write_text("stiffness_N_per_m,damping_Ns_per_m\n4000,10\n9000,10\n")
+    (tmp_path / "my-study.toml").write_text(STUDY)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -93,6 +106,8 @@ def test_the_keys_that_come_out_are_those_explained(folder):
     assert set(document["requirements"][0]) == {"requirement", "area_m2", "share"}
     document = found("experiment", TWO_MASS, "--stiffnesses", 1, "--tips", 0)
     assert set(document) - asked == keys("experiment")
+    document = found("sweep", "my-study.toml")
+    assert set(document) - asked == keys("sweep")
     report = found("report", TWO_MASS, "--output", "report.html")
     assert set(report) >= {"file", "summary", "stiffness_max_N_per_m", *(asked - {"reason"})}
 

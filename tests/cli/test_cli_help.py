@@ -26,6 +26,7 @@ def test_the_commands_are_those_promised():
         "check",
         "polar",
         "map",
+        "sweep",
         "report",
         "sensitivity",
         "felt",

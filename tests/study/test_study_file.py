@@ -202,6 +202,7 @@ WRONG = [
     ({"measures": ["isotropy", "isotropy"]}, "measures.1: isotropy is asked for twice"),
     ({"measures": ["worst(rigid_mass)"]}, "measures.0: worst(rigid_mass): whether more of it is better depends"),
     ({"measures": ["mean(isotropy)"]}, "measures.0: mean is nothing that is made of a measure over a workspace"),
+    ({"measures": ["isotropy_index(rigid_mass)"]}, "measures.0: isotropy_index(rigid_mass): is of isotropy only"),
     ({"measures_file": "none.py"}, "measures_file: no such file"),
     ({"samplin": "grid"}, "samplin: is not a key of a study file; did you mean 'sampling'?"),
     ({"sampling": "random"}, "sampling: must be 'grid' or 'latin-hypercube', got the text 'random'"),

@@ -15,13 +15,13 @@ from zwidth.device.load import load
 from zwidth.loop.loop import Loop
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS, Measure, MeasureError
-from zwidth.measures.overall import overall
 from zwidth.model.effective import effective_parameters
 from zwidth.study.executor import run
-from zwidth.study.places import place_of
 from zwidth.study.store import Store
 from zwidth.study.study_file import study_of
 from zwidth.study.sweep import Sweep, sweep, sweep_job
+from zwidth.study.whole import over_the_workspace
+from zwidth.study.workspace import workspace_map
 
 LENGTHS = axis(LENGTH, range=[0.11, 0.18], count=4, tie=[OTHER, {"key": "links.upper-left.mass_kg", "power": 1}])
 ASSEMBLIES = axis("assembly", "elbows-out", "elbows-in")
@@ -107,21 +107,20 @@ def test_the_wanted_wall_may_be_an_axis():
     assert evaluate(wanted, place).values == 2000.0
 
 
-def test_over_the_workspace():
-    over = ["average", "worst", "best", "uniformity", "variation", "share"]
-    columns = [f"{name}(isotropy)" for name in over]
+def test_over_the_workspace_a_design_has_what_its_map_has():
+    over = ["average", "worst", "best", "uniformity", "variation", "share", "conditioning_index", "isotropy_index"]
     space = {"x_m": [-0.15, 0.15], "y_m": [0.1, 0.4], "count": [5, 4]}
-    made = study(LENGTHS, measures=[*columns, "conditioning_index(isotropy)"], workspace=space)
+    made = study(LENGTHS, measures=[f"{name}(isotropy)" for name in over], workspace=space, assembly="elbows-in")
     found = sweep(made, workers=1)
-    device = load(FIVE_BAR, found.design(3).items())
     assert made.plane is not None
-    each = evaluate(made.asked[0].measure, place_of(device, made.plane.positions))
-    assert 0 < (each.status == OK).sum() < each.status.size
-    expected = overall(each.values, each.status, None, "lower")
-    got = dict(zip(found.job.measures, found.cells.values[3], strict=True))
-    assert [got[f"{name}(isotropy)"] for name in over] == [pytest.approx(getattr(expected, n)) for n in over]
-    assert got["conditioning_index(isotropy)"] == pytest.approx(np.mean(1.0 / each.values[each.status == OK]))
-    assert [one.unit for one in made.asked] == [""] * 7
+    for n in (0, 3):
+        device = load(FIVE_BAR, list(found.design(n).items()))
+        mapped = workspace_map(device, ["isotropy"], made.plane, assembly="elbows-in", workers=1)
+        assert 0 < (mapped["isotropy_status"] == OK).sum() < 20
+        expected = over_the_workspace(mapped, "isotropy", device)
+        assert found.cells.values[n].tolist() == [pytest.approx(expected[name], rel=1e-12) for name in over]
+    assert [one.unit for one in made.asked] == [""] * 8
+    assert {one.name: one.better for one in made.asked}["variation(isotropy)"] == "lower"
 
 
 def test_a_workspace_out_of_reach_has_no_value_and_says_so():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import secrets
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -35,6 +37,23 @@ def write_dataset(path: Path, dataset: xr.Dataset) -> None:
         raise ValueError(f"a dataset is written as {', '.join(_WRITERS)}, got '{path.name}'; change the extension")
     with replacing(path) as draft:
         _WRITERS[kind](draft, dataset)
+
+
+def write_zarr(path: Path, dataset: xr.Dataset) -> None:
+    """Write a dataset as a zarr folder (version 2, which knows texts), whole or not at all.
+
+    path    where nothing is yet
+    Raises  OutputError  where it cannot be written
+    """
+    draft = path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}")
+    try:
+        dataset.to_zarr(draft, mode="w", zarr_format=2, consolidated=True)
+        draft.rename(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"{path}: cannot be written: {reason[:1].lower() + reason[1:]}; name another") from None
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
 
 
 def _netcdf(draft: Path, dataset: xr.Dataset) -> None:

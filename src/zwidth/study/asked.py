@@ -5,14 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.device.faults import listed, nearest
 from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure, Measured, MeasureError
-from zwidth.measures.overall import global_conditioning_index, overall
+from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
 from zwidth.measures.own import find_measure
+from zwidth.study.whole import CONDITIONS
+
+if TYPE_CHECKING:
+    from zwidth.measures.place import Place
 
 # What is said of it in a figure; does it keep the measure's unit?
 OVER: Final[dict[str, tuple[str, bool]]] = {
@@ -23,8 +28,10 @@ OVER: Final[dict[str, tuple[str, bool]]] = {
     "variation": ("standard deviation over average", False),
     "share": ("share of the workspace with a value", False),
     "conditioning_index": ("mean of the reciprocal", False),
+    "isotropy_index": ("global isotropy index", False),
 }
 JUDGING: Final = ("worst", "best")
+OF: Final = {"conditioning_index": CONDITIONS, "isotropy_index": ("isotropy",)}  # others are of any measure
 
 
 @dataclass(frozen=True)
@@ -68,17 +75,23 @@ class Asked:
             return self.measure.key
         return f"{self.over}_{self.measure.key if self.unit or not self.measure.unit else self.measure.name}"
 
-    def reduced(self, found: Measured) -> tuple[float, int, str]:
+    def reduced(
+        self, found: Measured, place: Place, weights: NDArray[np.float64] | None = None
+    ) -> tuple[float, int, str]:
         """Value, status and reason of this design, from the measure's values over its workspace.
 
+        weights  what each cell stands for; None: all alike
         Cells without a value do not count; where none has one, their commonest status is the design's.
         """
         assert self.over is not None
         try:
             if self.over == "conditioning_index":
-                value = global_conditioning_index(found.values, found.status)
+                value = global_conditioning_index(found.values, found.status, weights)
+            elif self.over == "isotropy_index":
+                value = global_isotropy_index(place.jacobian, found.status, len(place.drives.names))
             else:
-                value = float(getattr(overall(found.values, found.status, None, self.measure.better), self.over))
+                whole = overall(found.values, found.status, weights, self.measure.better)
+                value = float(getattr(whole, self.over))
         except ValueError as error:
             return float("nan"), FAILED, str(error)
         if not np.isnan(value):
@@ -113,6 +126,8 @@ def asked(name: str, own: Mapping[str, Measure] | None = None) -> Asked:
         raise ValueError(
             f"{over}({measure.name}): whether more of it is better depends; ask for average({measure.name})"
         )
+    if measure.name not in OF.get(over, (measure.name,)):
+        raise ValueError(f"{over}({measure.name}): is of {listed(OF[over])} only; ask for average({measure.name})")
     return Asked(f"{over}({measure.name})", measure, over)
 
 

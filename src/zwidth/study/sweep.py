@@ -32,6 +32,7 @@ from zwidth.study.job import Cells
 from zwidth.study.journal import fingerprint
 from zwidth.study.places import place_of
 from zwidth.study.study_file import Study, read_study
+from zwidth.study.whole import areas
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,6 +58,7 @@ class SweepJob:
     label      of the device, for messages
     operators  as in `Study`
     positions  (..., 3) of the workspace [m]; None where nothing is asked over it
+    weights    (...) what each of them stands for [m^2]
     fixed      circumstances that no axis sets
     """
 
@@ -66,6 +68,7 @@ class SweepJob:
     sampling: Sampling
     asked: tuple[Asked, ...]
     positions: NDArray[np.float64] | None
+    weights: NDArray[np.float64] | None
     fixed: dict[str, Any]
     _last: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
@@ -115,7 +118,7 @@ class SweepJob:
             except _NoPlace as none:
                 yield np.nan, none.status, none.reason
                 continue
-            yield _answer(one, place)
+            yield _answer(one, place, self.weights)
 
     @cached_property
     def _in_mechanism(self) -> frozenset[str]:
@@ -217,11 +220,11 @@ def _moves_mass(place: Place) -> bool:
     return bool((eigenvalues[..., 0] > least).all())
 
 
-def _answer(one: Asked, place: Place) -> tuple[float, int, str]:
+def _answer(one: Asked, place: Place, weights: NDArray[np.float64] | None) -> tuple[float, int, str]:
     """Value, status and reason of one column."""
     try:
         if one.over is not None:
-            return one.reduced(evaluate(one.measure, place))
+            return one.reduced(evaluate(one.measure, place), place, weights)
         if one.measure.each:
             status = int(place.status)
             return (np.nan, status, "") if status != OK else answered(lambda: one.measure.compute(place))
@@ -279,10 +282,12 @@ def sweep_job(study: Study) -> SweepJob:
     wanted = {key: getattr(study.wanted, name) for key, name in NAMES.items()}
     told = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
     fixed = {key: value for key, value in told.items() if value is not None}
-    positions = None if study.plane is None else study.plane.positions
+    plane = study.plane
+    positions, weights = (None, None) if plane is None else (plane.positions, areas(plane.x, plane.y))
     # what a device's numbers come from is told of the study; it need not be read again for each design
     document = {key: value for key, value in study.device.document.items() if key != "sources"}
-    job = SweepJob(document, study.device.label, study.operators, study.sampling, study.asked, positions, fixed)
+    asked, designs = study.asked, study.sampling
+    job = SweepJob(document, study.device.label, study.operators, designs, asked, positions, weights, fixed)
     _check_measures(job)
     return job
 

@@ -59,15 +59,16 @@ def as_dataset(found: Sweep) -> xr.Dataset:
 
 def _columns(found: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str, tuple[Any, dict[str, str]]]]:
     """The axis's coordinates: itself, and what goes with it."""
-    about = {"units": axis.unit, "long_name": axis.key}
+    about = {"units": axis.unit, "long_name": axis.key, "scale": "log" if axis.log else "linear"}
     if values and isinstance(values[0], tuple):
-        yield axis.key, (np.array([label(value) for value in values]), {"units": "", "long_name": axis.key})
+        texts = {"units": "", "long_name": axis.key, "role": "axis"}
+        yield axis.key, (np.array([label(value) for value in values]), texts)
         length = max(len(value) for value in values)
         padded = np.array([[*value, *[0.0] * (length - len(value))] for value in values])
         for n in range(length):
             yield f"{axis.key}_{COMPONENTS[n]}", (padded[:, n], about)
     else:
-        yield axis.key, (np.array(values), about)
+        yield axis.key, (np.array(values), about | {"role": "axis"})
     for tie in axis.ties:
         tied = np.array([tie.value(value) for value in values])
         unit = unit_of(found.study.device.document, tie.key)

@@ -25,7 +25,7 @@ def over_the_workspace(dataset: xr.Dataset, name: str, device: Device | None = N
     the device's postures are solved again; without a device it is left out.
     """
     values, status = dataset[name].values, dataset[f"{name}_status"].values
-    weights = np.outer(_trapezoids(dataset["y_m"].values), _trapezoids(dataset["x_m"].values))
+    weights = areas(dataset["x_m"].values, dataset["y_m"].values)
     better = dataset[name].attrs["better"] or None
     found = dict(vars(overall(values, status, weights, better)))
     if name in CONDITIONS:
@@ -45,6 +45,15 @@ def positions(dataset: xr.Dataset) -> NDArray[np.float64]:
     through = np.asarray(dataset.attrs["plane_through_m"], dtype=np.float64)
     x, y = dataset["x_m"].values, dataset["y_m"].values
     return np.asarray(through + x[None, :, None] * axes[0] + y[:, None, None] * axes[1])
+
+
+def areas(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What each point (ny, nx) of a grid stands for by the trapezoidal rule [m^2].
+
+    >>> areas(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0])).tolist()
+    [[0.5, 1.0, 0.5], [0.5, 1.0, 0.5]]
+    """
+    return np.outer(_trapezoids(y), _trapezoids(x))
 
 
 def _trapezoids(x: NDArray[np.float64]) -> NDArray[np.float64]:

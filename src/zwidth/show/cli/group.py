@@ -26,6 +26,7 @@ from zwidth.show.cli.schema import schema
 from zwidth.show.cli.sensitivity import sensitivity
 from zwidth.show.cli.show import show
 from zwidth.show.cli.simulate import simulate
+from zwidth.show.cli.sweep import sweep
 
 EPILOG = """\b
 Example:
@@ -56,6 +57,7 @@ COMMANDS = (
     check,
     polar,
     map_command,
+    sweep,
     report,
     sensitivity,
     felt,

@@ -157,23 +157,34 @@ def _ratios(low: float, high: float) -> Floats:
 
 
 def _contours(ax: Axes, x: Floats, y: Floats, values: Floats, title: str, unit: str, *, faint: bool) -> None:
-    levels = levels_of(values)
+    levels, norm, colours = bands_of(values, faint=faint)
+    extend: Any = norm.extend
     finite = values[np.isfinite(values)]
-    under = bool((values < levels[0]).any())
-    over = bool((values > levels[-1]).any())
+    most = 2.0 * max(abs(float(finite.max(initial=0.0))), abs(float(levels[-1])), abs(float(levels[0])))
+    z = np.ma.masked_invalid(np.clip(values, -most, most))
+    ax.contourf(x, y, z, levels=levels, cmap=colours, norm=norm, extend=extend, corner_mask=True, zorder=1.0)
+    ax.contour(x, y, z, levels=levels, colors="white", linewidths=0.4, corner_mask=True, zorder=1.1)
+    colour_bar(ax, levels, norm, colours, title, unit)
+
+
+def bands_of(values: Floats, *, faint: bool = False) -> tuple[Floats, BoundaryNorm, ListedColormap]:
+    """Round levels over the values, and the colours of the bands between them and beyond."""
+    levels = levels_of(values)
+    under, over = bool((values < levels[0]).any()), bool((values > levels[-1]).any())
     extend: Any = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[
         under, over
     ]
-    most = 2.0 * max(abs(float(finite.max(initial=0.0))), abs(float(levels[-1])), abs(float(levels[0])))
-    z = np.ma.masked_invalid(np.clip(values, -most, most))
     bands = len(levels) - 1 + under + over
     shades = mpl.colormaps[COLOURS](np.linspace(0.0, 1.0, bands))
     if faint:  # lines and hatches stand out on it
         shades[:, :3] = 1.0 - 0.45 * (1.0 - shades[:, :3])
-    colours = ListedColormap(shades)
-    norm = BoundaryNorm(levels, bands, extend=extend)
-    ax.contourf(x, y, z, levels=levels, cmap=colours, norm=norm, extend=extend, corner_mask=True, zorder=1.0)
-    ax.contour(x, y, z, levels=levels, colors="white", linewidths=0.4, corner_mask=True, zorder=1.1)
+    return levels, BoundaryNorm(levels, bands, extend=extend), ListedColormap(shades)
+
+
+def colour_bar(
+    ax: Axes, levels: Floats, norm: BoundaryNorm, colours: ListedColormap, title: str, unit: str
+) -> None:
+    """The bands' colours beside the axes."""
     assert ax.figure is not None
     bar = ax.figure.colorbar(
         ScalarMappable(norm, colours),

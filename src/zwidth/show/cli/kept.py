@@ -1,0 +1,97 @@
+"""Long runs whose results are kept on disk, so that they can be stopped and go on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.main import say
+from zwidth.show.cli.options import Command, named
+from zwidth.show.output import shown
+
+if TYPE_CHECKING:
+    from zwidth.study.job import Job
+    from zwidth.study.store import Store
+
+
+class Stopped(Exception):
+    """A run that could not be finished, through no fault of what was asked; the text says why."""
+
+
+def kept_options(command: Command) -> Command:
+    """Give a command `--resume` and `--workers`."""
+    options: list[Callable[[Any], Any]] = [
+        click.option(
+            "--resume", metavar="FOLDER", callback=named, help="Keep what is done here, and go on from it."
+        ),
+        click.option(
+            "--workers",
+            type=click.IntRange(min=1),
+            metavar="N",
+            help="Processes at most that compute a long run. Default: one for each core.",
+        ),
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def opened(job: Job, beside: Path | None, resume: str | None) -> Store | None:
+    """Where a job's results are kept: in a folder of the user's, or beside the file that is written; else nowhere.
+
+    Raises  BadInput  where there is no room, or something else is there
+    """
+    from zwidth.study.store import Store, StoreError
+
+    if resume is None and beside is None:
+        return None
+    path = Path(resume) if resume is not None else _progress(beside)
+    try:
+        return Store(path, job)
+    except StoreError as error:
+        raise BadInput(str(error)) from None
+    except OSError as error:
+        raise BadInput(_unwritable(path, error)) from None
+
+
+def _progress(beside: Path | None) -> Path:
+    assert beside is not None
+    return beside.with_name(beside.name + ".progress")
+
+
+@contextmanager
+def keeping(store: Store | None) -> Iterator[None]:
+    """Run inside this block; says where the work is if it is stopped.
+
+    Raises  Stopped   where a process that computed is lost
+            BadInput  where the disk refuses
+    """
+    from zwidth.study.workers import WorkerLost
+
+    goes_on = (
+        ""
+        if store is None
+        else f"{shown(str(store.path))} keeps what is done; the same command goes on from there"
+    )
+    try:
+        yield
+    except KeyboardInterrupt:
+        if store is not None and store.batch is not None:
+            say(f"zwidth: {goes_on}")
+        raise
+    except WorkerLost as error:
+        raise Stopped("; ".join(filter(None, (str(error), goes_on)))) from None
+    except OSError as error:
+        if store is None:
+            raise
+        raise BadInput(_unwritable(store.path, error)) from None
+
+
+def _unwritable(path: Path, error: OSError) -> str:
+    reason = error.strerror or str(error)
+    return f"{shown(str(path))}: cannot be written: {reason[:1].lower() + reason[1:]}; name another folder"

@@ -1,0 +1,318 @@
+"""Many designs of one device: curves, heat maps, parallel coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import AutoLocator
+from numpy.typing import NDArray
+
+from zwidth.measures.measure import FAILED, NO_VALUE, OUT_OF_REACH, SINGULAR, STATUS, UNDECIDED
+from zwidth.show.figures.map import MARKS, bands_of, colour_bar, printed
+from zwidth.show.figures.parallel import draw_parallel
+from zwidth.show.figures.style import BLACK, GREY, LINES, context, figure, label
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = NDArray[np.float64]
+
+SYMBOLS: Final = {OUT_OF_REACH: "x", SINGULAR: "+", NO_VALUE: "o", UNDECIDED: "d", FAILED: "v"}
+MOST_PANELS: Final = 12
+POINTS: Final = ("o", "s", "^", "D", "v", "P")
+MARKED: Final = 40  # points up to which each is marked
+FOOT: Final = 0.045  # of the height of a panel, for each line that has gaps
+LETTERS: Final = 34  # of a label along the height of a panel
+
+
+def study_figure(dataset: xr.Dataset) -> Figure:
+    """A study's figure, chosen by the axes it has.
+
+    One axis, or one and a few texts such as assemblies: curves over it, a panel for each column. Two axes of
+    numbers: heat maps. All else, and what a Latin hypercube has found: parallel coordinates.
+
+    dataset  as `study.sweep_data` makes it
+    """
+    names = [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
+    numeric, texts = _kinds(dataset, names)
+    lines = int(np.prod([dataset.sizes[key] for key in texts]))
+    if dataset[names[0]].dims == ("design",):
+        return _parallel(dataset, names)
+    if len(numeric) <= 1 and (lines if numeric else lines / dataset.sizes[texts[0]]) <= len(LINES):
+        return _curves(dataset, names, numeric[0] if numeric else texts[0])
+    if len(numeric) == 2 and lines * len(names) <= MOST_PANELS and min(dataset.sizes[k] for k in numeric) > 1:
+        return _heat_maps(dataset, names, numeric, texts)
+    return _parallel(dataset, names)
+
+
+def _kinds(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The axes of numbers, and those of texts."""
+    axes = [str(dim) for dim in dataset[names[0]].dims]
+    numeric = [key for key in axes if dataset[key].dtype.kind in "if"] if axes != ["design"] else []
+    return numeric, [key for key in axes if key not in numeric]
+
+
+# --- curves -----------------------------------------------------------------------------------------
+
+
+def _curves(dataset: xr.Dataset, names: Sequence[str], along: str) -> Figure:
+    others = [str(dim) for dim in dataset[names[0]].dims if dim != along]
+    lines = 1 if not others else int(np.prod([dataset.sizes[key] for key in others]))
+    drawing, panels = _panels(5.8, 0.9 + 0.17 * lines + 2.1 * len(names), len(names), 1, len(names))
+    found: dict[int, None] = {}
+    for panel, name in zip(panels, names, strict=True):
+        found |= dict.fromkeys(draw_curves(panel, dataset, name, along))
+        if panel is not panels[-1]:
+            panel.sharex(panels[-1])
+            panel.tick_params(labelbottom=False)
+            panel.set_xlabel("")
+    numeric = dataset[along].dtype.kind in "if"
+    handles = list(_line_handles(dataset, others, lines=numeric))
+    _legend_above(panels[0], handles, [_symbol(status) for status in sorted(found)])
+    return drawing
+
+
+def _panels(width: float, height: float, rows: int, columns: int, count: int) -> tuple[Figure, list[Axes]]:
+    """A figure with so many axes, row after row."""
+    drawing, ax = figure(width, height)
+    grid = drawing.add_gridspec(rows, columns)
+    ax.set_subplotspec(grid[0])
+    with context():
+        return drawing, [ax, *(drawing.add_subplot(grid[n]) for n in range(1, count))]
+
+
+def draw_curves(ax: Axes, dataset: xr.Dataset, name: str, along: str) -> list[int]:
+    """One column over one axis, a line for each combination of the others; gaps where there is no value.
+
+    Returns  the statuses that are marked at the foot of the axes, where designs have no value
+    """
+    column, status = dataset[name], dataset[f"{name}_status"]
+    others = [str(dim) for dim in column.dims if dim != along]
+    numeric = dataset[along].dtype.kind in "if"
+    x = dataset[along].values if numeric else np.arange(dataset.sizes[along])
+    lost: list[tuple[str, NDArray[np.uint8]]] = []
+    for n, chosen in enumerate(_combinations(dataset, others)):
+        y = np.asarray(column.sel(chosen).transpose(along).values, dtype=float)
+        style = _line(n) if numeric else _point(n)
+        if numeric and len(x) <= MARKED:
+            style |= {"marker": "o", "markersize": 3.2}
+        ax.plot(x, np.where(np.isfinite(y), y, np.nan), zorder=2.0 + 0.01 * n, **style)
+        here = status.sel(chosen).transpose(along).values
+        if np.isin(here, list(SYMBOLS)).any():
+            lost.append((style["color"], here))
+    _draw_lost(ax, x, lost)
+    if not np.isfinite(column.values).any():
+        ax.set_yticks([])
+    _name_column(ax, column)
+    _name_axis(ax, "x", dataset[along])
+    return [kind for kind in SYMBOLS if any((here == kind).any() for _, here in lost)]
+
+
+class _From(AutoLocator):
+    """Ticks from a value upwards: what stands below it is no number."""
+
+    def __init__(self, low: float) -> None:
+        super().__init__()
+        self.low = low
+
+    def tick_values(self, vmin: float, vmax: float) -> Any:
+        return [value for value in super().tick_values(vmin, vmax) if value >= self.low]
+
+
+def _draw_lost(ax: Axes, x: NDArray[Any], lost: Sequence[tuple[str, NDArray[np.uint8]]]) -> None:
+    """A row of symbols for each line that has gaps, below all lines."""
+    if not lost:
+        return
+    low, high = ax.get_ylim()
+    foot = FOOT * (len(lost) + 0.5)
+    ax.set_ylim(low - (high - low) * foot / (1.0 - foot), high)
+    ax.yaxis.set_major_locator(_From(low))
+    ax.axhline(low, color=GREY, linewidth=0.5)
+    for row, (colour, here) in enumerate(lost):
+        for kind, symbol in SYMBOLS.items():
+            ax.plot(
+                x[here == kind],
+                np.full(int((here == kind).sum()), FOOT * (row + 0.75)),
+                symbol,
+                color=colour,
+                markersize=4.0,
+                markerfacecolor="none",
+                markeredgewidth=0.9,
+                transform=ax.get_xaxis_transform(),
+                zorder=3.0,
+            )
+
+
+def _name_column(ax: Axes, column: Any) -> None:
+    title = "\n".join(wrap(str(column.attrs["title"]), LETTERS - 6, break_long_words=False))
+    unit = printed(str(column.attrs["unit"]))
+    if unit:
+        label(ax.yaxis, title, unit)
+    else:
+        ax.set_ylabel(title)
+
+
+def _name_axis(ax: Axes, which: str, coordinate: Any) -> None:
+    """An axis by its key, in SI units, or by its texts."""
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    key = str(coordinate.attrs.get("long_name", coordinate.name))
+    if coordinate.dtype.kind not in "if":
+        places = list(range(len(coordinate)))
+        axis.set_ticks(places, [str(value) for value in coordinate.values])
+        axis.set_label_text(key)
+        return
+    if coordinate.attrs.get("scale") == "log":
+        (ax.set_xscale if which == "x" else ax.set_yscale)("log")
+        unit = str(coordinate.attrs["units"])
+        axis.set_label_text(f"{key} [{printed(unit)}]" if unit else key)
+    elif unit := printed(str(coordinate.attrs["units"])):
+        label(axis, key, unit, plain=True)
+    else:
+        axis.set_label_text(key)
+
+
+def _combinations(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[dict[str, Any]]:
+    for values in product(*(dataset[key].values for key in keys)):
+        yield dict(zip(keys, values, strict=True))
+
+
+def _line_handles(dataset: xr.Dataset, keys: Sequence[str], *, lines: bool) -> Iterator[Line2D]:
+    for n, chosen in enumerate(_combinations(dataset, keys) if keys else ()):
+        yield Line2D([], [], label=_said(chosen), **(_line(n) if lines else _point(n)))
+
+
+def _line(n: int) -> dict[str, Any]:
+    colour, dashes = LINES[n % len(LINES)]
+    return {"color": colour, "linestyle": dashes}
+
+
+def _point(n: int) -> dict[str, Any]:
+    """A point among texts: larger and larger open ones, so that those that coincide are seen."""
+    colour, _ = LINES[n % len(LINES)]
+    filled = {} if n == 0 else {"markerfacecolor": "none"}
+    return {"color": colour, "linestyle": "none", "marker": POINTS[n], "markersize": 4.0 + 2.0 * n, **filled}
+
+
+def _said(chosen: dict[str, Any]) -> str:
+    return ", ".join(
+        f"{key} {value}" if isinstance(value, str) else f"{key} {value:.4g}" for key, value in chosen.items()
+    )
+
+
+def _symbol(status: int) -> Line2D:
+    style: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none", "markersize": 4.5, "color": BLACK}
+    return Line2D([], [], marker=SYMBOLS[status], label=STATUS[status], **style)
+
+
+def _legend_above(ax: Axes, lines: list[Any], marks: list[Any]) -> None:
+    handles = [*lines, *marks]
+    if not handles:
+        return
+    made = ax.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.02),
+        ncols=3 if max(len(str(handle.get_label())) for handle in handles) < 24 else 1,
+        borderaxespad=0.0,
+        handlelength=2.6,
+        columnspacing=1.6,
+        fontsize=8.0,
+        frameon=False,
+        alignment="left",
+    )
+    made.set_zorder(6.0)
+
+
+# --- heat maps --------------------------------------------------------------------------------------
+
+
+def _heat_maps(dataset: xr.Dataset, names: Sequence[str], axes: Sequence[str], texts: Sequence[str]) -> Figure:
+    choices = list(_combinations(dataset, texts))
+    wide = len(choices) if len(choices) > 1 else min(2, len(names))
+    high = len(names) if len(choices) > 1 else -(-len(names) // wide)
+    each = [(name, chosen) for name in names for chosen in choices]
+    drawing, panels = _panels(4.3 * wide + (0.9 if wide == 1 else 0.0), 3.1 * high + 0.5, high, wide, len(each))
+    found: dict[int, None] = {}
+    for panel, (name, chosen) in zip(panels, each, strict=True):
+        values = np.asarray(dataset[name].values, dtype=float)
+        found |= dict.fromkeys(draw_heat_map(panel, dataset.sel(chosen), name, axes[0], axes[1], values))
+        if chosen:
+            panel.set_title(_said(chosen), loc="left")
+    handles = [_patch(status) for status in sorted(found)]
+    if handles:
+        drawing.legend(
+            handles=handles, loc="outside upper left", ncols=4, fontsize=8.0, frameon=False, borderaxespad=0.4
+        )
+    return drawing
+
+
+def draw_heat_map(
+    ax: Axes, dataset: xr.Dataset, name: str, first: str, second: str, scale: Floats | None = None
+) -> list[int]:
+    """One column over two axes of numbers, a cell for each design; hatched where there is no value.
+
+    scale    values that the colours span; left out: those shown
+    Returns  the statuses that are hatched
+    """
+    x, y = (_edges(dataset[key]) for key in (first, second))
+    column = dataset[name].transpose(second, first)
+    values = np.asarray(column.values, dtype=float)
+    status = dataset[f"{name}_status"].transpose(second, first).values
+    scale = values if scale is None else scale
+    if np.isfinite(scale).any():
+        levels, norm, colours = bands_of(scale)
+        cells = np.ma.masked_where(np.isnan(values), values)
+        ax.pcolormesh(x, y, cells, norm=norm, cmap=colours, linewidth=0.0, rasterized=True)
+        title, unit = str(column.attrs["title"]), printed(str(column.attrs["unit"]))
+        colour_bar(ax, levels, norm, colours, title, unit)
+    marked = [kind for kind in _HATCHES if (status == kind).any()]
+    for kind in marked:
+        here = np.ma.masked_where(status != kind, np.ones(status.shape))
+        blank = ListedColormap(["white"])
+        ax.pcolor(x, y, here, cmap=blank, hatch=_HATCHES[kind], edgecolor=GREY, linewidth=0.0, zorder=1.5)
+    _name_axis(ax, "x", dataset[first])
+    _name_axis(ax, "y", dataset[second])
+    return marked
+
+
+_HATCHES: Final = {OUT_OF_REACH: "", **{kind: hatch for kind, (_, hatch) in MARKS.items()}}
+
+
+def _patch(status: int) -> Patch:
+    edge: dict[str, Any] = {"facecolor": "white", "edgecolor": GREY, "linewidth": 0.5}
+    return Patch(hatch=_HATCHES[status], label=STATUS[status], **edge)
+
+
+def _edges(coordinate: Any) -> Floats:
+    """Ends of the cells about an axis's values, halfway between them, by ratio where the axis is divided so."""
+    values = np.asarray(coordinate.values, dtype=float)
+    logarithmic = coordinate.attrs.get("scale") == "log" and bool((values > 0.0).all())
+    at = np.log(values) if logarithmic else values
+    inner = 0.5 * (at[1:] + at[:-1])
+    edges = np.concatenate([[at[0] - (inner[0] - at[0])], inner, [at[-1] + (at[-1] - inner[-1])]])
+    return np.asarray(np.exp(edges) if logarithmic else edges)
+
+
+# --- parallel coordinates ---------------------------------------------------------------------------
+
+
+def _parallel(dataset: xr.Dataset, names: Sequence[str]) -> Figure:
+    dims = [str(dim) for dim in dataset[names[0]].dims]
+    keys = dims if dims != ["design"] else _keys_of(dataset)
+    drawing, ax = figure(max(5.6, 1.25 * (len(keys) + len(names)) + 0.8), 4.3)
+    draw_parallel(ax, dataset, keys, names)
+    return drawing
+
+
+def _keys_of(dataset: xr.Dataset) -> list[str]:
+    """The axes of a Latin hypercube: its coordinates but the number, and what goes with them."""
+    return [str(key) for key in dataset.coords if key != "design" and dataset[key].attrs.get("role") == "axis"]

@@ -1,0 +1,276 @@
+"""`zwidth sweep`: designs, their values and what became of them; files, resuming, and everything refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from tests.cli.cli_run import found, refused, strict, zwidth
+from zwidth.study.store import Store
+from zwidth.study.study_file import read_study
+from zwidth.study.sweep import sweep_job
+
+PAGE = (Path(__file__).parents[2] / "docs" / "studies.md").read_text(encoding="utf-8")
+ZWIDTH = Path(sys.executable).with_name("zwidth")
+LENGTH, OTHER = "links.upper-right.length_m", "links.upper-left.length_m"
+STUDY = f"""
+device = "five-bar"
+measures = ["rigid_mass", "isotropy"]
+[[axis]]
+key = "{LENGTH}"
+range = [0.02, 0.18]
+count = 5
+tie = ["{OTHER}"]
+[[axis]]
+key = "assembly"
+values = ["elbows-out", "elbows-in"]
+"""
+SLOW = """
+from time import sleep
+from zwidth.measures.own import measure
+
+@measure(unit="s")
+def slow(place):
+    sleep(0.01)
+    with open("asked", "ab") as file:
+        file.write(b".")
+    return place.controller.sampling_period
+"""
+MANY = """
+device = "published-two-mass"
+measures = ["slow"]
+measures_file = "slow.py"
+[[axis]]
+key = "loop.sampling_period_s"
+range = [1e-3, 2e-3]
+count = {count}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "study.toml").write_text(STUDY)
+    (tmp_path / "slow.py").write_text(SLOW)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_designs_values_and_status(folder):
+    document = found("sweep", "study.toml")
+    assert len(document["designs"]) == len(document["values"]) == len(document["status"]) == 10
+    assert document["designs"][3] == {LENGTH: 0.06, OTHER: 0.06, "assembly": "elbows-in"}
+    assert document["status"][0] == {"rigid_mass": "out of reach", "isotropy": "out of reach"}
+    assert document["values"][0] == {"rigid_mass": None, "isotropy": None}
+    assert document["status"][9] == {"rigid_mass": "ok", "isotropy": "ok"}
+    shown = found(
+        "show", "five-bar", "--set", f"{LENGTH}=0.18", "--set", f"{OTHER}=0.18", "--assembly", "elbows-in"
+    )
+    assert document["values"][9]["rigid_mass"] == pytest.approx(shown["rigid_mass_kg"], rel=1e-12)
+    assert document["values"][9]["isotropy"] == pytest.approx(shown["isotropy"], rel=1e-12)
+    assert document["units"] == {"rigid_mass": "kg", "isotropy": None}
+    assert document["axes"][0]["tied"] == [OTHER]
+
+
+def test_what_people_read(folder):
+    ran = zwidth("sweep", "study.toml")
+    assert (ran.code, ran.err) == (0, "")
+    assert "5 x 2 designs over links.upper-right.length_m, assembly" in ran.out
+    assert ran.out.count("out of reach") == 4
+    text = STUDY.replace("count = 5", "count = 21") + "[optimise]\nbudget = 3\n"
+    (folder / "study.toml").write_text(text)
+    ran = zwidth("sweep", "study.toml")
+    assert "[optimise] is left aside" in ran.out
+    assert re.search(r"lowest +1\.\d+ at links\.upper-right\.length_m = 0\.18, assembly = elbows-", ran.out)
+    assert re.search(r"designs +\d+ ok, \d+ out of reach", ran.out)
+
+
+@pytest.mark.parametrize("kind", ["csv", "json", "nc", "mat", "zarr", "svg"])
+def test_files(folder, kind):
+    document = found("sweep", "study.toml", "--output", f"designs.{kind}")
+    path = folder / f"designs.{kind}"
+    assert sorted(p.name for p in folder.iterdir()) == sorted(["slow.py", "study.toml", path.name])
+    masses = np.array([value["rigid_mass"] for value in document["values"]], dtype=float).reshape(5, 2)
+    if kind == "csv":
+        rows = list(csv.DictReader(path.read_text().splitlines()))
+        assert [float(row["rigid_mass_kg"] or "nan") for row in rows] == pytest.approx(masses.ravel(), nan_ok=True)
+        assert {row["isotropy_status"] for row in rows} == {"ok", "out of reach"}
+        assert rows[3][OTHER] == "0.06"
+    elif kind == "json":
+        assert strict(path.read_text()) == document
+    elif kind in ("nc", "zarr"):
+        options = {"engine": "scipy"} if kind == "nc" else {"engine": "zarr", "consolidated": True}
+        with xr.open_dataset(path, **options) as dataset:
+            assert np.array_equal(dataset["rigid_mass"].values, masses, equal_nan=True)
+            assert list(dataset["assembly"].values.astype(str)) == ["elbows-out", "elbows-in"]
+            assert dataset["rigid_mass"].attrs["unit"] == "kg"
+            assert json.loads(dataset.attrs["study"])["measures"] == ["rigid_mass", "isotropy"]
+            assert dataset["isotropy_status"].values[0, 0] == 1
+    elif kind == "mat":
+        from scipy.io import loadmat
+
+        inside = loadmat(path)
+        assert np.array_equal(inside["rigid_mass"], masses, equal_nan=True)
+    else:
+        assert path.read_text().count("<svg") == 1
+
+
+def test_a_study_in_which_nothing_has_a_value(folder):
+    (folder / "study.toml").write_text(STUDY.replace("range = [0.02, 0.18]", "range = [0.01, 0.02]"))
+    ran = zwidth("sweep", "study.toml", "--json")
+    assert ran.code == 1
+    document = strict(ran.out)
+    assert document["reason"] == "no design has a value"
+    assert len(document["designs"]) == 10
+
+
+def test_everything_wrong_is_told_at_once(folder):
+    wrong = STUDY.replace("rigid_mass", "rigd_mass").replace(OTHER, "links.upper-left.lenght_m")
+    (folder / "study.toml").write_text(wrong)
+    assert [line.split(";")[0] for line in refused("sweep", "study.toml")] == [
+        "study.toml: measures.0: no measure is named 'rigd_mass'",
+        "study.toml: axis.0.tie.0: 'links.upper-left.lenght_m' is no key of a device file",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["none.toml"], "none.toml: no such file; give a study file"),
+        (["."], ".: is a directory; give a study file"),
+        (["study.toml", "--output", "a.txt"], "a.txt: must end in .png or .svg or .pdf"),
+        (["study.toml", "--output", "there.zarr"], "there.zarr: is there already; remove it, or name another"),
+        (["study.toml", "--workers", "0"], "0 is not in the range x>=1"),
+        (["study.toml", "--resume", "slow.py"], "slow.py: is not the store of a study; name another folder"),
+        (["study.toml", "--resume", "no/where"], "no/where"),
+        (["plant.toml"], "plant.toml: measures: isotropy speaks of a mechanism"),
+        (["large.toml"], "large.toml: 100000000000000 designs of 1 measures would take"),
+    ],
+)
+def test_what_is_refused(folder, words, said):
+    (folder / "there.zarr").mkdir()
+    axis = '[[axis]]\nkey = "plant.mass_kg.{0}.{0}"\nrange = [0.1, 0.2]\ncount = {1}\n'
+    head = 'device = "published-two-mass"\nmeasures = ["{}"]\n'
+    (folder / "plant.toml").write_text(head.format("isotropy") + axis.format(0, 3))
+    (folder / "large.toml").write_text(
+        head.format("stiffness_max") + axis.format(0, 10**7) + axis.format(1, 10**7)
+    )
+    before = {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    if words[-1] == "no/where":
+        (folder / "no").write_text("a file")
+        before[folder / "no"] = b"a file"
+    (line,) = refused("sweep", *words)
+    assert said in line
+    assert before == {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def kept_in(path):
+    return list(Store(path, sweep_job(read_study("study.toml"))).kept())
+
+
+def test_an_interrupted_run_goes_on_where_it_was(folder):
+    """Ctrl-C to the command itself, as the terminal sends it: to all its processes."""
+    (folder / "study.toml").write_text(MANY.format(count=200))
+    command = [ZWIDTH, "sweep", "study.toml", "--output", "designs.csv", "--workers", "2", "--json"]
+    running = subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    done, progress = folder / "designs.csv.progress" / "status" / "c", time.monotonic()
+    while len(list(done.glob("*/0"))) < 3 and time.monotonic() - progress < 30.0:
+        time.sleep(0.01)
+    os.killpg(running.pid, signal.SIGINT)
+    out, err = running.communicate(timeout=20)
+    assert (running.returncode, out) == (130, "")
+    assert "designs.csv.progress keeps what is done; the same command goes on from there" in err
+    assert "Traceback" not in err
+    kept = sum(len(cells.values) for _, cells in kept_in(folder / "designs.csv.progress"))
+    assert kept >= 3
+    before = (folder / "asked").stat().st_size
+    subprocess.run(command, cwd=folder, capture_output=True, check=True)
+    assert (folder / "asked").stat().st_size - before == 200 - kept + 3, "and three to see whether it can be asked"
+    assert not (folder / "designs.csv.progress").exists(), "what it kept is written"
+    rows = list(csv.DictReader((folder / "designs.csv").read_text().splitlines()))
+    assert [float(row["slow_s"]) for row in rows] == np.linspace(1e-3, 2e-3, 200).tolist()
+
+
+def test_a_folder_of_the_user_s_is_kept_and_another_study_begins_anew(folder):
+    (folder / "study.toml").write_text(MANY.format(count=4))
+    first = found("sweep", "study.toml", "--resume", "cells")
+    values = folder / "cells" / "values" / "c" / "3" / "0"
+    written = values.stat().st_mtime_ns
+    assert found("sweep", "study.toml", "--resume", "cells") == first
+    assert values.stat().st_mtime_ns == written, "nothing is computed again"
+    (folder / "study.toml").write_text(MANY.format(count=5))
+    assert len(found("sweep", "study.toml", "--resume", "cells")["values"]) == 5
+    (folder / "slow.py").write_text(SLOW.replace("sampling_period", "sampling_period + 1.0"))
+    assert found("sweep", "study.toml", "--resume", "cells")["values"][0]["slow"] == 1.001
+
+
+def test_a_lost_process_is_one_clear_line(folder):
+    text = SLOW.replace(
+        "sleep(0.01)", "import os; os.getpid() == int(os.environ['FIRST']) or os.kill(os.getpid(), 9)"
+    )
+    (folder / "slow.py").write_text(text)
+    (folder / "study.toml").write_text(MANY.format(count=40))
+    program = (
+        "import os, sys, zwidth.study.executor as e; os.environ['FIRST'] = str(os.getpid())\n"
+        "from zwidth.show.cli.main import run as command\n"
+        "def impatient(job, store, progress, workers, **more):\n"
+        "    return kept(job, store, progress, workers, patience=-1.0, **more)\n"
+        "kept, e.run = e.run, impatient\n"
+        "sys.exit(command(['sweep', 'study.toml', '--workers', '2', '--resume', 'cells']))\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True)
+    assert (ran.returncode, ran.stdout) == (70, "")
+    (line,) = ran.stderr.splitlines()
+    assert line.startswith("zwidth: a process that computed was killed (SIGKILL)")
+    assert line.endswith("cells keeps what is done; the same command goes on from there")
+
+
+# --- the page ---------------------------------------------------------------------------------------
+
+
+def blocks(language: str) -> list[str]:
+    found = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    return [text for kind, text in found if kind == language]
+
+
+@pytest.fixture
+def arms(folder):
+    (text,) = blocks("toml")
+    (folder / "arms.toml").write_text(text)
+    return folder
+
+
+def test_the_page_s_study_prints_what_the_page_says(arms):
+    ran = zwidth("sweep", "arms.toml")
+    assert (ran.code, ran.err) == (0, "")
+    (said,) = blocks("")
+    assert ran.out == said
+
+
+def test_the_page_s_python_runs(arms):
+    (program,) = blocks("python")
+    exec(compile(program, "studies.md", "exec"), {})
+
+
+def test_the_page_names_every_key():
+    from zwidth.study.asked import OVER
+    from zwidth.study.axes import CIRCUMSTANCES
+    from zwidth.study.study_schema import AxisSection, StudyFile, TieSection, WorkspaceSection
+
+    for section in (StudyFile, AxisSection, TieSection, WorkspaceSection):
+        for key in section.model_fields:
+            assert re.search(rf"\b{key}\b", PAGE), key
+    assert all(f"`{key}`" in PAGE for key in CIRCUMSTANCES)
+    assert all(f"`{key}(" in PAGE for key in OVER)
