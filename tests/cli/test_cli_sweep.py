@@ -95,6 +95,22 @@ def test_what_people_read(folder):
     assert re.search(r"designs +\d+ ok, \d+ out of reach", ran.out)
 
 
+def test_reasons_are_told_once_and_not_all_of_them(folder):
+    text = STUDY.replace(LENGTH, "links.distal-left.mass_kg").replace(
+        "range = [0.02, 0.18]", "range = [-0.9, 0.1]"
+    )
+    text = text.replace(f'tie = ["{OTHER}"]', "").replace("count = 5", "count = 11")
+    (folder / "study.toml").write_text(text)
+    ran = zwidth("sweep", "study.toml")
+    reasons = [line for line in ran.out.splitlines() if "designs failed" in line]
+    assert len(reasons) == 6
+    assert reasons[0].startswith(
+        "2 designs failed: mechanism.links.distal-left.mass_kg: must be at least 0, got -0.9"
+    )
+    assert "and 3 more reasons; --json or --output holds them" in ran.out
+    assert len(found("sweep", "study.toml")["notes"]) == 18
+
+
 @pytest.mark.parametrize("kind", ["csv", "json", "nc", "mat", "zarr", "svg"])
 def test_files(folder, kind):
     document = found("sweep", "study.toml", "--output", f"designs.{kind}")
@@ -197,7 +213,7 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     assert kept >= 3
     before = (folder / "asked").stat().st_size
     subprocess.run(command, cwd=folder, capture_output=True, check=True)
-    assert (folder / "asked").stat().st_size - before == 200 - kept + 3, "and three to see whether it can be asked"
+    assert (folder / "asked").stat().st_size - before == 200 - kept + 1, "and one to see whether it can be asked"
     assert not (folder / "designs.csv.progress").exists(), "what it kept is written"
     rows = list(csv.DictReader((folder / "designs.csv").read_text().splitlines()))
     assert [float(row["slow_s"]) for row in rows] == np.linspace(1e-3, 2e-3, 200).tolist()

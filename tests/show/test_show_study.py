@@ -199,3 +199,13 @@ def test_the_same_bytes_from_the_same_numbers(tmp_path):
 def test_names_of_uprights_fit_between_them():
     assert _lines("links.upper-right.length_m [m]") == "links.\nupper-right.\nlength_m [m]"
     assert _lines("Largest virtual stiffness [kN/m]") == "Largest virtual\nstiffness [kN/m]"
+
+
+def test_values_listed_in_any_order_are_drawn_in_theirs():
+    data = dataset("length_m", "period_s", columns=("mass",))
+    mixed = data.isel(length_m=[3, 0, 4, 1, 2], period_s=[1, 0, 3, 2])
+    meshes = [
+        next(c for c in drawn(study_figure(one))[0].collections if isinstance(c, QuadMesh))
+        for one in (data, mixed)
+    ]
+    assert np.array_equal(meshes[0].get_array(), meshes[1].get_array())

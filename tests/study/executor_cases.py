@@ -64,11 +64,17 @@ class Deadly(Roots):
 
 
 @dataclass
-class Refusing(Roots):
+class Talkative(Roots):
+    def compute(self, first, last):
+        print("talkative", flush=True)
+        return super().compute(first, last)
+
+
+@dataclass
+class Refusing(Talkative):
     def compute(self, first, last):
         if first <= 12 < last:
             raise MeasureError("cannot be asked")
-        print("talkative")
         return super().compute(first, last)
 
 

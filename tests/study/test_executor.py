@@ -11,7 +11,7 @@ import time
 import numpy as np
 import pytest
 
-from tests.study.executor_cases import LEFT_OUT, Deadly, Odd, Processes, Refusing, Roots, alike
+from tests.study.executor_cases import LEFT_OUT, Deadly, Odd, Processes, Refusing, Roots, Talkative, alike
 from zwidth.contact.room import TooLarge
 from zwidth.measures.measure import FAILED, MISSING, NO_VALUE, MeasureError, Note
 from zwidth.study.executor import MORE, merged, run
@@ -60,8 +60,11 @@ def test_what_a_job_raises_in_a_process_is_raised(capfd):
     with pytest.raises(MeasureError, match="cannot be asked"):
         run(Refusing(40), workers=2, batch=5, patience=NOW)
     out, err = capfd.readouterr()
-    assert out.count("talkative") <= 10, "what the processes print does not get between the replies"
+    assert out == 2 * "talkative\n", "what this one prints, before they start"
     assert "Traceback" not in err
+    found = run(Talkative(40), workers=2, batch=5, patience=NOW)
+    assert alike(found, Roots(40).compute(0, 40)), "what they print does not get between their replies"
+    assert capfd.readouterr().err.count("talkative") == 6
 
 
 def test_a_killed_process_is_one_clear_error_and_what_is_done_is_kept(tmp_path):
@@ -125,6 +128,7 @@ def test_ctrl_c_stops_at_once_and_leaves_no_process(tmp_path):
         pass
     children = subprocess.run(["pgrep", "-P", str(running.pid)], capture_output=True, text=True).stdout.split()
     assert len(children) == 2
+    assert running.pid not in {os.getpgid(int(child)) for child in children}, "ctrl-C is not for them"
     os.killpg(running.pid, signal.SIGINT)  # as the terminal does
     began = time.monotonic()
     _, err = running.communicate(timeout=20)

@@ -249,6 +249,7 @@ WRONG_AXES = [
     ({"key": LENGTH, **R, "count": 2.5}, "axis.0.count: must be a whole number, got 2.5"),
     ({"key": LENGTH, **R, "values": [1.0]}, "axis.0.values: stands beside a range"),
     ({"key": LENGTH, "values": [0.1], "count": 3}, "axis.0.count: is read with a range only"),
+    ({"key": LENGTH, "values": [0.1, 0.2, 0.1]}, "axis.0.values.2: 0.1 is listed already"),
     ({"key": LENGTH, "values": []}, "axis.0.values: must have at least 1 element"),
     ({"key": LENGTH, "range": [0.2, 0.1], "count": 3}, "axis.0.range: must be [lower, upper] with lower < upper"),
     ({"key": LENGTH, "range": [0.1, 0.1], "count": 3}, "axis.0.range: must be [lower, upper] with lower < upper"),

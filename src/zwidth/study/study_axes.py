@@ -74,6 +74,12 @@ def _filling(table: dict[str, Any], hypercube: bool) -> Iterator[Fault]:
     if span is not None and values is not None:
         yield (("values",), "stands beside a range; keep one of them")
     elif values is not None:
+        said = [repr(value) for value in values] if isinstance(values, list) else []
+        yield from (
+            (("values", n), f"{quote(values[n])} is listed already; remove it")
+            for n, text in enumerate(said)
+            if text in said[:n]
+        )
         for key in ("count", "scale"):
             if key in table:
                 yield ((key,), "is read with a range only; remove it")

@@ -294,14 +294,14 @@ def sweep_job(study: Study) -> SweepJob:
 
 def _check_measures(job: SweepJob) -> None:
     """Raises MeasureError where a measure can be asked of no design, as far as a few of them tell."""
-    refused: list[dict[str, str]] = []
+    refused: dict[str, str] = {}
+    pending = job.asked
     for number in sorted({0, job.count // 2, job.count - 1}):
         try:
             place = job.place(number)
         except _NoPlace:
             continue
-        refused.append(probe(job.asked, lambda measure: evaluate(measure, place)))  # noqa: B023
+        refused = probe(pending, lambda measure: evaluate(measure, place))  # noqa: B023
+        pending = tuple(one for one in pending if one.name in refused)
     if refused:
-        always = [name for name in refused[0] if all(name in others for others in refused)]
-        if always:
-            raise MeasureError("\n".join(f"{name} {refused[0][name]}" for name in always))
+        raise MeasureError("\n".join(f"{name} {why}" for name, why in refused.items()))

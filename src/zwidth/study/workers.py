@@ -189,6 +189,7 @@ def work() -> None:
                 reply = _error(error)
             sent.write(reply)
             sent.flush()
+            sys.stdout.flush()
     except (EOFError, BrokenPipeError):
         os._exit(0)  # whoever asked has gone, or has all he wants; nothing is left to be tidied up
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 KEYS: Final = ("designs", "values", "status", "notes")
 ZARR: Final = ".zarr"
 LISTED: Final = 12  # designs up to which all are listed
+REASONS: Final = 6  # told to people
 NONE: Final = "no design has a value"
 
 
@@ -157,9 +158,24 @@ def _pages(found: Sweep, document: dict[str, Any]) -> Iterator[Any]:
         for number, one in enumerate(found.job.asked):
             yield f"\n{one.title} ({one.name})"
             yield sheet(list(_rows(found, number)))
-    yield from document["notes"]
+    yield from _reasons(found)
     if "file" in document:
         yield f"written: {document['file']}"
+
+
+def _reasons(found: Sweep) -> Iterator[str]:
+    """Why designs have no value, once for all columns that say the same."""
+    from zwidth.study.sweep_data import sentence
+
+    told: dict[str, list[str]] = {}
+    for name, notes in zip(found.job.measures, found.cells.notes, strict=True):
+        for note in notes:
+            told.setdefault(sentence(found, note), []).append(name)
+    for reason, names in list(told.items())[:REASONS]:
+        every = len(names) == len(found.job.measures)
+        yield shown(reason if every else f"{', '.join(names)}: {reason}")
+    if len(told) > REASONS:
+        yield f"and {len(told) - REASONS} more reasons; --json or --output holds them"
 
 
 def _column(one: Any) -> str:

@@ -44,6 +44,8 @@ def study_figure(dataset: xr.Dataset) -> Figure:
     """
     names = [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
     numeric, texts = _kinds(dataset, names)
+    for key in numeric:  # values may be listed in any order
+        dataset = dataset.sortby(key)
     lines = int(np.prod([dataset.sizes[key] for key in texts]))
     if dataset[names[0]].dims == ("design",):
         return _parallel(dataset, names)
