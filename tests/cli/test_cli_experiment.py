@@ -23,6 +23,7 @@ from zwidth.show.experiment import numbers, sentences
 from zwidth.study.experiment import Experiment, MeasuredPoint, Plan
 
 FEW = ("--stiffnesses", 2, "--tips", 1)
+FEWEST = ("--stiffnesses", 1, "--tips", 0)
 DRY = """
 name = "dry"
 [plant]
@@ -67,7 +68,7 @@ def test_points_lie_on_the_exact_boundary_and_can_be_read_again(folder):
     with open("points.csv", newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [float(row["damping_Ns_per_m"]) for row in rows] == [point["damping_Ns_per_m"] for point in points]
-    again = found("experiment", TWO_MASS, *FEW, "--measured", "points.csv")["measured"]
+    again = found("experiment", TWO_MASS, *FEWEST, "--measured", "points.csv")["measured"]
     assert max(abs(p["deviation_Ns_per_m"]) for p in again) < 3e-3
 
 
@@ -79,7 +80,7 @@ def eigenvalue_edge(low, high):
 
 def test_own_points_are_held_against_the_exact_edge(folder):
     Path("own.csv").write_text(OWN)
-    document = found("experiment", TWO_MASS, *FEW, "--measured", "own.csv", "--output", "own.svg")
+    document = found("experiment", TWO_MASS, *FEWEST, "--measured", "own.csv", "--output", "own.svg")
     lower, upper, tip, free = document["measured"]
     assert lower["deviation_Ns_per_m"] == pytest.approx(2.6 - eigenvalue_edge(2.0, 3.0), abs=1e-6)
     assert upper["deviation_Ns_per_m"] == pytest.approx(20.7 - eigenvalue_edge(21.0, 22.0), abs=1e-6)
@@ -99,11 +100,12 @@ def test_own_points_are_held_against_the_exact_edge(folder):
     ],
 )
 def test_the_difference_is_explained_by_what_makes_it(folder, friction, step, says, says_not):
-    document = found("experiment", dry(folder, friction, step), *FEW)
+    asked = ("experiment", dry(folder, friction, step), *FEW, "--resume", "run.progress")
+    document = found(*asked)
     text = " ".join(document["explanation"])
     assert says in text
     assert says_not not in text
-    people = zwidth("experiment", dry(folder, friction, step), *FEW)
+    people = zwidth(*asked)
     assert says in " ".join(people.out.split())
 
 
@@ -134,7 +136,7 @@ def test_a_tip_far_off_is_named_before_edges_that_are_near_and_doubts_are_told()
 
 def test_a_run_that_takes_its_time_says_what_it_does(folder, monkeypatch):
     monkeypatch.setattr("zwidth.show.cli.progress.PATIENCE", 0.0)
-    ran = zwidth("experiment", TWO_MASS, *FEW)
+    ran = zwidth("experiment", TWO_MASS, *FEWEST)
     assert "looking for stable walls" in ran.err
     assert "looking" not in ran.out
 
@@ -147,14 +149,14 @@ def test_subjects_and_trials_give_bars(folder):
     assert lower["trials"] == 4
     assert lower["damping_low_Ns_per_m"] < lower["damping_Ns_per_m"] < lower["damping_high_Ns_per_m"]
     assert len({tuple(subject.values()) for subject in document["subjects"]}) == 2
-    assert found(*many, "--seed", 2)["points"] != document["points"] == found(*many)["points"]
+    assert found(*many, "--seed", 2)["points"] != document["points"]  # of one seed: see the interrupted run
     assert upper["damping_Ns_per_m"] > 10.0
 
 
 def test_an_interrupted_run_goes_on_where_it_was(folder):
     """Stopped by ctrl-C once something is on disk; the rest gives the same points bit for bit."""
     words = ["experiment", TWO_MASS, "--operator", "thesis-arm", "--stiffnesses", "1", "--tips", "0"]
-    words += ["--subjects", "6", "--trials", "3", "--output", "points.csv"]
+    words += ["--subjects", "3", "--trials", "3", "--output", "points.csv"]
     journal, command = folder / "points.csv.progress", [Path(sys.executable).with_name("zwidth"), *words]
     running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     give_up = time.monotonic() + 120.0
@@ -166,7 +168,7 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     assert "points.csv.progress keeps what is done" in err
     assert not (folder / "points.csv").exists()
     kept = journal.read_bytes()
-    assert 4 < kept.count(b"\n") < 38
+    assert 4 < kept.count(b"\n") < 20
     assert zwidth(*words).code == 0
     assert not journal.exists()
     resumed = (folder / "points.csv").read_bytes()
@@ -174,13 +176,18 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     assert (folder / "points.csv").read_bytes() == resumed
 
 
-def test_a_journal_of_ones_own_is_kept_and_a_changed_question_begins_anew(folder):
-    asked = ("experiment", TWO_MASS, *FEW, "--resume", "run.progress")
+def measured_again(*_):
+    raise AssertionError("measured again")
+
+
+def test_a_journal_of_ones_own_is_kept_and_a_changed_question_begins_anew(folder, monkeypatch):
+    asked = ("experiment", TWO_MASS, *FEWEST, "--resume", "run.progress")
     first = found(*asked)["points"]
     kept = Path("run.progress").read_bytes()
-    start = time.perf_counter()
-    assert found(*asked)["points"] == first
-    assert time.perf_counter() - start < 1.5
+    with monkeypatch.context() as patched:
+        for name in ("find_place", "measure_edges", "measure_tips"):
+            patched.setattr(f"zwidth.study.experiment.{name}", measured_again)
+        assert found(*asked)["points"] == first
     assert Path("run.progress").read_bytes() == kept
     assert found(*asked, "--disturbance", 0.002)["points"]
     assert Path("run.progress").read_bytes() != kept
