@@ -169,7 +169,8 @@ def test_walls_inside_are_stable_for_all_and_walls_outside_are_not(seed):
         assert radius < 1.0 + 1e-7 if shapely.contains_xy(region, K, B) else radius > 1.0 - 1e-7
 
 
-@pytest.mark.parametrize("seed", range(12))
+# the sixth has many arcs and takes longer than the others together
+@pytest.mark.parametrize("seed", [*range(6), pytest.param(6, marks=pytest.mark.slow), *range(7, 12)])
 def test_order_does_not_matter_and_more_members_never_help(seed):
     rng = np.random.default_rng(2000 + seed)
     base = random_loop(rng, ratios=(0.05, 0.3, 1.0), kind="chain")

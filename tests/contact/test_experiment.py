@@ -56,7 +56,7 @@ def test_the_published_plant_has_its_published_edges():
     assert tip[0].stiffness == pytest.approx(7133.8692938, rel=2e-5)
 
 
-SEEDS = [1, 6, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3, 5, 12, 14, 20, 25, 29, 33))]
+SEEDS = [14, 29, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3, 5, 6, 12, 20, 25, 33))]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
