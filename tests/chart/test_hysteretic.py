@@ -1,6 +1,7 @@
 """Loss factors: the sampled response by brute force, and the chart at its own edge."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,6 +19,13 @@ from zwidth.model.plant import Plant
 
 def with_loss(plant, factor):
     return replace(plant, damping=0.0 * plant.damping, hysteresis=factor * plant.stiffness)
+
+
+@cache
+def lossy(factor):
+    """The published masses with this loss factor, and their chart, made once for all tests."""
+    loop = Loop(with_loss(two_mass(0.2616, 0.0254, 15620.0), factor), Controller(0.00125))
+    return loop, hysteretic_chart(loop)
 
 
 def brute_force(loop, theta, aliases=30000):
@@ -50,8 +58,7 @@ def test_the_sampled_response_is_the_sum_over_all_aliases():
 
 @pytest.mark.parametrize("factor", [0.02, 0.1, 0.5])
 def test_the_tip_is_the_largest_stiffness_along_the_exact_curve(factor):
-    loop = Loop(with_loss(two_mass(0.2616, 0.0254, 15620.0), factor), Controller(0.00125))
-    chart = hysteretic_chart(loop)
+    loop, chart = lossy(factor)
     reference = Loop(viscous(loop.plant), loop.controller)
     (tip,) = chart.frequencies_at_stiffness_max
 
@@ -67,7 +74,7 @@ def test_the_tip_is_the_largest_stiffness_along_the_exact_curve(factor):
 def test_little_loss_is_like_dampers_that_lose_as_much_at_the_tip():
     plant = two_mass(0.2616, 0.0254, 15620.0)
     for factor, close in ((0.1, 4e-3), (0.01, 1e-3)):
-        chart = hysteretic_chart(Loop(with_loss(plant, factor), Controller(0.00125)))
+        _, chart = lossy(factor)
         rate = 2.0 * np.pi * chart.frequencies_at_stiffness_max[0]
         damped = replace(plant, damping=factor / rate * plant.stiffness)
         alike = stability_chart(Loop(damped, Controller(0.00125)), decay=False)
@@ -82,7 +89,7 @@ def test_little_loss_is_like_dampers_that_lose_as_much_at_the_tip():
 
 def test_filters_and_operators_go_with_a_loss_factor():
     bare = with_loss(two_mass(0.2616, 0.0254, 15620.0), 0.1)
-    plain = hysteretic_chart(Loop(bare, Controller(0.00125))).stiffness_max
+    plain = lossy(0.1)[1].stiffness_max
     filtered = hysteretic_chart(Loop(bare, Controller(0.00125, force_filter=Butterworth(2, 200.0)))).stiffness_max
     held = attach(bare, Operator(0.8, 580.0, 5.5, 10000.0, 5.0))
     assert filtered < 0.5 * plain

@@ -19,6 +19,15 @@ SLIPPERY = ("--set", "friction.coulomb_N=0.01")
 BOTH = (*ROUGH, *LIMITED, "--stiffness", "2600", "--damping", "0")
 
 
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    """What is predicted of everything at once, and the two files of it."""
+    folder = tmp_path_factory.mktemp("cycles")
+    table, plane = folder / "cycles.csv", folder / "plane.svg"
+    document = found("limit-cycles", ONE_MASS, *BOTH, "--no-simulation", "--output", table, "--plane", plane)
+    return document, table, plane
+
+
 def test_a_limited_force_holds_a_growing_vibration_as_predicted():
     document = found("limit-cycles", TWO_MASS, *WALL, *LIMITED)
     assert (document["verdict"], document["nonlinear"]) == ("unstable", ["the force limit"])
@@ -34,8 +43,8 @@ def test_a_limited_force_holds_a_growing_vibration_as_predicted():
     assert document["resting_limit_N_per_m"] is None
 
 
-def test_the_numbers_are_those_of_the_package():
-    document = found("limit-cycles", ONE_MASS, *BOTH, "--no-simulation")
+def test_the_numbers_are_those_of_the_package(both):
+    document, *_ = both
     settings = [word for word in (*ROUGH, *LIMITED) if word != "--set"]
     device = load(ONE_MASS, settings)
     expected = limit_cycles(Loop(device.plant(), device.controller), 2600.0, 0.0)
@@ -119,10 +128,8 @@ def test_a_simulation_that_vibrates_otherwise_is_said_to():
     assert "otherwise" not in zwidth("limit-cycles", TWO_MASS, *WALL, *LIMITED).out
 
 
-def test_files(tmp_path):
-    table, figure, plane = tmp_path / "cycles.csv", tmp_path / "growth.svg", tmp_path / "plane.svg"
-    words = ("limit-cycles", ONE_MASS, *BOTH, "--no-simulation")
-    document = found(*words, "--output", table, "--plane", plane)
+def test_files(both, tmp_path):
+    (document, table, plane), figure = both, tmp_path / "growth.svg"
     assert document["plane_file"] == str(plane)
     with table.open(newline="") as stream:
         rows = list(csv.DictReader(stream))
@@ -130,7 +137,7 @@ def test_files(tmp_path):
         cycle["amplitude_m"] for cycle in document["limit_cycles"]
     ]
     assert [row["stable"] for row in rows] == ["false", "true"]
-    found(*words, "--output", figure)
+    found("limit-cycles", TWO_MASS, *WALL, *LIMITED, "--no-simulation", "--output", figure)
     assert "<svg" in figure.read_text()
     assert "<svg" in plane.read_text()
 
