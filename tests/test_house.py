@@ -18,6 +18,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import zwidth
+from tests.cli.cli_run import zwidth as run_zwidth
 
 ROOT = Path(__file__).parent.parent
 SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -145,15 +146,15 @@ def said_of(line: str) -> list[str]:
 
 
 @pytest.mark.parametrize("line", typed("zwidth"))
-def test_a_command_of_the_readme_runs(line, tmp_path):
+def test_a_command_of_the_readme_runs(line, tmp_path, monkeypatch):
     (device,) = re.findall(r"^```toml\n(.*?)^```", text("README.md"), re.MULTILINE | re.DOTALL)
     (tmp_path / "my-paddle.toml").write_text(device)
-    zwidth_here = Path(sys.executable).with_name("zwidth")
-    done = subprocess.run([zwidth_here, *shlex.split(line)[1:]], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout
+    monkeypatch.chdir(tmp_path)
+    ran = run_zwidth(*shlex.split(line)[1:])
+    assert ran.code == 0, ran.err
+    assert ran.out
     for number in said_of(line):
-        assert number in done.stdout
+        assert number in ran.out
     outputs = re.findall(r"--output (\S+)", line)
     assert all((tmp_path / name).stat().st_size > 1000 for name in outputs)
 
