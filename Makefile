@@ -32,14 +32,12 @@ report: $(VENV)/.installed
 	@mkdir -p $(dir $(OUTPUT))
 	$(BIN)/zwidth report $(DEVICE) --output $(OUTPUT)
 
-# A cached kernel does not notice an edit in a function that it calls from another file.
-test: $(VENV)/.installed-test
-	@$(DROP_KERNELS)
-	$(BIN)/python -m pytest -n auto
+# Each worker takes its tests as they stand, so that what a file's tests share is computed once.
+test: $(VENV)/.kernels
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
-slow: $(VENV)/.installed-test
-	@$(DROP_KERNELS)
-	$(BIN)/python -m pytest -n auto -m slow
+slow: $(VENV)/.kernels
+	$(BIN)/python -m pytest -n auto --dist worksteal -m slow
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .
@@ -66,6 +64,13 @@ $(VENV)/.installed-test: $(VENV)/bin/python pyproject.toml constraints.txt
 	@echo 'Installing zwidth and its tests into $(VENV); the first time takes a few minutes.'
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	@touch $(VENV)/.installed $@
+
+# A cached kernel does not notice an edit in a function that it calls from another file: after any edit all are
+# dropped and, once for all workers, compiled anew.
+$(VENV)/.kernels: $(VENV)/.installed-test tests/compile_kernels.py $(shell find src -name '*.py' 2>/dev/null)
+	@$(DROP_KERNELS)
+	@$(BIN)/python tests/compile_kernels.py
+	@touch $@
 
 # The first interpreter of PYTHON that is new enough; venv, else virtualenv, else one sentence.
 $(VENV)/bin/python:
