@@ -11,7 +11,7 @@ from tests.model.model_cases import random_five_bar, spatial_arm
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.model.posture import Singular, reachable_positions, solve_posture
-from zwidth.study.plane import PlaneError, plane_of
+from zwidth.study.plane import PlaneError, plane_of, reach_of, rounded_outwards
 
 
 @pytest.fixture(scope="module")
@@ -69,13 +69,54 @@ def test_without_bounds_it_is_the_box_of_what_is_reached(planar):
     plane = plane_of(device, cells=(60, 60))
     span = 0.147 + 0.199  # both arms stretched
     for line in (plane.x, plane.y):
-        assert -span < line[0] < -0.95 * span
-        assert 0.95 * span < line[-1] < span
+        assert (line[0], line[-1]) == (-0.35, 0.35)
     # what is reached lies in a ring, and nearly all of the ring is reached
     radius = np.hypot(*np.moveaxis(plane.positions[..., :2], -1, 0))
     ok = solve_posture(device.mechanism, plane.positions, "elbows-out").status == 0
     assert not (ok & ((radius > span) | (radius < 0.199 - 0.147))).any()
     assert ok[(radius < 0.97 * span) & (radius > 0.08)].mean() > 0.99
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("make", [spatial_arm, random_five_bar])
+def test_the_default_range_holds_all_that_is_reached_and_little_more(planar, seed, make):
+    """Postures of which only the angles are known, the stretched ones among them, against the range."""
+    mechanism = make(np.random.default_rng(seed))
+    name = next(iter(mechanism.assemblies))
+    reach = reach_of(mechanism, name)
+    near = reachable_positions(mechanism, name)
+    rng = np.random.default_rng(seed)
+    size = float(np.abs(near).max())
+    goals = near[rng.integers(0, len(near), 4000)] + 0.1 * size * rng.standard_normal((4000, 3))
+    if len(mechanism.drives.names) == 2:
+        goals = goals - np.outer((goals - near[0]) @ (0, 0, 1), (0, 0, 1))
+    found = goals[solve_posture(mechanism, goals, name).status == 0]
+    assert len(found) > 500
+    for axis in np.eye(3):
+        low, high = reach.extent(axis)
+        along = found @ axis
+        assert low - 1e-12 <= along.min()
+        assert along.max() <= high + 1e-12
+        assert high - low <= 1.25 * np.ptp(along) + 1e-12
+
+
+def test_coordinates_are_the_decimals_that_are_meant(planar):
+    x = plane_of(planar, x=(-0.3, 0.3), y=(0.1, 0.2), cells=(41, 4))
+    assert x.x.tolist() == [round(-0.3 + 0.015 * i, 3) for i in range(41)]
+    assert x.y.tolist() == [0.1, (0.1 * 2 + 0.2) / 3, (0.1 + 0.2 * 2) / 3, 0.2]  # thirds are no decimals
+    tiny = plane_of(planar, x=(-3e-7, 3e-7), cells=(41, 2)).x.tolist()
+    assert tiny == [float(f"{-300 + 15 * i}e-9") for i in range(41)]
+    assert plane_of(planar, x=(-3e6, 3e6), cells=(41, 2)).x.tolist() == [-3e6 + 15e4 * i for i in range(41)]
+
+
+@pytest.mark.parametrize(("low", "high"), [(-0.3459, 0.35), (-3.4e-4, 1.1e-3), (12.0, 3456.7), (-1e6, -1e6 + 7.3)])
+def test_what_is_left_out_is_rounded_outwards(low, high):
+    a, b = rounded_outwards(low, high)
+    step = 10.0 ** np.floor(np.log10(high - low)) / 20.0
+    assert a <= low < a + 1.001 * step
+    assert b - 1.001 * step < high <= b
+    for end in (a, b):
+        assert abs(end / step - round(end / step)) < 1e-6
 
 
 def test_a_tilted_planar_device_gets_its_own_plane(planar):
@@ -124,7 +165,7 @@ def test_what_is_reached_is_reached(spatial):
         ({"axes": (1, 0, 0, 0, 0, 0)}, "has no length"),
         ({"axes": (1, 0, 0)}, "six finite numbers"),
         ({"axes": "zx"}, "must be xy, xz, yz or six numbers"),
-        ({"through": (0, 0.25, 0.1)}, r"lies 0\.1 m beside it; it reaches x from -0\.341 to 0\.341 m"),
+        ({"through": (0, 0.25, 0.1)}, r"lies 0\.1 m beside it; it reaches x from -0\.346 to 0\.346 m"),
         ({"x": (0.1, 0.1)}, "range along x must be LOW,HIGH"),
         ({"y": (0.2, float("inf"))}, "range along y"),
         ({"cells": (1, 9)}, "at least two points"),

@@ -238,7 +238,7 @@ def test_questions_that_cannot_be_meant(device, asked, error, said):
 def test_a_plane_beside_the_workspace(device):
     plane = plane_of(device, x=(1.0, 1.1), y=(0.0, 1.0), cells=(4, 4))
     with pytest.raises(
-        PlaneError, match=r"reaches no point of this plane .*; it reaches x from -0\.341 to 0\.341 m"
+        PlaneError, match=r"reaches no point of this plane .*; it reaches x from -0\.346 to 0\.346 m"
     ):
         workspace_map(device, ["isotropy"], plane)
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil, floor, log10
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.device import Device
+from zwidth.model.arrays import pack
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import reachable_positions
+from zwidth.model.reach import Shell, shells
 
 Floats = NDArray[np.float64]
 
@@ -20,6 +23,9 @@ LONG_SIDE: Final = 81  # points along the longer side where nothing is said
 MOST: Final = 10**8  # points
 FLAT: Final = 1e-9  # share of its spread below which what a handle reaches is flat
 PARALLEL: Final = 1e-6  # sine of the angle below which two axes are one
+BETWEEN: Final = 0.08  # share of its extent by which what is reached may lie beyond the nearest known positions
+ROUND: Final = 20  # parts of a power of ten that ranges are rounded to
+DIGITS: Final = 14  # of coordinates, those of the longest counted
 
 
 class PlaneError(ValueError):
@@ -79,8 +85,8 @@ def plane_of(
     axes      "xy", "xz", "yz", or six numbers: two vectors in it, of which the second is made orthogonal to the
               first; left out: the plane that the handle cannot leave, or xy
     through   a point of it, x, y or x, y, z [m]; left out: the device's reference position
-    x, y      lowest and highest coordinate along both axes [m]; left out: the file's workspace, or the box of what
-              is reached
+    x, y      lowest and highest coordinate along both axes [m]; left out: the file's workspace, or a box around
+              what is reached, its ends rounded outwards
     cells     points along both; left out: 81 along the longer side, as many to the metre along the other
     Raises    PlaneError   for parallel axes, an empty range, fewer than two points, a plane that the handle meets
                            in a line at most
@@ -90,26 +96,52 @@ def plane_of(
     point = device.position(through)
     mechanism = device.mechanism
     assert mechanism is not None
-    reach = reachable_positions(mechanism, assembly or device.reference_assembly)
+    reach = reach_of(mechanism, assembly or device.reference_assembly)
     if len(mechanism.drives.names) < 2:
         raise PlaneError("the handle has one drive and moves along a curve; a map needs a device with two drives")
-    own = _own_normal(reach)
+    own = _own_normal(reach.positions)
     first, second, names = _axes(axes, own)
     _check_met(np.cross(first, second), point, own, reach)
     sides = (("x", x, first), ("y", y, second))
-    ranges = [_range(name, given, axis, mechanism, reach) for name, given, axis in sides]
+    ranges = [_range(name, given, axis, mechanism.workspace, reach) for name, given, axis in sides]
     nx, ny = _counts(cells, ranges)
     normal = np.cross(first, second)
     return Plane(first, second, (point @ normal) * normal, _line(*ranges[0], nx), _line(*ranges[1], ny), names)
 
 
-def reached(reach: Floats) -> str:
-    """What a handle reaches, for people: the box of positions (K, 3)."""
-    low, high = reach.min(axis=0), reach.max(axis=0)
-    return ", ".join(
-        f"{axis} from {a:.3g} to {b:.3g} m" if b - a > FLAT else f"{axis} = {_short(a)} m"
-        for axis, a, b in zip("xyz", low, high, strict=True)
-    )
+@dataclass(frozen=True)
+class Reach:
+    """What a handle reaches: positions all over it, some way from its edge, and what the links' lengths allow.
+
+    positions  (K, 3) [m]
+    shells     no chain of links reaches out of its own
+    """
+
+    positions: Floats
+    shells: tuple[Shell, ...]
+
+    def extent(self, axis: Floats) -> tuple[float, float]:
+        """Lowest and highest coordinate along a unit vector (3,): at least what is reached, little more [m]."""
+        along = self.positions @ axis
+        low, high = float(along.min()), float(along.max())
+        margin = BETWEEN * (high - low)
+        allowed = [(float(shell.centre @ axis), shell.most) for shell in self.shells]
+        return (
+            max([low - margin, *(min(low, centre - most) for centre, most in allowed)]),
+            min([high + margin, *(max(high, centre + most) for centre, most in allowed)]),
+        )
+
+    def __str__(self) -> str:
+        boxed = zip("xyz", (self.extent(axis) for axis in np.eye(3)), strict=True)
+        return ", ".join(
+            f"{axis} from {a:.3g} to {b:.3g} m" if b - a > FLAT else f"{axis} = {_short(a)} m"
+            for axis, (a, b) in boxed
+        )
+
+
+def reach_of(mechanism: Mechanism, assembly: str | None) -> Reach:
+    """What an assembly reaches. Raises PostureError where it is singular throughout, or does not close."""
+    return Reach(reachable_positions(mechanism, assembly), tuple(shells(pack(mechanism), 0)))
 
 
 def _short(value: float) -> str:
@@ -163,39 +195,50 @@ def _vector(v: Floats) -> str:
     return "(" + ", ".join(f"{c:.6g}" for c in v) + ")"
 
 
-def _check_met(normal: Floats, point: Floats, own: Floats | None, reach: Floats) -> None:
+def _check_met(normal: Floats, point: Floats, own: Floats | None, reach: Reach) -> None:
     """Raises PlaneError where a handle that cannot leave its own plane meets this one in a line or nowhere."""
     if own is None:
         return
-    k = int(np.argmax(np.abs(own)))
+    known, k = reach.positions, int(np.argmax(np.abs(own)))
     aligned = bool(abs(own[k]) > 1.0 - PARALLEL**2)
     plane = next((n for n, axes in AXES.items() if aligned and k not in axes), "")
-    where = f"the plane {'xyz'[k]} = {_short(reach[0, k])} m" if aligned else f"the plane across {_vector(own)}"
+    where = f"the plane {'xyz'[k]} = {_short(known[0, k])} m" if aligned else f"the plane across {_vector(own)}"
     if np.linalg.norm(np.cross(normal, own)) > PARALLEL:
         hint = f"ask for --plane {plane}" if plane else "leave --plane out"
         raise PlaneError(f"the handle cannot leave {where}, and meets the plane asked for in a line; {hint}")
-    off = float(abs((point - reach[0]) @ own))
-    if off > FLAT * float(np.ptp(reach, axis=0).max()):
+    off = float(abs((point - known[0]) @ own))
+    if off > FLAT * float(np.ptp(known, axis=0).max()):
         raise PlaneError(
             f"the handle cannot leave {where}, and the plane asked for lies {off:.4g} m beside it; it reaches "
-            f"{reached(reach)}"
+            f"{reach}"
         )
 
 
 def _range(
-    name: str, given: Sequence[float] | None, axis: Floats, mechanism: Mechanism, reach: Floats
+    name: str, given: Sequence[float] | None, axis: Floats, bounds: Floats, reach: Reach
 ) -> tuple[float, float]:
     if given is not None:
         low, high = (float(value) for value in given)
         if not (np.isfinite([low, high]).all() and low < high):
             raise PlaneError(f"the range along {name} must be LOW,HIGH with LOW < HIGH, got {low:.6g},{high:.6g}")
         return low, high
-    bounds = mechanism.workspace
     if np.isnan(bounds[axis != 0.0]).any():
-        along = reach @ axis
-        return float(along.min()), float(along.max())
+        return rounded_outwards(*reach.extent(axis))
     ends = np.where(axis[:, None] != 0.0, axis[:, None] * bounds, 0.0)
     return float(ends.min(axis=1).sum()), float(ends.max(axis=1).sum())
+
+
+def rounded_outwards(low: float, high: float) -> tuple[float, float]:
+    """The range to the next twentieth of a power of ten that has room in it, such as -0.35 to 0.35.
+
+    >>> rounded_outwards(-0.3459, 0.35)
+    (-0.35, 0.35)
+    """
+    if not high > low:
+        return low, high
+    power = floor(log10(high - low))
+    per_metre = ROUND * 10.0**-power  # divided by, since its decimals are exact
+    return floor(low * per_metre + 1e-6) / per_metre, ceil(high * per_metre - 1e-6) / per_metre
 
 
 def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) -> tuple[int, int]:
@@ -214,6 +257,13 @@ def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) 
 
 
 def _line(low: float, high: float, count: int) -> Floats:
-    """Equidistant points, as symmetric about 0 as their ends are, to the last bit."""
+    """Equidistant points, as symmetric about 0 as their ends are, and the decimals that are meant: -0.15.
+
+    >>> _line(-0.3, 0.3, 9).tolist()
+    [-0.3, -0.225, -0.15, -0.075, 0.0, 0.075, 0.15, 0.225, 0.3]
+    """
     k = np.arange(count)
-    return np.asarray((low * k[::-1] + high * k) / (count - 1))
+    x = (low * k[::-1] + high * k) / (count - 1)
+    size = max(abs(low), abs(high))
+    decimal = np.round(x, DIGITS - 1 - floor(log10(size)))
+    return np.asarray(np.where(np.abs(decimal - x) <= 2.0 * np.spacing(size), decimal, x))

@@ -15,12 +15,11 @@ from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import OK, OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note
 from zwidth.measures.own import find_measure
 from zwidth.measures.place import Place, Wanted
-from zwidth.model.posture import reachable_positions
 from zwidth.study.executor import Progress, run
 from zwidth.study.job import Cells
 from zwidth.study.journal import fingerprint
 from zwidth.study.places import place_of
-from zwidth.study.plane import Plane, PlaneError, plane_of, reached
+from zwidth.study.plane import Plane, PlaneError, plane_of, reach_of
 from zwidth.study.worst import EXTREMES, along_extreme, sense
 
 if TYPE_CHECKING:
@@ -255,8 +254,8 @@ def _check_reached(job: MapJob, cells: Cells) -> None:
     mechanism = job.device.mechanism
     assert mechanism is not None
     assembly = job.assembly or job.device.reference_assembly
-    box = reached(reachable_positions(mechanism, assembly))
-    raise PlaneError(f"the handle reaches no point of this plane in assembly {assembly!r}; it reaches {box}")
+    reach = reach_of(mechanism, assembly)
+    raise PlaneError(f"the handle reaches no point of this plane in assembly {assembly!r}; it reaches {reach}")
 
 
 def _circumstances(job: MapJob) -> dict[str, Any]:
@@ -286,11 +285,3 @@ def _circumstances(job: MapJob) -> dict[str, Any]:
         **{key: value for key, value in wanted.items() if value is not None},
         "zwidth": __version__,
     }
-
-
-def failed_everywhere(dataset: xr.Dataset, name: str) -> str | None:
-    """Why no cell has a value; None where one has."""
-    if (dataset[f"{name}_status"].values == OK).any():
-        return None
-    notes = str(dataset[name].attrs["notes"]).splitlines()
-    return f"{name} has no value in any cell" + (f": {notes[0]}" if notes else "")
