@@ -8,7 +8,7 @@ can be set where the schema has them.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import deepcopy
 from typing import Any, Final
 
@@ -69,13 +69,28 @@ def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
 
     Raises DeviceError  if the schema has no such path, or a list no such element
     """
-    *outer, last = resolve(document, path)
+    return assign_all(document, [(path, value)])
+
+
+def assign_all(document: dict[str, Any], settings: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """A copy of the document with several values set in turn, each as by `assign`.
+
+    >>> assign_all({"loop": {"delay_s": 0.1}}, [("loop.sampling_period_s", 0.01), ("loop.delay_samples", 2.0)])
+    {'loop': {'sampling_period_s': 0.01, 'delay_samples': 2.0}}
+    """
     document = deepcopy(document)
+    for path, value in settings:
+        _set(document, path, value)
+    return document
+
+
+def _set(document: dict[str, Any], path: str, value: Any) -> None:
+    *outer, last = resolve(document, path)
     table: Any = document
     for step in outer:
         if isinstance(table, dict) and step not in table:
             if value is UNSET:
-                return document
+                return
             table[step] = {}
         table = table[step]
     if value is UNSET:
@@ -83,7 +98,7 @@ def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
             table.pop(int(last))
         else:
             table.pop(last, None)
-        return document
+        return
     table[last] = value
     tag, kinds = schema.kinds(tuple(outer))
     if tag == last == "method" and value in kinds:
@@ -92,7 +107,6 @@ def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     dropped = [key for key in _rivals(tuple(outer), last) if table.pop(key, UNSET) is not UNSET]
     if dropped:  # the table may now be of another kind, as a filter is that gets the other filter's key
         table.update((tag, kind) for kind, keys in kinds.items() if last in keys)
-    return document
 
 
 def unset(document: dict[str, Any], path: str) -> dict[str, Any]:

@@ -141,8 +141,7 @@ class SweepJob:
                 operator = self.operators[chosen["operator"]]
                 document = {k: v for k, v in document.items() if k != "operator"}
                 document |= {} if operator is None else {"operator": operator}
-            for path, value in own:
-                document = address.assign(document, path, value)
+            document = address.assign_all(document, own)
             # whether it can be put together shows where its posture is solved, which takes a tenth of the time
             self._last.update(key=key, device=from_document(document, self.label, put_together=True))
         return self._last["device"]  # type: ignore[no-any-return]
