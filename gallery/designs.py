@@ -13,9 +13,9 @@ import numpy as np
 from gallery.five_bar import SIDES, bundled
 from zwidth.device.device import Device
 from zwidth.device.load import load
+from zwidth.measures.catalogue import find_measure
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import Measured
-from zwidth.measures.own import find_measure
 from zwidth.measures.place import Place
 from zwidth.study.places import place_of
 

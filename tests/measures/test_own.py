@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from zwidth.device.load import load
+from zwidth.measures.catalogue import find_measure
 from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure
-from zwidth.measures.own import find_measure, load_measures, measure
+from zwidth.measures.own import load_measures, measure
 from zwidth.study.plane import plane_of
 from zwidth.study.workspace import map_job, workspace_map
 
@@ -148,7 +149,7 @@ def test_what_fails_fails_in_its_own_cells(write):
         "failed: returned 'much' instead of a number",
         "failed: returned None instead of a number",
         "failed: returned 1j instead of a number",
-        "failed: raised RuntimeError: ends the program (3)",
+        "failed: raised SystemExit: 3",
         "no value: has no value here",
     ):
         assert said in notes
@@ -178,6 +179,18 @@ def test_what_fails_fails_in_its_own_cells(write):
             "from zwidth.measures.own import measure\n@measure(better='more')\ndef mine(place):\n    return 1.0\n",
             r"my\.py:2 does not run: ValueError: a measure's better must be",
         ),
+        (
+            "from zwidth.measures.own import measure\n@measure\ndef mine(place):\n    return 1.0\n",
+            r"my\.py:2 does not run: ValueError: .* write @measure\(unit=\"kg\"\)",
+        ),
+        (
+            "from zwidth.measures.own import measure\n@measure(unit=3)\ndef mine(place):\n    return 1.0\n",
+            r"my\.py:2 does not run: ValueError: a measure's unit must be a text of one line, got 3",
+        ),
+        (
+            "from zwidth.measures.own import measure\n@measure(title='a\\nb')\ndef mine(place):\n    return 1.0\n",
+            r"a measure's title must be a text of one line, got 'a\\nb'",
+        ),
     ],
 )
 def test_a_file_that_cannot_be_used(write, text, said):
@@ -198,6 +211,14 @@ def test_the_nearest_name_may_be_a_user_s_own(write):
         find_measure("inertia_force", own)
     with pytest.raises(ValueError, match="no measure is named 'height'"):
         find_measure("height")
+
+
+def test_what_it_prints_does_not_stand_in_the_answer(write, capsys):
+    own = load_measures(write("print('loading')\n" + GOOD.replace("return ACC", "print('asked'); return ACC")))
+    device = load("five-bar")
+    workspace_map(device, ["inertial_force"], plane_of(device, cells=(3, 2)), own=own, workers=1)
+    said = capsys.readouterr()
+    assert (said.out, set(said.err.split())) == ("", {"loading", "asked"})
 
 
 def test_the_decorator_makes_a_measure():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Final
 
@@ -239,14 +240,19 @@ _MEASURES: Final = (
 MEASURES: Final = {measure.name: measure for measure in _MEASURES}
 
 
-def find_measure(name: str) -> Measure:
-    """The measure of that name. Raises ValueError, naming the nearest, if there is none.
+def find_measure(name: str, own: Mapping[str, Measure] | None = None) -> Measure:
+    """The measure of that name, a user's own or ours; the name may carry its unit.
 
-    >>> find_measure("stiffness_max").unit
-    'N/m'
+    own     measures of a user's own, by name (`own.load_measures`)
+    Raises  ValueError  naming the nearest, if there is none
+
+    >>> find_measure("stiffness_max").unit, find_measure("stiffness_max_N_per_m").name
+    ('N/m', 'stiffness_max')
     """
-    if name in MEASURES:
-        return MEASURES[name]
-    near = get_close_matches(name, MEASURES, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(MEASURES)}"
+    known = {**MEASURES, **(own or {})}
+    with_unit = {one.key: one for one in known.values()}
+    if name in known or name in with_unit:
+        return known.get(name) or with_unit[name]
+    near = get_close_matches(name, known, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
     raise ValueError(f"no measure is named {name!r}; {hint}")

@@ -26,6 +26,7 @@ from zwidth.measures.place import Place
 from zwidth.model.reduction import ModelError
 
 NUMBERS = "biuf"  # kinds of arrays that are numbers: bool, signed, unsigned, floating
+FAILURES = (Exception, SystemExit)  # a user's own measure that ends the program has failed, and nothing else has
 NONE = (NoValueError, ModelError, UnmovedError, HysteresisError, NonlinearError)
 
 
@@ -42,7 +43,7 @@ def evaluate(measure: Measure, place: Place) -> Measured:
         found = measure.compute(place)
     except MeasureError:
         raise
-    except Exception as error:  # of a user's own measure, too
+    except FAILURES as error:
         return _everywhere(place, FAILED, _said(error))
     if isinstance(found, Measured):
         return found
@@ -51,14 +52,14 @@ def evaluate(measure: Measure, place: Place) -> Measured:
         return _everywhere(place, FAILED, f"returned an array of shape {values.shape} for places of {place.shape}")
     if values.dtype.kind not in NUMBERS:
         return _everywhere(place, FAILED, f"returned {values.dtype} instead of numbers")
-    values = values.astype(np.float64)
-    return _with_status(values, place.status)
+    return measured(place, values.astype(np.float64))
 
 
-def _with_status(values: NDArray[np.float64], status: NDArray[np.uint8]) -> Measured:
-    none = (status == OK) & np.isnan(values)
-    status = np.where(none, NO_VALUE, status).astype(np.uint8)
-    notes = (_note(none, NO_VALUE, "has no value here"),) if none.any() else ()
+def measured(place: Place, values: NDArray[np.float64], reason: str = "has no value here") -> Measured:
+    """Values with the places' status; NO_VALUE with a reason where they are nan though the place is OK."""
+    none: NDArray[np.bool_] = np.asarray((place.status == OK) & np.isnan(values))
+    status = np.where(none, NO_VALUE, place.status).astype(np.uint8)
+    notes = (_note(none, NO_VALUE, reason),) if none.any() else ()
     return Measured(np.where(status == OK, values, np.nan), status, notes)
 
 
@@ -104,7 +105,7 @@ def answered(ask: Callable[[], Any]) -> tuple[float, int, str]:
         return float("nan"), NO_VALUE, str(error)
     except ChartError as error:
         return float("nan"), UNDECIDED, str(error)
-    except Exception as error:
+    except FAILURES as error:
         return float("nan"), FAILED, _said(error)
     if value.shape != ():
         return float("nan"), FAILED, f"returned an array of shape {value.shape} instead of one number"
@@ -115,5 +116,5 @@ def answered(ask: Callable[[], Any]) -> tuple[float, int, str]:
     return float(value), OK, ""
 
 
-def _said(error: Exception) -> str:
+def _said(error: BaseException) -> str:
     return f"raised {type(error).__name__}: {str(error).splitlines()[0] if str(error) else 'without a word'}"

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -50,10 +50,8 @@ class Own:
 
     def __call__(self, place: Place) -> Any:
         measures = _measures(self.file, self.text)
-        try:
+        with redirect_stdout(sys.stderr):
             return measures[self.name].compute(place)
-        except SystemExit as error:  # a measure that ends the program has failed, and nothing else has
-            raise RuntimeError(f"ends the program ({error})") from None
 
     def __reduce__(self) -> tuple[Any, ...]:
         # a text that speaks of __main__ must not look like a function that only this process has
@@ -77,7 +75,9 @@ def measure(
     along   False: it does not depend on the rendered direction
     each    True: asked of one place at a time; False: of many at once, returning an array of their shape
     source  where its formula stands
-    Raises  ValueError  for another `better`
+    Raises  ValueError  for another `better`, and for texts that are none, or of more than one line
+
+    What it prints goes to standard error, as that of the file does: standard output is the answer's.
 
     >>> @measure(unit="kg")
     ... def moved_mass(place):
@@ -86,6 +86,11 @@ def measure(
     >>> moved_mass.name, moved_mass.title, moved_mass.unit
     ('moved_mass', 'Mass of links and rotors', 'kg')
     """
+    if callable(unit):
+        raise ValueError('@measure stands above a function with its unit: write @measure(unit="kg") or @measure()')
+    for key, text in (("unit", unit), ("title", title), ("source", source)):
+        if not isinstance(text, str) or not text.isprintable():
+            raise ValueError(f"a measure's {key} must be a text of one line, got {text!r}")
     if better not in BETTER:
         raise ValueError(f"a measure's better must be 'higher', 'lower' or None, got {better!r}")
 
@@ -122,23 +127,6 @@ def load_measures(path: str) -> dict[str, Measure]:
     }
 
 
-def find_measure(name: str, own: Mapping[str, Measure] | None = None) -> Measure:
-    """The measure of that name, a user's own or ours.
-
-    Raises  ValueError  naming the nearest, if there is none
-
-    >>> find_measure("stiffness_max").unit
-    'N/m'
-    """
-    known = {**MEASURES, **(own or {})}
-    with_unit = {one.key: one for one in known.values()}
-    if name in known or name in with_unit:
-        return known.get(name) or with_unit[name]
-    near = get_close_matches(name, known, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
-    raise ValueError(f"no measure is named {name!r}; {hint}")
-
-
 def _unpacked(file: str, text: bytes, name: str) -> Own:
     return Own(file, decompress(text).decode(), name)
 
@@ -157,7 +145,8 @@ def _run(file: Path, text: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[label] = module  # dataclasses look a function's module up
     try:
-        exec(compile(text, str(file), "exec"), module.__dict__)
+        with redirect_stdout(sys.stderr):
+            exec(compile(text, str(file), "exec"), module.__dict__)
     except (Exception, SystemExit) as error:
         del sys.modules[label]
         line = error.lineno if isinstance(error, SyntaxError) else _line(error, file)

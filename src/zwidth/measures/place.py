@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -117,16 +119,23 @@ class Place:
         assert self.direction is not None
         return effective_parameters(self.mechanism, self.placed, self.direction)
 
-    def at(self, *index: int) -> Place:
-        """One of the places, of shape ()."""
-        if self.posture is None:
-            return self
-        posture = Posture(
-            self.posture.assembly,
-            *(np.asarray(getattr(self.posture, name)[index]) for name in _OF_POSTURE),
-        )
+    def at(self, *index: int | NDArray[np.int64]) -> Place:
+        """One of the places, of shape (), or several, in any order and number; a plant has but one."""
+        return self if self.posture is None else self._posed(lambda array: array[index])
+
+    @property
+    def flat(self) -> Place:
+        """All places in one row. Raises MeasureError for a device given by its plant."""
+        axes = self.placed.status.ndim
+        return self._posed(lambda array: array.reshape(-1, *array.shape[axes:]))
+
+    def _posed(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Place:
+        """The places with every array of their postures changed in its leading axes, the directions alike."""
         assert self.direction is not None
-        return replace(self, posture=posture, direction=np.broadcast_to(self.direction, (*self.shape, 3))[index])
+        posture = self.placed
+        arrays = (np.asarray(change(np.asarray(getattr(posture, name)))) for name in _OF_POSTURE)
+        direction = change(np.broadcast_to(self.direction, (*self.shape, 3)))
+        return replace(self, posture=Posture(posture.assembly, *arrays), direction=direction)
 
     def towards(self, direction: ArrayLike) -> Place:
         """The same postures rendering another direction, unit vectors (..., 3)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import OK, Measure, Measured
 from zwidth.measures.place import Place
-from zwidth.model.posture import Posture
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,7 +41,7 @@ class Around:
         parts = []
         for first in range(0, max(1, len(which)), ROWS):
             rows = slice(first, first + ROWS)
-            there = taken(self.place, which[rows])
+            there = self.place.at(which[rows])
             parts.append(evaluate(self.measure, there.towards(self.directions(which[rows], components[rows]))))
         if len(parts) == 1:
             return parts[0]
@@ -58,29 +57,6 @@ class Around:
         return np.asarray(u / np.linalg.norm(u, axis=-1, keepdims=True))
 
 
-def taken(place: Place, which: Ints) -> Place:
-    """Some places of a flat one, in any order and number."""
-    assert place.posture is not None
-    assert place.direction is not None
-    numbers = {name: getattr(place.posture, name)[which] for name in _OF_POSTURE}
-    return replace(
-        place, posture=Posture(place.posture.assembly, **numbers), direction=np.asarray(place.direction)[which]
-    )
-
-
-def flat(place: Place) -> Place:
-    """The places in one row. Raises MeasureError for a device given by its plant: it has one direction only."""
-    posture = place.placed
-    assert place.direction is not None
-    count, axes = posture.status.size, posture.status.ndim
-    numbers = {
-        name: np.asarray(getattr(posture, name)).reshape(count, *getattr(posture, name).shape[axes:])
-        for name in _OF_POSTURE
-    }
-    direction = np.broadcast_to(place.direction, (*posture.status.shape, 3)).reshape(count, 3)
-    return replace(place, posture=Posture(posture.assembly, **numbers), direction=direction)
-
-
 def arounds(measure: Measure, place: Place) -> Iterator[tuple[Ints, Around]]:
     """Those places of a flat one that are OK, by their freedom to move: which they are, and how to ask there."""
     ok = np.flatnonzero(place.status == OK)
@@ -90,7 +66,7 @@ def arounds(measure: Measure, place: Place) -> Iterator[tuple[Ints, Around]]:
     freedom = (speeds > STILL * speeds[:, :1]).sum(axis=1)
     for r in np.unique(freedom):
         mine = np.flatnonzero(freedom == r)
-        some = taken(place, ok[mine])
+        some = place.at(ok[mine])
         basis = left[mine][:, :, :r]
         yield ok[mine], Around(measure, some, basis, _one_sided(measure, some, basis))
 
@@ -106,6 +82,3 @@ def _one_sided(measure: Measure, place: Place, basis: Floats) -> bool:
     with np.errstate(invalid="ignore"):
         apart = np.abs(there - back) > SAME * np.maximum(np.abs(there), np.abs(back))
     return bool((apart | (np.isnan(there) != np.isnan(back))).any())
-
-
-_OF_POSTURE: Final = ("position", "status", "angles", "mass_matrix", "jacobian", "closure_residual")

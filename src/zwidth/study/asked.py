@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.faults import listed, nearest
+from zwidth.measures.catalogue import find_measure
 from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure, Measured, MeasureError
 from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
-from zwidth.measures.own import find_measure
 from zwidth.study.whole import CONDITIONS
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.measures.catalogue import find_measure
 from zwidth.measures.measure import Measure
-from zwidth.measures.own import find_measure
 
 _FORM: Final = re.compile(r"\s*(?P<name>[^<>=\s]*)\s*(?P<sign>[<>=]*)\s*(?P<value>.*?)\s*")
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from zwidth.measures.measure import Measure
 from zwidth.measures.place import Place
-from zwidth.study.around import Around, Floats, Ints, arounds, flat
+from zwidth.study.around import Around, Floats, Ints, arounds
 from zwidth.study.requirement import Requirement
 
 Bools = NDArray[np.bool_]
@@ -62,7 +62,7 @@ def share_of_directions(requirement: Requirement, place: Place) -> Floats:
 
     Raises  MeasureError  for a device given by its plant
     """
-    row = flat(place)
+    row = place.flat
     share: Floats = np.full(row.shape, np.nan)
     for which, around in arounds(requirement.measure, row):
         r = around.basis.shape[2]

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.device import Device
+from zwidth.measures.catalogue import find_measure
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.measure import OK, OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note
-from zwidth.measures.own import find_measure
+from zwidth.measures.measure import OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note
 from zwidth.measures.place import Place, Wanted
 from zwidth.study.executor import Progress, run
 from zwidth.study.job import Cells

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import MISSING, OK, Measure, Measured, MeasureError, Note
 from zwidth.measures.place import Place
-from zwidth.study.around import Around, Floats, Ints, arounds, flat
+from zwidth.study.around import Around, Floats, Ints, arounds
 
 Extreme = Literal["worst", "best", "lowest", "highest"]
 EXTREMES: Final = ("worst", "best", "lowest", "highest")
@@ -52,13 +52,13 @@ def along_extreme(measure: Measure, place: Place, extreme: Extreme) -> Directed:
     Directions are those in which the handle can move. A direction and its opposite count as one unless the measure
     tells them apart; then both are asked. A place in which one direction has no value has no worst one; otherwise
     such directions are left out. Either is told in a note. The direction is found to 1e-5 rad, and so a smooth
-    measure's extreme to 1e-10 of its curvature; where a measure grows beyond bounds about a direction, as stiffness
-    does along a rigid drive, a very large number stands for it.
+    measure's extreme to 1e-10 of its curvature; where a measure grows beyond bounds about a direction, as
+    stiffness does along a rigid drive, a very large number stands for it.
 
     Raises  MeasureError  for a device given by its plant, or "worst" and "best" of a measure of which neither more
                           nor less is better
     """
-    row = flat(place)
+    row = place.flat
     if not measure.along:
         return Directed(evaluate(measure, place), np.full((*place.shape, 3), np.nan))
     goal = _Goal(sense(measure, extreme), extreme == "worst")

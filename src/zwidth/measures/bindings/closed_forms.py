@@ -11,7 +11,8 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from zwidth.conditions.assumptions import AT_ONCE, RIGID, SPRUNG, WHOLE
-from zwidth.measures.bindings.common import computer, measured, meets, reads_motors
+from zwidth.measures.bindings.common import computer, meets, reads_motors
+from zwidth.measures.evaluate import measured
 from zwidth.measures.impedance_range import ImpedanceRange, rigid_range, sprung_range
 from zwidth.measures.measure import Measured, MeasureError
 from zwidth.measures.place import Place

@@ -1,4 +1,4 @@
-"""What several measures ask of a place: the wanted wall and frequency, what its loop is like, reasons for nan."""
+"""What several measures ask of a place: the wanted wall and frequency, and what its loop is like."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.conditions.assumptions import COLLOCATED, PLAIN, Case, case_of
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.loop import Loop
 from zwidth.measures.felt import HandleError, handle_of
-from zwidth.measures.measure import NO_VALUE, OK, Measured, MeasureError, Note
-from zwidth.measures.place import Floats, Place
+from zwidth.measures.measure import MeasureError
+from zwidth.measures.place import Place
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
 
@@ -80,13 +79,3 @@ def reads_motors(place: Place) -> None:
     """Raises MeasureError for encoders behind the drives, which a model with its link side held cannot read."""
     if place.mechanism is not None and place.encoders == "link":
         raise MeasureError("speaks of motors that are read at the motors, and these encoders read the links")
-
-
-def measured(place: Place, values: Floats, reason: str) -> Measured:
-    """Values with the place's status, NO_VALUE with a reason where they are nan though the place is OK."""
-    none: NDArray[np.bool_] = np.asarray((place.status == OK) & np.isnan(values))
-    status = np.where(none, NO_VALUE, place.status).astype(np.uint8)
-    notes: tuple[Note, ...] = ()
-    if none.any():
-        notes = (Note(NO_VALUE, reason, int(none.sum()), tuple(int(i) for i in np.argwhere(none)[0])),)
-    return Measured(np.where(status == OK, values, np.nan), status, notes)

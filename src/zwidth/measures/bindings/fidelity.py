@@ -15,12 +15,12 @@ from zwidth.measures import felt, fidelity, structural
 from zwidth.measures.bindings.common import (
     computer,
     held_plant,
-    measured,
     meets,
     reads_motors,
     wanted_frequency,
     wanted_wall,
 )
+from zwidth.measures.evaluate import measured
 from zwidth.measures.measure import Measured, MeasureError, NoValueError
 from zwidth.measures.place import Place
 

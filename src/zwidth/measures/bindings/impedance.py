@@ -19,8 +19,8 @@ NO_WALL = "no wall with K > 0 and B >= 0 is stable"
 def stiffness_max(place: Place) -> Measured:
     """Supremum of K over the stable walls with K > 0, B >= 0, of the place's model and loop [N/m].
 
-    Postures of classically damped mechanisms go through compiled code together (`chart.stiffest`); what is in doubt
-    there, and what has no wall there, is asked by itself, as every other device is.
+    Postures of classically damped mechanisms go through compiled code together (`chart.stiffest`); what is in
+    doubt there, and what has no wall there, is asked by itself, as every other device is.
     """
     fast = _together(place)
     if fast is None:
@@ -57,7 +57,7 @@ def _largest(place: Place) -> float:
 
 
 def damping_max(place: Place) -> float:
-    """Supremum of B >= 0 that is stable for all sufficiently small K > 0, of one place; 0 if there is none [N s/m]."""
+    """Supremum of B >= 0 that is stable for all sufficiently small K > 0, of one place [N s/m]; 0 if none is."""
     return stability_chart(place.loop, decay=False).damping_max
 
 

@@ -164,7 +164,8 @@ def _measures(
     names: tuple[str, ...], file: str | None, texts: tuple[str, ...], share: str | None
 ) -> tuple[list[Measure], list[Requirement]]:
     """What to map, the first of them shown; and the requirements."""
-    from zwidth.measures.own import find_measure, load_measures
+    from zwidth.measures.catalogue import find_measure
+    from zwidth.measures.own import load_measures
     from zwidth.study.requirement import parse_requirement
     from zwidth.study.share import NAME, share_measure
 
