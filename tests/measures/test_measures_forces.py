@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 from scipy.optimize import linprog
 
 from tests.model.model_cases import random_rotation
-from zwidth.chart.polar import circle
 from zwidth.measures.forces import (
     acceleration_along,
     force_along,
@@ -18,7 +17,6 @@ from zwidth.measures.forces import (
     friction_along,
     joint_rates,
     resolution_along,
-    share_of_directions,
 )
 
 RNG = np.random.default_rng(5)
@@ -157,43 +155,3 @@ def test_a_direction_is_of_unit_length():
     ):
         with pytest.raises(ValueError, match="has length 2; divide it by its length"):
             call([0.0, 2.0, 0.0])
-
-
-# --- share of directions ----------------------------------------------------------------------------
-
-
-def test_share_of_directions_of_an_isotropic_device_and_of_a_known_ellipse():
-    """Largest velocity along u of J = diag(a, b): 1/|J^-1 u|, and c at a known angle."""
-    a, b, c = 0.3, 0.1, 0.2
-    directions = circle(20000)
-    radius = 1.0 / np.linalg.norm(directions[:, :2] / [a, b], axis=1)
-    # (cos/a)^2 + (sin/b)^2 = 1/c^2
-    sine = np.sqrt((1.0 / c**2 - 1.0 / a**2) / (1.0 / b**2 - 1.0 / a**2))
-    assert_allclose(share_of_directions(radius, c), 2.0 * np.arcsin(sine) / np.pi, atol=2e-4)
-    assert share_of_directions(radius, b * (1.0 - 1e-12)) == 1.0
-    assert share_of_directions(radius, a * (1.0 + 1e-12)) == 0.0
-    assert_allclose(share_of_directions(radius, c) + share_of_directions(radius, c, "lower"), 1.0, atol=1e-12)
-
-
-def test_share_of_directions_counts_those_without_a_value_as_not_met():
-    values = np.array([[1.0, np.nan, 3.0, 4.0], [np.nan] * 4])
-    for better, share in (("higher", 0.5), ("lower", 0.5)):
-        assert_allclose(share_of_directions(values, 3.0, better), [share, np.nan])
-    assert_allclose(share_of_directions(values, [4.0, 1.0]), [0.25, np.nan])
-    assert_allclose(share_of_directions(values.T, 3.0, axis=0), [0.5, np.nan])
-    assert_allclose(share_of_directions(values[0], 3.0, weights=[1.0, 1.0, 0.0, 2.0]), 0.5)
-
-
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        ({"better": "more"}, "better must be 'higher' or 'lower', got 'more'"),
-        ({"weights": [1.0, 1.0]}, "weights must be 3 numbers"),
-        ({"weights": [1.0, -1.0, 1.0]}, "none negative"),
-        ({"weights": [0.0, 0.0, 0.0]}, "not all 0"),
-        ({"weights": [1.0, np.nan, 1.0]}, "weights must be"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(more, words):
-    with pytest.raises(ValueError, match=words):
-        share_of_directions([1.0, 2.0, 3.0], 2.0, **more)

@@ -11,7 +11,7 @@ in these.
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -159,39 +159,6 @@ def joint_rates(jacobian: ArrayLike, direction: ArrayLike) -> tuple[Floats, NDAr
     q = (np.linalg.pinv(known) @ u[..., None])[..., 0]
     left = np.linalg.norm(u - (known @ q[..., None])[..., 0], axis=-1)
     return np.where(unknown[..., None], np.nan, q), np.asarray((left <= OFF) & ~unknown)
-
-
-def share_of_directions(
-    values: ArrayLike,
-    requirement: ArrayLike,
-    better: Literal["higher", "lower"] = "higher",
-    weights: ArrayLike | None = None,
-    axis: int = -1,
-) -> Floats:
-    """Share of the directions in which a measure meets a requirement.
-
-    values       (..., k)  the measure by direction; nan where it has no value, which does not meet anything
-    requirement  of it, broadcasting with the values without the axis of directions; met by equality, too
-    better       "higher": at least as much; "lower": at most
-    weights      (k,)      how much of all directions each stands for; None: all alike, as round a circle
-    axis         that of the directions
-    Returns      (...)     0 to 1; nan where no direction has a value
-    Raises       ValueError  for another word, or weights that are negative, all zero or not k
-
-    >>> float(share_of_directions([3.0, 5.0, 7.0, float("nan")], 5.0))
-    0.5
-    """
-    if better not in ("higher", "lower"):
-        raise ValueError(f"better must be 'higher' or 'lower', got {better!r}")
-    by_direction = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
-    k = by_direction.shape[-1]
-    w = np.ones(k) if weights is None else np.asarray(weights, dtype=np.float64)
-    if w.shape != (k,) or not np.all(w >= 0.0) or not 0.0 < w.sum() < np.inf:
-        raise ValueError(f"weights must be {k} numbers, none negative and not all 0, got {w.tolist()}")
-    wanted = np.asarray(requirement, dtype=np.float64)[..., None]
-    met = by_direction >= wanted if better == "higher" else by_direction <= wanted
-    share = (met * w).sum(axis=-1) / w.sum()
-    return np.asarray(np.where(np.isnan(by_direction).all(axis=-1), np.nan, share))
 
 
 def _felt(jacobian: ArrayLike, direction: ArrayLike) -> Floats:
