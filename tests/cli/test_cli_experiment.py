@@ -49,12 +49,20 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """The journal of the smallest experiment, for tests of what is made of its points."""
+    journal = tmp_path_factory.mktemp("experiment") / "run.progress"
+    found("experiment", TWO_MASS, *FEWEST, "--resume", journal)
+    return journal.read_bytes()
+
+
 def dry(folder, friction=0.02, step=0.0):
     (folder / "dry.toml").write_text(DRY.format(friction=friction, step=step))
     return "dry.toml"
 
 
-def test_points_lie_on_the_exact_boundary_and_can_be_read_again(folder):
+def test_points_lie_on_the_exact_boundary_and_can_be_read_again(folder, kept):
     document = found("experiment", TWO_MASS, *FEW, "--output", "points.csv")
     points = document["points"]
     assert [point["edge"] for point in points] == ["lower", "lower", "upper", "upper", "tip"]
@@ -68,7 +76,9 @@ def test_points_lie_on_the_exact_boundary_and_can_be_read_again(folder):
     with open("points.csv", newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [float(row["damping_Ns_per_m"]) for row in rows] == [point["damping_Ns_per_m"] for point in points]
-    again = found("experiment", TWO_MASS, *FEWEST, "--measured", "points.csv")["measured"]
+    Path("run.progress").write_bytes(kept)
+    resumed = ("--resume", "run.progress", "--measured", "points.csv")
+    again = found("experiment", TWO_MASS, *FEWEST, *resumed)["measured"]
     assert max(abs(p["deviation_Ns_per_m"]) for p in again) < 3e-3
 
 
@@ -78,9 +88,11 @@ def eigenvalue_edge(low, high):
     return brentq(lambda B: np.abs(np.linalg.eigvals(matrix(4000.0, B))).max() - 1.0, low, high, xtol=1e-12)
 
 
-def test_own_points_are_held_against_the_exact_edge(folder):
+def test_own_points_are_held_against_the_exact_edge(folder, kept):
     Path("own.csv").write_text(OWN)
-    document = found("experiment", TWO_MASS, *FEWEST, "--measured", "own.csv", "--output", "own.svg")
+    Path("run.progress").write_bytes(kept)
+    resumed = ("--resume", "run.progress", "--measured", "own.csv", "--output", "own.svg")
+    document = found("experiment", TWO_MASS, *FEWEST, *resumed)
     lower, upper, tip, free = document["measured"]
     assert lower["deviation_Ns_per_m"] == pytest.approx(2.6 - eigenvalue_edge(2.0, 3.0), abs=1e-6)
     assert upper["deviation_Ns_per_m"] == pytest.approx(20.7 - eigenvalue_edge(21.0, 22.0), abs=1e-6)
@@ -163,7 +175,7 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     while time.monotonic() < give_up and not (journal.is_file() and journal.read_bytes().count(b"\n") > 4):
         time.sleep(0.01)
     running.send_signal(signal.SIGINT)
-    _, err = running.communicate(timeout=60)
+    _, err = running.communicate(timeout=120)
     assert running.returncode == 130
     assert "points.csv.progress keeps what is done" in err
     assert not (folder / "points.csv").exists()
