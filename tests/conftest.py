@@ -1,17 +1,17 @@
-"""What holds for every test: no display, no deadline on a first compilation, and where asked no skips."""
+"""What holds for every test: no display, no deadlines, and where asked no skips."""
 
 from __future__ import annotations
 
 import os
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-# The first example of a test may compile a kernel. `settings()` keeps what hypothesis chose for this
-# machine: on continuous integration the examples are the same in every run.
-settings.register_profile("zwidth", parent=settings(), deadline=None)
+# The first example of a test may compile a kernel, and a busy machine draws examples slowly. `settings()` keeps
+# what hypothesis chose for this machine: on continuous integration the examples are the same in every run.
+settings.register_profile("zwidth", parent=settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("zwidth")
 
 NO_SKIPS = "ZWIDTH_NO_SKIPS"

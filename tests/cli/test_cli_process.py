@@ -15,7 +15,9 @@ import pytest
 from tests.cli.cli_run import TWO_MASS, strict
 
 ZWIDTH = Path(sys.executable).with_name("zwidth")
-HELP_WITHIN = 0.3  # seconds of a processor, which other work on the machine does not lengthen
+HELP_WITHIN = 0.3  # seconds of a processor
+AS_NUMPY = 2.0  # and on a machine for which that is nothing: times what numpy takes there to be imported
+PATIENT = 120.0  # seconds, for what takes one on a quiet machine
 HEAVY = {"numpy", "numba", "scipy", "matplotlib", "pydantic", "jinja2", "shapely"}
 
 
@@ -33,12 +35,15 @@ def processor_time():
 
 @pytest.mark.parametrize("words", [("--help",), ("devices",)])
 def test_the_command_starts_quickly(words):
-    times = []
+    times, measures = [], []
     for _ in range(5):
         before = processor_time()
         assert zwidth(*words).returncode == 0
-        times.append(processor_time() - before)
-    assert min(times) < HELP_WITHIN
+        between = processor_time()
+        subprocess.run([sys.executable, "-c", "import numpy"], check=True)
+        times.append(between - before)
+        measures.append(processor_time() - between)
+    assert min(times) < max(HELP_WITHIN, AS_NUMPY * min(measures))
 
 
 @pytest.mark.parametrize("words", [["--help"], ["chart", "--help"], ["devices", "--json"], ["chart"]])
@@ -85,7 +90,7 @@ def test_ctrl_c_while_reading(tmp_path):
     running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     with open(pipe, "w"):  # opens once the command reads
         running.send_signal(signal.SIGINT)
-        out, err = running.communicate(timeout=20)
+        out, err = running.communicate(timeout=PATIENT)
     assert running.returncode == 130
     assert (out, len(err.splitlines())) == ("", 1)
     assert "interrupted" in err
@@ -101,7 +106,7 @@ def test_ctrl_c_while_computing(tmp_path):
         stream.write("stiffness_N_per_m,damping_Ns_per_m\n" + "4000,10\n" * 400_000)
     time.sleep(0.5)
     running.send_signal(signal.SIGINT)
-    out, err = running.communicate(timeout=20)
+    out, err = running.communicate(timeout=PATIENT)
     assert running.returncode == 130
     assert (out, len(err.splitlines())) == ("", 1)
     assert verdicts.read_text() == "from before"
