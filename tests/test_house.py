@@ -142,7 +142,7 @@ def said_of(line: str) -> list[str]:
     page = text("README.md")
     beside = re.search(rf"^{re.escape(line)} +# (.*)$", page, re.MULTILINE)
     about = beside[1] if beside else page.partition("The third line ")[2] if "motor-right" in line else ""
-    return re.findall(r"[\d.]+ k?(?:N/m|Hz)", about.partition("\n\n")[0])
+    return re.findall(r"[\d.]+ k?(?:N/m|Hz|cm\^2)", about.partition("\n\n")[0])
 
 
 @pytest.mark.parametrize("line", typed("zwidth"))

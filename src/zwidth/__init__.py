@@ -150,6 +150,11 @@ if TYPE_CHECKING:
     from zwidth.study.robust import RobustError as RobustError
     from zwidth.study.robust import robust_study as robust_study
     from zwidth.study.sensitivity import sensitivities as sensitivities
+    from zwidth.study.store import Store as Store
+    from zwidth.study.study_file import Study as Study
+    from zwidth.study.study_file import read_study as read_study
+    from zwidth.study.sweep import Sweep as Sweep
+    from zwidth.study.sweep import sweep as sweep
     from zwidth.study.validity import validity as validity
     from zwidth.study.workspace import workspace_map as workspace_map
 
@@ -360,6 +365,9 @@ _HOME = {
         "robust_study",
     ),
     "study.sensitivity": ("sensitivities",),
+    "study.store": ("Store",),
+    "study.study_file": ("Study", "read_study"),
+    "study.sweep": ("Sweep", "sweep"),
     "study.validity": ("validity",),
     "study.workspace": ("workspace_map",),
 }
