@@ -79,6 +79,7 @@ if TYPE_CHECKING:
     from zwidth.loop.estimators.running import velocity_of as velocity_of
     from zwidth.loop.loop import Loop as Loop
     from zwidth.loop.multi import MultiLoop as MultiLoop
+    from zwidth.measures.catalogue import find_measure as find_measure
     from zwidth.measures.dexterity import dynamic_isotropy as dynamic_isotropy
     from zwidth.measures.dexterity import dynamic_manipulability as dynamic_manipulability
     from zwidth.measures.dexterity import handle_mass_isotropy as handle_mass_isotropy
@@ -254,6 +255,7 @@ _HOME = {
     "loop.estimators.running": ("velocity_of",),
     "loop.loop": ("Loop",),
     "loop.multi": ("MultiLoop",),
+    "measures.catalogue": ("find_measure",),
     "measures.dexterity": (
         "dynamic_isotropy",
         "dynamic_manipulability",
