@@ -9,7 +9,7 @@ from matplotlib.patches import PathPatch
 
 from zwidth.device.load import load
 from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, SINGULAR, UNDECIDED, Measure, NoValueError
-from zwidth.show.figures.map import COLOURS, MARKS, draw_map, levels_of, map_figure, printed
+from zwidth.show.figures.map import MARKS, draw_map, map_figure
 from zwidth.show.figures.style import figure, save
 from zwidth.study.common_area import common_area
 from zwidth.study.plane import plane_of
@@ -32,42 +32,6 @@ def dataset(device):
 def legend(ax):
     made = ax.get_legend()
     return [] if made is None else [text.get_text() for text in made.get_texts()]
-
-
-@pytest.mark.parametrize("low", [-3.0, 0.0, 0.13, 1.0, 5e-5, 2e6])
-@pytest.mark.parametrize("ratio", [1.001, 1.3, 4.0, 30.0, 1e3, 1e6])
-def test_levels_span_the_values(low, ratio):
-    values = low + (abs(low) or 1.0) * (ratio - 1.0) * np.random.default_rng(0).uniform(size=200)
-    levels = levels_of(values)
-    assert 2 <= len(levels) <= 16
-    assert (np.diff(levels) > 0.0).all()
-    usual = np.percentile(values, [2.0, 98.0])
-    assert levels[0] <= usual[0] * (1 + 1e-12) if usual[0] > 0 else levels[0] <= usual[0] + 1e-12
-    assert levels[-1] >= usual[1] * (1 - 1e-12)
-
-
-def test_levels_of_a_long_tail_leave_it_to_the_arrow():
-    values = np.concatenate([np.linspace(1.0, 2.0, 200), [1e6, np.inf, np.nan]])
-    assert levels_of(values)[-1] < 10.0
-    assert len(levels_of(values)) > 5
-    assert levels_of(np.full(9, 4.0)).tolist() == [3.8, 4.2]
-    assert levels_of(np.array([np.nan])).tolist() == [0.0, 1.0]
-    assert levels_of(np.array([np.inf])).tolist() == [0.0, 1.0]
-
-
-def test_the_colours_get_lighter_step_by_step():
-    """So that a grey print can be read."""
-    import matplotlib as mpl
-
-    shades = mpl.colormaps[COLOURS](np.linspace(0.0, 1.0, 12))[:, :3]
-    lightness = shades @ [0.2126, 0.7152, 0.0722]
-    assert (np.diff(lightness) > 0.02).all()
-
-
-def test_units_are_printed_with_their_powers():
-    assert printed("N^2 s/m^2") == "N²s/m²"
-    assert printed("m^1/rad^1") == "m/rad"
-    assert printed("1/(kg m)^2") == "1/(kg m)²"
 
 
 def test_the_bar_names_the_measure_and_its_unit(dataset, device):
@@ -172,6 +136,23 @@ def test_infinite_values_are_drawn(device):
     mixed = found.copy(deep=True)
     mixed["stiffness"].values[:, :4] = np.where(np.isnan(mixed["stiffness"].values[:, :4]), np.nan, 4000.0)
     map_figure(mixed, "stiffness", rigid).canvas.draw()
+
+
+def test_where_all_is_infinite_no_bar_pretends_to_numbers(dataset, device):
+    infinite = dataset.copy(deep=True)
+    infinite["rigid_mass"].values[np.isfinite(infinite["rigid_mass"].values)] = np.inf
+    drawing = map_figure(infinite, "rigid_mass", device)
+    (ax,) = drawing.axes
+    assert legend(ax) == ["Rigid mass of links and rotors: infinite"]
+
+
+def test_the_largest_of_numbers_are_drawn(dataset, device):
+    huge = dataset.copy(deep=True)
+    x = dataset["x_m"].values
+    huge["rigid_mass"].values[:] = np.where(np.isnan(dataset["rigid_mass"].values), np.nan, 10.0 ** (1000.0 * x))
+    drawing = map_figure(huge, "rigid_mass", device)
+    drawing.canvas.draw()
+    assert len(drawing.axes[1].get_yticklabels()) > 4
 
 
 @pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])

@@ -9,7 +9,20 @@ import pytest
 from hypothesis import given as over
 from hypothesis import strategies as st
 
-from zwidth.show.units import NONE, PREFIXES, amount, at_most, given, number, point, quantity, scaled, vector
+from zwidth.show.units import (
+    NONE,
+    PREFIXES,
+    amount,
+    area_text,
+    at_most,
+    given,
+    number,
+    point,
+    printed,
+    quantity,
+    scaled,
+    vector,
+)
 
 
 @pytest.mark.parametrize(
@@ -99,3 +112,16 @@ def test_a_terminal_says_none_where_there_is_no_number(value):
 def test_a_vector_on_a_terminal():
     assert vector([0.0, -0.25, 0.0], "m") == "(0, -0.25) m"
     assert vector([0.1, 0.2, -0.3]) == "(0.1, 0.2, -0.3)"
+
+
+def test_units_are_printed_with_their_powers():
+    assert printed("N^2 s/m^2") == "N²s/m²"
+    assert printed("m^1/rad^1") == "m/rad"
+    assert printed("1/(kg m)^2") == "1/(kg m)²"
+
+
+def test_areas_have_the_unit_that_suits_them():
+    assert area_text(0.03789) == "378.9 cm²"
+    assert area_text(4.433e-7) == "0.4433 mm²"
+    assert area_text(36.87) == "36.87 m²"
+    assert area_text(0.0) == "0 cm²"

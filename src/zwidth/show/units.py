@@ -109,6 +109,29 @@ def given(value: float, unit: str) -> str:
     return f"{shown.replace('-', MINUS)}{SPACE}{PREFIXES[exponent]}{unit}"
 
 
+def printed(unit: str) -> str:
+    """A measure's unit as it is printed: powers raised, products without a blank before s.
+
+    >>> printed("N^2 s/m^2"), printed("m^2/rad^2")
+    ('N²s/m²', 'm²/rad²')
+    """
+    for power, raised in (("^1", ""), ("^2", "²"), ("^3", "³")):
+        unit = unit.replace(power, raised)
+    return unit.replace(" s", "s")
+
+
+def area_text(square_metres: float) -> str:
+    """An area in mm², cm² or m².
+
+    >>> area_text(0.0379), area_text(4.4e-7), area_text(36.87)
+    ('379 cm²', '0.44 mm²', '36.87 m²')
+    """
+    unit, size = "m²", 1.0
+    if square_metres < 1.0:
+        unit, size = ("mm²", 1e-6) if 0.0 < square_metres < 1e-4 else ("cm²", 1e-4)
+    return f"{square_metres / size:.4g} {unit}"
+
+
 def point(coordinates: Iterable[float], unit: str = "m") -> str:
     """A point or vector as (x, y) where it lies in the plane z = 0, else (x, y, z); no unit for "".
 

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from math import floor, log10
-from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FixedLocator, MaxNLocator
 from numpy.typing import NDArray
 
-from zwidth.measures.measure import FAILED, NO_VALUE, OK, SINGULAR, UNDECIDED
+from zwidth.measures.measure import FAILED, NO_VALUE, SINGULAR, UNDECIDED
+from zwidth.show.figures.bands import LARGEST, bands_of, colour_bar
 from zwidth.show.figures.mechanism import link_stroke, pins
 from zwidth.show.figures.style import BLACK, GREY, LINES, VERMILION, figure, label
-from zwidth.show.units import MINUS, exponent_of, given, scaled
+from zwidth.show.units import area_text, given, printed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,10 +29,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Drawn = tuple[list[Floats], Floats, Floats]  # strokes of the links, joints, handle
 
-COLOURS: Final = "cividis"  # even steps of lightness, the same to every eye
-LEVELS: Final = 10
-WIDE: Final = 6.0  # ratio of the usual values from which on levels are spaced by ratios
-USUAL: Final = (2.0, 98.0)  # per cent of the values that the levels span
 MARKS: Final = {
     SINGULAR: ("singular", "xxxx"),
     NO_VALUE: ("no value", "////"),
@@ -45,7 +36,7 @@ MARKS: Final = {
     FAILED: ("failed", "\\\\\\\\"),
 }
 HATCHES: Final = ("\\\\", "//", "||", "--", "xx")
-LETTERS: Final = 45  # of a line beside the bar
+PALE: Final = "#C8C8C8"
 ARROWS: Final = 14  # direction strokes along the longer side
 
 
@@ -80,8 +71,11 @@ def draw_map(
     about = dataset[name].attrs
     unit = printed(str(about["unit"]))
     handles: list[Any] = []
-    if (dataset[f"{name}_status"].values == OK).any():
-        _contours(ax, x, y, dataset[name].values, str(about["title"]), unit, faint=area is not None)
+    values = dataset[name].values
+    if (np.abs(values) <= LARGEST).any():
+        _contours(ax, x, y, values, str(about["title"]), unit, faint=area is not None)
+    elif not np.isnan(values).all():
+        handles += _infinite(ax, x, y, values, str(about["title"]))
     handles += _marks(ax, x, y, dataset[f"{name}_status"].values)
     handles += _strokes(ax, dataset, f"{name}_direction")
     if area is not None:
@@ -111,106 +105,21 @@ def draw_map(
         made.set_zorder(6.0)
 
 
-def printed(unit: str) -> str:
-    """A unit as it is printed: powers raised, products without a blank before s.
-
-    >>> printed("N^2 s/m^2"), printed("m^2/rad^2")
-    ('N²s/m²', 'm²/rad²')
-    """
-    for power, raised in (("^1", ""), ("^2", "²"), ("^3", "³")):
-        unit = unit.replace(power, raised)
-    return unit.replace(" s", "s")
-
-
-def levels_of(values: Floats) -> Floats:
-    """Round levels (k,) over the usual values, ascending; spaced by ratios where those differ much."""
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return np.array([0.0, 1.0])
-    low, high = (float(v) for v in np.percentile(finite, USUAL))
-    least, most = float(finite.min()), float(finite.max())
-    if most - high < 0.5 * (high - low) and low - least < 0.5 * (high - low):
-        low, high = least, most  # no tail to cut
-    if not high - low > 1e-9 * max(abs(low), abs(high)):
-        middle = 0.5 * (low + high)
-        reach = 0.05 * abs(middle) or 1.0
-        return np.array([middle - reach, middle + reach])
-    if low > 0.0 and high / low > WIDE:
-        return _ratios(low, high)
-    found = MaxNLocator(nbins=LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    return np.asarray(found, dtype=np.float64)
-
-
-def _ratios(low: float, high: float) -> Floats:
-    """1, 2, 5 or finer per decade, just as many as are wanted."""
-    grids = ([1.0], [1.0, 3.0], [1.0, 2.0, 5.0], [1.0, 1.5, 2.0, 3.0, 5.0, 7.0])
-    decades = np.arange(floor(log10(low)) - 1, floor(log10(high)) + 2)
-    best = np.array([low, high])
-    for grid in grids:
-        all_levels = (10.0 ** decades[:, None] * np.array(grid)).ravel()
-        first = max(int(np.searchsorted(all_levels, low, side="right")) - 1, 0)
-        last = int(np.searchsorted(all_levels, high, side="left"))
-        found = all_levels[first : last + 1]
-        if len(found) <= LEVELS + 3:
-            best = found
-    return np.asarray(best)
-
-
 def _contours(ax: Axes, x: Floats, y: Floats, values: Floats, title: str, unit: str, *, faint: bool) -> None:
     levels, norm, colours = bands_of(values, faint=faint)
     extend: Any = norm.extend
-    finite = values[np.isfinite(values)]
-    most = 2.0 * max(abs(float(finite.max(initial=0.0))), abs(float(levels[-1])), abs(float(levels[0])))
+    most = 2.0 * max(float(np.abs(values[np.abs(values) <= LARGEST]).max()), *np.abs(levels[[0, -1]]).tolist())
     z = np.ma.masked_invalid(np.clip(values, -most, most))
     ax.contourf(x, y, z, levels=levels, cmap=colours, norm=norm, extend=extend, corner_mask=True, zorder=1.0)
     ax.contour(x, y, z, levels=levels, colors="white", linewidths=0.4, corner_mask=True, zorder=1.1)
     colour_bar(ax, levels, norm, colours, title, unit)
 
 
-def bands_of(values: Floats, *, faint: bool = False) -> tuple[Floats, BoundaryNorm, ListedColormap]:
-    """Round levels over the values, and the colours of the bands between them and beyond."""
-    levels = levels_of(values)
-    under, over = bool((values < levels[0]).any()), bool((values > levels[-1]).any())
-    extend: Any = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[
-        under, over
-    ]
-    bands = len(levels) - 1 + under + over
-    shades = mpl.colormaps[COLOURS](np.linspace(0.0, 1.0, bands))
-    if faint:  # lines and hatches stand out on it
-        shades[:, :3] = 1.0 - 0.45 * (1.0 - shades[:, :3])
-    return levels, BoundaryNorm(levels, bands, extend=extend), ListedColormap(shades)
-
-
-def colour_bar(
-    ax: Axes, levels: Floats, norm: BoundaryNorm, colours: ListedColormap, title: str, unit: str
-) -> None:
-    """The bands' colours beside the axes."""
-    assert ax.figure is not None
-    bar = ax.figure.colorbar(
-        ScalarMappable(norm, colours),
-        ax=ax,
-        ticks=FixedLocator(levels.tolist()),
-        spacing="uniform",
-        fraction=0.05,
-        pad=0.02,
-    )
-    bar.minorticks_off()
-    bar.outline.set_linewidth(0.6)
-    _bar_label(bar, title, unit, levels)
-
-
-def _bar_label(bar: Any, title: str, unit: str, levels: Floats) -> None:
-    """Ticks at the levels, under a prefix or a power of ten that they have in common."""
-    largest = float(np.abs(levels).max())
-    exponent = exponent_of(largest)
-    if scaled(exponent, unit).startswith("10") and 0.01 <= largest < 1e4:
-        exponent = 0  # short enough without a power of ten
-    texts = [f"{v / 10.0**exponent:.4g}".replace("-", MINUS) for v in levels.tolist()]
-    bar.ax.set_yticks(levels, labels=texts)
-    bar.ax.tick_params(labelsize=8.0)
-    name = scaled(exponent, unit).strip("\u00a0")
-    said = f"{title} [{name}]" if name else title
-    bar.set_label("\n".join(wrap(said, LETTERS, break_long_words=False)), fontsize=9.0)
+def _infinite(ax: Axes, x: Floats, y: Floats, values: Floats, title: str) -> list[Any]:
+    """One colour where no value is finite: there is nothing to make levels of."""
+    z = np.ma.masked_array(np.ones(values.shape), np.isnan(values))
+    ax.contourf(x, y, z, levels=[0.0, 2.0], colors=[PALE], corner_mask=True, zorder=1.0)
+    return [Patch(facecolor=PALE, label=f"{title}: infinite")]
 
 
 def _marks(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -> list[Any]:
@@ -264,7 +173,7 @@ def _areas(ax: Axes, dataset: xr.Dataset, area: CommonArea) -> list[Any]:
         measure = requirement.measure
         sign = "\u2265" if requirement.at_least else "\u2264"
         bound = given(requirement.value, printed(str(dataset[measure.name].attrs["unit"]))).rstrip("\u00a0")
-        text = f"{measure.title} {sign} {bound}: {_square(region.area)}"
+        text = f"{measure.title} {sign} {bound}: {area_text(region.area)}"
         style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.3, "linestyle": dashes, "facecolor": "none"}
         for path in _paths(region.shape):
             # hatches take the edge's colour: once for them, faint, and once for the outline
@@ -277,13 +186,9 @@ def _areas(ax: Axes, dataset: xr.Dataset, area: CommonArea) -> list[Any]:
     for path in _paths(area.common.shape):
         ax.add_patch(PathPatch(path, facecolor="none", edgecolor=BLACK, zorder=2.6, capstyle="round", **dotted))
     share = f"{100.0 * area.common.share:.3g} % of what is reached"
-    text = f"Common area: {_square(area.common.area)}, {share}"
+    text = f"Common area: {area_text(area.common.area)}, {share}"
     handles.append(Line2D([], [], color=BLACK, dash_capstyle="round", label=text, **dotted))
     return handles
-
-
-def _square(area: float) -> str:
-    return f"{1e4 * area:.4g} cm²" if area < 1.0 else f"{area:.4g} m²"
 
 
 def _paths(shape: Any) -> list[Path]:

@@ -14,9 +14,9 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 from numpy.typing import NDArray
 
 from zwidth.measures.measure import OK
-from zwidth.show.figures.map import COLOURS, WIDE, printed
+from zwidth.show.figures.bands import COLOURS, WIDE
 from zwidth.show.figures.style import BLACK, VERMILION
-from zwidth.show.units import MINUS, exponent_of, scaled
+from zwidth.show.units import MINUS, exponent_of, printed, scaled
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,9 +17,11 @@ from matplotlib.ticker import AutoLocator
 from numpy.typing import NDArray
 
 from zwidth.measures.measure import FAILED, NO_VALUE, OUT_OF_REACH, SINGULAR, STATUS, UNDECIDED
-from zwidth.show.figures.map import MARKS, bands_of, colour_bar, printed
+from zwidth.show.figures.bands import bands_of, colour_bar
+from zwidth.show.figures.map import MARKS
 from zwidth.show.figures.parallel import draw_parallel
 from zwidth.show.figures.style import BLACK, GREY, LINES, context, figure, label
+from zwidth.show.units import printed
 
 if TYPE_CHECKING:
     import xarray as xr
