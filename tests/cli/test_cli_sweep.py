@@ -146,7 +146,7 @@ def test_a_study_in_which_nothing_has_a_value(folder):
     ran = zwidth("sweep", "study.toml", "--json")
     assert ran.code == 1
     document = strict(ran.out)
-    assert document["reason"] == "no design has a value"
+    assert document["reason"] == "no design has a value: out of reach"
     assert len(document["designs"]) == 10
 
 

@@ -303,6 +303,20 @@ WRONG_AXES = [
         {"key": LENGTH, "values": [0.1, -0.1], "tie": [{"key": OTHER, "power": 1}]},
         f"axis.0.tie.0.power: needs values of the sign that '{LENGTH}' has",
     ),
+    (
+        {"key": "loop.delay_samples", "values": [1.0], "tie": ["loop.delay_s"]},
+        "axis.0.tie.0: 'loop.delay_s' excludes 'loop.delay_samples', which is set by the axis",
+    ),
+    (
+        {"key": "operator.arm_mass_kg", "values": [1.0], "tie": [{"key": LENGTH, "power": 1}]},
+        "axis.0.tie.0.power: needs a value of 'operator.arm_mass_kg' other than 0 in the device file, which gives",
+    ),
+    ({"key": LENGTH, "values": [0.1], "tie": [3]}, "axis.0.tie.0: must be a path, or a table with a key, got 3"),
+    ({"key": LENGTH, "values": [0.1, float("nan")]}, "axis.0.values.1: must be a number for"),
+    (
+        {"key": "loop.velocity.method", "values": ["kalman", "windowed"]},
+        "axis.0.values.1: must be one of backward-difference, windowed-difference, ",
+    ),
     ({"key": LENGTH, "values": [0.1], "steps": 3}, "axis.0.steps: is not a key of an [[axis]]"),
 ]
 
@@ -313,6 +327,11 @@ def test_a_fault_of_an_axis_is_told(table, line):
     assert any(one.startswith(line) for one in told), told
 
 
+def test_what_goes_with_two_axes_is_told():
+    told = faults(tables(axis(LENGTH, 0.1, tie=[OTHER]), axis(OTHER, 0.1)))
+    assert told == [f"axis.1.key: '{OTHER}' goes with the axis '{LENGTH}' already; each number may be set once"]
+
+
 def test_what_is_set_twice_is_told():
     twice = axis(LENGTH, 0.1), axis(f"mechanism.{LENGTH}", 0.2), DELAY, axis("model", "full")
     told = faults(tables(*twice, model="rigid"))
@@ -320,6 +339,29 @@ def test_what_is_set_twice_is_told():
         f"axis.1.key: 'mechanism.{LENGTH}' is set by the axis '{LENGTH}' already; each number may be set once",
         "model: is an axis, too; remove one of them",
     ]
+
+
+COM = "links.upper-right.center_of_mass_m"
+LATER = [  # an axis beside LENGTH with the centre of mass tied to it, and DELAY
+    (f"{COM}.0", f"axis.2.key: '{COM}.0' overlaps '{COM}', which goes with the axis '{LENGTH}' already"),
+    (
+        "loop.delay_s",
+        "axis.2.key: 'loop.delay_s' excludes 'loop.delay_samples', which is set by the axis 'loop.del",
+    ),
+]
+
+
+@pytest.mark.parametrize(("key", "line"), LATER)
+def test_what_an_axis_would_take_from_another_is_told(key, line):
+    told = faults(tables(axis(LENGTH, 0.1, tie=[{"key": COM, "power": 1}]), DELAY, axis(key, 0.01)))
+    assert len(told) == 1
+    assert told[0].startswith(line)
+
+
+def test_numbers_of_an_operator_may_be_varied_beside_whose_they_are():
+    operators = axis("operator", "thesis-arm", "thesis-arm-rigid")
+    found = study(operators, axis("operator.arm_mass_kg", 0.5, 1.0))
+    assert found.sampling.shape == (2, 2)
 
 
 def test_a_hypercube_has_one_count():

@@ -195,6 +195,20 @@ def test_a_measure_that_this_device_cannot_be_asked_is_refused_before_anything_i
     assert "speaks of a mechanism" in lines[0]
 
 
+@pytest.mark.parametrize(
+    ("name", "more", "said"),
+    [
+        ("spectral_radius", {}, "stiffness_N_per_m and damping_Ns_per_m"),
+        ("felt_stiffness", {"stiffness_N_per_m": 100.0, "damping_Ns_per_m": 1.0}, "frequency_Hz"),
+        ("stiffness_max_closed_form", {"operator": "thesis-arm"}, 'operator = "none"'),
+    ],
+)
+def test_what_a_measure_wants_is_told_by_the_keys_of_a_study(name, more, said):
+    with pytest.raises(MeasureError) as caught:
+        sweep(study(axis("plant.mass_kg.0.0", 0.2), device=TWO_MASS, measures=[name], **more))
+    assert str(caught.value).endswith(f"give {said}")
+
+
 def test_a_plant_s_numbers_can_be_varied():
     coupling = axis("plant.stiffness_N_per_m.0.1", -10000.0, -15000.0, tie=[])
     found = asked(coupling, device=TWO_MASS, measures=["stiffness_max"])

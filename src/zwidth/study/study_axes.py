@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from math import isfinite
+from math import isfinite, isnan
 from typing import Any, Final
 
 from zwidth.device import address
@@ -18,6 +18,7 @@ NUMBER: Final = ("number", "integer")
 
 Fault = tuple[Path, str]
 Found = list[Fault]
+Taken = dict[Path, tuple[str, str]]  # what is set: as it is written, and the axis that sets it
 
 
 def axes_of(document: dict[str, Any], device: Device | None, found: Found) -> tuple[Axis, ...]:
@@ -27,7 +28,7 @@ def axes_of(document: dict[str, Any], device: Device | None, found: Found) -> tu
     device    None: it cannot be loaded, so that paths are not looked up
     """
     hypercube = document.get("sampling", "grid") == "latin-hypercube"
-    axes, taken = [], dict[Path, str]()
+    axes, taken = [], Taken()
     for n, table in tables(document, "axis"):
         here = ("axis", n)
         found += [((*here, *path), said) for path, said in _filling(table, hypercube)]
@@ -118,9 +119,12 @@ def _made(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> 
     return Axis(key, inner, (low, high), logarithmic, ties, unit)
 
 
-def _taken(key: str, where: Path, shown: str, device: Device | None, taken: dict[Path, str]) -> Iterator[Fault]:
-    """Whether another axis, or a tie, sets the same."""
-    steps: Path = (key,)
+def _taken(key: str, where: Path, axis: str, device: Device | None, taken: Taken) -> Iterator[Fault]:
+    """Whether another axis, or a tie, sets the same, a part of it, or what excludes it.
+
+    axis  the one that sets the key, which is itself or a number tied to it
+    """
+    steps: Path = ("", key)  # no path of the file: the axis `operator` chooses whose numbers others change
     if key not in CIRCUMSTANCES:
         if device is None:
             return
@@ -128,9 +132,24 @@ def _taken(key: str, where: Path, shown: str, device: Device | None, taken: dict
             steps = address.resolve(device.document, key)
         except DeviceError:
             return  # told where it is looked up
-    if steps in taken:
-        yield (where, f"'{shown}' is set by the axis '{taken[steps]}' already; each number may be set once")
-    taken.setdefault(steps, shown)
+    for other, (shown, setter) in taken.items():
+        by = f"is set by the axis '{setter}'" if shown == setter else f"goes with the axis '{setter}'"
+        if other == steps:
+            yield (where, f"'{key}' {by} already; each number may be set once")
+        elif steps[: len(other)] == other or other[: len(steps)] == steps:
+            yield (where, f"'{key}' overlaps '{shown}', which {by} already; each number may be set once")
+        elif _exclude(steps, other):
+            yield (where, f"'{key}' excludes '{shown}', which {by} already; remove one of them")
+    taken.setdefault(steps, (key, axis))
+
+
+def _exclude(one: Path, other: Path) -> bool:
+    """Are these keys of one table of which a file may hold one only?"""
+    if one[:-1] != other[:-1]:
+        return False
+    groups = address.EXCLUSIVE.get(tuple(map(str, one[:-1])), ())
+    of = [[group for group in groups if step in group] for step in (one[-1], other[-1])]
+    return all(of) and of[0] != of[1]
 
 
 def _names_numbers(document: dict[str, Any], key: str, values: list[tuple[Path, Any]]) -> Iterator[Fault]:
@@ -157,25 +176,38 @@ def _names_numbers(document: dict[str, Any], key: str, values: list[tuple[Path, 
     elif spanned and "number" not in kinds:
         yield (("range",), f"cannot be divided: '{key}' takes whole numbers; give values = [...]")
     else:
-        yield from (((*where,), said) for where, value in values if (said := _fits(value, kinds, key)))
+        texts = _texts(steps)
+        yield from (((*where,), said) for where, value in values if (said := _fits(value, kinds, key, texts)))
 
 
-def _fits(value: Any, kinds: set[Any], key: str) -> str:
-    """What is wrong with a value of these kinds, "" for nothing."""
+def _texts(steps: Path) -> list[str]:
+    """The texts that the schema knows at a path; none where any will do."""
+    kinds = [kind for kind in schema.at(steps) if kind.get("type") == "string"]
+    return (
+        list(dict.fromkeys(str(kind.get("const")) for kind in kinds)) if all("const" in k for k in kinds) else []
+    )
+
+
+def _fits(value: Any, kinds: set[Any], key: str, texts: list[str]) -> str:
+    """What is wrong with a value of these kinds, or these texts, "" for nothing."""
     if isinstance(value, bool):
         fits, wanted = "boolean" in kinds, "no true or false"
     elif isinstance(value, str):
         fits, wanted = "string" in kinds, "a number"
+        if fits and texts and value not in texts:
+            return f"must be one of {', '.join(texts)} for '{key}', got {quote(value)}"
     elif isinstance(value, int):
         fits, wanted = bool(kinds & {*NUMBER}), "text"
     elif isinstance(value, float):
         fits, wanted = "number" in kinds, "a whole number" if "integer" in kinds else "text"
+        if fits and isnan(value):
+            fits, wanted = False, "a number"
     else:
         fits, wanted = False, "a number"
     return "" if fits else f"must be {wanted} for '{key}', got {quote(value)}"
 
 
-def _ties(table: dict[str, Any], key: str, device: Device, taken: dict[Path, str], found: Found) -> Iterator[Tie]:
+def _ties(table: dict[str, Any], key: str, device: Device, taken: Taken, found: Found) -> Iterator[Tie]:
     """The ties that can be meant; faults are added to `found`."""
     document, given = device.document, table.get("tie")
     for n, tied in enumerate(given if isinstance(given, list) else []):
@@ -184,7 +216,7 @@ def _ties(table: dict[str, Any], key: str, device: Device, taken: dict[Path, str
         if not isinstance(to, str) or not to:
             continue
         faults = list(_tie_faults(document, key, to, factor, power, table))
-        faults += [] if faults else list(_taken(to, (), to, device, taken))
+        faults += [] if faults else list(_taken(to, (), key, device, taken))
         found += [(("tie", n, *path), said) for path, said in faults]
         if faults:
             continue
@@ -195,7 +227,7 @@ def _ties(table: dict[str, Any], key: str, device: Device, taken: dict[Path, str
     # an element of a symmetric matrix has no value of its own
     mirror = mirrored(document, key)
     if mirror is not None and address.resolve(document, mirror) not in taken:
-        taken[address.resolve(document, mirror)] = mirror
+        taken[address.resolve(document, mirror)] = mirror, key
         yield Tie(mirror)
 
 
@@ -237,7 +269,8 @@ def _tie_faults(
         if not _numbers(own):
             yield ((), f"'{to}' has no number in the device file that a power could scale; use factor, or set it")
         if not number(base) or base == 0:
-            yield (("power",), f"needs a value of '{key}' other than 0 in the device file, got {quote(base)}")
+            given = f"got {quote(base)}" if base is not None else "which gives none; set it first"
+            yield (("power",), f"needs a value of '{key}' other than 0 in the device file, {given}")
         elif not all(number(value) and value / base > 0 for _, value in _values(table)):
             yield (("power",), f"needs values of the sign that '{key}' has in the device file, {quote(base)}")
 

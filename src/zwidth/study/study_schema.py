@@ -17,6 +17,8 @@ LEAST_SEED: Final = 0
 
 def _by_name(value: Any) -> Any:
     """A tie written as the key alone."""
+    if not isinstance(value, str | dict):
+        raise ValueError(f"must be a path, or a table with a key, got {quote(value)}")
     return {"key": value} if isinstance(value, str) else value
 
 

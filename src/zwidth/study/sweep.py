@@ -10,6 +10,7 @@ or cannot get where it is asked about, has a status instead of values, and the o
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -229,7 +230,7 @@ def _answer(one: Asked, place: Place, weights: NDArray[np.float64] | None) -> tu
             return (np.nan, status, "") if status != OK else answered(lambda: one.measure.compute(place))
         found = evaluate(one.measure, place)
     except MeasureError as error:
-        return np.nan, NO_VALUE, str(error)
+        return np.nan, NO_VALUE, _in_keys(str(error))
     return float(found.values), int(found.status), found.notes[0].reason if found.notes else ""
 
 
@@ -303,4 +304,15 @@ def _check_measures(job: SweepJob) -> None:
         refused = probe(pending, lambda measure: evaluate(measure, place))  # noqa: B023
         pending = tuple(one for one in pending if one.name in refused)
     if refused:
-        raise MeasureError("\n".join(f"{name} {why}" for name, why in refused.items()))
+        raise MeasureError("\n".join(f"{name} {_in_keys(why)}" for name, why in refused.items()))
+
+
+def _in_keys(reason: str) -> str:
+    """A measure's reason with a study's keys for the options that commands have.
+
+    >>> _in_keys("needs a wanted wall; give --stiffness and --damping")
+    'needs a wanted wall; give stiffness_N_per_m and damping_Ns_per_m'
+    """
+    for key, name in NAMES.items():
+        reason = reason.replace(f"--{name}", key)
+    return re.sub(r"--(operator|model) ([\w-]+)", r'\1 = "\2"', reason)

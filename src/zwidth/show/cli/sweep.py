@@ -54,9 +54,7 @@ def sweep(study: str, resume: str | None, workers: int | None, output: str | Non
         say(f"zwidth: {stopped}")
         return INTERNAL
     document = facts(found.study) | numbers(found)
-    reason = None if _any_value(found) else NONE
-    if reason is not None and document["notes"]:
-        reason += f": {document['notes'][0]}"
+    reason = None if _any_value(found) else _why_none(found, document["notes"])
     if path is not None:
         document["file"] = str(path)
         _write(path, found, document | ({} if reason is None else {"reason": reason}))
@@ -89,6 +87,16 @@ def _swept(file: str, path: Path | None, resume: str | None, workers: int | None
     except MeasureError as error:
         raise BadInput(*(f"{file}: measures: {line}" for line in str(error).splitlines())) from None
     return Sweep(study, job, cells), store
+
+
+def _why_none(found: Sweep, notes: list[str]) -> str:
+    """The first reason; what became of the designs, where that says it all."""
+    import numpy as np
+
+    from zwidth.measures.measure import STATUS
+
+    kinds = ", ".join(STATUS[int(kind)] for kind in np.unique(found.cells.status))
+    return f"{NONE}: {notes[0] if notes else kinds}"
 
 
 def _any_value(found: Sweep) -> bool:
