@@ -11,11 +11,8 @@ from numba import njit, prange
 from zwidth.model.plant import Plant
 
 
-def by_eigenvalues(plant: Plant, period: float, K, B, chunk: int = 50_000):
-    """Stable or not (...) by the eigenvalues of stacked transition matrices.
-
-    Z = [x, v, y_{j-1}]; the plant is discretised once, the walls enter the matrices by broadcasting.
-    """
+def held(plant: Plant, period: float):
+    """Transition matrix (2n, 2n) and input (2n,) of [x, v] over one period of a held force."""
     from scipy.linalg import expm
 
     n = plant.size
@@ -25,7 +22,16 @@ def by_eigenvalues(plant: Plant, period: float, K, B, chunk: int = 50_000):
     A[n : 2 * n, n : 2 * n] = -np.linalg.solve(plant.mass, plant.damping)
     A[n : 2 * n, -1] = np.linalg.solve(plant.mass, plant.actuator)
     step = expm(A * period)
-    free, push = step[:-1, :-1], step[:-1, -1]
+    return step[:-1, :-1], step[:-1, -1]
+
+
+def by_eigenvalues(plant: Plant, period: float, K, B, chunk: int = 50_000):
+    """Stable or not (...) by the eigenvalues of stacked transition matrices.
+
+    Z = [x, v, y_{j-1}]; the plant is discretised once, the walls enter the matrices by broadcasting.
+    """
+    n = plant.size
+    free, push = held(plant, period)
     L0 = np.zeros((2 * n + 1, 2 * n + 1))
     L0[:-1, :-1] = free
     L0[-1, :n] = plant.sensor

@@ -22,6 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from benchmarks._peers import held
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.device.device import Device
 from zwidth.device.load import load
@@ -52,16 +53,8 @@ def stiffness_map(device: Device, at: np.ndarray) -> Measured:
 
 def by_bisection(plant: Plant, period: float) -> float:
     """The peer: the largest K over dampings B, each K by bisection on eigenvalues."""
-    from scipy.linalg import expm
-
     n = plant.size
-    A = np.zeros((2 * n + 1, 2 * n + 1))
-    A[:n, n : 2 * n] = np.eye(n)
-    A[n : 2 * n, :n] = -np.linalg.solve(plant.mass, plant.stiffness)
-    A[n : 2 * n, n : 2 * n] = -np.linalg.solve(plant.mass, plant.damping)
-    A[n : 2 * n, -1] = np.linalg.solve(plant.mass, plant.actuator)
-    step = expm(A * period)
-    free, push = step[:-1, :-1], step[:-1, -1]
+    free, push = held(plant, period)
     # motions along the wall are free whatever the wall: a double root z = 1 each, which rounding splits by 1e-8
     along = n - 2
 
