@@ -184,6 +184,7 @@ def test_another_plane_has_the_base_frame_s_coordinates_in_its_table(tmp_path):
         ),
         (("--measure", "share_of_directions"), "needs --share"),
         (("--require", "isotropy=2"), "--require: 'isotropy=2' is no requirement"),
+        (("--share", "rigid_mass>=0.1", "--share", "rigid_mass>=0.2"), "--share: a map has one"),
         (("--share", "nothing"), "--share: 'nothing' is no requirement"),
         (("--measures-file", "nowhere.py", "--measure", "isotropy"), "--measures-file: no such file"),
         (("--measure", "isotropy", "--plane", "xz"), "cannot leave the plane z = 0 m"),
@@ -212,6 +213,30 @@ def test_bad_input_is_one_line(words, said):
 def test_a_plant_has_no_workspace():
     (line,) = refused("map", TWO_MASS, "--measure", "stiffness_max")
     assert "no [mechanism]" in line
+
+
+def test_the_heading_says_what_matters_to_the_measures():
+    """Of the arm with friction, encoders and limits: neither a direction nor the loop matters to each measure."""
+    rubs = ("--set", "mechanism.drives.motor-left.coulomb_Nm=0.001")
+
+    def heading(*names):
+        measures = [word for name in names for word in ("--measure", name)]
+        document = found("map", MECHANISM, *measures, *rubs, "--direction", "1,0", "--cells", "3,3")
+        ran = zwidth("map", MECHANISM, *measures, *rubs, "--direction", "1,0", "--cells", "3,3")
+        said = ran.out.split("\n\n")[0]
+        assert ("leaves out dry friction" in said) == (document["left_out"] == ["dry friction"])
+        return "along (1, 0)" in said, "leaves out" in said
+
+    assert heading("isotropy") == (False, False)
+    assert heading("friction_force") == (True, False)
+    assert heading("stiffness_max") == (True, True)
+    assert heading("isotropy", "stiffness_max") == (True, True)
+
+
+def test_a_measure_of_one_s_own_cannot_be_called_a_share(tmp_path):
+    (tmp_path / "my.py").write_text(OWN.replace("def never", "def share_of_directions"))
+    (line,) = refused("map", MECHANISM, "--measures-file", tmp_path / "my.py", "--measure", "inertial_force")
+    assert "the name share_of_directions is taken by --share" in line
 
 
 def test_people_read_numbers_and_where_they_are():

@@ -66,8 +66,8 @@ def stable_area(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
 
         ((340 - 208 sqrt 2)/3 + 96 ln((2 + sqrt 2)/4)) m^2/T^3 = 0.0798634 m^2/T^3
 
-    Not in the thesis. Along the edge of `thesis_delays` p and d are rational in cos t, so that the integral of p dd
-    is a polynomial and a logarithm.
+    Not in the thesis. Along the edge of `thesis_delays` p and d are rational in cos t, so that the integral of
+    p dd is a polynomial and a logarithm.
     """
     number = (340.0 - 208.0 * np.sqrt(2.0)) / 3.0 + 96.0 * np.log((2.0 + np.sqrt(2.0)) / 4.0)
     return np.asarray(number * np.asarray(mass) ** 2 / np.asarray(sampling_period) ** 3)

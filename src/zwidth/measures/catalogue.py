@@ -9,6 +9,7 @@ from typing import Final
 from zwidth.measures.measure import Better, Measure
 
 _BINDINGS: Final = "zwidth.measures.bindings"
+_OF_THE_MECHANISM: Final = ("dexterity", "forces")  # in these files nothing is asked of a loop
 
 
 def _of(
@@ -22,7 +23,8 @@ def _of(
     each: bool = False,
     along: bool = True,
 ) -> Measure:
-    return Measure(name, title, unit, better, source, f"{_BINDINGS}.{file}:{name}", each, along)
+    linear = file not in _OF_THE_MECHANISM
+    return Measure(name, title, unit, better, source, f"{_BINDINGS}.{file}:{name}", each, along, linear)
 
 
 _YOSHIKAWA = "Yoshikawa 1985"

@@ -85,6 +85,7 @@ class Measure:
     function  of a `Place`; as text, "module:name", imported when it is first asked
     each      True: asked of one place at a time; False: of all at once, returning an array or a `Measured`
     along     whether it depends on the rendered direction
+    linear    whether it is read off the linear loop, which leaves out friction, encoder steps and limits
     """
 
     name: str
@@ -95,6 +96,7 @@ class Measure:
     function: Callable[[Place], Any] | str
     each: bool = False
     along: bool = True
+    linear: bool = True
 
     @property
     def key(self) -> str:

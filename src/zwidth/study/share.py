@@ -50,6 +50,7 @@ def share_measure(requirement: Requirement) -> Measure:
         source=f"{measure.title.lower()} over the directions that the handle can move in; {measure.source}",
         function=Share(requirement),
         along=False,
+        linear=measure.linear,
     )
 
 

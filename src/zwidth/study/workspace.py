@@ -208,6 +208,7 @@ def as_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
             "source": measure.source,
             "better": measure.better or "",
             "along": int(measure.along),
+            "linear": int(measure.linear),
             "key": measure.key,
             "notes": "\n".join(_sentence(note, plane) for note in cells.notes[column]),
         }
@@ -281,7 +282,7 @@ def _circumstances(job: MapJob) -> dict[str, Any]:
         "plane_through_m": plane.through.tolist(),
         "sampling_period_s": device.controller.sampling_period,
         "delay_samples": float(device.controller.delay),
-        "left_out": ", ".join(device.left_out),
+        "left_out": ", ".join(device.left_out if any(one.linear for one in job.asked) else ()),
         **{key: value for key, value in wanted.items() if value is not None},
         "zwidth": __version__,
     }

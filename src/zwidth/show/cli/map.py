@@ -115,7 +115,13 @@ def _axis_range(name: str) -> Callable[[Command], Command]:
     multiple=True,
     help="Show where it is met, and where all are; repeatable. Or NAME<=VALUE.",
 )
-@click.option("--share", metavar="NAME>=VALUE", help="Map the share of directions that meet it. Or NAME<=VALUE.")
+@click.option(
+    "--share",
+    "shares",
+    metavar="NAME>=VALUE",
+    multiple=True,
+    help="Map the share of directions that meet it. Or NAME<=VALUE.",
+)
 @click.option("--stiffness", type=Finite(), metavar="K", help="Of the wall that some measures are about [N/m].")
 @click.option("--damping", type=Finite(), metavar="B", help="Of that wall [Ns/m].")
 @click.option("--frequency", type=Finite(), metavar="F", help="At which the hand moves, for some measures [Hz].")
@@ -127,7 +133,7 @@ def map_command(
     measures: tuple[str, ...],
     measures_file: str | None,
     requirements: tuple[str, ...],
-    share: str | None,
+    shares: tuple[str, ...],
     stiffness: float | None,
     damping: float | None,
     frequency: float | None,
@@ -141,7 +147,7 @@ def map_command(
     other, and the area that they have in common is measured.
     """
     path = None if output is None else destination(output, FIGURES + DATA + ARRAYS)
-    asked, required = _measures(measures, measures_file, requirements, share)
+    asked, required = _measures(measures, measures_file, requirements, shares)
     device = question.device()
     if device.mechanism is None:
         raise BadInput(f"{question.name}: has no [mechanism], and so no workspace to map; ask for its chart")
@@ -161,7 +167,7 @@ def map_command(
 
 
 def _measures(
-    names: tuple[str, ...], file: str | None, texts: tuple[str, ...], share: str | None
+    names: tuple[str, ...], file: str | None, texts: tuple[str, ...], shared: tuple[str, ...]
 ) -> tuple[list[Measure], list[Requirement]]:
     """What to map, the first of them shown; and the requirements."""
     from zwidth.measures.catalogue import find_measure
@@ -171,11 +177,15 @@ def _measures(
 
     try:
         own = {} if file is None else load_measures(file)
+        if NAME in own:
+            raise ValueError(f"{file}: the name {NAME} is taken by --share; rename the function")
     except ValueError as error:
         raise BadInput(f"--measures-file: {error}") from None
     try:
         asked = "--share"
-        shares = [] if share is None else [share_measure(parse_requirement(share, own))]
+        shares = [share_measure(parse_requirement(text, own)) for text in shared]
+        if len(shares) > 1:
+            raise ValueError(f"a map has one {NAME}, got {len(shares)}; ask for the others in maps of their own")
         own |= {one.name: one for one in shares}
         asked = "--measure"
         if NAME in names and not shares:
@@ -258,4 +268,5 @@ def _unanswered(
     from zwidth.show.cli.mapped import KEYS, facts
 
     first = {"measure": asked[0].name, "title": asked[0].title, "unit": asked[0].unit}
-    return Answer(facts(question, device, extreme) | first | dict.fromkeys(KEYS), reason=reason)
+    linear = any(one.linear for one in asked)
+    return Answer(facts(question, device, extreme, linear=linear) | first | dict.fromkeys(KEYS), reason=reason)

@@ -35,9 +35,13 @@ KEYS: Final = (
 NAMES: Final = np.array([STATUS.get(k, "") for k in range(256)], dtype=object)
 
 
-def facts(question: Question, device: Device, extreme: str | None) -> dict[str, Any]:
-    """The circumstances of a map: no single posture; a direction, or which of all of them."""
-    found = {key: value for key, value in question.facts(device).items() if key != "position_m"}
+def facts(question: Question, device: Device, extreme: str | None, *, linear: bool) -> dict[str, Any]:
+    """The circumstances of a map: no single posture; a direction, or which of all of them.
+
+    linear  is a measure among those asked that leaves out what is not linear?
+    """
+    found = question.facts(device) | ({} if linear else {"left_out": []})
+    del found["position_m"]
     return found if extreme is None else found | {"direction": extreme}
 
 
@@ -51,7 +55,8 @@ def answered(
 ) -> Answer:
     """The answer of a map of these measures, the first of which stands at the top level of the document."""
     extreme = dataset.attrs["direction"]
-    document = facts(question, device, extreme if isinstance(extreme, str) else None)
+    linear = _any(dataset, names, "linear")
+    document = facts(question, device, extreme if isinstance(extreme, str) else None, linear=linear)
     each = {name: _measure(dataset, name, device) for name in names}
     plane = {
         "plane": dataset.attrs["plane"],
@@ -73,7 +78,7 @@ def answered(
     )
 
     def pages() -> Iterator[Any]:
-        yield _heading(question, device, dataset)
+        yield _heading(device, dataset, along=_any(dataset, names, "along"), linear=linear)
         for name in names:
             yield f"\n{dataset[name].attrs['title']} ({name})"
             yield sheet(list(_rows(dataset, name, each[name]["overall"])))
@@ -128,19 +133,27 @@ def _why(dataset: xr.Dataset, names: Sequence[str]) -> str:
     return "no cell has a value" + (f": {notes[0]}" if notes else "")
 
 
-def _heading(question: Question, device: Device, dataset: xr.Dataset) -> str:
+def _any(dataset: xr.Dataset, names: Sequence[str], what: str) -> bool:
+    return any(dataset[name].attrs[what] for name in names)
+
+
+def _heading(device: Device, dataset: xr.Dataset, *, along: bool, linear: bool) -> str:
+    """Three lines at most: the map and the device; the computer; what is left out.
+
+    along, linear  is a measure among those asked that depends on the direction, that leaves something out?
+    """
     about = dataset.attrs
     towards = about["direction"]
-    along = f"the {towards} direction of each cell" if isinstance(towards, str) else vector(towards)
+    way = f"along the {towards} direction of each cell" if isinstance(towards, str) else f"along {vector(towards)}"
     nx, ny = dataset.sizes["x_m"], dataset.sizes["y_m"]
     plane = f"{nx} x {ny} cells of the plane {about['plane']}"
     if about["plane"] not in ("xy", "xz", "yz"):
         plane += f" along {vector(about['plane_axes'][:3])} and {vector(about['plane_axes'][3:])}"
     plane += f" through {vector(about['plane_through_m'], 'm')}"
     held = f", held by {shown(about['operator'])}" if about["operator"] != "none" else ""
-    which = f"along {along}, assembly {about['assembly']}, model {about['model']}{held}"
+    which = f"{way + ', ' if along else ''}assembly {about['assembly']}, model {about['model']}{held}"
     lines = [f"{shown(device.name)}: {plane}, {which}", computer(device.controller)]
-    return "\n".join(lines + ([omission(device)] if device.left_out else []))
+    return "\n".join(lines + ([omission(device)] if linear and device.left_out else []))
 
 
 def _rows(dataset: xr.Dataset, name: str, found: dict[str, float]) -> Iterator[tuple[str, str]]:
