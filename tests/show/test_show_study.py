@@ -190,6 +190,26 @@ def test_one_design_is_drawn():
     drawn(study_figure(dataset("length_m").isel(length_m=[0])))
 
 
+def test_a_logarithmic_axis_is_numbered_below_the_last_panel_only():
+    upper, lower = drawn(study_figure(dataset("period_s")))
+    assert upper.get_xscale() == lower.get_xscale() == "log"
+    shown = [
+        [text.get_text() for text in panel.get_xticklabels(which="both") if text.get_visible() and text.get_text()]
+        for panel in (upper, lower)
+    ]
+    assert shown[0] == []
+    assert len(shown[1]) >= 2
+    assert not any("10^" in text for text in shown[1])
+
+
+def test_an_axis_of_one_value_is_told_beside_the_curves():
+    made = study_figure(dataset("length_m", "period_s", columns=("mass",)).isel(length_m=[2]))
+    (panel,) = drawn(made)
+    assert panel.get_xlabel().startswith("period_s")
+    assert len(panel.lines) == 1
+    assert texts(made)[0].startswith("length_m 0.")
+
+
 def test_the_same_bytes_from_the_same_numbers(tmp_path):
     for axes in (("assembly", "length_m"), ("length_m", "period_s")):
         files = [save(study_figure(dataset(*axes)), tmp_path / f"{n}.svg").read_bytes() for n in range(2)]

@@ -13,7 +13,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import AutoLocator
+from matplotlib.ticker import AutoLocator, FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from zwidth.measures.measure import FAILED, NO_VALUE, OUT_OF_REACH, SINGULAR, STATUS, UNDECIDED
@@ -33,6 +33,7 @@ MOST_PANELS: Final = 12
 POINTS: Final = ("o", "s", "^", "D", "v", "P")
 MARKED: Final = 40  # points up to which each is marked
 FOOT: Final = 0.045  # of the height of a panel, for each line that has gaps
+SPARSE: Final = 4  # decades above which only each is numbered
 LETTERS: Final = 34  # of a label along the height of a panel
 
 
@@ -62,6 +63,8 @@ def _kinds(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], list[s
     """The axes of numbers, and those of texts."""
     axes = [str(dim) for dim in dataset[names[0]].dims]
     numeric = [key for key in axes if dataset[key].dtype.kind in "if"] if axes != ["design"] else []
+    # one of a single value has nothing to be drawn along; it is told beside the texts
+    numeric = [key for key in numeric if dataset.sizes[key] > 1] or numeric[:1]
     return numeric, [key for key in axes if key not in numeric]
 
 
@@ -73,12 +76,13 @@ def _curves(dataset: xr.Dataset, names: Sequence[str], along: str) -> Figure:
     lines = 1 if not others else int(np.prod([dataset.sizes[key] for key in others]))
     drawing, panels = _panels(5.8, 0.9 + 0.17 * lines + 2.1 * len(names), len(names), 1, len(names))
     found: dict[int, None] = {}
+    for panel in panels[:-1]:  # before anything is drawn: what is logarithmic is so for all of them
+        panel.sharex(panels[-1])
     for panel, name in zip(panels, names, strict=True):
         found |= dict.fromkeys(draw_curves(panel, dataset, name, along))
-        if panel is not panels[-1]:
-            panel.sharex(panels[-1])
-            panel.tick_params(labelbottom=False)
-            panel.set_xlabel("")
+    for panel in panels[:-1]:
+        panel.tick_params(which="both", labelbottom=False)
+        panel.set_xlabel("")
     numeric = dataset[along].dtype.kind in "if"
     handles = list(_line_handles(dataset, others, lines=numeric))
     _legend_above(panels[0], handles, [_symbol(status) for status in sorted(found)])
@@ -178,10 +182,21 @@ def _name_axis(ax: Axes, which: str, coordinate: Any) -> None:
         (ax.set_xscale if which == "x" else ax.set_yscale)("log")
         unit = str(coordinate.attrs["units"])
         axis.set_label_text(f"{key} [{printed(unit)}]" if unit else key)
+        values = np.asarray(coordinate.values, dtype=float)
+        _number_logarithmic(axis, float(values.min()), float(values.max()))
     elif unit := printed(str(coordinate.attrs["units"])):
         label(axis, key, unit, plain=True)
     else:
         axis.set_label_text(key)
+
+
+def _number_logarithmic(axis: Any, low: float, high: float) -> None:
+    """Ticks of a logarithmic axis at 1, 2 and 5 of each decade, at 1 of many, at more of less than one."""
+    decades = np.log10(high / low)
+    steps = (1.0,) if decades > SPARSE else (1.0, 2.0, 5.0) if decades > 1.5 else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+    axis.set_major_locator(LogLocator(subs=steps))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _combinations(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[dict[str, Any]]:
