@@ -166,4 +166,4 @@ def run_batch(
     """All members, spread over the cores: samples (m,), and where the environment's machine code is."""
     for m in numba.prange(members.device.size):
         # the loop's own counter has no sign: all that is called would be compiled for it once more
-        run_member(devices, computers, members, np.int64(m), samples[m], address, records)
+        run_member(devices, computers, members, np.int64(m), samples[m], address, records)  # type: ignore[arg-type]
