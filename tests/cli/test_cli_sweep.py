@@ -219,6 +219,17 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     assert [float(row["slow_s"]) for row in rows] == np.linspace(1e-3, 2e-3, 200).tolist()
 
 
+def test_a_stop_within_compiled_code_is_a_stop(folder, monkeypatch):
+    def stopped(*_):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr("zwidth.study.executor._computed", stopped)
+    ran = zwidth("sweep", "study.toml", "--output", "out.csv")
+    assert ran.code == 130
+    assert "out.csv.progress keeps what is done; the same command goes on from there" in ran.err
+    assert not (folder / "out.csv").exists()
+
+
 def test_a_folder_of_the_user_s_is_kept_and_another_study_begins_anew(folder):
     (folder / "study.toml").write_text(MANY.format(count=4))
     first = found("sweep", "study.toml", "--resume", "cells")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.main import say
+from zwidth.show.cli.main import say, stopped_in_a_kernel
 from zwidth.show.cli.options import Command, named
 from zwidth.show.output import shown
 
@@ -80,8 +80,9 @@ def keeping(store: Store | None) -> Iterator[None]:
     )
     try:
         yield
-    except KeyboardInterrupt:
-        if store is not None and store.batch is not None:
+    except (KeyboardInterrupt, SystemError) as error:
+        stopped = isinstance(error, KeyboardInterrupt) or stopped_in_a_kernel(error)
+        if stopped and store is not None and store.batch is not None:
             say(f"zwidth: {goes_on}")
         raise
     except WorkerLost as error:

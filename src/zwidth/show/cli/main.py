@@ -48,10 +48,17 @@ def run(arguments: Sequence[str]) -> int:
         _drop_output()
         return DONE
     except Exception as error:
+        if stopped_in_a_kernel(error):
+            return interrupted()
         lines, code = explain(error)
         say(*lines)
         _drop_output()
         return code
+
+
+def stopped_in_a_kernel(error: BaseException) -> bool:
+    """Is it the ctrl-C that came while compiled code was called? Python makes a SystemError of that."""
+    return isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt)
 
 
 def interrupted() -> int:
