@@ -118,7 +118,7 @@ def stable_area(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLik
 
 
 def _area_of(c: Floats) -> Floats:
-    """c^2/2 + c - (1 + c) ln(1 + c) for 0 <= c <= 1; near 0 by its series c^3/6 - c^4/12 + ..., since it cancels."""
+    """c^2/2 + c - (1 + c) ln(1 + c), 0 <= c <= 1; near 0, where it cancels, by its series c^3/6 - c^4/12 + ..."""
     series = sum((-1.0) ** (n + 1) * c**n / (n * (n - 1.0)) for n in range(3, 20))
     return np.where(c < 0.1, series, c**2 / 2.0 + c - (1.0 + c) * np.log1p(c))
 
