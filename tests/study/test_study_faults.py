@@ -1,0 +1,257 @@
+"""Every way in which a study file can be wrong, told in one line each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.study.study_cases import FIVE_BAR, LENGTH, OTHER, TWO_MASS, axis, faults, study, tables
+from zwidth.contact.room import TooLarge
+from zwidth.device.faults import DeviceError
+from zwidth.study.study_file import read_study
+
+DELAY = axis("loop.delay_samples", 0.0, 1.0)
+
+WRONG = [
+    ({"device": "no-such"}, "no-such: is neither a file nor a bundled device"),
+    ({"device": 3}, "device: must be text, got 3"),
+    ({"measures": []}, "measures: must have at least 1 element"),
+    (
+        {"measures": ["stiffnes_max"]},
+        "measures.0: no measure is named 'stiffnes_max'; did you mean stiffness_max?",
+    ),
+    ({"measures": ["isotropy", "isotropy"]}, "measures.1: isotropy is asked for twice"),
+    ({"measures": ["worst(rigid_mass)"]}, "measures.0: worst(rigid_mass): whether more of it is better depends"),
+    ({"measures": ["mean(isotropy)"]}, "measures.0: mean is nothing that is made of a measure over a workspace"),
+    ({"measures": ["isotropy_index(rigid_mass)"]}, "measures.0: isotropy_index(rigid_mass): is of isotropy only"),
+    ({"measures_file": "none.py"}, "measures_file: no such file"),
+    ({"samplin": "grid"}, "samplin: is not a key of a study file; did you mean 'sampling'?"),
+    ({"sampling": "random"}, "sampling: must be 'grid' or 'latin-hypercube', got the text 'random'"),
+    ({"sampling": "latin-hypercube"}, "sampling: 'latin-hypercube' needs count"),
+    ({"sampling": "latin-hypercube", "count": 0}, "count: must be at least 1, got 0"),
+    ({"sampling": "latin-hypercube", "count": 3, "seed": -1}, "seed: must be at least 0, got -1"),
+    ({"count": 3}, "count: is read with sampling = 'latin-hypercube' only"),
+    ({"seed": 3}, "seed: is read with sampling = 'latin-hypercube' only"),
+    ({"axis": []}, "axis: must have at least 1 element"),
+    ({"axis": 7}, "axis: must be a list, got 7"),
+    ({"direction": [0.0, 0.0]}, "direction: has zero length"),
+    ({"assembly": "elbows-up"}, "assembly: names no assembly, got 'elbows-up'; did you mean 'elbows-"),
+    ({"model": "stiff"}, "model: must be 'full', 'two-mass', 'motor-mass' or 'rigid', got the text 'stiff'"),
+    ({"operator": "no-one"}, "no-one: is neither a file nor a bundled operator"),
+    ({"set": ["loop.delay=1"]}, "set.0: loop.delay: is no key of a device file; did you mean 'loop.delay_s'?"),
+    ({"set": ["loop.sampling_period_s=-1"]}, "loop.sampling_period_s: must be"),
+    ({"frequency_Hz": 0.0}, "frequency_Hz: must be greater than 0, got 0"),
+    ({"workspace": {}}, "workspace: is read by measures over it only, such as average(rigid_mass)"),
+    (
+        {"measures": ["average(isotropy)"], "workspace": {"count": 1}},
+        "workspace.count: must be at least 2, got 1",
+    ),
+    (
+        {"measures": ["average(isotropy)"], "workspace": {"plane": "xz"}},
+        "workspace: the handle cannot leave the plane z = 0 m",
+    ),
+    ({"measures": ["average(stiffness_max)"], "device": TWO_MASS}, "measures: average(stiffness_max) is over a"),
+    ({"optimise": {"objectives": {"isotropy": "low"}}}, "optimise.objectives.isotropy: must be 'max' or 'min'"),
+]
+
+
+@pytest.mark.parametrize(("change", "line"), WRONG, ids=[line for _, line in WRONG])
+def test_a_fault_is_told_with_its_key_and_what_is_allowed(change, line):
+    told = faults({**tables(DELAY), **change})
+    assert any(one.startswith(line) or f": {line}" in one for one in told), told
+
+
+R = {"range": [0.1, 0.2]}
+WRONG_AXES = [
+    ({}, "axis.0.key: is missing"),
+    ({"key": LENGTH}, "axis.0: has no values; give range = [low, high] and count, or values"),
+    ({"key": LENGTH, **R}, "axis.0: has no count"),
+    ({"key": LENGTH, **R, "count": 0}, "axis.0.count: must be at least 1, got 0"),
+    ({"key": LENGTH, **R, "count": 2.5}, "axis.0.count: must be a whole number, got 2.5"),
+    ({"key": LENGTH, **R, "values": [1.0]}, "axis.0.values: stands beside a range"),
+    ({"key": LENGTH, "values": [0.1], "count": 3}, "axis.0.count: is read with a range only"),
+    ({"key": LENGTH, "values": [0.1, 0.2, 0.1]}, "axis.0.values.2: 0.1 is listed already"),
+    ({"key": LENGTH, "values": []}, "axis.0.values: must have at least 1 element"),
+    ({"key": LENGTH, "range": [0.2, 0.1], "count": 3}, "axis.0.range: must be [lower, upper] with lower < upper"),
+    ({"key": LENGTH, "range": [0.1, 0.1], "count": 3}, "axis.0.range: must be [lower, upper] with lower < upper"),
+    ({"key": LENGTH, "range": [0.1], "count": 3}, "axis.0.range: must have at least 2 elements, got 1"),
+    (
+        {"key": LENGTH, "range": [0.0, 1.0], "count": 3, "scale": "log"},
+        "axis.0.range: must be above 0 to be divided",
+    ),
+    ({"key": LENGTH, **R, "count": 3, "scale": "ln"}, "axis.0.scale: must be 'linear' or 'log'"),
+    ({"key": "links.uper-right.length_m", "values": [1]}, "axis.0.key: 'links.uper-right.length_m' is no key"),
+    (
+        {"key": "links.upper-right", "values": [1]},
+        "axis.0.key: 'links.upper-right' names no number; numbers in it",
+    ),
+    ({"key": "loop", "values": [1]}, "axis.0.key: 'loop' names no number"),
+    ({"key": "assemblies", "values": ["elbows-in"]}, "axis.0.key: 'assemblies' names no number"),
+    ({"key": "asembly", "values": ["elbows-in"]}, "axis.0.key: 'asembly' is no key of a device file"),
+    ({"key": LENGTH, "values": [0.1, "long"]}, f"axis.0.values.1: must be a number for '{LENGTH}', got the text"),
+    ({"key": LENGTH, "values": [True]}, "axis.0.values.0: must be no true or false"),
+    ({"key": LENGTH, "values": [[0.1]]}, "axis.0.values.0: must be a number"),
+    ({"key": "loop.velocity.samples", "range": [1, 5], "count": 5}, "axis.0.range: cannot be divided"),
+    ({"key": "loop.velocity.samples", "values": [1.5]}, "axis.0.values.0: must be a whole number"),
+    ({"key": "loop.velocity.method", "range": [0, 1], "count": 2}, "axis.0.range: needs a number, but 'loop.vel"),
+    (
+        {"key": "assembly", "values": ["elbow-in"]},
+        "axis.0.values.0: names no assembly, got 'elbow-in'; did you mean",
+    ),
+    ({"key": "assembly", **R, "count": 3}, "axis.0.range: is of numbers; assembly needs values"),
+    ({"key": "model", "values": ["full", "stiff"]}, "axis.0.values.1: must be one of full, two-mass, motor-mass"),
+    ({"key": "direction", "values": [[0, 0]]}, "axis.0.values.0: has zero length"),
+    ({"key": "at", "values": [[0.1], 3]}, "axis.0.values.1: must be 2 or 3 numbers, got 3"),
+    ({"key": "operator", "values": ["no-one"]}, "no-one: is neither a file nor a bundled operator"),
+    ({"key": "frequency_Hz", "values": [0.0]}, "axis.0.values.0: must be a finite number, above 0, got 0"),
+    ({"key": "assembly", "values": ["elbows-in"], "tie": [OTHER]}, "axis.0.tie: goes with a number of the device"),
+    (
+        {"key": LENGTH, "values": [0.1], "tie": ["links.upper-left.lenth_m"]},
+        "axis.0.tie.0: 'links.upper-left.lenth",
+    ),
+    ({"key": LENGTH, "values": [0.1], "tie": ["links.upper-left"]}, "axis.0.tie.0: 'links.upper-left' names no"),
+    ({"key": LENGTH, "values": [0.1], "tie": [{"power": 1}]}, "axis.0.tie.0.key: is missing"),
+    ({"key": LENGTH, "values": [0.1], "tie": [LENGTH]}, f"axis.0.tie.0: '{LENGTH}' is set by the axis"),
+    (
+        {"key": LENGTH, "values": [0.1], "tie": [{"key": OTHER, "power": 1, "factor": 2}]},
+        "axis.0.tie.0.factor: stands beside a power",
+    ),
+    (
+        {"key": "loop.delay_samples", "values": [1.0], "tie": [{"key": OTHER, "power": 1}]},
+        "axis.0.tie.0.power: needs a value of 'loop.delay_samples' other than 0",
+    ),
+    (
+        {"key": LENGTH, "values": [0.1, -0.1], "tie": [{"key": OTHER, "power": 1}]},
+        f"axis.0.tie.0.power: needs values of the sign that '{LENGTH}' has",
+    ),
+    (
+        {"key": "loop.delay_samples", "values": [1.0], "tie": ["loop.delay_s"]},
+        "axis.0.tie.0: 'loop.delay_s' excludes 'loop.delay_samples', which is set by the axis",
+    ),
+    (
+        {"key": "operator.arm_mass_kg", "values": [1.0], "tie": [{"key": LENGTH, "power": 1}]},
+        "axis.0.tie.0.power: needs a value of 'operator.arm_mass_kg' other than 0 in the device file, which gives",
+    ),
+    ({"key": LENGTH, "values": [0.1], "tie": [3]}, "axis.0.tie.0: must be a path, or a table with a key, got 3"),
+    ({"key": LENGTH, "values": [0.1, float("nan")]}, "axis.0.values.1: must be a number for"),
+    (
+        {"key": "loop.velocity.method", "values": ["kalman", "windowed"]},
+        "axis.0.values.1: must be one of backward-difference, windowed-difference, ",
+    ),
+    ({"key": LENGTH, "values": [0.1], "steps": 3}, "axis.0.steps: is not a key of an [[axis]]"),
+]
+
+
+@pytest.mark.parametrize(("table", "line"), WRONG_AXES, ids=[line for _, line in WRONG_AXES])
+def test_a_fault_of_an_axis_is_told(table, line):
+    told = faults(tables(table))
+    assert any(one.startswith(line) for one in told), told
+
+
+def test_what_goes_with_two_axes_is_told():
+    told = faults(tables(axis(LENGTH, 0.1, tie=[OTHER]), axis(OTHER, 0.1)))
+    assert told == [f"axis.1.key: '{OTHER}' goes with the axis '{LENGTH}' already; each number may be set once"]
+
+
+def test_what_is_set_twice_is_told():
+    twice = axis(LENGTH, 0.1), axis(f"mechanism.{LENGTH}", 0.2), DELAY, axis("model", "full")
+    told = faults(tables(*twice, model="rigid"))
+    assert told == [
+        f"axis.1.key: 'mechanism.{LENGTH}' is set by the axis '{LENGTH}' already; each number may be set once",
+        "model: is an axis, too; remove one of them",
+    ]
+
+
+COM = "links.upper-right.center_of_mass_m"
+LATER = [  # an axis beside LENGTH with the centre of mass tied to it, and DELAY
+    (f"{COM}.0", f"axis.2.key: '{COM}.0' overlaps '{COM}', which goes with the axis '{LENGTH}' already"),
+    (
+        "loop.delay_s",
+        "axis.2.key: 'loop.delay_s' excludes 'loop.delay_samples', which is set by the axis 'loop.del",
+    ),
+]
+
+
+@pytest.mark.parametrize(("key", "line"), LATER)
+def test_what_an_axis_would_take_from_another_is_told(key, line):
+    told = faults(tables(axis(LENGTH, 0.1, tie=[{"key": COM, "power": 1}]), DELAY, axis(key, 0.01)))
+    assert len(told) == 1
+    assert told[0].startswith(line)
+
+
+def test_numbers_of_an_operator_may_be_varied_beside_whose_they_are():
+    operators = axis("operator", "thesis-arm", "thesis-arm-rigid")
+    found = study(operators, axis("operator.arm_mass_kg", 0.5, 1.0))
+    assert found.sampling.shape == (2, 2)
+
+
+def test_a_hypercube_has_one_count():
+    told = faults(tables(axis(LENGTH, **R, count=3), sampling="latin-hypercube", count=10))
+    assert told == [
+        "axis.0.count: is that of a grid; a Latin hypercube has one count for all axes: move it to the top"
+    ]
+
+
+def test_all_faults_are_told_at_once_in_the_order_of_the_file():
+    document = {
+        "device": FIVE_BAR,
+        "measures": ["stiffnes_max"],
+        "assembly": "sideways",
+        "set": ["loop.dely_s=1"],
+        "axis": [{"key": "loop.delays", "values": [1]}, {"key": LENGTH, "range": [2, 1], "count": 1}],
+        "optimise": {"budget": 0},
+    }
+    keys = [one.split(":")[0] for one in faults(document)]
+    assert keys == ["measures.0", "assembly", "set.0", "axis.0.key", "axis.1.range", "optimise.budget"]
+
+
+def test_faults_of_the_device_file_are_told_with_its_name(tmp_path):
+    (tmp_path / "bad.toml").write_text('name = "bad"\n[plant]\nmass_kg = -1\n[loop]\nsampling_period_s = 5\n')
+    (tmp_path / "study.toml").write_text('device = "bad.toml"\nmeasures = []\n[[axis]]\nkey = "a"\nvalues = [1]\n')
+    with pytest.raises(DeviceError) as caught:
+        read_study(tmp_path / "study.toml")
+    files = {(Path(fault.file).name, fault.key) for fault in caught.value.faults}
+    assert files == {
+        ("study.toml", "measures"),
+        ("bad.toml", "plant.mass_kg"),
+        ("bad.toml", "loop.sampling_period_s"),
+    }
+
+
+def test_a_measured_device_has_no_numbers_to_vary(tmp_path):
+    (tmp_path / "sweep.csv").write_text(
+        "frequency_Hz,real_m_per_N,imag_m_per_N\n" + "".join(f"{f},{-1.0 / f**2},-0.001\n" for f in range(1, 400))
+    )
+    (tmp_path / "m.toml").write_text(
+        'name = "m"\n[response]\nfile = "sweep.csv"\nintegrators = 2\n[loop]\nsampling_period_s = 0.001\n'
+    )
+    told = faults(tables(axis("loop.sampling_period_s", 0.001), device=str(tmp_path / "m.toml")))
+    assert any("has a measured [response] and no model" in one for one in told), told
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (None, "no such file; give a study file"),
+        (b"", "is empty; a study needs a device, measures and an [[axis]]"),
+        (b"device = ", "is not TOML"),
+        (b"\xff\xfea\x00", "is UTF-16 text"),
+    ],
+)
+def test_a_file_that_is_no_study_is_told(tmp_path, data, said):
+    path = tmp_path / "study.toml"
+    if data is not None:
+        path.write_bytes(data)
+    with pytest.raises(DeviceError) as caught:
+        read_study(path)
+    assert [fault.message.startswith(said) for fault in caught.value.faults] == [True]
+
+
+@pytest.mark.parametrize("hypercube", [False, True])
+def test_a_study_that_would_not_fit_is_refused_with_its_size(hypercube):
+    span = {"range": [0.1, 0.2]} | ({} if hypercube else {"count": 10**6})
+    more = {"sampling": "latin-hypercube", "count": 10**9} if hypercube else {}
+    designs = "1000000000" if hypercube else "1000000000000"
+    with pytest.raises(TooLarge, match=rf"^{designs} designs of 1 measures would take .* GB, of .* lower a count"):
+        study(axis(LENGTH, **span), axis(OTHER, **span), **more)
