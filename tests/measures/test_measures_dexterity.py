@@ -21,22 +21,21 @@ from zwidth.measures.dexterity import (
 )
 from zwidth.model.posture import solve_posture
 
-RNG = np.random.default_rng(3)
 
-
-def random_mass(d):
-    A = RNG.normal(size=(d, d))
+def random_mass(rng, d):
+    A = rng.normal(size=(d, d))
     return A @ A.T + 0.1 * np.eye(d)
 
 
 @pytest.mark.parametrize("d", [2, 3, 4])
 def test_as_many_drives_as_directions_or_more(d):
+    rng = np.random.default_rng(3)
     for rows in (2, 3):
         if rows > d:
             continue
         J = np.zeros((3, d))
-        J[:rows] = RNG.normal(size=(rows, d))
-        M = random_mass(d)
+        J[:rows] = rng.normal(size=(rows, d))
+        M = random_mass(rng, d)
         used = J[:rows]
         assert_allclose(manipulability(J), np.sqrt(np.linalg.det(used @ used.T)))
         inverse = np.linalg.inv(M.T @ M)
@@ -50,7 +49,8 @@ def test_as_many_drives_as_directions_or_more(d):
 
 @pytest.mark.parametrize("d", [1, 2])
 def test_fewer_drives_than_directions(d):
-    J, M = RNG.normal(size=(3, d)), random_mass(d)
+    rng = np.random.default_rng(4)
+    J, M = rng.normal(size=(3, d)), random_mass(rng, d)
     assert_allclose(manipulability(J), np.sqrt(np.linalg.det(J.T @ J)))
     assert_allclose(isotropy(J), np.linalg.cond(J))
     assert_allclose(isotropy_frobenius(J), np.linalg.norm(J) * np.linalg.norm(np.linalg.pinv(J)) / d)
@@ -59,17 +59,18 @@ def test_fewer_drives_than_directions(d):
 
 
 def test_the_plane_may_lie_anywhere():
-    J = RNG.normal(size=(2, 2))
+    J = np.random.default_rng(5).normal(size=(2, 2))
     upright = np.insert(J, 1, 0.0, axis=0)
     assert_allclose(manipulability(upright), abs(np.linalg.det(J)))
     assert_allclose(isotropy(upright), np.linalg.cond(J))
 
 
 def test_a_batch_is_its_postures_side_by_side():
-    J = RNG.normal(size=(4, 5, 3, 2))
+    rng = np.random.default_rng(6)
+    J = rng.normal(size=(4, 5, 3, 2))
     J[0, :, 2] = 0.0
     J[1, 1] = np.nan
-    M = np.array([[random_mass(2) for _ in range(5)] for _ in range(4)])
+    M = np.array([[random_mass(rng, 2) for _ in range(5)] for _ in range(4)])
     M[1, 1] = np.nan
     for measure in (
         lambda J, M: manipulability(J),
@@ -88,7 +89,7 @@ def test_a_batch_is_its_postures_side_by_side():
 
 
 def test_at_a_singularity():
-    J, M = np.array([[0.1, 0.2], [0.2, 0.4], [0.0, 0.0]]), random_mass(2)
+    J, M = np.array([[0.1, 0.2], [0.2, 0.4], [0.0, 0.0]]), random_mass(np.random.default_rng(7), 2)
     assert_allclose(manipulability(J), 0.0, atol=1e-15)
     assert isotropy(J) > 1e14
     assert isotropy_frobenius(J) > 1e14
@@ -106,7 +107,7 @@ def test_a_stretched_arm_is_singular_in_whatever_direction_it_points():
     # a spatial arm in a plane could be a planar one with a drive too many: that has to be told
     J = np.array([[0.1, 0.2, 0.0], [0.2, -0.1, 0.3], [0.0, 0.0, 0.0]])
     assert isotropy(J) < 3.0
-    for turned in (J, random_rotation(RNG) @ J):
+    for turned in (J, random_rotation(np.random.default_rng(8)) @ J):
         assert isotropy(turned, freedoms=3) > 1e14
         assert_allclose(isotropy(turned, freedoms=2), np.linalg.cond(J[:2]))
         assert_allclose(manipulability(turned, freedoms=3), 0.0, atol=1e-16)
@@ -121,15 +122,16 @@ def test_a_motion_without_mass():
 
 
 def test_isotropic_matrices_are_isotropic_in_every_norm():
+    rng = np.random.default_rng(9)
     for r in (1, 2, 3):
-        J = 0.2 * random_rotation(RNG)[:, :r]
+        J = 0.2 * random_rotation(rng)[:, :r]
         for kappa in (isotropy(J), isotropy_frobenius(J), handle_mass_isotropy(J, 0.03 * np.eye(r))):
             assert_allclose(kappa, 1.0)
     assert_allclose(dynamic_isotropy(0.02 * np.eye(3)), 1.0)
 
 
 def test_the_frobenius_norm_lies_below_the_other_and_is_known_for_two():
-    J = RNG.normal(size=(200, 3, 3))
+    J = np.random.default_rng(10).normal(size=(200, 3, 3))
     two, frobenius = isotropy(J), isotropy_frobenius(J)
     assert np.all((frobenius >= 1.0) & (frobenius <= two))
     plane = isotropy(J[..., :2])
@@ -138,8 +140,9 @@ def test_the_frobenius_norm_lies_below_the_other_and_is_known_for_two():
 
 def test_the_force_ellipsoid_is_the_inverse_of_the_velocity_ellipsoid():
     """Rates and torques of unit length; v^T (J J^T)^-1 v = 1 and f^T J J^T f = 1 (thesis 5.1)."""
-    J = RNG.normal(size=(3, 3))
-    unit = RNG.normal(size=(50, 3))
+    rng = np.random.default_rng(11)
+    J = rng.normal(size=(3, 3))
+    unit = rng.normal(size=(50, 3))
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     velocities, forces = unit @ J.T, unit @ np.linalg.inv(J)
     assert_allclose(np.einsum("ki,ij,kj->k", velocities, np.linalg.inv(J @ J.T), velocities), 1.0)
@@ -152,7 +155,8 @@ def test_the_force_ellipsoid_is_the_inverse_of_the_velocity_ellipsoid():
 
 def test_dynamic_manipulability_is_the_area_that_torques_of_unit_length_reach():
     """A linear map takes the polygon inscribed in the circle of torques to one in the ellipse of accelerations."""
-    J, M, k = RNG.normal(size=(2, 2)), random_mass(2), 60
+    rng = np.random.default_rng(12)
+    J, M, k = rng.normal(size=(2, 2)), random_mass(rng, 2), 60
     angle = 2.0 * np.pi * np.arange(k) / k
     x, y = J @ np.linalg.solve(M, np.array([np.cos(angle), np.sin(angle)]))
     area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))

@@ -19,20 +19,18 @@ from zwidth.measures.forces import (
     resolution_along,
 )
 
-RNG = np.random.default_rng(5)
 
-
-def random_direction(J):
+def random_direction(rng, J):
     """A unit vector that the handle can move along."""
-    u = J @ RNG.normal(size=J.shape[1])
+    u = J @ rng.normal(size=J.shape[1])
     return u / np.linalg.norm(u)
 
 
-def random_case(d):
+def random_case(rng, d):
     """Jacobian (3, d) of rank d, mass matrix, a direction within it, torques at the joints."""
-    J = random_rotation(RNG) @ np.vstack([RNG.normal(size=(d, d)), np.zeros((3 - d, d))])
-    A = RNG.normal(size=(d, d))
-    return J, A @ A.T + 0.1 * np.eye(d), random_direction(J), RNG.uniform(0.2, 2.0, d)
+    J = random_rotation(rng) @ np.vstack([rng.normal(size=(d, d)), np.zeros((3 - d, d))])
+    A = rng.normal(size=(d, d))
+    return J, A @ A.T + 0.1 * np.eye(d), random_direction(rng, J), rng.uniform(0.2, 2.0, d)
 
 
 def most(objective, equal, bounds):
@@ -45,8 +43,9 @@ def most(objective, equal, bounds):
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_against_linear_programs(d):
     """Unknown torques t within their limits, beside f or a in the direction; forces F in the handle's space."""
+    rng = np.random.default_rng(5)
     for _ in range(10):
-        J, M, u, t = random_case(d)
+        J, M, u, t = random_case(rng, d)
         free = [1e9]
         amount = np.append(np.zeros(d), 1.0)
         statics = np.column_stack([np.eye(d), -J.T @ u])  # t - J^T u f = 0
@@ -61,8 +60,9 @@ def test_against_linear_programs(d):
 
 
 def test_a_component_is_at_least_the_force_along_and_equal_towards_the_farthest_corner():
+    rng = np.random.default_rng(6)
     for d in (2, 3):
-        J, _, _, t = random_case(d)
+        J, _, _, t = random_case(rng, d)
         corners = (t * np.array(list(product((-1, 1), repeat=d)))) @ np.linalg.pinv(J)  # every drive at its limit
         sizes = np.linalg.norm(corners, axis=1)
         u = corners / sizes[:, None]
@@ -70,21 +70,23 @@ def test_a_component_is_at_least_the_force_along_and_equal_towards_the_farthest_
         assert_allclose(force_component(J, u, t), (u @ corners.T).max(axis=1))
         assert_allclose(force_component(J, u[sizes.argmax()], t), sizes.max())
         for _ in range(20):
-            u = random_direction(J)
+            u = random_direction(rng, J)
             assert force_along(J, u, t) <= force_component(J, u, t) * (1.0 + 1e-12)
 
 
 def test_the_steps_of_all_encoders_together():
-    J, _, u, _ = random_case(3)
-    steps = RNG.uniform(1e-5, 1e-3, 3)
+    rng = np.random.default_rng(7)
+    J, _, u, _ = random_case(rng, 3)
+    steps = rng.uniform(1e-5, 1e-3, 3)
     reached = [u @ J @ (np.array(signs) * steps) for signs in product((-1, 0, 1), repeat=3)]
     assert_allclose(resolution_along(J, u, steps), max(reached))
 
 
 def test_friction_is_the_work_of_a_metre():
     """However the hand moves there: small steps along a straight line, each drive slipping as it must."""
+    rng = np.random.default_rng(8)
     for d in (1, 2, 3):
-        J, _, u, friction = random_case(d)
+        J, _, u, friction = random_case(rng, d)
         pieces = np.diff(np.linspace(0.0, 1.0, 7))[:, None] * u
         slips = np.linalg.lstsq(J, pieces.T, rcond=None)[0]
         assert_allclose(friction_along(J, u, friction), np.sum(friction[:, None] * np.abs(slips)))
@@ -93,9 +95,10 @@ def test_friction_is_the_work_of_a_metre():
 
 def test_coordinates_that_turn_faster_change_nothing():
     """The motors' angles in place of the joints': torques smaller, steps larger by the same ratios."""
+    rng = np.random.default_rng(9)
     for d in (2, 3):
-        J, M, u, t = random_case(d)
-        n = RNG.uniform(5.0, 25.0, d)
+        J, M, u, t = random_case(rng, d)
+        n = rng.uniform(5.0, 25.0, d)
         fast, light = J / n, M / np.outer(n, n)
         assert_allclose(force_along(fast, u, t / n), force_along(J, u, t))
         assert_allclose(force_component(fast, u, t / n), force_component(J, u, t))
@@ -128,7 +131,8 @@ def test_a_drive_without_a_limit_or_without_a_part():
 
 
 def test_a_batch_is_its_postures_side_by_side():
-    cases = [[random_case(2) for _ in range(4)] for _ in range(3)]
+    rng = np.random.default_rng(10)
+    cases = [[random_case(rng, 2) for _ in range(4)] for _ in range(3)]
     J, M, u, t = (np.array([[case[i] for case in row] for row in cases]) for i in range(4))
     J[1, 2] = np.nan
     for measure in (
@@ -145,7 +149,7 @@ def test_a_batch_is_its_postures_side_by_side():
 
 
 def test_a_direction_is_of_unit_length():
-    J, M, _, t = random_case(2)
+    J, M, _, t = random_case(np.random.default_rng(11), 2)
     for call in (
         lambda u: force_along(J, u, t),
         lambda u: force_component(J, u, t),

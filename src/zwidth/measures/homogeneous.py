@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
-GOLDEN: Final = (np.sqrt(5.0) - 1.0) / 2.0
-NARROWED: Final = 90  # steps of golden section: the bracket shrinks to 1e-18 of itself
+HALVINGS: Final = 60  # of the bracket: it shrinks to 1e-18 of itself
+FLAT: Final = 1e-10  # a slope of log kappa against log L that counts as none: well above its rounding
 WIDEST: Final = 64.0  # of the bracket, in natural logarithms of a length: far beyond what double precision holds
 
 
@@ -58,10 +58,11 @@ def characteristic_length(
 
         L = argmin kappa(D(L) J E(L))      (Ma and Angeles 1991, Angeles and Lopez-Cajun 1992; second-hand)
 
-    There is one least value, and walking downhill finds it: with L = e^x and imaginary parts of x that only turn
-    the matrix by unitary ones, Hadamard's three lines theorem makes the logarithm of |D J E| convex in x, and
-    that of its inverse alike. So log kappa is convex, and golden section on it is global. In the Frobenius norm,
-    without prismatic drives, it can be written down: with J = [T; R], T the translations, and J^-1 = [T', R'],
+    There is one least value: with L = e^x and imaginary parts of x that only turn the matrix by unitary ones,
+    Hadamard's three lines theorem makes the logarithm of |D J E| convex in x, and that of its inverse alike. So log
+    kappa is convex, its slope never falls, and bisection on the sign of the slope is global. The slope follows from
+    the singular values' own, d s_k/dx = u_k^T (dH/dx) v_k. In the Frobenius norm, without prismatic drives, the length
+    can be written down: with J = [T; R], T the translations, and J^-1 = [T', R'],
 
         L = sqrt(|T| |R'| / (|R| |T'|))
 
@@ -69,8 +70,9 @@ def characteristic_length(
                             columns, or only columns mixed and no more columns than rows
     rotations, prismatic    as in `homogeneous_jacobian`
     norm       of the condition number; "frobenius" is smooth and has a single least point
-    Returns    (...)        L [m], good to about 1e-6 of itself and the condition number to rounding; nan where J
-                            is singular or nan. In the 2-norm a range of lengths may be equally good: one of them
+    Returns    (...)        L [m], good to about 1e-9 of itself and the condition number to rounding; nan where J
+                            is singular or nan. In the 2-norm a range of lengths may be equally good: its middle,
+                            in the logarithm
     Raises     ValueError   where all units are alike, or for a matrix of another shape
 
     >>> round(float(characteristic_length([[0.2, 0.0], [0.0, 1.0]], rotations=[1])), 6)
@@ -83,10 +85,10 @@ def characteristic_length(
     J = np.where(unknown[..., None, None], np.eye(*J.shape[-2:]), J)
     values = np.linalg.svd(J, compute_uv=False)
     start = _start(J, power)
-    best = _condition(J, power, start, "two")
-    singular = ~(best < 1.0 / (np.finfo(float).eps * max(J.shape[-2:]))) | (values[..., -1] == 0.0)
+    kappa = _condition(J, power, start)
+    singular = ~(kappa < 1.0 / (np.finfo(float).eps * max(J.shape[-2:]))) | (values[..., -1] == 0.0)
     J = np.where(singular[..., None, None], np.eye(*J.shape[-2:]), J)
-    x = _downhill(lambda x: np.log(_condition(J, power, x, norm)), np.where(singular, 0.0, start))
+    x = _least(lambda x: _slope(J, power, x, norm), np.where(singular, 0.0, start))
     return np.asarray(np.where(unknown | singular, np.nan, np.exp(x)))
 
 
@@ -161,26 +163,49 @@ def _start(J: Floats, power: Floats) -> Floats:
     return np.asarray(np.where(known.any(axis=0), first, 0.0))
 
 
-def _condition(J: Floats, power: Floats, x: Floats, norm: str) -> Floats:
-    """Condition number of the homogeneous Jacobian for the length e^x."""
+def _condition(J: Floats, power: Floats, x: Floats) -> Floats:
+    """Condition number (2-norm) of the homogeneous Jacobian for the length e^x."""
     s = np.linalg.svd(J * np.exp(x[..., None, None] * power), compute_uv=False)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        if norm == "two":
-            return np.asarray(s[..., 0] / s[..., -1])
-        return np.asarray(np.sqrt((s**2).sum(axis=-1) * (1.0 / s**2).sum(axis=-1)))
+        return np.asarray(s[..., 0] / s[..., -1])
 
 
-def _downhill(function: Callable[[Floats], Floats], start: Floats) -> Floats:
-    """Where a convex function (...) -> (...) is least, each by itself, from a start; nan without a bracket."""
-    here, half = function(start), np.ones_like(start)
+def _slope(J: Floats, power: Floats, x: Floats, norm: str) -> Floats:
+    """Slope of log kappa of the homogeneous Jacobian at the length e^x, against x."""
+    H = J * np.exp(x[..., None, None] * power)
+    U, s, V = np.linalg.svd(H, full_matrices=False)
+    growth = np.einsum("...ik,...ij,...kj->...k", U, power * H, V) / s  # of each singular value, relative
+    if norm == "two":
+        return np.asarray(growth[..., 0] - growth[..., -1])
+    # shares of each singular value in the squared norms of H and of its inverse, by ratios that cannot overflow
+    of_matrix, of_inverse = (s / s[..., :1]) ** 2, (s[..., -1:] / s) ** 2
+    return np.asarray(
+        (of_matrix * growth).sum(axis=-1) / of_matrix.sum(axis=-1)
+        - (of_inverse * growth).sum(axis=-1) / of_inverse.sum(axis=-1)
+    )
+
+
+def _least(slope: Callable[[Floats], Floats], start: Floats) -> Floats:
+    """Where convex functions (...) with a slope are least, each by itself; nan where none of the bracket rises.
+
+    Kinks and level stretches are treated alike: the place where the slope stops falling below -FLAT and the one where
+    it begins to exceed FLAT are bisected for, and the answer lies in their middle. So rounding of a slope that is
+    all but zero does not choose the place.
+    """
+    ends = []
     for side in (-1.0, 1.0):
         reach = np.ones_like(start)
-        while np.any(low := (function(start + side * reach) <= here) & (reach < WIDEST)):
-            reach = np.where(low, 2.0 * reach, reach)
-        half = np.maximum(half, reach)
-    a, b = start - half, start + half
-    for _ in range(NARROWED):
-        c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-        left = function(c) <= function(d)
-        a, b = np.where(left, a, c), np.where(left, d, b)
-    return np.asarray(np.where(half < WIDEST, 0.5 * (a + b), np.nan))
+        while np.any(level := ~(side * slope(start + side * reach) > FLAT) & (reach < WIDEST)):
+            reach = np.where(level, 2.0 * reach, reach)
+        ends.append(reach)
+    below, above = start - ends[0], start + ends[1]
+    edges = []
+    for level in (-FLAT, FLAT):
+        a, b = below, above
+        for _ in range(HALVINGS):
+            middle = 0.5 * (a + b)
+            falls = slope(middle) < level
+            a, b = np.where(falls, middle, a), np.where(falls, b, middle)
+        edges.append(0.5 * (a + b))
+    bracketed = np.maximum(*ends) < WIDEST
+    return np.asarray(np.where(bracketed, 0.5 * (edges[0] + edges[1]), np.nan))
