@@ -230,4 +230,6 @@ def _solved(A, B):
 
 
 def _determinant(A):
-    return A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
+    """Of 2 x 2 matrices; NaN where one holds inf or NaN, without a warning."""
+    with np.errstate(invalid="ignore"):
+        return A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]

@@ -38,10 +38,10 @@ def check_reach(mechanism: Mechanism, mech: Arrays, posture: Posture, surface: S
     for _ in range(REACHES):
         ways = normal @ plane @ plane.T
         gain = np.sum(ways * normal, axis=1)
-        reachable = gain > 1e-9
+        reachable = gain > 1e-9  # elsewhere the handle cannot move towards the surface at all
         if not reachable.any():
             break
-        goals = at[reachable] + (depth / gain)[reachable, None] * ways[reachable]
+        goals = at[reachable] + (depth[reachable] / gain[reachable])[:, None] * ways[reachable]
         solved = solve_posture(mechanism, goals, posture.assembly)
         if np.any(solved.status == OK):
             at, depth = goals[solved.status == OK], depth_and_normal(surface, goals[solved.status == OK])[0]
