@@ -10,9 +10,11 @@ from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-# The first example of a test may compile a kernel, and a busy machine draws examples slowly. `settings()` keeps
-# what hypothesis chose for this machine: on continuous integration the examples are the same in every run.
-settings.register_profile("zwidth", parent=settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# The same examples in every run, on every machine, whatever an earlier run has found. The first one may compile a
+# kernel, and a busy machine draws them slowly.
+settings.register_profile(
+    "zwidth", derandomize=True, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.load_profile("zwidth")
 
 NO_SKIPS = "ZWIDTH_NO_SKIPS"
