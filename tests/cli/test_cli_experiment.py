@@ -5,10 +5,6 @@ from __future__ import annotations
 import csv
 import os
 import re
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,6 +13,7 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.cli.cli_run import TWO_MASS, found, refused, zwidth
+from tests.interruption import stopped_by_ctrl_c
 from tests.systems import published
 from zwidth.contact.experiment import Place
 from zwidth.show.experiment import numbers, sentences
@@ -166,21 +163,15 @@ def test_subjects_and_trials_give_bars(folder):
 
 
 def test_an_interrupted_run_goes_on_where_it_was(folder):
-    """Stopped by ctrl-C once something is on disk; the rest gives the same points bit for bit."""
+    """Stopped by ctrl-C once four results are on disk; the rest gives the same points bit for bit."""
     words = ["experiment", TWO_MASS, "--operator", "thesis-arm", "--stiffnesses", "1", "--tips", "0"]
     words += ["--subjects", "3", "--trials", "3", "--output", "points.csv"]
-    journal, command = folder / "points.csv.progress", [Path(sys.executable).with_name("zwidth"), *words]
-    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    give_up = time.monotonic() + 120.0
-    while time.monotonic() < give_up and not (journal.is_file() and journal.read_bytes().count(b"\n") > 4):
-        time.sleep(0.01)
-    running.send_signal(signal.SIGINT)
-    _, err = running.communicate(timeout=120)
-    assert running.returncode == 130
+    journal = folder / "points.csv.progress"
+    code, _, err = stopped_by_ctrl_c(words, "zwidth.study.journal:Journal.ask", 4, folder)
+    assert code == 130
     assert "points.csv.progress keeps what is done" in err
     assert not (folder / "points.csv").exists()
-    kept = journal.read_bytes()
-    assert 4 < kept.count(b"\n") < 20
+    assert journal.read_bytes().count(b"\n") == 5, "the question, and four results"
     assert zwidth(*words).code == 0
     assert not journal.exists()
     resumed = (folder / "points.csv").read_bytes()

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +14,7 @@ import pytest
 import xarray as xr
 
 from tests.cli.cli_run import found, refused, strict, zwidth
+from tests.interruption import stopped_by_ctrl_c
 from zwidth.study.store import Store
 from zwidth.study.study_file import read_study
 from zwidth.study.sweep import sweep_job
@@ -195,24 +193,18 @@ def kept_in(path):
 
 
 def test_an_interrupted_run_goes_on_where_it_was(folder):
-    """Ctrl-C to the command itself, as the terminal sends it: to all its processes."""
+    """Ctrl-C once three batches are on disk."""
     (folder / "study.toml").write_text(MANY.format(count=200))
-    command = [ZWIDTH, "sweep", "study.toml", "--output", "designs.csv", "--workers", "2", "--json"]
-    running = subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
-    done, progress = folder / "designs.csv.progress" / "status" / "c", time.monotonic()
-    while len(list(done.glob("*/0"))) < 3 and time.monotonic() - progress < 30.0:
-        time.sleep(0.01)
-    os.killpg(running.pid, signal.SIGINT)
-    out, err = running.communicate(timeout=20)
-    assert (running.returncode, out) == (130, "")
+    words = ["sweep", "study.toml", "--output", "designs.csv", "--workers", "2", "--json"]
+    code, out, err = stopped_by_ctrl_c(words, "zwidth.study.store:Store.keep", 3, folder)
+    assert (code, out) == (130, "")
     assert "designs.csv.progress keeps what is done; the same command goes on from there" in err
     assert "Traceback" not in err
-    kept = sum(len(cells.values) for _, cells in kept_in(folder / "designs.csv.progress"))
-    assert kept >= 3
+    batches = kept_in(folder / "designs.csv.progress")
+    assert len(batches) == 3
+    kept = sum(len(cells.values) for _, cells in batches)
     before = (folder / "asked").stat().st_size
-    subprocess.run(command, cwd=folder, capture_output=True, check=True)
+    assert zwidth(*words).code == 0
     assert (folder / "asked").stat().st_size - before == 200 - kept + 1, "and one to see whether it can be asked"
     assert not (folder / "designs.csv.progress").exists(), "what it kept is written"
     rows = list(csv.DictReader((folder / "designs.csv").read_text().splitlines()))

@@ -6,11 +6,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
 
+from tests.interruption import HANGS
 from tests.study.executor_cases import LEFT_OUT, Deadly, Odd, Processes, Refusing, Roots, Talkative, alike
 from zwidth.contact.room import TooLarge
 from zwidth.measures.measure import FAILED, MISSING, NO_VALUE, MeasureError, Note
@@ -111,15 +111,17 @@ sys.path[:0] = {path!r}
 from tests.study.executor_cases import Roots
 from zwidth.study.executor import run
 from zwidth.study.store import Store
-job = Roots(1000, seconds=0.05)
+job = Roots({count}, seconds=0.2)
 def progress(stage, done, of):
     print(done, flush=True)
 run(job, Store(Path("cells"), job), progress, 2, batch=2, patience=0.1)
 """
 
 
-def test_ctrl_c_stops_at_once_and_leaves_no_process(tmp_path):
-    command = [sys.executable, "-c", ENDLESS.format(path=sys.path)]
+def test_ctrl_c_stops_and_leaves_no_process(tmp_path):
+    """Amid more cells than anybody waits for; what was computed until then is kept."""
+    count = 2000
+    command = [sys.executable, "-c", ENDLESS.format(path=sys.path, count=count)]
     running = subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
     )
@@ -130,14 +132,12 @@ def test_ctrl_c_stops_at_once_and_leaves_no_process(tmp_path):
     assert len(children) == 2
     assert running.pid not in {os.getpgid(int(child)) for child in children}, "ctrl-C is not for them"
     os.killpg(running.pid, signal.SIGINT)  # as the terminal does
-    began = time.monotonic()
-    _, err = running.communicate(timeout=20)
-    assert time.monotonic() - began < 2.0
+    _, err = running.communicate(timeout=HANGS)
     assert err.decode().count("KeyboardInterrupt") == 1, "the processes say nothing"
     for child in children:
         with pytest.raises(ProcessLookupError):
             os.kill(int(child), 0)
-    job = Roots(1000)
+    job = Roots(count)
     kept = [first for first, _ in Store(tmp_path / "cells", job).kept()]
     assert len(kept) >= 6
     assert all(first % 2 == 0 for first in kept)
