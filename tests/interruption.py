@@ -10,8 +10,8 @@ from pathlib import Path
 
 HANGS = 900.0  # seconds after which a process that should have ended counts as one that never will
 
-# The method `{name}` of `{owner}` of `{module}` (of the module itself where there is no owner) works as ever. After
-# call number `{calls}` it tells the test and waits for the signal; one that comes before the wait counts too.
+# The method `{name}` of `{owner}` of `{module}` (a function of the module where there is no owner) works as ever.
+# After call number `{calls}` it tells the test and waits for the signal; one that comes earlier counts too.
 STOPPING = """
 import importlib, os, signal, sys
 

@@ -59,10 +59,10 @@ def characteristic_length(
         L = argmin kappa(D(L) J E(L))      (Ma and Angeles 1991, Angeles and Lopez-Cajun 1992; second-hand)
 
     There is one least value: with L = e^x and imaginary parts of x that only turn the matrix by unitary ones,
-    Hadamard's three lines theorem makes the logarithm of |D J E| convex in x, and that of its inverse alike. So log
-    kappa is convex, its slope never falls, and bisection on the sign of the slope is global. The slope follows from
-    the singular values' own, d s_k/dx = u_k^T (dH/dx) v_k. In the Frobenius norm, without prismatic drives, the length
-    can be written down: with J = [T; R], T the translations, and J^-1 = [T', R'],
+    Hadamard's three lines theorem makes the logarithm of |D J E| convex in x, and that of its inverse alike. So
+    log kappa is convex, its slope never falls, and bisection on the sign of the slope is global. The slope follows
+    from those of the singular values, d s_k/dx = u_k^T (dH/dx) v_k. In the Frobenius norm, without prismatic
+    drives, the length can be written down: with J = [T; R], T the translations, and J^-1 = [T', R'],
 
         L = sqrt(|T| |R'| / (|R| |T'|))
 
@@ -188,9 +188,9 @@ def _slope(J: Floats, power: Floats, x: Floats, norm: str) -> Floats:
 def _least(slope: Callable[[Floats], Floats], start: Floats) -> Floats:
     """Where convex functions (...) with a slope are least, each by itself; nan where none of the bracket rises.
 
-    Kinks and level stretches are treated alike: the place where the slope stops falling below -FLAT and the one where
-    it begins to exceed FLAT are bisected for, and the answer lies in their middle. So rounding of a slope that is
-    all but zero does not choose the place.
+    Kinks and level stretches are treated alike: the place up to which the slope is below -FLAT and the one from
+    which it exceeds FLAT are bisected for, and the answer lies in their middle. So rounding of a slope that is all
+    but zero does not choose the place.
     """
     ends = []
     for side in (-1.0, 1.0):

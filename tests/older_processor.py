@@ -1,0 +1,58 @@
+"""Run the tests as an older processor would, on this one.
+
+    python tests/older_processor.py AVX512F [pytest's arguments ...]      as one without AVX-512
+    python tests/older_processor.py AVX2 [pytest's arguments ...]         as one without AVX2 and FMA, too
+
+NumPy, OpenBLAS, the C library and numba each choose their instructions when they start, by what the processor can
+do. The last digits of sums, matrix products and sines differ between them, and so does which floating point
+warnings NumPy gives. Each has an environment variable that takes instructions away.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy
+
+# What NumPy calls the instructions that are taken away; older releases name them one by one, newer ones in levels.
+LEVELS = {"AVX512F": ("AVX512", "X86_V4"), "AVX2": ("AVX", "X86_V3", "X86_V4", "FMA", "F16C")}
+OTHERS = {
+    "AVX512F": {
+        "OPENBLAS_CORETYPE": "Haswell",
+        "NUMBA_CPU_NAME": "haswell",
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F",
+    },
+    "AVX2": {
+        "OPENBLAS_CORETYPE": "Nehalem",
+        "NUMBA_CPU_NAME": "generic",
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4",
+    },
+}
+
+
+def environment(without: str) -> dict[str, str]:
+    """This process's environment, and what takes the instructions away from those it starts.
+
+    Raises  SystemExit  for instructions that are not in LEVELS
+    """
+    if without not in LEVELS:
+        raise SystemExit(f"which instructions are to be missing? one of {', '.join(LEVELS)}, got {without!r}")
+    found = numpy.show_config(mode="dicts")["SIMD Extensions"]
+    dispatched = [*found.get("found", ()), *found.get("not found", ())]
+    taken = [name for name in dispatched if name.startswith(LEVELS[without])]
+    return os.environ | OTHERS[without] | {"NUMBA_CPU_FEATURES": "", "NPY_DISABLE_CPU_FEATURES": " ".join(taken)}
+
+
+def main() -> int:
+    without, *arguments = sys.argv[1:] or [""]
+    env = environment(without)
+    here = Path(__file__).parent
+    subprocess.run([sys.executable, here / "compile_kernels.py"], env=env, check=True)
+    return subprocess.run([sys.executable, "-m", "pytest", *arguments], env=env, cwd=here.parent).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())
