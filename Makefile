@@ -1,27 +1,35 @@
 # On a fresh machine with Python 3.11 or newer and make:
 #     make report     sets up .venv, then writes the report on the bundled five-bar to out/
 #     make test       sets up .venv with what the tests want, then runs them
-# The set-up happens once, and again only when pyproject.toml or constraints.txt change.
+# The set-up happens once, and again only when pyproject.toml or the constraints change.
 
 DEVICE  ?= five-bar
 PYTHON  ?= python3 python3.13 python3.12 python3.11 python
+# The tests to run; none named: all of the everyday suite.
+TESTS   ?=
 
-VENV    := .venv
+# Another environment beside the first, with another Python or other versions of what zwidth needs:
+#     make test VENV=.venv-lowest PYTHON=python3.11 CONSTRAINTS=constraints-lowest.txt
+VENV        := .venv
+CONSTRAINTS := constraints.txt
 BIN     := $(VENV)/bin
+NUMERICAL := $(addprefix tests/,chart conditions contact guarantees loop measures model reproduction study)
 OUTPUT   = out/$(basename $(notdir $(DEVICE))).html
-DROP_KERNELS = find src -name '*.nbi' -delete -o -name '*.nbc' -delete
+# Those of this environment's Python; another's stay.
+DROP_KERNELS = find src -name "*.$$($(BIN)/python -c 'import sys; print("py%d%d" % sys.version_info[:2])').nb?" -delete
 
 # Relative on purpose: pip splits this variable at blanks, and a folder's name may hold one.
 # Newer releases of pip read the second for the build backend, older ones the first.
-export PIP_CONSTRAINT := constraints.txt
-export PIP_BUILD_CONSTRAINT := constraints.txt
+export PIP_CONSTRAINT := $(CONSTRAINTS)
+export PIP_BUILD_CONSTRAINT := $(CONSTRAINTS)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help report test slow lint bench docs clean
+.PHONY: help report test older-processor slow lint bench docs clean
 
 help:
 	@echo 'make report   the report on a device (DEVICE=$(DEVICE)), into $(OUTPUT)'
-	@echo 'make test     the test suite'
+	@echo 'make test     the test suite, or TESTS=... of it'
+	@echo 'make older-processor  the numerical tests, or TESTS=..., as a processor without AVX2 runs them'
 	@echo 'make slow     the longer studies: thousands of random loops'
 	@echo 'make lint     style and types'
 	@echo 'make bench    how fast, beside what a competent user would write otherwise'
@@ -34,7 +42,11 @@ report: $(VENV)/.installed
 
 # Each worker takes its tests as they stand, so that what a file's tests share is computed once.
 test: $(VENV)/.kernels
-	$(BIN)/python -m pytest -n auto --dist worksteal
+	$(BIN)/python -m pytest -n auto --dist worksteal $(TESTS)
+
+# Kernels for another processor stand beside this one's.
+older-processor: $(VENV)/.kernels
+	$(BIN)/python tests/older_processor.py AVX2 -n auto --dist worksteal $(or $(TESTS),$(NUMERICAL))
 
 slow: $(VENV)/.kernels
 	$(BIN)/python -m pytest -n auto --dist worksteal -m slow
@@ -54,12 +66,12 @@ clean:
 	rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find src tests benchmarks gallery docs -name __pycache__ -prune -exec rm -rf {} +
 
-$(VENV)/.installed: $(VENV)/bin/python pyproject.toml constraints.txt
+$(VENV)/.installed: $(VENV)/bin/python pyproject.toml $(CONSTRAINTS)
 	@echo 'Installing zwidth into $(VENV); the first time takes a few minutes.'
 	$(BIN)/python -m pip install --quiet --editable .
 	@touch $@
 
-$(VENV)/.installed-test: $(VENV)/bin/python pyproject.toml constraints.txt
+$(VENV)/.installed-test: $(VENV)/bin/python pyproject.toml $(CONSTRAINTS)
 	@echo 'Installing zwidth and its tests into $(VENV); the first time takes a few minutes.'
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	@touch $(VENV)/.installed $@

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 import zwidth
 from tests.cli.cli_run import zwidth as run_zwidth
@@ -118,11 +119,58 @@ def test_the_citation_says_when_and_who():
 # --- pages ------------------------------------------------------------------------------------------
 
 
+def anchors(page: Path) -> set[str]:
+    """What links into a page may name: its headings as code hosts spell them."""
+    prose = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    found: set[str] = set()
+    for heading in re.findall(r"^#+ +(.+?) *$", prose, re.MULTILINE):
+        plain = re.sub(r"\]\([^)]*\)|[^\w\- ]", "", heading.lower()).replace(" ", "-")
+        count = 0
+        while (name := f"{plain}-{count}" if count else plain) in found:
+            count += 1
+        found.add(name)
+    return found
+
+
+def links(page: Path) -> list[str]:
+    """Targets of a page's links and pictures, those of other sites left out."""
+    prose = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    targets = re.findall(r"\]\(([^)\s]+)[^)]*\)", prose) + re.findall(r"^\[[^\]]+\]: *(\S+)", prose, re.MULTILINE)
+    return [target for target in targets if "://" not in target]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=short)
-def test_every_link_leads_to_a_file(page):
-    targets = re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8"))
-    missing = [to for to in targets if "://" not in to and not (page.parent / to).exists()]
-    assert missing == []
+def test_every_link_leads_somewhere(page):
+    """To a file of the repository, and to a heading where it names one."""
+    for target in links(page):
+        name, _, anchor = target.partition("#")
+        file = page.parent / name if name else page
+        assert file.exists(), target
+        assert not anchor or anchor in anchors(file), target
+        assert ROOT in file.resolve().parents or file.resolve() == ROOT, f"{target} leads out of the repository"
+
+
+def test_links_are_found_and_anchors_spelled(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# Loss factors, K (1 + i eta)\n# `a`\n# a\n```\n# no heading\n[x](none)\n```\n[y](z.md#w)\n[r]: to\n"
+    )
+    assert anchors(page) == {"loss-factors-k-1--i-eta", "a", "a-1"}
+    assert links(page) == ["z.md#w", "to"]
+
+
+def test_the_lowest_versions_are_those_that_the_package_allows():
+    """Each dependency with its lower bound, in the file that the tests are also run with."""
+    lines = [line for line in text("constraints-lowest.txt").splitlines() if not line.startswith("#")]
+    wanted = {
+        canonicalize_name(Requirement(name).name): Requirement(name).specifier for name in PROJECT["dependencies"]
+    }
+    lowest = {canonicalize_name(pin.name): pin.specifier for pin in map(Requirement, lines)}
+    assert lowest.keys() == wanted.keys()
+    for name, (pin,) in lowest.items():
+        (bound,) = wanted[name]
+        assert (bound.operator, pin.operator) == (">=", "=="), name
+        assert Version(bound.version) == Version(pin.version), name
 
 
 def test_the_index_leads_to_every_page():
