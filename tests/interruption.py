@@ -37,6 +37,11 @@ main()
 """
 
 
+def interruptible() -> None:
+    """Let a process be interrupted, before it begins: one of a job in the background is started deaf to that."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def stopped_by_ctrl_c(
     words: list[str], where: str, calls: int = 1, folder: Path | None = None
 ) -> tuple[int, str, str]:
@@ -61,6 +66,7 @@ def stopped_by_ctrl_c(
         text=True,
         pass_fds=[tell],
         start_new_session=True,
+        preexec_fn=interruptible,
     )
     os.close(tell)
     with open(ready, "rb") as pipe:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.cli_run import TWO_MASS, strict
-from tests.interruption import HANGS, stopped_by_ctrl_c
+from tests.interruption import HANGS, interruptible, stopped_by_ctrl_c
 from zwidth.show.cli.check import AT_ONCE
 
 ZWIDTH = Path(sys.executable).with_name("zwidth")
@@ -66,7 +66,9 @@ def test_ctrl_c_while_reading(tmp_path):
     pipe = tmp_path / "walls.csv"
     os.mkfifo(pipe)
     command = [ZWIDTH, "check", TWO_MASS, "--points", pipe]
-    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    running = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=interruptible
+    )
     with open(pipe, "w"):  # opens once the command reads
         running.send_signal(signal.SIGINT)
         out, err = running.communicate(timeout=HANGS)

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from tests.interruption import HANGS
+from tests.interruption import HANGS, interruptible
 from tests.study.executor_cases import LEFT_OUT, Deadly, Odd, Processes, Refusing, Roots, Talkative, alike
 from zwidth.contact.room import TooLarge
 from zwidth.measures.measure import FAILED, MISSING, NO_VALUE, MeasureError, Note
@@ -123,7 +123,12 @@ def test_ctrl_c_stops_and_leaves_no_process(tmp_path):
     count = 2000
     command = [sys.executable, "-c", ENDLESS.format(path=sys.path, count=count)]
     running = subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+        command,
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+        preexec_fn=interruptible,
     )
     assert running.stdout is not None
     while int(running.stdout.readline()) < 12:  # the first four are computed before the processes start
