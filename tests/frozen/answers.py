@@ -19,7 +19,7 @@ from tests.frozen.commits import Side
 
 Answer = dict[str, Any]
 WORKER = Path(__file__).with_name("worker.py")
-TRIES = 3  # what a run that took too long has compiled is there for the next
+TRIES = 2  # what a run that took too long has compiled is there for the next
 COMPILING = 1200.0  # processor seconds for a run that compiles most kernels
 # what compiles most kernels
 WARM = (

@@ -38,6 +38,7 @@ class Tally:
     added     keys that only the second has, by command and key
     reworded  sentences that differ, by command and key
     parted    command lines of runs that parted
+    seconds   processor time of both
     """
 
     runs: int = 0
@@ -49,6 +50,7 @@ class Tally:
     added: Counter[tuple[str, str]] = field(default_factory=Counter)
     reworded: Counter[tuple[str, str]] = field(default_factory=Counter)
     parted: list[str] = field(default_factory=list)
+    seconds: tuple[float, float] = (0.0, 0.0)
 
 
 def compare(name: str, quantised: bool, base: dict[str, Any], new: dict[str, Any], tally: Tally) -> None:
@@ -58,6 +60,7 @@ def compare(name: str, quantised: bool, base: dict[str, Any], new: dict[str, Any
     quantised  may the two runs part?
     """
     tally.runs += 1
+    tally.seconds = (tally.seconds[0] + base["seconds"], tally.seconds[1] + new["seconds"])
     if _comparable(name, base, new, tally):
         if base["out"] == new["out"]:
             tally.same += 1

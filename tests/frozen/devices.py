@@ -38,6 +38,11 @@ class Device:
         return any(word in text for text in self.files.values() for word in QUANTISERS)
 
     @property
+    def drives(self) -> int:
+        """How many drives its mechanism has; 0 without one."""
+        return self.files.get(self.word, "").count("motor_inertia_kg_m2")
+
+    @property
     def sampling_period(self) -> float:
         """Of its computer [s]; a thousandth where its file cannot be read."""
         try:

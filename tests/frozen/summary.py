@@ -16,7 +16,8 @@ def summary(tally: Tally, left: list[Difference], accepted: dict[Accepted, int],
     """Lines of the summary; all differences go into a file besides."""
     complete.write_text("".join(f"{one.command}\t{one.device}\t{one.key}\t{one.reason}\n" for one in left))
     total = tally.same_numbers + sum(tally.numbers.values())
-    yield f"{tally.runs} command lines, {total} numbers compared"
+    took = " and ".join(f"{seconds:.0f} s" for seconds in tally.seconds)
+    yield f"{tally.runs} command lines, {total} numbers compared; processor time {took}"
     yield f"  {tally.same} documents with {tally.same_numbers} numbers are equal to the last digit; the others:"
     for kind, count in tally.numbers.most_common():
         size, where = tally.largest.get(kind, (0.0, ""))
