@@ -166,7 +166,7 @@ class Comparison:
             self._tally.added[self._command, inner + name] += 1
         for name in base:
             if name in new:
-                beside = _of_unit(base, name)
+                beside = _of_unit(base, name, key)
                 self._values(inner + name, base[name], new[name], beside)
 
     def _prose(self, key: str, base: Any, new: Any) -> None:
@@ -282,15 +282,14 @@ def _peak(a: np.ndarray) -> float:
     return float(np.nanmax(np.abs(a))) if np.isfinite(a).any() else float("nan")
 
 
-def _of_unit(record: dict[str, Any], name: str) -> dict[str, Any]:
-    """What has the same unit as one key of an object."""
+def _of_unit(record: dict[str, Any], name: str, key: str) -> dict[str, Any]:
+    """What has the same unit as one key of an object; nothing for a number that has none."""
     unit = UNIT.search(name)
-    same = {}
-    for key, value in record.items():
-        other = UNIT.search(key)
-        if (unit and unit[1]) == (other and other[1]):
-            same[key] = value
-    return same
+    if unit is None:  # as of "ledger_J.hand"
+        return record if UNIT.search(key) else {}
+    return {
+        other: value for other, value in record.items() if (found := UNIT.search(other)) and found[1] == unit[1]
+    }
 
 
 def _largest(value: Any) -> float:

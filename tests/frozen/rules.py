@@ -20,8 +20,8 @@ class Kind(Enum):
     PROSE     a sentence for people: may be worded anew, which is told
     IGNORED   not compared
 
-    The scale of a number is the largest with the same unit beside it: in its list, and under the other keys of
-    the object that holds it.
+    The scale of a number is the largest beside it: in its list, and under those keys of the object that holds it
+    which carry the same unit.
     """
 
     EXACT = "exact"

@@ -103,6 +103,11 @@ def test_what_is_zero_but_for_rounding_is_measured_by_its_neighbours_of_the_same
     ]
 
 
+def test_a_number_without_a_unit_is_measured_by_itself():
+    base = {"manipulability": 0.02, "dynamic_manipulability": 900.0}
+    assert keys(compared(base, changed(base, "manipulability", to=0.02 * (1.0 + 1e-8)))) == ["manipulability"]
+
+
 def test_one_element_of_a_matrix_is_found_with_its_place():
     base = {"jacobian": [[1.0, 2.0], [None, 4.0]]}
     (found,) = compared(base, {"jacobian": [[1.0, 2.0], [None, 4.0 + 1e-7]]}, "show arm").differences
