@@ -59,8 +59,9 @@ class Answers:
         kept = {"digest": case.digest, "name": case.name, **answer}
         with self._lock:
             self._by_digest[case.digest] = kept
-            with self._path.open("a") as file:
-                file.write(json.dumps(kept) + "\n")
+            # in one piece: two comparisons with one base may write at once
+            with self._path.open("ab", buffering=0) as file:
+                file.write((json.dumps(kept) + "\n").encode())
 
 
 class Worker:
