@@ -8,6 +8,9 @@ PYTHON  ?= python3 python3.13 python3.12 python3.11 python
 # The tests to run; none named: all of the everyday suite.
 TESTS   ?=
 
+# What `record` compares with what is here, or with the commit NEW.
+BASE    ?= main
+
 # Another environment beside the first, with another Python or other versions of what zwidth needs:
 #     make test VENV=.venv-lowest PYTHON=python3.11 CONSTRAINTS=constraints-lowest.txt
 VENV        := .venv
@@ -24,12 +27,13 @@ export PIP_CONSTRAINT := $(CONSTRAINTS)
 export PIP_BUILD_CONSTRAINT := $(CONSTRAINTS)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help report test older-processor slow lint bench docs clean
+.PHONY: help report test older-processor record slow lint bench docs clean
 
 help:
 	@echo 'make report   the report on a device (DEVICE=$(DEVICE)), into $(OUTPUT)'
 	@echo 'make test     the test suite, or TESTS=... of it'
 	@echo 'make older-processor  the numerical tests, or TESTS=..., as a processor without AVX2 runs them'
+	@echo 'make record   every number of two commits beside each other: BASE=$(BASE), and NEW or what is here'
 	@echo 'make slow     the longer studies: thousands of random loops'
 	@echo 'make lint     style and types'
 	@echo 'make bench    how fast, beside what a competent user would write otherwise'
@@ -47,6 +51,9 @@ test: $(VENV)/.kernels
 # Kernels for another processor stand beside this one's.
 older-processor: $(VENV)/.kernels
 	$(BIN)/python tests/older_processor.py AVX2 -n auto --dist worksteal $(or $(TESTS),$(NUMERICAL))
+
+record: $(VENV)/.installed-test
+	$(BIN)/python -m tests.frozen $(BASE) $(NEW)
 
 slow: $(VENV)/.kernels
 	$(BIN)/python -m pytest -n auto --dist worksteal -m slow
