@@ -109,8 +109,8 @@ def stable_area(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLik
 
         (m^2/T^3) 2 W^4/(1 - c)^2 (c^2/2 + c - (1 + c) ln(1 + c))
 
-    the integral of (4.43) over 0 < d < W^2 c/(1 - c). Misprint: thesis eq. 5.8 has the
-    logarithm of 1 - c instead.
+    the integral of (4.43) over 0 < d < W^2 c/(1 - c). It is thesis eq. 5.8 with the logarithm of 1 + c; the scan,
+    damaged there, seems to have 1 - c.
     """
     m, k, T = (np.asarray(value, dtype=float) for value in (mass, stiffness, sampling_period))
     c, s = _cosine_and_bend(m, k, T)

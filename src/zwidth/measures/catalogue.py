@@ -139,7 +139,7 @@ _MEASURES: Final = (
         "Area of stable walls, closed form of the undamped device",
         "N^2 s/m^2",
         "higher",
-        "thesis eq. 5.5, 5.8, corrected; structural damping left out",
+        "thesis eq. 5.5, 5.8; structural damping left out",
     ),
     # how a wanted wall feels
     _of(
@@ -148,7 +148,7 @@ _MEASURES: Final = (
         "Optimal spectral radius",
         "",
         "lower",
-        "thesis eq. 5.15, corrected; motor side on its spring, structural damping left out",
+        "thesis eq. 5.15; motor side on its spring, structural damping left out",
     ),
     _of(
         "fidelity",

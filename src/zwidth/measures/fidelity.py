@@ -18,8 +18,8 @@ A real g needs a discriminant that is not negative, which is R >= rho^2 with
 So rho is a lower bound: with no mass at all does this wall's slowest root decay faster. It is reached, with the
 mass of that g, if the two roots are conjugate, the third, g D/rho^2, is not slower, and 0 < g < 2. For K >= 0 that
 is B > K T/2 and a third root of at most rho: the rest follows. Where it is not reached the least spectral radius
-is larger and with another mass (`fastest_mass` finds it, for any model). Misprint: the last term under the root
-of (5.15) reads K^2 T; it is (K T)^2.
+is larger and with another mass (`fastest_mass` finds it, for any model). The scan damages the last
+term under the root of (5.15) to "KZAL"; it is (K T)^2.
 """
 
 from __future__ import annotations

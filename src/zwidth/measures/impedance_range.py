@@ -7,9 +7,10 @@ readings, unfiltered:
     motor side m on the structure's spring k       (4.43), (5.7), (5.8), no delay          `sprung_range`
 
 Everything else (damping, several masses, filters, other estimators, part of a sample of delay) has its exact chart
-only. Both are exact within what they assume: no W = sqrt(k/m) T is too large, aliasing included. Of the thesis are
-corrected: (4.46), whose damping is that of K = -k and not of K -> 0; (5.5), which is (12 - 16 ln 2) m^2/T^3; (5.7)
-beyond W = pi; (5.8), whose logarithm is ln(1 + c); and the numbers below (4.32), which are those without delay.
+only. Both are exact within what they assume: no W = sqrt(k/m) T is too large, aliasing included. (5.5), whose
+coefficient the scan has lost, is (12 - 16 ln 2) m^2/T^3; (5.7) is extended beyond W = pi; (5.8), damaged in the
+scan, is read with ln(1 + c). (4.46), the largest damping of all stable K, at K = -k, is not used: here it is that
+of K -> 0. The numbers below (4.32) are a misprint, those without delay.
 """
 
 from __future__ import annotations
