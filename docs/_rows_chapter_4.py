@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from docs._row import Claim, Misprint, Number, Row
+from docs._row import ANOTHER_QUESTION, MISPRINT, SCAN_DAMAGED, Claim, Evidence, Number, Reason, Row
 from gallery import chapter_4_completed as completed
 from gallery import fig_4_1_rigid as rigid
 from gallery import fig_4_2_delay as delay
 from gallery import fig_4_3_mass_spring as spring
 from gallery import fig_4_4_models as models
-from gallery import optimal_mass as optimum
 from gallery import which_model_where as where
 from gallery.brute_force import Judge
 
@@ -24,7 +23,7 @@ def figure_4_1() -> list[Row]:
     return [
         Number("(4.14), (5.4)", "largest p without damping", rigid.free.stiffness_max, printed="0.686"),
         Claim(
-            "below (4.14)",
+            "below (4.14), Fig. 4.2",
             "its closed form",
             "p_max = 12 − 8√2",
             f"4 (3 − 2√2) = 12 − 8√2 = {rigid.largest_p:.6f}; chart {rigid.free.stiffness_max:.6f}",
@@ -35,35 +34,39 @@ def figure_4_1() -> list[Row]:
         Claim(
             "(5.5)",
             "area, in m²/T³",
-            "(not readable in the scan)",
-            f"12 − 16 ln 2 = {rigid.area_of_5_5:.6f}, the integral of (4.14); chart {rigid.free.stable_area:.6f}",
-            abs(rigid.area_of_5_5 - rigid.free.stable_area) < 1e-9,
+            "a coefficient of m_e1²/Δt³",
+            f"12 − 16 ln 2 = {rigid.area_of_5_5:.6f}",
+            False,
+            Reason(
+                SCAN_DAMAGED,
+                "of the coefficient the scan keeps a first digit 0 alone. Ours is the integral of (4.14) from d "
+                f"= 0 to 2, as the text has it, and the chart's area {rigid.free.stable_area:.6f}",
+                abs(rigid.area_of_5_5 - rigid.free.stable_area) < 1e-9,
+            ),
         ),
         Number("Fig. 4.1", "β = 0.2: largest p, point B", rigid.damped.stiffness_max, judge=p, digits=8),
         Number("Fig. 4.1", "β = 0.2: its d", rigid.damped.damping_at_stiffness_max, judge=d, within=1e-6),
         Claim(
-            "(4.10), (4.11)",
-            "the tip in closed form, β = 0.2",
-            "largest p and its d",
-            f"p = {rigid.tip_of_4_10[0]:.6f}, d = {rigid.tip_of_4_10[1]:.6f}; chart "
-            f"{rigid.damped.stiffness_max:.6f}, {rigid.damped.damping_at_stiffness_max:.6f}",
+            "(4.11)",
+            "d of the tip in closed form, β = 0.2",
+            "β (1 − ε β)/(ε + ε β − 1 + ε √(β (ε + ε β − 1)))",
+            f"d = {rigid.tip_of_4_10[1]:.6f}; chart {rigid.damped.damping_at_stiffness_max:.6f}",
             np.allclose(
                 rigid.tip_of_4_10, (rigid.damped.stiffness_max, rigid.damped.damping_at_stiffness_max), rtol=1e-9
             ),
         ),
         Claim(
             "(4.9)",
-            "completeness",
-            "the region of the damped rigid wall, for any β",
-            f"incomplete for β > {rigid.beta_where_incomplete:.3f}",
+            "the stable region for any β",
+            "the edge where a pair of roots leaves the unit circle; of (4.6) it leaves out μ₀ > 0",
+            f"the root z = −1 cuts into it for β > {rigid.beta_where_incomplete:.3f}",
             False,
-            Misprint(
-                f"it leaves out the real root z = −1, which cuts into it for "
-                f"β > {rigid.beta_where_incomplete:.3f} and cuts off the tip (4.10) for "
+            Reason(
+                ANOTHER_QUESTION,
+                f"right up to that β; the thesis draws β = 0.2. The root cuts off the tip (4.10) for "
                 f"β > {rigid.beta_where_tip_unstable:.3f}: at β = {rigid.above:.2f} just inside the tip "
                 f"the spectral radius is {rigid.radius_inside_the_tip_above:.3f}",
-                stable_tip and 1.0 < rigid.beta_where_incomplete < rigid.beta_where_tip_unstable,
-                kind="incomplete",
+                stable_tip and rigid.BETA < rigid.beta_where_incomplete < rigid.beta_where_tip_unstable,
             ),
         ),
         Claim(
@@ -84,12 +87,17 @@ def figure_4_1() -> list[Row]:
             "(4.17)",
             "the linear condition",
             "d + β > p/2, “a conservative stability condition”",
-            f"error of order {rigid.order_of_4_17:.2f} in p; without damping the wall p = {p_wall}, d = {d_wall} "
-            f"meets it with spectral radius {rigid.radius_of_optimistic_wall:.4f}",
+            f"a tangent without friction, its error of order {rigid.order_of_4_17:.2f} in p; there the wall "
+            f"p = {p_wall}, d = {d_wall} meets it with spectral radius {rigid.radius_of_optimistic_wall:.4f}",
             rigid.radius_of_optimistic_wall <= 1.0,
-            Misprint(
-                "without damping it is optimistic: that wall meets it and is unstable",
-                d_wall > p_wall / 2.0 and rigid.radius_of_optimistic_wall > 1.0,
+            Reason(
+                ANOTHER_QUESTION,
+                f"conservative with friction and soft walls: with β = {rigid.BETA} its line stays within (4.9) "
+                f"up to p = {rigid.conservative_up_to:.3f}. Doubtful as a general statement: without friction "
+                "it is optimistic",
+                d_wall > p_wall / 2.0
+                and rigid.radius_of_optimistic_wall > 1.0
+                and rigid.conservative_up_to > rigid.passive_p / 2.0,
             ),
         ),
     ]
@@ -98,18 +106,24 @@ def figure_4_1() -> list[Row]:
 def figure_4_2() -> list[Row]:
     """Delays."""
     rows: list[Row] = []
-    repeated = Misprint(
-        "the text repeats the numbers without delay; (5.6) has 0.144 and 0.828, as the chart",
-        abs(delay.largest_p[1] - 0.144) < 5e-4 and abs(delay.largest_d[1] - 0.828) < 5e-4,
+    repeated = Reason(
+        MISPRINT,
+        "the text repeats the numbers without delay, and adds that the stiffness is considerably smaller than "
+        "those",
+        abs(delay.largest_p[0] - 0.686) < 5e-4 and delay.largest_p[1] < 0.5 * delay.largest_p[0],
+        (
+            Evidence("(5.6), largest p", "0.144", delay.largest_p[1]),
+            Evidence("(5.6), largest d", "0.828", delay.largest_d[1]),
+        ),
     )
     rows += [
-        Number("below (4.32)", "l = 1: largest p", delay.largest_p[1], printed="0.686", misprint=repeated),
-        Number("below (4.32)", "l = 1: its d", delay.d_at_largest_p[1], printed="0.828", misprint=repeated),
-        Number("below (4.32)", "l = 1: largest d", delay.largest_d[1], printed="2", misprint=repeated),
+        Number("below (4.32)", "l = 1: largest p", delay.largest_p[1], printed="0.686", reason=repeated),
+        Number("below (4.32)", "l = 1: its d", delay.d_at_largest_p[1], printed="0.828", reason=repeated),
+        Number("below (4.32)", "l = 1: largest d", delay.largest_d[1], printed="2", reason=repeated),
         Number("(5.6)", "l = 1: largest p", delay.largest_p[1], printed="0.144"),
         Number("(5.6)", "l = 1: largest d", delay.largest_d[1], printed="0.828"),
         Claim(
-            "(4.32)",
+            "(4.32), Fig. 4.2",
             "l = 1: edge in closed form",
             "p < (−12 − d² + (2 + d) √(36 − 20 d + d²))/4",
             f"largest p = {delay.closed_largest_p:.6f} at d = {delay.closed_d_at_largest_p:.6f}, largest "
@@ -130,10 +144,10 @@ def figure_4_2() -> list[Row]:
         Claim(
             "(4.26)",
             "any whole delay in closed form",
-            "solved for l = 0 (4.29) and l = 1 (4.32)",
-            "(l + 1) sin t tan((l + 1) t) = 2 at the tip, on the unit circle; charts agree to 1e-9, "
-            f"l = 0 to {max(completed.DELAYS)}",
+            None,
+            f"(l + 1) sin t tan((l + 1) t) = 2 at the tip, on the unit circle, l = 0 to {max(completed.DELAYS)}",
             completed.error_of_delayed < 1e-9,
+            route="exact charts, to 1e-09",
         )
     )
     return rows
@@ -142,25 +156,27 @@ def figure_4_2() -> list[Row]:
 def completed_4_9() -> list[Row]:
     """The damped rigid wall with the root that (4.9) leaves out."""
     tried = ", ".join(f"{beta:g}" for beta in completed.FRICTIONS)
+    beside = completed.judged_beside_the_axis
     rows: list[Row] = [
         Claim(
             "(4.9)",
             "completed by the root z = −1",
-            "–",
-            f"with p + 2 d < 2 β/(1 − tanh(β/2)/(β/2)) as well, largest p and its d agree with charts to 1e-9 at "
-            f"β = {tried}",
+            None,
+            f"with p + 2 d < 2 β/(1 − tanh(β/2)/(β/2)) as well: largest p and its d, at β = {tried}",
             completed.error_of_completed < 1e-9,
+            route="exact charts, to 1e-09",
         ),
         Claim(
             "(4.9)",
             "completed: where no wall damping is best",
-            "–",
+            None,
             f"from β = {completed.beta_on_the_axis:.4f} on the stiffest wall has d = 0",
-            completed.on_the_axis[0] > 0.0 == completed.on_the_axis[1],
+            completed.on_the_axis[0] > 0.0 == completed.on_the_axis[1] and beside[0] > 1e-3 > 1e-6 > beside[1],
+            route=f"brute force at {completed.BESIDE} and {2 - completed.BESIDE:.2f} times that β",
         ),
     ]
     for beta in completed.FRICTIONS[-2:]:
-        p, d = completed.judged(beta)
+        p, d = completed.judged_tips[beta]
         rows.append(Number("(4.9)", f"completed, β = {beta:g}: largest p", completed.completed[beta][0], judge=p))
         (its_p, its_d), tip = completed.completed[beta], completed.printed[beta]
         rows.append(
@@ -170,11 +186,11 @@ def completed_4_9() -> list[Row]:
                 f"the formula gives {tip[0]:.4f}",
                 f"{its_p:.4f} at d = {its_d:.4f}",
                 abs(tip[0] / p - 1.0) < 1e-5,
-                Misprint(
-                    "its tip lies beyond the root z = −1; brute force has "
+                Reason(
+                    ANOTHER_QUESTION,
+                    "it is the tip of (4.9) and lies beyond the root z = −1; brute force has "
                     f"{p:.4f} at d = {d:.4f}, as the completed form",
                     abs(p / its_p - 1.0) < 1e-7 and abs(d - its_d) < 1e-6 and tip[0] > p,
-                    kind="incomplete",
                 ),
             )
         )
@@ -186,7 +202,7 @@ def figure_4_3() -> list[Row]:
     W, stable = spring.W, spring.stable_beyond
     seen = ", ".join(f"{'yes' if s else 'no'} at {w:.2f}" for w, s in zip(spring.BEYOND, stable, strict=True))
     closed = (
-        ("(4.44), (5.7)", "largest p", spring.error_of_4_44),
+        ("(4.43), (4.44), (5.7), Fig. 4.3", "largest p", spring.error_of_4_44),
         ("(4.45)", "its d", spring.error_of_4_45),
         ("(5.7)", "largest d with p > 0, W² c/(1 − c)", spring.error_of_5_7),
     )
@@ -202,9 +218,10 @@ def figure_4_3() -> list[Row]:
             f"W²/(1 − cos W) = {spring.d_of_4_46:.4f}",
             f"{spring.largest_d:.4f} for p → 0",
             abs(spring.d_of_4_46 - spring.largest_d) < 1e-6,
-            Misprint(
-                f"it is the value at p = −W² ({spring.highest_d_of_region:.4f} at "
-                f"p = {spring.p_at_highest_d:.2f}); on the axis p = 0 it is "
+            Reason(
+                ANOTHER_QUESTION,
+                f"it is the largest of the whole stable set, at p = −W² ({spring.highest_d_of_region:.4f} at "
+                f"p = {spring.p_at_highest_d:.2f}), which the text names. At p = 0 it is "
                 f"W² c/(1 − c) = {spring.d_of_5_7:.4f}, as (5.7) has it",
                 abs(spring.highest_d_of_region - spring.d_of_4_46) < 1e-6
                 and abs(spring.p_at_highest_d + W**2) < 1e-6
@@ -217,38 +234,48 @@ def figure_4_3() -> list[Row]:
             "none at frequencies higher than half of the Nyquist frequency",
             f"stable walls: {seen}",
             not any(stable[1:]),
-            Misprint(
-                "that holds up to W = 3π/2; beyond it aliasing brings stable walls back",
-                stable == (True, False, False, False, True, True),
-                kind="incomplete",
+            Reason(
+                ANOTHER_QUESTION,
+                "right up to W = 3π/2, so for every frequency below Nyquist's (W = π); beyond 3π/2 the samples "
+                "see a slower vibration, and stable walls come back",
+                stable == (True, False, False, False, True, True) and spring.BEYOND[2] < np.pi < spring.BEYOND[3],
             ),
         ),
         Claim(
             "(5.8)",
             f"area, in m²/T³, W = {W}",
-            f"with ln(1 − cos 2W): {spring.area_as_printed:.4f}",
+            "a factor with W⁴ and sin(W/2), times 1 + 4 cos W + cos 2W − 4 (1 + cos W) ln(1 − cos “2,”)",
             f"{spring.area:.6f}",
-            abs(spring.area_as_printed - spring.area) < 1e-4,
-            Misprint(
-                f"integrating (4.43) gives ln(1 + cos W) there: {spring.area_with_the_right_logarithm:.6f}, which "
-                "is 2 W⁴/(1 − c)² (c²/2 + c − (1 + c) ln(1 + c))",
-                abs(spring.area_with_the_right_logarithm - spring.area) < 1e-9
-                and abs(spring.area_right - spring.area) < 1e-9,
+            False,
+            Reason(
+                SCAN_DAMAGED,
+                "“2,” is Ω_n elsewhere in this scan, the factor is damaged and one sign in doubt. With W⁴/(8 "
+                f"sin⁴(W/2)) and ln(1 + cos W) the printed structure gives {spring.area_with_a_plus:.6f}, the "
+                f"integral of (4.43); with ln(1 − cos W) {spring.area_with_a_minus:.1f}",
+                abs(spring.area_with_a_plus - spring.area) < 1e-9
+                and abs(spring.area_right - spring.area) < 1e-9
+                and abs(spring.area_with_a_minus - spring.area) > 1.0,
             ),
         ),
         Claim(
             "(4.47)",
             "edge by the cosine's series",
-            "(4.43) with the second-order series",
+            "(4.43) with cos W = 1 − W²/2",
             f"an approximation: its error is of order {spring.order_of_4_47:.1f} in W",
             abs(spring.order_of_4_47 - 2.0) < 0.1,
         ),
         Claim(
             "(4.48)",
             "linear condition with flexibility",
-            "d > p/(2 − W²)",
-            f"an approximation: the slope at d → 0 errs to order {spring.order_of_4_48:.1f} in W",
-            abs(spring.order_of_4_48 - 4.0) < 0.1,
+            "fragments of a fraction in p and Ω_n",
+            f"d > p/(2 − W²); the slope at d → 0 errs to order {spring.order_of_4_48:.1f} in W",
+            False,
+            Reason(
+                SCAN_DAMAGED,
+                "read from (4.47) at small d, as the text derives it; an approximation of (4.43), whose slope is "
+                "1/(2 cos W)",
+                abs(spring.order_of_4_48 - 4.0) < 0.1,
+            ),
         ),
     ]
     return rows
@@ -265,7 +292,11 @@ def figure_4_4() -> list[Row]:
     K, B, _ = judge.largest_stiffness(9000.0, 40.0)
     return [
         Number(
-            "Fig. 4.4", "motor's mass, damped: largest stiffness", models.motor_mass.stiffness_max, "N/m", judge=K
+            "Fig. 4.4, (2.44)",
+            "motor's mass, damped: largest stiffness",
+            models.motor_mass.stiffness_max,
+            "N/m",
+            judge=K,
         ),
         Number(
             "Fig. 4.4",
@@ -281,6 +312,7 @@ def figure_4_4() -> list[Row]:
             bare.stiffness_max,
             "N/m",
             judge=models.closed_form,
+            route="exact chart",
         ),
         Claim(
             "Fig. 4.4",
@@ -333,42 +365,6 @@ def which_model_where() -> list[Row]:
             "without damping nowhere is",
             where.rigid_below < where.motor_above and not where.motor_undamped,
         ),
-    ]
-
-
-def optimal_spectral_radius() -> list[Row]:
-    """(5.15), and its numbers of 5.3.2."""
-    mass = {name: found[0] for name, found in optimum.optimum.items()}
-    rho = {name: found[1] for name, found in optimum.optimum.items()}
-    swapped = Misprint(
-        f"B and C are each other's: (3000, 15) gives {rho['B']:.6f} at {mass['B']:.7f} kg, (4000, 20) "
-        f"{rho['C']:.6f} at {mass['C']:.7f} kg",
-        abs(rho["B"] - 0.8956) < 5e-5 < abs(rho["C"] - 0.8956) and abs(rho["C"] - 0.8729) < 1e-4,
-    )
-    other = Misprint(
-        f"the numbers belong to (5000, 55): {rho['printed for D']:.6f} at {mass['printed for D']:.7f} kg",
-        abs(rho["printed for D"] - 0.71627) < 1e-5 and abs(mass["printed for D"] - 0.1315) < 5e-5,
-    )
-    scan = optimum.printed_5_15(optimum.WALLS["B"])
-    return [
-        Claim(
-            "(5.15)",
-            "optimal spectral radius at (3000, 15)",
-            f"{scan:.4f} by the formula as the scan reads",
-            f"{rho['B']:.6f}, by eigenvalues",
-            abs(scan - rho["B"]) < 1e-4,
-            Misprint(
-                "its terms have unlike units; ρ² = 8 D (1 + P)/(4 D² + 4 D P + 8 D + P²) gives "
-                f"{optimum.by_5_15['B']:.6f}, and agrees at all four walls",
-                all(abs(optimum.by_5_15[name] - rho[name]) < 1e-6 for name in rho),
-            ),
-        ),
-        Number("5.3.2", "point B (3000, 15): radius", rho["B"], printed="0.8729", misprint=swapped),
-        Number("5.3.2", "point B: mass", mass["B"], "kg", printed="0.0603", misprint=swapped),
-        Number("5.3.2", "point C (4000, 20): radius", rho["C"], printed="0.8956", misprint=swapped),
-        Number("5.3.2", "point C: mass", mass["C"], "kg", printed="0.0510", misprint=swapped),
-        Number("5.3.2", "point D (5000, 25): radius", rho["D"], printed="0.71627", misprint=other),
-        Number("5.3.2", "point D: mass", mass["D"], "kg", printed="0.1315", misprint=other),
     ]
 
 

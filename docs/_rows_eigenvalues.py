@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from docs._row import Claim, Misprint, Number, Row
-from docs._rows_chapter_4 import optimal_spectral_radius
+from docs._row import MISPRINT, SCAN_DAMAGED, UNEXPLAINED, Claim, Evidence, Number, Reason, Row
 from gallery import fig_5_10_eigenvalues as across
 from gallery import fig_5_11_radii as radii
 from gallery import fig_5_12_eigenvalue_paths as over_mass
-from gallery import optimal_mass
+from gallery import optimal_mass as optimum
 from gallery.fig_3_7_bilateral_wall import edges_at_4000
 
 
@@ -19,8 +18,22 @@ def figure_5_10() -> list[Row]:
     low, *double = across.real_at_A
     at = "at 4000 N/m"
     return [
-        Number("Fig. 5.10", f"slow pair enters {at}, lower edge", slow.value, "Ns/m", judge=edges_at_4000[0]),
-        Number("Fig. 5.10", f"fast pair leaves {at}, upper edge", fast.value, "Ns/m", judge=edges_at_4000[1]),
+        Number(
+            "Fig. 5.10",
+            f"slow pair enters {at}, lower edge",
+            slow.value,
+            "N s/m",
+            judge=edges_at_4000[0],
+            route="bisection",
+        ),
+        Number(
+            "Fig. 5.10",
+            f"fast pair leaves {at}, upper edge",
+            fast.value,
+            "N s/m",
+            judge=edges_at_4000[1],
+            route="bisection",
+        ),
         Claim(
             "Fig. 5.10",
             f"where the eigenvalues leave {at}",
@@ -44,10 +57,10 @@ def figure_5_10() -> list[Row]:
             f"From edge to edge it moves by {moves['slow pair']:.3f}, the real one by {moves['real']:.2f}, the "
             f"fast pair by {moves['fast pair']:.2f}",
             across.slow_at_first < 1.0 and moves["real"] < 0.1,
-            Misprint(
-                "the slow pair makes the lower edge, and the real eigenvalue moves as far as the fast pair",
+            Reason(
+                UNEXPLAINED,
+                "true of the slow pair within the stable walls; the real eigenvalue moves as far as the fast pair",
                 across.slow_at_first > 1.0 and moves["real"] > moves["fast pair"] and moves["slow pair"] < 0.1,
-                "true of the slow pair alone",
             ),
         ),
         Claim(
@@ -118,7 +131,6 @@ def figures_5_12_to_5_14() -> list[Row]:
     pairs = ", ".join(f"{name} {1e3 * mass:.1f} g" for name, (mass, _) in over_mass.fastest_pair.items())
     best = {name: each[two].fastest for name, each in over_mass.ways.items()}
     whole = ", ".join(f"{name} {rho:.4f} at {1e3 * mass:.1f} g" for name, (mass, rho) in best.items())
-    optimum = {name: optimal_mass.optimum[name] for name in radii.WALLS}
     return [
         *found,
         Claim(
@@ -132,14 +144,68 @@ def figures_5_12_to_5_14() -> list[Row]:
         Claim(
             "Figs. 5.12-5.14",
             "least spectral radius of the two masses over the motor's mass",
-            "–",
+            None,
             f"{whole}: another mass than (5.14), less than half of it, because the slow pair, which both masses "
             "make and (5.15) does not know, decays last",
             all(
-                rho > optimum[name][1] + 0.05 and mass < 0.5 * optimum[name][0]
+                rho > optimum.optimum[name][1] + 0.05
+                and mass < 0.5 * optimum.optimum[name][0]
+                and abs(over_mass.judged_radius(two, name, mass) - rho) < 1e-6
+                and all(over_mass.judged_radius(two, name, share * mass) > rho for share in (0.9, 0.99, 1.01, 1.1))
                 for name, (mass, rho) in best.items()
             ),
+            route="brute force there and 1 and 10 % beside, to 1e-06",
         ),
+    ]
+
+
+def optimal_spectral_radius() -> list[Row]:
+    """(5.15), and its numbers of 5.3.2."""
+    mass, rho = ({name: found[i] for name, found in optimum.optimum.items()} for i in (0, 1))
+    swapped = {
+        unit: Reason(
+            MISPRINT,
+            "the results of B and C are printed for each other",
+            True,
+            (
+                Evidence("point C at B's wall", for_C, values["B"], unit),
+                Evidence("point B at C's wall", for_B, values["C"], unit),
+            ),
+        )
+        for unit, values, for_B, for_C in (("", rho, "0.8729", "0.8956"), ("kg", mass, "0.0603", "0.0510"))
+    }
+    elsewhere = Reason(
+        MISPRINT,
+        "both numbers belong to one other wall, (5000, 55); the text, Fig. 5.14 and its caption have (5000, 25)",
+        True,
+        (
+            Evidence("point D at that wall", "0.71627", rho["printed for D"]),
+            Evidence("point D at that wall", "0.1315", mass["printed for D"], "kg"),
+        ),
+    )
+    given = (("B", "0.8956"), ("C", "0.8729"), ("printed for D", "0.71627"))
+    apart = max(abs(optimum.by_5_15[name] - rho[name]) for name in rho)
+    numbers = ", ".join(f"{optimum.by_5_15[name]:.6f}" for name, _ in given)
+    return [
+        Claim(
+            "(5.15)",
+            "optimal spectral radius",
+            "2 √2 √(k_e k_d Δt + k_d k_p Δt)/√(4 k_d² + 8 k_e k_d Δt + 4 k_d k_p Δt + “KZAL”)",
+            f"{numbers} at (3000, 15), (4000, 20) and (5000, 55), by eigenvalues too, to 1e-6",
+            False,
+            Reason(
+                SCAN_DAMAGED,
+                "“KZAL” is k_p² (Δt)², which has the unit of the other terms",
+                apart < 1e-6,
+                tuple(Evidence("5.3.2", printed, optimum.by_5_15[name]) for name, printed in given),
+            ),
+        ),
+        Number("5.3.2", "point B (3000, 15): radius", rho["B"], printed="0.8729", reason=swapped[""]),
+        Number("5.3.2", "point B: mass", mass["B"], "kg", printed="0.0603", reason=swapped["kg"]),
+        Number("5.3.2", "point C (4000, 20): radius", rho["C"], printed="0.8956", reason=swapped[""]),
+        Number("5.3.2", "point C: mass", mass["C"], "kg", printed="0.0510", reason=swapped["kg"]),
+        Number("5.3.2", "point D (5000, 25): radius", rho["D"], printed="0.71627", reason=elsewhere),
+        Number("5.3.2", "point D: mass", mass["D"], "kg", printed="0.1315", reason=elsewhere),
     ]
 
 

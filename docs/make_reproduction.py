@@ -17,28 +17,40 @@ from docs import _rows_chapter_4 as chapter_4
 from docs import _rows_chapter_5 as chapter_5
 from docs import _rows_chapters_1_2 as chapters_1_2
 from docs import _rows_contact as contact
-from docs._row import Row
+from docs import _rows_device as device
+from docs._numbered import KINDS, NOT_COVERED, NOT_COVERED_ELSEWHERE, NUMBERED, covered
+from docs._row import MEANING, OURS_ONLY, Row, count_verdicts
 
 Sections = list[tuple[str, list[Row]]]
 
 HERE = Path(__file__).parent
 PAGE = HERE / "reproducing-the-thesis.md"
-HEADER = ("Where", "What", "Printed", "Ours", "Difference", "Verdict")
 
 INTRODUCTION = """# Reproducing the thesis
 
-One row for each table, figure and numbered result that this release covers. Every number under *Ours* was computed
-by a script of the [gallery](../gallery) when this page was written, and so was every verdict:
+What the thesis prints, beside what zwidth computes. Every number of ours was computed by a script of the
+[gallery](../gallery) when this page was written, and so was every verdict: a row whose number changes changes its
+verdict. `make docs` writes the page again, and a test holds it to what the code gives.
 
-- **agrees to the digits printed**: within half a unit of the last digit printed;
-- **not printed; agrees with brute force**: the thesis only draws it, in a figure that the scan does not hold. The
-  number is compared with [a judge](../gallery/brute_force.py) that shares no code with zwidth (matrix exponential,
-  eigenvalues, bisection), what is felt of the five-bar with
-  [its two arms written out by hand](../gallery/five_bar.py);
-- **differs**: with the reason, whose numbers are computed too and must bear it out, or else the row would say
-  *differs, not explained*.
+[Printed, and checked](#printed-and-checked) holds what the thesis says, number, formula or statement.
+[Ours only](#ours-only) holds values that it does not print, most of them drawn in figures that the scan does not
+hold; they are known by two routes that share no code, as a rule zwidth and [a judge](../gallery/brute_force.py) by
+matrix exponential, eigenvalues and bisection. [Not covered](#not-covered) is the rest.
 
-`make docs` writes the page again, and a test holds it to what the code gives.
+## Verdicts
+"""
+
+PRINTED = """## Printed, and checked
+"""
+
+OURS = """## Ours only
+
+Not printed. The last column has the second route, and how close it comes (relative, where no unit stands).
+"""
+
+NOT_COVERED_TEXT = """## Not covered
+
+No row is about these numbered equations, figures and tables:
 """
 
 CHAPTER_5 = "Chapter 5: measures and design"
@@ -46,9 +58,10 @@ SECTIONS = (
     ("Chapters 1 and 2: what is compared with, several directions", chapters_1_2.rows),
     ("Chapter 3: the device and its walls", chapter_3.rows),
     ("Chapter 4: closed forms", chapter_4.rows),
-    ("Chapter 4 and Appendix A: by computer algebra", algebra.rows),
+    ("Chapters 4 and 5, Appendix A: by computer algebra", algebra.rows),
     (CHAPTER_5, chapter_5.rows),
     ("Chapters 3 and 5: by simulation", contact.rows),
+    ("Appendix B: the five-bar", device.appendix),
 )
 
 # `docs/make_images.py` draws them.
@@ -66,39 +79,72 @@ their common area](images/fig-5-4-common-area.svg)
 """
 }
 
-NOT_COVERED = """## Not covered yet
-
-- 3.2.2, 3.3: the measured points of Figs. 3.7, 3.11 and 3.12 are not in the scan, nor are the coordinates of
-  points A to D of Fig. 3.10, the Coulomb friction and the encoder's step of 3.2.5. None is invented: where a
-  simulation needs them, it says that they are ours, or what does not depend on them.
-- Fig. 3.6: measured frequency responses.
-- Fig. 3.12: the measured points; the model's curve and a virtual experiment are here.
-- Figs. 5.5-5.8: the drawings of the assemblies are not in the scan. Which two are "elbow up" and "elbow down" is
-  not known; where it matters all four are here.
-- 1.1: two-port networks and virtual couplings are computed ([Guarantees](guarantees.md)), but the thesis gives no
-  number to compare with; time-domain passivity control is there ([Virtual environments](environments.md)), without
-  a number of the thesis either.
-"""
-
 
 def sections() -> Sections:
     """Headings and their rows."""
     return [(title, rows()) for title, rows in SECTIONS]
 
 
-def table(rows: list[Row]) -> str:
+def table(header: tuple[str, ...], cells: list[list[str]]) -> str:
     """A Markdown table."""
-    lines = ["| " + " | ".join(HEADER) + " |", "|" + "---|" * len(HEADER)]
-    lines += ["| " + " | ".join(cell.replace("|", "\\|") for cell in row.cells()) + " |" for row in rows]
-    return "\n".join(lines)
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    lines += ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells]
+    return "\n".join(lines) + "\n"
+
+
+def verdicts(rows: list[Row]) -> str:
+    """The words, what they mean and how many rows have each."""
+    counts = count_verdicts(rows)
+    return table(
+        ("Verdict", "Rows", "Meaning"),
+        [[f"**{word}**", str(counts[word]), text] for word, text in MEANING.items()],
+    )
+
+
+def coverage(rows: list[Row]) -> str:
+    """One sentence: how many of the thesis's numbered items are in rows."""
+    found = covered(row.place for row in rows)
+    parts = [
+        f"{sum(item[0] == kind for item in found)} of {sum(item[0] == kind for item in NUMBERED)} numbered {kind}s"
+        for kind in KINDS
+    ]
+    printed = sum(row.printed is not None for row in rows)
+    return (
+        f"{printed} rows are about something printed, {len(rows) - printed} are *{OURS_ONLY}*. Together they "
+        f"cover {', '.join(parts[:-1])} and {parts[-1]}.\n"
+    )
+
+
+def part(content: Sections, printed: bool) -> list[str]:
+    """The tables of what is printed, or of what is ours only, by chapter; with pictures among the printed."""
+    header = ("Where", "What", "Verdict", *(("Printed", "Ours, and why") if printed else ("Ours", "Second route")))
+    found = []
+    for title, rows in content:
+        cells = [row.cells() for row in rows if (row.printed is not None) == printed]
+        picture = PICTURES.get(title, "") if printed else ""
+        if cells:
+            found.append(f"### {title}\n\n{picture}{table(header, cells)}")
+    return found
 
 
 def page(content: Sections) -> str:
     """The whole page."""
+    rows = [row for _, rows in content for row in rows]
+    missing, elsewhere = (
+        table(("What", "Why"), [list(row) for row in rows]) for rows in (NOT_COVERED, NOT_COVERED_ELSEWHERE)
+    )
     parts = [
         INTRODUCTION,
-        *(f"## {title}\n\n{PICTURES.get(title, '')}{table(rows)}\n" for title, rows in content),
-        NOT_COVERED,
+        verdicts(rows),
+        coverage(rows),
+        PRINTED,
+        *part(content, printed=True),
+        OURS,
+        *part(content, printed=False),
+        NOT_COVERED_TEXT,
+        missing,
+        "Nor about these parts of the rest:\n",
+        elsewhere,
     ]
     return "\n".join(parts)
 

@@ -83,6 +83,34 @@ as_4_26 = all(
     same(characteristic(l), z**l * (z**3 - 2 * z**2 + z) + ((p + d) * z**2 + p * z - d) / 2) for l in DELAYS
 )
 
+
+def by_blocks(delay: int) -> sp.Expr:
+    """det(z I - L) of (4.21) by the blocks of (4.22): (4.23) times the Schur complement (4.25).
+
+    State x', x, last readings; raises ArithmeticError where (4.23) or (4.24) is not what is printed.
+    """
+    n = 3 + delay
+    L = sp.zeros(n, n)
+    L[0, 0] = L[1, 0] = L[1, 1] = 1
+    L[0, n - 2], L[0, n - 1], L[1, n - 2], L[1, n - 1] = -(p + d), d, -(p + d) / 2, d / 2
+    for i in range(2, n):
+        L[i, i - 1] = 1
+    lower = L[2:, 2:] - z * sp.eye(n - 2)
+    if not same(lower.det(), (-z) ** (delay + 1)):
+        raise ArithmeticError("(4.23)")
+    inner = lower.inv() * L[2:, :2]
+    if inner != -sp.Matrix(n - 2, 2, lambda i, j: j * z ** -(i + 1)):
+        raise ArithmeticError("(4.24)")
+    rest = L[:2, :2] - z * sp.eye(2) - L[:2, 2:] * inner
+    return sp.expand((-1) ** n * sp.expand(lower.det() * rest.det()))
+
+
+as_4_22 = all(same(by_blocks(l), characteristic(l)) for l in DELAYS if l)
+
+# (4.29), (4.32): where the last determinants vanish.
+as_4_29 = same(sp.cancel(determinant_4_28.subs(p, 2 * d * (2 - d) / (d + 2))), 0)
+as_4_32 = same(sp.expand(determinant_4_31.subs(p, (-12 - d**2 + (2 + d) * sp.sqrt(36 - 20 * d + d**2)) / 4)), 0)
+
 # (A.2), (A.3): the printed minors, and the criterion against roots.
 a = sp.symbols("a0:5", positive=True)
 table = hurwitz(list(a))

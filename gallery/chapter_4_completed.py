@@ -46,6 +46,8 @@ def _room_on_the_axis(beta: float) -> float:
 beta_on_the_axis = float(brentq(_room_on_the_axis, 3.0, 4.5))
 on_the_axis = tuple(float(thesis_damped.largest(x * beta_on_the_axis, 1.0, 1.0)[1]) for x in (0.999, 1.001))
 
+BESIDE = 0.98
+
 delayed = {l: tuple(float(v) for v in thesis_delays.largest(1.0, 1.0, l)) for l in DELAYS}
 delayed_damping = {l: float(thesis_delays.largest_damping(1.0, 1.0, l)) for l in DELAYS}
 error_of_delayed = max(_off(unit_mass(delay=float(l)), delayed[l]) for l in DELAYS)
@@ -61,3 +63,10 @@ def judged_late(samples: int) -> tuple[float, float]:
     """The same of a mass without friction, so many samples late."""
     p, d, _ = Judge(1.0, 0.0, 0.0, 1.0, 1.0, delay=samples).largest_stiffness(1.0, 2.0)
     return p, d
+
+
+judged_tips = {beta: judged(beta) for beta in FRICTIONS}
+# d of the stiffest wall by brute force, a little less and more friction than `beta_on_the_axis`
+judged_beside_the_axis = tuple(
+    Judge(1.0, x * beta_on_the_axis, 0.0, 1.0, 1.0).largest_stiffness(30.0, 2.0)[1] for x in (BESIDE, 2.0 - BESIDE)
+)

@@ -28,8 +28,8 @@ REFERENCE = (0.0, 0.25)
 LENGTH = float(device.mechanism.links.tip[RIGHT, 0])
 
 # What becomes of a driven arm's mass and inertia with its length: "kept"; "grown" as a bar of the same section,
-# m ~ L, I ~ L^3, its centre of mass moving along; "as Appendix B", m kept and m L^2/12 added to the inertia of all
-# four links.
+# m ~ L, I ~ L^3, its centre of mass moving along; "as Appendix B", both kept, and slender rods for the distal
+# links, whose inertia is m L^2/12.
 LAWS = ("kept", "grown", "as Appendix B")
 
 
@@ -60,8 +60,9 @@ def with_lengths(right: np.ndarray, left: np.ndarray, law: str = "kept") -> Devi
             numbers["center_of_mass"][:, arm] *= share[:, None]
             numbers["inertia"][:, arm] *= share[:, None, None] ** 3
     if law == "as Appendix B":
-        lengths = numbers["tip"][..., 0]
-        numbers["inertia"] += (numbers["mass"] * lengths**2 / 12.0)[..., None, None] * np.eye(3)
+        for rod in (DISTAL_RIGHT, DISTAL_LEFT):
+            inertia = numbers["mass"][:, rod] * numbers["tip"][:, rod, 0] ** 2 / 12.0
+            numbers["inertia"][:, rod] = inertia[:, None, None] * np.eye(3)
     mechanism = replace(
         device.mechanism,
         links=replace(links, **numbers),

@@ -8,7 +8,7 @@ Ns/m), and E the wall of fastest decay. Both masses start 1 mm inside the wall, 
   200 Hz, of which the link side has 7 % at B, 4 % at A, of what the motor side has;
 - at C and D "both x1 and x2 show oscillatory motion at the same frequency": 17.1 Hz, the link side with 1.24 times
   the motor side's amplitude, by the spring between them. "The behaviour of the system can be described by a
-  rigid-body model": roughly, one rigid mass would vibrate at 18.9 Hz;
+  rigid-body model": one rigid mass is stable at C and unstable at D too; it would vibrate at 18.9 Hz;
 - E "represents the fastest decaying oscillation": all other walls take longer, by definition of the chart.
 
 What the simulated motion grows or decays by in each sample is the logarithm of the spectral radius.
@@ -77,6 +77,7 @@ def point(K: float, B: float, duration: float) -> Point:
 
 
 points = {name: point(*where, LENGTHS[name]) for name, where in WALLS.items()}
+rigid_radius = {name: float(spectral_radius(published("rigid"), *WALLS[name])) for name in "CD"}
 rigid_frequency = float(
     np.max(np.abs(np.angle(eigenvalues(published("rigid"), *WALLS["C"])))[:2]) / (2.0 * np.pi * loop.period)
 )

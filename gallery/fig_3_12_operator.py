@@ -16,8 +16,10 @@ nor the measured points; what the text says about them can be asked of the model
   place of 5 % adds 23 % of stiffness and 32 % of area;
 - "for low virtual damping values the difference is significant": alone no wall of B <= 0 is stable, in his hand
   those down to -6 Ns/m, and without damping those up to 6 kN/m;
-- his stiffness "slightly reduces the physically meaningful (positive) domain": not here. It moves the static edge
-  to K = -1/(1/k_e + 1/k_c + 1/k_h) and leaves the area of positive walls as it is, to 1e-7.
+- his stiffness "slightly reduces the physically meaningful (positive) domain, as it will be shown later": shown in
+  4.2, where a mass stands on the operator's spring; there 580 N/m lower the largest stiffness by 0.2 % (rigid) and
+  3 % (motor's mass alone), by (4.44). Not so of these three masses: it moves their static edge to
+  K = -1/(1/k_e + 1/k_c + 1/k_h) and leaves the area of positive walls as it is, to 1e-7.
 
 Run `python -m gallery.fig_3_12_operator` to draw it.
 """
@@ -29,8 +31,10 @@ import numpy as np
 from gallery.brute_force import Judge
 from gallery.models import PUBLISHED, write_figure
 from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.conditions import thesis_flexible
 from zwidth.device.load import load
 from zwidth.loop.loop import Loop
+from zwidth.model.modes import natural_frequencies
 
 OPERATOR = "thesis-arm"
 LINK, MOTOR, SPRING = 0.2616, 0.0254, 15620.0  # m_e1, m_e2 [kg], k_e [N/m]
@@ -65,6 +69,14 @@ def judge_of(ratio: float) -> Judge:
     )
 
 
+def on_the_operators_spring(mass: float, stiffness: float) -> tuple[float, float]:
+    """Largest stiffness of a mass on a spring of the operator, by (4.44) and by brute force [N/m]."""
+    period = chart.loop.period
+    closed = float(thesis_flexible.largest_stiffness(mass, stiffness, period))
+    judge = Judge(mass, 0.0, stiffness, 1.0, period)
+    return closed, judge.largest_stiffness(1.3 * closed, 2.0 * mass / period)[0]
+
+
 def edge(stability: StabilityChart) -> np.ndarray:
     """All points of the edge, (2, n): stiffness [N/m], damping [Ns/m]."""
     return np.concatenate([np.stack([arc.stiffness, arc.damping]) for arc in stability.boundary], axis=1)
@@ -86,6 +98,13 @@ alone = stability_chart(held(ASSUMED, "none"), decay=False)
 chart_at_5_percent = stability_chart(held(USUAL), decay=False)
 alone_at_5_percent = stability_chart(held(USUAL, "none"), decay=False)
 without_arm_stiffness = stability_chart(held(ASSUMED, arm_stiffness_N_per_m=0.0), decay=False)
+
+# 4.2's models: the device's mass, or the motor's alone, free and on the arm's spring.
+MASSES = {"rigid": 0.287, "motor": MOTOR}  # kg
+sprung = {(name, k): on_the_operators_spring(mass, k) for name, mass in MASSES.items() for k in (0.0, ARM[1])}
+
+# Highest natural frequency, free and in his hand [Hz].
+frequency_alone, frequency_held = (float(natural_frequencies(each.loop.plant)[-1]) for each in (alone, chart))
 
 gain_by_operator = chart.stiffness_max / alone.stiffness_max - 1.0
 gain_by_damping = chart.stiffness_max / chart_at_5_percent.stiffness_max - 1.0

@@ -113,6 +113,11 @@ order_of_4_17 = _order(lambda p: float(brentq(lambda d: 2 * d * (2 - d) / (2 + d
 OPTIMISTIC = (0.5, 0.3)
 radius_of_optimistic_wall = float(judge(unit_mass(), *OPTIMISTIC).spectral_radius)
 
+# With friction its line is steeper than the tangent: where (4.9) bends back to it.
+conservative_up_to = float(
+    brentq(lambda p: p / 2.0 - BETA - _edge_damping(p, BETA), 1e-2 * passive_p, 0.99 * tip(BETA)[0])
+)
+
 
 def draw(ax) -> None:
     """Both charts; p and d on the axes."""

@@ -53,9 +53,9 @@ def area_of_5_8(rate: float, logarithm_of: float) -> float:
     return float(rate**4 / (8.0 * np.sin(rate / 2.0) ** 4) * bracket)
 
 
-# Printed is ln(1 - cos 2W); integrating (4.43) gives ln(1 + cos W).
-area_as_printed = area_of_5_8(W, 1.0 - np.cos(2.0 * W))
-area_with_the_right_logarithm = area_of_5_8(W, 1.0 + np.cos(W))
+# The scan has ln(1 - cos "2,"), and "2," elsewhere is Omega_n; integrating (4.43) gives ln(1 + cos W).
+area_with_a_minus = area_of_5_8(W, 1.0 - np.cos(W))
+area_with_a_plus = area_of_5_8(W, 1.0 + np.cos(W))
 
 
 def stable_at(rate: float) -> bool:

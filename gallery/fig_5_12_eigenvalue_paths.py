@@ -87,17 +87,23 @@ def _fastest_pair(name: str) -> tuple[float, float]:
 fastest_pair = {name: _fastest_pair(name) for name in WALLS}
 
 
+def judged_radius(model: str, name: str, motor_side_mass: float) -> float:
+    """Spectral radius at a wall with another motor-side mass [kg], by brute force."""
+    plant = LOOPS[model].plant
+    place = int(np.argmax(plant.actuator))
+    mass = plant.mass.copy()
+    mass[place, place] = motor_side_mass
+    return float(
+        Judge(mass, plant.damping, plant.stiffness, plant.actuator, LOOPS[model].period).radius(*WALLS[name])
+    )
+
+
 def judged_stable_from(model: str, name: str) -> float:
     """The mass from which the wall is stable, by bisection of brute force's eigenvalues between two masses."""
-    plant, period = LOOPS[model].plant, LOOPS[model].period
-    place = int(np.argmax(plant.actuator))
     low, high = LIGHTEST, optimal_mass.optimum[name][0]
     for _ in range(50):
         middle = 0.5 * (low + high)
-        mass = plant.mass.copy()
-        mass[place, place] = middle
-        judge = Judge(mass, plant.damping, plant.stiffness, plant.actuator, period)
-        low, high = (low, middle) if judge.radius(*WALLS[name]) < 1.0 else (middle, high)
+        low, high = (low, middle) if judged_radius(model, name, middle) < 1.0 else (middle, high)
     return high
 
 

@@ -1,8 +1,8 @@
 """Figs. 5.1 to 5.3: dexterity and impedance range over the workspace, x from -0.3 to 0.3 m, y from 0.05 m upwards.
 
     Fig. 5.1   manipulability (5.1), dynamic manipulability (5.3), condition number of the Jacobian (5.2)
-    Fig. 5.2   largest stiffness and stable area of the rigid body, (5.4) and the corrected (5.5)
-    Fig. 5.3   the same of the motors' mass on the drives' spring, (5.7) and the corrected (5.8)
+    Fig. 5.2   largest stiffness and stable area of the rigid body, (5.4) and (5.5)
+    Fig. 5.3   the same of the motors' mass on the drives' spring, (5.7) and (5.8)
 
 and beside them what the full model, damped as bundled, has exactly. The mass of Fig. 5.2 is that of links and
 rotors; (5.4) prints m_e1, the links' alone.
@@ -100,6 +100,14 @@ _dexterous = (
     reached & (values["w"] >= 0.9 * np.nanmax(values["w"])) & (values["w_d"] >= 0.9 * np.nanmax(values["w_d"]))
 )
 kappa_where_dexterous = (float(values["kappa"][_dexterous].min()), float(values["kappa"][_dexterous].max()))
+
+
+def where_stiffest(name: str, share: float = 0.1) -> tuple[float, float]:
+    """Medians of condition number and manipulability over the stiffest share of the cells, over those of all."""
+    stiffest_cells = reached & (values[name] >= np.quantile(values[name][reached], 1.0 - share))
+    return tuple(
+        float(np.median(values[k][stiffest_cells]) / np.median(values[k][reached])) for k in ("kappa", "w")
+    )
 
 
 def at_largest(name: str) -> tuple[float, float]:

@@ -3,9 +3,9 @@
 The handle stays at (0, 0.25) m. Of the two arms each may have its elbow on either side: four assemblies. The scan
 does not hold the drawing that says which two are "up" and "down"; all four are here.
 
-- flexible (Fig. 5.6): (5.7) and the corrected (5.8), the motors' mass on the drives' spring; and exactly, of the
+- flexible (Fig. 5.6): (5.7) and (5.8), the motors' mass on the drives' spring; and exactly, of the
   full model as it is bundled;
-- rigid (Fig. 5.7): (5.4) and the corrected (5.5), with the mass of links and rotors and, as (5.4) prints it, of
+- rigid (Fig. 5.7): (5.4) and (5.5), with the mass of links and rotors and, as (5.4) prints it, of
   the links alone.
 
 The position can be reached for |d| < 0.478 m only. There both arms are stretched and the handle cannot move along
@@ -20,12 +20,12 @@ Run `python -m gallery.fig_5_6_assemblies` to draw them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gallery import designs
-from gallery.five_bar import SIDES
+from gallery.five_bar import SIDES, bundled, closed_form
 from gallery.models import write_page
 from zwidth.measures.impedance_range import rigid_range, sprung_range
 
@@ -94,6 +94,14 @@ least = {
     }
     for name, each in found.items()
 }
+
+
+def by_hand(name: str, at: float) -> float:
+    """(5.7) of the arms written out by hand, base joints a distance apart [N/m]."""
+    felt = replace(bundled(), base=(at / 2.0, -at / 2.0)).at(designs.REFERENCE, name)
+    return float(closed_form(felt.motor_side_mass, felt.stiffness, PERIOD))
+
+
 # Of the last point over the one 5 cm before it.
 growth_at_the_end = float(_out.rigid[-1] / _out.rigid[-11])
 

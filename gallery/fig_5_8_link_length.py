@@ -4,7 +4,7 @@ A minimum at L1 = 0.146 m, "the current value" (Table 3.2: 0.147 m), is claimed 
 that longer links render stiffer walls. The scan does not hold the drawing of that assembly, nor whether the other
 driven arm L3 changes along, nor what becomes of the arm's mass. So here is everything: L1 alone and L1 = L3, all
 four assemblies, and three laws for mass and inertia: kept, grown as a bar of the same section (m ~ L, I ~ L^3),
-and as Appendix B has it (m kept, m L^2/12 added to the inertia).
+and as Appendix B has it (both kept, the distal links slender rods).
 
 Two kinds of low points are told apart:
 

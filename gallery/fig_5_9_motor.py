@@ -25,6 +25,7 @@ import numpy as np
 
 from gallery import designs
 from gallery.brute_force import Judge
+from gallery.five_bar import bundled, closed_form
 from gallery.models import write_page
 from zwidth.measures.impedance_range import sprung_range
 from zwidth.study.places import place_of
@@ -77,6 +78,12 @@ def over_inertia(assembly: str) -> tuple[np.ndarray, np.ndarray]:
 
 flexible, exact = over_inertia("elbows-in")
 flexible_outward, exact_outward = over_inertia("elbows-out")
+_bar = bundled()
+_at_the_joint = float(device.mechanism.drives.transmission[0]) ** 2 * inertia
+_felt = replace(_bar, rotor=(_at_the_joint, _bar.rotor[1])).at(
+    np.broadcast_to(designs.REFERENCE, (len(inertia), 2)), "elbows-in"
+)
+error_by_hand = float(np.abs(flexible / closed_form(_felt.motor_side_mass, _felt.stiffness, PERIOD) - 1.0).max())
 at_present = len(inertia) // 2
 # One rotor alone: the first one endlessly heavy.
 levels_off = float(

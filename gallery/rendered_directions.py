@@ -1,8 +1,8 @@
-"""Several rendered directions: (2.14)-(2.17) for any m, and the 2m masses of (2.28), (2.34), (2.35).
+"""Several rendered directions: (2.6)-(2.17) for any m, and the 2m masses of (2.28), (2.34), (2.35).
 
-With A q' = u_r rendered and B q' = u_a admissible, A M^-1 B^T = 0, the mass matrix in u = [A; B] q' falls into
-W_rr = (A M^-1 A^T)^-1 and W_aa = (B M^-1 B^T)^-1. Shown on random mass matrices whose motions differ by powers of
-ten.
+With A q' = u_r rendered and B q' = u_a admissible, A M^-1 B^T = 0, the mass matrix in u = [A; B] q' = R q' falls
+into W_rr = (A M^-1 A^T)^-1 and W_aa = (B M^-1 B^T)^-1, and a wall's force f_v = A^T lambda becomes [lambda; 0].
+Shown on random mass matrices whose motions differ by powers of ten.
 
 The five-bar rendering both directions of its plane, m = n = 2: link-side and motor-side mass matrices joined by
 K_e. Nothing is lost there, because as many directions are rendered as there are drives, and the 2m masses vibrate
@@ -20,8 +20,8 @@ from zwidth.model.directions import decompose, reduce_directions
 SIZES = ((1, 3), (1, 5), (2, 3), (2, 5), (3, 4), (3, 6))  # m of n
 
 
-def _blocks(m: int, n: int) -> tuple[float, float]:
-    """Relative size of A M^-1 B^T, and of what lies outside the two blocks of R^-T M R^-1."""
+def _blocks(m: int, n: int) -> tuple[float, float, float]:
+    """Relative size of A M^-1 B^T and of what R^-T M R^-1 has outside its blocks; size of R^-T A^T - [1; 0]."""
     rng = np.random.default_rng([m, n])
     root = rng.normal(size=(n, n)) * 10.0 ** rng.uniform(-2, 1, n)
     M, A = root @ root.T, rng.normal(size=(m, n))
@@ -32,10 +32,11 @@ def _blocks(m: int, n: int) -> tuple[float, float]:
     whole = R.T @ M @ R
     apart = whole - block_diag(np.linalg.inv(A @ inverse @ A.T), np.linalg.inv(B @ inverse @ B.T))
     scale = np.sqrt(np.outer(np.diag(whole), np.diag(whole)))
-    return float(np.max(np.abs(A @ inverse @ B.T) / sizes)), float(np.max(np.abs(apart) / scale))
+    forces = np.abs(R.T @ A.T - np.eye(n)[:, :m]).max()
+    return float(np.max(np.abs(A @ inverse @ B.T) / sizes)), float(np.max(np.abs(apart) / scale)), float(forces)
 
 
-coupling, outside = (max(values) for values in zip(*(_blocks(m, n) for m, n in SIZES), strict=True))
+coupling, outside, elsewhere = (max(values) for values in zip(*(_blocks(m, n) for m, n in SIZES), strict=True))
 
 device = load("five-bar")
 posture = device.posture()
@@ -46,12 +47,17 @@ J, drives = posture.jacobian[:2], device.mechanism.drives
 _squared = drives.transmission**2
 
 
-def _seen(matrix: np.ndarray) -> np.ndarray:
-    return np.linalg.inv(J @ np.linalg.inv(matrix) @ J.T)
+def _seen(matrix: np.ndarray, through: np.ndarray) -> np.ndarray:
+    return np.linalg.inv(through @ np.linalg.inv(matrix) @ through.T)
 
 
-W1, W2 = _seen(posture.mass_matrix), _seen(np.diag(_squared * drives.motor_inertia))  # (2.28)
-K = _seen(np.diag(_squared * drives.stiffness))  # (2.34)
+A_1, A_2 = np.hstack([J, 0.0 * J]), np.hstack([0.0 * J, J])  # (2.25), (2.27)
+M = block_diag(posture.mass_matrix, np.diag(_squared * drives.motor_inertia))
+W1, W2 = _seen(M, A_1), _seen(M, A_2)  # (2.28)
+K_phi = np.diag(_squared * drives.stiffness)
+K = _seen(K_phi, J)  # (2.34)
+# (2.29)-(2.33): motors locked, a unit force at the handle along each direction moves it by K^-1
+deflection = J @ np.linalg.solve(K_phi, J.T)
 
 
 def _off(found: np.ndarray, expected: np.ndarray) -> float:

@@ -1,6 +1,7 @@
 """Table 3.4 from Tables 3.1-3.3: what the wall feels of the five-bar at (0, 0.25) m along y.
 
-The capstan drives turn the motor 18.6 times per turn of the joint (printed as (96 - 4.95)/4.95, which is 18.39),
+The capstan drives turn the motor 18.6 times per turn of the joint (printed as (96 - 4.95)/4.95, which is 18.39; a
+pulley of 9.8 mm instead of "approximately 9.9 mm" gives 18.59),
 so that a rotor of J at the motor is n^2 J at the joint, and a shaft of k at the motor n^2 k. With h = J^T u the
 columns of the handle's Jacobian along the rendered direction u,
 
@@ -8,8 +9,8 @@ columns of the handle's Jacobian along the rendered direction u,
     k_e  = 1/(h^T K^-1 h)                                                       (thesis eq. 2.34)
 
 where M_phi is the mass matrix of the links and M_theta, K are those of the drives. The link inertias are Table
-3.2's as measured; Appendix B adds m L^2/12 to them, and drawing the distal links' centres of mass onto their axes
-is a third reading. Only the first gives the printed m_e1.
+3.2's as measured, and their centres of mass lie beside their axes. (B.15) puts m L^2/12, a slender rod's, for that
+of the distal links and their centres onto the axes; only the measured numbers give the printed m_e1.
 
 Run `python -m gallery.table_3_4` to see the numbers.
 """
@@ -38,6 +39,7 @@ device = load(DEVICE)
 drives = device.mechanism.drives
 ratio = float(drives.transmission[0])
 ratio_of_the_pulleys = (96.0 - 4.95) / 4.95
+ratio_of_a_pulley_of_9_8_mm = (96.0 - 4.9) / 4.9
 motor_inertia_at_the_joint = ratio**2 * float(drives.motor_inertia[0])
 
 effective = at_the_handle()
@@ -54,26 +56,25 @@ average_stiffness = [
 frequencies_at_average_stiffness = natural_frequencies(load(DEVICE, average_stiffness).plant())[2:]
 
 # The readings that do not give the printed numbers.
-link_side_mass_without_offsets = float(
-    at_the_handle(
-        *[(f"mechanism.links.{name}.center_of_mass_m.1", 0.0) for name in (*UPPER, *DISTAL)]
-    ).link_side_mass
-)
+on_the_axes = [(f"mechanism.links.{name}.center_of_mass_m.1", 0.0) for name in (*UPPER, *DISTAL)]
+link_side_mass_without_offsets = float(at_the_handle(*on_the_axes).link_side_mass)
 
 
-def _as_appendix_b_adds(name: str) -> tuple[str, object]:
+def _rod(name: str) -> tuple[str, object]:
+    """A slender rod's inertia about its middle, m L^2/12, in place of the measured one."""
     link = next(link for link in device.document["mechanism"]["links"] if link["name"] == name)
-    rod = link["mass_kg"] * link["length_m"] ** 2 / 12.0
-    return f"mechanism.links.{name}.inertia_kg_m2", link["inertia_kg_m2"] + rod
+    return f"mechanism.links.{name}.inertia_kg_m2", link["mass_kg"] * link["length_m"] ** 2 / 12.0
 
 
-link_side_mass_of_appendix_b = float(
-    at_the_handle(*[_as_appendix_b_adds(name) for name in (*UPPER, *DISTAL)]).link_side_mass
-)
+rods = [_rod(name) for name in DISTAL]
+link_side_mass_of_appendix_b = float(at_the_handle(*rods, *on_the_axes).link_side_mass)
+link_side_mass_of_rods_with_offsets = float(at_the_handle(*rods).link_side_mass)
 masses_with_the_pulleys_ratio = at_the_handle(
     *[(f"mechanism.drives.{name}.transmission_ratio", ratio_of_the_pulleys) for name in drives.names]
 )
 motor_side_mass_with_the_pulleys_ratio = float(masses_with_the_pulleys_ratio.motor_side_mass)
+# It goes with the rotor's inertia at the joint.
+motor_side_mass_with_the_printed_inertia = motor_side_mass * 1.186e-4 / motor_inertia_at_the_joint
 
 # The printed 15 620 N/m puts the two-mass model at the device's second frequency.
 published = load("published-two-mass").plant()

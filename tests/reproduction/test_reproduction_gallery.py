@@ -25,6 +25,10 @@ table_3_4 = Later("gallery.table_3_4")
 plane = Later("gallery.rendered_directions")
 worst = Later("gallery.spring_stability")
 where = Later("gallery.which_model_where")
+matrices = Later("gallery.transition_matrices")
+damped = Later("gallery.damped_mass_algebra")
+sprung = Later("gallery.mass_spring_algebra")
+appendix_b = Later("gallery.appendix_b")
 
 # Transition matrix by matrix exponential, eigenvalues: largest stiffness, its damping and frequency, largest
 # damping for K -> 0. All digits given are right.
@@ -134,6 +138,15 @@ def test_the_operators_hand():
     assert hand.lowest_damping == pytest.approx(-6.0213, abs=5e-5)
     assert hand.stiffest_undamped == pytest.approx(6025, abs=15)
     assert hand.static_edge == pytest.approx(hand.static_edge_by_hand, rel=1e-9)
+    # 4.2's models on the arm's spring, by the closed form and by brute force
+    for (mass, spring_rate), stiffness in {
+        ("rigid", 0.0): 126058.0,
+        ("rigid", 580.0): 125751.6,
+        ("motor", 0.0): 11156.4,
+        ("motor", 580.0): 10851.7,
+    }.items():
+        assert hand.sprung[mass, spring_rate] == pytest.approx((stiffness, stiffness), abs=0.05)
+    assert (hand.frequency_alone, hand.frequency_held) == pytest.approx((130.727, 131.079), abs=5e-4)
     assert hand.alone.regions
     assert np.all(hand.edge(hand.alone)[1] >= -1e-9)
 
@@ -146,6 +159,7 @@ def test_the_rigid_wall():
     assert rigid.tip_of_4_10[0] == pytest.approx(rigid.damped.stiffness_max, rel=1e-12)
     assert rigid.radius_inside_the_tip_below < 1.0 < rigid.radius_inside_the_tip_above
     assert rigid.radius_of_optimistic_wall > 1.0
+    assert rigid.conservative_up_to == pytest.approx(0.475, abs=5e-4)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +180,7 @@ def test_delays(samples, p, d):
 def test_the_mass_on_its_spring():
     assert max(spring.error_of_4_44, spring.error_of_4_45, spring.error_of_5_7, spring.error_of_area) < 1e-10
     assert spring.stable_beyond == (True, False, False, False, True, True)
-    assert spring.area_with_the_right_logarithm == pytest.approx(spring.area, rel=1e-10)
+    assert spring.area_with_a_plus == pytest.approx(spring.area, rel=1e-10)
 
 
 def test_the_models_of_figure_4_4():
@@ -179,7 +193,7 @@ def test_the_damped_rigid_wall_completed():
     assert completed.error_of_completed < 1e-12
     assert completed.beta_on_the_axis == pytest.approx(3.7208, abs=5e-5)
     for beta in completed.FRICTIONS:
-        p, d = completed.judged(beta)
+        p, d = completed.judged_tips[beta]
         assert completed.completed[beta][0] == pytest.approx(p, rel=1e-10)
         assert completed.completed[beta][1] == pytest.approx(d, abs=1e-6)
         assert (completed.printed[beta][0] > 1.0001 * p) == (beta > 3.659)
@@ -197,11 +211,41 @@ def test_chapter_4_by_algebra():
         "1/2",
         "1/2",
     )
+    assert all((algebra.as_4_22, algebra.as_4_29, algebra.as_4_32))
     assert all((algebra.as_4_26, algebra.as_4_27, algebra.as_4_28, algebra.as_4_30, algebra.as_4_31))
     assert algebra.as_A_2
     assert algebra.as_A_3
     assert algebra.by_roots == {"stable": 994, "unstable": 2006, "wrong": 0}
     assert not algebra.same(algebra.no_delay[1], algebra.one_sample[1])
+
+
+def test_the_thesis_transition_matrices():
+    assert matrices.error_of_modes < 1e-14
+    assert matrices.error_of_modal < 1e-9
+    assert matrices.zero < 1e-12 < 0.01 < matrices.non_zero
+    assert max(matrices.error_of_damped, matrices.error_of_filtered) < 1e-12
+    assert matrices.error_of_filter < 1e-15
+    # another wall is another polynomial
+    wall = (4000.0, 10.0)
+    assert matrices.apart(matrices.modal_matrix(*wall), matrices.modal_matrix(4000.0, 10.01)) > 1e-5
+
+
+def test_a_mass_with_friction_and_one_on_a_spring_by_algebra():
+    assert all((damped.as_4_5, damped.as_4_7, damped.as_4_9, damped.as_4_14))
+    assert not damped.as_4_9_in_the_scan
+    assert damped.error_of_4_10 < 1e-11
+    names = ("37", "39", "40", "41", "42", "46")
+    assert all(getattr(sprung, f"as_4_{name}") for name in names)
+    assert all((sprung.as_5_12, sprung.as_5_13))
+    assert sprung.error_of_5_14 < 1e-7
+
+
+def test_appendix_b():
+    for name in ("position", "jacobian", "B_6", "B_7", "B_8", "inverse", "mass", "terms"):
+        assert getattr(appendix_b, f"error_of_{name}") < 1e-13
+    assert appendix_b.error_of_B_17 > 1.0
+    assert table_3_4.link_side_mass_of_appendix_b == pytest.approx(0.2626, abs=5e-5)
+    assert table_3_4.link_side_mass_of_rods_with_offsets == pytest.approx(0.2586, abs=5e-5)
 
 
 def test_several_directions():
@@ -233,3 +277,4 @@ def test_chapter_5():
     for name, (mass, rho) in given.items():
         assert optimal_mass.optimum[name] == pytest.approx((mass, rho), abs=6e-7)
         assert optimal_mass.by_5_15[name] == pytest.approx(rho, abs=6e-7)
+    assert optimal_mass.by_5_15 == pytest.approx(optimal_mass.by_zwidth, rel=1e-14)
