@@ -30,7 +30,7 @@ from zwidth.loop.loop import Loop
 from zwidth.model.operator import Operator
 
 PUSH = 5.0  # N
-STIFFNESS = np.array([500.0, 1000.0, 2000.0, 3000.0, 4500.0, 6000.0])
+STIFFNESS = np.array([500.0, 1000.0, 3000.0, 6000.0])
 # What the hand adds when it stiffens: placeholders.
 REFLEX = Reflex(threshold=1.0, latency=0.03, rise=0.05, arm_stiffness=1500.0, arm_damping=40.0, grasp_damping=30.0)
 
