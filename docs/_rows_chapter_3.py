@@ -28,16 +28,22 @@ def judge_of(chart: StabilityChart, delay: int = 0, filter_of=None) -> Judge:
 def chart_rows(
     place: str, case: str, chart: StabilityChart, judge: Judge, corners=(), within_area=1e-8
 ) -> list[Row]:
-    """Largest stiffness, its damping and frequency, largest damping and area, each beside the brute force's."""
+    """Largest stiffness, its damping and frequency, largest damping and area, each beside the brute force's.
+
+    A corner has two frequencies, and rounding decides which of them the judge calls dominant: those have rows of
+    their own.
+    """
     K, B, f = judge.largest_stiffness(1.3 * chart.stiffness_max, 1.2 * chart.damping_max)
     area = judge.area(K, 1.05 * chart.damping_max, corners)
     d_max = judge.largest_damping(1.2 * chart.damping_max)
-    nearest = min(chart.frequencies_at_stiffness_max, key=lambda hertz: abs(hertz - f))
+    smooth = len(chart.frequencies_at_stiffness_max) == 1
+    hertz = chart.frequencies_at_stiffness_max[0]
+    frequency = [Number(place, f"{case}: frequency there", hertz, "Hz", judge=f, within=1e-5)] if smooth else []
     return [
         Number(place, f"{case}: largest stiffness", chart.stiffness_max, "N/m", judge=K, digits=9),
         # damping and frequency at a maximum are known to the root of the rounding only
         Number(place, f"{case}: damping there", chart.damping_at_stiffness_max, "N s/m", judge=B, within=1e-5),
-        Number(place, f"{case}: frequency there", nearest, "Hz", judge=f, within=1e-5),
+        *frequency,
         Number(place, f"{case}: largest damping, K → 0", chart.damping_max, "N s/m", judge=d_max, digits=8),
         Number(
             place, f"{case}: stable area", chart.stable_area, "N² s/m²", judge=area, within=within_area, digits=9
