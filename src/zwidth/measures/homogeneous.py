@@ -200,11 +200,11 @@ def _least(slope: Callable[[Floats], Floats], start: Floats) -> Floats:
         ends.append(reach)
     below, above = start - ends[0], start + ends[1]
     edges = []
-    for level in (-FLAT, FLAT):
+    for limit in (-FLAT, FLAT):
         a, b = below, above
         for _ in range(HALVINGS):
             middle = 0.5 * (a + b)
-            falls = slope(middle) < level
+            falls = slope(middle) < limit
             a, b = np.where(falls, middle, a), np.where(falls, b, middle)
         edges.append(0.5 * (a + b))
     bracketed = np.maximum(*ends) < WIDEST
