@@ -16,7 +16,7 @@ from tests.cli.cli_run import TWO_MASS, found, refused, zwidth
 from tests.interruption import stopped_by_ctrl_c
 from tests.systems import published
 from zwidth.contact.experiment import Place
-from zwidth.show.experiment import numbers, sentences
+from zwidth.show.experiment import numbers, point_rows, sentences
 from zwidth.study.experiment import Experiment, MeasuredPoint, Plan
 
 FEW = ("--stiffnesses", 2, "--tips", 1)
@@ -118,29 +118,63 @@ def test_the_difference_is_explained_by_what_makes_it(folder, friction, step, sa
     assert says in " ".join(people.out.split())
 
 
-def test_a_tip_far_off_is_named_before_edges_that_are_near_and_doubts_are_told():
-    def point(K, B, edge, exact, unsure=False):
-        value = K if edge == "tip" else B
-        seen = ("limit cycle", 1e-4, 90.0, unsure)
-        return MeasuredPoint(K, B, edge, value, value, 1, (value,), exact, *seen)
+def point(K, B, edge, exact, unsure=False):
+    value = K if edge == "tip" else B
+    seen = ("limit cycle", 1e-4, 90.0, unsure)
+    return MeasuredPoint(K, B, edge, value, value, 1, (value,), exact, *seen)
 
-    edges = (point(2e3, 1.0, "lower", 1.1), point(2e3, 11.0, "upper", 11.0))
-    place = Place(4e3, 5.0, 11.0, True)
+
+def measured_run(*points):
+    """An experiment that measured these points, with the chart of a device of 4 kN/m."""
     chart = SimpleNamespace(stiffness_max=4e3)
+    return Experiment(Plan(), Place(4e3, 5.0, 11.0, True), points, 0, (None,), chart, (), 0)
 
-    def told(*tips):
-        run = Experiment(Plan(), place, (*edges, *tips), 0, (None,), chart, (), 0)
-        return dict(sentences(run, None)), numbers(run, [])["points"]
 
-    far, points = told(point(5e3, 5.0, "tip", 4e3, True))
+EDGES = (point(2e3, 1.0, "lower", 1.1), point(2e3, 11.0, "upper", 11.0))
+
+
+def test_a_tip_far_off_is_named_before_edges_that_are_near_and_doubts_are_told():
+    doubtful = measured_run(*EDGES, point(5e3, 5.0, "tip", 4e3, True))
+    far = dict(sentences(doubtful, None))
     assert far["difference"].startswith("farthest from the exact linear edge is the tip at 5.000 Ns/m")
     assert "measured 5.000 kN/m, exact 4.000 kN/m, more is stable" in far["difference"]
+    assert far["stiffest"].endswith(", unsure")
     assert far["unsure"].startswith("at 1 tip the verdict changes more than once")
     assert "--trials" in far["unsure"]
-    assert [p["unsure"] for p in points] == [False, False, True]
-    near, _ = told(point(4.001e3, 5.0, "tip", 4e3))
+    assert [p["unsure"] for p in numbers(doubtful, [])["points"]] == [False, False, True]
+    near = dict(sentences(measured_run(*EDGES, point(4.001e3, 5.0, "tip", 4e3)), None))
     assert near["difference"].startswith("farthest from the exact linear edge is the lower one")
     assert "unsure" not in near
+
+
+def test_edges_that_are_unsure_are_marked_as_tips_are():
+    doubtful = measured_run(EDGES[0], point(2e3, 11.0, "upper", 11.0, True), point(4e3, 5.0, "tip", 4e3))
+    assert dict(sentences(doubtful, None))["unsure"].startswith("at 1 edge the verdict changes more than once")
+    assert [row[-1] for row in point_rows(doubtful)[1]] == ["", "unsure", ""]
+
+
+@pytest.mark.parametrize(
+    ("tips", "says"),
+    [
+        (
+            [(1500.0, 6.0), (4000.0, 5.0)],
+            "at 2.000 kN/m walls from 1.000 Ns/m to 11.00 Ns/m were stable, although ",
+        ),
+        ([(1500.0, 12.0), (1900.0, 5.0)], "the tip at 5.000 Ns/m is 1.900 kN/m"),
+        ([(1500.0, 12.0)], "the tip at 12.00 Ns/m is 1.500 kN/m"),
+        ([(1500.0, 6.0), (1500.0, 7.0)], "(2 tips lie below edges)"),
+    ],
+)
+def test_an_edge_beyond_a_tip_is_warned_of(tips, says):
+    """At 2 kN/m walls from 1 to 11 N s/m were stable: no tip between them is softer, nor is the stiffest tip."""
+    text = numbers(measured_run(*EDGES, *(point(K, B, "tip", K) for K, B in tips)), [])["warning"]
+    assert text.startswith("an edge lies beyond a tip")
+    assert says in text
+
+
+@pytest.mark.parametrize("tips", [[(4000.0, 5.0)], [(1500.0, 12.0), (4000.0, 5.0)], []])
+def test_tips_beyond_all_edges_or_beside_them_contradict_nothing(tips):
+    assert numbers(measured_run(*EDGES, *(point(K, B, "tip", K) for K, B in tips)), [])["warning"] is None
 
 
 def test_a_run_that_takes_its_time_says_what_it_does(folder, monkeypatch):

@@ -54,3 +54,16 @@ def test_a_device_without_a_chart_shows_its_points():
     ax = drawn()
     assert not ax.patches
     assert [line.get_label() for line in ax.lines if not line.get_label().startswith("_")] != []
+
+
+def test_points_that_are_unsure_are_crossed_and_the_legend_says_so():
+    doubtful = [point._replace(unsure=point.edge != "lower") for point in POINTS]
+    made, ax = figure()
+    draw_experiment(ax, doubtful, None)
+    (crosses,) = [line for line in ax.lines if line.get_marker() == "x"]
+    assert crosses.get_xydata().tolist() == [[4000.0, 21.7], [7100.0, 10.0]]
+    told = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "unsure: verdict changes more than once" in told
+    made.canvas.draw()
+    assert ax.get_legend().get_window_extent().x1 <= made.bbox.x1
+    assert not [line for line in drawn().lines if line.get_marker() == "x"]

@@ -1,7 +1,7 @@
 """Along lines through the plane of walls: outwards until the verdict changes, and to where it does.
 
-One verdict beyond a nonlinear device's edge may be stable by chance, so a march from it ends anywhere. The way up
-to what was found is therefore looked at again, and the lowest change counts.
+One verdict beyond a nonlinear device's edge may be stable by chance, so a march from it ends anywhere. The way to
+what was found is therefore looked at again, and the change nearest to the line's start counts.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from zwidth.contact.bench import Bench, Observation, observe
 Floats = NDArray[np.float64]
 
 MARCHES: Final = 12  # steps outwards, each twice as long as the one before
-# of a stiffness found: where the way to it is looked at again
+# of the way to what was found: where it is looked at again
 SHARES: Final = np.array([1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 0.94, 0.98, 1.0])
 LOWERED: Final = 4  # times a way without a stable wall is looked at again, further down
-AFTER: Final = np.array([1.05, 1.2, 1.5])  # times the first unstable stiffness: looked at beyond it
+AFTER: Final = np.array([1.05, 1.2, 1.5])  # times the way to the first unstable wall: looked at beyond it
 
 
 class Lines(NamedTuple):
@@ -31,7 +31,7 @@ class Lines(NamedTuple):
     def at(self, t: Floats) -> Floats:
         return np.asarray(self.start + t[:, None] * self.outwards)
 
-    def only(self, lanes: NDArray[np.bool_]) -> Lines:
+    def only(self, lanes: NDArray[np.bool_] | NDArray[np.intp]) -> Lines:
         return Lines(self.start[lanes], self.outwards[lanes])
 
 
@@ -83,55 +83,53 @@ def bisect(bench: Bench, lines: Lines, found: Found, tolerance: Floats, levels: 
                 unstable[i], beyond[i] = middle[i], seen
 
 
-def stiffenings(damping: Floats) -> Lines:
-    """The lines of growing stiffness, from none, at dampings (m,)."""
+def stiffenings(damping: Floats, least: float) -> Lines:
+    """The lines of growing stiffness, from the softest wall that is looked at [N/m], at dampings (m,)."""
     m = len(damping)
-    return Lines(np.column_stack([np.zeros(m), damping]), np.tile([1.0, 0.0], (m, 1)))
+    return Lines(np.column_stack([np.full(m, least), damping]), np.tile([1.0, 0.0], (m, 1)))
 
 
-def lowest_change(bench: Bench, damping: Floats, found: Found, least: float, tolerance: Floats) -> Found:
-    """The same stiffnesses where all on the way to them is stable; else the lowest at which the verdict changes.
+def nearest_change(bench: Bench, lines: Lines, found: Found, tolerance: Floats, *, start_stable: bool) -> Found:
+    """The same places where every wall on the way to them is stable; else where the verdict changes first.
 
-    damping   (m,);   found  along `stiffenings` of them [N/m]
-    least     no softer wall is looked at [N/m];   tolerance  (m,)  of a change [N/m]
-    Returns   as `found`; stable 0 where no stable wall was met
+    found         along the lines, as `march` and `bisect` leave it;   tolerance  (m,)  of a change
+    start_stable  is the start of each line known to be stable? If not, the way begins at the first stable wall
+    Returns       as `found`; stable 0 where no stable wall was met
     """
     stable, unstable, beyond = found.stable.copy(), found.unstable.copy(), list(found.beyond)
-    top, changed = found.stable.copy(), np.zeros(len(damping), dtype=bool)
+    top, changed = found.stable.copy(), np.zeros(len(stable), dtype=bool)
     lanes = np.flatnonzero(stable > 0.0)
     for _ in range(LOWERED):
         if not len(lanes):
             break
-        K = least + SHARES * (top[lanes, None] - least)
-        walls = np.column_stack([K.ravel(), np.repeat(damping[lanes], len(SHARES))])
-        looks = observe(bench, walls)
+        t = SHARES * top[lanes, None]
+        again = lanes.repeat(len(SHARES))
+        looks = observe(bench, lines.only(again).at(t.ravel()))
         open_ones = []
         for n, i in enumerate(lanes):
             own = looks[n * len(SHARES) : (n + 1) * len(SHARES)]
-            holds = [seen.stable for seen in own]
+            holds = [start_stable, *(seen.stable for seen in own)]
+            places = [0.0, *t[n]]
             if not any(holds):
                 open_ones.append(i)
-                top[i], stable[i] = K[n, 0], 0.0
+                top[i], stable[i] = t[n, 0], 0.0
                 continue
             first = holds.index(True)
             rest = holds[first:]
             last = first + (rest.index(False) if False in rest else len(rest)) - 1
-            if last + 1 < len(own):
-                stable[i], unstable[i], beyond[i], changed[i] = K[n, last], K[n, last + 1], own[last + 1], True
-            else:
-                stable[i] = K[n, last]
+            stable[i] = places[last]
+            if last < len(own):
+                unstable[i], beyond[i], changed[i] = places[last + 1], own[last], True
         lanes = np.array(open_ones, dtype=int)
-    halved = bisect(
-        bench, stiffenings(damping), Found(stable, np.where(changed, unstable, np.nan), beyond), tolerance
-    )
+    halved = bisect(bench, lines, Found(stable, np.where(changed, unstable, np.nan), beyond), tolerance)
     return Found(halved.stable, np.where(changed, halved.unstable, unstable), halved.beyond)
 
 
-def holds_beyond(bench: Bench, damping: Floats, unstable: Floats) -> NDArray[np.bool_]:
-    """Is some stiffer wall than the first unstable one (m,) stable again? False where none was unstable."""
+def stable_beyond(bench: Bench, lines: Lines, unstable: Floats) -> NDArray[np.bool_]:
+    """Is some wall farther out than the first unstable one (m,) stable again? False where none was unstable."""
     known = np.flatnonzero(np.isfinite(unstable))
-    again = np.zeros(len(damping), dtype=bool)
-    walls = np.column_stack([np.outer(unstable[known], AFTER).ravel(), np.repeat(damping[known], len(AFTER))])
-    looks = np.array([seen.stable for seen in observe(bench, walls)], dtype=bool)
-    again[known] = looks.reshape(len(known), len(AFTER)).any(axis=1)
+    again = np.zeros(len(unstable), dtype=bool)
+    t = np.outer(unstable[known], AFTER)
+    looks = observe(bench, lines.only(known.repeat(len(AFTER))).at(t.ravel()))
+    again[known] = np.array([seen.stable for seen in looks], dtype=bool).reshape(t.shape).any(axis=1)
     return again

@@ -20,7 +20,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.contact.along import Found, Lines, bisect, holds_beyond, lowest_change, march
+from zwidth.contact.along import Found, Lines, bisect, march, nearest_change, stable_beyond, stiffenings
 from zwidth.contact.bench import LEVELS, Bench, BenchError, Observation, observe
 from zwidth.model.modes import undeformed
 from zwidth.model.operator import attach
@@ -76,8 +76,8 @@ class EdgePoint:
     beyond     what the device does at that first unstable wall; None: no unstable wall was found, and the point
                has nan for what was bisected
     amplitude, frequency   of that [m], [Hz]
-    unsure     tip of what is not linear: the verdict changes more than once along the stiffness; this is the
-               lowest change
+    unsure     of what is not linear: the verdict changes more than once along the line; this is the change
+               nearest to its start
     """
 
     stiffness: float
@@ -250,13 +250,30 @@ def _measured(
     found = bisect(bench, lines, found, tolerance * start, levels)
     found = Found(np.where(begins, start + found.stable, 0.0), start + found.unstable, found.beyond)
     if not bench.linear:
-        found = lowest_change(bench, B, found, least, tolerance * np.minimum(start, found.stable))
+        found, _ = _looked_again(bench, B, found, least, tolerance * np.minimum(start, found.stable))
     return list(zip(B.tolist(), found.stable.tolist(), np.isfinite(found.unstable).tolist(), strict=True))
+
+
+def _looked_again(
+    bench: Bench, damping: Floats, found: Found, least: float, tolerance: Floats
+) -> tuple[Found, NDArray[np.bool_]]:
+    """The stiffnesses found at dampings (m,), or else the lowest at which the verdict changes.
+
+    least    no softer wall is looked at [N/m]
+    Returns  as `found` [N/m], stable 0 where no stable wall was met; and at which dampings the verdict changed
+    """
+    ways = stiffenings(damping, least)
+    first = Found(found.stable - least, found.unstable - least, found.beyond)
+    lower = nearest_change(bench, ways, first, tolerance, start_stable=False)
+    stable = np.where(lower.stable > 0.0, least + lower.stable, 0.0)
+    unsure = lower.stable < first.stable
+    return Found(stable, least + lower.unstable, lower.beyond), unsure
 
 
 def measure_edges(bench: Bench, stiffness: Floats, place: Place, box: Box | None = None) -> list[EdgePoint]:
     """Lower and upper edge at each stiffness (k,), from the damping of the tip outwards.
 
+    Of what is not linear: the change of the verdict nearest to that damping.
     Returns  lower edges first; a stiffness at which that damping is not stable has none
     """
     k = len(stiffness)
@@ -274,13 +291,19 @@ def measure_edges(bench: Bench, stiffness: Floats, place: Place, box: Box | None
     farthest = np.minimum(np.maximum(farthest, 0.0), 1e3 * scale)
     found = march(bench, lines, np.full(2 * k, 0.25 * scale), farthest)
     width = np.nan_to_num(found.unstable, nan=scale).reshape(2, k).sum(axis=0)
-    found = bisect(bench, lines, found, np.tile(ACCURACY * width, 2))
+    tolerance = np.tile(ACCURACY * width, 2)
+    found = bisect(bench, lines, found, tolerance)
+    unsure = np.zeros(2 * k, dtype=bool)
+    if not bench.linear:
+        nearer = nearest_change(bench, lines, found, tolerance, start_stable=True)
+        unsure = (nearer.stable < found.stable) | stable_beyond(bench, lines, nearer.unstable)
+        found = nearer
     middle = lines.at(0.5 * (found.stable + found.unstable))[:, 1]
     kinds: tuple[Edge, Edge] = ("lower", "upper")
     edges = [kind for kind in kinds for _ in range(k)]
     return [
-        _point(float(K), float(B), edge, seen)
-        for (K, _), B, edge, seen in zip(starts, middle, edges, found.beyond, strict=True)
+        _point(float(K), float(B), edge, seen, bool(doubt))
+        for (K, _), B, edge, seen, doubt in zip(starts, middle, edges, found.beyond, unsure, strict=True)
     ]
 
 
@@ -301,9 +324,8 @@ def measure_tips(bench: Bench, damping: Floats, place: Place, box: Box | None = 
     found = Found(start + found.stable, start + found.unstable, found.beyond)
     unsure = np.zeros(len(B), dtype=bool)
     if not bench.linear:
-        lower = lowest_change(bench, B, found, least, tolerance)
-        unsure = (lower.stable < found.stable) | holds_beyond(bench, B, lower.unstable)
-        found = lower
+        found, unsure = _looked_again(bench, B, found, least, tolerance)
+        unsure |= stable_beyond(bench, stiffenings(B, least), found.unstable - least)
     middle = np.where(found.stable > 0.0, 0.5 * (found.stable + found.unstable), np.nan)
     ends = zip(middle.tolist(), B.tolist(), found.beyond, unsure.tolist(), strict=True)
     return [_point(K, b, "tip", seen if isfinite(K) else None, doubt) for K, b, seen, doubt in ends]

@@ -33,6 +33,7 @@ def numbers(found: Experiment, own: Sequence[PointFromBench]) -> dict[str, Any]:
     return {
         "points": [_entry(point) for point in found.points],
         "lost": found.lost,
+        "warning": warning(found),
         "stiffness_max_N_per_m": None if best is None else best.stiffness,
         "damping_at_stiffness_max_Ns_per_m": None if best is None else best.damping,
         "exact_stiffness_max_N_per_m": None if chart is None else chart.stiffness_max,
@@ -71,7 +72,7 @@ def point_table(document: dict[str, Any]) -> dict[str, list[Any]]:
 
 def point_rows(found: Experiment) -> tuple[list[str], list[list[str]]]:
     """Headings and rows for people."""
-    many = any(p.trials > 1 for p in found.points)
+    many, doubts = any(p.trials > 1 for p in found.points), any(p.unsure for p in found.points)
     rows = []
     for p in found.points:
         unit = "N/m" if p.edge == "tip" else "Ns/m"
@@ -84,10 +85,29 @@ def point_rows(found: Experiment) -> tuple[list[str], list[list[str]]]:
                 amount(p.exact, unit),
                 str(p.beyond),
                 amount(p.frequency, "Hz"),
+                *(["unsure" if p.unsure else ""] if doubts else []),
             ]
         )
     spread = ["lowest to highest", "trials"] if many else []
-    return ["edge", "stiffness", "damping", *spread, "exact, linear", "beyond it", "at"], rows
+    marks = [""] if doubts else []
+    return ["edge", "stiffness", "damping", *spread, "exact, linear", "beyond it", "at", *marks], rows
+
+
+def warning(found: Experiment) -> str | None:
+    """That edges lie beyond tips, with the pair farthest apart; None where none does."""
+    from zwidth.study.beyond_tip import edges_beyond_tips
+
+    pairs = edges_beyond_tips(found)
+    if not pairs:
+        return None
+    tip, stiffness, (low, high) = pairs[0]
+    others = f" ({len(pairs)} tips lie below edges)" if len(pairs) > 1 else ""
+    return (
+        f"an edge lies beyond a tip: at {amount(stiffness, 'N/m')} walls from {amount(low, 'Ns/m')} to "
+        f"{amount(high, 'Ns/m')} were stable, although the tip at {amount(tip.damping, 'Ns/m')} is "
+        f"{amount(tip.stiffness, 'N/m')}{others}; verdicts there hang on chance: repeat with --trials 8, or stay "
+        "below with --stiffness and --damping"
+    )
 
 
 def deviations(found: Experiment, own: Sequence[PointFromBench]) -> list[dict[str, Any]] | None:
@@ -120,12 +140,13 @@ def sentences(found: Experiment, measured: list[dict[str, Any]] | None) -> Itera
     tips = [p for p in found.points if p.edge == "tip"]
     if tips:
         best = max(tips, key=lambda p: p.stiffness)
-        yield "stiffest", f"{amount(best.stiffness, 'N/m')} at {amount(best.damping, 'Ns/m')}"
+        doubt = ", unsure" if best.unsure else ""
+        yield "stiffest", f"{amount(best.stiffness, 'N/m')} at {amount(best.damping, 'Ns/m')}{doubt}"
     if found.plan.visible:
         yield "visible", f"vibrations above {amount(found.plan.visible, 'm')}"
     if found.lost:
         yield "not found", f"{found.lost} of the points sought: no unstable wall, or no stable one, was met there"
-    doubtful = sum(p.unsure for p in found.points)
+    doubtful = [p.edge == "tip" for p in found.points if p.unsure]
     if doubtful:
         yield "unsure", _doubt(doubtful, single=len(found.subjects) * found.plan.trials == 1)
     for n, text in enumerate(explanation(found)):
@@ -135,9 +156,13 @@ def sentences(found: Experiment, measured: list[dict[str, Any]] | None) -> Itera
             yield "" if n else "your points", text
 
 
-def _doubt(points: int, *, single: bool) -> str:
-    which = "1 tip" if points == 1 else f"{points} tips"
-    text = f"at {which} the verdict changes more than once as the stiffness grows; the lowest change is given"
+def _doubt(tips: list[bool], *, single: bool) -> str:
+    """What the unsure points are, each a tip or not."""
+    counts = [(len(tips) - sum(tips), "edge"), (sum(tips), "tip")]
+    which = " and ".join(f"{count} {name}{'s' * (count > 1)}" for count, name in counts if count)
+    text = (
+        f"at {which} the verdict changes more than once along the line; the change nearest to its start is given"
+    )
     return text + "; a single trial does not say how far it scatters, --trials 8 does" * single
 
 

@@ -159,7 +159,7 @@ class Experiment:
 
 def question(loop: Loop, operator: Operator | None, plan: Plan) -> str:
     """By which a journal knows the experiment."""
-    return fingerprint("experiment 2", loop, operator, plan)
+    return fingerprint("experiment 3", loop, operator, plan)
 
 
 def measure(

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 KEYS: Final = (
     "points",
     "lost",
+    "warning",
     "stiffness_max_N_per_m",
     "damping_at_stiffness_max_Ns_per_m",
     "exact_stiffness_max_N_per_m",
@@ -233,6 +234,8 @@ def _kept(journal: Journal) -> Iterator[None]:
 
 def _pages(question: Question, device: Device, found: Experiment, document: dict[str, Any]) -> Iterator[Any]:
     yield heading(question, device, linear=False)
+    if document["warning"]:
+        yield f"warning: {document['warning']}"
     headings, rows = point_rows(found)
     yield table(headings, rows)
     yield sheet(list(sentences(found, document["measured"])))
@@ -247,7 +250,7 @@ def _write(path: Path, found: Experiment, document: dict[str, Any], own: list[Po
     from zwidth.show.figures.experiment import Barred, draw_experiment
     from zwidth.show.figures.style import figure, save
 
-    points = [Barred(p.stiffness, p.damping, p.edge, p.low, p.high) for p in found.points]
+    points = [Barred(p.stiffness, p.damping, p.edge, p.low, p.high, p.unsure) for p in found.points]
     others = [
         Barred(p.stiffness, p.damping, p.edge or "lower", p.stiffness_low, p.stiffness_high)
         if p.edge == "tip"

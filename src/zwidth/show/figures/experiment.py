@@ -22,13 +22,17 @@ TITLES = {
 
 
 class Barred(NamedTuple):
-    """A point to draw: its wall, its edge, and lowest and highest along what was bisected; nan: no bar."""
+    """A point to draw: its wall, its edge, and lowest and highest along what was bisected; nan: no bar.
+
+    unsure   the verdict changes more than once along the line
+    """
 
     stiffness: float
     damping: float
     edge: str
     low: float
     high: float
+    unsure: bool = False
 
 
 def draw_experiment(
@@ -40,6 +44,7 @@ def draw_experiment(
 ) -> None:
     """The exact chart filled, with the measured points and their bars over it.
 
+    points  those that are unsure are crossed
     others  points of somebody's own, drawn in black
     window  what to show; None: chart and points for K > 0, and 5 %
     """
@@ -50,6 +55,7 @@ def draw_experiment(
         ax.plot(arc.stiffness, arc.damping, color=BLACK, linewidth=1.0, solid_capstyle="round")
     for edge, (colour, marker) in LOOKS.items():
         _draw(ax, [p for p in points if p.edge == edge], colour, marker, TITLES[edge], filled=False)
+    _cross(ax, [p for p in points if p.unsure])
     _draw(ax, others, BLACK, "D", "your points", filled=True)
     frame(ax, window or _window(points, others, chart), empty=False)
     legend_above(ax, columns=2)
@@ -79,6 +85,14 @@ def _draw(ax: Axes, points: Sequence[Barred], colour: str, marker: str, title: s
         zorder=5.0,
         label=title,
     )
+
+
+def _cross(ax: Axes, unsure: Sequence[Barred]) -> None:
+    """Crosses over the points whose verdict changes more than once."""
+    if unsure:
+        K, B = [p.stiffness for p in unsure], [p.damping for p in unsure]
+        title = "unsure: verdict changes more than once"
+        ax.plot(K, B, "x", color=BLACK, markersize=7.0, markeredgewidth=0.9, zorder=6.0, label=title)
 
 
 def _window(points: Sequence[Barred], others: Sequence[Barred], chart: StabilityChart | None) -> Window:
