@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from math import isnan, nan
 from typing import TYPE_CHECKING, Any, Final
 
+from zwidth.show import own_points
 from zwidth.show.units import amount
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def numbers(found: Experiment, own: Sequence[PointFromBench]) -> dict[str, Any]:
     tips = [p for p in found.points if p.edge == "tip"]
     best = max(tips or found.points, key=lambda p: p.stiffness, default=None)
     chart = found.chart
+    measured = own_points.compared(chart, own)
     return {
         "points": [_entry(point) for point in found.points],
         "lost": found.lost,
@@ -40,7 +42,8 @@ def numbers(found: Experiment, own: Sequence[PointFromBench]) -> dict[str, Any]:
         "visible_m": found.plan.visible,
         "subjects": [None if subject is None else vars(subject) for subject in found.subjects],
         "explanation": explanation(found),
-        "measured": deviations(found, own),
+        "measured": measured,
+        "measured_counts": own_points.counts(measured),
     }
 
 
@@ -110,31 +113,6 @@ def warning(found: Experiment) -> str | None:
     )
 
 
-def deviations(found: Experiment, own: Sequence[PointFromBench]) -> list[dict[str, Any]] | None:
-    """How far somebody's points are from the exact edge nearest to them; None without points."""
-    if not own:
-        return None
-    return [_deviation(found, point) for point in own]
-
-
-def _deviation(found: Experiment, point: PointFromBench) -> dict[str, Any]:
-    from zwidth.study.exact_edge import exact_edge
-
-    edge: Any = point.edge or None
-    exact = nan if found.chart is None else exact_edge(found.chart, point.stiffness, point.damping, edge)
-    tip = point.edge == "tip"
-    return {
-        "stiffness_N_per_m": point.stiffness,
-        "damping_Ns_per_m": point.damping,
-        "edge": point.edge or None,
-        "trials": point.trials,
-        "exact_stiffness_N_per_m": exact if tip else point.stiffness,
-        "exact_damping_Ns_per_m": point.damping if tip else exact,
-        "deviation_N_per_m": point.stiffness - exact if tip else 0.0,
-        "deviation_Ns_per_m": 0.0 if tip else point.damping - exact,
-    }
-
-
 def sentences(found: Experiment, measured: list[dict[str, Any]] | None) -> Iterator[tuple[str, str]]:
     """What to say below the points: labels and values."""
     tips = [p for p in found.points if p.edge == "tip"]
@@ -152,7 +130,7 @@ def sentences(found: Experiment, measured: list[dict[str, Any]] | None) -> Itera
     for n, text in enumerate(explanation(found)):
         yield "" if n else "difference", text
     if measured:
-        for n, text in enumerate(_own_words(measured)):
+        for n, text in enumerate(own_points.sentences(measured)):
             yield "" if n else "your points", text
 
 
@@ -164,24 +142,6 @@ def _doubt(tips: list[bool], *, single: bool) -> str:
         f"at {which} the verdict changes more than once along the line; the change nearest to its start is given"
     )
     return text + "; a single trial does not say how far it scatters, --trials 8 does" * single
-
-
-def _own_words(measured: list[dict[str, Any]]) -> Iterator[str]:
-    beside = [p for p in measured if p["edge"] != "tip"]
-    apart = [p["deviation_Ns_per_m"] for p in beside if not isnan(p["deviation_Ns_per_m"])]
-    if apart:
-        worst = max(apart, key=abs)
-        mean = sum(map(abs, apart)) / len(apart)
-        yield (
-            f"{amount(mean, 'Ns/m')} from the exact edge on average over {len(apart)}, at most "
-            f"{amount(worst, 'Ns/m')}"
-        )
-    tips = [p["deviation_N_per_m"] for p in measured if p["edge"] == "tip" and not isnan(p["deviation_N_per_m"])]
-    if tips:
-        yield f"the tip is {amount(max(tips, key=abs), 'N/m')} from the exact one at most"
-    nowhere = len(measured) - len(apart) - len(tips)
-    if nowhere:
-        yield f"{nowhere} where the exact chart has no edge"
 
 
 def explanation(found: Experiment) -> list[str]:

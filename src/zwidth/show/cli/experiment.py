@@ -37,6 +37,7 @@ KEYS: Final = (
     "subjects",
     "explanation",
     "measured",
+    "measured_counts",
 )
 MOST: Final = 1000
 PUSH: Final = 2.0  # N, against a one-sided wall
@@ -118,8 +119,9 @@ def _range(ctx: click.Context, param: click.Parameter, span: tuple[float, float]
     "--measured",
     metavar="FILE.csv",
     callback=named,
-    help="Your own points: stiffness_N_per_m, damping_Ns_per_m, and if you like edge, damping_low_Ns_per_m, "
-    "damping_high_Ns_per_m, stiffness_low_N_per_m, stiffness_high_N_per_m, trials.",
+    help="Your own points: stiffness_N_per_m, damping_Ns_per_m, and edge (lower, upper, tip) or verdict (stable, "
+    "unstable) of each; if you like damping_low_Ns_per_m, damping_high_Ns_per_m, stiffness_low_N_per_m, "
+    "stiffness_high_N_per_m, trials.",
 )
 @click.option("--resume", metavar="FILE", callback=named, help="Keep what is done here, and go on from it.")
 @output_option("Write a figure (.png .svg .pdf) or the points (.csv .json).")
@@ -252,9 +254,9 @@ def _write(path: Path, found: Experiment, document: dict[str, Any], own: list[Po
 
     points = [Barred(p.stiffness, p.damping, p.edge, p.low, p.high, p.unsure) for p in found.points]
     others = [
-        Barred(p.stiffness, p.damping, p.edge or "lower", p.stiffness_low, p.stiffness_high)
+        Barred(p.stiffness, p.damping, p.edge or p.verdict or "lower", p.stiffness_low, p.stiffness_high)
         if p.edge == "tip"
-        else Barred(p.stiffness, p.damping, p.edge or "lower", p.damping_low, p.damping_high)
+        else Barred(p.stiffness, p.damping, p.edge or p.verdict or "lower", p.damping_low, p.damping_high)
         for p in own
     ]
     drawing, ax = figure()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from math import nan
 from typing import Any, Final
@@ -20,6 +21,7 @@ SPREADS: Final = (
     "stiffness_high_N_per_m",
 )
 EDGES: Final = ("lower", "upper", "tip", "")
+VERDICTS: Final = ("stable", "unstable", "")
 MOST_FAULTS: Final = 20
 LARGEST_FILE: Final = 200_000_000  # bytes; some millions of walls
 
@@ -38,10 +40,11 @@ def read_walls(file: str) -> Walls:
 
 @dataclass(frozen=True)
 class PointFromBench:
-    """A point of a boundary that somebody measured; nan, "" and 1 for what was left out.
+    """A point that somebody measured, of the boundary or beside it; nan, "" and 1 for what was left out.
 
     damping_low, damping_high   [N s/m];   stiffness_low, stiffness_high  [N/m]
-    edge     lower, upper, tip or ""
+    edge     lower, upper, tip or "": the boundary was found here
+    verdict  stable, unstable or "": the wall was tried, and was found so
     trials   how many it is the mean of
     """
 
@@ -53,6 +56,7 @@ class PointFromBench:
     stiffness_low: float
     stiffness_high: float
     trials: int
+    verdict: str = ""
 
 
 def read_measured(file: str) -> list[PointFromBench]:
@@ -60,7 +64,12 @@ def read_measured(file: str) -> list[PointFromBench]:
 
     Raises BadInput  as `read_walls`
     """
-    optional = {"edge": _edge, **dict.fromkeys(SPREADS, _spread), "trials": _trials}
+    optional: dict[str, Reader] = {
+        "edge": partial(_word, EDGES),
+        "verdict": partial(_word, VERDICTS),
+        **dict.fromkeys(SPREADS, _spread),
+        "trials": _trials,
+    }
     return [
         PointFromBench(
             stiffness=row["stiffness_N_per_m"],
@@ -71,13 +80,14 @@ def read_measured(file: str) -> list[PointFromBench]:
             stiffness_low=row.get("stiffness_low_N_per_m", nan),
             stiffness_high=row.get("stiffness_high_N_per_m", nan),
             trials=row.get("trials", 1),
+            verdict=row.get("verdict", ""),
         )
         for row in _read(file, optional)
     ]
 
 
-def _edge(text: str) -> tuple[str, str]:
-    return text, "" if text in EDGES else f"must be {', '.join(EDGES[:-1])} or nothing, got {text[:60]!r}"
+def _word(allowed: tuple[str, ...], text: str) -> tuple[str, str]:
+    return text, "" if text in allowed else f"must be {', '.join(allowed[:-1])} or nothing, got {text[:60]!r}"
 
 
 def _spread(text: str) -> tuple[float, str]:
@@ -111,7 +121,7 @@ def _read(file: str, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
                 cells[name], fault = readers[name](row[place].strip() if place < len(row) else "")
                 if fault:
                     faults.append(f"{file}: line {rows.line_num}: {name}: {fault}")
-            faults += [f"{file}: line {rows.line_num}: {fault}" for fault in _turned_round(cells)]
+            faults += [f"{file}: line {rows.line_num}: {fault}" for fault in _at_odds(cells)]
             found.append(cells)
     except csv.Error as error:
         raise BadInput(f"{file}: line {rows.line_num}: is not CSV: {error}") from None
@@ -123,8 +133,13 @@ def _read(file: str, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
     return found
 
 
-def _turned_round(cells: dict[str, Any]) -> Iterator[str]:
-    """Spreads whose low end is above their high one."""
+def _at_odds(cells: dict[str, Any]) -> Iterator[str]:
+    """Spreads whose low end is above their high one, and a point that is both edge and wall."""
+    if cells.get("edge") and cells.get("verdict"):
+        yield (
+            f"verdict: must be left empty where edge is {cells['edge']!r}, got {cells['verdict']!r}; a point lies "
+            "on an edge, or is a wall that was tried"
+        )
     for low, high in (SPREADS[:2], SPREADS[2:]):
         if cells.get(low, nan) > cells.get(high, nan):  # nan: left out
             yield f"{low}: must be at most {high} = {cells[high]:g}, got {cells[low]:g}"

@@ -20,10 +20,18 @@ TITLES = {
     "tip": "tip, stiffness bisected",
 }
 
+# of a user's own points: marker and title, of which edges or verdicts, and whether the marker is filled
+OWN_LOOKS = (
+    (("D", "your points"), ("lower", "upper", "tip"), True),
+    (("P", "your walls, stable"), ("stable",), True),
+    (("X", "your walls, unstable"), ("unstable",), False),
+)
+
 
 class Barred(NamedTuple):
-    """A point to draw: its wall, its edge, and lowest and highest along what was bisected; nan: no bar.
+    """A point to draw: its wall, and lowest and highest along what was bisected; nan: no bar.
 
+    edge     lower, upper or tip; of a wall that was tried the verdict, stable or unstable
     unsure   the verdict changes more than once along the line
     """
 
@@ -56,7 +64,8 @@ def draw_experiment(
     for edge, (colour, marker) in LOOKS.items():
         _draw(ax, [p for p in points if p.edge == edge], colour, marker, TITLES[edge], filled=False)
     _cross(ax, [p for p in points if p.unsure])
-    _draw(ax, others, BLACK, "D", "your points", filled=True)
+    for looks, kinds, filled in OWN_LOOKS:
+        _draw(ax, [p for p in others if p.edge in kinds], BLACK, *looks, filled=filled)
     frame(ax, window or _window(points, others, chart), empty=False)
     legend_above(ax, columns=2)
 
