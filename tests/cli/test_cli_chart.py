@@ -43,6 +43,19 @@ def test_the_published_plant_gives_the_numbers_of_the_thesis():
     assert "reason" not in chart
 
 
+@pytest.mark.xfail(strict=True, reason="the fastest decay of all walls is given, springs with K < 0 included")
+def test_the_fastest_decay_of_a_spring_that_can_be_built_comes_first():
+    """A grounded mass whose own spring is too stiff: the fastest of all walls would soften it."""
+    stiff = ("chart", ONE_MASS, "--set", "plant.stiffness_N_per_m=20000.0", "--set", "plant.damping_Ns_per_m=0.5")
+    chart = found(*stiff)
+    assert chart["fastest_decay"]["stiffness_N_per_m"] < 0.0
+    assert chart["fastest_decay_in_first_quadrant"]["stiffness_N_per_m"] == 0.0
+    lines = zwidth(*stiff).out.splitlines()
+    (first,) = [n for n, line in enumerate(lines) if "fastest decay" in line]
+    assert "at 0 N/m" in lines[first]
+    assert "with K < 0 or B < 0" in lines[first + 1]
+
+
 def test_a_corner_has_both_of_its_frequencies():
     chart = found("chart", TWO_MASS, "--set", "loop.delay_samples=1")
     assert_allclose(chart["frequencies_at_stiffness_max_Hz"], [9.628, 135.28], atol=5e-3)
