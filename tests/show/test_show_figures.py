@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
+from tests.systems import mass
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.verdict import spectral_radius
 from zwidth.device.load import load
+from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.plant import Plant
 from zwidth.show.figures.decay import draw_decay_contours, round_radii, tenfold_time
@@ -158,7 +160,17 @@ def test_contours_have_the_spectral_radius_they_name(chart):
         np.testing.assert_allclose(spectral_radius(chart.loop, K, B), radius, rtol=1e-6)
     star = [line for line in ax.lines if line.get_marker() == "*"]
     best = chart.fastest_decay
-    assert star[0].get_xydata().tolist() == [[best.stiffness, best.damping]]
+    assert [s.get_xydata().tolist() for s in star] == [[[best.stiffness, best.damping]]]
+
+
+def test_the_fastest_wall_with_a_spring_and_the_fastest_of_all_have_a_star_each():
+    chart = stability_chart(Loop(mass(0.1, damping=0.5, stiffness=2e4), Controller(0.001)))
+    _, ax = figure()
+    draw_decay_contours(ax, chart.loop, radii=(), chart=chart)
+    stars = [line for line in ax.lines if line.get_marker() == "*"]
+    assert [star.get_xdata()[0] < 0.0 for star in stars] == [False, True]
+    titles = [text.get_text().split(":")[0] for text in ax.get_legend().get_texts()]
+    assert titles[-2:] == ["fastest with K, B ≥ 0", "fastest of all"]
 
 
 @given(st.floats(0.0, 0.99999))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arcs import Rings
 from zwidth.chart.cells import Box, Samples, box_of, cells, outline
-from zwidth.chart.decay import FastestDecay, fastest_decay
+from zwidth.chart.decay import FastestDecay, fastest_decay, fastest_decay_in_first_quadrant
 from zwidth.chart.outline import quadrant_area, sample_arc
 from zwidth.chart.peak import Peak, largest_damping, stiffest
 from zwidth.chart.region import closed_rings
@@ -46,6 +46,7 @@ class StabilityChart:
     damping_max     supremum of B >= 0 stable for all sufficiently small K > 0 [N s/m]; 0 if there is none
     stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
     fastest_decay   the wall of smallest spectral radius over the whole set; None if nothing is stable
+    fastest_decay_in_first_quadrant   the same over K >= 0, B >= 0; None if nothing there is stable
     corner_blur     share of the set's size to which its corners are known: 1e-7, more where a mode that the wall
                     hardly moves hides one in rounding
     """
@@ -60,6 +61,7 @@ class StabilityChart:
     damping_max: float
     stable_area: float
     fastest_decay: FastestDecay | None
+    fastest_decay_in_first_quadrant: FastestDecay | None
     corner_blur: float
 
     @property
@@ -82,7 +84,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
 
     loop    plant, sampling, delay and filter
     radius  1 for stability; less for the walls whose slowest motion shrinks at least by that factor per sample
-    decay   False skips the search for the fastest-decaying wall, half of the time
+    decay   False skips the search for the fastest-decaying walls, most of the time
     Raises  ChartError if the edge cannot be closed (a sliver finer than double precision resolves)
 
     >>> from zwidth.loop.controller import Controller
@@ -97,6 +99,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     rings, blur, samples, outlines = traced(tracer)
     width = widest(outlines)
     peak = stiffest(tracer, rings, width)
+    fastest = fastest_decay(tracer, outlines) if decay else None
     in_hertz = 1.0 / (2.0 * np.pi * loop.period)
     return StabilityChart(
         loop=loop,
@@ -108,7 +111,8 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
         frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
         damping_max=largest_damping(tracer, rings, width),
         stable_area=max(quadrant_area(tracer, rings), 0.0) if peak else 0.0,
-        fastest_decay=fastest_decay(tracer, outlines) if decay else None,
+        fastest_decay=fastest,
+        fastest_decay_in_first_quadrant=fastest_decay_in_first_quadrant(tracer, outlines, fastest),
         corner_blur=blur,
     )
 

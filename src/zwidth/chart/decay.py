@@ -1,4 +1,10 @@
-"""The fastest-decaying wall: the smallest spectral radius over the stable set."""
+"""The fastest-decaying wall: the smallest spectral radius over the stable set, or over its part with K, B >= 0.
+
+That part's optimum is the whole set's where that has K, B >= 0. Else it lies inside the quadrant, or on one of its
+two axes: the search moves in the quadrant, walls outside it being taken for the nearest ones inside, and each axis
+is searched by itself. A cell of walls that decay faster than the best found is bounded and the quadrant is not, so
+that a cell which reaches into the quadrant has some of its edge there. That edge is what is looked for at the end.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +18,7 @@ from zwidth.chart.roots import polynomial_radius, spread_roots
 from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled
 from zwidth.loop.evaluate import Factors, characteristic, degree_of_loop
+from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -19,8 +26,16 @@ Complexes = NDArray[np.complex128]
 # Simplex sizes of successive searches, in shares of the cell: the spectral radius has edges and cusps in which a
 # single search stalls.
 RESTARTS = np.array([1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8])
-# How much faster than the best found (in shares of 1 - radius) the next wall is looked for.
-FASTER = 0.003
+# How much faster than the best found (in shares of 1 - radius) the next wall is looked for. A larger step finds
+# other cells of faster walls sooner, a smaller one those that are hardly faster.
+FASTER = (3e-3, 3e-4, 3e-5)
+ROUNDS = 20  # of looking for faster walls, at each
+ALL = np.full(2, -np.inf)  # least K and B of the walls that are searched
+QUADRANT = np.zeros(2)
+# Walls along an axis, as shares of its stable part; dense near its origin, where the walls of a light device are.
+ALONG = np.union1d(np.linspace(0.0, 1.0, 200), np.logspace(-6.0, 0.0, 60))
+ZOOMS, ZOOMED = 9, 33  # how often a minimum along an axis is closed in on, and walls in each
+VALLEYS = 4  # minima along an axis that are
 
 
 @dataclass(frozen=True)
@@ -34,6 +49,14 @@ class FastestDecay:
     stiffness: float
     damping: float
     spectral_radius: float
+
+    def document(self) -> dict[str, float]:
+        """The numbers under the keys of --json."""
+        return {
+            "stiffness_N_per_m": self.stiffness,
+            "damping_Ns_per_m": self.damping,
+            "spectral_radius": self.spectral_radius,
+        }
 
 
 @compiled
@@ -57,22 +80,25 @@ def scatter_values(polynomials: Floats, radius: float, K: Floats, B: Floats) -> 
 
 @compiled
 def descend(
-    polynomials: Floats, radius: float, start: Floats, extent: Floats, sizes: Floats
+    polynomials: Floats, radius: float, start: Floats, extent: Floats, sizes: Floats, least: Floats
 ) -> tuple[float, float, float]:
-    """Nelder and Mead's simplex (1965) from `start`, restarted at each size; K, B and the radius found."""
+    """Nelder and Mead's simplex (1965) from `start`, restarted at each size; K, B and the radius found.
+
+    least  (2,)  least K and B; a wall below stands for the nearest one that is not
+    """
     N = polynomials.shape[1] - 1
     p, roots = np.empty(N + 1), np.empty(N, dtype=np.complex128)
     spread_roots(roots)
     x, f = np.empty((3, 2)), np.empty(3)
     best = start.copy()
-    value = _value(polynomials, radius, best[0], best[1], p, roots)
+    value = _bounded(polynomials, radius, best, least, p, roots)
     trial = np.empty((4, 2))
     for size in sizes:
         for i in range(3):
             x[i] = best
             if i:
                 x[i, i - 1] += size * extent[i - 1]
-            f[i] = value if i == 0 else _value(polynomials, radius, x[i, 0], x[i, 1], p, roots)
+            f[i] = value if i == 0 else _bounded(polynomials, radius, x[i], least, p, roots)
         for _ in range(60):
             order = np.argsort(f)
             x, f = x[order], f[order]
@@ -81,10 +107,10 @@ def descend(
                 break
             middle = 0.5 * (x[0] + x[1])
             away = middle - x[2]
-            reflected = _value(polynomials, radius, middle[0] + away[0], middle[1] + away[1], p, roots)
+            reflected = _bounded(polynomials, radius, middle + away, least, p, roots)
             if reflected < f[0]:
                 trial[0] = middle + 2.0 * away
-                farther = _value(polynomials, radius, trial[0, 0], trial[0, 1], p, roots)
+                farther = _bounded(polynomials, radius, trial[0], least, p, roots)
                 if farther < reflected:
                     x[2], f[2] = trial[0], farther
                 else:
@@ -93,16 +119,21 @@ def descend(
                 x[2], f[2] = middle + away, reflected
             else:
                 trial[0] = middle + (0.5 if reflected < f[2] else -0.5) * away
-                inner = _value(polynomials, radius, trial[0, 0], trial[0, 1], p, roots)
+                inner = _bounded(polynomials, radius, trial[0], least, p, roots)
                 if inner < min(reflected, f[2]):
                     x[2], f[2] = trial[0], inner
                 else:
                     for i in range(1, 3):
                         x[i] = 0.5 * (x[0] + x[i])
-                        f[i] = _value(polynomials, radius, x[i, 0], x[i, 1], p, roots)
+                        f[i] = _bounded(polynomials, radius, x[i], least, p, roots)
         k = np.argmin(f)
         best, value = x[k].copy(), f[k]
-    return best[0], best[1], value
+    return max(best[0], least[0]), max(best[1], least[1]), value
+
+
+@compiled
+def _bounded(polynomials: Floats, radius: float, x: Floats, least: Floats, p: Floats, roots: Complexes) -> float:
+    return _value(polynomials, radius, max(x[0], least[0]), max(x[1], least[1]), p, roots)
 
 
 @compiled
@@ -150,21 +181,40 @@ def fastest_decay(tracer: Tracer, outlines: list[Floats]) -> FastestDecay | None
     it finds there encloses walls that decay faster, and the search goes on among them until none is left. Where
     the best wall has a double real root, as it mostly has, its place is then solved for.
     """
+    best = _fastest(tracer, outlines, ALL)
+    return _sharpened(tracer, best, ALL) if best else None
+
+
+def fastest_decay_in_first_quadrant(
+    tracer: Tracer, outlines: list[Floats], of_all: FastestDecay | None
+) -> FastestDecay | None:
+    """Smallest spectral radius over these cells' walls with K >= 0 and B >= 0; None if none of them is stable.
+
+    of_all  as `fastest_decay` finds it, both signs of K and B
+    """
+    if of_all is None or min(of_all.stiffness, of_all.damping) >= 0.0:
+        return of_all
+    best = _fastest(tracer, outlines, QUADRANT)
+    return _on_axes(tracer.loop, _sharpened(tracer, best, QUADRANT)) if best else None
+
+
+def _fastest(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDecay | None:
     best: FastestDecay | None = None
     for outline in outlines:
-        best = _search(tracer, outline, best)
-    for _ in range(20):
-        radius = 1.0 - (1.0 - best.spectral_radius) * (1.0 + FASTER) if best else 0.0
-        if not 0.0 < radius < 1.0:
-            break
-        walls = _edge_walls(Tracer.of(tracer.loop, radius))
-        previous, best = best, _search(tracer, walls, best) if len(walls) else best
-        if best is previous:
-            break
-    return _sharpened(tracer, best) if best else None
+        best = _search(tracer, outline, least, best)
+    for share in FASTER:
+        for _ in range(ROUNDS):
+            radius = 1.0 - (1.0 - best.spectral_radius) * (1.0 + share) if best else 0.0
+            if not 0.0 < radius < 1.0:
+                break
+            walls = _edge_walls(Tracer.of(tracer.loop, radius))
+            previous, best = best, _search(tracer, walls, least, best) if len(walls) else best
+            if best is previous:
+                break
+    return best
 
 
-def _sharpened(tracer: Tracer, best: FastestDecay) -> FastestDecay:
+def _sharpened(tracer: Tracer, best: FastestDecay, least: Floats) -> FastestDecay:
     """The wall with a coalesced real root next to a found one if there is one no worse; else the found one, with
     the radius that its eigenvalues give."""
     z = np.linalg.eigvals(tracer.loop.transition_matrix(best.stiffness, best.damping))
@@ -174,22 +224,80 @@ def _sharpened(tracer: Tracer, best: FastestDecay) -> FastestDecay:
     for positive in (True, False):
         if tracer.degree > 2 and low < high:
             K, B, radius = coalesced(tracer.factors, positive, low, high)
-            if radius <= best.spectral_radius + 1e-12:
+            inside = bool(np.all(np.array([K, B]) >= least))
+            if inside and radius <= best.spectral_radius + 1e-12:
                 best = FastestDecay(float(K), float(B), float(radius))
     return best
 
 
-def _search(tracer: Tracer, outline: Floats, best: FastestDecay | None) -> FastestDecay | None:
-    """A search from the best of the middles between points of an outline; the better of its end and `best`."""
-    picks = outline[np.linspace(0, len(outline) - 1, 15).astype(int)[:-1]]
+def _on_axes(loop: Loop, best: FastestDecay) -> FastestDecay:
+    """The same wall with K or B exactly zero where that decays as fast to within rounding."""
+    for K, B in ((0.0, 0.0), (0.0, best.damping), (best.stiffness, 0.0)):
+        radius = float(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max())
+        if radius <= best.spectral_radius + 1e-12:
+            return FastestDecay(K, B, radius)
+    return best
+
+
+def _search(tracer: Tracer, outline: Floats, least: Floats, best: FastestDecay | None) -> FastestDecay | None:
+    """A search from the best of the middles between points of an outline, no softer or less damped than the least;
+    the better of its end and `best`."""
+    part = outline if least is ALL else _in_quadrant(outline)
+    if not len(part):
+        return best
+    picks = part[np.linspace(0, len(part) - 1, 15).astype(int)[:-1]]
     i, j = np.triu_indices(len(picks), 1)
-    middles = np.vstack([picks[i] + picks[j], 2.0 * picks.mean(axis=0)[None]]) / 2.0
-    values = scatter_values(tracer.polynomials, tracer.radius, middles[:, 0].copy(), middles[:, 1].copy())
+    starts = np.vstack([picks[i] + picks[j], 2.0 * picks.mean(axis=0)[None]]) / 2.0
+    if least is QUADRANT:
+        starts = np.vstack([starts, picks, *(_along(tracer, part, axis) for axis in (0, 1))])
+    values = scatter_values(tracer.polynomials, tracer.radius, starts[:, 0].copy(), starts[:, 1].copy())
     extent = np.maximum(np.ptp(outline, axis=0), 1e-300)
-    K, B, value = descend(tracer.polynomials, tracer.radius, middles[np.argmin(values)], extent, RESTARTS)
+    start = starts[np.argmin(values)]
+    K, B, value = descend(tracer.polynomials, tracer.radius, start, extent, RESTARTS, least)
     if value < (best.spectral_radius if best else tracer.radius):
         return FastestDecay(float(K), float(B), float(value))
     return best
+
+
+def _in_quadrant(outline: Floats) -> Floats:
+    """The points (k, 2) of an outline with K, B >= 0, those where it crosses the axes among them."""
+    points = [outline]
+    for axis in (0, 1):
+        before, after = outline[:-1], outline[1:]
+        crosses = before[:, axis] * after[:, axis] < 0.0
+        before, after = before[crosses], after[crosses]
+        share = before[:, axis] / (before[:, axis] - after[:, axis])
+        there = before + share[:, None] * (after - before)
+        there[:, axis] = 0.0
+        points.append(there)
+    every = np.vstack(points)
+    return every[(every >= 0.0).all(axis=1)]
+
+
+def _along(tracer: Tracer, part: Floats, axis: int) -> Floats:
+    """The wall (1, 2) of smallest spectral radius on an axis, as far as the part goes; K (0) or B (1) is zero."""
+    farthest = part[:, 1 - axis].max()
+    t = ALONG * farthest
+
+    def radii(t: Floats) -> Floats:
+        zero = np.zeros(len(t))
+        return scatter_values(tracer.polynomials, tracer.radius, *((zero, t) if axis == 0 else (t, zero)))
+
+    rho = radii(t)
+    lowest = np.flatnonzero((rho <= np.append(rho[1:], np.inf)) & (rho <= np.append(np.inf, rho[:-1])))
+    best = t[np.argmin(rho)], rho.min()
+    for k in lowest[np.argsort(rho[lowest])][:VALLEYS]:
+        low, high = t[max(k - 1, 0)], t[min(k + 1, len(t) - 1)]
+        for _ in range(ZOOMS):
+            closer = np.linspace(low, high, ZOOMED)
+            own = radii(closer)
+            n = int(np.argmin(own))
+            low, high = closer[max(n - 1, 0)], closer[min(n + 1, ZOOMED - 1)]
+            if own[n] < best[1]:
+                best = closer[n], own[n]
+    wall = np.zeros((1, 2))
+    wall[0, 1 - axis] = best[0]
+    return wall
 
 
 def _edge_walls(tracer: Tracer) -> Floats:

@@ -63,6 +63,11 @@ class MultiChart:
         return None
 
     @property
+    def fastest_decay_in_first_quadrant(self) -> None:
+        """None, as `fastest_decay`."""
+        return None
+
+    @property
     def box(self) -> Box:
         """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
         return box_of(self.regions)

@@ -76,6 +76,7 @@ class MeasuredChart:
     open: bool
     window: Box
     fastest_decay: None = None
+    fastest_decay_in_first_quadrant: None = None
     unobserved_modes: tuple[str, ...] = ()
 
     @property

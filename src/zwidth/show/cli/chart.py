@@ -21,6 +21,7 @@ from zwidth.show.units import amount, vector
 
 if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
+    from zwidth.chart.decay import FastestDecay
     from zwidth.chart.eigenloci import MultiChart
     from zwidth.device.device import Device
     from zwidth.model.reduction import Model
@@ -35,6 +36,7 @@ KEYS: Final = (
     "damping_max_Ns_per_m",
     "stable_area_N2s_per_m2",
     "fastest_decay",
+    "fastest_decay_in_first_quadrant",
     "unobserved_modes",
 )
 NO_WALL: Final = "no stable wall has K > 0 and B >= 0"
@@ -125,6 +127,7 @@ def _charted_together(question: Question, device: Device, along: list[Any]) -> M
 def numbers(chart: StabilityChart | MultiChart) -> dict[str, Any]:
     """The chart under the keys of --json."""
     frequencies = chart.frequencies_at_stiffness_max
+    fastest, buildable = chart.fastest_decay, chart.fastest_decay_in_first_quadrant
     return {
         "regions": list(chart.regions),
         "boundary": [
@@ -137,12 +140,8 @@ def numbers(chart: StabilityChart | MultiChart) -> dict[str, Any]:
         "frequencies_at_stiffness_max_Hz": frequencies or None,
         "damping_max_Ns_per_m": chart.damping_max,
         "stable_area_N2s_per_m2": chart.stable_area,
-        "fastest_decay": chart.fastest_decay
-        and {
-            "stiffness_N_per_m": chart.fastest_decay.stiffness,
-            "damping_Ns_per_m": chart.fastest_decay.damping,
-            "spectral_radius": chart.fastest_decay.spectral_radius,
-        },
+        "fastest_decay": fastest and fastest.document(),
+        "fastest_decay_in_first_quadrant": buildable and buildable.document(),
         "unobserved_modes": chart.unobserved_modes,
     }
 
@@ -186,10 +185,7 @@ def rows(chart: StabilityChart | MultiChart) -> Iterator[tuple[str, str]]:
     yield "largest stiffness", _stiffest(chart)
     yield "largest damping", _most_damped(chart)
     yield "stable area", amount(chart.stable_area, "N²s/m²")
-    if chart.fastest_decay:
-        fastest = chart.fastest_decay
-        wall = f"{amount(fastest.stiffness, 'N/m')} and {amount(fastest.damping, 'Ns/m')}"
-        yield "fastest decay", f"at {wall}: spectral radius {amount(fastest.spectral_radius)}"
+    yield from _decays(chart.fastest_decay_in_first_quadrant, chart.fastest_decay)
     if len(chart.regions) != 1:
         yield "stable regions", f"{len(chart.regions)}"
     if chart.unobserved_modes:
@@ -201,6 +197,16 @@ def rows(chart: StabilityChart | MultiChart) -> Iterator[tuple[str, str]]:
         # several directions are those of a mechanism, whose springs and dampers feed no motion
         runs_away = isinstance(chart.loop, Loop) and hidden_instability(chart.loop)
         yield "moved by no wall", names + (warned if runs_away else "")
+
+
+def _decays(buildable: FastestDecay | None, of_all: FastestDecay | None) -> Iterator[tuple[str, str]]:
+    """The fastest decay with K, B >= 0 first, and that of all walls where it is another."""
+    label = "fastest decay"
+    for fastest in (buildable, None if of_all == buildable else of_all):
+        if fastest:
+            wall = f"{amount(fastest.stiffness, 'N/m')} and {amount(fastest.damping, 'Ns/m')}"
+            yield label, f"at {wall}: spectral radius {amount(fastest.spectral_radius)}"
+        label = "with K or B < 0"
 
 
 def _most_damped(chart: StabilityChart | MultiChart) -> str:

@@ -10,6 +10,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 
 from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.decay import FastestDecay
 from zwidth.chart.region import ChartError
 from zwidth.loop.loop import Loop
 from zwidth.show.figures.stability import Window, frame
@@ -39,19 +40,20 @@ def draw_decay_contours(
         except ChartError:  # a sliver too fine to close: this level is left out of the drawing, and its legend
             continue
         draw_level(ax, level, _meaning(radius, loop.period), n + 1, len(levels) + 1)
-    if best:
-        ax.plot(
-            [best.stiffness],
-            [best.damping],
-            marker="*",
-            markersize=11.0,
-            color=VERMILION,
-            linestyle="none",
-            zorder=5.0,
-            label=f"fastest: {_meaning(best.spectral_radius, loop.period)}",
-        )
+    buildable = chart.fastest_decay_in_first_quadrant
+    _star(ax, buildable, f"fastest{' with K, B ≥ 0' * (best != buildable)}", loop.period, VERMILION)
+    if best != buildable:
+        _star(ax, best, "fastest of all", loop.period, "white")
     frame(ax, window or chart.box, empty=not chart.regions)
     legend_above(ax, columns=2, title="Slowest motion: factor per sample (time until a tenth is left)")
+
+
+def _star(ax: Axes, wall: FastestDecay | None, name: str, period: float, colour: str) -> None:
+    """A star at the wall, if there is one; its name and what its radius means stand in the legend."""
+    if wall:
+        title = f"{name}: {_meaning(wall.spectral_radius, period)}"
+        (star,) = ax.plot([wall.stiffness], [wall.damping], "*", color=VERMILION, markersize=11.0, label=title)
+        star.set(markerfacecolor=colour, zorder=5.0)
 
 
 def draw_level(ax: Axes, chart: StabilityChart, text: str, rank: int, count: int) -> None:

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.chart.decay import FastestDecay
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, BackwardDifference
 from zwidth.model.mechanism import Floats
@@ -216,14 +217,23 @@ def difference(ratio: float) -> str:
 
 
 def decay(facts: Facts) -> str:
-    """The wall that comes to rest fastest; "" where none is stable."""
-    best = facts.chart.fastest_decay
-    if best is None:
+    """The wall that comes to rest fastest, of those with K, B >= 0 first; "" where none is stable."""
+    best, of_all = facts.chart.fastest_decay_in_first_quadrant, facts.chart.fastest_decay
+    if of_all is None:
         return ""
-    wall = f"{quantity(best.stiffness, 'N/m')} and {quantity(best.damping, 'Ns/m')}"
-    time = quantity(tenfold_time(best.spectral_radius, facts.loop.period), "s", 2)
-    aside = " (a wall of negative stiffness or damping)" if min(best.stiffness, best.damping) < 0.0 else ""
-    return f"A wall of {wall}{aside} comes to rest fastest: a tenth is left after {time}."
+    if best is None:
+        return f"Only walls of negative stiffness or damping are stable; {_comes_to_rest(of_all, facts)}."
+    text = _comes_to_rest(best, facts)
+    if of_all != best:
+        text += f"; with negative stiffness or damping allowed, {_comes_to_rest(of_all, facts)}"
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _comes_to_rest(wall: FastestDecay, facts: Facts) -> str:
+    """The wall and how long its slowest motion takes."""
+    time = quantity(tenfold_time(wall.spectral_radius, facts.loop.period), "s", 2)
+    numbers = f"{quantity(wall.stiffness, 'N/m')} and {quantity(wall.damping, 'Ns/m')}"
+    return f"a wall of {numbers} comes to rest fastest: a tenth is left after {time}"
 
 
 def conditions(facts: Facts) -> str:

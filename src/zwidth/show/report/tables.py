@@ -107,7 +107,7 @@ def _told(bound: Bound) -> str:
 def document(facts: Facts) -> dict[str, Any]:
     """All numbers of the report, under the names of the command line's --json; what is not known is None."""
     chart, e = facts.chart, facts.effective
-    best = chart.fastest_decay
+    fastest, buildable = chart.fastest_decay, chart.fastest_decay_in_first_quadrant
     found = {
         "device": facts.device.name,
         "summary": sentences.summary(facts),
@@ -122,12 +122,8 @@ def document(facts: Facts) -> dict[str, Any]:
         "natural_frequencies_Hz": facts.natural.tolist(),
         **_walls(facts.base),
         "damping_max_Ns_per_m": chart.damping_max,
-        "fastest_decay": best
-        and {
-            "stiffness_N_per_m": best.stiffness,
-            "damping_Ns_per_m": best.damping,
-            "spectral_radius": best.spectral_radius,
-        },
+        "fastest_decay": fastest and fastest.document(),
+        "fastest_decay_in_first_quadrant": buildable and buildable.document(),
         "unobserved_modes": list(chart.unobserved_modes),
         "static_stiffness_at_stiffness_max_N_per_m": facts.felt and facts.felt.stiffest,
         "static_stiffness_limit_N_per_m": facts.felt and facts.felt.limit,
