@@ -66,7 +66,7 @@ def test_no_wall_with_a_spring_and_a_damper_decays_faster(seed):
         assert least > 1.0 - 1e-9
         return
     assert min(best.stiffness, best.damping) >= 0.0
-    assert fastest.spectral_radius <= best.spectral_radius
+    assert fastest.spectral_radius <= best.spectral_radius + 1e-9
     # at a double or triple root the eigenvalues of the rounded wall miss by a root of the rounding
     assert best.spectral_radius <= least + 1e-6
     assert spectral_radius(loop, best.stiffness, best.damping) == pytest.approx(best.spectral_radius, abs=3e-5)
