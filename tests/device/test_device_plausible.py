@@ -1,10 +1,16 @@
-"""Numbers that are allowed and look wrong are warned of: which, why, and what to type; plausible devices are not."""
+"""Numbers that are allowed and look wrong are warned of, with what to type; plausible devices are not."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
-from zwidth.device.load import load
+from tests.cli.cli_run import zwidth
+from zwidth.device.load import bundled, from_document, load
+from zwidth.device.plausible import ImplausibleNumber, implausible
+from zwidth.model.response import Response
 
 PADDLE = """
 name = "Paddle"
@@ -53,7 +59,132 @@ def paddle(tmp_path):
     return tmp_path / "paddle.toml"
 
 
-@pytest.mark.xfail(strict=True, reason="whatever is within far bounds passes without a word")
-def test_an_inertia_too_large_for_its_link_is_warned_of(paddle):
-    with pytest.warns(UserWarning, match="a radius of gyration of 115 m on a device of 75 mm"):
-        load(paddle, ["mechanism.links.paddle.inertia_kg_m2=600"])
+LINK, DRIVE, LOOP = "mechanism.links.paddle.", "mechanism.drives.motor.", "loop."
+
+SLIPS = [
+    (LINK + "inertia_kg_m2", 600, "a radius of gyration of 115 m on a device of 75 mm", "g cm^2, write 6e-05"),
+    (LINK + "inertia_kg_m2", 0.6, "a radius of gyration of 3.65 m", "kg cm^2, write 6e-05"),
+    (LINK + "inertia_kg_m2", [1e4, 6e4, 6e4], "a radius of gyration of", "g mm^2, write 6e-05"),
+    (LINK + "mass_kg", 45, "no metal is so dense", "g, write 0.045"),
+    ("mechanism.assemblies.only.joints_rad.paddle", 70, "more than a full turn", "degrees, write 1.222"),
+    ("mechanism.assemblies.only.joints_rad.paddle", -160, "more than a full turn", "degrees, write -2.793"),
+    (LINK + "orientation_rad", [0, 0, 90], "more than a full turn", "degrees, write 1.571"),
+    (LINK + "center_of_mass_m", [20], "looks wrong for a device", "mm, write 0.02"),
+    (DRIVE + "motor_inertia_kg_m2", 11, "looks wrong for a rotor", "g cm^2, write 1.1e-06"),
+    (DRIVE + "transmission_ratio", 0.087, "motor turns per joint turn", "per motor turn, write 11.49"),
+    (DRIVE + "torque_constant_Nm_per_A", 23.4, "looks wrong for a motor", "mN m/A, write 0.0234"),
+    (DRIVE + "torque_limit_Nm", 80, "1.2e+04 N at the handle", "mN m, write 0.08"),
+    (DRIVE + "continuous_torque_Nm", 45, "6.9e+03 N at the handle", "mN m, write 0.045"),
+    (DRIVE + "coulomb_Nm", 12, "1.8e+03 N at the handle", "mN m, write 0.012"),
+    (DRIVE + "encoder_counts_per_rev", 0.18, "counts per revolution", "2000 (of degrees)"),
+    (LOOP + "sampling_period_s", 0.5, "2 samples a second", "ms, write 0.0005"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "why", "instead"), SLIPS)
+def test_a_slipped_unit_is_warned_of_with_what_to_type(paddle, key, value, why, instead):
+    with pytest.warns(ImplausibleNumber) as warned:
+        load(paddle, [*([DRIVE + "torque_limit_Nm=unset"] if "continuous" in key else []), (key, value)])
+    (text,) = [str(warning.message) for warning in warned]
+    assert text.startswith(f"{paddle}: {key}: ")
+    assert why in text
+    assert text.endswith(instead)
+    assert "\n" not in text
+
+
+def test_what_is_typed_instead_is_not_warned_of(paddle):
+    load(paddle)  # a warning would be an error
+
+
+PLANT = {"name": "one", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}}
+
+
+@pytest.mark.parametrize(
+    ("section", "keys", "says"),
+    [
+        ("plant", {"mass_kg": [[26160.0, 0.0], [0.0, 25.4]], "actuator": [0, 1], "sensor": [0, 1]}, "write 26.16"),
+        ("operator", {"arm_mass_kg": 800.0, "arm_stiffness_N_per_m": 580.0, "grasp": "rigid"}, "g, write 0.8"),
+        ("loop", {"sampling_period_s": 0.001, "encoder": {"resolution_m": 0.02}}, "mm, write 2e-05"),
+    ],
+)
+def test_plants_operators_and_encoders_are_held_against_bounds(section, keys, says):
+    document = PLANT | {section: keys}
+    if section == "operator":
+        document["plant"] = {"mass_kg": 0.1, "handle": [1.0]}
+    (fault,) = implausible(from_document(document))
+    assert fault.key.startswith(section)
+    assert says in fault.message
+
+
+@pytest.mark.parametrize(("scale", "wrong"), [(1.0, False), (1e3, True), (1e6, True)])
+@pytest.mark.parametrize(("mass", "damping", "stiffness"), [(0.03, 0.0, 0.0), (0.3, 3.0, 0.0), (0.06, 0.5, 300.0)])
+def test_a_response_in_millimetres_shows_too_little_mass(mass, damping, stiffness, scale, wrong):
+    frequency = np.arange(1.0, 400.0)
+    s = 2j * np.pi * frequency
+    response = Response(frequency, scale / (mass * s**2 + damping * s + stiffness))
+    found = implausible(SimpleNamespace(document={}, label="swept", response=response))
+    assert [fault.key for fault in found] == ["response"] * wrong
+
+
+def a_serial_arm(rng):
+    """One to three links of 20 mm to 1 m, of plastic tube or of steel with a motor on board, with their drives."""
+    count, size = int(rng.integers(1, 4)), 10.0 ** rng.uniform(np.log10(0.02), 0.0)
+    links, drives = [], []
+    for n in range(count):
+        length = size * rng.uniform(0.4, 1.0)
+        mass = length * 10.0 ** rng.uniform(-1.0, 0.7) + rng.choice([0.0, 1.0]) * rng.uniform(0.02, 1.5)
+        ball = np.sqrt(0.4) * (mass / (4.0 / 3.0 * np.pi * 8000.0)) ** (1.0 / 3.0)  # of steel
+        gyration = max(length * rng.uniform(0.15, 0.8), ball)
+        links.append(
+            {
+                "name": f"link{n}",
+                "length_m": length,
+                "mass_kg": mass,
+                "center_of_mass_m": [length * rng.uniform(-0.5, 1.0)],
+                "inertia_kg_m2": mass * gyration**2,
+            }
+        )
+        ratio = 10.0 ** rng.uniform(0.0, 2.0)
+        torque = size * 10.0 ** rng.uniform(-0.5, 2.7) / ratio  # 0.3 to 500 N at the handle
+        drives.append(
+            {
+                "name": f"motor{n}",
+                "joint": f"link{n}",
+                "motor_inertia_kg_m2": 10.0 ** rng.uniform(-7.5, -2.0),
+                "transmission_ratio": ratio,
+                "torque_limit_Nm": 3.0 * torque,
+                "continuous_torque_Nm": torque,
+                "coulomb_Nm": 0.1 * torque,
+                "torque_constant_Nm_per_A": 10.0 ** rng.uniform(-3.0, 0.5),
+                "encoder_counts_per_rev": float(rng.integers(12, 1_000_000)),
+            }
+        )
+    angles = {f"link{n}": rng.uniform(-np.pi, np.pi) for n in range(count)}
+    return {
+        "mechanism": {
+            "links": links,
+            "drives": drives,
+            "assemblies": {"only": {"joints_rad": angles}},
+            "reference": {"position_m": [0.5 * size, 0.5 * size]},
+        },
+        "loop": {"sampling_period_s": 10.0 ** rng.uniform(-5.0, -1.7)},
+    }
+
+
+def test_random_plausible_arms_are_not_warned_of():
+    rng = np.random.default_rng(3)
+    for _ in range(1000):
+        device = SimpleNamespace(document=a_serial_arm(rng), label="arm", response=None)
+        assert implausible(device) == []
+
+
+@pytest.mark.parametrize("name", [name for name, *_ in bundled()])
+def test_bundled_devices_are_not_warned_of(name):
+    assert implausible(load(name)) == []
+
+
+def test_a_warning_changes_neither_the_answer_s_exit_code_nor_its_json(paddle):
+    with pytest.warns(ImplausibleNumber, match="more than a full turn"):
+        ran = zwidth("show", paddle, "--set", "mechanism.links.paddle.orientation_rad=[0, 0, 7]", "--json")
+    assert ran.code == 0
+    assert ran.document["link_side_mass_kg"] > 0.0

@@ -12,6 +12,7 @@ from zwidth.device import address, build, geometry, unsupported
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, Path, dotted
 from zwidth.device.holding import held_by
+from zwidth.device.plausible import warn_of_implausible
 from zwidth.device.read import bundled, read
 from zwidth.device.relations import relations
 from zwidth.device.schema.file import DeviceFile, schema
@@ -34,10 +35,13 @@ def load(
     settings  "PATH=VALUE" texts or (path, value) pairs, see `address.apply`
     operator  who holds the handle: a bundled operator's name, a file with an [operator], or "none"; left out: as
               the device file says
+    Warns  ImplausibleNumber  of each number that is allowed and looks wrong
     Raises DeviceError  with all the faults of the file, or else of the settings
     """
     document, label = read(name_or_path)
-    return from_document(address.apply(held_by(document, operator), settings), label)
+    device = from_document(address.apply(held_by(document, operator), settings), label)
+    warn_of_implausible(device)
+    return device
 
 
 def from_document(document: dict[str, Any], label: str = "device", *, put_together: bool = False) -> Device:

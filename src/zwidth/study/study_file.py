@@ -18,6 +18,7 @@ from zwidth.device.faults import DeviceError, Fault, fail, quote
 from zwidth.device.holding import NOBODY, operator_table
 from zwidth.device.load import from_document, in_order
 from zwidth.device.plain import number, table, tables
+from zwidth.device.plausible import warn_of_implausible
 from zwidth.device.read import DEVICES, OPERATORS, Shelf, bundled_names, decode, parse, read
 from zwidth.device.translate import sentences
 from zwidth.measures.measure import Measure
@@ -168,6 +169,7 @@ def _device(document: dict[str, Any], folder: File, found: Found, elsewhere: lis
     if device.response is not None:
         found.append((("device",), "has a measured [response] and no model, whose numbers a study could vary"))
         return None
+    warn_of_implausible(device)
     return device
 
 
