@@ -8,7 +8,7 @@ that a cell which reaches into the quadrant has some of its edge there. That edg
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,10 @@ RESTARTS = np.array([1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8])
 # How much faster than the best found (in shares of 1 - radius) the next wall is looked for. A larger step finds
 # other cells of faster walls sooner, a smaller one those that are hardly faster.
 FASTER = (3e-3, 3e-4, 3e-5)
+# How far from the radius found (in shares of 1 - radius) a coalesced root is looked for: where three roots meet,
+# the search sees them miss by a cube root of rounding.
+REACHES = (0.02, 0.1, 0.3)
+STARTS = 3  # of each search
 ROUNDS = 20  # of looking for faster walls, at each
 ALL = np.full(2, -np.inf)  # least K and B of the walls that are searched
 QUADRANT = np.zeros(2)
@@ -215,27 +219,29 @@ def _fastest(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDe
 
 
 def _sharpened(tracer: Tracer, best: FastestDecay, least: Floats) -> FastestDecay:
-    """The wall with a coalesced real root next to a found one if there is one no worse; else the found one, with
-    the radius that its eigenvalues give."""
-    z = np.linalg.eigvals(tracer.loop.transition_matrix(best.stiffness, best.damping))
-    best = replace(best, spectral_radius=float(np.abs(z).max()))
-    reach = 0.02 * (1.0 - best.spectral_radius)
-    low, high = (max(best.spectral_radius - reach, 1e-6), min(best.spectral_radius + reach, 1.0))
-    for positive in (True, False):
-        if tracer.degree > 2 and low < high:
-            K, B, radius = coalesced(tracer.factors, positive, low, high)
+    """The wall with a coalesced real root next to a found one if there is one no worse; else the found one."""
+    for reach in REACHES if tracer.degree > 2 else ():
+        away = reach * (1.0 - best.spectral_radius)
+        low, high = max(best.spectral_radius - away, 1e-6), min(best.spectral_radius + away, 1.0)
+        for positive in (True, False):
+            K, B, radius = coalesced(tracer.factors, positive, low, high) if low < high else (0.0, 0.0, np.inf)
             inside = bool(np.all(np.array([K, B]) >= least))
             if inside and radius <= best.spectral_radius + 1e-12:
                 best = FastestDecay(float(K), float(B), float(radius))
     return best
 
 
+def _judged(loop: Loop, K: float, B: float) -> FastestDecay:
+    """A wall with its radius by eigenvalues: where three roots meet, the polynomial's may be far too small."""
+    return FastestDecay(K, B, float(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max()))
+
+
 def _on_axes(loop: Loop, best: FastestDecay) -> FastestDecay:
     """The same wall with K or B exactly zero where that decays as fast to within rounding."""
     for K, B in ((0.0, 0.0), (0.0, best.damping), (best.stiffness, 0.0)):
-        radius = float(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max())
-        if radius <= best.spectral_radius + 1e-12:
-            return FastestDecay(K, B, radius)
+        found = _judged(loop, K, B)
+        if found.spectral_radius <= best.spectral_radius + 1e-12:
+            return found
     return best
 
 
@@ -247,15 +253,16 @@ def _search(tracer: Tracer, outline: Floats, least: Floats, best: FastestDecay |
         return best
     picks = part[np.linspace(0, len(part) - 1, 15).astype(int)[:-1]]
     i, j = np.triu_indices(len(picks), 1)
-    starts = np.vstack([picks[i] + picks[j], 2.0 * picks.mean(axis=0)[None]]) / 2.0
+    starts = np.vstack([(picks[i] + picks[j]) / 2.0, picks.mean(axis=0)[None], picks])
     if least is QUADRANT:
-        starts = np.vstack([starts, picks, *(_along(tracer, part, axis) for axis in (0, 1))])
+        starts = np.vstack([starts, *(_along(tracer, part, axis) for axis in (0, 1))])
     values = scatter_values(tracer.polynomials, tracer.radius, starts[:, 0].copy(), starts[:, 1].copy())
     extent = np.maximum(np.ptp(outline, axis=0), 1e-300)
-    start = starts[np.argmin(values)]
-    K, B, value = descend(tracer.polynomials, tracer.radius, start, extent, RESTARTS, least)
-    if value < (best.spectral_radius if best else tracer.radius):
-        return FastestDecay(float(K), float(B), float(value))
+    for start in starts[np.argsort(values)[:STARTS]]:
+        K, B, _ = descend(tracer.polynomials, tracer.radius, start, extent, RESTARTS, least)
+        found = _judged(tracer.loop, float(K), float(B))
+        if found.spectral_radius < (best.spectral_radius if best else tracer.radius):
+            best = found
     return best
 
 
