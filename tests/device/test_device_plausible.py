@@ -11,6 +11,7 @@ from tests.cli.cli_run import zwidth
 from zwidth.device.load import bundled, from_document, load
 from zwidth.device.plausible import ImplausibleNumber, implausible
 from zwidth.model.response import Response
+from zwidth.study.study_file import study_of
 
 PADDLE = """
 name = "Paddle"
@@ -188,3 +189,11 @@ def test_a_warning_changes_neither_the_answer_s_exit_code_nor_its_json(paddle):
         ran = zwidth("show", paddle, "--set", "mechanism.links.paddle.orientation_rad=[0, 0, 7]", "--json")
     assert ran.code == 0
     assert ran.document["link_side_mass_kg"] > 0.0
+
+
+def test_a_study_s_device_is_warned_of_once():
+    angle = "mechanism.assemblies.elbows-in.joints_rad.upper-left=37.2"
+    document = {"device": "five-bar", "measures": ["rigid_mass"], "set": [angle]}
+    with pytest.warns(ImplausibleNumber, match=r"assemblies\.elbows-in\.joints_rad\.upper-left") as warned:
+        study_of(document | {"axis": [{"key": "loop.delay_samples", "values": [0.0, 1.0]}]})
+    assert len(warned) == 1
