@@ -27,11 +27,13 @@ evaluate(find_measure("stiffness_max"), place_of(load("five-bar"), np.stack([x, 
 ZWIDTH = str(Path(sys.executable).with_name("zwidth"))
 MOVE = "move five-bar --plane 0,0.28,0,-1 --stiffness 2000 --damping 5 --push 0,2 --duration 0.3"
 SIMULATE = "simulate published-two-mass --stiffness 4000 --damping 10"
+CYCLES = "limit-cycles hapkit-course --stiffness 2600 --damping 0 --set loop.saturation.force_N=5 --no-simulation"
 # What takes longest comes first.
 COMMANDS = (
     (ZWIDTH, *shlex.split(MOVE)),
     (sys.executable, "-c", WORKSPACE),
     (ZWIDTH, *shlex.split(SIMULATE)),
+    (ZWIDTH, *shlex.split(CYCLES)),
     (ZWIDTH, "sensitivity", "hapkit-course"),
     (ZWIDTH, "guarantees", "hapkit-course"),
 )

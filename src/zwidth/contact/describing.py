@@ -10,8 +10,13 @@ definition). A loop that passes little of the harmonics vibrates about as if f w
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Final
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from zwidth.compiled import compiled_lean
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +26,11 @@ def _positive(**values: ArrayLike) -> None:
     for name, value in values.items():
         if not np.all(np.asarray(value, dtype=float) > 0.0):
             raise ValueError(f"{name.replace('_', ' ')} must be positive, got {value!r}")
+
+
+def _each(gain: Callable[..., float], *values: ArrayLike) -> Floats:
+    """A compiled gain of numbers, of arrays that are broadcast."""
+    return np.asarray(np.vectorize(gain, otypes=[float])(*(np.asarray(value, dtype=float) for value in values)))
 
 
 def quantiser(amplitude: ArrayLike, step: ArrayLike, offset: ArrayLike = 0.0) -> Floats:
@@ -47,24 +57,25 @@ def quantiser(amplitude: ArrayLike, step: ArrayLike, offset: ArrayLike = 0.0) ->
     _positive(amplitude=A)
     if not np.all(step >= 0.0):
         raise ValueError(f"step must not be negative, got {np.min(step)!r}")
-    gain = np.ones(A.shape)
-    for index in np.argwhere(step > 0.0):
-        at = tuple(index)
-        gain[at] = _quantiser(float(A[at] / step[at]), float(c[at] / step[at]))
-    return gain
+    unit = np.where(step > 0.0, step, 1.0)
+    return np.where(step > 0.0, _each(quantiser_gain, A / unit, c / unit), 1.0)
 
 
 # From here on the gain is 1 to 1e-6 (it swings about 1 like a^-3/2), and its sum longer than it is worth.
-MANY_STEPS = 1e4
+MANY_STEPS: Final = 1e4
 
 
-def _quantiser(a: float, c: float) -> float:
-    """The gain with step 1."""
+@compiled_lean
+def quantiser_gain(a: float, c: float) -> float:
+    """The gain of a quantiser with step 1, for an amplitude `a` about `c`."""
     if a > MANY_STEPS:
         return 1.0
-    c -= round(c)
-    t = np.arange(np.floor(c - a), np.ceil(c + a) + 1.0) + 0.5 - c
-    return float(2.0 / (np.pi * a) * np.sum(np.sqrt(np.maximum(1.0 - (t / a) ** 2, 0.0))))
+    c -= np.floor(c + 0.5)
+    total = 0.0
+    for k in range(int(np.floor(c - a)), int(np.ceil(c + a)) + 1):
+        share = (k + 0.5 - c) / a
+        total += np.sqrt(max(1.0 - share * share, 0.0))
+    return float(2.0 / (np.pi * a) * total)
 
 
 def quantiser_mean(amplitude: ArrayLike, step: float, offset: ArrayLike) -> Floats:
@@ -109,7 +120,13 @@ def coulomb_damper(coulomb: ArrayLike, velocity_amplitude: ArrayLike) -> Floats:
     6.366
     """
     _positive(velocity_amplitude=velocity_amplitude)
-    return np.asarray(4.0 * np.asarray(coulomb, float) / (np.pi * np.asarray(velocity_amplitude, float)))
+    return _each(damper_gain, coulomb, velocity_amplitude)
+
+
+@compiled_lean
+def damper_gain(coulomb: float, velocity_amplitude: float) -> float:
+    """`coulomb_damper` of one friction."""
+    return 4.0 * coulomb / (np.pi * velocity_amplitude)
 
 
 def saturation(amplitude: ArrayLike, limit: ArrayLike) -> Floats:
@@ -124,8 +141,14 @@ def saturation(amplitude: ArrayLike, limit: ArrayLike) -> Floats:
     [1.0, 0.609, 0.0127]
     """
     _positive(amplitude=amplitude, limit=limit)
-    s = np.minimum(np.asarray(limit, float) / np.asarray(amplitude, float), 1.0)
-    return np.asarray(2.0 / np.pi * (np.arcsin(s) + s * np.sqrt(1.0 - s * s)))
+    return _each(saturation_gain, amplitude, limit)
+
+
+@compiled_lean
+def saturation_gain(amplitude: float, limit: float) -> float:
+    """`saturation` of one force."""
+    s = min(limit / amplitude, 1.0)
+    return float(2.0 / np.pi * (np.arcsin(s) + s * np.sqrt(1.0 - s * s)))
 
 
 def bent_spring(amplitude: ArrayLike, cubic: ArrayLike = 0.0, backward_excess: ArrayLike = 0.0) -> Floats:
@@ -141,5 +164,10 @@ def bent_spring(amplitude: ArrayLike, cubic: ArrayLike = 0.0, backward_excess: A
     >>> float(bent_spring(0.1, cubic=400.0))
     3.0
     """
-    A = np.asarray(amplitude, dtype=float)
-    return np.asarray(0.75 * np.asarray(cubic, float) * A * A + 0.5 * np.asarray(backward_excess, float))
+    return _each(bent_spring_gain, amplitude, cubic, backward_excess)
+
+
+@compiled_lean
+def bent_spring_gain(amplitude: float, cubic: float, backward_excess: float) -> float:
+    """`bent_spring` of one spring."""
+    return 0.75 * cubic * amplitude * amplitude + 0.5 * backward_excess

@@ -11,6 +11,7 @@ is measured in docs/limit-cycles.md.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -22,7 +23,9 @@ from zwidth.loop.loop import Loop
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear
 
 Floats = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
 
+STAGE = "vibrations by amplitude"
 PER_DECADE = 24
 STEPS_RESOLVED = 12  # encoder steps up to which each hump of the quantiser's gain gets points of its own
 # The amplitudes looked at, in units of the smallest and largest of the loop's own; between counts an encoder is
@@ -114,6 +117,7 @@ def harmonic_balance(
     saturation: float | None = None,
     offset: float = 0.0,
     amplitudes: tuple[float, float] | None = None,
+    progress: Progress | None = None,
 ) -> HarmonicBalance:
     """Growth of vibrations over their amplitude, and where it changes sign: the limit cycles.
 
@@ -127,6 +131,7 @@ def harmonic_balance(
     offset            middle of the vibration as a share of each encoder's step: 0 on a count, 0.5 between two, the
                       worst that a constant push can do
     amplitudes        lowest and highest to look at [m]; None: well beyond what the nonlinear parts suggest
+    progress          called with a stage's name, steps done, steps of all
     Raises            ValueError   for a wall that is not finite, negative friction or resolution, a saturation
                                    that is not positive, an empty range of amplitudes
     """
@@ -139,13 +144,16 @@ def harmonic_balance(
     at = _amplitudes(own, amplitudes)
     if not len(at):
         return _nothing()
-    swings = _followed(own, at)
-    return HarmonicBalance(
+    tell, steps = progress or (lambda stage, done, of: None), 2 * len(at) + 1
+    swings = _followed(own, at, lambda done: tell(STAGE, done, steps))
+    found = HarmonicBalance(
         at,
         np.array([_growth(own, swing) for swing in swings]),
         np.array([_frequency(own, swing) if swing else np.nan for swing in swings]),
         tuple(_crossings(own, at, swings)),
     )
+    tell(STAGE, steps, steps)
+    return found
 
 
 def _nothing() -> HarmonicBalance:
@@ -204,18 +212,21 @@ def _amplitudes(own: EquivalentLoop, bounds: tuple[float, float] | None) -> Floa
     return grid[(grid >= low) & (grid <= high)]
 
 
-def _followed(own: EquivalentLoop, amplitudes: Floats) -> list[Swing | None]:
+def _followed(own: EquivalentLoop, amplitudes: Floats, tell: Callable[[int], None]) -> list[Swing | None]:
     """The fastest growing vibration at each amplitude, followed downwards and upwards.
 
     More than one kind of vibration may agree with the gains that it makes itself, so both ways count.
+    tell  called with how many amplitudes are done, of both ways
     """
     last = own.first_guess(float(amplitudes[-1]))
     down: list[Swing | None] = []
-    for amplitude in amplitudes[::-1]:
+    for k, amplitude in enumerate(amplitudes[::-1]):
+        tell(k)
         down.append(own.swing(float(amplitude), last, same=ROUGHLY))
         last = down[-1] or last
     swings: list[Swing | None] = []
     for k, (amplitude, other) in enumerate(zip(amplitudes, down[::-1], strict=True)):
+        tell(len(amplitudes) + k)
         starts = [] if other is not None and abs(other.root - last.root) < ROUGHLY else [last]
         if k % SEEDED == 0:
             starts += [own.seed(float(amplitude), angle * np.pi) for angle in ANGLES]

@@ -25,6 +25,7 @@ from zwidth.show.cli.predicted_cycles import (
     numbers,
     predicted,
 )
+from zwidth.show.cli.progress import progress_told
 from zwidth.show.output import DATA, FIGURES, destination, write_data
 from zwidth.show.units import amount
 
@@ -104,12 +105,12 @@ def limit_cycles(
         return without_model(question, device, wall | dict.fromkeys(KEYS), as_json)
     facts = question.circumstances(device) | wall
     try:
-        with computing(question):
+        with computing(question), progress_told() as progress:
             loop = _loop(question, device)
             if not acting(loop):
                 raise NoAnswer(NOTHING.format(_key(FRICTION, device), _key(STEPS, device)))
             _check(question, device, loop, stiffness, offset, drawn)
-            found = predicted(loop, stiffness, damping, offset, simulate=not no_simulation)
+            found = predicted(loop, stiffness, damping, offset, progress, simulate=not no_simulation)
     except NoAnswer as none:
         return deliver(Answer(facts | dict.fromkeys(KEYS), reason=str(none)), as_json)
     document = facts | numbers(found)

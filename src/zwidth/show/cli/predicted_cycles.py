@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from math import log, pi
 from typing import TYPE_CHECKING, Any, Final
 
+from zwidth.show.cli.progress import Progress
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -74,23 +76,25 @@ def acting(loop: Loop) -> tuple[str, ...]:
     return tuple(name for name in loop.nonlinear.left_out if name not in NOT_PREDICTED)
 
 
-def predicted(loop: Loop, K: float, B: float, offset: float, *, simulate: bool) -> Predicted:
+def predicted(loop: Loop, K: float, B: float, offset: float, progress: Progress, *, simulate: bool) -> Predicted:
     """Limit cycles on a two-sided wall, held against the simulation if asked for."""
     from zwidth.chart.verdict import judge
     from zwidth.contact.harmonics import with_harmonics
     from zwidth.contact.limit_cycles import harmonic_balance
 
     parts = acting(loop)
-    balance = harmonic_balance(loop, K, B, offset=offset)
+    balance = harmonic_balance(loop, K, B, offset=offset, progress=progress)
     cycles, by = balance.cycles, BY_FIRST
     if parts == ("the force limit",):
         cycles, by = tuple(with_harmonics(loop, K, B, cycle) for cycle in cycles), BY_HARMONICS
     met: tuple[Met | None, ...] = (None,) * len(cycles)
     otherwise = None
     if simulate:
+        progress("simulating", 0, 1)
         met = tuple(_met(loop, K, B, offset, cycle) if cycle.stable else None for cycle in cycles)
         if not any(cycle.stable for cycle in cycles):
             otherwise = _otherwise(loop, K, B, offset, cycles)
+        progress("simulating", 1, 1)
     rest, quiet = _limits(loop, K, B)
     verdict = judge(loop, [K], [B]).names[0]
     return Predicted(K, B, offset, verdict, parts, by, balance, cycles, met, otherwise, rest, quiet)

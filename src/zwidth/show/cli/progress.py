@@ -44,6 +44,8 @@ def _lines() -> Iterator[Progress]:
     began, told, now = monotonic(), set[str](), ["starting"]
 
     def speak() -> None:
+        if now[0] in told:  # the timer and the computation may come here together
+            return
         told.add(now[0])
         say(f"zwidth: {now[0]}")
 

@@ -1,0 +1,387 @@
+"""A vibration and the gains that it makes itself, brought into agreement: compiled for `contact.equivalent`.
+
+A vibration is its root z and its sizes, one row of numbers:
+
+    [amplitude at the sensor, amplitude of the force, velocities at the frictions, readings, deflections]
+
+From sizes to gains (`contact.describing`), from gains to the transition matrix of the sampled loop, from its
+eigenvectors to sizes again. One wall needs ten thousand small matrices and more. Their exponential is a series
+summed here: a linear algebra library shares even a matrix of five rows among threads, which then wait for each other.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.compiled import compiled
+from zwidth.contact.describing import bent_spring_gain, damper_gain, quantiser_gain, saturation_gain
+from zwidth.contact.mechanism.stepping import multiply
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# A root whose angle is below this does not swing: it creeps, or is a rounded double root at z = 1.
+CREEPS: Final = 1e-5
+UNREAD: Final = 1e-7  # share of a motion below which the sensor does not read it
+ITERATIONS: Final = 200
+HELD: Final = 1e-3  # share of the wall's power below which a friction counts for less and less
+BLOCK: Final = 25  # iterations, of which the largest change is compared with that of those before
+NEARER: Final = 0.9  # ratio of the two from which nothing comes nearer to agreement
+ROUNDS: Final = 4  # times that a faster vibration of the loop so found is followed
+PARTS: Final = 4  # of a sampling interval, over which the mean square of a velocity is taken (Simpson's rule)
+TERMS: Final = (
+    16  # of the series of an exponential, of a matrix not larger than `SMALL`: 0.5^17/17! of it are left
+)
+SMALL: Final = 0.5
+STOPPED: Final = 1e9  # part of a motion left after a sample is exp(-this): a stronger damper does the same
+LEAST: Final = 1e-300  # a size that gains are taken at instead of 0
+FORCE: Final = 1  # place of the force among the sizes; the amplitude is at 0
+VELOCITIES: Final = 2  # and where the velocities begin
+
+
+class Arrays(NamedTuple):
+    """A loop and a wall: N states of the plant, M of the whole loop, f frictions, s springs, c counters.
+
+    generator   (N, N)  of the plant, times T, in scaled states;   drive  (N,)  of the held force, likewise
+    coordinates n       the first n states are positions [m], the next n velocities [m per sample]
+    period      T [s];  late  share of a sample by which the force changes late;   whole  samples of delay besides
+    stiffness, damping  of the wall [N/m], [N s/m];   limit  largest force [N]
+    sensor      (n,)
+    pushed      (N, f + s)  what a force along each friction's and spring's motion adds, times T, scaled
+    rubbed      (f, n), coulomb (f,)         frictions
+    bent        (s, n), cubic, excess (s,)   springs
+    counted     (c, n), weight, step (c,)    encoders, none: the sensor;   offset  of the middle, in steps
+    filter_*, estimator_*  `Series` of the force filter and of the velocity estimate
+    """
+
+    generator: Floats
+    drive: Floats
+    coordinates: int
+    period: float
+    late: float
+    whole: int
+    stiffness: float
+    damping: float
+    limit: float
+    sensor: Floats
+    pushed: Floats
+    rubbed: Floats
+    coulomb: Floats
+    bent: Floats
+    cubic: Floats
+    excess: Floats
+    counted: Floats
+    weight: Floats
+    step: Floats
+    offset: float
+    filter_A: Floats
+    filter_input: Floats
+    filter_output: Floats
+    filter_direct: float
+    estimator_A: Floats
+    estimator_input: Floats
+    estimator_output: Floats
+    estimator_direct: float
+
+
+@compiled
+def held(A: Floats, b: Floats, share: float) -> tuple[Floats, Floats]:
+    """exp(A share), and what an input held over that share of a sample leaves, both by one series."""
+    k = len(A)
+    X, E, product = np.zeros((k + 1, k + 1)), np.eye(k + 1), np.zeros((k + 1, k + 1))
+    size = 0.0
+    for i in range(k):
+        row = abs(b[i]) * share
+        X[i, k] = b[i] * share
+        for j in range(k):
+            X[i, j] = A[i, j] * share
+            row += abs(X[i, j])
+        size = max(size, row)
+    doublings = 0
+    while size > SMALL and doublings < 60:
+        size *= 0.5
+        doublings += 1
+    X *= 0.5**doublings
+    for term in range(TERMS, 0, -1):  # 1 + X (1 + X/2 (1 + X/3 (...)))
+        multiply(X, E, product)
+        for i in range(k + 1):
+            for j in range(k + 1):
+                E[i, j] = product[i, j] / term
+            E[i, i] += 1.0
+    for _ in range(doublings):
+        multiply(E, E, product)
+        E[:] = product
+    return E[:k, :k].copy(), E[:k, k].copy()
+
+
+@compiled
+def plant_steps(own: Arrays, sizes: Floats) -> tuple[Floats, Floats]:
+    """The plant's states at times within the sample and at its end, (t, N, N) from those at its beginning and
+    (t, 2, N) from the new force and from the old one."""
+    A, n, f = own.generator.copy(), own.coordinates, len(own.coulomb)
+    N = len(A)
+    for p in range(f):
+        strongest = 0.0
+        for i in range(n):
+            strongest += abs(own.pushed[n + i, p] * own.rubbed[p, i])
+        b = damper_gain(own.coulomb[p], max(sizes[VELOCITIES + p], LEAST))
+        b = min(b, STOPPED * own.period / strongest) if strongest > 0.0 else 0.0
+        for i in range(N):
+            for j in range(n):
+                A[i, n + j] -= b * own.pushed[i, p] * own.rubbed[p, j] / own.period
+    first = VELOCITIES + f + len(own.step)
+    for s in range(len(own.cubic)):
+        k = bent_spring_gain(sizes[first + s], own.cubic[s], own.excess[s])
+        for i in range(N):
+            for j in range(n):
+                A[i, j] -= k * own.pushed[i, f + s] * own.bent[s, j]
+    times = PARTS * (2 if own.late > 0.0 else 1)
+    states, forces = np.zeros((times, N, N)), np.zeros((times, 2, N))
+    E, g, product = np.eye(N), np.zeros((2, N)), np.zeros((N, N))
+    at = 0
+    for which in range(1 if own.late > 0.0 else 0, -1, -1):
+        share = own.late if which else 1.0 - own.late
+        one, gain = held(A, own.drive, share / PARTS)
+        for _ in range(PARTS):
+            multiply(one, E, product)
+            E[:] = product
+            for force in range(2):
+                for i in range(N):
+                    total = gain[i] if force == which else 0.0
+                    for j in range(N):
+                        total += one[i, j] * g[force, j]
+                    forces[at, force, i] = total
+                g[force] = forces[at, force]
+            states[at] = E
+            at += 1
+    return states, forces
+
+
+@compiled
+def transition(
+    own: Arrays, sizes: Floats, passes: float, states: Floats, forces: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Transition (M, M) of the loop whose gains are those of a vibration; the velocities (t, n, M) at times within
+    the sample, from its beginning to its end [m per sample]; and the force (M,) that is asked for.
+
+    passes  share of the force that acts; negative: what its limit lets pass
+    """
+    n, N = own.coordinates, len(own.generator)
+    queue = own.whole + (1 if own.late > 0.0 else 0)
+    f = N + queue
+    e = f + len(own.filter_A)
+    M = e + len(own.estimator_A)
+    L, command, read, speed, wall = np.zeros((M, M)), np.zeros(M), np.zeros(M), np.zeros(M), np.zeros(M)
+    if len(own.step):
+        first = VELOCITIES + len(own.coulomb)
+        for c in range(len(own.step)):
+            size = max(sizes[first + c], LEAST)
+            gain = own.weight[c] * quantiser_gain(size / own.step[c], own.offset)
+            for i in range(n):
+                read[i] += gain * own.counted[c, i]
+    else:
+        read[:n] = own.sensor
+    for i in range(n):
+        speed[i] = own.estimator_direct * read[i]
+    speed[e:] = own.estimator_output
+    wall[:] = own.stiffness * read + own.damping * speed
+    for i in range(M - e):
+        for j in range(n):
+            L[e + i, j] = own.estimator_input[i] * read[j]
+        L[e + i, e:] = own.estimator_A[i]
+        L[e + i, e + i] += 1.0
+    command[:] = -own.filter_direct * wall
+    for i in range(e - f):
+        command[f + i] -= own.filter_output[i]
+        L[f + i] = own.filter_input[i] * wall
+        for j in range(e - f):
+            L[f + i, f + j] += own.filter_A[i, j]
+        L[f + i, f + i] += 1.0
+    if passes < 0.0:
+        passes = saturation_gain(max(sizes[FORCE], LEAST), own.limit) if own.limit < np.inf else 1.0
+    # what waits: the newest force first, then the queue, oldest last
+    for k in range(queue):
+        if k == 0:
+            L[N] = passes * command
+        else:
+            L[N + k, N + k - 1] = 1.0
+    times = len(states)
+    inside = np.zeros((times + 1, n, M))
+    row = np.zeros(M)
+    for i in range(n):
+        inside[0, i, n + i] = 1.0
+    for t in range(times):
+        last = t == times - 1
+        for i in range(0 if last else n, N if last else 2 * n):
+            row[:] = 0.0
+            row[:N] = states[t, i]
+            new, old = forces[t, 0, i], forces[t, 1, i]
+            if own.whole == 0:
+                row += (new * passes) * command
+            else:
+                row[N + own.whole - 1] += new
+            if own.late > 0.0:
+                row[N + own.whole] += old
+            if n <= i < 2 * n:
+                inside[t + 1, i - n] = row
+            if last:
+                L[i] = row
+    return L, inside, command
+
+
+@compiled
+def weights(late: float) -> Floats:
+    """Simpson's weights of the mean over a sample, which falls into two where the force changes within it."""
+    share = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 12.0
+    found = np.zeros(2 * PARTS + 1 if late > 0.0 else PARTS + 1)
+    if late > 0.0:
+        found[: PARTS + 1] = late * share
+        found[PARTS:] += (1.0 - late) * share
+    else:
+        found[:] = share
+    return found
+
+
+@compiled
+def sizes_of(own: Arrays, state: Complexes, inside: Floats, command: Floats, mean: Floats) -> Floats:
+    """The sizes of a vibration with these states, which moves the sensor by 1 m."""
+    n, f, c, s = own.coordinates, len(own.coulomb), len(own.step), len(own.cubic)
+    found = np.zeros(VELOCITIES + f + c + s)
+    found[0] = 1.0
+    force = 0.0j
+    for i in range(len(state)):
+        force += command[i] * state[i]
+    found[FORCE] = abs(force)
+    for p in range(f):
+        square = 0.0
+        for t in range(len(mean)):
+            speed = 0.0j
+            for i in range(n):
+                if own.rubbed[p, i] != 0.0:
+                    for j in range(len(state)):
+                        speed += own.rubbed[p, i] * inside[t, i, j] * state[j]
+            square += mean[t] * (speed.real**2 + speed.imag**2)
+        found[VELOCITIES + p] = np.sqrt(square) / own.period
+    for k in range(c + s):
+        moved = 0.0j
+        for i in range(n):
+            moved += (own.counted[k, i] if k < c else own.bent[k - c, i]) * state[i]
+        found[VELOCITIES + f + k] = abs(moved)
+    return found
+
+
+@compiled
+def measured(own: Arrays, sizes: Floats, by_velocity: bool) -> float:
+    """Amplitude at the sensor [m]; by velocity, the length of the vector of the frictions' velocities [m/s]."""
+    if not by_velocity:
+        return float(sizes[0])
+    square = 0.0
+    for p in range(len(own.coulomb)):
+        square += sizes[VELOCITIES + p] ** 2
+    return float(np.sqrt(square))
+
+
+@compiled
+def vibrations(own: Arrays, sizes: Floats, size: float, by_velocity: bool) -> tuple[Complexes, Floats]:
+    """All vibrations of this size of the linear loop with the gains of `sizes`: roots (k,), sizes (k, ...)."""
+    states, forces = plant_steps(own, sizes)
+    L, inside, command = transition(own, sizes, -1.0, states, forces)
+    roots, vectors = np.linalg.eig(L.astype(np.complex128))
+    n, M, mean = own.coordinates, len(L), weights(own.late)
+    most = 0.0
+    for i in range(n):
+        most = max(most, abs(own.sensor[i]))
+    found_roots, found, count = np.zeros(M, np.complex128), np.zeros((M, len(sizes))), 0
+    for k in range(M):
+        if not (np.angle(roots[k]) > CREEPS and abs(roots[k]) > 1e-6):
+            continue
+        reading, whole = 0.0j, 0.0
+        for i in range(2 * n):
+            whole = max(whole, abs(vectors[i, k]))
+            if i < n:
+                reading += own.sensor[i] * vectors[i, k]
+        if not abs(reading) > UNREAD * most * whole:
+            continue
+        here = sizes_of(own, vectors[:, k] / reading, inside, command, mean)
+        found_roots[count] = roots[k]
+        found[count] = here * (size / measured(own, here, by_velocity))
+        count += 1
+    return found_roots[:count], found[:count]
+
+
+@compiled
+def difference(own: Arrays, one: Floats, other: Floats, root: complex) -> float:
+    """Largest relative difference of two rows of sizes.
+
+    A friction that holds its motion fast is a damper that grows without end and a velocity that falls as fast,
+    with no effect on the rest: a velocity counts relative to no less than that at which the friction takes a small
+    share of the power which the wall can give.
+    """
+    f, most = len(own.coulomb), 0.0
+    power = other[FORCE] * other[0] * abs(np.angle(root)) / own.period
+    for i in range(len(one)):
+        larger = max(abs(one[i]), abs(other[i]))
+        if VELOCITIES <= i < VELOCITIES + f:
+            larger = max(larger, HELD * power / own.coulomb[i - VELOCITIES])
+        if larger > 0.0:
+            most = max(most, abs(one[i] - other[i]) / larger)
+    return most
+
+
+@compiled
+def settled(
+    own: Arrays, root: complex, start: Floats, size: float, by_velocity: bool, same: float
+) -> tuple[bool, complex, Floats]:
+    """Shape and gains in agreement, following the root nearest to the start's; False where they do not come to it.
+
+    same  largest relative change of a size, and change of the root, that counts as none
+    """
+    now, z = start * (size / measured(own, start, by_velocity)), root
+    weight, before, last, peak, vain = 1.0, np.inf, np.inf, 0.0, 0
+    for iteration in range(ITERATIONS):
+        roots, all_sizes = vibrations(own, now, size, by_velocity)
+        if len(roots) == 0:
+            return False, z, now
+        k = np.argmin(np.abs(roots - z))
+        after = all_sizes[k]
+        change = max(abs(roots[k] - z), difference(own, now, after, roots[k]))
+        if change < same:
+            return True, roots[k], after
+        peak = max(peak, change)
+        if (iteration + 1) % BLOCK == 0:
+            vain = vain + 1 if peak > NEARER * last else 0
+            last, peak = peak, 0.0
+            if vain == 2:
+                break
+        if change > 0.7 * before:
+            weight = max(0.6 * weight, 0.05)
+        before, z = change, roots[k]
+        for i in range(len(now)):
+            both = now[i] > 0.0 and after[i] > 0.0
+            now[i] = np.exp((1.0 - weight) * np.log(now[i]) + weight * np.log(after[i])) if both else after[i]
+    return before < 1e-6, z, now
+
+
+@compiled
+def swing(
+    own: Arrays, root: complex, start: Floats, size: float, by_velocity: bool, same: float
+) -> tuple[bool, complex, Floats]:
+    """The fastest growing vibration of this size near a start; False where nothing swings."""
+    known, z, sizes = settled(own, root, start, size, by_velocity, same)
+    for _ in range(ROUNDS):
+        if not known:
+            break
+        roots, all_sizes = vibrations(own, sizes, size, by_velocity)
+        if len(roots) == 0:
+            break
+        k = np.argmax(np.abs(roots))
+        if abs(roots[k]) <= abs(z) + 1e-6:
+            break
+        faster, other, changed = settled(own, roots[k], all_sizes[k].copy(), size, by_velocity, same)
+        if not faster or abs(other) <= abs(z):
+            break
+        z, sizes = other, changed
+    return known, z, sizes
