@@ -8,6 +8,7 @@ import pytest
 
 from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, refused, strict, zwidth
 from tests.cli.test_cli_docs import PAGE, keys
+from tests.paddle import LENGTH, paddle
 from zwidth.contact.limit_cycles import limit_cycles
 from zwidth.device.load import load
 from zwidth.loop.loop import Loop
@@ -147,3 +148,27 @@ def test_the_keys_that_come_out_are_those_explained():
     last = document["limit_cycles"][-1]
     assert {*document, *last, "plane_file"} - keys("What comes out") == keys("limit-cycles")
     assert all(f"`{key}`" in PAGE for key in (*last["simulated"], *document["growth"]))
+
+
+@pytest.mark.xfail(strict=True, reason="a vibration of 0.7 m on an arm of 90 mm is called what is seen")
+def test_a_vibration_larger_than_the_handle_can_move_is_not_what_is_seen(tmp_path):
+    words = (paddle(tmp_path), "--stiffness", 3000, "--damping", 1)
+    document = found("limit-cycles", *words)
+    edge, far = document["limit_cycles"]
+    assert document["largest_motion_m"] == pytest.approx(LENGTH, rel=1e-3)
+    assert (edge["within_range"], far["within_range"]) == (True, False)
+    assert far["amplitude_m"] > LENGTH
+    assert far["simulated"] is None
+    assert document["otherwise"]["behaviour"] == "converged"
+    out = " ".join(zwidth("limit-cycles", *words, "--no-simulation").out.split())
+    assert "what is seen" not in out
+    assert "the handle moves 90.00 mm to either side at most" in out
+    assert "vibrations that grow leave this range" in out
+
+
+@pytest.mark.xfail(strict=True, reason="a vibration of metres is called what is seen")
+def test_a_given_plant_moves_a_metre_at_most():
+    limited = ("--set", "loop.saturation.force_N=5000", "--stiffness", 2600, "--damping", 0, "--no-simulation")
+    document = found("limit-cycles", ONE_MASS, *limited)
+    assert document["largest_motion_m"] == 1.0
+    assert [cycle["within_range"] for cycle in document["limit_cycles"]] == [False]

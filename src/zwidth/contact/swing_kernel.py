@@ -6,7 +6,7 @@ A vibration is its root z and its sizes, one row of numbers:
 
 From sizes to gains (`contact.describing`), from gains to the transition matrix of the sampled loop, from its
 eigenvectors to sizes again. One wall needs ten thousand small matrices and more. Their exponential is a series
-summed here: a linear algebra library shares even a matrix of five rows among threads, which then wait for each other.
+summed here: a linear algebra library shares even a matrix of five rows among threads that wait for each other.
 """
 
 from __future__ import annotations
@@ -32,9 +32,7 @@ BLOCK: Final = 25  # iterations, of which the largest change is compared with th
 NEARER: Final = 0.9  # ratio of the two from which nothing comes nearer to agreement
 ROUNDS: Final = 4  # times that a faster vibration of the loop so found is followed
 PARTS: Final = 4  # of a sampling interval, over which the mean square of a velocity is taken (Simpson's rule)
-TERMS: Final = (
-    16  # of the series of an exponential, of a matrix not larger than `SMALL`: 0.5^17/17! of it are left
-)
+TERMS: Final = 16  # of the series of an exponential; of a matrix not larger than `SMALL` 0.5^17/17! are left
 SMALL: Final = 0.5
 STOPPED: Final = 1e9  # part of a motion left after a sample is exp(-this): a stronger damper does the same
 LEAST: Final = 1e-300  # a size that gains are taken at instead of 0
