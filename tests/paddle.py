@@ -1,4 +1,4 @@
-"""A paddle with one drive, as a user writes it from the page on device files: friction, encoder counts, a limit."""
+"""A paddle with one drive, as a user writes it from the docs: friction, encoder counts, a torque limit."""
 
 from pathlib import Path
 

@@ -66,3 +66,17 @@ def test_the_device_stands_in_the_plane_where_it_is(damping, said):
     assert named[-3:] == ["100 N/m", "200 N/m", "1.00 kN/m"]
     assert {"passive", "small vibrations", "large vibrations"} < set(named)
     made.draw_without_rendering()
+
+
+def test_what_is_farther_than_the_device_moves_is_grey():
+    found = harmonic_balance(LOOP, 400.0, 0.0, coulomb_friction=0.01, saturation=1.0, largest_motion=2.5e-3)
+    small, large = found.cycles
+    assert (small.within_range, large.within_range) == (True, False)
+    made, ax = figure()
+    draw_balance(ax, found)
+    assert ax.get_xlim()[1] == pytest.approx(3.0 * large.amplitude)
+    said = texts(ax)
+    assert any(line.startswith("larger ones grow, smaller ones die: 2.02 mm") for line in said)
+    assert any(line.startswith("beyond the range: ") for line in said)
+    assert "farther than the device moves, 2.50 mm" in said
+    made.draw_without_rendering()

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.contact.equivalent import EquivalentLoop, Measure, Swing, amplitude_of, equivalent_loop, velocity_of
+from zwidth.contact.simulate import LARGEST_MOTION
 from zwidth.loop.loop import Loop
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear
 
@@ -46,6 +47,7 @@ class LimitCycle:
     stable               do smaller vibrations grow into it, and larger ones shrink?
     force_amplitude      of the force that is asked for, before saturation [N]
     velocity_amplitudes  (f,)  at each dry friction [m/s]
+    largest_motion       as far as the device can move to either side [m]
     """
 
     amplitude: float
@@ -53,6 +55,12 @@ class LimitCycle:
     stable: bool
     force_amplitude: float
     velocity_amplitudes: Floats
+    largest_motion: float = LARGEST_MOTION
+
+    @property
+    def within_range(self) -> bool:
+        """Can the device move so far? Where it cannot, the model says nothing of it, and nobody sees the cycle."""
+        return self.amplitude <= self.largest_motion
 
 
 @dataclass(frozen=True)
@@ -64,12 +72,20 @@ class HarmonicBalance:
                         nothing swings
     frequency_Hz  (p,)  its frequency; nan where nothing swings
     cycles        limit cycles by amplitude
+    largest_motion  as far as the device can move to either side [m]; larger vibrations are those of no device
     """
 
     amplitude: Floats
     growth: Floats
     frequency_Hz: Floats
     cycles: tuple[LimitCycle, ...]
+    largest_motion: float = LARGEST_MOTION
+
+    @property
+    def leaves_range(self) -> bool:
+        """Do the largest vibrations within the range grow, so that nothing modelled holds them?"""
+        within = self.growth[self.amplitude <= self.largest_motion]
+        return bool(len(within) and within[-1] > 0.0)
 
 
 def limit_cycles(
@@ -81,6 +97,7 @@ def limit_cycles(
     resolution: float | None = None,
     saturation: float | None = None,
     offset: float = 0.0,
+    largest_motion: float = LARGEST_MOTION,
 ) -> list[LimitCycle]:
     """Limit cycles on a two-sided wall, by amplitude; see `harmonic_balance` for the arguments.
 
@@ -103,6 +120,7 @@ def limit_cycles(
         resolution=resolution,
         saturation=saturation,
         offset=offset,
+        largest_motion=largest_motion,
     )
     return list(found.cycles)
 
@@ -117,6 +135,7 @@ def harmonic_balance(
     saturation: float | None = None,
     offset: float = 0.0,
     amplitudes: tuple[float, float] | None = None,
+    largest_motion: float = LARGEST_MOTION,
     progress: Progress | None = None,
 ) -> HarmonicBalance:
     """Growth of vibrations over their amplitude, and where it changes sign: the limit cycles.
@@ -131,34 +150,39 @@ def harmonic_balance(
     offset            middle of the vibration as a share of each encoder's step: 0 on a count, 0.5 between two, the
                       worst that a constant push can do
     amplitudes        lowest and highest to look at [m]; None: well beyond what the nonlinear parts suggest
+    largest_motion    as far as the device can move to either side [m], by `model.posture.handle_range` for one; it
+                      bounds what holds of the answer, and not what is looked at
     progress          called with a stage's name, steps done, steps of all
     Raises            ValueError   for a wall that is not finite, negative friction or resolution, a saturation
-                                   that is not positive, an empty range of amplitudes
+                                   or a largest motion that is not positive, an empty range of amplitudes
     """
     parts, limit = _parts(loop, coulomb_friction, resolution, saturation)
     if not (np.isfinite(wall_stiffness) and np.isfinite(wall_damping)):
         raise ValueError(f"the wall must be finite, got K = {wall_stiffness} N/m, B = {wall_damping} N s/m")
+    if not largest_motion > 0.0:
+        raise ValueError(f"largest_motion must be positive, got {largest_motion} m")
     own = equivalent_loop(loop, wall_stiffness, wall_damping, parts, saturation=limit, offset=offset)
     if not (own.parts.friction or own.parts.counters or own.parts.springs or np.isfinite(limit)):
-        return _nothing()
+        return _nothing(largest_motion)
     at = _amplitudes(own, amplitudes)
     if not len(at):
-        return _nothing()
+        return _nothing(largest_motion)
     tell, steps = progress or (lambda stage, done, of: None), 2 * len(at) + 1
     swings = _followed(own, at, lambda done: tell(STAGE, done, steps))
     found = HarmonicBalance(
         at,
         np.array([_growth(own, swing) for swing in swings]),
         np.array([_frequency(own, swing) if swing else np.nan for swing in swings]),
-        tuple(_crossings(own, at, swings)),
+        tuple(replace(cycle, largest_motion=largest_motion) for cycle in _crossings(own, at, swings)),
+        largest_motion,
     )
     tell(STAGE, steps, steps)
     return found
 
 
-def _nothing() -> HarmonicBalance:
+def _nothing(largest_motion: float) -> HarmonicBalance:
     """Of a loop in which nothing depends on the amplitude."""
-    return HarmonicBalance(np.zeros(0), np.zeros(0), np.zeros(0), ())
+    return HarmonicBalance(np.zeros(0), np.zeros(0), np.zeros(0), (), largest_motion)
 
 
 def _parts(

@@ -24,6 +24,7 @@ from zwidth.loop.loop import Loop
 Floats = NDArray[np.float64]
 
 SUBSTEPS = 20
+LARGEST_MOTION = 1.0  # m, from the wall to either side: a device farther away, of which no more is known, is lost
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ __all__ = [
     "Posture",
     "PostureError",
     "Singular",
+    "handle_range",
     "inertia_terms",
     "link_points",
     "reachable_positions",
@@ -158,6 +159,19 @@ def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Fl
     if uncontrolled:
         raise _throughout(name, uncontrolled)
     return roadmap(mech, 0, reference[0]).position
+
+
+def handle_range(mechanism: Mechanism, posture: Posture, direction: ArrayLike) -> tuple[float, float]:
+    """How far the handle can be from a posture along a direction, backwards (not positive) and forwards [m].
+
+    What lies between is not asked: the handle need not get there on a straight line. It is right to the spacing of
+    the postures of `reachable_positions`.
+    posture    a single one, OK
+    direction  (3,)  unit vector in the base frame
+    Raises     as `reachable_positions`
+    """
+    offsets = (reachable_positions(mechanism, posture.assembly) - posture.position) @ np.asarray(direction)
+    return min(float(offsets.min()), 0.0), max(float(offsets.max()), 0.0)
 
 
 def inertia_terms(mechanism: Mechanism, posture: Posture, driven_rates: ArrayLike) -> Floats:

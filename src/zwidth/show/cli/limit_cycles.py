@@ -41,6 +41,8 @@ KEYS: Final = (
     "predicted_by",
     "limit_cycles",
     "otherwise",
+    "largest_motion_m",
+    "leaves_range",
     "resting_limit_N_per_m",
     "quiet_limit_N_per_m",
     "growth",
@@ -110,7 +112,8 @@ def limit_cycles(
             if not acting(loop):
                 raise NoAnswer(NOTHING.format(_key(FRICTION, device), _key(STEPS, device)))
             _check(question, device, loop, stiffness, offset, drawn)
-            found = predicted(loop, stiffness, damping, offset, progress, simulate=not no_simulation)
+            largest = _largest_motion(question, device)
+            found = predicted(loop, stiffness, damping, offset, largest, progress, simulate=not no_simulation)
     except NoAnswer as none:
         return deliver(Answer(facts | dict.fromkeys(KEYS), reason=str(none)), as_json)
     document = facts | numbers(found)
@@ -129,6 +132,21 @@ def _loop(question: Question, device: Device) -> Loop:
     loop = Loop(question.plant(device), device.controller)
     _ = loop.sections  # refuses plants that no wall moves, or not in time
     return loop
+
+
+def _largest_motion(question: Question, device: Device) -> float:
+    """How far the device can move to either side of its posture [m]: a mechanism's handle along the direction,
+    in its assembly; a [plant] as far as any device does."""
+    from zwidth.contact.simulate import LARGEST_MOTION
+
+    if device.mechanism is None:
+        return LARGEST_MOTION
+    from zwidth.model.posture import handle_range
+
+    posture, along = device.posture(question.at, question.assembly), device.direction(question.direction)
+    back, forth = handle_range(device.mechanism, posture, along)
+    # at the edge of the workspace it moves to one side only, and about a middle within that
+    return min(-back, forth) or max(-back, forth) / 2.0
 
 
 def _key(keys: tuple[str, str], device: Device) -> str:
@@ -165,9 +183,11 @@ def _in_plane(loop: Loop, stiffness: float) -> DevicePlane:
 
 def _pages(question: Question, device: Device, found: Predicted, document: dict[str, Any]) -> Iterator[Any]:
     yield heading(question, device, linear=False)
+    far, whose = found.balance.largest_motion, "the handle moves" if device.mechanism else "taken to move"
     rows = [
         ("wall", f"{amount(found.stiffness, 'N/m')}, {amount(found.damping, 'Ns/m')}: {found.verdict} if linear"),
         ("not linear", ", ".join(found.parts)),
+        ("range", f"{whose} {amount(far, 'm')} to either side at most"),
     ]
     if found.offset:
         rows.append(("middle", f"{found.offset:.4g} of a step beyond a count"))
@@ -197,9 +217,16 @@ def _rows(found: Predicted) -> Iterator[tuple[str, ...]]:
             amount(cycle.frequency_Hz, "Hz"),
             f"{cycle_speed(cycle):.4g} m/s",
             amount(cycle.force_amplitude, "N"),
-            "stable: what is seen" if cycle.stable else "unstable: larger ones grow, smaller ones die",
+            _kind(cycle),
             _said(met) if met else "",
         )
+
+
+def _kind(cycle: LimitCycle) -> str:
+    """What a limit cycle is to who stands before the device."""
+    if not cycle.within_range:
+        return "beyond the range: outside what the model holds for"
+    return "stable: what is seen" if cycle.stable else "unstable: larger ones grow, smaller ones die"
 
 
 def _elsewhere(cycle: LimitCycle, met: Met | None) -> bool:
@@ -220,6 +247,8 @@ def _remarks(found: Predicted, without: Sequence[str]) -> Iterator[str]:
         yield f"simulated from {amount(found.otherwise.start, 'm')}: {_said(found.otherwise)}"
     if any(_elsewhere(cycle, met) for cycle, met in zip(found.cycles, found.met, strict=True)):
         yield "the simulation vibrates otherwise than predicted; believe it: predictions follow one kind"
+    if found.balance.leaves_range:
+        yield "vibrations that grow leave this range: what stops them is not modelled"
     yield f"predicted by {found.by}"
     if without:
         yield f"the prediction leaves out {', '.join(without)}"

@@ -53,7 +53,7 @@ class Predicted:
 
     verdict    of the linear loop
     cycles     by amplitude;   met  for each, None where it was not simulated
-    otherwise  from some counts off, where no stable cycle is predicted; None: not simulated
+    otherwise  from some counts off, where no stable cycle is predicted within the range; None: not simulated
     rest       stiffest wall with a place to rest under every push;   quiet  without any vibration; None: unknown
     """
 
@@ -76,14 +76,19 @@ def acting(loop: Loop) -> tuple[str, ...]:
     return tuple(name for name in loop.nonlinear.left_out if name not in NOT_PREDICTED)
 
 
-def predicted(loop: Loop, K: float, B: float, offset: float, progress: Progress, *, simulate: bool) -> Predicted:
-    """Limit cycles on a two-sided wall, held against the simulation if asked for."""
+def predicted(
+    loop: Loop, K: float, B: float, offset: float, largest: float, progress: Progress, *, simulate: bool
+) -> Predicted:
+    """Limit cycles on a two-sided wall, held against the simulation if asked for.
+
+    largest  as far as the device can move to either side [m]
+    """
     from zwidth.chart.verdict import judge
     from zwidth.contact.harmonics import with_harmonics
     from zwidth.contact.limit_cycles import harmonic_balance
 
     parts = acting(loop)
-    balance = harmonic_balance(loop, K, B, offset=offset, progress=progress)
+    balance = harmonic_balance(loop, K, B, offset=offset, largest_motion=largest, progress=progress)
     cycles, by = balance.cycles, BY_FIRST
     if parts == ("the force limit",):
         cycles, by = tuple(with_harmonics(loop, K, B, cycle) for cycle in cycles), BY_HARMONICS
@@ -91,13 +96,18 @@ def predicted(loop: Loop, K: float, B: float, offset: float, progress: Progress,
     otherwise = None
     if simulate:
         progress("simulating", 0, 1)
-        met = tuple(_met(loop, K, B, offset, cycle) if cycle.stable else None for cycle in cycles)
-        if not any(cycle.stable for cycle in cycles):
+        met = tuple(_met(loop, K, B, offset, cycle) if is_seen(cycle) else None for cycle in cycles)
+        if not any(map(is_seen, cycles)):
             otherwise = _otherwise(loop, K, B, offset, cycles)
         progress("simulating", 1, 1)
     rest, quiet = _limits(loop, K, B)
     verdict = judge(loop, [K], [B]).names[0]
     return Predicted(K, B, offset, verdict, parts, by, balance, cycles, met, otherwise, rest, quiet)
+
+
+def is_seen(cycle: LimitCycle) -> bool:
+    """Does a vibration settle there, and can the device move so far?"""
+    return cycle.stable and cycle.within_range
 
 
 def _limits(loop: Loop, K: float, B: float) -> tuple[float | None, float | None]:
@@ -194,6 +204,7 @@ def numbers(found: Predicted) -> dict[str, Any]:
                 "amplitude_m": cycle.amplitude,
                 "frequency_Hz": cycle.frequency_Hz,
                 "stable": cycle.stable,
+                "within_range": cycle.within_range,
                 "force_N": cycle.force_amplitude,
                 "velocity_m_per_s": cycle_speed(cycle),
                 "simulated": told(met),
@@ -201,6 +212,8 @@ def numbers(found: Predicted) -> dict[str, Any]:
             for cycle, met in zip(found.cycles, found.met, strict=True)
         ],
         "otherwise": told(found.otherwise),
+        "largest_motion_m": balance.largest_motion,
+        "leaves_range": balance.leaves_range,
         "resting_limit_N_per_m": found.rest,
         "quiet_limit_N_per_m": found.quiet,
         "growth": {
@@ -227,9 +240,10 @@ def told(met: Met | None) -> dict[str, Any] | None:
 def columns(document: dict[str, Any]) -> dict[str, list[Any]]:
     """The limit cycles as columns, one a line."""
     cycles = document["limit_cycles"]
-    own = ("amplitude_m", "frequency_Hz", "stable", "force_N", "velocity_m_per_s")
+    own = ("amplitude_m", "frequency_Hz", "stable", "within_range", "force_N", "velocity_m_per_s")
     made = {key: [cycle[key] for cycle in cycles] for key in own}
     for key in ("behaviour", "amplitude_m", "frequency_Hz"):
         made[f"simulated_{key}"] = [cycle["simulated"] and cycle["simulated"][key] for cycle in cycles]
-    made["stable"] = ["true" if stable else "false" for stable in made["stable"]]
+    for key in ("stable", "within_range"):
+        made[key] = ["true" if value else "false" for value in made[key]]
     return made

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-AWAY: Final = 1.0  # m from the wall at which a device counts as lost; more where it starts or grows that far
 JUDGED: Final = 32  # samples of growth that are run all the same, so that it can be told
 FARTHEST: Final = 1e6  # m, to which they may grow
 TRACED: Final = 17  # numbers kept of each sample
@@ -228,9 +227,12 @@ def _busy(hand: Hand) -> float:
 
 
 def _bound(offset: float, predicted: float | None) -> float:
-    """Distance from the wall at which a run is given up: lost, or grown beyond every device."""
+    """Distance from the wall at which a run is given up: lost, or grown beyond every device; more where it starts
+    or grows that far."""
+    from zwidth.contact.simulate import LARGEST_MOTION
+
     grown = offset * exp(min(max(predicted or 0.0, 0.0) * JUDGED, 600.0))
-    return max(AWAY, 10.0 * offset, min(grown, FARTHEST))
+    return max(LARGEST_MOTION, 10.0 * offset, min(grown, FARTHEST))
 
 
 def _check_reach(question: Question, device: Device, position: float, what: str) -> None:

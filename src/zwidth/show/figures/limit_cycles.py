@@ -12,26 +12,28 @@ from zwidth.show.figures.style import BLACK, BLUE, GREY, STABLE, VERMILION, lege
 from zwidth.show.units import quantity
 
 AROUND = 100.0  # times, below the smallest limit cycle and above the largest, that is drawn
+BEYOND = 3.0  # times, above the range and above a limit cycle beyond it
 RESOLVED = 1e-3  # of the largest growth, below which the axis is linear
 
 
 def draw_balance(ax: Axes, balance: HarmonicBalance) -> None:
     """How fast vibrations grow or die over their amplitude; limit cycles where the line crosses zero.
 
-    A full dot is a stable limit cycle, a hollow one the edge of what is recovered from. The growth has a
-    logarithmic axis on both sides of zero.
+    A full dot is a stable limit cycle, a hollow one the edge of what is recovered from; grey is what lies beyond
+    the range of the device. The growth has a logarithmic axis on both sides of zero.
     """
     growth = np.where(np.isfinite(balance.growth), balance.growth, np.nan)
     ax.semilogx(balance.amplitude, growth, color=BLACK, label="growth of a vibration")
     ax.axhline(0.0, color=GREY, linewidth=0.6)
     for cycle in balance.cycles:
         kind = "stable limit cycle" if cycle.stable else "larger ones grow, smaller ones die"
+        kind, color = (kind, VERMILION) if cycle.within_range else ("beyond the range", GREY)
         ax.plot(
             cycle.amplitude,
             0.0,
             "o",
-            markerfacecolor=VERMILION if cycle.stable else "white",
-            markeredgecolor=VERMILION,
+            markerfacecolor=color if cycle.stable else "white",
+            markeredgecolor=color,
             linestyle="none",
             label=f"{kind}: {quantity(cycle.amplitude, 'm')}, {quantity(cycle.frequency_Hz, 'Hz')}",
         )
@@ -39,6 +41,9 @@ def draw_balance(ax: Axes, balance: HarmonicBalance) -> None:
     ax.set_ylabel("Growth rate [1/s]")
     low, high = _around(balance)
     ax.set_xlim(low, high)
+    if balance.largest_motion < high:
+        text = f"farther than the device moves, {quantity(balance.largest_motion, 'm')}"
+        ax.axvspan(max(low, balance.largest_motion), high, color=GREY, alpha=0.2, linewidth=0.0, label=text)
     seen = growth[(balance.amplitude >= low) & (balance.amplitude <= high) & np.isfinite(growth)]
     largest = float(np.max(np.abs(seen), initial=0.0)) or 1.0
     linear = 10.0 ** np.ceil(np.log10(RESOLVED * largest))
@@ -57,7 +62,8 @@ def _around(balance: HarmonicBalance) -> tuple[float, float]:
         swings = at[np.isfinite(balance.growth)]
         return (float(swings[0]), float(swings[-1])) if len(swings) > 1 else (float(at[0]), float(at[-1]))
     found = [cycle.amplitude for cycle in balance.cycles]
-    return max(float(at[0]), min(found) / AROUND), min(float(at[-1]), max(found) * AROUND)
+    most = max(BEYOND * max(found), min(AROUND * max(found), BEYOND * balance.largest_motion))
+    return max(float(at[0]), min(found) / AROUND), min(float(at[-1]), most)
 
 
 def draw_plane(ax: Axes, device: DevicePlane) -> None:
