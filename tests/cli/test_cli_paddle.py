@@ -1,0 +1,60 @@
+"""Every command on a paddle with one drive, whose handle reaches a circle and nothing else."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.cli.cli_run import found, refused, zwidth
+from tests.paddle import LENGTH, paddle
+
+WALL = ("--stiffness", 1000, "--damping", 5)
+PROJECTING = pytest.mark.xfail(strict=True, reason="a position beside the handle's circle is refused")
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return paddle(tmp_path_factory.mktemp("paddle"))
+
+
+@PROJECTING
+def test_a_contact_is_simulated_from_a_start_beside_the_circle(file):
+    document = found("simulate", file, *WALL)
+    assert document["stable"] is True
+    assert document["start"]["position_m"] == 1e-3
+    assert document["start"]["off_the_path_m"] == pytest.approx(1e-3**2 / (2.0 * LENGTH), rel=1e-3)
+    assert found("simulate", file, *WALL, "--wall", "one-sided", "--duration", 0.2)["behaviour"]
+    (line,) = refused("simulate", file, *WALL, "--start-position", 0.05)
+    assert "--start-position" in line
+    assert "the nearest that it has is (0.0437071, 0.0786728, 0) m" in line
+
+
+@PROJECTING
+def test_a_position_beside_the_circle_is_projected_and_said_to_be(file):
+    for command in ("chart", "show"):
+        words = (command, file, "--at", f"0.0001,{LENGTH}")
+        document = found(*words)
+        assert document["projected_m"] == pytest.approx(1e-4**2 / (2.0 * LENGTH), rel=1e-3)
+        assert document["position_m"] == pytest.approx([1e-4, LENGTH, 0.0], abs=1e-7)
+        assert "55.56 nm from the position asked for" in zwidth(*words).out
+    assert found("chart", file)["projected_m"] == 0.0
+    assert "asked for" not in zwidth("chart", file).out
+    ran = zwidth("chart", file, "--at", "0,0.1", "--json")
+    assert ran.code == 1
+    assert "the nearest that it has is (0, 0.09, 0) m, 10 mm away" in ran.document["reason"]
+    assert ran.document["position_m"] == [0.0, 0.1, 0.0]
+
+
+@PROJECTING
+def test_a_posture_may_be_given_by_the_angle_of_its_joint(file):
+    document = found("chart", file, "--at", "lever=1.2", "--direction", "1,-0.4")
+    assert document["position_m"] == pytest.approx([0.0326122, 0.0838835, 0.0], abs=1e-6)
+    for at, said in (
+        ("handle=1.2", "lever"),
+        ("lever=70", "degrees"),
+        ("lever=1,lever=2", "twice"),
+        ("lever=", "such as"),
+        ("lever=1,other=2", "other"),
+    ):
+        (line,) = refused("chart", file, "--at", at)
+        assert said in line
+        assert line.count("\n") == 0
