@@ -371,11 +371,11 @@ def test_nan_is_out_of_reach_in_a_batch():
 
 
 def test_a_reference_position_out_of_reach_is_called_that():
-    """The advice to ask nearer to the reference is for other positions."""
+    """Its file is to be checked, and for other positions the nearest is named."""
     mechanism = five_bar()
     far = replace(mechanism, reference_position=np.array([0.0, 9.0, 0.0]))
     with pytest.raises(OutOfReach, match="its own reference position") as caught:
         solve_posture(far, [0.0, 9.0])
     assert "nearer" not in str(caught.value)
-    with pytest.raises(OutOfReach, match="ask for a position nearer to the reference"):
+    with pytest.raises(OutOfReach, match="the nearest that it has is"):
         solve_posture(mechanism, [0.0, 9.0])

@@ -7,8 +7,6 @@ from tests.paddle import LENGTH, paddle
 from zwidth.device.load import load
 from zwidth.model.posture import OK, OUT_OF_REACH, OutOfReach, solve_posture
 
-pytestmark = pytest.mark.xfail(strict=True, reason="a position beside the handle's circle is refused")
-
 
 @pytest.fixture(scope="module")
 def device(tmp_path_factory):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import nan, pi
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
     from zwidth.model.reduction import Encoders, Model
 
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
+PROJECTED: Final = 0.01  # of the arm's length, within which a position is projected onto what the handle has
+# Where the handle is: x, y or x, y, z [m], or the angle of every driven joint by the name of its link [rad].
+At = Sequence[float] | Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -96,24 +102,36 @@ class Device:
             return bool(np.isfinite(self.mechanism.drives.encoder_counts).all())
         return self.document.get("loop", {}).get("encoder", {}).get("resolution_m") is not None
 
-    def posture(self, at: Sequence[float] | None = None, assembly: str | None = None) -> Posture:
+    def posture(self, at: At | None = None, assembly: str | None = None) -> Posture:
         """The mechanism with its handle at a position, in a named assembly (left out: those of the file).
 
-        at      x, y or x, y, z [m] (see `position`)
+        A position that the handle misses by 1 % of the arm's length or less is projected onto the nearest that it
+        has; `Posture.projected` says how far.
+
+        at      x, y or x, y, z [m], or the driven joints' angles (see `position`)
         Raises  DeviceError    if the device has no mechanism, the arguments cannot be meant, or the mechanism
                                cannot be assembled or driven as the file says
                 PostureError   (model.posture) where there is no answer: out of reach, or singular
         """
         mechanism = self._mechanism(at=at, assembly=assembly)
+        position = self.position(at, assembly)
+        from zwidth.model.posture import solve_posture
+
+        with self._solving(assembly) as name:
+            return solve_posture(mechanism, position, name, tolerance=PROJECTED)
+
+    @contextmanager
+    def _solving(self, assembly: str | None) -> Iterator[str | None]:
+        """The name of the assembly, and what goes wrong in it as faults of the file where it is one."""
+        mechanism = self._mechanism(assembly=assembly)
         if assembly is not None and assembly not in mechanism.assemblies:
             message = f"names no assembly, got '{assembly}'; {suggestion(assembly, set(mechanism.assemblies))}"
             raise fail(self.label, "assembly", message)
-        position = self.position(at)
         name = assembly or self.reference_assembly
-        from zwidth.model.posture import LoopOpen, PostureError, solve_posture
+        from zwidth.model.posture import LoopOpen, PostureError
 
         try:
-            return solve_posture(mechanism, position, name)
+            yield name
         except LoopOpen as error:
             raise fail(self.label, f"mechanism.assemblies.{name}", str(error)) from None
         except PostureError:
@@ -123,7 +141,7 @@ class Device:
 
     def plant(
         self,
-        at: Sequence[float] | None = None,
+        at: At | None = None,
         direction: Sequence[float] | None = None,
         assembly: str | None = None,
         model: str | None = None,
@@ -132,7 +150,8 @@ class Device:
     ) -> Plant:
         """The rendered direction's dynamics at a posture, in one of the models, with the operator at its handle.
 
-        at, direction   x, y or x, y, z [m], [1]; a direction may have any length but zero
+        at, direction   x, y or x, y, z [m], [1]; at may be the driven joints' angles, a direction of any length
+                        but zero
         model           "full", "two-mass", "motor-mass" or "rigid"; left out: full for a mechanism, and a
                         given plant as it is
         held            False: the device by itself, without its operator. "motor-mass" holds the link side, and so
@@ -177,17 +196,25 @@ class Device:
 
         return attach(plant, self.operator)
 
-    def position(self, at: Sequence[float] | None = None) -> Floats:
+    def position(self, at: At | None = None, assembly: str | None = None) -> Floats:
         """The handle's position meant, (3,) [m]; left out: that of the file.
 
         at  x, y or x, y, z [m]; x, y lies at the height of the file's reference, whose plane a planar device
-            does not leave
+            does not leave. Or the angle of every driven joint by the name of its link [rad], in the assembly
+        Raises  DeviceError   if the arguments cannot be meant
+                PostureError  (model.posture) for joints that cannot be turned to these angles
         """
-        self._mechanism(at=at)
+        mechanism = self._mechanism(at=at)
         reference = self.reference_position
         assert reference is not None
         if at is None:
             return reference
+        if isinstance(at, Mapping):
+            from zwidth.model.posture import joint_position
+
+            angles = self._angles(mechanism, at)
+            with self._solving(assembly) as name:
+                return joint_position(mechanism, angles, name)
         position = self._vector("at", at)
         return np.array([*position[:2], reference[2]]) if len(at) == 2 else position
 
@@ -201,6 +228,25 @@ class Device:
             raise fail(self.label, "direction", "has zero length; give any vector along it, such as 0,1")
         vector = vector / largest  # so that the squares neither overflow nor vanish
         return np.asarray(vector / np.linalg.norm(vector))
+
+    def _angles(self, mechanism: Mechanism, at: Mapping[str, float]) -> dict[str, float]:
+        """Angles of all driven joints by the names of their links, checked [rad]."""
+        driven = [mechanism.links.names[joint] for joint in mechanism.drives.joint]
+        if set(at) != set(driven):
+            message = (
+                f"must be the angle of every driven joint, {', '.join(driven)}, got {', '.join(map(str, at))}"
+            )
+            raise fail(self.label, "at", message)
+        angles = {}
+        for joint, value in at.items():
+            angle = float(value) if isinstance(value, Real) else nan
+            if not abs(angle) <= 2.0 * pi:
+                message = (
+                    f"{joint}: must be an angle from -2 pi to 2 pi rad, got {quote(value)}; is it in degrees?"
+                )
+                raise fail(self.label, "at", message)
+            angles[joint] = angle
+        return angles
 
     def _given(self, plant: Plant, model: str | None) -> Plant:
         if model in (None, "full"):

@@ -163,4 +163,4 @@ class Place:
         return Loop(self.plant, self.controller)
 
 
-_OF_POSTURE = ("position", "status", "angles", "mass_matrix", "jacobian", "closure_residual")
+_OF_POSTURE = ("position", "status", "angles", "mass_matrix", "jacobian", "closure_residual", "projected")

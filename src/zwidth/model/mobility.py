@@ -59,7 +59,7 @@ def closed(mech: Arrays, design: int, rough: Floats) -> Floats:
 
 
 def _misfit(mechanism: Mechanism, mech: Arrays, design: int, configurations: Sequence[Floats]) -> Misfit | None:
-    rows = [constraint_rows(mech, design, angles) for angles in configurations]
+    rows = [constraints(mech, design, angles)[0] for angles in configurations]
     m, d, loops = mech.joint.size, mech.driven, 3 * mech.a.size
     size = float(mech.size[design])
     freedom = m - max(_rank(A[:, :loops], size) for A in rows)
@@ -81,12 +81,13 @@ def _misfit(mechanism: Mechanism, mech: Arrays, design: int, configurations: Seq
 
 
 @compiled
-def constraint_rows(mech: Arrays, design: int, angles: Floats) -> Floats:
-    """d(closure gaps, handle)/d(unknowns), (m, 3k+3), passive joints first."""
+def constraints(mech: Arrays, design: int, angles: Floats) -> tuple[Floats, Floats]:
+    """d(closure gaps, handle)/d(unknowns), (m, 3k+3), passive joints first; and the gaps of the loops, then the
+    handle's position, both negated, (3k+3,) [m]."""
     work = workspace(mech)
     place(mech, design, angles, work)
     equations(mech, design, work.goal, work)
-    return work.rows
+    return work.rows, work.gaps
 
 
 def _rank(rows: Floats, size: float) -> int:

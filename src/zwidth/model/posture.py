@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from zwidth.model.bias import bias_batch
 from zwidth.model.continuation import ASSEMBLED, OK, OUT_OF_REACH, SINGULAR, assemble_batch
 from zwidth.model.mechanism import Floats, Ints, Mechanism
 from zwidth.model.mobility import check_mobility
+from zwidth.model.projection import arm_length, nearest_position, turned_position
 from zwidth.model.roadmap import roadmap
 from zwidth.model.tree import place, workspace
 
@@ -29,6 +31,7 @@ __all__ = [
     "Singular",
     "handle_range",
     "inertia_terms",
+    "joint_position",
     "link_points",
     "reachable_positions",
     "solve_posture",
@@ -56,7 +59,8 @@ class Posture:
     """A mechanism at rest with its handle somewhere; all arrays carry the batch's leading axes.
 
     assembly          name of the assembly
-    position          (..., 3)     handle, as asked for [m]
+    position          (..., 3)     handle [m]; where not OK as asked for
+    projected         (...)        how far that lies from the position asked for [m]: 0, but where it was projected
     status            (...)        OK, OUT_OF_REACH or SINGULAR; where not OK the numbers below are nan
     angles            (..., n)     joint angles, 0 for fixed joints [rad]
     mass_matrix       (..., d, d)  M of the links in the driven coordinates [kg m^2]
@@ -71,6 +75,7 @@ class Posture:
     mass_matrix: Floats
     jacobian: Floats
     closure_residual: Floats
+    projected: Floats
 
 
 @dataclass(frozen=True)
@@ -93,15 +98,19 @@ class LinkPoints:
         return np.asarray(self.origin[..., link, :] + (R @ point[..., None])[..., 0])
 
 
-def solve_posture(mechanism: Mechanism, position: ArrayLike, assembly: str | None = None) -> Posture:
+def solve_posture(
+    mechanism: Mechanism, position: ArrayLike, assembly: str | None = None, *, tolerance: float = 0.0
+) -> Posture:
     """The posture with the handle at a position, in a named assembly (None: the first).
 
     The assembly's approximate joint angles are closed onto the reference position; from there Newton is
     continued to the position without passing a singularity (`continuation`), along the straight line or by
-    the roadmap of all postures of the assembly (`roadmap`).
+    the roadmap of all postures of the assembly (`roadmap`). A position that the handle cannot have is projected
+    onto the nearest that it has (`projection`).
 
     position  (..., 3), or (..., 2) in the plane of the reference position [m]; it broadcasts with the leading
               axes of the mechanism's numbers
+    tolerance how far a position may be projected, as a share of the arm's length from base to handle
     Returns   Posture; in a batch a position that cannot be had is marked by its status
     Raises    OutOfReach, Singular  where a single posture is asked for and cannot be had; an assembly may be
                           singular throughout
@@ -126,6 +135,14 @@ def solve_posture(mechanism: Mechanism, position: ArrayLike, assembly: str | Non
         raise _throughout(name, uncontrolled)
     singular = uncontrolled and not designs  # of several designs another may be in control
     solved = nowhere(mech, len(goals)) if singular else solve(mech, design, reference, goals)
+    near, projected = None, np.where(solved.status == OK, 0.0, np.nan)
+    wanted = np.flatnonzero(solved.status == OUT_OF_REACH) if tolerance > 0.0 or not shape else ()
+    for i in wanted:
+        near = nearest_position(mech, int(design[i]), reference, goals[i])
+        if near is None or np.linalg.norm(near - goals[i]) > tolerance * arm_length(mech, int(design[i])):
+            continue
+        solved.put(np.array([i]), solve(mech, design[i : i + 1], reference, near[None]))
+        goals[i], projected[i] = near, np.linalg.norm(near - goals[i])
     n, d = mech.parent.size, mech.driven
     posture = Posture(
         assembly=name,
@@ -135,9 +152,10 @@ def solve_posture(mechanism: Mechanism, position: ArrayLike, assembly: str | Non
         mass_matrix=solved.mass.reshape(*shape, d, d),
         jacobian=solved.jacobian.reshape(*shape, 3, d),
         closure_residual=solved.residual.reshape(shape),
+        projected=projected.reshape(shape),
     )
     if not shape:
-        _check_single(posture, mechanism.reference_position)
+        _check_single(posture, mechanism.reference_position, near)
     return posture
 
 
@@ -150,15 +168,44 @@ def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Fl
               ValueError  for an unknown assembly, or a batch of designs
     """
     name = _assembly_name(mechanism, assembly)
+    mech, reference = _single(mechanism, name, "what can be reached is asked of one design at a time")
+    return roadmap(mech, 0, reference).position
+
+
+def _single(mechanism: Mechanism, name: str, otherwise: str) -> tuple[Arrays, Floats]:
+    """One design packed, and its reference posture (n,) in an assembly; `otherwise` is said of several designs."""
     if design_shape(mechanism):
-        raise ValueError("what can be reached is asked of one design at a time")
+        raise ValueError(otherwise)
     mech = pack(mechanism)
     reference, gaps = _references(mechanism, mech, name)
     _check_loops(mechanism, mech, name, gaps[0])
     uncontrolled = check_mobility(mechanism, mech, 0, reference[0])
     if uncontrolled:
         raise _throughout(name, uncontrolled)
-    return roadmap(mech, 0, reference[0]).position
+    return mech, reference[0]
+
+
+def joint_position(mechanism: Mechanism, angles: Mapping[str, float], assembly: str | None = None) -> Floats:
+    """The handle's position with the driven joints at given angles, (3,) [m].
+
+    angles    of every driven joint, by the name of its link [rad]; turns of 2 pi do not count
+    Raises    OutOfReach  where the joints cannot be turned there from the reference without passing a singularity
+              LoopOpen, Singular  as `reachable_positions`
+              ValueError  for other joints than the driven ones, an unknown assembly, or a batch of designs
+    """
+    name = _assembly_name(mechanism, assembly)
+    driven = [mechanism.links.names[joint] for joint in mechanism.drives.joint]
+    if set(angles) != set(driven):
+        raise ValueError(f"give the angle of every driven joint, {', '.join(driven)}; got {', '.join(angles)}")
+    mech, reference = _single(mechanism, name, "postures are given by their joints for one design at a time")
+    found = turned_position(mech, reference, np.array([angles[joint] for joint in driven]))
+    if found is None:
+        told = ", ".join(f"{joint} = {angles[joint]:.6g} rad" for joint in driven)
+        raise OutOfReach(
+            f"the joints cannot be turned to {told} in assembly {name!r} without passing a singularity; "
+            "ask for angles nearer to those of the reference"
+        )
+    return found
 
 
 def handle_range(mechanism: Mechanism, posture: Posture, direction: ArrayLike) -> tuple[float, float]:
@@ -239,6 +286,10 @@ def _throughout(name: str, uncontrolled: str) -> Singular:
     )
 
 
+def _vector(position: Floats) -> str:
+    return "(" + ", ".join(f"{x + 0.0:.6g}" for x in np.round(position, 12)) + ") m"
+
+
 def _assembly_name(mechanism: Mechanism, assembly: str | None) -> str:
     names = list(mechanism.assemblies)
     name = names[0] if assembly is None else assembly
@@ -272,17 +323,21 @@ def _check_loops(mechanism: Mechanism, mech: Arrays, name: str, gaps: Floats) ->
         )
 
 
-def _check_single(posture: Posture, reference: Floats) -> None:
-    where = "(" + ", ".join(f"{x:.6g}" for x in posture.position) + ") m"
+def _check_single(posture: Posture, reference: Floats, near: Floats | None) -> None:
+    where, instead = _vector(posture.position), "ask for a position nearer to the reference"
+    if near is not None:
+        away = float(np.linalg.norm(near - posture.position))
+        distance = f"{away:.4g} m" if away >= 1.0 else f"{1e3 * away:.4g} mm"
+        instead = f"the nearest that it has is {_vector(near)}, {distance} away"
     if posture.status == OUT_OF_REACH and np.array_equal(posture.position, reference):
         raise OutOfReach(
             f"the handle cannot reach its own reference position {where} in assembly {posture.assembly!r}; "
-            "check the lengths of the links, or ask for another position"
+            f"check the lengths of the links, or ask for another position; {instead}"
         )
     if posture.status == OUT_OF_REACH:
         raise OutOfReach(
             f"the handle cannot reach {where} in assembly {posture.assembly!r} without passing a "
-            "singularity; ask for a position nearer to the reference"
+            f"singularity; {instead}"
         )
     if posture.status == SINGULAR:
         raise Singular(

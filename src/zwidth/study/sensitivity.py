@@ -20,7 +20,7 @@ import numpy as np
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.peak import Peak
 from zwidth.device import address
-from zwidth.device.device import Device
+from zwidth.device.device import At, Device
 from zwidth.device.faults import DeviceError, Path, dotted
 from zwidth.device.load import from_document
 from zwidth.device.parts import outside_linear
@@ -119,7 +119,7 @@ class Sensitivities:
 
 def sensitivities(
     device: Device,
-    at: Sequence[float] | None = None,
+    at: At | None = None,
     direction: Sequence[float] | None = None,
     assembly: str | None = None,
     model: str | None = None,

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.region import ChartError
 from zwidth.chart.tracer import Tracer
-from zwidth.device.device import Device
+from zwidth.device.device import At, Device
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import natural_frequencies
@@ -89,7 +89,7 @@ class Validity:
 
 def validity(
     device: Device,
-    at: Sequence[float] | None = None,
+    at: At | None = None,
     direction: Sequence[float] | None = None,
     assembly: str | None = None,
     tolerance: float = TOLERANCE,

@@ -15,7 +15,7 @@ import numpy as np
 
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.region import ChartError
-from zwidth.device.device import Device
+from zwidth.device.device import At, Device
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.plant import Plant
@@ -74,7 +74,7 @@ class Variant:
 
 def what_if(
     device: Device,
-    at: Sequence[float] | None = None,
+    at: At | None = None,
     direction: Sequence[float] | None = None,
     assembly: str | None = None,
     model: str | None = None,

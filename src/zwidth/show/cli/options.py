@@ -11,9 +11,13 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from zwidth.device.device import Device
     from zwidth.model.plant import Plant
 
+    Floats = NDArray[np.float64]
     ParamType = click.ParamType[Any]
 else:
     ParamType = click.ParamType  # generic in newer releases only
@@ -32,7 +36,7 @@ class Question:
 
     name: str
     settings: tuple[str, ...] = ()
-    at: tuple[float, ...] | None = None
+    at: tuple[float, ...] | dict[str, float] | None = None
     direction: tuple[float, ...] | None = None
     assembly: str | None = None
     model: str | None = None
@@ -82,13 +86,25 @@ class Question:
         """What a linear result states first: its circumstances, and what of the device it leaves out."""
         return self.circumstances(device) | {"left_out": list(device.left_out)}
 
+    def _where(self, device: Device) -> tuple[Floats | None, float | None]:
+        """Position of the handle [m], and how far it was projected; as asked for, and None, where it cannot be."""
+        from zwidth.model.posture import PostureError
+
+        try:
+            posture = device.posture(self.at, self.assembly)
+        except PostureError:
+            return (None if isinstance(self.at, dict) else device.position(self.at)), None
+        return posture.position, float(posture.projected)
+
     def circumstances(self, device: Device) -> dict[str, Any]:
         """Name, place and sampling as a result states them; null where inapplicable."""
         mechanism = device.mechanism is not None
+        position, projected = self._where(device) if mechanism else (None, None)
         return {
             "name": device.name,
             "device": self.name,
-            "position_m": device.position(self.at) if mechanism else None,
+            "position_m": position,
+            "projected_m": projected,
             "direction": device.direction(self.direction) if mechanism else None,
             "assembly": self.assembly or device.reference_assembly,
             "model": self.model_of(device),
@@ -96,6 +112,34 @@ class Question:
             "sampling_period_s": device.controller.sampling_period,
             "delay_samples": device.controller.delay,
         }
+
+
+class Posture(ParamType):
+    """A handle's position, or the angles of driven joints by name."""
+
+    name = "posture"
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        return "X,Y[,Z]|JOINT=RAD,..."
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str) or "=" not in value:
+            return Numbers("", (2, 3), "0.1,0.25").convert(value, param, ctx)
+        angles: dict[str, float] = {}
+        for part in value.split(","):
+            joint, _, text = part.partition("=")
+            try:
+                angle = float(text)
+            except ValueError:
+                angle = math.nan
+            if not joint.strip() or not math.isfinite(angle):
+                self.fail(
+                    f"must be joints with angles in rad such as upper=0.6,lower=1.2, got {value!r}", param, ctx
+                )
+            if joint.strip() in angles:
+                self.fail(f"names {joint.strip()} twice, got {value!r}", param, ctx)
+            angles[joint.strip()] = angle
+        return angles
 
 
 class Numbers(ParamType):
@@ -171,7 +215,9 @@ def about_a_device(command: Command) -> Command:
     return _asking(
         command,
         click.option(
-            "--at", type=Numbers("X,Y[,Z]", (2, 3), "0.1,0.25"), help="Posture, by the handle's position [m]."
+            "--at",
+            type=Posture(),
+            help="Posture: the handle's position [m], or the driven joints' angles [rad].",
         ),
         click.option(
             "--direction",

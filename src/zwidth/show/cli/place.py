@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from zwidth.show.output import shown
-from zwidth.show.units import vector
+from zwidth.show.units import amount, vector
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
     from zwidth.loop.controller import Butterworth, Controller, FirstOrder
     from zwidth.show.cli.options import Question
+
+
+ROUNDING: Final = 1e-9  # m, that a position may be projected by without a word
 
 
 def heading(question: Question, device: Device, *, linear: bool = True) -> str:
@@ -23,6 +26,8 @@ def heading(question: Question, device: Device, *, linear: bool = True) -> str:
     place = f"model {facts['model']}" if device.mechanism else f"{kind} {facts['model']}"
     if device.mechanism:
         where = f"along {vector(facts['direction'])} at {vector(facts['position_m'], 'm')}"
+        if (facts["projected_m"] or 0.0) > ROUNDING:
+            where += f" ({amount(facts['projected_m'], 'm')} from the position asked for)"
         place = f"{where}, assembly {facts['assembly']}, {place}"
     held = f", held by {_operator(facts['operator'])}" if facts["operator"] else ""
     lines = [f"{shown(device.name)}: {place}{held}", computer(device.controller)]

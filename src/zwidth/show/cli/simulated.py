@@ -42,7 +42,7 @@ class Simulated:
 
     loop         the device without the operator;   values  of the environment
     predicted    ln rho of the linear loop on the two-sided wall; None where there is none
-    start        of the reading [m], [m/s]
+    start        of the reading [m], [m/s];   off_path  how far from it the handle's path passes [m]; None: unknown
     length       how long, and why
     without      the same without the passivity controller; None where there is none
     substeps     taken between samples
@@ -54,6 +54,7 @@ class Simulated:
     loop: Loop
     predicted: float | None
     start: tuple[float, float]
+    off_path: float | None
     length: Length
     response: TimeResponse
     judgement: Judgement
@@ -108,7 +109,7 @@ def simulated(
         hand = contact.hand(environment, device.operator if plant.handle is not None else None)
         start = contact.start(environment)
         _check_reach(question, device, contact.wall_position, "--wall-position: the wall")
-        _check_reach(question, device, start, "--start-position: the start")
+        off_path = _check_reach(question, device, start, "--start-position: the start")
         loop = Loop(plant, device.controller)
         predicted, frequency = _predicted(Loop(question.plant(device), device.controller), environment, values)
         if duration is None:
@@ -152,6 +153,7 @@ def simulated(
         loop=loop,
         predicted=predicted,
         start=(start, contact.start_velocity),
+        off_path=off_path,
         length=length,
         response=done[0],
         judgement=judge_response(done[0]),
@@ -235,18 +237,30 @@ def _bound(offset: float, predicted: float | None) -> float:
     return max(LARGEST_MOTION, 10.0 * offset, min(grown, FARTHEST))
 
 
-def _check_reach(question: Question, device: Device, position: float, what: str) -> None:
-    """Raises BadInput where the handle of a mechanism cannot be moved so far along the direction."""
-    if device.mechanism is None or position == 0.0:
-        return
+def _check_reach(question: Question, device: Device, position: float, what: str) -> float | None:
+    """How far from a position of the reading the handle's path passes [m]; None for a device without a mechanism.
+
+    The model moves along the tangent, and the handle on a curve if it has few drives. Raises BadInput where the
+    handle of a mechanism cannot be moved so far along the direction.
+    """
+    if device.mechanism is None:
+        return None
+    import numpy as np
+
     from zwidth.model.posture import PostureError
 
-    here, along = device.position(question.at), device.direction(question.direction)
-    device.posture(question.at, question.assembly)  # has its own sentence
+    posture, along = device.posture(question.at, question.assembly), device.direction(question.direction)
+    if position == 0.0:
+        return 0.0
+    # without forces across, a handle with few drives moves by the part of the direction that it can move along
+    left, singular, _ = np.linalg.svd(posture.jacobian, full_matrices=False)
+    moves = left[:, singular > 1e-9 * singular[0]]
+    way = moves @ (moves.T @ along)
     try:
-        device.posture(list(here + position * along), question.assembly)
+        reached = device.posture(list(posture.position + position / (way @ along) * way), question.assembly)
     except PostureError as error:
         raise BadInput(f"{what} lies {position:g} m along the direction, out of the workspace: {error}") from None
+    return float(reached.projected)
 
 
 def numbers(found: Simulated, seed: int) -> dict[str, Any]:
@@ -262,6 +276,7 @@ def numbers(found: Simulated, seed: int) -> dict[str, Any]:
         "start": {
             "position_m": found.start[0],
             "velocity_m_per_s": found.start[1],
+            "off_the_path_m": found.off_path,
             "inside": found.start[0] > response.wall_position,
         },
         "hand": _hand(found.hand),

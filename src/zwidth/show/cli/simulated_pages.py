@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.show.cli.answer import Row, sheet, table
 from zwidth.show.cli.energies import HEADINGS, energy_rows
-from zwidth.show.cli.place import heading
+from zwidth.show.cli.place import ROUNDING, heading
 from zwidth.show.units import amount
 
 if TYPE_CHECKING:
@@ -66,7 +66,9 @@ def _start(document: dict[str, Any]) -> str:
     depth = start["position_m"] - document["wall_position_m"]
     where = f"{amount(abs(depth), 'm')} {'inside' if depth > 0.0 else 'outside'}" if depth else "at its position"
     speed = start["velocity_m_per_s"]
-    return f"{where}, {f'at {speed:.6g} m/s' if speed else 'at rest'}"
+    beside = start["off_the_path_m"] or 0.0
+    path = f", {amount(beside, 'm')} beside the handle's path" if beside > ROUNDING else ""
+    return f"{where}, {f'at {speed:.6g} m/s' if speed else 'at rest'}{path}"
 
 
 def _hand(hand: dict[str, Any]) -> str:

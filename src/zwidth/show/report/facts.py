@@ -10,7 +10,7 @@ from typing import Any
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.region import ChartError
 from zwidth.conditions import Bound, compare
-from zwidth.device.device import Device
+from zwidth.device.device import At, Device
 from zwidth.loop.loop import Loop
 from zwidth.measures.felt_chart import FeltChart, felt_chart
 from zwidth.model.effective import EffectiveParameters, effective_parameters
@@ -102,7 +102,7 @@ class Facts:
 
 def gather(
     device: Device,
-    at: Sequence[float] | None = None,
+    at: At | None = None,
     direction: Sequence[float] | None = None,
     assembly: str | None = None,
     model: str | None = None,

@@ -11,7 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from zwidth import __version__
-from zwidth.device.device import Device
+from zwidth.device.device import At, Device
 from zwidth.show.output import write_text
 from zwidth.show.report import answers, sentences, tables
 from zwidth.show.report.facts import Facts, gather
@@ -22,7 +22,7 @@ def write_report(
     device: Device,
     path: str | os.PathLike[str],
     *,
-    at: Sequence[float] | None = None,
+    at: At | None = None,
     direction: Sequence[float] | None = None,
     assembly: str | None = None,
     model: str | None = None,
