@@ -54,3 +54,34 @@ def test_a_posture_may_be_given_by_the_angle_of_its_joint(file):
         (line,) = refused("chart", file, "--at", at)
         assert said in line
         assert line.count("\n") == 0
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("check", *WALL),
+        ("bounds",),
+        ("felt", *WALL),
+        ("polar", "--count", 12),
+        ("sensitivity",),
+        ("move", "--plane", f"0.02,{LENGTH},-1,0", *WALL, "--push", "1,0", "--duration", 0.2),
+    ],
+    ids=lambda words: words[0],
+)
+def test_every_command_answers(words, file):
+    command, *more = words
+    document = found(command, file, *more)
+    assert document["name"] == "Teaching paddle"
+    assert document["projected_m"] == 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["guarantees", "report", "experiment"])
+def test_every_longer_command_answers(command, file, tmp_path):
+    output = ("--output", tmp_path / "report.html") if command == "report" else ()
+    assert zwidth(command, file, *output).code == 0
+
+
+def test_a_map_says_that_it_needs_two_drives(file):
+    (line,) = refused("map", file, "--measure", "stiffness_max")
+    assert "has one drive and moves along a curve" in line
