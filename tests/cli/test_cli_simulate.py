@@ -137,7 +137,8 @@ def test_a_force_limit_gives_the_limit_cycle_of_harmonic_balance(folder):
 
 def test_a_one_sided_wall_starts_outside_and_is_pushed():
     document = simulated(ONE_MASS, *SOFT, "--wall", "one-sided")
-    assert document["start"] == {"position_m": -0.001, "velocity_m_per_s": 0.0, "inside": False}
+    start = {"position_m": -0.001, "velocity_m_per_s": 0.0, "off_the_path_m": None, "inside": False}
+    assert document["start"] == start
     assert document["hand"]["push_N"] == 2.0
     assert (document["stable"], document["behaviour"]) == (True, "converged")
     assert document["predicted_growth_per_sample"] is None
