@@ -18,6 +18,7 @@ from zwidth.model.reach import beyond
 from zwidth.model.roadmap import roadmap
 from zwidth.model.tree import workspace
 
+FEW: Final = 8  # postures up to which threads cost more than they bring
 MANY: Final = 64  # postures of one design, from which on a roadmap pays
 
 
@@ -107,7 +108,11 @@ def nowhere(mech: Arrays, count: int, status: int = SINGULAR) -> Solved:
 
 def run(mech: Arrays, design: Ints, starts: Floats, which: Ints, goals: Floats) -> Solved:
     solved = empty(mech, len(goals))
-    posture_batch(mech, design, starts, which, goals, *vars(solved).values())
+    if len(goals) <= FEW:
+        into = (solved.status, solved.angles, solved.mass, solved.jacobian, solved.residual)
+        _postures(mech, design, starts, which, goals, *into, 0, len(goals))
+    else:
+        posture_batch(mech, design, starts, which, goals, *vars(solved).values())
     return solved
 
 
