@@ -1,0 +1,132 @@
+"""Which files are read at all: plain ones, and of a [response] those that lie with the device file."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from tests import systems
+from tests.cli.cli_run import TWO_MASS, refused
+from tests.measured_cases import measured
+from zwidth.device.faults import DeviceError
+from zwidth.device.load import load
+from zwidth.study.study_file import read_study
+
+DEVICE = 'name = "measured"\n[response]\n{}\n[loop]\nsampling_period_s = 0.00125\n'
+STUDY = 'device = "{}"\nmeasures = ["stiffness_max"]\n[[axis]]\nkey = "loop.delay_samples"\nvalues = [0, 1]\n'
+SECRET = "root:swordfish:0"
+HANG = 20  # seconds after which a reading counts as one that waits for ever
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder in which a right sweep lies beside the device file, one below it, and one outside."""
+    inside = tmp_path / "inside"
+    (inside / "data").mkdir(parents=True)
+    response, _ = measured(systems.published(), np.linspace(4.0, 400.0, 100))
+    cells = zip(response.frequency, response.value.real, response.value.imag, strict=True)
+    text = "frequency_Hz,real_m_per_N,imag_m_per_N\n" + "".join(f"{f!r},{a!r},{b!r}\n" for f, a, b in cells)
+    text = text.replace("np.float64(", "").replace(")", "")
+    for file in ("sweep.csv", "data/sweep.csv", "../outside.csv"):
+        (inside / file).write_text(text)
+    (tmp_path / "secret").write_text(f"{SECRET}\n{SECRET}\n")
+    monkeypatch.chdir(tmp_path)
+    return inside
+
+
+@pytest.fixture
+def no_waiting():
+    """A reading that waits for ever is a failure."""
+
+    def late(*_):
+        raise TimeoutError("it waits for ever")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(HANG)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def faults(folder, file):
+    """The lines that refuse a device whose response is in this file."""
+    (folder / "device.toml").write_text(DEVICE.format(f"file = '{file}'"))
+    with pytest.raises(DeviceError) as caught:
+        load(folder / "device.toml")
+    return [str(fault) for fault in caught.value.faults]
+
+
+@pytest.mark.parametrize("file", ["sweep.csv", "./sweep.csv", "data/sweep.csv", "data/../sweep.csv", "link.csv"])
+def test_a_response_is_read_from_the_folder_of_its_device_file(folder, file):
+    (folder / "link.csv").symlink_to("data/sweep.csv")
+    (folder / "device.toml").write_text(DEVICE.format(f"file = '{file}'"))
+    assert len(load(folder / "device.toml").response.frequency) == 100
+    assert len(load("inside/device.toml").response.frequency) == 100
+
+
+@pytest.mark.xfail(strict=True, reason="a response may be named anywhere")
+@pytest.mark.parametrize(
+    "file", ["../outside.csv", "data/../../outside.csv", "{}/outside.csv", "out.csv", "up/outside.csv"]
+)
+def test_a_response_from_elsewhere_is_refused(folder, file):
+    (folder / "out.csv").symlink_to("../outside.csv")
+    (folder / "up").symlink_to("..")
+    (line,) = faults(folder, file.format(folder.parent))
+    assert "response.file: must lie in the folder of the device file, or below it, got " in line
+    assert line.endswith("; copy it there")
+
+
+@pytest.mark.xfail(strict=True, reason="the first line of any file is repeated")
+@pytest.mark.parametrize("file", ["../secret", "secret", "secret.csv"])
+def test_a_refusal_repeats_nothing_of_a_file_that_is_no_sweep(folder, file):
+    (folder / "secret").symlink_to("../secret")
+    (folder / "secret.csv").write_text((folder.parent / "secret").read_text())
+    (line,) = faults(folder, file)
+    assert "swordfish" not in line
+    if file == "secret.csv":
+        assert "line 1: columns frequency_Hz, real_m_per_N, imag_m_per_N are missing" in line
+
+
+@pytest.mark.xfail(strict=True, reason="a pipe is waited for")
+@pytest.mark.usefixtures("no_waiting")
+def test_a_pipe_for_a_response_is_refused(folder):
+    os.mkfifo(folder / "pipe.csv")
+    (line,) = faults(folder, "pipe.csv")
+    assert line.endswith("pipe.csv: is a pipe, no plain file; save what comes through it as one")
+
+
+@pytest.mark.xfail(strict=True, reason="a pipe is waited for")
+@pytest.mark.usefixtures("no_waiting")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("chart", "{}"),
+        ("chart", TWO_MASS, "--operator", "{}"),
+        ("check", TWO_MASS, "--points", "{}"),
+        ("experiment", TWO_MASS, "--measured", "{}"),
+        ("robust", TWO_MASS, "--operator-list", "{}"),
+        ("simulate", TWO_MASS, "--environment", "{}:wall"),
+        ("map", "five-bar", "--measures-file", "{}", "--measure", "isotropy"),
+        ("sweep", "{}"),
+    ],
+)
+def test_a_pipe_for_any_file_is_one_line(tmp_path, words):
+    pipe = tmp_path / "pipe.py"
+    os.mkfifo(pipe)
+    (line,) = refused(*(word.format(pipe) for word in words))
+    assert "is a pipe, no plain file" in line
+
+
+@pytest.mark.xfail(strict=True, reason="a pipe is waited for, and a device is read")
+@pytest.mark.usefixtures("no_waiting")
+def test_what_a_study_names_is_a_plain_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe.toml")
+    for name, fault in (("pipe.toml", "is a pipe"), ("/dev/zero", "is a device"), (".", "is a directory")):
+        (tmp_path / "study.toml").write_text(STUDY.format(name))
+        with pytest.raises(DeviceError) as caught:
+            read_study(tmp_path / "study.toml")
+        (line,) = map(str, caught.value.faults)
+        assert fault in line
