@@ -42,10 +42,9 @@ def deliver(answer: Answer, as_json: bool) -> int:
 
 
 def put(text: str) -> None:
-    """Text on standard output; nowhere if that is closed."""
-    if sys.stdout and text:
-        sys.stdout.write(text)
-        sys.stdout.flush()
+    """Text on standard output."""
+    sys.stdout.write(text)
+    sys.stdout.flush()
 
 
 def sheet(rows: Sequence[Row]) -> Any:
@@ -78,7 +77,7 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
 def _rendered(pages: Sequence[Any]) -> str:
     from rich.console import Console
 
-    width = None if sys.stdout and sys.stdout.isatty() else 110
+    width = None if sys.stdout.isatty() else 110
     console = Console(markup=False, highlight=False, emoji=False, width=width)
     with console.capture() as captured:
         for page in pages:

@@ -35,12 +35,14 @@ def run(arguments: Sequence[str]) -> int:
         from zwidth.show.cli.errors import explain
     except KeyboardInterrupt:
         return interrupted()
+    if sys.stdout is None or sys.stdout.closed:  # said before anything is computed in vain
+        say("zwidth: standard output is closed; send it to a file, or to /dev/null")
+        return BAD_INPUT
     try:
         from zwidth.show.cli.group import invoke
 
         code = invoke(arguments)
-        if sys.stdout:
-            sys.stdout.flush()
+        sys.stdout.flush()
         return code
     except KeyboardInterrupt:
         return interrupted()
@@ -69,6 +71,8 @@ def interrupted() -> int:
 
 def say(*lines: str) -> None:
     """Lines on standard error, if anybody listens."""
+    if sys.stderr is None:  # for which print would take standard output
+        return
     with suppress(OSError, ValueError):
         for line in lines:
             print(line, file=sys.stderr)
@@ -90,8 +94,7 @@ def _warn(
 def _drop_output() -> None:
     """Send what standard output still holds to nowhere if it cannot be written, or Python complains at its end."""
     try:
-        if sys.stdout:
-            sys.stdout.flush()
+        sys.stdout.flush()
     except (OSError, ValueError):
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -19,7 +19,7 @@ PATIENCE: Final = 5.0  # s without a word
 @contextmanager
 def progress_told() -> Iterator[Progress]:
     """A bar on standard error where somebody watches; else a line for each stage of a run that takes its time."""
-    with _bar() if sys.stderr.isatty() else _lines() as progress:
+    with _bar() if sys.stderr is not None and sys.stderr.isatty() else _lines() as progress:
         yield progress
 
 
