@@ -283,7 +283,7 @@ def test_what_cannot_be_meant_is_one_line(folder, words, line):
     ("text", "line"),
     [
         ("", "is empty"),
-        ("K,B\n1,2\n", "column stiffness_N_per_m is missing"),
+        ("K,B\n1,2\n", "columns stiffness_N_per_m, damping_Ns_per_m are missing"),
         ("stiffness_N_per_m,damping_Ns_per_m\n", "holds no walls"),
         ("stiffness_N_per_m,damping_Ns_per_m\n1,nan\n", "line 2: damping_Ns_per_m: must be a finite number"),
         ("stiffness_N_per_m,damping_Ns_per_m,edge\n1,2,left\n", "edge: must be lower, upper, tip or nothing"),

@@ -50,7 +50,7 @@ def test_operators_from_a_list_file(tmp_path):
     names.write_text("# who may come\nnone\n\nthesis-arm  # the usual one\n", encoding="utf-8")
     document = found("robust", TWO_MASS, "--operator-list", names)
     assert [member["operator"] for member in document["members"]] == ["none", "thesis-arm"]
-    assert "cannot be read" in refused("robust", TWO_MASS, "--operator-list", tmp_path / "missing")[0]
+    assert "no such file" in refused("robust", TWO_MASS, "--operator-list", tmp_path / "missing")[0]
 
 
 def test_people_read_who_binds_what_is_lost_and_what_was_tried():

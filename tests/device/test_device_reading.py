@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import bundled, load
-from zwidth.device.read import LARGEST_FILE, decode, parse
+from zwidth.device.read import LARGEST_FILE, parse
+from zwidth.device.text_file import Unreadable, decode
 
 GOOD = b'name = "a mass"\n[plant]\nmass_kg = 0.1\n[loop]\nsampling_period_s = 0.001\n'
 
@@ -49,7 +50,7 @@ def test_byte_order_marks_and_line_ends_do_not_matter(tmp_path, data):
         (b'{"name": "json"}', "is not TOML"),
         (b"\x89PNG\r\n\x1a\n\x00", "is not UTF-8 text (byte 0 is 0x89)"),
         (b"name = 'a'\x00", "is a binary file (byte 10 is zero)"),
-        (GOOD.decode().encode("utf-16"), "is UTF-16 text; save it as UTF-8"),
+        (GOOD.decode().encode("utf-16"), "is UTF-16 text, not UTF-8"),
         ("name = 'Gerät'".encode("latin-1"), "is not UTF-8 text (byte 11 is 0xe4)"),
         (b"a = " + b"[" * 10_000 + b"]" * 10_000, "nested too deeply"),
         (b"a = " + b"{a=" * 10_000 + b"1" + b"}" * 10_000, "nested too deeply"),
@@ -116,8 +117,8 @@ def test_a_file_that_may_not_be_read(tmp_path):
 
 @given(st.binary(max_size=60))
 def test_whatever_the_bytes_only_device_errors_come_out(data):
-    with contextlib.suppress(DeviceError):
-        parse(decode(data, "my.toml"), "my.toml")
+    with contextlib.suppress(DeviceError, Unreadable):
+        parse(decode(data), "my.toml")
 
 
 def test_listing_the_bundled_devices_needs_no_numerics():

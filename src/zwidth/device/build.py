@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -115,7 +114,7 @@ def response(section: ResponseSection, label: str, period: float) -> Response:
     """The measured response, from files beside the device file; `label` is its path."""
     from zwidth.device.response_file import read_response
 
-    return read_response(section, Path(label).parent, period)
+    return read_response(section, label, period)
 
 
 def damping(section: DampingSection | None) -> Damping:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from zwidth.device.faults import fail, listed, nearest
+from zwidth.device.text_file import Unreadable, read_text
 
 
 @dataclass(frozen=True)
@@ -65,24 +66,7 @@ def read(name_or_path: str | os.PathLike[str], shelf: Shelf = DEVICES) -> tuple[
         raise fail(shelf.noun, "", message)
     if label in names:
         return parse(_bundled_text(label, shelf), label, shelf), label
-    return parse(decode(_bytes(label, shelf), label), label, shelf), label
-
-
-def decode(data: bytes, label: str) -> str:
-    """The text of a file: UTF-8, with or without a byte order mark."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise fail(label, "", "is UTF-16 text; save it as UTF-8")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise fail(
-            label,
-            "",
-            f"is not UTF-8 text (byte {error.start} is 0x{data[error.start]:02x}); give a TOML text file",
-        ) from None
-    if "\x00" in text:
-        raise fail(label, "", f"is a binary file (byte {data.index(0)} is zero); give a TOML text file")
-    return text
+    return parse(_text(label, shelf), label, shelf), label
 
 
 def parse(text: str, label: str, shelf: Shelf = DEVICES) -> dict[str, Any]:
@@ -117,22 +101,12 @@ def within_depth(value: Any, deepest: int = DEEPEST) -> bool:
     return False
 
 
-def _bytes(label: str, shelf: Shelf) -> bytes:
+def _text(label: str, shelf: Shelf) -> str:
     try:
-        with open(label, "rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
-    except FileNotFoundError:
-        raise fail(label, "", _not_found(label, shelf)) from None
-    except IsADirectoryError:
-        raise fail(label, "", f"is a directory; give {shelf.file} or a bundled name") from None
-    except PermissionError:
-        raise fail(label, "", "cannot be read: permission denied; change its permissions") from None
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise fail(label, "", f"cannot be read: {_lower_first(reason)}") from None
-    if len(data) > LARGEST_FILE:
-        raise fail(label, "", f"is larger than {LARGEST_FILE // 1_000_000} MB; this is no {shelf.noun} file")
-    return data
+        return read_text(label, LARGEST_FILE)
+    except Unreadable as error:
+        wrong = _not_found(label, shelf) if error.missing else f"{error}; give {shelf.file} or a bundled name"
+        raise fail(label, "", wrong) from None
 
 
 def _not_found(label: str, shelf: Shelf) -> str:

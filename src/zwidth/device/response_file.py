@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +12,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.device.faults import DeviceError, Fault, fail, listed
+from zwidth.device.faults import DeviceError, Fault, fail, quote
 from zwidth.device.schema.response import ResponseSection
+from zwidth.device.text_file import LARGEST_TABLE, Unreadable, filled, header_fault, read_text
 from zwidth.model.response import Response, ResponseError
 from zwidth.model.sweep import sweep_response
 
@@ -26,20 +28,25 @@ SPECTRUM: Final = ("frequency_Hz", "real_m_per_N", "imag_m_per_N")
 RECORD: Final = ("time_s", "force_command_N", "position_m")
 OPTIONAL: Final = ("coherence", "sweep")
 LINE: Final = ""
-LARGEST_FILE: Final = 200_000_000  # bytes
 MOST_LINES: Final = 3  # told of one cause
 UNEVEN: Final = 0.05  # of the sampling period, by which time stamps may jitter
 OFF: Final = 1e-3  # relative, by which their mean may differ from it
 
 
-def read_response(section: ResponseSection, folder: Path, period: float) -> Response:
+def read_response(section: ResponseSection, label: str, period: float) -> Response:
     """The response of a device file; several sweeps come with their mean.
 
-    folder  where the device file stands
+    label   path of the device file
     period  sampling period T [s]
     Raises  DeviceError  with every fault of the first file that has some
     """
     names = section.files or (section.file or "",)
+    folder = Path(label).parent
+    outside = [name for name in names if not _lies_in(folder, folder / name)]
+    if outside:
+        key = "response.files" if section.files else "response.file"
+        wrong = "must lie in the folder of the device file, or below it, got {}; copy it there"
+        raise DeviceError(Fault(label, key, wrong.format(quote(name))) for name in outside)
     responses = [one for name in names for one in _responses(folder / name, section, period)]
     first = responses[0]
     for name, other in zip(
@@ -163,11 +170,11 @@ def _table(path: Path) -> Table:
     lines: list[int] = []
     uneven: list[tuple[int, str]] = []
     try:
-        header = [name.strip() for name in next(_filled(rows), [])]
+        header = [name.strip() for name in next(filled(rows), [])]
         columns = _columns(path, header)
         places = [header.index(name) for name in columns]
         wrong: dict[str, list[tuple[int, str]]] = {name: [] for name in columns}
-        for row in _filled(rows):
+        for row in filled(rows):
             if len(row) > len(header):
                 told = f"has {len(row)} cells, but the header names {len(header)} columns"
                 uneven.append((rows.line_num, f"{told}; write a decimal point, not a comma"))
@@ -193,20 +200,10 @@ def _columns(path: Path, header: list[str]) -> list[str]:
     if not header:
         raise fail(str(path), "", f"is empty; its first line must name columns, such as {', '.join(SPECTRUM)}")
     wanted = RECORD if "time_s" in header else SPECTRUM
-    used = [*wanted, *(name for name in OPTIONAL if name in header and wanted is SPECTRUM)]
-    faults = [
-        Fault(
-            str(path),
-            "line 1",
-            f"column {name} is {'missing' if name not in header else 'there more than once'}; there are "
-            f"{listed(header, 8)[:200]}, needed are {', '.join(wanted)}",
-        )
-        for name in used
-        if header.count(name) != 1
-    ]
-    if faults:
-        raise DeviceError(faults)
-    return used
+    optional = [name for name in OPTIONAL if name in header and wanted is SPECTRUM]
+    if fault := header_fault(header, wanted, optional):
+        raise fail(str(path), "line 1", fault)
+    return [*wanted, *optional]
 
 
 def _raise(path: Path, causes: Iterable[Cause]) -> None:
@@ -225,10 +222,6 @@ def _raise(path: Path, causes: Iterable[Cause]) -> None:
         raise DeviceError(faults)
 
 
-def _filled(rows: Iterator[list[str]]) -> Iterator[list[str]]:
-    return (row for row in rows if any(cell.strip() for cell in row))
-
-
 def _number(cell: str) -> float:
     try:
         return float(cell)
@@ -240,21 +233,22 @@ def _got(cell: str) -> str:
     return f"got {cell[:60]!r}" if cell else "but it is missing"
 
 
+def _lies_in(folder: Path, path: Path) -> bool:
+    """Does a file lie in a folder or below it, all links followed?
+
+    Who opens a device file from somebody else must not have other files of his own read by it, nor through a link
+    that came with it.
+    """
+    try:
+        home = os.path.realpath(folder)
+        return os.path.commonpath((home, os.path.realpath(path))) == home
+    except ValueError:  # another drive, or a zero byte in the name
+        return False
+
+
 def _text(path: Path) -> str:
     try:
-        with open(path, "rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
-    except FileNotFoundError:
-        raise fail(str(path), "", "there is no such file; response.file is meant beside the device file") from None
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise fail(str(path), "", f"cannot be read: {reason[:1].lower() + reason[1:]}") from None
-    if len(data) > LARGEST_FILE:
-        raise fail(str(path), "", f"is larger than {LARGEST_FILE // 1_000_000} MB; shorten it")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise fail(str(path), "", f"is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8") from None
-    if "\x00" in text:
-        raise fail(str(path), "", "is a binary file; give a CSV text file")
-    return text
+        return read_text(path, LARGEST_TABLE)
+    except Unreadable as error:
+        hint = "response.file is meant beside the device file" if error.missing else "give a CSV file"
+        raise fail(str(path), "", f"{error}; {hint}") from None

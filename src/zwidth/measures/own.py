@@ -110,7 +110,7 @@ def load_measures(path: str) -> dict[str, Measure]:
     """
     file = Path(path)
     if not file.is_file():
-        raise ValueError(f"no such file: {path}")
+        raise ValueError(f"{path} is no plain file" if file.exists() else f"no such file: {path}")
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

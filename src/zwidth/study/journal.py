@@ -68,6 +68,8 @@ class Journal:
         if path is None:
             self.kept = 0
             return
+        if path.exists() and not path.is_file():
+            raise JournalError(f"{path.name}: is no plain file; name another")
         data = path.read_bytes() if path.exists() else b""
         whole = _read(path, data.split(b"\n")[:-1], data != b"", question)
         self.known = {entry["name"]: entry["value"] for entry in map(json.loads, whole[1:])}

@@ -19,7 +19,8 @@ from zwidth.device.holding import NOBODY, operator_table
 from zwidth.device.load import from_document, in_order
 from zwidth.device.plain import number, table, tables
 from zwidth.device.plausible import warn_of_implausible
-from zwidth.device.read import DEVICES, OPERATORS, Shelf, bundled_names, decode, parse, read
+from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, Shelf, bundled_names, parse, read
+from zwidth.device.text_file import Unreadable, read_text
 from zwidth.device.translate import sentences
 from zwidth.measures.measure import Measure
 from zwidth.measures.own import load_measures
@@ -72,15 +73,10 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     """
     label = os.fspath(path)
     try:
-        data = File(label).read_bytes()
-    except FileNotFoundError:
-        raise fail(label, "", "no such file; give a study file") from None
-    except IsADirectoryError:
-        raise fail(label, "", "is a directory; give a study file") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise fail(label, "", f"cannot be read: {reason[:1].lower() + reason[1:]}") from None
-    return study_of(parse(decode(data, label), label, STUDIES), label)
+        text = read_text(label, LARGEST_FILE)
+    except Unreadable as error:
+        raise fail(label, "", f"{error}; give a study file") from None
+    return study_of(parse(text, label, STUDIES), label)
 
 
 def study_of(document: dict[str, Any], label: str = "study") -> Study:

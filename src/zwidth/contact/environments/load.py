@@ -37,7 +37,7 @@ def load_environment(source: str) -> Environment:
         raise ValueError(f'no environment is named {source!r}; {hint} (your own: "file.py:name")')
     file = Path(path)
     if not file.is_file():
-        raise ValueError(f"no such file: {path}")
+        raise ValueError(f"{path} is no plain file" if file.exists() else f"no such file: {path}")
     module = _run(file)
     found = getattr(module, name, None)
     if not isinstance(found, Environment):

@@ -10,6 +10,7 @@ from itertools import islice
 from math import nan
 from typing import Any, Final
 
+from zwidth.device.text_file import LARGEST_TABLE, Unreadable, filled, header_fault, read_text
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import wall_number
 
@@ -23,7 +24,6 @@ SPREADS: Final = (
 EDGES: Final = ("lower", "upper", "tip", "")
 VERDICTS: Final = ("stable", "unstable", "")
 MOST_FAULTS: Final = 20
-LARGEST_FILE: Final = 200_000_000  # bytes; some millions of walls
 
 Walls = list[tuple[float, float]]
 # from a cell to its value, and what is wrong with it ("" if nothing)
@@ -106,10 +106,10 @@ def _read(file: str, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
     faults: list[str] = []
     found: list[dict[str, Any]] = []
     try:
-        header = [name.strip() for name in next(_filled(rows), [])]
+        header = [name.strip() for name in next(filled(rows), [])]
         places = _places(file, header, optional)
         readers: dict[str, Reader] = {**dict.fromkeys(COLUMNS, wall_number), **optional}
-        for row in _filled(rows):
+        for row in filled(rows):
             if len(row) > len(header):
                 faults.append(
                     f"{file}: line {rows.line_num}: has {len(row)} cells, but the header names {len(header)} "
@@ -145,37 +145,17 @@ def _at_odds(cells: dict[str, Any]) -> Iterator[str]:
             yield f"{low}: must be at most {high} = {cells[high]:g}, got {cells[low]:g}"
 
 
-def _filled(rows: Iterator[list[str]]) -> Iterator[list[str]]:
-    return (row for row in rows if any(cell.strip() for cell in row))
-
-
 def _places(file: str, header: list[str], optional: Collection[str]) -> dict[str, int]:
     """Index of each column wanted, and of the optional ones that are there."""
     if not header:
         raise BadInput(f"{file}: is empty; its first line must name the columns {', '.join(COLUMNS)}")
-    faults = []
-    for name in (*COLUMNS, *optional):
-        if header.count(name) != 1 and not (name in optional and name not in header):
-            trouble = "is missing" if name not in header else "is there more than once"
-            faults.append(f"{file}: line 1: column {name} {trouble}; the columns are {', '.join(header)[:200]}")
-    if faults:
-        raise BadInput(*faults)
+    if fault := header_fault(header, COLUMNS, optional):
+        raise BadInput(f"{file}: line 1: {fault}")
     return {name: header.index(name) for name in (*COLUMNS, *optional) if name in header}
 
 
 def _text(file: str) -> str:
     try:
-        with open(file, "rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise BadInput(f"{file}: cannot be read: {reason[:1].lower() + reason[1:]}; give a CSV file") from None
-    if len(data) > LARGEST_FILE:
-        raise BadInput(f"{file}: is larger than {LARGEST_FILE // 1_000_000} MB; split it")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise BadInput(f"{file}: is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8") from None
-    if "\x00" in text:
-        raise BadInput(f"{file}: is a binary file; give a CSV text file")
-    return text
+        return read_text(file, LARGEST_TABLE)
+    except Unreadable as error:
+        raise BadInput(f"{file}: {error}; give a CSV file") from None

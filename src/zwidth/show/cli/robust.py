@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.device.read import LARGEST_FILE
+from zwidth.device.text_file import Unreadable, read_text
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.errors import BadInput
@@ -149,10 +151,9 @@ def _operators(question: Question, names: str | None, file: str | None) -> tuple
         raise BadInput("--operator is one of those in the list; leave it out")
     if file is not None:
         try:
-            lines = Path(file).read_text(encoding="utf-8").splitlines()
-        except (OSError, ValueError) as error:
-            why = getattr(error, "strerror", None) or "is no text"
-            raise BadInput(f"--operator-list: {file}: cannot be read: {why}") from None
+            lines = read_text(file, LARGEST_FILE).splitlines()
+        except Unreadable as error:
+            raise BadInput(f"--operator-list: {file}: {error}; give a text file, one name a line") from None
         listed = [line.split("#")[0].strip() for line in lines]
         found = tuple(dict.fromkeys(name for name in listed if name))
     else:

@@ -1,0 +1,113 @@
+"""Plain files with text: read whole, up to a size. A folder, a pipe or a device is refused before it is opened."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Collection, Iterator, Sequence
+from typing import Final
+
+LARGEST_TABLE: Final = 200_000_000  # bytes of CSV: some millions of lines, an hour of samples at 1 kHz
+SEPARATORS: Final = {";": "';'", "\t": "tabs", "|": "'|'"}  # that tables are written with instead of commas
+_KINDS: Final = ((stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
+
+
+class Unreadable(ValueError):
+    """A file that is not read; the text says why, without its name and its contents.
+
+    missing  is there no such file?
+    """
+
+    def __init__(self, text: str, *, missing: bool = False) -> None:
+        self.missing = missing
+        super().__init__(text)
+
+
+def read_plain(path: str | os.PathLike[str], largest: int) -> bytes:
+    """Bytes of a plain file, found by its path, of at most `largest` bytes; links are followed.
+
+    Raises  Unreadable  where there is none, for anything else than a plain file, for one that is larger, and
+                        where the system refuses to read it
+    """
+    try:
+        if wrong := _no_plain_file(os.stat(path).st_mode):
+            raise Unreadable(wrong)
+        with open(path, "rb") as stream:
+            data = stream.read(largest + 1)
+    except FileNotFoundError:
+        raise Unreadable("no such file", missing=True) from None
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise Unreadable(f"cannot be read: {reason[:1].lower() + reason[1:]}") from None
+    except ValueError as error:
+        if isinstance(error, Unreadable):
+            raise
+        raise Unreadable("cannot be read: its name holds a zero byte") from None
+    if len(data) > largest:
+        raise Unreadable(f"is larger than {largest // 1_000_000} MB")
+    return data
+
+
+def _no_plain_file(mode: int) -> str:
+    """What something other than a plain file is; "" for a plain file."""
+    if stat.S_ISREG(mode):
+        return ""
+    if stat.S_ISDIR(mode):
+        return "is a directory"
+    kind = next((kind for test, kind in _KINDS if test(mode)), "device")
+    return f"is a {kind}, no plain file"
+
+
+def read_text(path: str | os.PathLike[str], largest: int) -> str:
+    """Text of a plain file in UTF-8, with or without a byte order mark.
+
+    Raises  Unreadable  as `read_plain`, and for what is not such text
+    """
+    return decode(read_plain(path, largest))
+
+
+def decode(data: bytes) -> str:
+    """Text of bytes in UTF-8, with or without a byte order mark. Raises Unreadable for what is not such text."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise Unreadable("is UTF-16 text, not UTF-8")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise Unreadable(f"is not UTF-8 text (byte {error.start} is 0x{data[error.start]:02x})") from None
+    if "\x00" in text:
+        raise Unreadable(f"is a binary file (byte {data.index(0)} is zero)")
+    return text
+
+
+def filled(rows: Iterator[list[str]]) -> Iterator[list[str]]:
+    """The rows of a table that are not blank."""
+    return (row for row in rows if any(cell.strip() for cell in row))
+
+
+def header_fault(header: Sequence[str], needed: Sequence[str], optional: Collection[str] = ()) -> str:
+    """What is wrong with the names of a table's columns, one sentence; "" if nothing.
+
+    It says what is needed and nothing of what is there: the file may be another than was meant.
+
+    >>> header_fault(["frequency_Hz"], ["frequency_Hz", "coherence"])
+    'column coherence is missing; needed are frequency_Hz, coherence'
+    >>> header_fault(["K;B"], ["K", "B"])
+    "columns K, B are missing: the cells are separated by ';'; use commas"
+    """
+    missing = [name for name in needed if name not in header]
+    twice = [name for name in (*needed, *optional) if header.count(name) > 1]
+    told = []
+    if missing:
+        told.append(f"{_columns(missing)} missing")
+    if twice:
+        told.append(f"{_columns(twice)} there more than once")
+    if not told:
+        return ""
+    other = next((name for mark, name in SEPARATORS.items() if len(header) == 1 and mark in header[0]), None)
+    if missing and other:
+        return f"{' and '.join(told)}: the cells are separated by {other}; use commas"
+    return f"{' and '.join(told)}; needed are {', '.join(needed)}"
+
+
+def _columns(names: Sequence[str]) -> str:
+    return f"column {names[0]} is" if len(names) == 1 else f"columns {', '.join(names)} are"
