@@ -1,0 +1,262 @@
+"""What is handed over by mistake: every public entry says in one sentence what it takes and what to type."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import inf, nan
+
+import numpy as np
+import pytest
+
+import zwidth
+from tests import systems
+from tests.measured_cases import measured
+from zwidth.chart.measured import measured_chart
+
+ONE = np.ones(1)
+NONE = np.zeros((1, 1))
+
+
+@cache
+def device():
+    return zwidth.load("published-two-mass")
+
+
+@cache
+def loop():
+    return zwidth.Loop(device().plant(), device().controller)
+
+
+@cache
+def chart():
+    return zwidth.stability_chart(loop(), decay=False)
+
+
+def plant(mass=1.0):
+    return zwidth.Plant(np.array([[mass]]), NONE, NONE, ONE, ONE)
+
+
+def multi():
+    return zwidth.MultiPlant(np.eye(2), *np.zeros((2, 2, 2)), np.eye(2), np.eye(2))
+
+
+KINDS = [
+    (
+        lambda: zwidth.Loop(device(), device().controller),
+        "plant must be a Plant, got a Device; write Loop(device.plant(), device.controller)",
+    ),
+    (lambda: zwidth.Loop("my.toml", device().controller), "plant must be a Plant, got the text 'my.toml'"),
+    (
+        lambda: zwidth.Loop(multi(), device().controller),
+        "plant must be a Plant, got a MultiPlant; write MultiLoop(plant, controller) for several directions",
+    ),
+    (
+        lambda: zwidth.Loop(plant(), device()),
+        "controller must be a Controller, got a Device; write device.controller",
+    ),
+    (
+        lambda: zwidth.Loop(plant(), 0.001),
+        "controller must be a Controller, got 0.001; write Controller(sampling_period=...)",
+    ),
+    (
+        lambda: zwidth.MultiLoop(plant(), device().controller),
+        "plant must be a MultiPlant, got a Plant; write Loop(plant, controller) for one direction",
+    ),
+    (
+        lambda: zwidth.stability_chart(device()),
+        "loop must be a Loop, got a Device; write Loop(device.plant(), device.controller)",
+    ),
+    (lambda: zwidth.stability_chart(plant()), "loop must be a Loop, got a Plant; write Loop(plant, controller)"),
+    (lambda: zwidth.largest_stiffness("my.toml"), "loop must be a Loop, got the text 'my.toml'"),
+    (lambda: zwidth.judge(device(), 1.0, 1.0), "loop must be a Loop, got a Device; write Loop(device.plant(), "),
+    (lambda: zwidth.multi_chart(loop()), "loop must be a MultiLoop, got a Loop; stability_chart takes a Loop"),
+    (lambda: zwidth.hysteretic_chart(device()), "loop must be a Loop, got a Device"),
+    (lambda: zwidth.robust_chart(loop()), "members must be a list of Loops, got a Loop; write [loop]"),
+    (lambda: zwidth.robust_chart([device()]), "members[0] must be a Loop, got a Device"),
+    (
+        lambda: zwidth.measured_chart(device(), device().controller),
+        "response must be a Response, got a Device; write device.response",
+    ),
+    (lambda: zwidth.compare(device()), "loop must be a Loop, got a Device"),
+    (lambda: zwidth.passive_region(device()), "loop must be a Loop, got a Device"),
+    (lambda: zwidth.spring_stable_region(device()), "loop must be a Loop, got a Device"),
+    (lambda: zwidth.nested(device()), "loop must be a Loop, got a Device"),
+    (lambda: zwidth.limit_cycles(device(), 1.0, 1.0), "loop must be a Loop, got a Device"),
+    (lambda: zwidth.felt_impedance(device(), 1.0, 1.0, [1.0]), "loop must be a Loop, got a Device"),
+    (lambda: zwidth.felt_chart(device()), "chart must be a StabilityChart, got a Device"),
+    (lambda: zwidth.felt_chart(loop()), "chart must be a StabilityChart, got a Loop; write stability_chart(loop)"),
+    (lambda: zwidth.static_stiffness(device(), 1.0), "plant must be a Plant, got a Device; write device.plant()"),
+    (lambda: zwidth.natural_frequencies(device()), "plant must be a Plant, got a Device; write device.plant()"),
+    (lambda: zwidth.reduce_plant(device(), "rigid"), "plant must be a Plant, got a Device; write device.plant()"),
+    (lambda: zwidth.attach(plant(), "firm"), "operator must be an Operator, got the text 'firm'"),
+    (lambda: zwidth.wall_paths(device(), 1.0, [0.0, 1.0]), "loop must be a Loop, got a Device"),
+    (
+        lambda: zwidth.simulate(device(), None, [], duration=1.0),
+        "loop must be a Loop, got a Device",
+    ),
+    (lambda: zwidth.sensitivities(loop()), "device must be a Device, got a Loop"),
+    (
+        lambda: zwidth.sensitivities("my.toml"),
+        "device must be a Device, got the text 'my.toml'; write load('my.toml')",
+    ),
+    (lambda: zwidth.validity(loop()), "device must be a Device, got a Loop"),
+    (lambda: zwidth.place_of("my.toml"), "device must be a Device, got the text 'my.toml'; write load('my.toml')"),
+    (lambda: zwidth.plane_of("my.toml"), "device must be a Device, got the text 'my.toml'; write load('my.toml')"),
+    (
+        lambda: zwidth.workspace_map("my.toml", ["isotropy"]),
+        "device must be a Device, got the text 'my.toml'; write load('my.toml')",
+    ),
+    (
+        lambda: zwidth.workspace_map(device(), "isotropy"),
+        "measures must be a list of names, got the text 'isotropy'; write ['isotropy']",
+    ),
+    (lambda: zwidth.sweep(device()), "study must be a Study or the path of a study file, got a Device"),
+    (lambda: zwidth.robust_study(device()), "family must be a Family, got a Device"),
+    (
+        lambda: zwidth.evaluate("isotropy", None),
+        "measure must be a Measure, got the text 'isotropy'; write find_measure('isotropy')",
+    ),
+    (
+        lambda: zwidth.evaluate(zwidth.find_measure("isotropy"), device()),
+        "place must be a Place, got a Device; write place_of(device)",
+    ),
+    (
+        lambda: zwidth.solve_posture(device(), (0.0, 0.25)),
+        "mechanism must be a Mechanism, got a Device; write device.mechanism",
+    ),
+    (lambda: zwidth.load(3), "name_or_path must be a bundled name or a path, got 3"),
+    (
+        lambda: zwidth.load("published-two-mass", "loop.delay_samples=1"),
+        "settings must be a list or a dictionary, got the text 'loop.delay_samples=1'; "
+        "write ['loop.delay_samples=1']",
+    ),
+    (
+        lambda: zwidth.from_document("my.toml"),
+        "document must be a dictionary, got the text 'my.toml'; write load(",
+    ),
+    (lambda: zwidth.velocity_of("foaw", [0.0, 1.0], 0.001), "method must be a velocity estimate, got the text"),
+    (lambda: zwidth.judge_response(chart()), "response must be a TimeResponse, got a StabilityChart"),
+    (lambda: zwidth.find_measure(3), "name must be a measure's name, got 3"),
+]
+
+VALUES = [
+    (lambda: chart().check(nan, 1.0), "wall_stiffness must be a finite number [N/m], got nan"),
+    (lambda: chart().check(1.0, inf), "wall_damping must be a finite number [N s/m], got inf"),
+    (lambda: chart().check("stiff", 1.0), "wall_stiffness must be numbers [N/m], got the text 'stiff'"),
+    (
+        lambda: chart().check([1.0, 2.0], [1.0, 2.0, 3.0]),
+        "wall_stiffness has the shape (2,) and wall_damping (3,); give equal shapes, or one number for all",
+    ),
+    (lambda: zwidth.judge(loop(), nan, nan), "wall_stiffness must be a finite number [N/m], got nan"),
+    (lambda: zwidth.spectral_radius(loop(), 1.0, nan), "wall_damping must be a finite number [N s/m], got nan"),
+    (lambda: zwidth.eigenvalues(loop(), [nan, 1.0], 1.0), "wall_stiffness must be finite numbers [N/m], got nan"),
+    (lambda: zwidth.felt_impedance(loop(), nan, 1.0, [1.0]), "wall_stiffness must be a finite number [N/m]"),
+    (
+        lambda: zwidth.Controller(-0.001),
+        "sampling_period must be a finite number greater than 0 [s], got -0.001; is it a frequency?",
+    ),
+    (lambda: zwidth.Controller(nan), "sampling_period must be a finite number greater than 0 [s], got nan"),
+    (
+        lambda: zwidth.Controller("1 ms"),
+        "sampling_period must be a finite number greater than 0 [s], got the text",
+    ),
+    (lambda: zwidth.Controller(0.001, -1.0), "delay must be a finite number, at least 0 [samples], got -1"),
+    (lambda: zwidth.Controller(0.001, nan), "delay must be a finite number, at least 0 [samples], got nan"),
+    (
+        lambda: zwidth.Controller(0.001, actuator_time_constant=-1.0),
+        "actuator_time_constant must be a finite number, at least 0 [s], got -1",
+    ),
+    (lambda: zwidth.Controller(0.001, saturation=nan), "saturation must be a number greater than 0 [N], got nan"),
+    (
+        lambda: zwidth.Controller(0.001, velocity="foaw"),
+        "velocity must be an estimate such as WindowedDifference(4), got the text 'foaw'",
+    ),
+    (
+        lambda: zwidth.Controller(0.001, velocity_filter=20.0),
+        "velocity_filter must be a FirstOrder, a Butterworth or None, got 20",
+    ),
+    (
+        lambda: zwidth.Controller(0.001, force_filter=zwidth.Butterworth(2, 500.0)),
+        "force_filter: cutoff_Hz must be below half the sampling frequency, 500 Hz, got 500",
+    ),
+    (lambda: zwidth.Butterworth(0, 20.0), "order must be a whole number from 1 on, got 0"),
+    (lambda: zwidth.Butterworth(2, -20.0), "cutoff_Hz must be a finite number greater than 0 [Hz], got -20"),
+    (
+        lambda: zwidth.Butterworth(2, 20.0, "euler"),
+        "discretisation must be 'tustin' or 'tustin-prewarped', got the text 'euler'",
+    ),
+    (lambda: zwidth.FirstOrder(-1.0), "time_constant must be a finite number, at least 0 [s], got -1"),
+    (
+        lambda: zwidth.Plant(0.3, 0.0, 0.0, 1.0, 1.0),
+        "mass must be an array (n, n), got 0.3; write [[0.3]] for one coordinate",
+    ),
+    (
+        lambda: zwidth.Plant(np.eye(2), NONE, NONE, ONE, ONE),
+        "damping must be an array (2, 2) as mass is, got one of the shape (1, 1)",
+    ),
+    (lambda: zwidth.Plant(np.eye(1), NONE, NONE, np.ones(2), ONE), "actuator must be an array (1,), got one of"),
+    (lambda: zwidth.Loop(plant(nan), device().controller), "plant.mass holds nan; every number must be finite"),
+    (lambda: zwidth.Loop(plant(-1.0), device().controller), "plant.mass must be positive definite, and its least"),
+    (lambda: zwidth.stability_chart(loop(), nan), "radius must be a number with 0 < radius <= 1, got nan"),
+    (lambda: zwidth.stability_chart(loop(), 0.0), "radius must be a number with 0 < radius <= 1, got 0"),
+    (lambda: zwidth.hysteretic_chart(loop()), "the plant has no loss factor; stability_chart charts it"),
+    (lambda: zwidth.compare(loop(), wall_damping=inf), "wall_damping must be finite, or nan for none, got inf"),
+    (lambda: zwidth.decay_time(0.9, -0.001), "sampling_period must be greater than 0 s, got -0.001"),
+    (lambda: zwidth.Operator(nan, 1.0, 1.0), "arm_mass must be a finite number, at least 0 [kg], got nan"),
+    (
+        lambda: zwidth.Response([1.0, 2.0], [1.0]),
+        "value has the shape (1,) and frequency (2,); they must be alike",
+    ),
+]
+
+
+@pytest.mark.xfail(strict=True, reason="what is no Loop, Plant or Device fails later, or not at all")
+@pytest.mark.parametrize(
+    ("call", "sentence"), KINDS, ids=lambda value: value[:40] if isinstance(value, str) else ""
+)
+def test_another_kind_of_thing_is_refused_at_once(call, sentence):
+    with pytest.raises(TypeError) as caught:
+        call()
+    assert str(caught.value).startswith(sentence)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.xfail(strict=True, reason="numbers that are none are computed with")
+@pytest.mark.parametrize(
+    ("call", "sentence"), VALUES, ids=lambda value: value[:40] if isinstance(value, str) else ""
+)
+def test_a_number_that_cannot_be_meant_is_refused_at_once(call, sentence):
+    with pytest.raises(ValueError) as caught:  # noqa: PT011  the sentence is compared below
+        call()
+    assert str(caught.value).startswith(sentence)
+    assert "\n" not in str(caught.value)
+
+
+def test_among_many_walls_one_that_is_no_number_is_undecided():
+    """Failures among many are data; the same question asked alone raises."""
+    found = chart().check([nan, 1000.0], [10.0, 10.0])
+    assert found.names == ["undecided", "stable"]
+    assert np.isnan(found.spectral_radius[0])
+    assert chart().check([nan], [1.0]).names == ["undecided"]
+    response, _ = measured(systems.published(), np.linspace(4.0, 400.0, 100))
+    other = measured_chart(response, zwidth.Controller(0.00125))
+    assert other.check([nan], [1.0]).names == ["undecided"]
+
+
+@pytest.mark.xfail(strict=True, reason="a measured device's chart takes nan as well")
+def test_a_wall_of_a_measured_device_is_finite():
+    response, _ = measured(systems.published(), np.linspace(4.0, 400.0, 100))
+    other = measured_chart(response, zwidth.Controller(0.00125))
+    with pytest.raises(ValueError, match=r"wall_stiffness must be a finite number \[N/m\], got nan"):
+        other.check(nan, 1.0)
+
+
+@pytest.mark.xfail(strict=True, reason="a dictionary's keys are read as settings")
+def test_settings_may_be_a_dictionary():
+    changed = zwidth.load("published-two-mass", {"loop.delay_samples": 1, "loop.sampling_period_s": 0.002})
+    assert (changed.controller.delay, changed.controller.sampling_period) == (1.0, 0.002)
+
+
+def test_a_plant_of_lists_becomes_one_of_arrays():
+    given = zwidth.Plant([[0.3]], [[0.0]], [[0.0]], [1.0], [1.0])
+    assert zwidth.judge(zwidth.Loop(given, zwidth.Controller(0.001)), 1000.0, 10.0).names == ["stable"]
