@@ -17,6 +17,7 @@ from zwidth.chart.region import closed_rings
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 
 Floats = NDArray[np.float64]
 
@@ -95,6 +96,9 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     >>> round(chart.stiffness_max, 6), round(chart.damping_max, 6)      # 12 - 8 sqrt 2 and 2 (thesis 4.14)
     (0.686292, 2.0)
     """
+    require("loop", loop, Loop)
+    if not 0.0 < radius <= 1.0:
+        raise ValueError(f"radius must be a number with 0 < radius <= 1, got {radius:g}")
     tracer = Tracer.of(loop, radius)
     rings, blur, samples, outlines = traced(tracer)
     width = widest(outlines)
@@ -119,6 +123,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
 
 def largest_stiffness(loop: Loop) -> Peak | None:
     """Only the stiffest stable wall with K > 0, B >= 0; None if there is none."""
+    require("loop", loop, Loop)
     tracer = Tracer.of(loop)
     rings, _, _, outlines = traced(tracer)
     return stiffest(tracer, rings, widest(outlines))

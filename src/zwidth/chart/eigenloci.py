@@ -15,7 +15,9 @@ from zwidth.chart.loci import Loci, refine_loci, trace_loci, with_angles
 from zwidth.chart.loci_arcs import ring_arcs, sample_arc
 from zwidth.chart.loci_cells import Line, cut_lines, reach, real_root_lines, stable_polygons
 from zwidth.chart.loci_numbers import is_stable, largest_damping, quadrant_area, stiffest
+from zwidth.loop.loop import Loop
 from zwidth.loop.multi import MultiLoop
+from zwidth.model.arguments import require
 
 Floats = NDArray[np.float64]
 
@@ -94,6 +96,7 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
     >>> round(chart.stiffness_max, 6), round(chart.damping_max, 6)       # the lighter mass's, thesis 4.14
     (0.686292, 2.0)
     """
+    require("loop", loop, MultiLoop, "stability_chart takes a Loop" if isinstance(loop, Loop) else "")
     loci, lines = trace_loci(loop), real_root_lines(loop)
     far = reach(loci, lines)
     polygons = stable_polygons(loop, cut_lines(loci, lines, -far, far))

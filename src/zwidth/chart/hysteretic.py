@@ -27,6 +27,7 @@ from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.loop.response import product
 from zwidth.loop.sections import HysteresisError
+from zwidth.model.arguments import require
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response, ResponseError
@@ -55,7 +56,9 @@ def hysteretic_chart(loop: Loop) -> MeasuredChart:
     >>> hysteretic_chart(Loop(plant, Controller(0.001))).stiffness_max > 0.0
     True
     """
-    assert loop.plant.hysteresis is not None
+    require("loop", loop, Loop)
+    if loop.plant.hysteresis is None:
+        raise HysteresisError("the plant has no loss factor; stability_chart charts it")
     if np.max(np.abs(loop.plant.hysteresis)) < LEAST * (1.0 - 1e-9) * np.max(np.abs(loop.plant.stiffness)):
         raise HysteresisError(f"the loss factor is below {LEAST:.0e}, {TOO_SMALL}")
     try:

@@ -19,6 +19,7 @@ from zwidth.chart.measured_verdict import MeasuredVerdicts, NearestEdge, judge_m
 from zwidth.chart.trust import Stretch
 from zwidth.chart.verdict import UNDECIDED
 from zwidth.loop.controller import Controller
+from zwidth.model.arguments import require
 from zwidth.model.response import Response, ResponseError
 
 Floats = NDArray[np.float64]
@@ -117,6 +118,8 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
     >>> chart.integrators, round(chart.stiffness_max, 5), round(chart.damping_max, 5)   # 12 - 8 sqrt 2 and 2
     (2, 0.68629, 2.0)
     """
+    require("response", response, Response)
+    require("controller", controller, Controller)
     loop = MeasuredLoop(response, controller)
     cells, closed = _cells(loop)
     if cells is None:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.chart.measured_curve import Boundary
 from zwidth.chart.measured_loop import MeasuredLoop
 from zwidth.chart.verdict import NAMES, STABLE, UNDECIDED, UNSTABLE
+from zwidth.model.arguments import walls as broadcast_walls
 
 Floats = NDArray[np.float64]
 
@@ -62,9 +63,10 @@ def judge_measured(
     """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast.
 
     A wall is undecided where, at any measured frequency, K + B w lies within the disk round h that the
-    measurement's error leaves: there the device may have a root on the circle for it. So is one not finite.
+    measurement's error leaves: there the device may have a root on the circle for it. So is, among many, one not
+    finite; alone it raises ValueError.
     """
-    K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
+    K, B = broadcast_walls(wall_stiffness, wall_damping)
     walls = np.column_stack([K.ravel(), B.ravel()])
     finite = np.all(np.isfinite(walls), axis=1)
     safe = np.where(finite[:, None], walls, 0.0)

@@ -18,6 +18,7 @@ from zwidth.chart.robust_members import Member, chart_members, polygons
 from zwidth.chart.robust_numbers import robust_largest_damping, robust_stiffest
 from zwidth.chart.verdict import judge
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import refusal, require
 
 Floats = NDArray[np.float64]
 
@@ -109,8 +110,12 @@ def robust_chart(members: Sequence[Loop]) -> RobustChart:
     >>> chart.binding, round(chart.stiffness_max, 2), round(chart.lost_stiffness_share, 6)
     ((1,), 68629.15, 0.666667)
     """
+    if isinstance(members, Loop):
+        raise refusal("members", "a list of Loops", members, "write [loop]")
     if not members:
         raise ValueError("a robust chart needs at least one member")
+    for index, loop in enumerate(members):
+        require(f"members[{index}]", loop, Loop)
     charted, failed = chart_members(members)
     return robust_of(charted, failed)
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require, walls
 
 Floats = NDArray[np.float64]
 
@@ -42,11 +43,13 @@ class Verdicts:
 
 def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.complex128]:
     """All eigenvalues z (..., N) of the transition matrix (thesis eq. 2.41), unobserved motions left out."""
-    return np.asarray(np.linalg.eigvals(loop.transition_matrix(wall_stiffness, wall_damping)), dtype=complex)
+    require("loop", loop, Loop)
+    K, B = walls(wall_stiffness, wall_damping, finite=True)
+    return np.asarray(np.linalg.eigvals(loop.transition_matrix(K, B)), dtype=complex)
 
 
 def spectral_radius(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
-    """Largest |z| (...) of walls K, B (...) that broadcast; nan for a wall that is not finite."""
+    """Largest |z| (...) of walls K, B (...) that broadcast; nan among many for one that is not finite."""
     return judge(loop, wall_stiffness, wall_damping).spectral_radius
 
 
@@ -54,10 +57,13 @@ def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Ver
     """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast.
 
     stable: |z| < 1 - u for all roots; unstable: |z| > 1 + u for one; undecided between, where u is 1e-9 or the
-    rounding error of the dominant eigenvalue (from its condition number), whichever is larger. A wall that is not
-    finite, or so large that its transition matrix is not, is undecided, with nan.
+    rounding error of the dominant eigenvalue (from its condition number), whichever is larger. One of many walls
+    that is not finite is undecided, with nan, and so is one so large that its transition matrix is not finite.
+
+    Raises  ValueError  for a single wall that is not finite
     """
-    K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
+    require("loop", loop, Loop)
+    K, B = walls(wall_stiffness, wall_damping)
     finite = np.isfinite(K) & np.isfinite(B)
     with np.errstate(over="ignore", invalid="ignore"):
         L = loop.transition_matrix(np.where(finite, K, 0.0), np.where(finite, B, 0.0))

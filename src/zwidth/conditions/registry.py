@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import nan
+from math import isinf, nan
 
 from zwidth.conditions import (
     abbott_okamura,
@@ -24,6 +24,7 @@ from zwidth.conditions import (
 from zwidth.conditions.assumptions import case_of
 from zwidth.conditions.bound import Bound
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 
 CONDITIONS = (
     thesis_rigid.condition,
@@ -68,5 +69,8 @@ def compare(
     >>> "rigid mass" in [bound.name for bound in held]
     True
     """
+    require("loop", loop, Loop)
+    if isinf(wall_damping):
+        raise ValueError(f"wall_damping must be finite, or nan for none, got {wall_damping:g}")
     case = case_of(loop, wall_damping, coulomb_friction, resolution)
     return [condition(case) for condition in CONDITIONS]

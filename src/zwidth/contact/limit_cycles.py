@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.contact.equivalent import EquivalentLoop, Measure, Swing, amplitude_of, equivalent_loop, velocity_of
 from zwidth.contact.simulate import LARGEST_MOTION
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear
 
 Floats = NDArray[np.float64]
@@ -112,6 +113,7 @@ def limit_cycles(
     >>> f"{grows.amplitude * 1e3:.2f} mm at {grows.frequency_Hz:.2f} Hz, stable: {grows.stable}"
     '2.02 mm at 10.06 Hz, stable: False'
     """
+    require("loop", loop, Loop)
     found = harmonic_balance(
         loop,
         wall_stiffness,

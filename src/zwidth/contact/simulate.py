@@ -20,6 +20,7 @@ from zwidth.contact.response import Plan, TimeResponse
 from zwidth.contact.room import check_room
 from zwidth.loop.estimators import Foaw, Levant
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 
 Floats = NDArray[np.float64]
 
@@ -85,6 +86,7 @@ def simulate(
     >>> [round(1e3 * x, 3) for x in response.reading[[0, 10, 20]].tolist()]
     [1.0, 0.556, -0.308]
     """
+    require("loop", loop, Loop)
     run = Run(loop, np.asarray(values, dtype=float), **circumstances)  # type: ignore[arg-type]
     return simulate_batch([run], environment, duration=duration, substeps=substeps, trail=trail, ledger=ledger)[0]
 

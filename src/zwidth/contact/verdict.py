@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.contact.response import TimeResponse
+from zwidth.model.arguments import require
 
 Floats = NDArray[np.float64]
 
@@ -77,6 +78,7 @@ def judge_response(response: TimeResponse) -> Judgement:
     >>> judge_response(simulate(loop, wall, values, duration=2.0, start_position=1e-3)).behaviour
     'growing'
     """
+    require("response", response, TimeResponse)
     S = len(response.time)
     touching = response.force != 0.0
     if S < FEWEST:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from pydantic import ValidationError
@@ -17,6 +17,7 @@ from zwidth.device.read import bundled, read
 from zwidth.device.relations import relations
 from zwidth.device.schema.file import DeviceFile, schema
 from zwidth.device.translate import sentences
+from zwidth.model.arguments import refusal
 
 AS_GIVEN: Final = "as given"  # an operator without a name
 
@@ -25,21 +26,27 @@ __all__ = ["bundled", "from_document", "load", "schema"]
 
 def load(
     name_or_path: str | os.PathLike[str],
-    settings: Sequence[str | tuple[str, Any]] = (),
+    settings: Mapping[str, Any] | Sequence[str | tuple[str, Any]] = (),
     operator: str | os.PathLike[str] | None = None,
 ) -> Device:
     """The device of a bundled name or a file, with settings applied before it is checked.
 
-        load("my-device.toml", ["loop.delay_samples=1", ("links.upper.length_m", 0.15)], operator="firm-grasp")
+        load("my-device.toml", {"loop.delay_samples": 1, "links.upper.length_m": 0.15}, operator="firm-grasp")
 
-    settings  "PATH=VALUE" texts or (path, value) pairs, see `address.apply`
+    settings  path -> value; or "PATH=VALUE" texts and (path, value) pairs, see `address.apply`
     operator  who holds the handle: a bundled operator's name, a file with an [operator], or "none"; left out: as
               the device file says
     Warns  ImplausibleNumber  of each number that is allowed and looks wrong
     Raises DeviceError  with all the faults of the file, or else of the settings
+           TypeError    for a name or settings of another kind
     """
+    if not isinstance(name_or_path, str | os.PathLike):
+        raise refusal("name_or_path", "a bundled name or a path", name_or_path)
+    if isinstance(settings, str):
+        raise refusal("settings", "a list or a dictionary", settings, f"write [{settings!r}]")
+    changes = list(settings.items()) if isinstance(settings, Mapping) else settings
     document, label = read(name_or_path)
-    device = from_document(address.apply(held_by(document, operator), settings), label)
+    device = from_document(address.apply(held_by(document, operator), changes), label)
     warn_of_implausible(device)
     return device
 
@@ -53,6 +60,9 @@ def from_document(document: dict[str, Any], label: str = "device", *, put_togeth
     put_together  True: it is known that it can, since it is a device already checked with numbers little changed
     Raises DeviceError  with all faults found
     """
+    if not isinstance(document, dict):
+        hint = f"write load({document!r})" if isinstance(document, str) else ""
+        raise refusal("document", "a dictionary", document, hint)
     cleaned, found = unsupported.refuse(document)
     checked: DeviceFile | None = None
     try:

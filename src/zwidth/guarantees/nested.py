@@ -14,6 +14,7 @@ from zwidth.guarantees.port import Floats
 from zwidth.guarantees.region import Region, empty, stiffest_corner
 from zwidth.guarantees.springs import nyquist_region, spring_stable_region
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 
 COLGATE = (
     "Colgate and Schenkel 1997, read in Weir and Colgate's chapter of 2008; here for any device by alias disks"
@@ -68,6 +69,7 @@ def nested(loop: Loop, robust: Sequence[Floats] | None = None) -> Guarantees:
     >>> [guarantee.name for guarantee in found.guarantees]
     ['passive', 'spring-stable', 'nyquist-spring', 'stable']
     """
+    require("loop", loop, Loop)
     plant = loop.plant
     found = []
     apart = plant.handle is None or not _same_place(plant.actuator, plant.handle)

@@ -20,6 +20,7 @@ from zwidth.guarantees.grid import angle_grid
 from zwidth.guarantees.port import Floats
 from zwidth.guarantees.region import Region, empty
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 
 Complexes = NDArray[np.complex128]
 
@@ -48,6 +49,7 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     >>> round(passive_region(Loop(paddle, Controller(sampling_period=0.001)), one).stiffness_max, 4)   # 2 b/T
     2000.0
     """
+    require("loop", loop, Loop)
     held = loop.plant.handle if held is None else held
     if held is None:
         raise ValueError("the plant has no handle: say with `held` where the operator holds it")

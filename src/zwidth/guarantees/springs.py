@@ -18,6 +18,7 @@ from zwidth.guarantees.region import Region, empty, rings_of, stiffest_corner
 from zwidth.guarantees.spring_family import Springs, parts, spring_for
 from zwidth.guarantees.sweep import Sweep
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 
 # Springs charted first, by the frequency of the mode they make: so many, up to so many times Nyquist's.
 SPRINGS, BEYOND = 27, 6.0
@@ -94,6 +95,7 @@ def spring_stable_region(loop: Loop) -> Region:
     >>> 2000.0 < region.stiffness_max < 2400.0           # every passive operator: 2000 (2 b/T)
     True
     """
+    require("loop", loop, Loop)
     springs = Springs.of(Loop(reached(loop.plant), loop.controller))
     new = _spread(np.union1d(springs.shares(_grid(springs.loop, SPRINGS)), _alternating(springs)))
     tried = springs.shares(_grid(springs.loop, TRIED))

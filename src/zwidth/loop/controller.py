@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import floor, inf
-from typing import Literal
+from typing import Literal, get_args
+
+import numpy as np
 
 from zwidth.loop.estimators import BackwardDifference, VelocityMethod
+from zwidth.model.arguments import check_choice, check_number, refusal, told
 
 Discretisation = Literal["tustin", "tustin-prewarped"]
 
@@ -17,6 +20,9 @@ class FirstOrder:
 
     time_constant: float  # tau [s]
 
+    def __post_init__(self) -> None:
+        check_number("time_constant", self.time_constant, "s", least=0.0)
+
 
 @dataclass(frozen=True)
 class Butterworth:
@@ -25,6 +31,12 @@ class Butterworth:
     order: int
     cutoff_Hz: float
     discretisation: Discretisation = "tustin"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.order, int | np.integer) or self.order < 1:
+            raise ValueError(f"order must be a whole number from 1 on, got {told(self.order)}")
+        check_number("cutoff_Hz", self.cutoff_Hz, "Hz", above=0.0)
+        check_choice("discretisation", self.discretisation, get_args(Discretisation))
 
 
 @dataclass(frozen=True)
@@ -38,6 +50,8 @@ class Controller:
     force_filter            F, acts on the whole force; None: none
     actuator_time_constant  tau of the actuator, tau a' + a = held force [s]; 0: none
     saturation              largest force that is commanded [N]; charts know nothing of it
+    Raises  TypeError   for an estimate or a filter that is none
+            ValueError  for a number out of range, a prewarped cutoff from half the sampling frequency on
     """
 
     sampling_period: float
@@ -47,6 +61,26 @@ class Controller:
     force_filter: FirstOrder | Butterworth | None = None
     actuator_time_constant: float = 0.0
     saturation: float = inf
+
+    def __post_init__(self) -> None:
+        T = self.sampling_period
+        check_number("sampling_period", T, "s", above=0.0, hint="is it a frequency?")
+        check_number("delay", self.delay, "samples", least=0.0)
+        check_number("actuator_time_constant", self.actuator_time_constant, "s", least=0.0)
+        check_number("saturation", self.saturation, "N", above=0.0, infinite=True)
+        if not isinstance(self.velocity, VelocityMethod):
+            raise refusal("velocity", "an estimate such as WindowedDifference(4)", self.velocity)
+        for name in ("velocity_filter", "force_filter"):
+            low_pass = getattr(self, name)
+            if not isinstance(low_pass, FirstOrder | Butterworth | None):
+                raise refusal(name, "a FirstOrder, a Butterworth or None", low_pass)
+            if not isinstance(low_pass, Butterworth) or low_pass.discretisation == "tustin":
+                continue
+            if low_pass.cutoff_Hz >= 0.5 / T:  # which prewarping would send beyond infinity
+                raise ValueError(
+                    f"{name}: cutoff_Hz must be below half the sampling frequency, {0.5 / T:.10g} Hz, got "
+                    f"{low_pass.cutoff_Hz:.10g}"
+                )
 
     @property
     def whole_delay(self) -> int:

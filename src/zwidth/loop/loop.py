@@ -14,11 +14,17 @@ from zwidth.loop.filters import Filter, force_path, velocity_estimator
 from zwidth.loop.realisation import StateSpace, realise
 from zwidth.loop.response import product, rows_response, window_response
 from zwidth.loop.sections import Sections, sampled_sections
+from zwidth.model.arguments import require
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+_INSTEAD = {
+    "Device": "write Loop(device.plant(), device.controller)",
+    "MultiPlant": "write MultiLoop(plant, controller) for several directions",
+}
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,13 @@ class Loop:
 
     plant: Plant
     controller: Controller
+
+    def __post_init__(self) -> None:
+        """Raise TypeError for what is no plant or controller, ValueError for a plant that holds nan."""
+        hint = _INSTEAD.get(type(self.plant).__name__, "")
+        require("plant", self.plant, Plant, hint)
+        require("controller", self.controller, Controller)
+        self.plant.check_numbers()
 
     @property
     def period(self) -> float:

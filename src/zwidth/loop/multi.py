@@ -14,7 +14,9 @@ from zwidth.loop.filters import force_filter, velocity_estimator
 from zwidth.loop.multi_hold import Held, Motion, hold, moved
 from zwidth.loop.sections import UnmovedError
 from zwidth.loop.series import Series, series
+from zwidth.model.arguments import require
 from zwidth.model.directions import MultiPlant
+from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -31,6 +33,12 @@ class MultiLoop:
 
     plant: MultiPlant
     controller: Controller
+
+    def __post_init__(self) -> None:
+        """Raise TypeError for what is no plant of several directions, or no controller."""
+        hint = "write Loop(plant, controller) for one direction" if isinstance(self.plant, Plant) else ""
+        require("plant", self.plant, MultiPlant, hint)
+        require("controller", self.controller, Controller)
 
     @property
     def period(self) -> float:

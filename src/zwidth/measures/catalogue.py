@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from typing import Final
 
 from zwidth.measures.measure import Better, Measure
+from zwidth.model.arguments import refusal
 
 _BINDINGS: Final = "zwidth.measures.bindings"
 _OF_THE_MECHANISM: Final = ("dexterity", "forces")  # in these files nothing is asked of a loop
@@ -251,6 +252,8 @@ def find_measure(name: str, own: Mapping[str, Measure] | None = None) -> Measure
     >>> find_measure("stiffness_max").unit, find_measure("stiffness_max_N_per_m").name
     ('N/m', 'stiffness_max')
     """
+    if not isinstance(name, str):
+        raise refusal("name", "a measure's name", name)
     known = {**MEASURES, **(own or {})}
     with_unit = {one.key: one for one in known.values()}
     if name in known or name in with_unit:

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.verdict import BAND
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -124,6 +125,7 @@ def wall_paths(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -
     >>> [round(c.value, 6) for c in wall_paths(free, 0.5, np.linspace(0.0, 2.0, 9)).crossings]    # thesis eq. 4.14
     [0.359612, 0.359612, 1.390388, 1.390388]
     """
+    require("loop", loop, Loop)
     K, B = np.asarray(wall_stiffness, dtype=np.float64), np.asarray(wall_damping, dtype=np.float64)
     if K.ndim + B.ndim != 1:
         raise ValueError("one of stiffness and damping must be a row of values and the other one number")

@@ -23,6 +23,7 @@ from zwidth.measures.measure import (
     NoValueError,
 )
 from zwidth.measures.place import Place
+from zwidth.model.arguments import require
 from zwidth.model.reduction import ModelError
 
 NUMBERS = "biuf"  # kinds of arrays that are numbers: bool, signed, unsigned, floating
@@ -37,6 +38,8 @@ def evaluate(measure: Measure, place: Place) -> Measured:
     others keep their values.
     Raises  MeasureError  where it cannot be asked of this device at all
     """
+    require("measure", measure, Measure)
+    require("place", place, Place)
     if measure.each:
         return one_by_one(measure.compute, place)
     try:

@@ -33,6 +33,7 @@ from zwidth.loop.evaluate import factor_arrays, plant_response, velocity_respons
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
 from zwidth.loop.response import product
+from zwidth.model.arguments import require, walls
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
 
@@ -67,6 +68,8 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
     >>> round(float(-Z.imag * 2 * np.pi), 2), round(1000.0 - 0.1 * (2 * np.pi) ** 2, 2)
     (996.09, 996.05)
     """
+    require("loop", loop, Loop)
+    walls(wall_stiffness, wall_damping)
     f = np.asarray(frequency, dtype=float)
     nyquist = 0.5 / loop.period
     if not np.all((f > 0.0) & (f < nyquist)):
@@ -117,6 +120,7 @@ def static_stiffness(plant: Plant, wall_stiffness: ArrayLike) -> Floats:
     >>> static_stiffness(pair, [0.0, 3000.0, 6000.0]).round(6).tolist()
     [0.0, 1500.0, 2000.0]
     """
+    require("plant", plant, Plant)
     K = np.asarray(wall_stiffness, dtype=float)
     own, act, read, h = _dynamic(plant, np.zeros(()))
     return _stiffness(own + K[..., None, None] * np.outer(act, read), h)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.chart import BoundaryArc, StabilityChart
 from zwidth.measures.felt import hardest_static_stiffness, static_stiffness
+from zwidth.model.arguments import require
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -43,6 +44,7 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
 
     Raises  HandleError  where the plant has no handle
     """
+    require("chart", chart, StabilityChart)
     plant = device or chart.loop.plant
     walls = np.vstack(chart.regions) if chart.regions else np.zeros((1, 2))
     (_, low), (right, high) = walls.min(axis=0), walls.max(axis=0)

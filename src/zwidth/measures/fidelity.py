@@ -153,5 +153,7 @@ def decay_time(radius: ArrayLike, sampling_period: ArrayLike) -> Floats:
     [0.009491, inf, nan]
     """
     rho, T = np.asarray(radius, dtype=np.float64), np.asarray(sampling_period, dtype=np.float64)
+    if np.any(T <= 0.0):
+        raise ValueError(f"sampling_period must be greater than 0 s, got {float(np.min(T)):g}")
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(rho <= 1.0, T / np.abs(np.log(rho)), np.nan))

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.arguments import require
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -57,6 +58,7 @@ def undamped_modes(mass: Floats, stiffness: Floats) -> tuple[Floats, Floats]:
 
 def natural_frequencies(plant: Plant) -> Floats:
     """Undamped natural frequencies [Hz], ascending; rigid modes exactly 0, unstable ones (w^2 < 0) nan."""
+    require("plant", plant, Plant)
     squared, _ = undamped_modes(plant.mass, plant.stiffness)
     return np.sqrt(np.where(squared < 0.0, np.nan, squared)) / (2.0 * np.pi)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from zwidth.model.arguments import check_number, require
 from zwidth.model.plant import Plant
 
 
@@ -31,6 +32,15 @@ class Operator:
     grasp_stiffness: float | None = None
     grasp_damping: float | None = None
 
+    def __post_init__(self) -> None:
+        units = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
+        for part, unit in units.items():
+            check_number(f"arm_{part}", getattr(self, f"arm_{part}"), unit, least=0.0)
+        for part in ("stiffness", "damping"):
+            value = getattr(self, f"grasp_{part}")
+            if value is not None:
+                check_number(f"grasp_{part}", value, units[part], least=0.0)
+
     @property
     def rigid_grasp(self) -> bool:
         """Is the arm one with the handle?"""
@@ -48,6 +58,8 @@ def attach(plant: Plant, operator: Operator) -> Plant:
     >>> float(attach(paddle, Operator(0.5, 500.0, 10.0)).mass[0, 0])
     0.53
     """
+    require("plant", plant, Plant)
+    require("operator", operator, Operator)
     h = plant.handle
     if h is None:
         raise OperatorError("an operator needs a handle to hold; give the plant's `handle`, or leave him out")

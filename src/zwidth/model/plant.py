@@ -60,6 +60,39 @@ class Plant:
     hysteresis: Floats | None = None
     nonlinear: Nonlinear = field(default_factory=Nonlinear)
 
+    def __post_init__(self) -> None:
+        """Make lists arrays. Raise ValueError for shapes that do not go together."""
+        for name in ("mass", "damping", "stiffness", "actuator", "sensor", "handle", "hysteresis"):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, np.ndarray):
+                object.__setattr__(self, name, np.asarray(value, dtype=np.float64))
+        if self.mass.ndim < 2 or self.mass.shape[-1] != self.mass.shape[-2]:
+            number = f"{float(self.mass):g}" if self.mass.ndim == 0 else f"one of the shape {self.mass.shape}"
+            hint = f"; write [[{number}]] for one coordinate" if self.mass.ndim == 0 else ""
+            raise ValueError(f"mass must be an array (n, n), got {number}{hint}")
+        n = self.mass.shape[-1]
+        for name, shape in (("damping", (n, n)), ("stiffness", (n, n)), ("actuator", (n,)), ("sensor", (n,))):
+            own = getattr(self, name).shape
+            if own[len(own) - len(shape) :] != shape:
+                raise ValueError(
+                    f"{name} must be an array {shape} where mass is {(n, n)}, got one of the shape {own}"
+                )
+
+    def check_numbers(self) -> None:
+        """Raise ValueError unless matrices and vectors are finite, and the mass matrix positive definite."""
+        for name in ("mass", "damping", "stiffness", "actuator", "sensor"):
+            values = getattr(self, name)
+            if not np.isfinite(values).all():
+                wrong = values[~np.isfinite(values)][0]
+                raise ValueError(f"plant.{name} holds {wrong:g}; every number must be finite")
+        try:
+            np.linalg.cholesky(self.mass)
+        except np.linalg.LinAlgError:
+            least = float(np.min(np.linalg.eigvalsh(self.mass)))
+            raise ValueError(
+                f"plant.mass must be positive definite, and its least eigenvalue is {least:.4g} kg"
+            ) from None
+
     @property
     def size(self) -> int:
         """Number of coordinates n."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.compiled import compiled
+from zwidth.model.arguments import require
 from zwidth.model.arrays import Arrays, design_shape, pack, per_design
 from zwidth.model.batch import nowhere, solve
 from zwidth.model.bias import bias_batch
@@ -117,6 +118,7 @@ def solve_posture(
               LoopOpen    if the loops of a single mechanism do not close near the assembly's angles
               ValueError  for an unknown assembly, or drives that do not fit the mechanism's freedom
     """
+    require("mechanism", mechanism, Mechanism)
     name = _assembly_name(mechanism, assembly)
     mech, designs = pack(mechanism), design_shape(mechanism)
     target = _in_space(mechanism, position)

@@ -19,6 +19,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth.model.arguments import require
 from zwidth.model.carried import seen_by
 from zwidth.model.dampers import carried, winding_dampers, with_dampers
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
@@ -115,6 +116,7 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
     Returns  Plant; `full` gives the plant itself, and so does the model it already is
     Raises   ModelError  where the model does not apply, with the reason; for hysteresis all but `full`
     """
+    require("plant", plant, Plant)
     _check_model(model)
     if model != "full" and plant.hysteresis is not None:
         raise ModelError("a loss factor is charted on the full model only; leave --model out")

@@ -41,6 +41,11 @@ class Response:
     sweeps: Complexes | None = None
     note: str = ""
 
+    def __post_init__(self) -> None:
+        f, P = np.shape(self.frequency), np.shape(self.value)
+        if f != P:
+            raise ValueError(f"value has the shape {P} and frequency {f}; they must be alike")
+
 
 def relative_error(coherence: Floats, averages: float) -> Floats:
     """Standard error of |P| over |P|, and of its phase in radians:  sqrt((1 - g^2) / (2 n g^2)).

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from zwidth.device.device import Device
 from zwidth.measures.place import Place, Wanted
+from zwidth.model.arguments import require
 from zwidth.model.posture import Posture, solve_posture
 from zwidth.model.reduction import Model
 
@@ -32,6 +33,7 @@ def place_of(
     Raises     DeviceError   as `Device.plant` does, for a measured response too
                PostureError  where one posture is asked for and does not exist
     """
+    require("device", device, Device)
     asked = wanted or Wanted()
     if device.mechanism is None:
         device.plant(None if positions is None else (0.0, 0.0), direction, assembly, model)  # raises what is wrong

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.device import Device
+from zwidth.model.arguments import require
 from zwidth.model.arrays import pack
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import reachable_positions
@@ -93,6 +94,7 @@ def plane_of(
               DeviceError  for a device without a mechanism, or a point that is none
               PostureError where the assembly is singular throughout, or does not close
     """
+    require("device", device, Device)
     point = device.position(through)
     mechanism = device.mechanism
     assert mechanism is not None

@@ -29,6 +29,7 @@ from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.device.faults import DeviceError
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 from zwidth.study.robust_family import Family, Point
 
 Floats = NDArray[np.float64]
@@ -115,6 +116,7 @@ def robust_study(
     >>> round(study.chart.stiffness_max, 2), study.violation.violating    # the lightest mass binds
     (68629.15, 0)
     """
+    require("family", family, Family)
     faults = family.faults()
     if faults:
         raise DeviceError(faults)

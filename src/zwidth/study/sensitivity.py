@@ -26,6 +26,7 @@ from zwidth.device.load import from_document
 from zwidth.device.parts import outside_linear
 from zwidth.device.schema import file as schema
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 from zwidth.study.optimum import Kind, Optimum, OptimumError, optimum
 from zwidth.study.rivals import rival_stiffness
 from zwidth.study.slope import Slope, central_slope, one_sided_slope
@@ -138,6 +139,8 @@ def sensitivities(
     >>> [(n.path, round(n.logarithmic, 6)) for n in sensitivities(plain).numbers][:2]
     [('loop.sampling_period_s', -2.0), ('plant.mass_kg', 1.0)]
     """
+
+    require("device", device, Device)
 
     def loop_of(changed: Device) -> Loop:
         return Loop(changed.plant(at, direction, assembly, model), changed.controller)

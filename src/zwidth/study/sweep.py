@@ -25,6 +25,7 @@ from zwidth.device.load import from_document
 from zwidth.measures.evaluate import answered, evaluate
 from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, SINGULAR, MeasureError, Note
 from zwidth.measures.place import Place, Wanted
+from zwidth.model.arguments import refusal
 from zwidth.model.posture import OutOfReach, PostureError, Singular
 from zwidth.study.asked import Asked, probe
 from zwidth.study.axes import CIRCUMSTANCES, WANTED, Sampling, settings
@@ -269,6 +270,8 @@ def sweep(
             MeasureError  for measures that cannot be asked of this device
             what `executor.run` raises
     """
+    if not isinstance(study, Study | str | os.PathLike):
+        raise refusal("study", "a Study or the path of a study file", study)
     study = study if isinstance(study, Study) else read_study(study)
     job = sweep_job(study)
     return Sweep(study, job, run(job, store, progress, workers, stage="computing designs"))

@@ -27,6 +27,7 @@ from zwidth.chart.tracer import Tracer
 from zwidth.device.device import At, Device
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
+from zwidth.model.arguments import require
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
@@ -101,6 +102,7 @@ def validity(
     tolerance                the largest e that still counts as the same
     Raises  what `Device.plant` raises, and ChartError if the full model cannot be charted
     """
+    require("device", device, Device)
     full = device.plant(at, direction, assembly, "full")
     chart = stability_chart(Loop(full, device.controller), decay=False)
     natural = natural_frequencies(device.plant(at, direction, assembly, "full", held=False))

@@ -15,6 +15,7 @@ from zwidth.measures.catalogue import find_measure
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note
 from zwidth.measures.place import Place, Wanted
+from zwidth.model.arguments import refusal, require
 from zwidth.study.executor import Progress, run
 from zwidth.study.job import Cells
 from zwidth.study.journal import fingerprint
@@ -167,6 +168,10 @@ def map_job(
     own: Mapping[str, Measure] | None = None,
 ) -> MapJob:
     """The question that `workspace_map` asks, checked, so that a store can be made for it."""
+    require("device", device, Device)
+    if isinstance(measures, str | Measure):
+        hint = f"write [{measures!r}]" if isinstance(measures, str) else "write it in a list"
+        raise refusal("measures", "a list of names", measures, hint)
     asked = tuple(one if isinstance(one, Measure) else find_measure(one, own) for one in measures)
     names = [one.name for one in asked]
     if not names or len(set(names)) < len(names):

@@ -11,6 +11,7 @@ from zwidth.loop.estimators import Foaw, Levant, VelocityMethod
 from zwidth.loop.estimators.bounds import check_period
 from zwidth.loop.estimators.foaw_kernel import foaw_estimate
 from zwidth.loop.estimators.levant_kernel import levant_estimate
+from zwidth.model.arguments import refusal
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +31,8 @@ def velocity_of(method: VelocityMethod | Estimator, positions: ArrayLike, period
     >>> velocity_of(BackwardDifference(), [0.0, 1e-3, 3e-3], 0.001)
     array([0., 1., 2.])
     """
+    if not isinstance(method, VelocityMethod | Estimator):
+        raise refusal("method", "a velocity estimate such as WindowedDifference(4)", method)
     check_period(period)
     x = np.array(positions, dtype=np.float64, order="C")
     if x.ndim == 0:
