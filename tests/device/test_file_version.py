@@ -1,0 +1,152 @@
+"""Versions of files: what is newer than this zwidth reads is refused with one sentence, and left as it is."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from zwidth import __version__
+from zwidth.device import address
+from zwidth.device.faults import DeviceError
+from zwidth.device.holding import operator_table
+from zwidth.device.load import from_document, load, schema
+from zwidth.study.job import Cells
+from zwidth.study.journal import Journal, JournalError, fingerprint
+from zwidth.study.store import Store, StoreError
+from zwidth.study.study_file import read_study
+from zwidth.study.study_schema import StudyFile
+
+DEVICE = 'name = "m"\n{}\n[plant]\nmass_kg = 0.1\n{}\n[loop]\nsampling_period_s = 0.001\n'
+AXIS = '[[axis]]\nkey = "loop.delay_samples"\nvalues = [0]\n'
+STUDY = '{}\ndevice = "hapkit-course"\nmeasures = ["stiffness_max"]\n{}\n' + AXIS
+OPERATOR = "{}\narm_mass_kg = 0.8\narm_stiffness_N_per_m = 500.0\narm_damping_Ns_per_m = 5.0\n{}\n"
+READ = {"device": load, "study": read_study, "operator": operator_table}
+TEXT = {"device": DEVICE, "study": STUDY, "operator": OPERATOR}
+NEWER = f"is {{}}, and zwidth {__version__} reads up to version 1; upgrade zwidth"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(kind, *parts):
+        path = tmp_path / f"{kind}.toml"
+        path.write_text(TEXT[kind].format(*parts))
+        return path
+
+    return written
+
+
+def faults(kind, path):
+    with pytest.raises(DeviceError) as caught:
+        READ[kind](path)
+    return [str(fault).replace(str(path), "file") for fault in caught.value.faults]
+
+
+@pytest.mark.xfail(strict=True, reason="files carry no version")
+@pytest.mark.parametrize("kind", READ)
+def test_a_file_may_say_its_version(write, kind):
+    READ[kind](write(kind, "", ""))
+    READ[kind](write(kind, "file_version = 1", ""))
+
+
+@pytest.mark.xfail(strict=True, reason="files carry no version")
+@pytest.mark.parametrize("kind", READ)
+@pytest.mark.parametrize("version", ["2", "17", "1.5"])
+def test_a_newer_file_is_refused_before_anything_else_of_it(write, kind, version):
+    (line,) = faults(kind, write(kind, f"file_version = {version}", "novelty = true"))
+    assert line == f"file: file_version: {NEWER.format(version)}"
+
+
+@pytest.mark.xfail(strict=True, reason="files carry no version")
+@pytest.mark.parametrize("kind", READ)
+@pytest.mark.parametrize("version", ["0", "-1", "'1'", "true", "[1]"])
+def test_a_version_that_is_none_is_a_fault_like_others(write, kind, version):
+    found = faults(kind, write(kind, f"file_version = {version}", "novelty = true"))
+    assert len(found) == 2
+    (line,) = (line for line in found if line.startswith("file: file_version: must be "))
+    assert "newer" not in line
+
+
+@pytest.mark.xfail(strict=True, reason="files carry no version")
+def test_a_version_is_no_number_of_the_device(write):
+    device = load(write("device", "file_version = 1", ""))
+    assert "file_version" not in address.numeric_addresses(device.document)
+    assert device.document == load(write("device", "", "")).document
+    with pytest.raises(DeviceError, match=r"file_version: is 2, and zwidth"):
+        from_document({"file_version": 2})
+    with pytest.raises(DeviceError, match=r"file_version: is 3, and zwidth"):
+        load("hapkit-course", {"file_version": 3})
+
+
+@pytest.mark.xfail(strict=True, reason="files carry no version")
+def test_the_schemas_know_it():
+    for found in (schema(), StudyFile.model_json_schema()):
+        own = found["properties"]["file_version"]
+        assert (own["minimum"], own["maximum"], own["default"]) == (1, 1, 1)
+
+
+class Job:
+    """Two cells of one measure."""
+
+    count, measures, question = 2, ("a",), "q"
+
+
+def kept(path):
+    store = Store(path, Job())
+    store.begin(2)
+    store.keep(0, Cells(np.ones((2, 1)), np.zeros((2, 1), np.uint8), ((), ())))
+    return store
+
+
+def told(path, **changes):
+    """Change the attributes of a store on the disk."""
+    file = path / "zarr.json"
+    document = json.loads(file.read_text())
+    document["attributes"] |= changes
+    file.write_text(json.dumps(document))
+
+
+@pytest.mark.xfail(strict=True, reason="stores carry no version")
+@pytest.mark.parametrize("changes", [{}, {"question": "another"}, {"batch": "two"}])
+def test_a_newer_store_is_refused_and_left_alone(tmp_path, changes):
+    path = tmp_path / "store"
+    kept(path)
+    assert json.loads((path / "zarr.json").read_text())["attributes"]["version"] == 1
+    told(path, version=2, **changes)
+    before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
+    with pytest.raises(StoreError) as caught:
+        Store(path, Job())
+    assert str(caught.value) == f"store: its version {NEWER.format(2)}, or name another folder"
+    assert {file: file.read_bytes() for file in path.rglob("*") if file.is_file()} == before
+
+
+def test_a_store_without_a_version_is_of_the_first(tmp_path):
+    path = tmp_path / "store"
+    kept(path)
+    document = json.loads((path / "zarr.json").read_text())
+    document["attributes"].pop("version", None)
+    (path / "zarr.json").write_text(json.dumps(document))
+    assert len(list(Store(path, Job()).kept())) == 1
+
+
+@pytest.mark.xfail(strict=True, reason="journals carry no version")
+@pytest.mark.parametrize("question", ["how much?", "another"])
+def test_a_newer_journal_is_refused_and_left_alone(tmp_path, question):
+    path = tmp_path / "journal"
+    Journal(path, fingerprint("how much?")).ask("first", lambda: [1.5])
+    head, *lines = path.read_text().splitlines()
+    assert json.loads(head)["version"] == 1
+    path.write_text("\n".join([json.dumps(json.loads(head) | {"version": 2}), *lines]) + "\n")
+    before = path.read_bytes()
+    with pytest.raises(JournalError) as caught:
+        Journal(path, fingerprint(question))
+    assert str(caught.value) == f"journal: its version {NEWER.format(2)}, or name another file"
+    assert path.read_bytes() == before
+
+
+def test_a_journal_without_a_version_is_of_the_first(tmp_path):
+    path = tmp_path / "journal"
+    question = fingerprint("how much?")
+    path.write_text(json.dumps({"question": question}) + '\n{"name": "first", "value": [1.5]}\n')
+    assert Journal(path, question).known == {"first": [1.5]}
