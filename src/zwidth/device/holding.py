@@ -10,9 +10,10 @@ from pydantic import ValidationError
 from zwidth.device.faults import DeviceError, Fault, dotted, fail
 from zwidth.device.read import OPERATORS, read
 from zwidth.device.relations import operator_relations
-from zwidth.device.schema.numbers import Section
+from zwidth.device.schema.numbers import VERSION, Section, WholeNumber
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.translate import sentences
+from zwidth.device.version import KEY, without_version
 
 NOBODY: Final = "none"
 
@@ -20,6 +21,7 @@ NOBODY: Final = "none"
 class OperatorFile(Section):
     """A file with nothing but an operator."""
 
+    file_version: WholeNumber = VERSION
     operator: OperatorSection
 
 
@@ -41,7 +43,8 @@ def operator_table(name_or_path: str | os.PathLike[str]) -> dict[str, Any]:
     A device file with an [operator] serves, too. An operator without a name is called as his file is.
     Raises DeviceError  with all faults
     """
-    document, label = read(name_or_path, OPERATORS)
+    whole, label = read(name_or_path, OPERATORS)
+    version, document = {KEY: whole[KEY]} if KEY in whole else {}, without_version(whole)
     others = sorted(document.keys() - {"operator"})
     if "operator" not in document:
         if {"plant", "mechanism", "response", "loop"} & document.keys():
@@ -52,7 +55,7 @@ def operator_table(name_or_path: str | os.PathLike[str]) -> dict[str, Any]:
             Fault(label, key, "is no part of an operator; put it into [operator] or remove it") for key in others
         )
     table = document["operator"]
-    document = {"operator": table}
+    document = {"operator": table} | version
     found = list(operator_relations(document))
     try:
         OperatorFile.model_validate(document)

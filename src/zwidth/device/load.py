@@ -17,6 +17,7 @@ from zwidth.device.read import bundled, read
 from zwidth.device.relations import relations
 from zwidth.device.schema.file import DeviceFile, schema
 from zwidth.device.translate import sentences
+from zwidth.device.version import refuse_newer, without_version
 from zwidth.model.arguments import refusal
 
 AS_GIVEN: Final = "as given"  # an operator without a name
@@ -63,6 +64,7 @@ def from_document(document: dict[str, Any], label: str = "device", *, put_togeth
     if not isinstance(document, dict):
         hint = f"write load({document!r})" if isinstance(document, str) else ""
         raise refusal("document", "a dictionary", document, hint)
+    refuse_newer(document, label)
     cleaned, found = unsupported.refuse(document)
     checked: DeviceFile | None = None
     try:
@@ -72,7 +74,7 @@ def from_document(document: dict[str, Any], label: str = "device", *, put_togeth
     found += relations(cleaned, document)
     if found or checked is None:
         raise DeviceError(in_order(found, document, label))
-    device = _device(checked, document, label)
+    device = _device(checked, without_version(document), label)
     if device.mechanism is not None and checked.mechanism is not None and not put_together:
         found += geometry.disagreements(device.mechanism, checked.mechanism)
     if found:

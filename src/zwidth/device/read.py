@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from zwidth.device.faults import fail, listed, nearest
 from zwidth.device.text_file import Unreadable, read_text
+from zwidth.device.version import refuse_newer
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def read(name_or_path: str | os.PathLike[str], shelf: Shelf = DEVICES) -> tuple[
 
 
 def parse(text: str, label: str, shelf: Shelf = DEVICES) -> dict[str, Any]:
-    """The document a TOML text holds; never empty, never nested beyond reason."""
+    """The document a TOML text holds; never empty, never nested beyond reason, never of a newer version."""
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -79,6 +80,7 @@ def parse(text: str, label: str, shelf: Shelf = DEVICES) -> dict[str, Any]:
         raise fail(label, "", f"is nested too deeply; at most {DEEPEST} levels are allowed") from None
     except ValueError as error:  # a whole number of thousands of digits
         raise fail(label, "", f"holds a number that cannot be read: {_lower_first(str(error))}") from None
+    refuse_newer(document, label)
     if not document:
         raise fail(label, "", f"is empty; {shelf.needs}")
     if not within_depth(document):

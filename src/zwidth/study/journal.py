@@ -1,7 +1,8 @@
 """Results of a long run, kept on disk line by line, so that a run that was stopped goes on where it was.
 
-The first line says which question they answer; a journal of another question is begun anew. Numbers come back with
-all their bits. A line cut short, by a crash or a full disk, is dropped and computed again.
+The first line says which question they answer, and the version of the format; a journal of another question is
+begun anew, one of a newer version refused. Numbers come back with all their bits. A line cut short, by a crash
+or a full disk, is dropped and computed again.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from zwidth.device.version import KEPT, newer
 
 
 def fingerprint(*parts: object) -> str:
@@ -95,8 +98,10 @@ class Journal:
 
 def _read(path: Path, lines: list[bytes], there: bool, question: str) -> list[bytes]:
     """The lines up to the first that is damaged; a first line only where they answer another question."""
-    first = json.dumps({"question": question}).encode()
+    first = json.dumps({"version": KEPT, "question": question}).encode()
     known = _entry(lines[0]) if lines else {}
+    if said := newer(known.get("version"), KEPT):
+        raise JournalError(f"{path.name}: its version {said}, or name another file")
     if there and not isinstance(known.get("question"), str):
         raise JournalError(f"{path.name}: is not the journal of a run; name another file, or remove it")
     if known.get("question") != question:

@@ -4,8 +4,9 @@
     status    (count, measures)  uint8, named by its attributes; 255 = not computed
     notes                        a journal beside them: why cells have no value
 
-Attributes say which question they answer; a store of another question is begun anew. Chunks are batches: a batch
-is one file of values and one of status, each there wholly or not at all, and the status is written last.
+Attributes say which question they answer, and the version of the format; a store of another question is begun
+anew, one of a newer version refused. Chunks are batches: a batch is one file of values and one of status, each
+there wholly or not at all, and the status is written last.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth import __version__
+from zwidth.device.version import KEPT, newer
 from zwidth.measures.measure import MISSING, OK, STATUS, Note
 from zwidth.study.job import Cells, Job
 from zwidth.study.journal import Journal, JournalError, fingerprint
@@ -73,7 +75,8 @@ class Store:
             group.create_array(
                 "status", shape=shape, chunks=chunks, dtype="uint8", fill_value=MISSING, attributes=about | flags
             )
-            group.attrs.update({"zwidth": KIND, "question": self.question, "batch": batch})
+            about = {"zwidth": KIND, "version": KEPT, "question": self.question, "batch": batch}
+            group.attrs.update(about)
             if self._ours or (self.path.is_dir() and not any(self.path.iterdir())):
                 shutil.rmtree(self.path)
             draft.replace(self.path)
@@ -124,11 +127,15 @@ class Store:
         other = StoreError(f"{self.path.name}: is not the store of a study; name another folder, or remove it")
         try:
             group = zarr.open_group(str(self.path), mode="r+")
-            kind, question, batch = (group.attrs.get(key) for key in ("zwidth", "question", "batch"))
+            kind, version, question, batch = (
+                group.attrs.get(key) for key in ("zwidth", "version", "question", "batch")
+            )
         except PermissionError:
             raise
         except Exception:  # zarr's own, of many kinds
             raise other from None
+        if kind == KIND and (said := newer(version, KEPT)):
+            raise StoreError(f"{self.path.name}: its version {said}, or name another folder")
         if kind != KIND or not isinstance(batch, int):
             raise other
         self._ours = True

@@ -22,6 +22,7 @@ from zwidth.device.plausible import warn_of_implausible
 from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, Shelf, bundled_names, parse, read
 from zwidth.device.text_file import Unreadable, read_text
 from zwidth.device.translate import sentences
+from zwidth.device.version import refuse_newer
 from zwidth.measures.measure import Measure
 from zwidth.measures.own import load_measures
 from zwidth.measures.place import Wanted
@@ -86,6 +87,7 @@ def study_of(document: dict[str, Any], label: str = "study") -> Study:
     Raises  DeviceError  with all faults found
             TooLarge     where its designs would not fit into memory
     """
+    refuse_newer(document, label)
     found: Found = []
     checked: StudyFile | None = None
     try:

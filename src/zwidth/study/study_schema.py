@@ -8,7 +8,17 @@ from pydantic import BeforeValidator, Field
 
 from zwidth.device.faults import Path, quote, suggestion
 from zwidth.device.plain import number
-from zwidth.device.schema.numbers import Bounds, Direction, Number, Position, Section, Text, WholeNumber, quantity
+from zwidth.device.schema.numbers import (
+    VERSION,
+    Bounds,
+    Direction,
+    Number,
+    Position,
+    Section,
+    Text,
+    WholeNumber,
+    quantity,
+)
 from zwidth.model.reduction import Model
 
 MOST: Final = 10**9  # designs along one axis, and altogether: numbers beyond are slips of the keyboard
@@ -80,6 +90,7 @@ class OptimiseSection(Section):
 class StudyFile(Section):
     """Many designs of one device, and what is asked of each."""
 
+    file_version: WholeNumber = VERSION
     device: Text = quantity("a bundled name, or a file beside this one")
     measures: tuple[Text, ...] = quantity("what is asked of each design", min_length=1)
     measures_file: Text | None = quantity("a file of your own measures, beside this one", default=None)

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, ConfigDict
 from zwidth.device.schema.friction import FrictionSection
 from zwidth.device.schema.loop import LoopSection
 from zwidth.device.schema.mechanism import MechanismSection
-from zwidth.device.schema.numbers import Section, Text, quantity
+from zwidth.device.schema.numbers import VERSION, Section, Text, WholeNumber, quantity
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.plant import PlantSection
 from zwidth.device.schema.response import ResponseSection
@@ -43,6 +43,7 @@ class DeviceFile(Section):
         },
     )
 
+    file_version: WholeNumber = VERSION
     name: Text = quantity("the device's name, for people")
     description: str = quantity("one line on what the device is", default="")
     source: str = quantity("one line on where the numbers come from", default="")

@@ -22,6 +22,7 @@ from pydantic import (
 
 from zwidth.device.faults import quote
 from zwidth.device.schema import bounds
+from zwidth.device.version import READ
 
 SYMMETRY_TOLERANCE: Final = 1e-9  # relative to the largest element
 LARGEST: Final = 1e30  # SI units; the squares of such numbers can still be multiplied
@@ -41,6 +42,9 @@ class Section(BaseModel):
 def quantity(description: str, unit: str | None = None, **limits: Any) -> Any:
     """A documented key with its unit; `limits` are pydantic's gt, ge, lt, le, default and the like."""
     return Field(description=description, json_schema_extra={"unit": unit} if unit else None, **limits)
+
+
+VERSION: Final = quantity("version of the format that the file is written in", ge=1, le=READ, default=READ)
 
 
 def _not_nan(value: float) -> float:
