@@ -207,9 +207,9 @@ def test_a_response_cut_short_warns_above_the_numbers(tmp_path):
     short = cut_short(tmp_path, 300.0)
     chart, text = found("chart", short), zwidth("chart", short).out
     assert chart["measured_up_to_share"] == pytest.approx(0.75)
-    assert chart["warning"].startswith("measured up to 300 Hz, 75 % of half the sampling rate (400 Hz)")
+    assert chart["warning"].startswith("measured up to 300.0 Hz, 75.00 % of half the sampling rate (400.0 Hz)")
     assert "walls that fail above are not seen" in chart["warning"]
-    assert text.index("warning: measured up to 300 Hz") < text.index("largest stiffness")
+    assert text.index("warning: measured up to 300.0 Hz") < text.index("largest stiffness")
 
 
 @pytest.mark.parametrize(("highest", "share"), [(380.0, 0.95), (400.0, 1.0)])

@@ -21,7 +21,7 @@ ASKED = {
     "bounds": (),
     "felt": WALL,
     "sensitivity": (),
-    "simulate": WALL,
+    "simulate": ("--stiffness", "3000", "--damping", "12"),
 }
 UNITS = {
     "_N_per_m": "N/m",
@@ -33,6 +33,7 @@ UNITS = {
     "_m": "m",
     "_J": "J",
 }
+LONGEST = 30
 PREFIXES = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
 NUMBER = re.compile(
     r"(?<![\w.])(?P<digits>\d+\.?\d*)(?: ?× ?10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
@@ -43,11 +44,11 @@ BLANKS = str.maketrans("\u00a0\u2009\u2212", "  -")
 
 
 def numbers(text: str) -> Iterator[tuple[str, str, float, float]]:
-    """Every number of two digits or more: as it stands, its unit, its size, and one of its last digit."""
+    """Every number of three digits, with a unit two: its text, its unit, its size, and one of its last digit."""
     for match in NUMBER.finditer(text.translate(BLANKS)):
         digits, unit = match["digits"], match["unit"] or ""
         scale = PREFIXES[match["prefix"] or ""] * 10.0 ** int((match["power"] or "0").translate(RAISED))
-        if len(digits.replace(".", "").lstrip("0")) >= 2 and (unit or "." in digits):
+        if len(digits.replace(".", "").lstrip("0")) >= (2 if unit else 3):
             yield (
                 match[0],
                 unit.replace("×", ""),
@@ -61,17 +62,9 @@ def exact(document: Any, unit: str = "") -> Iterator[tuple[str, float]]:
     if isinstance(document, dict):
         for key, value in document.items():
             known = next((own for ending, own in UNITS.items() if key.endswith(ending)), "")
-            if key not in (
-                "spectral_radius",
-                "boundary",
-                "regions",
-                "time_s",
-                "position_m",
-                "force_N",
-                "energy_J",
-            ):
+            if key != "spectral_radius":
                 yield from exact(value, known or unit)
-    elif isinstance(document, list):
+    elif isinstance(document, list) and len(document) <= LONGEST:  # the samples of a curve are not printed
         for value in document:
             yield from exact(value, unit)
     elif isinstance(document, float) and document != 0.0:
@@ -104,20 +97,20 @@ def drawn(monkeypatch):
     save = style.save
 
     def kept(figure, path):
+        found = figure.findobj(Text)
         ticks = {
             text
             for ax in figure.axes
             for axis in (ax.xaxis, ax.yaxis)
             for text in [*axis.get_ticklabels(which="both"), axis.get_offset_text()]
         }
-        words.extend(text.get_text() for text in figure.findobj(Text) if text not in ticks)
+        words.extend(text.get_text() for text in found if text not in ticks)
         save(figure, path)
 
     monkeypatch.setattr(style, "save", kept)
     return words
 
 
-@pytest.mark.xfail(strict=True, reason="three digits here and four there, rounded down here and to nearest there")
 def test_no_number_is_printed_in_two_roundings(drawn, tmp_path):
     documents = {command: found(command, TWO_MASS, *options) for command, options in ASKED.items()}
     known = {*derived(documents), *(pair for document in documents.values() for pair in exact(document))}
@@ -137,7 +130,7 @@ def test_no_number_is_printed_in_two_roundings(drawn, tmp_path):
         for unit, size in known
         if own == unit and abs(value - size) <= last and not _right(value, size)
     }
-    assert sorted(wrong) == []
+    assert not wrong, sorted(wrong)
     seen = {text for written in texts.values() for text, *_ in numbers(written)}
     assert {"7.134 kN/m", "9.975 Ns/m", "174.5 Hz"} <= seen  # the numbers are found at all
 

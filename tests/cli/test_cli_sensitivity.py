@@ -56,9 +56,9 @@ def test_people_see_the_top_of_the_list_with_units():
     assert ran.code == 0
     rows = [line.split() for line in ran.out.splitlines() if line.startswith((" loop.", " plant."))]
     assert [row[0] for row in rows] == ["loop.sampling_period_s", "plant.mass_kg.1.1"]
-    assert rows[0][1:] == ["0.00125", "s", "-2.8504", "-203", "N/m"]
-    assert rows[1][1:] == ["0.0254", "kg", "+1.2147", "+86.7", "N/m"]
-    assert "a delay of 0.01 samples gives -281 N/m" in ran.out
+    assert rows[0][1:] == ["0.00125", "s", "-2.850", "-203.3", "N/m"]
+    assert rows[1][1:] == ["0.0254", "kg", "+1.215", "+86.65", "N/m"]
+    assert "a delay of 0.01 samples gives -281.1 N/m" in ran.out
     assert "and 10 more" in ran.out
 
 

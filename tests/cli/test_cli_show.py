@@ -88,7 +88,7 @@ def test_damping_that_couples_the_modes_has_no_ratios():
 
 def test_people_see_every_number_and_every_source():
     text = zwidth("show", MECHANISM).out
-    for words in ("0.2616 kg", "11.79 kN/m", "130.8 Hz (5 %)", "upper-left", "elbows-out", "(0, 0.25) m"):
+    for words in ("0.2616 kg", "11.79 kN/m", "130.8 Hz (5.000 %)", "upper-left", "elbows-out", "(0, 0.25) m"):
         assert words in text
     for path in load(MECHANISM).sources:
         assert path in text

@@ -45,8 +45,8 @@ def test_the_impedances_are_drawn_as_they_are():
 def test_the_felt_chart_names_its_limits():
     made, ax = figure()
     draw_felt_chart(ax, felt_chart(stability_chart(published())))
-    assert "hardest felt contact: 4.89 kN/m" in texts(ax)
-    assert "no wall is felt above 15.6 kN/m" in texts(ax)
+    assert "hardest felt contact: 4.897 kN/m" in texts(ax)
+    assert "no wall is felt above 15.62 kN/m" in texts(ax)
     made.draw_without_rendering()
     _, ax = figure()
     draw_felt_chart(ax, felt_chart(stability_chart(Loop(mass(0.1), Controller(0.001)))))
@@ -65,7 +65,7 @@ def test_the_bars_are_the_sensitivities_from_the_top():
     draw_sensitivities(ax, found, top=4)
     assert [bar.get_width() for bar in ax.patches] == pytest.approx([n.logarithmic for n in found.numbers[:4]])
     assert [label.get_text() for label in ax.get_yticklabels()] == [n.path for n in found.numbers[:4]]
-    assert [text.get_text() for text in ax.texts] == ["−2.85", "+1.21", "−1.00", "−1.00"]
+    assert [text.get_text() for text in ax.texts] == ["−2.850", "+1.215", "−1.000", "−1.000"]
     made.draw_without_rendering()
 
 

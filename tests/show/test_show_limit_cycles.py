@@ -28,7 +28,7 @@ def test_growth_is_seen_on_both_sides_of_zero_and_cycles_are_named():
     swings = np.isfinite(found.growth)
     assert ax.lines[0].get_ydata()[swings] == pytest.approx(found.growth[swings])
     small, large = (cycle.amplitude for cycle in found.cycles)
-    assert texts(ax)[1].startswith("larger ones grow, smaller ones die: 2.02 mm, 10.1 Hz")
+    assert texts(ax)[1].startswith("larger ones grow, smaller ones die: 2.015 mm, 10.06 Hz")
     assert texts(ax)[2].startswith("stable limit cycle: ")
     left, right = ax.get_xlim()
     assert left <= small / 50.0 < 50.0 * large <= right
@@ -63,7 +63,7 @@ def test_the_device_stands_in_the_plane_where_it_is(damping, said):
     assert device.get_ydata() == pytest.approx(found.sigma)
     assert device.get_xdata() == pytest.approx(np.maximum(found.beta, ax.get_xlim()[0]))
     named = [text.get_text().replace("\u00a0", " ") for text in ax.texts]
-    assert named[-3:] == ["100 N/m", "200 N/m", "1.00 kN/m"]
+    assert named[-3:] == ["100.0 N/m", "200.0 N/m", "1.000 kN/m"]
     assert {"passive", "small vibrations", "large vibrations"} < set(named)
     made.draw_without_rendering()
 

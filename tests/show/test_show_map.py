@@ -11,6 +11,7 @@ from zwidth.device.load import load
 from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, SINGULAR, UNDECIDED, Measure, NoValueError
 from zwidth.show.figures.map import MARKS, draw_map, map_figure
 from zwidth.show.figures.style import figure, save
+from zwidth.show.units import area_text, percent
 from zwidth.study.common_area import common_area
 from zwidth.study.plane import plane_of
 from zwidth.study.requirement import parse_requirement
@@ -95,8 +96,7 @@ def test_requirements_are_outlined_and_what_they_share_is_dotted(dataset, device
     assert said[1].startswith("Condition number of the Jacobian ≤ 1.3: ")
     assert said[2].startswith("Manipulability ≥ 0.015\u00a0m²/rad²: ")
     assert (
-        said[3]
-        == f"Common area: {1e4 * area.common.area:.4g} cm², {100 * area.common.share:.3g} % of what is reached"
+        said[3] == f"Common area: {area_text(area.common.area)}, {percent(area.common.share)} of what is reached"
     )
     patches = [patch for patch in ax.patches if isinstance(patch, PathPatch)]
     assert len({patch.get_hatch() for patch in patches} - {None}) == 3

@@ -29,8 +29,8 @@ def test_the_outline_is_closed_and_as_far_out_as_the_stiffness():
 def test_the_stiffest_and_the_least_stiff_direction_are_named():
     _, ax = drawn(made([1000.0, 2000.0, 3000.0, 2000.0]))
     texts = [text.get_text().replace("\u00a0", " ") for text in ax.get_legend().get_texts()]
-    assert "stiffest: 3.00 kN/m along 180°" in texts
-    assert "least stiff: 1.00 kN/m along 0°" in texts
+    assert "stiffest: 3.000 kN/m along 180°" in texts
+    assert "least stiff: 1.000 kN/m along 0°" in texts
 
 
 def test_directions_without_an_answer_are_marked_and_open_the_outline():

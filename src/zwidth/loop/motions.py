@@ -10,7 +10,7 @@ def motion_name(squared: float, decay: float) -> str:
     if squared <= 0.0:
         return "rigid motion (0 Hz)" if squared == 0.0 else "unstable motion (negative stiffness)"
     rate = sqrt(squared)
-    return f"mode at {rate / (2.0 * pi):.4g} Hz (damping ratio {decay / rate:.3g})"
+    return f"mode at {rate / (2.0 * pi):.4g} Hz (damping ratio {decay / rate:.4g})"
 
 
 def pole_name(pole: complex) -> str:

@@ -1,13 +1,17 @@
-"""Numbers with units for people: sensible digits, SI prefixes, a real minus sign.
+"""Numbers with units for people: one rounding everywhere, SI prefixes, a real minus sign.
 
-Figures and reports use `quantity`, `at_most`, `number` and `point`; terminals `amount` and `vector`, the same
-notation with blanks and signs that can be typed and searched.
+What is computed has four significant digits, rounded to nearest, limits too: whoever renders a wall at its limit
+has no margin, and a pair of stiffness and damping promises nothing however it is rounded. What somebody chose
+stays as it was written (`given`), an error has two digits (`uncertain`), a spectral radius four of its distance
+from 1.
+
+Figures and reports use `quantity`, `number`, `percent` and `point`; terminals `amount` and `vector`, the same
+notation with blanks and signs that can be typed and searched (`typed`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from decimal import ROUND_DOWN, Context
 from math import floor, isfinite, isnan, log10
 from typing import Final
 
@@ -15,6 +19,9 @@ PREFIXES: Final = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Prefixes, as powers of ten, that a unit may take; one that is not named takes none: kg has a prefix already, one
 # before a square would be squared with it, and mNs/m reads as a metre-newton.
 _TAKES: Final = {"N/m": (0, 3, 6), **dict.fromkeys(("Hz", "s", "m", "N", "J"), tuple(PREFIXES))}
+DIGITS: Final = 4  # of whatever is computed
+OF_ERRORS: Final = 2
+OF_RADII: Final = range(4, 11)  # decimals of a spectral radius
 SPACE: Final = "\u00a0"
 MINUS: Final = "\u2212"
 THIN: Final = "\u2009"
@@ -48,12 +55,56 @@ def _prefixed(value: float, unit: str) -> int:
     return exponent if exponent in _TAKES.get(unit, ()) else 0
 
 
-def number(value: float, digits: int = 3) -> str:
-    """A number to so many significant digits, as a power of ten where it is very large or small.
+def number(value: float) -> str:
+    """A number in four digits, as a power of ten where it is very large or small; a dash where it is nan.
 
     >>> number(0.0253667), number(-12.0), number(164944.5)
-    ('0.0254', '−12.0', '1.65\u2009×\u200910⁵')
+    ('0.02537', '−12.00', '1.649\u2009×\u200910⁵')
     """
+    return _rounded(value, DIGITS)
+
+
+def uncertain(value: float) -> str:
+    """An error, or what else says how exact another number is, in two digits.
+
+    >>> uncertain(0.01234), uncertain(67.08)
+    ('0.012', '67')
+    """
+    return _rounded(value, OF_ERRORS)
+
+
+def signed(value: float) -> str:
+    """A number with its sign, for changes.
+
+    >>> signed(1.21474), signed(-0.0002)
+    ('+1.215', '−0.0002000')
+    """
+    return ("+" if value > 0.0 else "") + number(value)
+
+
+def percent(share: float) -> str:
+    """A share in percent.
+
+    >>> percent(0.49237)
+    '49.24\xa0%'
+    """
+    return f"{number(100.0 * share)}{SPACE}%"
+
+
+def radius(value: float) -> str:
+    """A spectral radius, in four digits of its distance from 1 as far as ten decimals reach.
+
+    >>> radius(0.94553), radius(0.99998766), radius(1.0), radius(1.25)
+    ('0.94553', '0.99998766', '1.0000000000', '1.2500')
+    """
+    if not isfinite(value):
+        return number(value)
+    away = abs(value - 1.0)
+    decimals = DIGITS - 1 - floor(log10(away)) if away else OF_RADII[-1]
+    return f"{value:.{min(max(decimals, OF_RADII[0]), OF_RADII[-1])}f}"
+
+
+def _rounded(value: float, digits: int) -> str:
     if isnan(value):
         return UNKNOWN
     if not isfinite(value):
@@ -69,33 +120,22 @@ def number(value: float, digits: int = 3) -> str:
     return text.replace("-", MINUS)
 
 
-def quantity(value: float, unit: str, digits: int = 3) -> str:
+def quantity(value: float, unit: str) -> str:
     """A value with its unit and the prefix that suits it; a dash where the value is not known (nan).
 
-    >>> quantity(7849.44, "N/m", 2), quantity(0.02, "Ns/m"), quantity(0.2616, "kg")
-    ('7.8\xa0kN/m', '0.0200\xa0Ns/m', '0.262\xa0kg')
+    >>> quantity(7849.44, "N/m"), quantity(0.02, "Ns/m"), quantity(0.2616, "kg")
+    ('7.849\xa0kN/m', '0.02000\xa0Ns/m', '0.2616\xa0kg')
     """
     if isnan(value):
         return UNKNOWN
     if not isfinite(value):
-        return f"{number(value, digits)}{SPACE}{unit}".strip()
-    rounded = float(f"{value:.{digits - 1}e}")  # so that 999.96 becomes 1.00 k, not 1000
+        return f"{number(value)}{SPACE}{unit}".strip()
+    rounded = float(f"{value:.{DIGITS - 1}e}")  # so that 999.996 becomes 1.000 k, not 1000
     exponent = _prefixed(rounded, unit)
-    return f"{number(rounded / 10.0**exponent, digits)}{SPACE}{PREFIXES[exponent]}{unit}".strip()
+    return f"{number(rounded / 10.0**exponent)}{SPACE}{PREFIXES[exponent]}{unit}".strip()
 
 
-def at_most(value: float, unit: str, digits: int = 3) -> str:
-    """A largest value, rounded towards 0, so that it promises no more than there is.
-
-    >>> at_most(147.04, "N/m"), at_most(7849.44, "N/m")
-    ('147\xa0N/m', '7.84\xa0kN/m')
-    """
-    if isfinite(value):
-        value = float(Context(prec=digits, rounding=ROUND_DOWN).create_decimal(repr(float(value))))
-    return quantity(value, unit, digits)
-
-
-def given(value: float, unit: str) -> str:
+def given(value: float, unit: str = "") -> str:
     """A number that somebody chose, as short as it was written: 1.25 ms, 0.03 kg.
 
     >>> given(0.00125, "s"), given(0.03, "kg"), given(1000.0, "Hz")
@@ -106,7 +146,7 @@ def given(value: float, unit: str) -> str:
     if "e" in shown:
         mantissa, power = shown.split("e")
         shown = f"{mantissa}{THIN}×{THIN}10{str(int(power)).translate(_RAISED)}"
-    return f"{shown.replace('-', MINUS)}{SPACE}{PREFIXES[exponent]}{unit}"
+    return f"{shown.replace('-', MINUS)}{SPACE}{PREFIXES[exponent]}{unit}".strip()
 
 
 def printed(unit: str) -> str:
@@ -124,12 +164,12 @@ def area_text(square_metres: float) -> str:
     """An area in mm², cm² or m².
 
     >>> area_text(0.0379), area_text(4.4e-7), area_text(36.87)
-    ('379 cm²', '0.44 mm²', '36.87 m²')
+    ('379.0 cm²', '0.4400 mm²', '36.87 m²')
     """
     unit, size = "m²", 1.0
     if square_metres < 1.0:
         unit, size = ("mm²", 1e-6) if 0.0 < square_metres < 1e-4 else ("cm²", 1e-4)
-    return f"{square_metres / size:.4g} {unit}"
+    return f"{number(square_metres / size)} {unit}"
 
 
 def point(coordinates: Iterable[float], unit: str = "m") -> str:
@@ -141,11 +181,11 @@ def point(coordinates: Iterable[float], unit: str = "m") -> str:
     values = [float(c) for c in coordinates]
     if len(values) == 3 and values[2] == 0.0:
         values.pop()
-    inside = ", ".join(f"{round(v, 12) + 0.0:.4g}".replace("-", MINUS) for v in values)
+    inside = ", ".join(f"{round(v, 12) + 0.0:.{DIGITS}g}".replace("-", MINUS) for v in values)
     return f"({inside}){SPACE}{unit}".rstrip(SPACE)
 
 
-def amount(value: float | None, unit: str = "", digits: int = 4) -> str:
+def amount(value: float | None, unit: str = "") -> str:
     """A quantity on a terminal; "none" where there is no finite one.
 
     >>> amount(7849.44, "N/m"), amount(-0.2616, "kg"), amount(None, "N/m"), amount(0.25)
@@ -153,7 +193,7 @@ def amount(value: float | None, unit: str = "", digits: int = 4) -> str:
     """
     if value is None or not isfinite(value):
         return NONE
-    return typed(quantity(value, unit, digits))
+    return typed(quantity(value, unit))
 
 
 def vector(components: Iterable[float], unit: str = "") -> str:

@@ -136,7 +136,7 @@ class Reach:
     def __str__(self) -> str:
         boxed = zip("xyz", (self.extent(axis) for axis in np.eye(3)), strict=True)
         return ", ".join(
-            f"{axis} from {a:.3g} to {b:.3g} m" if b - a > FLAT else f"{axis} = {_short(a)} m"
+            f"{axis} from {a:.4g} to {b:.4g} m" if b - a > FLAT else f"{axis} = {_short(a)} m"
             for axis, (a, b) in boxed
         )
 

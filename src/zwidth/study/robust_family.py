@@ -195,9 +195,9 @@ def _types(found: dict[str, Any]) -> Sequence[str]:
 def in_words(value: Any) -> str:
     """A member's value, in four digits where it is a number.
 
-    >>> in_words(30000.0), in_words(0.74483), in_words("thesis-arm")
+    >>> in_words(30004.0), in_words(0.74483), in_words("thesis-arm")
     ('30000', '0.7448', 'thesis-arm')
     """
     if isinstance(value, str):
         return value
-    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
+    return f"{float(f'{value:.3e}'):.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"

@@ -15,7 +15,7 @@ from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
-from zwidth.show.units import amount, at_most, typed
+from zwidth.show.units import amount, number, typed
 
 if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
@@ -202,7 +202,7 @@ def _row(found: Found, bound: Bound, unmet: list[str]) -> tuple[str, ...]:
         bound.name,
         f"{bound.kind}, {bound.claim}",
         _stiffness(there),
-        "-" if ratio is None or ratio != ratio else f"{ratio:.3g}",
+        "-" if ratio is None or ratio != ratio else typed(number(ratio)),
         _stiffness(bound.stiffness_max),
         " ".join(str(unmet.index(sentence) + 1) for sentence in bound.violated) or "-",
     )
@@ -212,7 +212,7 @@ def _stiffness(value: float) -> str:
     """A largest stiffness, no more than there is; "-" where nothing is said, "none" where none is admitted."""
     if value != value:
         return "-"
-    return typed(at_most(value, "N/m", 4)) if value > 0.0 else "none"
+    return amount(value, "N/m") if value > 0.0 else "none"
 
 
 def _needs(bound: Bound) -> str:

@@ -17,7 +17,7 @@ from zwidth.show.cli.options import Numbers, Question, about_a_device, as_json, 
 from zwidth.show.cli.place import heading
 from zwidth.show.motions import counted
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
-from zwidth.show.units import amount, vector
+from zwidth.show.units import amount, radius, vector
 
 if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
@@ -205,7 +205,7 @@ def _decays(buildable: FastestDecay | None, of_all: FastestDecay | None) -> Iter
     for fastest in (buildable, None if of_all == buildable else of_all):
         if fastest:
             wall = f"{amount(fastest.stiffness, 'N/m')} and {amount(fastest.damping, 'Ns/m')}"
-            yield label, f"at {wall}: spectral radius {amount(fastest.spectral_radius)}"
+            yield label, f"at {wall}: spectral radius {radius(fastest.spectral_radius)}"
         label = "with K or B < 0"
 
 

@@ -14,7 +14,7 @@ from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, e
 from zwidth.show.cli.place import heading
 from zwidth.show.cli.points import Walls, read_walls
 from zwidth.show.output import DATA, destination, write_data
-from zwidth.show.units import amount
+from zwidth.show.units import NONE, amount, radius
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
@@ -74,7 +74,7 @@ def _judged(question: Question, device: Device, walls: Walls) -> list[dict[str, 
     for start in range(0, len(walls), AT_ONCE):
         batch = walls[start : start + AT_ONCE]
         found = judge(loop, [K for K, _ in batch], [B for _, B in batch])
-        for (K, B), verdict, radius, frequency in zip(
+        for (K, B), verdict, size, frequency in zip(
             batch, found.names, found.spectral_radius.tolist(), found.frequency.tolist(), strict=True
         ):
             entries.append(
@@ -82,7 +82,7 @@ def _judged(question: Question, device: Device, walls: Walls) -> list[dict[str, 
                     "stiffness_N_per_m": K,
                     "damping_Ns_per_m": B,
                     "verdict": verdict,
-                    "spectral_radius": radius,
+                    "spectral_radius": size,
                     "frequency_Hz": frequency,
                 }
             )
@@ -110,7 +110,7 @@ def _pages(question: Question, device: Device, document: dict[str, Any]) -> Sequ
             amount(point["stiffness_N_per_m"], "N/m"),
             amount(point["damping_Ns_per_m"], "Ns/m"),
             point["verdict"],
-            amount(point["spectral_radius"], digits=10),
+            NONE if point["spectral_radius"] is None else radius(point["spectral_radius"]),
             amount(point["frequency_Hz"], "Hz"),
         )
         for point in points[:SHOWN]

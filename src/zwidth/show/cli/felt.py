@@ -16,7 +16,7 @@ from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
-from zwidth.show.units import amount
+from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -163,7 +163,7 @@ def _pages(question: Question, device: Device, found: Felt, file: str | None) ->
     wall = f"{amount(found.stiffness, 'N/m')}, {amount(found.damping, 'Ns/m')}: {found.verdict}"
     rows = [("wall", wall)]
     if found.impedance is not None:
-        share = f" ({100.0 * found.static / found.stiffness:.1f} % of it)" if found.stiffness else ""
+        share = f" ({typed(percent(found.static / found.stiffness))} of it)" if found.stiffness else ""
         rows.append(("felt at rest", amount(found.static, "N/m") + share))
     if found.mass == found.mass:
         rows.append(("felt in free motion", amount(found.mass, "kg")))

@@ -27,7 +27,7 @@ from zwidth.show.cli.predicted_cycles import (
 )
 from zwidth.show.cli.progress import progress_told
 from zwidth.show.output import DATA, FIGURES, destination, write_data
-from zwidth.show.units import amount
+from zwidth.show.units import amount, given
 
 if TYPE_CHECKING:
     from zwidth.contact.limit_cycles import LimitCycle
@@ -190,7 +190,7 @@ def _pages(question: Question, device: Device, found: Predicted, document: dict[
         ("range", f"{whose} {amount(far, 'm')} to either side at most"),
     ]
     if found.offset:
-        rows.append(("middle", f"{found.offset:.4g} of a step beyond a count"))
+        rows.append(("middle", f"{given(found.offset)} of a step beyond a count"))
     if found.rest is not None:
         rows.append(("rests under every push", _up_to(found.rest)))
         rows.append(("hunts in no way", f"{_up_to(found.quiet)}, at this damping"))
@@ -215,7 +215,7 @@ def _rows(found: Predicted) -> Iterator[tuple[str, ...]]:
         yield (
             amount(cycle.amplitude, "m"),
             amount(cycle.frequency_Hz, "Hz"),
-            f"{cycle_speed(cycle):.4g} m/s",
+            amount(cycle_speed(cycle), "m/s"),
             amount(cycle.force_amplitude, "N"),
             _kind(cycle),
             _said(met) if met else "",

@@ -12,7 +12,7 @@ from zwidth.measures.measure import OK, STATUS
 from zwidth.show.cli.answer import Answer, sheet
 from zwidth.show.cli.place import computer, omission
 from zwidth.show.output import ARRAYS, DATA, replacing, shown, write_data
-from zwidth.show.units import amount, area_text, vector
+from zwidth.show.units import amount, area_text, percent, typed, vector
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,7 +187,7 @@ def _area_rows(area: CommonArea) -> Iterator[tuple[str, str]]:
 
 
 def _area(area: float, share: float) -> str:
-    return f"{area_text(area).replace('²', '^2')}, {100 * share:.3g} % of what is reached"
+    return f"{area_text(area).replace('²', '^2')}, {typed(percent(share))} of what is reached"
 
 
 def write(

@@ -11,7 +11,7 @@ from zwidth.show.cli.answer import Answer, deliver, sheet
 from zwidth.show.cli.computing import computing
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, replacing, write_data
-from zwidth.show.units import amount
+from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
@@ -133,7 +133,8 @@ def warning(chart: MeasuredChart) -> str | None:
     if share >= 1.0 - MOST_UNMEASURED:
         return None
     return (
-        f"measured up to {share * half:.6g} Hz, {100.0 * share:.3g} % of half the sampling rate ({half:.6g} Hz); "
+        f"measured up to {amount(share * half, 'Hz')}, {typed(percent(share))} of half the sampling rate "
+        f"({amount(half, 'Hz')}); "
         "walls that fail above are not seen"
     )
 
@@ -185,7 +186,7 @@ def more_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
 def told(stretch: Stretch) -> str:
     """A stretch in words."""
     where = "; the edge of the stable walls runs through it" if stretch.on_edge else ""
-    return f"{stretch.low:.6g} to {stretch.high:.6g} Hz: {stretch.reason}{where}"
+    return f"{amount(stretch.low, 'Hz')} to {amount(stretch.high, 'Hz')}: {stretch.reason}{where}"
 
 
 def judged(question: Question, device: Device, walls: Walls) -> list[dict[str, Any]]:

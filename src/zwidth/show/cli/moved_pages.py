@@ -10,7 +10,7 @@ from zwidth.show.cli.answer import Row, sheet, table
 from zwidth.show.cli.energies import HEADINGS, energy_rows
 from zwidth.show.cli.place import computer
 from zwidth.show.output import shown
-from zwidth.show.units import amount, vector
+from zwidth.show.units import amount, percent, typed, vector
 
 if TYPE_CHECKING:
     from zwidth.show.cli.moved import Moved
@@ -81,7 +81,7 @@ def _results(found: Moved, document: Mapping[str, Any]) -> Iterator[Row]:
         yield "largest penetration", _when(document["largest_penetration_m"], "m", _depths(found), motion.time)
         size = np.linalg.norm(motion.force, axis=1)
         yield "largest force", _when(document["largest_force_N"], "N", size, motion.time)
-        yield "in contact", f"{100.0 * document['contact_share']:.4g} % of the samples"
+        yield "in contact", f"{typed(percent(document['contact_share']))} of the samples"
         yield "torque limits", _limits(found, document)
         if isfinite(found.device.controller.saturation):
             yield "force limit", _share(document["force_limit_share"])
@@ -122,7 +122,7 @@ def _limits(found: Moved, document: Mapping[str, Any]) -> str:
 
 
 def _share(share: float) -> str:
-    return f"reached in {100.0 * share:.4g} % of the samples" if share > 0.0 else "not reached"
+    return f"reached in {typed(percent(share))} of the samples" if share > 0.0 else "not reached"
 
 
 def _energies(book: Mapping[str, float]) -> Iterator[tuple[str, str, str]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from zwidth.show.output import shown
-from zwidth.show.units import amount, vector
+from zwidth.show.units import amount, given, typed, vector
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
@@ -51,15 +51,19 @@ def computer(controller: Controller) -> str:
     """What the computer and the amplifier do, in one line."""
     from zwidth.loop.estimators import METHODS, BackwardDifference
 
-    period = f"{1e3 * controller.sampling_period:.6g} ms"
+    period = _given(controller.sampling_period, "s")
     samples = "sample" if controller.delay == 1.0 else "samples"
-    delay = f"{controller.delay:.6g} {samples} of delay" if controller.delay else "no delay"
+    delay = f"{_given(controller.delay)} {samples} of delay" if controller.delay else "no delay"
     parts = [f"sampled every {period}", delay]
     estimate = "velocity"
     if not isinstance(controller.velocity, BackwardDifference):
         name = next(name for name, method in METHODS.items() if isinstance(controller.velocity, method))
         own = ", ".join(
-            key if value is True else value if isinstance(value, str) else f"{key.replace('_', ' ')} {value:.6g}"
+            key
+            if value is True
+            else value
+            if isinstance(value, str)
+            else f"{key.replace('_', ' ')} {_given(value)}"
             for key, value in vars(controller.velocity).items()
             if value is not False
         )
@@ -71,7 +75,7 @@ def computer(controller: Controller) -> str:
     if controller.force_filter is not None:
         parts.append(f"force through {_filter(controller.force_filter)}")
     if controller.actuator_time_constant:
-        parts.append(f"force lagging by {controller.actuator_time_constant:.6g} s")
+        parts.append(f"force lagging by {_given(controller.actuator_time_constant, 's')}")
     return ", ".join(parts)
 
 
@@ -79,6 +83,10 @@ def _filter(low_pass: FirstOrder | Butterworth) -> str:
     from zwidth.loop.controller import FirstOrder
 
     if isinstance(low_pass, FirstOrder):
-        return f"a first-order filter of {low_pass.time_constant:.6g} s"
+        return f"a first-order filter of {_given(low_pass.time_constant, 's')}"
     kind = f"a Butterworth filter of order {low_pass.order}"
-    return f"{kind} at {low_pass.cutoff_Hz:.6g} Hz ({low_pass.discretisation})"
+    return f"{kind} at {_given(low_pass.cutoff_Hz, 'Hz')} ({low_pass.discretisation})"
+
+
+def _given(value: float, unit: str = "") -> str:
+    return typed(given(value, unit))

@@ -14,7 +14,7 @@ from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, shown, write_data
-from zwidth.show.units import amount, vector
+from zwidth.show.units import amount, given, typed, vector
 
 if TYPE_CHECKING:
     from zwidth.chart.polar import ByDirection
@@ -170,7 +170,7 @@ def _rows(found: ByDirection, plane: str) -> Iterator[tuple[str, str]]:
             yield (
                 name,
                 f"{amount(found.stiffness[k], 'N/m')} at {amount(found.damping[k], 'Ns/m')} of damping, "
-                f"along {angles[k]:.6g}° from {plane[0]} towards {plane[1]}",
+                f"along {typed(given(float(angles[k])))}° from {plane[0]} towards {plane[1]}",
             )
     for status in sorted({status for status, answered in zip(found.status, have, strict=True) if not answered}):
         yield "without answer", f"{found.status.count(status)}: {status}"

@@ -20,7 +20,7 @@ from zwidth.show.cli.place import heading
 from zwidth.show.cli.progress import progress_told
 from zwidth.show.motions import counted
 from zwidth.show.output import DATA, FIGURES, destination, replacing, shown, write_data
-from zwidth.show.units import amount
+from zwidth.show.units import amount, percent, radius, typed, uncertain
 
 if TYPE_CHECKING:
     from zwidth.chart.robust import RobustChart
@@ -263,7 +263,7 @@ def _pages(question: Question, device: Device, found: RobustStudy, path: Path | 
         binding.sort(key=lambda index: -_lengths(chart)[index])
         paths = list(found.members[0])
         rows = [
-            [str(index), *(_cell(found.members[index][p]) for p in paths), f"{100 * _lengths(chart)[index]:.1f} %"]
+            [str(index), *(_cell(found.members[index][p]) for p in paths), typed(percent(_lengths(chart)[index]))]
             for index in binding[:TOLD]
         ]
         yield table(["binds", *paths, "of the edge"], rows)
@@ -304,8 +304,8 @@ def _rows(found: RobustStudy) -> Iterator[tuple[str, str]]:
     yield (
         "lost against the best",
         (
-            f"{100 * chart.lost_stiffness_share:.2f} % of its stiffness (member {chart.best_by_stiffness}), "
-            f"{100 * chart.lost_share:.2f} % of its area (member {chart.best_by_area})"
+            f"{typed(percent(chart.lost_stiffness_share))} of its stiffness (member {chart.best_by_stiffness}), "
+            f"{typed(percent(chart.lost_share))} of its area (member {chart.best_by_area})"
         ),
     )
     yield "largest damping", amount(chart.damping_max, "Ns/m")
@@ -327,13 +327,13 @@ def _rows(found: RobustStudy) -> Iterator[tuple[str, str]]:
 
 
 def _members(found: RobustStudy) -> str:
-    count = len(found.members)
+    count, moved = len(found.members), f"{typed(uncertain(100 * found.moved))} %"
     if found.violation is None:
         return f"{count}, all of the list"
     if found.settled:
-        end = f"the search settled, its last round moved the edge by {100 * found.moved:.2g} % of the area"
+        end = f"the search settled, its last round moved the edge by {moved} of the area"
     else:
-        end = f"the search used up --members {count} and had still moved the edge by {100 * found.moved:.2g} %"
+        end = f"the search used up --members {count} and had still moved the edge by {moved}"
     return f"{count}, of which {count - found.sampled} found by searching the ranges for worse ones; {end}"
 
 
@@ -342,12 +342,13 @@ def _violation(found: RobustStudy) -> str:
     assert violation is not None
     if not violation.violating:
         return f"of {violation.unseen} at random none finds one of these walls unstable"
-    softer = f"{100 * violation.worst_stiffness_share:.2g} % less of the largest stiffness would do for all"
+    less = typed(uncertain(100 * violation.worst_stiffness_share))
+    softer = f"{less} % less of the largest stiffness would do for all"
     if violation.worst_stiffness_share == 0.0:
         softer = "all of these have K <= 0 or B < 0"
     return (
         f"of {violation.unseen} at random {violation.violating} find a wall unstable, with spectral radii up to "
-        f"1 + {violation.worst_spectral_radius - 1.0:.2g}; {softer}"
+        f"{radius(violation.worst_spectral_radius)}; {softer}"
     )
 
 

@@ -14,7 +14,7 @@ from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
-from zwidth.show.units import amount
+from zwidth.show.units import amount, given, signed, typed
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
@@ -127,9 +127,9 @@ def _row(found: Sensitivities, number: Sensitivity) -> tuple[str, str, str, str]
     gain = 0.01 * number.logarithmic * found.peak.stiffness
     return (
         number.path,
-        f"{number.value:.6g} {number.unit}".rstrip(),
-        f"{number.logarithmic:+.4f}",
-        f"{'+' if gain > 0.0 else ''}{amount(gain, 'N/m', 3)}",
+        f"{typed(given(number.value))} {number.unit}".rstrip(),
+        typed(signed(number.logarithmic)),
+        f"{'+' if gain > 0.0 else ''}{amount(gain, 'N/m')}",
     )
 
 
@@ -137,7 +137,7 @@ def _remarks(found: Sensitivities, more: int) -> Iterator[str]:
     """What the table does not show."""
     late = next((n for n in found.numbers if n.path == "loop.delay_samples" and n.value == 0.0), None)
     if late is not None and late.derivative == late.derivative:
-        yield f"a delay of 0.01 samples gives {amount(0.01 * late.derivative, 'N/m', 3)}"
+        yield f"a delay of 0.01 samples gives {amount(0.01 * late.derivative, 'N/m')}"
     if found.tie:
         yield "two walls are stiffest at once: these numbers are of one of them, and a change may lower the other"
     elif found.peak is not None and found.rival > 0.9 * found.peak.stiffness:

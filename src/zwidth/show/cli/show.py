@@ -13,7 +13,7 @@ from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, destination, plain, write_data
-from zwidth.show.units import amount
+from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
@@ -170,7 +170,7 @@ def _pages(question: Question, device: Device, document: Mapping[str, Any]) -> I
             ]
         )
         yield table(
-            ["joint", "angle [rad]"], [(name, f"{angle:.4f}") for name, angle in found["joints_rad"].items()]
+            ["joint", "angle [rad]"], [(name, amount(angle)) for name, angle in found["joints_rad"].items()]
         )
     if found["sources"]:
         yield table(["numbers", "source"], list(found["sources"].items()))
@@ -199,4 +199,4 @@ def _modes(found: Mapping[str, Any]) -> Iterator[str]:
         if frequency is None:
             yield "unstable"
         else:
-            yield amount(frequency, "Hz") + (f" ({100.0 * ratio:.3g} %)" if ratio is not None else "")
+            yield amount(frequency, "Hz") + (f" ({typed(percent(ratio))})" if ratio is not None else "")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from zwidth.show.cli.answer import Row, sheet, table
 from zwidth.show.cli.energies import HEADINGS, energy_rows
 from zwidth.show.cli.place import ROUNDING, heading
-from zwidth.show.units import amount
+from zwidth.show.units import amount, given, percent, signed, typed, uncertain
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
@@ -68,7 +68,8 @@ def _start(document: dict[str, Any]) -> str:
     speed = start["velocity_m_per_s"]
     beside = start["off_the_path_m"] or 0.0
     path = f", {amount(beside, 'm')} beside the handle's path" if beside > ROUNDING else ""
-    return f"{where}, {f'at {speed:.6g} m/s' if speed else 'at rest'}{path}"
+    moving = f"at {typed(given(speed, 'm/s'))}" if speed else "at rest"
+    return f"{where}, {moving}{path}"
 
 
 def _hand(hand: dict[str, Any]) -> str:
@@ -92,16 +93,16 @@ def _results(found: Simulated, document: dict[str, Any]) -> Iterator[Row]:
     if isfinite(judged.frequency):
         yield "dominant frequency", amount(judged.frequency, "Hz")
     none = "too fast to tell" if found.response.given_up else "no motion is left"
-    growth = f"{judged.growth:+.4g} per sample" if isfinite(judged.growth) else none
+    growth = f"{typed(signed(judged.growth))} per sample" if isfinite(judged.growth) else none
     if found.predicted is not None:
         left = found.loop.plant.nonlinear.left_out
         linear = " of the linear loop" if left or isfinite(found.limit) else ""
-        growth += f"; by the eigenvalues{linear} {found.predicted:+.4g}"
+        growth += f"; by the eigenvalues{linear} {typed(signed(found.predicted))}"
     yield "growth", growth
     if found.environment.surface:
-        yield "in contact", f"{100.0 * judged.contact:.4g} % of the second half"
+        yield "in contact", f"{typed(percent(judged.contact))} of the second half"
     if document["limited_share"] > 0.0:
-        share = f"{100.0 * document['limited_share']:.3g} % of the samples"
+        share = f"{typed(percent(document['limited_share']))} of the samples"
         yield "at the force limit", f"{share}, {amount(found.limit, 'N')}"
     if document["passivity"] is not None:
         own = document["passivity"]
@@ -140,7 +141,7 @@ def _remarks(found: Simulated, document: dict[str, Any]) -> Iterator[str]:
     if found.loop.plant.handle is None:
         yield "no handle is known: it is taken to be where the sensor is"
     if response.imbalance > 1e-6:
-        yield f"the energies miss adding up by {100.0 * response.imbalance:.2g} % of the largest"
+        yield f"the energies miss adding up by {typed(uncertain(100.0 * response.imbalance))} % of the largest"
 
 
 def _rubs(found: Simulated) -> bool:

@@ -15,7 +15,7 @@ from zwidth.show.cli.main import INTERNAL, say
 from zwidth.show.cli.options import as_json, example, named, output_option
 from zwidth.show.cli.progress import progress_told
 from zwidth.show.output import ARRAYS, DATA, FIGURES, OutputError, destination, replacing, shown, write_data
-from zwidth.show.units import typed
+from zwidth.show.units import number, typed
 
 if TYPE_CHECKING:
     from zwidth.study.store import Store
@@ -195,7 +195,7 @@ def _cells(found: Sweep, design: int) -> list[str]:
     from zwidth.measures.measure import OK, STATUS
 
     values, status = found.cells.values[design], found.cells.status[design]
-    return [f"{v:.5g}" if s == OK else STATUS[int(s)] for v, s in zip(values, status, strict=True)]
+    return [typed(number(float(v))) if s == OK else STATUS[int(s)] for v, s in zip(values, status, strict=True)]
 
 
 def _rows(found: Sweep, column: int) -> Iterator[tuple[str, str]]:
@@ -215,7 +215,7 @@ def _rows(found: Sweep, column: int) -> Iterator[tuple[str, str]]:
             where = ", ".join(
                 f"{axis.key} = {label(v)}" for axis, v in zip(sampling.axes, sampling.values(n), strict=True)
             )
-            yield name, f"{typed(quantity(float(values[n]), one.unit, 4))} at {where}"
+            yield name, f"{typed(quantity(float(values[n]), one.unit))} at {where}"
     kinds, counts = np.unique(status, return_counts=True)
     yield "designs", ", ".join(f"{n} {STATUS[int(kind)]}" for kind, n in zip(kinds, counts, strict=True))
 

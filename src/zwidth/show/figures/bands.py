@@ -103,7 +103,7 @@ def _bar_label(bar: Any, title: str, unit: str, levels: Floats) -> None:
     exponent = _common_exponent(levels, unit)
     texts = _texts(levels, exponent)
     if any("e" in text for text in texts):
-        texts = [given(v / 10.0**exponent, "").strip() for v in levels.tolist()]
+        texts = [given(v / 10.0**exponent) for v in levels.tolist()]
     bar.ax.set_yticks(levels, labels=[text.replace("-", MINUS) for text in texts])
     bar.ax.tick_params(labelsize=8.0)
     name = scaled(exponent, unit).strip("\u00a0")

@@ -82,4 +82,4 @@ def tenfold_time(radius: float, period: float) -> float:
 
 
 def _meaning(radius: float, period: float) -> str:
-    return f"{radius:.4g} ({quantity(tenfold_time(radius, period), 's', 2)})"
+    return f"{radius:.4g} ({quantity(tenfold_time(radius, period), 's')})"

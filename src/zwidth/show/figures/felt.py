@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from zwidth.measures.felt_chart import FeltChart
 from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above
-from zwidth.show.units import MINUS, at_most, quantity
+from zwidth.show.units import MINUS, quantity
 
 
 def draw_impedance(
@@ -50,7 +50,7 @@ def draw_felt_chart(ax: Axes, chart: FeltChart) -> None:
         ax.plot(arc.stiffness, arc.damping, color=BLACK, solid_capstyle="round")
     widest = max((float(ring[:, 0].max()) for ring in chart.regions), default=1.0)
     if isfinite(chart.stiffest):
-        text = f"hardest felt contact: {at_most(chart.stiffest, 'N/m')}"
+        text = f"hardest felt contact: {quantity(chart.stiffest, 'N/m')}"
         ax.axvline(chart.stiffest, color=VERMILION, linewidth=0.9, linestyle=":", label=text)
     if isfinite(chart.limit) and chart.limit < 4.0 * widest:
         text = f"no wall is felt above {quantity(chart.limit, 'N/m')}"

@@ -18,7 +18,7 @@ from zwidth.measures.measure import FAILED, NO_VALUE, SINGULAR, UNDECIDED
 from zwidth.show.figures.bands import LARGEST, bands_of, colour_bar
 from zwidth.show.figures.mechanism import link_stroke, pins
 from zwidth.show.figures.style import BLACK, GREY, LINES, VERMILION, figure, label
-from zwidth.show.units import area_text, given, printed
+from zwidth.show.units import area_text, given, percent, printed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -172,7 +172,7 @@ def _areas(ax: Axes, dataset: xr.Dataset, area: CommonArea) -> list[Any]:
         hatch = HATCHES[n % len(HATCHES)]
         measure = requirement.measure
         sign = "\u2265" if requirement.at_least else "\u2264"
-        bound = given(requirement.value, printed(str(dataset[measure.name].attrs["unit"]))).rstrip("\u00a0")
+        bound = given(requirement.value, printed(str(dataset[measure.name].attrs["unit"])))
         text = f"{measure.title} {sign} {bound}: {area_text(region.area)}"
         style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.3, "linestyle": dashes, "facecolor": "none"}
         for path in _paths(region.shape):
@@ -185,7 +185,7 @@ def _areas(ax: Axes, dataset: xr.Dataset, area: CommonArea) -> list[Any]:
     dotted: dict[str, Any] = {"linestyle": (0, (0.1, 1.6)), "linewidth": 3.2}
     for path in _paths(area.common.shape):
         ax.add_patch(PathPatch(path, facecolor="none", edgecolor=BLACK, zorder=2.6, capstyle="round", **dotted))
-    share = f"{100.0 * area.common.share:.3g} % of what is reached"
+    share = f"{percent(area.common.share)} of what is reached"
     text = f"Common area: {area_text(area.common.area)}, {share}"
     handles.append(Line2D([], [], color=BLACK, dash_capstyle="round", label=text, **dotted))
     return handles

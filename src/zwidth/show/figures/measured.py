@@ -77,5 +77,4 @@ def _unusable(ax: Axes, chart: MeasuredChart) -> None:
 def _named(stretch: Stretch) -> str:
     why = stretch.reason.partition(",")[0].partition(";")[0]
     why = why if len(why) <= 44 else "uncertain between frequencies"
-    low = f"{stretch.low:.4g}"
-    return f"unusable: {low} to {quantity(stretch.high, 'Hz')}, {why}"
+    return f"unusable: {quantity(stretch.low, 'Hz')} to {quantity(stretch.high, 'Hz')}, {why}"

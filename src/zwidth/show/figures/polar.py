@@ -8,7 +8,7 @@ from matplotlib.ticker import MaxNLocator
 
 from zwidth.chart.polar import OK, ByDirection
 from zwidth.show.figures.style import BLACK, GREY, STABLE, VERMILION, label, legend_above
-from zwidth.show.units import at_most
+from zwidth.show.units import given, quantity
 
 
 def draw_polar(ax: Axes, found: ByDirection, angles_deg: np.ndarray, axes: tuple[str, str] = ("x", "y")) -> None:
@@ -28,7 +28,7 @@ def draw_polar(ax: Axes, found: ByDirection, angles_deg: np.ndarray, axes: tuple
     reach = 1.1 * float(np.max(found.stiffness[have])) if have.any() else 1.0
     for name, k, marker in _extremes(found):
         angle = np.deg2rad(angles_deg[k])
-        text = f"{name}: {at_most(found.stiffness[k], 'N/m')} along {angles_deg[k]:.4g}°"
+        text = f"{name}: {quantity(found.stiffness[k], 'N/m')} along {given(float(angles_deg[k]))}°"
         ax.plot(
             *(found.stiffness[k] * np.array([[np.cos(angle)], [np.sin(angle)]])),
             marker=marker,

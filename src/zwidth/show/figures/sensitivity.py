@@ -7,7 +7,7 @@ from math import isnan
 from matplotlib.axes import Axes
 
 from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION
-from zwidth.show.units import MINUS, NONE
+from zwidth.show.units import MINUS, NONE, signed
 from zwidth.study.sensitivity import Sensitivities
 
 
@@ -34,7 +34,7 @@ def draw_sensitivities(ax: Axes, found: Sensitivities, top: int = 12, *, wholes:
             linewidth=0.8,
         )
         ax.annotate(
-            _signed(value),
+            signed(value),
             (value, row),
             xytext=(4 if value > 0.0 else -4, 0),
             textcoords="offset points",
@@ -45,7 +45,7 @@ def draw_sensitivities(ax: Axes, found: Sensitivities, top: int = 12, *, wholes:
     ax.axvline(0.0, color=BLACK, linewidth=0.8)
     low, high = min([0.0, *values]), max([0.0, *values])
     ax.set_xlim(
-        low - 0.16 * widest * (low < 0.0) - 0.02 * widest, high + 0.16 * widest * (high > 0.0) + 0.02 * widest
+        low - 0.2 * widest * (low < 0.0) - 0.02 * widest, high + 0.2 * widest * (high > 0.0) + 0.02 * widest
     )
     ax.set_ylim(0.4, len(shown) + 0.6)
     ax.set_yticks(rows, [_short(path) for path, _ in shown])
@@ -61,8 +61,3 @@ def draw_sensitivities(ax: Axes, found: Sensitivities, top: int = 12, *, wholes:
 def _short(path: str) -> str:
     """A path without the table that all its neighbours share."""
     return path.removeprefix("mechanism.")
-
-
-def _signed(value: float) -> str:
-    text = f"{value:+.2f}" if abs(value) >= 0.005 else f"{value:+.0e}"
-    return text.replace("-", MINUS)

@@ -12,7 +12,7 @@ from matplotlib.patches import Polygon
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.measured import MeasuredChart
 from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above
-from zwidth.show.units import at_most, quantity
+from zwidth.show.units import quantity
 
 # KMIN, KMAX [N/m], BMIN, BMAX [N s/m]
 Window = tuple[float, float, float, float]
@@ -55,7 +55,7 @@ def draw_models(ax: Axes, charts: Mapping[str, StabilityChart], window: Window |
 
 def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart) -> None:
     """The stiffest wall, with its numbers in the legend."""
-    numbers = f"{at_most(chart.stiffness_max, 'N/m')} at {quantity(chart.damping_at_stiffness_max, 'Ns/m')}"
+    numbers = f"{quantity(chart.stiffness_max, 'N/m')} at {quantity(chart.damping_at_stiffness_max, 'Ns/m')}"
     vibration = " and ".join(quantity(f, "Hz") for f in chart.frequencies_at_stiffness_max)
     ax.plot(
         [chart.stiffness_max],

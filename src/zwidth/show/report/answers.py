@@ -7,7 +7,7 @@ from typing import Final
 
 from zwidth.show.report.facts import Facts
 from zwidth.show.report.sentences import hertz, listed
-from zwidth.show.units import SPACE, at_most, number, quantity
+from zwidth.show.units import SPACE, number, percent, quantity
 from zwidth.study.validity import Fit, Interval, Validity
 
 # How the actuator pulls and what the sensor reads are scales of the description, not parts to be changed.
@@ -22,11 +22,11 @@ def first_change(facts: Facts) -> str:
         return ""
     (path, value), *rest = told[:3]
     gain = quantity(0.01 * abs(value) * facts.base.stiffness_max, "N/m")
-    share = f"{number(abs(value), 2)}{SPACE}% more stiffness"
+    share = f"{percent(0.01 * abs(value))} more stiffness"
     text = f"What to change first is {path}: 1{SPACE}% {_way(value)} of it gives {share}, {gain}"
     if not rest:
         return f"{text}."
-    others = [f"{other} (1{SPACE}% {_way(slope)} gives {number(abs(slope), 2)}{SPACE}%)" for other, slope in rest]
+    others = [f"{other} (1{SPACE}% {_way(slope)} gives {percent(0.01 * abs(slope))})" for other, slope in rest]
     return f"{text}; then {listed(others)}."
 
 
@@ -42,8 +42,8 @@ def summit(facts: Facts) -> str:
     if not found.rival > NEAR * facts.base.stiffness_max:
         return ""
     return (
-        f"Another summit of the edge stands at {at_most(found.rival, 'N/m')}: it takes over where a change lowers "
-        "the stiffest wall below it."
+        f"Another summit of the edge stands at {quantity(found.rival, 'N/m')}: it takes over where a change "
+        "lowers the stiffest wall below it."
     )
 
 
@@ -56,9 +56,9 @@ def felt(facts: Facts) -> str:
         return (
             "Nothing gives way between the wall and the hand: at rest a wall is felt as stiff as it is commanded."
         )
-    share = 100.0 * stiffest / facts.base.stiffness_max
+    share = percent(stiffest / facts.base.stiffness_max)
     return (
-        f"At rest the hand feels the stiffest wall with {at_most(stiffest, 'N/m')}, {number(share, 2)} % of its "
+        f"At rest the hand feels the stiffest wall with {quantity(stiffest, 'N/m')}, {share} of its "
         f"stiffness; whatever is commanded, nothing stiffer than {quantity(limit, 'N/m')} can be felt."
     )
 
@@ -72,7 +72,7 @@ def which_model(facts: Facts) -> str:
     highest = float(found.frequency[-1])
     text = f"The walls of the full model fail at up to {hertz(highest)}"
     if isfinite(found.first_natural):
-        times = number(highest / found.first_natural, 2)
+        times = number(highest / found.first_natural)
         text += f", {times} times its first natural frequency of {hertz(found.first_natural)}"
     good = [f"{fit.label} {_where(fit, found)}" for fit in fits if fit.within]
     bad = [fit.label for fit in fits if not fit.within]
@@ -84,7 +84,7 @@ def which_model(facts: Facts) -> str:
 
 
 def _where(fit: Fit, found: Validity) -> str:
-    """everywhere, below 17.6 Hz (17 % of the first natural frequency), between 3 Hz and 9 Hz, ..."""
+    """everywhere, below 17.60 Hz (17.37 % of the first natural frequency), between 3 Hz and 9 Hz, ..."""
     if fit.everywhere:
         return "everywhere"
     return listed([_range(interval, found) for interval in fit.within])
@@ -102,4 +102,4 @@ def _range(interval: Interval, found: Validity) -> str:
 def _share(frequency: float, found: Validity) -> str:
     if not isfinite(found.first_natural):
         return ""
-    return f" ({100.0 * frequency / found.first_natural:.0f} % of that)"
+    return f" ({percent(frequency / found.first_natural)} of that)"

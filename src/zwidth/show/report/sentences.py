@@ -15,7 +15,7 @@ from zwidth.model.mechanism import Floats
 from zwidth.show.figures.decay import tenfold_time
 from zwidth.show.motions import counted
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import MINUS, at_most, given, number, point, quantity
+from zwidth.show.units import MINUS, given, number, percent, point, quantity
 from zwidth.study.what_if import REMEDIES, WORTH, Variant, find, limiting_change
 
 NO_WALL: Final = "no wall with positive stiffness and without negative damping is stable"
@@ -63,7 +63,7 @@ def renders(facts: Facts) -> str:
     start = start[0].upper() + start[1:]
     if not facts.renders:
         return f"{start} renders no wall: {NO_WALL}."
-    stiffness = at_most(facts.base.stiffness_max, "N/m")
+    stiffness = quantity(facts.base.stiffness_max, "N/m")
     if facts.base.damping <= 1e-9 * facts.chart.box[3]:
         return (
             f"{start} renders walls of up to {stiffness}, those without any virtual damping; "
@@ -115,7 +115,7 @@ def _cause(facts: Facts, best: Variant) -> str:
         return "that the sensor does not sit where the wall acts"
     if best.key == "half-period":
         mass = float(facts.effective.rigid_mass)
-        moved = "its mass" if isnan(mass) else f"its mass of {quantity(mass, 'kg', 2)}"
+        moved = "its mass" if isnan(mass) else f"its mass of {quantity(mass, 'kg')}"
         return f"{moved}, sampled at {given(1.0 / controller.sampling_period, 'Hz')}"
     return "how little it damps its own vibrations" if flexible else "how little friction it has"
 
@@ -132,7 +132,7 @@ def _with(facts: Facts, best: Variant) -> str:
 
 
 def _reached(variant: Variant) -> str:
-    return at_most(variant.stiffness_max, "N/m")
+    return quantity(variant.stiffness_max, "N/m")
 
 
 def _late(facts: Facts) -> str:
@@ -207,13 +207,12 @@ def models(facts: Facts) -> str:
 
 
 def difference(ratio: float) -> str:
-    """A ratio in words: "2.0 % above", "as", "16 times"."""
+    """A ratio in words: "2.000 % above", "as", "16.00 times"."""
     if ratio >= 3.0:
-        return f"{number(ratio, 2)} times that of"
-    percent = 100.0 * (ratio - 1.0)
-    if abs(percent) < 0.05:
+        return f"{number(ratio)} times that of"
+    if abs(ratio - 1.0) < 5e-4:
         return "just as"
-    return f"{number(abs(percent), 2)} % {'above' if percent > 0 else 'below'}"
+    return f"{percent(abs(ratio - 1.0))} {'above' if ratio > 1.0 else 'below'}"
 
 
 def decay(facts: Facts) -> str:
@@ -231,7 +230,7 @@ def decay(facts: Facts) -> str:
 
 def _comes_to_rest(wall: FastestDecay, facts: Facts) -> str:
     """The wall and how long its slowest motion takes."""
-    time = quantity(tenfold_time(wall.spectral_radius, facts.loop.period), "s", 2)
+    time = quantity(tenfold_time(wall.spectral_radius, facts.loop.period), "s")
     numbers = f"{quantity(wall.stiffness, 'N/m')} and {quantity(wall.damping, 'Ns/m')}"
     return f"a wall of {numbers} comes to rest fastest: a tenth is left after {time}"
 
@@ -262,7 +261,7 @@ def setting(facts: Facts) -> str:
 
 def delay_name(controller: Controller) -> str:
     """1 sample (1.25 ms)"""
-    count = f"{controller.delay:.4g} sample{'' if controller.delay == 1.0 else 's'}"
+    count = f"{given(controller.delay)} sample{'' if controller.delay == 1.0 else 's'}"
     return f"{count} ({given(controller.delay * controller.sampling_period, 's')})"
 
 
@@ -292,7 +291,7 @@ def filter_name(low_pass: FirstOrder | Butterworth) -> str:
 
 
 def hertz(frequency: float) -> str:
-    """171 Hz"""
+    """170.5 Hz"""
     return quantity(frequency, "Hz")
 
 

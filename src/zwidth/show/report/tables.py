@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from zwidth.conditions import Bound
-from zwidth.model.mechanism import Floats
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import UNKNOWN, at_most, given, number, quantity
+from zwidth.show.units import UNKNOWN, number, quantity
 from zwidth.study.validity import Validity
 from zwidth.study.what_if import Variant
 
@@ -25,18 +22,13 @@ def parameters(facts: Facts) -> list[Row]:
     rigid = int((facts.natural == 0.0).sum())
     modes = ", ".join([*(["0 Hz" if rigid == 1 else f"0 Hz ({rigid} rigid motions)"] if rigid else []), *flexible])
     rows = [
-        ("link-side mass", "m₁", _short(e.link_side_mass, "kg")),
-        ("motor-side mass", "m₂", _short(e.motor_side_mass, "kg")),
-        ("mass with rigid drives", "m", _short(e.rigid_mass, "kg")),
-        ("stiffness between the two sides", "k", _short(e.stiffness, "N/m")),
+        ("link-side mass", "m₁", quantity(float(e.link_side_mass), "kg")),
+        ("motor-side mass", "m₂", quantity(float(e.motor_side_mass), "kg")),
+        ("mass with rigid drives", "m", quantity(float(e.rigid_mass), "kg")),
+        ("stiffness between the two sides", "k", quantity(float(e.stiffness), "N/m")),
         ("natural frequencies", "f", modes or UNKNOWN),
     ]
     return [row for row in rows if row[-1] != UNKNOWN]
-
-
-def _short(value: Floats, unit: str) -> str:
-    """Four digits, without zeros at the end."""
-    return quantity(float(value), unit, 4) if not np.isfinite(value) else given(float(f"{float(value):.4g}"), unit)
 
 
 def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:
@@ -45,7 +37,7 @@ def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:
     return [
         (
             v.label,
-            at_most(v.stiffness_max, "N/m") if v.stiffness_max > 0.0 else "none",
+            quantity(v.stiffness_max, "N/m") if v.stiffness_max > 0.0 else "none",
             f"{number(v.stiffness_max / base)}\u00a0×" if base > 0.0 else UNKNOWN,
             quantity(v.damping, "Ns/m"),
             ", ".join(sentences.hertz(f) for f in v.frequencies) or UNKNOWN,
@@ -87,7 +79,7 @@ def bounds(facts: Facts) -> list[dict[str, Any]]:
             "kind": f"{bound.kind}, {bound.claim}",
             "statement": bound.statement,
             "stiffness": _told(bound),
-            "ratio": f"{number(bound.stiffness_max / exact, 3)}\u00a0×"
+            "ratio": f"{number(bound.stiffness_max / exact)}\u00a0×"
             if exact > 0.0 and bound.stiffness_max > 0.0
             else UNKNOWN,
             "violated": bound.violated,
@@ -100,8 +92,8 @@ def _told(bound: Bound) -> str:
     if bound.stiffness_max == 0.0:
         return "none"
     if bound.damping_at_stiffness_max != bound.damping_at_stiffness_max:
-        return at_most(bound.stiffness_max, "N/m")
-    return f"{at_most(bound.stiffness_max, 'N/m')} at {quantity(bound.damping_at_stiffness_max, 'Ns/m')}"
+        return quantity(bound.stiffness_max, "N/m")
+    return f"{quantity(bound.stiffness_max, 'N/m')} at {quantity(bound.damping_at_stiffness_max, 'Ns/m')}"
 
 
 def document(facts: Facts) -> dict[str, Any]:
