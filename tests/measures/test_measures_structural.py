@@ -72,8 +72,8 @@ def test_against_a_shaken_structure():
     for i in range(2):
         K[i : i + 2, i : i + 2] += k[i] * link
         B[i : i + 2, i : i + 2] += b[i] * link
-    plant = replace(random_plant(np.random.default_rng(0), 1e3), mass=np.diag(m), damping=B, stiffness=K)
-    plant = replace(plant, actuator=np.eye(3)[2], sensor=np.eye(3)[2], handle=np.eye(3)[0])
+    ends = {"actuator": np.eye(3)[2], "sensor": np.eye(3)[2], "handle": np.eye(3)[0]}
+    plant = replace(random_plant(np.random.default_rng(0), 1e3), mass=np.diag(m), damping=B, stiffness=K, **ends)
     w = 2.0 * np.pi * f
 
     def motion(t, y):
@@ -118,10 +118,9 @@ def test_a_resonance_without_damping():
 def test_a_resonance_that_the_actuator_does_not_drive():
     """Two equal arms on the actuator, the handle between: their motion against each other is not driven."""
     K = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, -1.0], [-1.0, -1.0, 2.0]]) * 1e4
-    plant = replace(
-        two_mass(1.0, 1.0, 1.0), mass=np.diag([0.25, 0.25, 0.1]), damping=np.zeros((3, 3)), stiffness=K
-    )
-    plant = replace(plant, actuator=np.eye(3)[2], sensor=np.eye(3)[2], handle=np.array([0.5, 0.5, 0.0]))
+    ends = {"actuator": np.eye(3)[2], "sensor": np.eye(3)[2], "handle": np.array([0.5, 0.5, 0.0])}
+    mass, none = np.diag([0.25, 0.25, 0.1]), np.zeros((3, 3))
+    plant = replace(two_mass(1.0, 1.0, 1.0), mass=mass, damping=none, stiffness=K, **ends)
     damped = replace(plant, damping=2.0 * np.outer([1.0, 1.0, -2.0], [1.0, 1.0, -2.0]))
     assert structural_distortion(plant, 100.0) == np.inf
     assert 1.0 < structural_distortion(damped, 100.0) < 100.0
