@@ -154,8 +154,8 @@ def test_the_heading_names_him_and_what_the_computer_does():
     ran = zwidth("chart", TWO_MASS, "--operator", "thesis-arm", *words)
     assert "as given, held by thesis-arm" in ran.out
     assert (
-        "velocity by windowed-difference (samples 3), force through a first-order filter of 0.001 s, "
-        "force lagging by 0.0002 s" in ran.out
+        "velocity by windowed-difference (samples 3), force through a first-order filter of 1 ms, "
+        "force lagging by 200 µs" in ran.out
     )
 
 
