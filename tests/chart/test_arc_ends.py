@@ -42,7 +42,6 @@ def farthest_end(loop):
 
 
 # Small cells, whose corners are nearer to each other than 1e-7 of the whole set, or modes that the wall hardly moves
-@pytest.mark.xfail(strict=True, reason="corners within 1e-7 of the whole set's size are given one wall")
 @pytest.mark.parametrize("seed", [132, 972, 3060])
 def test_an_arc_ends_on_the_unit_circle(seed):
     assert farthest_end(mixed_loop(seed)) <= 1.0

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.corner import cross_line, refine_corner
+from zwidth.chart.corner import cross_line, refine_corner, wall_on_line
 from zwidth.chart.curve import walls
 from zwidth.chart.tracer import ROOTS, RealRoot, Tracer, Wall
 
@@ -129,7 +129,7 @@ def _line_arcs(
         sure = np.flatnonzero(np.abs(value) > noise)
     turns = np.flatnonzero(np.sign(value[sure[1:]]) != np.sign(value[sure[:-1]]))
     crossings = [cross_line(tracer, root, thetas[sure[i]], thetas[sure[i + 1]]) for i in turns]
-    nodes += [tracer.wall(theta)[:2] for theta in crossings]
+    nodes += [wall_on_line(tracer, root, theta) for theta in crossings]
     nodes = [wall for wall in nodes if np.isfinite(wall).all()]
     nodes.sort(key=lambda wall: float(along @ (wall[0] * T, wall[1])))
     angle = 0.0 if root == "plus" else np.pi

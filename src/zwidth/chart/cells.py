@@ -29,9 +29,10 @@ def box_of(regions: Sequence[Floats]) -> Box:
 
 
 def outline(arcs: list[tuple[Floats, Floats, Floats]]) -> Floats:
-    """A ring's arcs as one closed walk of points (k, 2)."""
-    points = np.vstack([np.column_stack([K[:-1], B[:-1]]) for _, K, B in arcs])
-    return np.vstack([points, points[:1]])
+    """A ring's arcs as one closed walk of points (k, 2); in a blurred corner from one arc's end to the next one's."""
+    points = np.vstack([np.column_stack([K, B]) for _, K, B in arcs])
+    moved = np.append(True, np.any(points[1:] != points[:-1], axis=1))
+    return np.vstack([points[moved], points[:1]]) if np.any(points[0] != points[-1]) else points[moved]
 
 
 def signed_area(ring: Floats) -> float:

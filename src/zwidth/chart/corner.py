@@ -12,6 +12,7 @@ from zwidth.compiled import compiled
 from zwidth.loop.evaluate import Factors
 
 Floats = NDArray[np.float64]
+LAST_DIGITS = 1e-14  # of an angle
 
 
 @compiled
@@ -67,6 +68,24 @@ def cross_line(tracer: Tracer, root: RealRoot, low: float, high: float) -> float
     return zero_between(tracer.factors, tracer.radius, (a, s, v, 0.0, 0.0), low, high)
 
 
+def wall_on_line(tracer: Tracer, root: RealRoot, theta: float) -> Wall:
+    """The wall where the curve crosses a line of real roots, at the angle that `cross_line` gives.
+
+    A mode that the wall hardly moves passes far between one angle and the next that a double can hold. The rest of
+    the way to the line is gone along the curve's tangent, by less than those last digits of the angle. Where the
+    curve changes sides through infinity there is no such wall, and the curve's own is returned.
+    """
+    a, s, v = tracer.line(root).tolist()
+    K, B, dK, dB = tracer.wall(theta)
+    off, slope = a + s * K + v * B, s * dK + v * dB
+    for beside in (theta * (1.0 - LAST_DIGITS), theta * (1.0 + LAST_DIGITS)):
+        k, b, _, _ = tracer.wall(beside)
+        if not abs(a + s * k + v * b) > abs(off):
+            return K, B
+    step = -off / slope if slope else 0.0
+    return (K + step * dK, B + step * dB) if abs(step) <= LAST_DIGITS * theta else (K, B)
+
+
 def _last_edge(tracer: Tracer, on: float, off: float) -> float:
     """The last angle from `on` towards `off` that is an edge."""
     if tracer.certain(on) and tracer.certain(off):
@@ -100,7 +119,7 @@ def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, f
         if ends[0] * ends[1] < 0.0:
             crossing = cross_line(tracer, root, low, high)
             if abs(crossing - theta) <= 1e-6 * theta:
-                return crossing, tracer.wall(crossing)[:2], partner
+                return crossing, wall_on_line(tracer, root, crossing), partner
     wall = tracer.wall(theta)[:2]
     partner = _partner(tracer, theta, wall)
     if 0.0 < partner < np.pi:

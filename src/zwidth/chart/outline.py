@@ -141,9 +141,10 @@ def quadrant_area(tracer: Tracer, rings: Rings) -> float:
     """Area of the stable set within K >= 0, B >= 0 [N^2 s/m^2]."""
     total = 0.0
     for ring in rings:
-        for arc in ring:
+        for arc, following in zip(ring, ring[1:] + ring[:1], strict=True):
             if arc.kind == "pair":
                 total += quadrant_integral(tracer.factors, tracer.radius, arc_angles(arc))
             else:
                 total += segment_integral(arc.first, arc.last)
+            total += segment_integral(arc.last, following.first)
     return total

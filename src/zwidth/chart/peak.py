@@ -67,7 +67,8 @@ def stiffest(tracer: Tracer, rings: Rings, width: float) -> Peak | None:
 
 def _candidates(tracer: Tracer, arc: Arc, following: Arc) -> list[Peak]:
     """Walls of an arc and its last corner where the largest stiffness can be."""
-    peaks = [Peak(*arc.last, tuple(sorted({arc.end, following.start})))]
+    angles = tuple(sorted({arc.end, following.start}))
+    peaks = [Peak(*wall, angles) for wall in (arc.last, following.first)]
     if arc.kind == "pair":
         nodes = np.sort(arc_angles(arc))
         for which in (1, 2):

@@ -6,8 +6,6 @@ sector, runs counter-clockwise round a cell and clockwise round a hole.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,7 +53,7 @@ def closed_rings(tracer: Tracer, seen: Floats | None = None) -> tuple[Rings, flo
         rings = join(edges, tracer.period, blur)
         if rings is not None and _hold(tracer, rings):
             return rings, blur
-    _, nodes, alive = _corners(edges, tracer.period, SAME_CORNER)
+    nodes, alive = _corners(edges, tracer.period, SAME_CORNER)
     closed = bridged(tracer, edges, nodes, alive)
     rings = join(closed[0], tracer.period, SAME_CORNER) if closed else None
     if closed and rings is not None and _hold(tracer, rings):
@@ -93,23 +91,22 @@ def _around(edges: Edges) -> Floats:
     return near[(near > 1e-9) & (near < np.pi - 1e-9)]
 
 
-def _corners(edges: Edges, period: float, blur: float) -> tuple[tuple[Arc, ...], NDArray[np.int64], list[int]]:
-    """Arcs with one wall for each corner, the corners' numbers (k, 2), and which arcs are more than a corner."""
+def _corners(edges: Edges, period: float, blur: float) -> tuple[NDArray[np.int64], list[int]]:
+    """Numbers (k, 2) of the corners that the arcs begin and end in, and which arcs are more than a corner.
+
+    Arcs that meet keep their own ends, each a wall with a root on the circle at the arc's angle there: in a small
+    cell, what is one corner to a share of the whole set's size can be two walls that differ by much.
+    """
     ends = np.array([[arc.first, arc.last] for arc in edges.arcs]) * (period, 1.0)
     nodes = _cluster(ends.reshape(-1, 2), blur * edges.size).reshape(-1, 2)
-    walls = (ends.reshape(-1, 2)[nodes] / (period, 1.0)).tolist()
-    arcs = tuple(
-        replace(arc, first=tuple(first), last=tuple(last))
-        for arc, (first, last) in zip(edges.arcs, walls, strict=True)
-    )
-    return arcs, nodes, [k for k in range(len(arcs)) if edges.extents[k] > blur * edges.size]
+    return nodes, [k for k in range(len(edges.arcs)) if edges.extents[k] > blur * edges.size]
 
 
 def join(edges: Edges, period: float, blur: float) -> Rings | None:
     """Walks along arcs, or None if one of them does not close; corners within `blur` of the size are one."""
     if not edges.arcs:
         return ()
-    arcs, nodes, alive = _corners(edges, period, blur)
+    nodes, alive = _corners(edges, period, blur)
     leaving: dict[int, list[int]] = {}
     for k in alive:
         leaving.setdefault(int(nodes[k, 0]), []).append(k)
@@ -123,10 +120,10 @@ def join(edges: Edges, period: float, blur: float) -> Rings | None:
             choices = [n for n in leaving.get(int(nodes[k, 1]), []) if n in left or n == ring[0]]
             if not choices:
                 return None
-            k = choices[0] if len(choices) == 1 else _turn(arcs, k, choices, period)
+            k = choices[0] if len(choices) == 1 else _turn(edges.arcs, k, choices, period)
         if k != ring[0]:
             return None
-        rings.append(tuple(arcs[n] for n in ring))
+        rings.append(tuple(edges.arcs[n] for n in ring))
     return tuple(rings)
 
 
