@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
 Floats = NDArray[np.float64]
+# Of a ring's extent: corners blurred by more are drawn from one arc's end to the next one's beginning.
+WIDE_CORNER = 1e-6
 # Angles, K and B along every arc of every ring.
 Samples = list[list[tuple[Floats, Floats, Floats]]]
 
@@ -29,10 +31,20 @@ def box_of(regions: Sequence[Floats]) -> Box:
 
 
 def outline(arcs: list[tuple[Floats, Floats, Floats]]) -> Floats:
-    """A ring's arcs as one closed walk of points (k, 2); in a blurred corner from one arc's end to the next one's."""
-    points = np.vstack([np.column_stack([K, B]) for _, K, B in arcs])
-    moved = np.append(True, np.any(points[1:] != points[:-1], axis=1))
-    return np.vstack([points[moved], points[:1]]) if np.any(points[0] != points[-1]) else points[moved]
+    """A ring's arcs as one closed walk of points (k, 2).
+
+    An arc's last point is left out where the next one begins, unless they are farther apart than WIDE_CORNER.
+    """
+    walks = [np.column_stack([K, B]) for _, K, B in arcs]
+    apart = WIDE_CORNER * np.ptp(np.vstack(walks), axis=0)
+    following = [*walks[1:], walks[0]]
+    points = np.vstack(
+        [
+            walk if np.any(np.abs(walk[-1] - after[0]) > apart) else walk[:-1]
+            for walk, after in zip(walks, following, strict=True)
+        ]
+    )
+    return np.vstack([points, points[:1]])
 
 
 def signed_area(ring: Floats) -> float:
