@@ -41,7 +41,7 @@ def farthest_end(loop):
     return max(shares)
 
 
-# Small cells, whose corners are nearer to each other than 1e-7 of the whole set, or modes that the wall hardly moves
+# Cells whose corners are within 1e-7 of the whole set from each other, or modes that the wall hardly moves
 @pytest.mark.parametrize("seed", [132, 972, 3060])
 def test_an_arc_ends_on_the_unit_circle(seed):
     assert farthest_end(mixed_loop(seed)) <= 1.0

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
 from zwidth.chart.cells import Box
-from zwidth.chart.measured_curve import Boundary, boundary, real_root, refine, sizes
+from zwidth.chart.measured_curve import Boundary, boundary, own_sizes, real_root, refine
 from zwidth.chart.measured_loop import MeasuredLoop
 
 Floats = NDArray[np.float64]
@@ -19,7 +19,7 @@ Whole = NDArray[np.int64]
 
 CHORD = 1e-5  # a chord's distance from the curve, as a share of the window
 GRID = 1e-11  # to which lines are noded, as a share of the window
-LARGEST = 1e3  # stable walls, in `sizes` of the curve
+LARGEST = 1e3  # stable walls, in `own_sizes` that a tenth of the stable set's edge exceeds
 TICK = 1e-9  # by which the curve's ends are drawn across the lines they end on
 BESIDE = 1e-4  # from a chord, in its lengths: where its side is asked for its count
 
@@ -90,9 +90,9 @@ def _chords(edge: Boundary, low: Floats, scale: Floats) -> list[shapely.Geometry
 def edges_stable_set(edge: Boundary, which: Whole, scale: Floats) -> Flags:
     """Whether the chords `which` (indices into the segments, of the curve) have stable walls on their inner side.
 
-    scale  (2,) what counts as one unit of K and of B
+    scale  (2,) or (k, 2) what counts as one unit of K and of B
     """
-    segments = edge.segments[which] / np.concatenate([scale, scale])
+    segments = edge.segments[which] / np.concatenate([scale, scale], axis=-1)
     along = segments[:, 2:] - segments[:, :2]
     length = np.maximum(np.hypot(*along.T), 1e-300)
     left = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
@@ -106,13 +106,15 @@ def window(loop: MeasuredLoop, edge: Boundary) -> Box | None:
 
     Every cell has a piece of the curve on its edge, and any further corner where the two lines cross.
     """
-    scale = sizes(loop)
-    # where P is all but zero the curve runs out along a line of real roots, nearer to it than chords can tell
-    near = np.all(np.abs(edge.segments) < LARGEST * np.concatenate([scale, scale]), axis=1)
-    curve = np.flatnonzero((edge.at >= 0) & near)
-    flagged = curve[edges_stable_set(edge, curve, scale)]
-    if not len(flagged):
+    curve = np.flatnonzero(edge.at >= 0)
+    scale = own_sizes(loop, 0.5 * (edge.angles[edge.at[curve]] + edge.angles[edge.at[curve] + 1]))
+    curve, scale = curve[np.all(np.isfinite(scale), axis=1)], scale[np.all(np.isfinite(scale), axis=1)]
+    flags = edges_stable_set(edge, curve, scale)
+    if not flags.any():
         return None
+    # where P is all but zero the curve runs out along a line of real roots, nearer to it than chords can tell
+    near = np.all(scale[flags] < LARGEST * np.quantile(scale[flags], 0.9, axis=0), axis=1)
+    flagged = curve[flags][near]
     walls = edge.segments[flagged].reshape(-1, 2)
     sectors = _lines_cross(loop, 1e-3 * float(np.ptp(walls[:, 1])))
     if len(sectors) and np.any(edge.outside(sectors) == 0):

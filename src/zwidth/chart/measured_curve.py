@@ -20,6 +20,7 @@ Whole = NDArray[np.int64]
 NEAREST = 1e-5  # to an end of the curve or an asymptote, of the spacing there
 FAR = 1e9  # how far lines are drawn, in `sizes`
 COARSE = 0.02  # of its distance from K = B = 0, to which the whole curve is kept
+CLEAR = 0.8  # of the clearest wall's distance from the boundary: clear too
 MOST = 200_000  # angles on the curve
 
 
@@ -82,43 +83,51 @@ def refine(loop: MeasuredLoop, angles: Floats, box: Box, tolerance: float) -> Fl
     K0, K1, B0, B1 = box
     scale, low = np.array([K1 - K0, B1 - B0]), np.array([K0, B0])
 
+    def scales(theta: Floats) -> Floats:
+        return np.broadcast_to(scale, (len(theta), 2))
+
     def wanted(a: Floats, b: Floats, middle: Floats) -> Floats:
         touches = np.all((np.maximum(a, b) >= 0.0) & (np.minimum(a, b) <= 1.0), axis=1)
         return np.where(touches, tolerance, np.inf)
 
-    return _bisected(loop, angles, low, scale, wanted)
+    return _bisected(loop, angles, low, scales, wanted)
 
 
 def coarse(loop: MeasuredLoop) -> Floats:
     """Angles at which chords keep to the curve to a share of its own distance from no wall, wherever it runs."""
 
-    def wanted(a: Floats, b: Floats, middle: Floats) -> Floats:
-        return np.asarray(COARSE * np.maximum(np.hypot(*middle.T), 1e-12))
+    def scales(theta: Floats) -> Floats:
+        return own_sizes(loop, theta)
 
-    return _bisected(loop, first_angles(loop), np.zeros(2), sizes(loop), wanted)
+    def wanted(a: Floats, b: Floats, middle: Floats) -> Floats:
+        return np.asarray(COARSE * np.hypot(*middle.T))
+
+    return _bisected(loop, first_angles(loop), np.zeros(2), scales, wanted)
 
 
 def _bisected(
     loop: MeasuredLoop,
     angles: Floats,
     low: Floats,
-    scale: Floats,
+    scales: Callable[[Floats], Floats],
     wanted: Callable[[Floats, Floats, Floats], Floats],
 ) -> Floats:
     """The angles, with those between added until each chord passes its middle on the curve as closely as wanted.
 
+    scales  of angles (n,), what counts as one unit of K and of B there (n, 2)
     wanted  of the ends (n, 2) and middles (n, 2), (walls - low) / scale, the distances allowed (n,)
     """
     for _ in range(40):
         K, B, orientation = loop.walls(angles)
-        points = (np.column_stack([K, B]) - low) / scale
-        near = np.all(np.abs(points) < FAR, axis=1)
+        points = np.column_stack([K, B]) - low
+        near = np.all(np.abs(points) < FAR * scales(angles), axis=1)
         joined = (orientation[:-1] == orientation[1:]) & near[:-1] & near[1:]
         at = np.flatnonzero(joined & (np.diff(angles) > 1e-13 * angles[1:]))
         middle = 0.5 * (angles[at] + angles[at + 1])
         Km, Bm, _ = loop.walls(middle)
+        scale = scales(middle)
         m = (np.column_stack([Km, Bm]) - low) / scale
-        a, b = points[at], points[at + 1]
+        a, b = points[at] / scale, points[at + 1] / scale
         along, to = b - a, m - a
         length = np.maximum(np.hypot(*along.T), 1e-150)
         off = np.abs(along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0]) / length
@@ -129,6 +138,12 @@ def _bisected(
             break
         angles = np.sort(np.concatenate([angles, middle[bent]]))
     return angles
+
+
+def own_sizes(loop: MeasuredLoop, theta: Floats) -> Floats:
+    """|h| and |h / w| (n, 2) at angles (n,): the sizes of K and of B that count there, since K + B w = h."""
+    h, w = np.abs(loop.h(theta)), np.abs(loop.w(theta))
+    return np.column_stack([h, h / w])
 
 
 def sizes(loop: MeasuredLoop) -> Floats:
@@ -167,7 +182,7 @@ def real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float]:
 
 
 def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[Floats, Whole, Whole]:
-    """The line of real roots, upwards, cut where the curve ends on it: there the count's jump changes its sign.
+    """The line of real roots, cut where the curve ends on it: there the count's jump changes its sign.
 
     On it D = K + B w - h = 0. The root moves by -dK / D', and D' (z = +-1) has the sign of -+(B Im w - Im h)
     at an angle just beside.
@@ -178,11 +193,13 @@ def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[
     theta = np.array([near])
     Im_h, Im_w = float(loop.h(theta)[0].imag), float(loop.w(theta)[0].imag)
     cut = float(np.clip(Im_h / Im_w, -far, far))
-    ends = np.unique([-far, cut, far])
-    middle = 0.5 * (ends[:-1] + ends[1:])
-    rising = np.sign(middle * Im_w - Im_h)
+    # both from the cut outwards: seen from the far end, rounding would hide on which side a wall lies
+    ends = np.unique([-far, far])
+    ends = ends[ends != cut]
+    rising = np.sign((0.5 * (cut + ends)) * Im_w - Im_h) * np.sign(ends - cut)
     jumps = (rising if kind == -1 else -rising).astype(np.int64)
-    segments = np.column_stack([h - ends[:-1] * w, ends[:-1], h - ends[1:] * w, ends[1:]])
+    start = np.full(len(ends), cut)
+    segments = np.column_stack([h - start * w, start, h - ends * w, ends])
     return segments, jumps, np.full(len(jumps), kind)
 
 
@@ -221,16 +238,22 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Wh
 
 
 def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
-    """The boundary with the clearest of many walls as its reference, the next clearest counted against it."""
+    """The boundary with the softest clear one of many walls as its reference, the clearest counted against it.
+
+    From a soft one, since the way from a wall many powers of ten beyond the stable ones loses their digits; where
+    the data end early, the clearest one.
+    """
     h, w = np.abs(loop.h(loop.inner)), np.abs(loop.w(loop.inner))
     sizes = np.geomspace(1e-3, 3.0, 9)
-    K = np.quantile(h, [0.25, 0.5, 0.75])[:, None] * sizes
-    B = np.quantile(h / w, [0.25, 0.5, 0.75])[:, None] * sizes
+    shares = [0.0, 0.05, 0.25, 0.5, 0.75] if loop.between.closed else [0.25, 0.5, 0.75]
+    K = np.quantile(h, shares)[:, None] * sizes
+    B = np.quantile(h / w, shares)[:, None] * sizes
     walls = np.array([(k, b) for k in K.ravel() for b in B.ravel()])
     every = max(1, len(found.angles) // 4000)
     counts, clear = nyquist_count(loop, found.angles[::every], walls)
     order = np.argsort(-clear)[:7]
-    best = order[0]
+    enough = np.flatnonzero(clear >= (CLEAR if loop.between.closed else 1.0) * clear[order[0]])
+    best = enough[np.argmin(walls[enough, 0])]
     made = Boundary(
         found.angles,
         found.walls,
