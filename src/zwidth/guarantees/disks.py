@@ -33,10 +33,12 @@ Complexes = NDArray[np.complex128]
 
 # Terms of the expansion in 1/w that the far aliases are summed by, and where they begin beyond the fastest pole.
 TERMS, REACH = 9, 16
-# Between angles the curve of centres is followed to these shares of the radius and of its size.
-BEND, STRAIGHT, HALVINGS = 0.05, 3e-6, 16
 # Nodes in theta at which the aliases beyond the nearest are summed; they vary little over one period.
 NODES = 13
+# A radius smaller than this share of the centre is rounding: the reading hardly sees the operator.
+SEEN = 1e-13
+# A sum smaller than its terms by this share is zero.
+ROUNDING = 1e-13
 # The expansion is moved out, four times as far each, until what it misses in all is less than the first share of a
 # near alias; one that misses more than the second at last is of aliases that do not fall off.
 MISSED, FALLS, MOVES = 1e-11, 1e-6, 4
@@ -47,74 +49,91 @@ class Disks:
     """Where the sampled response can be at angles (k,): |P - centre| <= radius.
 
     radius  inf where the device dissipates nothing at one of the frequencies that look like this one
+    power   |centre|^2 - radius^2, the power of the point 0: negative where the disk holds it, exactly 0 where it
+            goes through it
     """
 
     angles: Floats
     centre: Complexes
     radius: Floats
+    power: Floats
 
 
 def response_disks(loop: Loop, held: Port, angles: Floats) -> Disks:
-    """The disks of a loop held at a port, at angles in (0, pi].
+    """The disks of a loop held at a port, at angles in (0, pi]; relative error about 1e-12."""
+    return Aliases.of(loop, held).disks(angles)
 
-    The nearest aliases are summed one by one; the rest is a smooth function of the angle, summed at Chebyshev
-    nodes and, far out, by its expansion in 1/w (Hurwitz's zeta function, Laguerre's rule where a delay that is not
-    whole turns the terms round). Relative error about 1e-12.
+
+@dataclass(frozen=True)
+class Aliases:
+    """The sums over all frequencies that look alike, prepared for one loop.
+
+    The nearest aliases are summed one by one at each angle; the rest is a smooth function of the angle, summed at
+    Chebyshev nodes and, far out, by its expansion in 1/w (Hurwitz's zeta function, Laguerre's rule where a delay
+    that is not whole turns the terms round).
+
+    near    aliases -near to near are summed one by one
+    centre  (NODES,)  centres of the others' disks, summed
+    radius  (NODES,)  their radii
     """
-    theta = np.asarray(angles, dtype=float)
-    near, far = _ranges(loop, held)
-    expansion = _expansion(loop, held, far)
-    for _ in range(MOVES):
-        if expansion.missed < MISSED:
-            break
-        far *= 4
+
+    loop: Loop
+    held: Port
+    near: int
+    centre: Complexes
+    radius: Floats
+
+    @classmethod
+    def of(cls, loop: Loop, held: Port) -> Aliases:
+        """The sums of a loop held at a port."""
+        near, far = _ranges(loop, held)
         expansion = _expansion(loop, held, far)
-    k = np.arange(-near, near + 1)
-    centre, radius = _terms(loop, held, theta[:, None] / (2.0 * np.pi) + k)
-    nodes = chebyshev.chebpts1(NODES) / 2.0
-    more = np.arange(near + 1, far + 1)
-    c, r = _terms(loop, held, nodes[:, None] + more)
-    beyond_c, beyond_r = _sums_beyond(expansion, nodes, loop.fractional_delay)
-    tail_c, tail_r = c.sum(axis=1) + beyond_c, r.sum(axis=1) + beyond_r
-    # aliases -k at x are the conjugates of aliases k at -x
-    tail_c, tail_r = tail_c + tail_c[::-1].conj(), tail_r + tail_r[::-1]
-    at = theta / np.pi
-    centre = centre.sum(axis=1) + _interpolated(tail_c, at)
-    radius = radius.sum(axis=1) + _interpolated(tail_r, at).real
-    late = np.exp(-1j * theta * loop.whole_delay)
-    common = _one_less_z_inverse(theta) * late * force_filter_response(loop, theta)
-    with np.errstate(invalid="ignore"):
-        return Disks(theta, np.where(np.isfinite(radius), common * centre, 0.0), np.abs(common) * radius)
+        for _ in range(MOVES):
+            if expansion.missed < MISSED or np.isinf(expansion.missed):
+                break
+            far *= 4
+            expansion = _expansion(loop, held, far)
+        nodes = chebyshev.chebpts1(NODES) / 2.0
+        direct, swing = _terms(loop, held, nodes[:, None] + np.arange(near + 1, far + 1))
+        beyond_c, beyond_r = _sums_beyond(expansion, nodes, loop.fractional_delay)
+        centre, radius = (direct - swing).sum(axis=1) + beyond_c, np.abs(swing).sum(axis=1) + beyond_r
+        # aliases -k at x are the conjugates of aliases k at -x
+        return cls(loop, held, near, centre + centre[::-1].conj(), radius + radius[::-1])
 
-
-def followed_disks(loop: Loop, held: Port, angles: Floats) -> Disks:
-    """The disks at ascending angles and at as many between as it takes to follow the centres' curve.
-
-    Between neighbours the centre bends by less than BEND of the radius, or than STRAIGHT of its own size.
-    """
-    found = response_disks(loop, held, angles)
-    split = np.ones(len(angles) - 1, dtype=bool)
-    for _ in range(HALVINGS):
-        left = np.flatnonzero(split)
-        if not len(left):
-            break
-        middle = response_disks(loop, held, (found.angles[left] + found.angles[left + 1]) / 2.0)
+    def disks(self, angles: Floats) -> Disks:
+        """The disks at angles (k,) in (0, pi]."""
+        theta = np.asarray(angles, dtype=float)
+        k = np.arange(-self.near, self.near + 1)
+        direct, swing = _terms(self.loop, self.held, theta[:, None] / (2.0 * np.pi) + k)
+        p, q, others = direct[:, self.near], swing[:, self.near], k != 0
+        at = theta / np.pi
+        late = np.exp(-1j * theta * self.loop.whole_delay)
+        common = one_less_z_inverse(theta) * late * force_filter_response(self.loop, theta)
         with np.errstate(invalid="ignore"):
-            bend = np.abs(found.centre[left] + found.centre[left + 1] - 2.0 * middle.centre)
-            keep = bend > np.maximum(BEND * middle.radius, STRAIGHT * np.abs(middle.centre))
-        after = np.zeros(len(split) + len(left), dtype=bool)
-        at = left + np.arange(len(left))
-        after[at], after[at + 1] = keep, keep
-        split = after
-        found = Disks(
-            np.insert(found.angles, left + 1, middle.angles),
-            np.insert(found.centre, left + 1, middle.centre),
-            np.insert(found.radius, left + 1, middle.radius),
-        )
-    return found
+            c = (direct - swing)[:, others].sum(axis=1) + _interpolated(self.centre, at)
+            r = np.abs(swing)[:, others].sum(axis=1) + _interpolated(self.radius, at).real
+            centre, radius = common * (p - q + c), np.abs(common) * (np.abs(q) + r)
+            power = np.abs(common) ** 2 * _power(p, q, c, r)
+        lost = ~np.isfinite(radius)
+        centre, radius = np.where(lost, 0.0, centre), np.where(lost, np.inf, radius)
+        return Disks(theta, centre, radius, np.where(lost, -np.inf, power))
 
 
-def _one_less_z_inverse(theta: Floats) -> Complexes:
+def _power(p: Complexes, q: Complexes, c: Complexes, r: Floats) -> Floats:
+    """|p - q + c|^2 - (|q| + r)^2 without the cancellation of |q|^2; what rounding alone can leave is 0.
+
+    p - q and |q| are centre and radius of the lowest frequency's own disk: at low angles it is all but a half
+    plane, |q| many orders larger than what is left.
+    """
+    kept = np.abs(p) ** 2 - 2.0 * np.real(p * q.conj())
+    own = np.abs(p - q)
+    mixed = 2.0 * np.real((p - q) * c.conj()) - 2.0 * np.abs(q) * r
+    power = kept + mixed + (np.abs(c) - r) * (np.abs(c) + r)
+    terms = np.abs(p) * (np.abs(p) + np.abs(q)) + own * np.abs(c) + np.abs(q) * r + np.abs(c) ** 2 + r**2
+    return np.where(np.abs(power) > ROUNDING * terms, power, 0.0)
+
+
+def one_less_z_inverse(theta: Floats) -> Complexes:
     """1 - e^(-i theta) without cancellation."""
     return np.asarray(2j * np.sin(theta / 2.0) * np.exp(-0.5j * theta), dtype=complex)
 
@@ -122,24 +141,23 @@ def _one_less_z_inverse(theta: Floats) -> Complexes:
 def force_filter_response(loop: Loop, theta: Floats) -> Complexes:
     """The discrete filter of the whole force."""
     top, bottom = low_pass_factors(loop.controller.force_filter, loop.period)
-    d = np.exp(1j * theta) * _one_less_z_inverse(theta)
+    d = np.exp(1j * theta) * one_less_z_inverse(theta)
     return np.asarray(product(np.array(top).reshape(-1, 3), np.array(bottom).reshape(-1, 3), d), dtype=complex)
 
 
-def _terms(loop: Loop, held: Port, cycles: Floats) -> tuple[Complexes, Floats]:
-    """Centre and radius of single aliases at w = 2 pi cycles / T, without the factor common to all."""
+def _terms(loop: Loop, held: Port, cycles: Floats) -> tuple[Complexes, Complexes]:
+    """Of single aliases at w = 2 pi cycles / T, without the factor common to all: the response p to the actuator
+    and the swing q that operators add. The alias's disk has centre p - q and radius |q|; inf where it has none."""
     T = loop.period
     w = 2.0 * np.pi * cycles / T
     response = port_response(held, w)
+    moved = response.back * response.felt
+    weight = np.exp(-2j * np.pi * cycles * loop.fractional_delay) / T
+    weight = weight / (1.0 + 1j * w * loop.controller.actuator_time_constant)
+    dead = ~(response.dissipation > 0.0) & (np.abs(moved) > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        swing = response.back * response.felt / (2.0 * response.dissipation)
-        weight = np.exp(-2j * np.pi * cycles * loop.fractional_delay) / T
-        weight = weight / (1.0 + 1j * w * loop.controller.actuator_time_constant)
-        dead = ~(response.dissipation > 0.0) & (np.abs(response.back * response.felt) > 0.0)
-        swing = np.where(np.abs(response.back * response.felt) > 0.0, swing, 0.0)
-        centre = weight * (response.direct / (1j * w) - swing)
-        radius = np.abs(weight * swing)
-    return np.where(dead, 0.0, centre), np.where(dead, np.inf, radius)
+        swing = np.where(np.abs(moved) > 0.0, weight * moved / (2.0 * response.dissipation), 0.0)
+    return weight * response.direct / (1j * w), np.where(dead, np.inf, swing)
 
 
 def _ranges(loop: Loop, held: Port) -> tuple[int, int]:
@@ -168,15 +186,18 @@ class Expansion:
 def _expansion(loop: Loop, held: Port, far: int) -> Expansion:
     t = (1.05 + chebyshev.chebpts1(2 * TERMS)) / 2.05
     cycles = far / t
-    centre, radius = _terms(loop, held, cycles)
-    upright = centre * np.exp(2j * np.pi * loop.fractional_delay * cycles)
+    direct, swing = _terms(loop, held, cycles)
+    radius = np.abs(swing)
     if not np.all(np.isfinite(radius)):
         return Expansion(far, np.zeros(TERMS, dtype=complex), np.zeros(TERMS, dtype=complex), np.inf)
+    upright = (direct - swing) * np.exp(2j * np.pi * loop.fractional_delay * cycles)
     values = np.column_stack([upright, radius]) / (t * t)[:, None]
     powers = t[:, None] ** np.arange(TERMS)
     fit, *_ = np.linalg.lstsq(powers.astype(complex), values, rcond=None)
-    near = _terms(loop, held, np.array([0.5]))[1][0] or 1.0
-    misfit = far * np.abs(powers @ fit - values).max() / near
+    direct, swing = _terms(loop, held, np.array([0.5]))
+    centre, radius = np.abs(direct - swing)[0], np.abs(swing)[0]
+    near = np.maximum([centre, radius], SEEN * (centre + radius)) if centre + radius > 0.0 else np.ones(2)
+    misfit = far * (np.abs(powers @ fit - values).max(axis=0) / near).max()
     return Expansion(far, fit[:, 0], fit[:, 1], float(misfit))
 
 

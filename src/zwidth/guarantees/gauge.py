@@ -3,14 +3,20 @@
 At each angle the sampled response fills a disk |P - C| <= R (see `disks`). A wall with H = K + B w(z) keeps clear
 of vibration with every passive operator if and only if no P of the disk makes 1 + P H vanish,
 
-    1 + 2 Re(H C) + |H|^2 (|C|^2 - R^2) > 0,        0 < theta <= pi
+    1 + 2 a + b > 0,      a = Re(H C),  b = |H|^2 (|C|^2 - R^2),        0 < theta <= pi
 
-Along a ray lambda H the smallest lambda that fails is 1/mu,
+Along a ray lambda H the smallest lambda that fails is 1/mu, with the larger root of mu^2 + 2 a mu + b = 0,
 
-    mu = -Re(H C) + sqrt( |H|^2 R^2 - Im(H C)^2 )
+    mu = -a + sqrt(D),      D = a^2 - b = |H|^2 R^2 - Im(H C)^2
 
-and the largest mu over all angles says how far the ray may go. The kernel below walks along the angles once for
-each wall.
+and the largest mu over all angles says how far the ray may go. A small disk is met by a ray at angles much closer
+together than any grid's, so that the largest mu is found by branch and bound: the walls that (a, b) leave passive,
+mu^2 + 2 a mu + b > 0 for all mu > m, are an intersection of half planes in (a, b); hence on a straight path of
+(a, b) the largest mu stands at an end, and a path that bends by e_a and e_b at most has none above
+
+    max over both ends of mu(a - e_a, b - e_b)
+
+Stretches of angles whose bound exceeds the best mu found are halved.
 """
 
 from __future__ import annotations
@@ -21,13 +27,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.compiled import compiled
-from zwidth.guarantees.disks import Disks, followed_disks
-from zwidth.guarantees.port import Floats, port, static_compliances
+from zwidth.guarantees.conics import A_B, A_K, B_KK, C_B, C_K, QUARTIC, R_KK, Conics, conics
+from zwidth.guarantees.port import Floats, static_compliances
 from zwidth.loop.loop import Loop
 
-Complexes = NDArray[np.complex128]
-
-# |C| and R closer than this are equal, and products of theirs below this share are zero.
+# mu is found to this share; stretches are halved at most so often.
+SHARE, DEPTH = 1e-10, 48
+# Below this share of |H C| is rounding.
 ROUNDING = 1e-13
 
 
@@ -35,121 +41,143 @@ ROUNDING = 1e-13
 class Gauge:
     """The sampled response under every passive operator, as walls meet it.
 
-    disks    of the sampled response
-    w        velocity estimate at the same angles
+    conics   what each angle asks of a wall; None where nothing is dissipated
     static   compliances that springs can make of the reading at z = 1 [m/N]
     """
 
-    disks: Disks
-    w: Complexes
+    conics: Conics | None
     static: tuple[float, float]
 
-    def largest(self, K: Floats, B: Floats) -> tuple[Floats, NDArray[np.int64]]:
-        """mu (k,) of walls (k,), and the interval of angles that it comes from: the index of its lower end.
+    def largest(self, K: Floats, B: Floats) -> tuple[Floats, Floats]:
+        """mu (k,) of walls (k,), and the angle that it comes from, 0 for the limit there.
 
         Never negative; inf where a wall fails at once. A wall is passive if and only if its mu is below 1.
         """
-        disks = self.disks
-        mu, worst = _largest(K, B, disks.angles, disks.centre, disks.radius, self.w)
+        if self.conics is None:
+            return np.where((K == 0.0) & (B == 0.0), 0.0, np.inf), np.zeros(len(K))
+        mu, at = _largest(K, B, self.conics.angles, self.conics.pieces, self.conics.wide)
         with np.errstate(invalid="ignore"):
             drift = np.max([np.where(K == 0.0, 0.0, -g * K) for g in self.static], axis=0)
-        return np.maximum(np.maximum(mu, drift), 0.0), worst
+        slow = np.maximum(_at_zero(K, B, self.conics.limit), drift)
+        return np.maximum(mu, slow), np.where(slow > mu, 0.0, at)
 
 
-def gauge(loop: Loop, held: Floats, angles: Floats) -> Gauge:
-    """The gauge of a loop held along `held` (n,), at ascending angles and as many between as it takes."""
-    disks = followed_disks(loop, port(loop.plant, held), angles)
-    w = np.asarray(loop.velocity_response(np.exp(1j * disks.angles)), dtype=complex)
-    return Gauge(disks, w, static_compliances(loop.plant, held))
+def gauge(loop: Loop, held: Floats) -> Gauge:
+    """The gauge of a loop held along `held` (n,)."""
+    return Gauge(conics(loop, held), static_compliances(loop.plant, held))
 
 
-@compiled
-def _mu(H: complex, C: complex, R: float, excess: float) -> float:
-    """mu at one angle, excess being R^2 - |C|^2; -inf where the ray passes the disk by."""
-    if np.inf == R:
-        return np.inf
-    size = H.real * H.real + H.imag * H.imag
-    beta = H.real * C.real - H.imag * C.imag
-    if beta * beta < ROUNDING * ROUNDING * size * R * R:
-        beta = 0.0
-    under = beta * beta + size * excess
-    return np.sqrt(under) - beta if under >= 0.0 else -np.inf
-
-
-@compiled
-def _crossing(first: complex, last: complex, reach0: float, reach1: float) -> float:
-    """mu between two angles where Im(H C) changes sign.
-
-    A disk that is small beside its distance from 0 is met by a ray at angles closer together than any grid. With
-    H C straight and R level between the angles the largest mu is
-
-        -Re(H C) + |H| R |slope of H C| / |slope of Im(H C)|
-    """
-    if not np.isfinite(reach0 + reach1):
-        return -np.inf
-    share = first.imag / (first.imag - last.imag)
-    room = reach0 + share * (reach1 - reach0)
-    step = last - first
-    lean = abs(step) / abs(step.imag)
-    if room * lean < abs(step.imag):  # wide disks are met at the angles themselves
-        room *= lean
-    return room - first.real - share * step.real
+def _at_zero(K: Floats, B: Floats, limit: Floats) -> Floats:
+    """mu (k,) of walls (k,) in the limit of the angle to zero: the larger root of q mu^2 + 2 a mu + b."""
+    q, aK, aB, bKK, bKB, bBB = limit
+    a, b = aK * K + aB * B, bKK * K * K + bKB * K * B + bBB * B * B
+    a = np.where(np.abs(a) < ROUNDING * (np.abs(aK * K) + np.abs(aB * B)), 0.0, a)
+    D = a * a - q * b
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(D)
+        mu = np.where(a > 0.0, -b / (a + root), (root - a) / q)
+    return np.where((D >= 0.0) & (mu > 0.0), mu, 0.0)
 
 
 @compiled
-def _vertex(x: Floats, y: tuple[float, float, float], i: int) -> float:
-    """Top of the parabola through three points about x[i]; -inf where it has none between them."""
-    left, right = x[i - 1] - x[i], x[i + 1] - x[i]
-    fall, rise = (y[0] - y[1]) / left, (y[2] - y[1]) / right
-    bend = (rise - fall) / (right - left)
-    slope = fall - bend * left
-    at = -slope / (2.0 * bend)
-    top = y[1] - slope * slope / (4.0 * bend)
-    return top if bend < 0.0 and left < at < right and np.isfinite(top) else -np.inf
+def _mu(a: float, b: float, D: float) -> float:
+    """The larger root of mu^2 + 2 a mu + b, D = a^2 - b; 0 where there is none above."""
+    if not D >= 0.0 or (a >= 0.0 and b >= 0.0):
+        return 0.0
+    root: float = np.sqrt(D)
+    return -b / (a + root) if a > 0.0 else root - a
+
+
+@compiled
+def _state(K: float, B: float, piece: Floats, wide: bool, s: float) -> tuple[float, float, float, float]:
+    """a, b, D and |H C| of a wall at a part s of the way through a piece, D without the cancellation that b has in
+    narrow disks: D = |H|^2 R^2 - Im(H C)^2."""
+    KK, KB, BB = K * K, K * B, B * B
+    a = across = square = 0.0
+    first = B_KK if wide else R_KK
+    for q in range(QUARTIC - 1, -1, -1):
+        a = a * s + (K * piece[A_K, q] + B * piece[A_B, q])
+        across = across * s + (K * piece[C_K, q] + B * piece[C_B, q])
+        square = square * s + (KK * piece[first, q] + KB * piece[first + 1, q] + BB * piece[first + 2, q])
+    if abs(a) < ROUNDING * abs(across):
+        a = 0.0
+    size = abs(a) + abs(across)
+    if wide:
+        return a, square, a * a - square, size
+    D = square - across * across
+    return a, a * a - D, D, size
+
+
+@compiled
+def _sag(x2: float, x3: float, x4: float, s: float, h: float) -> float:
+    """How far a quartic can lie below its chord from s - h/2 to s + h/2."""
+    bend = 2.0 * x2 + 6.0 * x3 * s + 12.0 * x4 * s * s
+    sag: float = max(bend + 0.5 * h * (abs(6.0 * x3) + abs(24.0 * x4)), 0.0) * h * h / 8.0
+    return sag
+
+
+@compiled
+def _sags(K: float, B: float, piece: Floats, s: float, h: float) -> tuple[float, float]:
+    """The same of a and b of a wall."""
+    KK, KB, BB = K * K, K * B, B * B
+    x, y, i = piece[A_K], piece[A_B], B_KK
+    ea = _sag(K * x[2] + B * y[2], K * x[3] + B * y[3], K * x[4] + B * y[4], s, h)
+    b2 = KK * piece[i, 2] + KB * piece[i + 1, 2] + BB * piece[i + 2, 2]
+    b3 = KK * piece[i, 3] + KB * piece[i + 1, 3] + BB * piece[i + 2, 3]
+    b4 = KK * piece[i, 4] + KB * piece[i + 1, 4] + BB * piece[i + 2, 4]
+    return ea, _sag(b2, b3, b4, s, h)
+
+
+@compiled
+def _bound(a: float, b: float, D: float, ea: float, eb: float) -> float:
+    """mu of a - ea and b - eb."""
+    return _mu(a - ea, b - eb, D + ea * (ea - 2.0 * a) + eb)
+
+
+@compiled
+def _within(K: float, B: float, piece: Floats, wide: bool, best: float) -> float:
+    """The largest mu of a wall within a piece, or the best known if that is larger."""
+    starts, widths = np.empty(DEPTH + 1), np.empty(DEPTH + 1)
+    starts[0], widths[0], waiting = 0.0, 1.0, 1
+    while waiting > 0:
+        waiting -= 1
+        s, h = starts[waiting], widths[waiting]
+        a0, b0, D0, size = _state(K, B, piece, wide, s)
+        a1, b1, D1, _ = _state(K, B, piece, wide, s + h)
+        best = max(best, _mu(a0, b0, D0), _mu(a1, b1, D1))
+        ea, eb = _sags(K, B, piece, s + 0.5 * h, h)
+        above = max(_bound(a0, b0, D0, ea, eb), _bound(a1, b1, D1, ea, eb))
+        if above <= best + SHARE * best + ROUNDING * size or waiting + 2 > DEPTH:
+            continue
+        h *= 0.5
+        starts[waiting], widths[waiting] = s, h
+        starts[waiting + 1], widths[waiting + 1] = s + h, h
+        waiting += 2
+    return best
 
 
 @compiled
 def _largest(
-    K: Floats, B: Floats, angles: Floats, C: Complexes, R: Floats, w: Complexes
-) -> tuple[Floats, NDArray[np.int64]]:
-    """Largest mu over all angles (k,) of walls (k,), and the interval that it comes from."""
-    count, m = len(K), len(angles)
-    out, at = np.empty(count), np.zeros(count, dtype=np.int64)
-    excess = np.empty(m)
-    for i in range(m):
-        excess[i] = (R[i] - abs(C[i])) * (R[i] + abs(C[i]))
-        if abs(excess[i]) < ROUNDING * R[i] * R[i]:
-            excess[i] = 0.0
-    # the limit at zero, from the lowest angle and about its double
-    twice = 1
-    while twice < m - 1 and angles[twice] < 2.0 * angles[0]:
-        twice += 1
-    share = 1.0 / ((angles[twice] / angles[0]) ** 2 - 1.0)
+    K: Floats, B: Floats, angles: Floats, pieces: Floats, wide: NDArray[np.bool_]
+) -> tuple[Floats, Floats]:
+    """Largest mu over all angles (k,) of walls (k,), and the angle at the start of the piece it comes from."""
+    count, n = len(K), len(pieces)
+    out, at = np.zeros(count), np.zeros(count)
+    a, b, D, size = np.empty(n + 1), np.empty(n + 1), np.empty(n + 1), np.empty(n + 1)
     for k in range(count):
-        top, met = -np.inf, -np.inf
-        place, narrow = 0, 0
-        before = 0.0 + 0.0j
-        for i in range(m):
-            H = K[k] + B[k] * w[i]
-            mu = _mu(H, C[i], R[i], excess[i])
-            if mu > top:
-                top, place = mu, i
-            after = H * C[i]
-            if i > 0 and before.imag * after.imag < 0.0:
-                reach0, reach1 = abs(K[k] + B[k] * w[i - 1]) * R[i - 1], abs(H) * R[i]
-                crossed = _crossing(before, after, reach0, reach1)
-                if crossed > met:
-                    met, narrow = crossed, i - 1
-            before = after
-        i = min(max(place, 1), m - 2)
-        low = _mu(K[k] + B[k] * w[i - 1], C[i - 1], R[i - 1], excess[i - 1])
-        middle = _mu(K[k] + B[k] * w[i], C[i], R[i], excess[i])
-        high = _mu(K[k] + B[k] * w[i + 1], C[i + 1], R[i + 1], excess[i + 1])
-        top = max(top, _vertex(angles, (low, middle, high), i))
-        low = _mu(K[k] + B[k] * w[0], C[0], R[0], excess[0])
-        middle = _mu(K[k] + B[k] * w[twice], C[twice], R[twice], excess[twice])
-        if np.isfinite(low + middle):
-            top = max(top, low + share * (low - middle))
-        out[k] = max(top, met)
-        at[k] = narrow if met > top else place
+        best, place = 0.0, 0
+        for i in range(n + 1):
+            j = min(i, n - 1)
+            a[i], b[i], D[i], size[i] = _state(K[k], B[k], pieces[j], wide[j], float(i - j))
+            mu = _mu(a[i], b[i], D[i])
+            if mu > best:
+                best, place = mu, j
+        for i in range(n):
+            ea, eb = _sags(K[k], B[k], pieces[i], 0.5, 1.0)
+            above = max(_bound(a[i], b[i], D[i], ea, eb), _bound(a[i + 1], b[i + 1], D[i + 1], ea, eb))
+            if above > best + SHARE * best + ROUNDING * size[i]:
+                inner = _within(K[k], B[k], pieces[i], wide[i], best)
+                if inner > best:
+                    best, place = inner, i
+        out[k], at[k] = best, angles[place]
     return out, at

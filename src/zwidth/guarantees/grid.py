@@ -7,7 +7,7 @@ import numpy as np
 from zwidth.guarantees.port import Floats, fixed, port
 from zwidth.loop.loop import Loop
 
-# Lowest angle; limits at zero are extrapolated from there.
+# Lowest angle.
 LOWEST = 3e-4
 # Steps across a resonance, in units of its width, on both sides.
 ACROSS = np.sinh(np.linspace(-6.0, 6.0, 41)) / 4.0

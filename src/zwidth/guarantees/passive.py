@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.guarantees.gauge import Gauge, gauge
-from zwidth.guarantees.grid import angle_grid
 from zwidth.guarantees.port import Floats
 from zwidth.guarantees.region import Region, empty
 from zwidth.loop.loop import Loop
@@ -24,10 +23,12 @@ from zwidth.model.arguments import require
 
 Complexes = NDArray[np.complex128]
 
-# Chords of the outline deviate from it by this share, if bisecting directions at most so often gets there.
-CHORD, BISECTIONS = 1e-6, 24
-# Angles are made denser where they limit a ray: so often, and so.
-REFINEMENTS, SPLIT = 2, np.arange(1, 8) / 8.0
+# Chords deviate from the outline by this share of the wall, outwards less; directions are bisected so often.
+CHORD, OUTSIDE, BISECTIONS = 1e-6, 1e-7, 26
+# Directions at which bites are found join so often, if they are not as close to others as this.
+ROUNDS, NARROW = 6, 1e-7
+# Rays with a mu this small go on for ever.
+UNLIMITED = 1e-100
 # Stiffnesses closer than this are equal.
 LEVEL = 1e-12
 # A stiffness this small, beside the largest, is none.
@@ -53,20 +54,20 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     held = loop.plant.handle if held is None else held
     if held is None:
         raise ValueError("the plant has no handle: say with `held` where the operator holds it")
-    found = gauge(loop, held, angle_grid(loop, held))
-    for _ in range(REFINEMENTS):
-        found = _denser(loop, held, found, np.linspace(-np.pi, np.pi, 241))
-    directions, reach = _outline(found, loop.period)
-    if not np.max(reach) > 0.0:
+    found = gauge(loop, held)
+    directions, ends = _outline(found, loop.period)
+    if not np.any(ends):
         return empty(NOTHING)
-    K, B = _walls(directions, reach, loop.period)
-    ring = np.column_stack([np.append(K, K[:1]), np.append(B, B[:1])])
+    corners = np.append(ends[:1], ends[1:][ends[1:] != ends[:-1]])
+    ring = np.column_stack([corners.real / loop.period, corners.imag])
+    ring = np.vstack([ring, ring[:1]])
+    K = ends.real / loop.period
     usable = (directions >= 0.0) & (directions < np.pi / 2.0) & (SHORT * np.max(np.abs(K)) < K)
     if not usable.any():
         return Region((ring,), float("nan"), float("nan"), NO_SPRING)
     best = int(np.argmax(np.where(usable, K, -np.inf)))
     low, high = max(directions[best - 1], 0.0), min(directions[best + 1], np.pi / 2.0)
-    return Region((ring,), *_stiffest(loop, held, found, low, high))
+    return Region((ring,), *_stiffest(found, loop.period, low, high))
 
 
 def _walls(directions: Floats, reach: Floats, period: float) -> tuple[Floats, Floats]:
@@ -74,59 +75,73 @@ def _walls(directions: Floats, reach: Floats, period: float) -> tuple[Floats, Fl
     return reach * np.cos(directions) / period, reach * np.sin(directions)
 
 
-def _reach(found: Gauge, directions: Floats, period: float) -> Floats:
-    """How far rays go (k,) [N s/m]; 0 where they fail at once."""
-    mu, _ = found.largest(*_walls(directions, np.ones(len(directions)), period))
-    with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / mu)
+def _mu(found: Gauge, directions: Floats, period: float) -> Floats:
+    """mu of walls at reach 1 along directions (k,): the inverse of how far rays go [1/(N s/m)]."""
+    return found.largest(*_walls(directions, np.ones(len(directions)), period))[0]
 
 
-def _outline(found: Gauge, period: float) -> tuple[Floats, Floats]:
-    """Directions (k,) once round and the reach along each, bisected until chords follow the outline."""
+def _ends(found: Gauge, directions: Floats, period: float) -> Complexes:
+    """Where rays end (k,): K T + j B; 0 where they fail at once."""
+    return np.asarray(np.exp(1j * directions) / np.maximum(_mu(found, directions, period), UNLIMITED))
+
+
+def _outline(found: Gauge, period: float) -> tuple[Floats, Complexes]:
+    """Directions (k,) once round and where rays end, K T + j B (k,), bisected until chords follow the outline.
+
+    Light modes bite narrow pieces out: directions in which an angle forbids walls of a chord join too.
+    """
     directions = np.linspace(-np.pi, np.pi, 241)
-    reach = _reach(found, directions, period)
-    coarse = np.ones(len(directions) - 1, dtype=bool)
-    for _ in range(BISECTIONS):
-        left = np.flatnonzero(coarse)
-        if not len(left):
+    ends = _ends(found, directions, period)
+    left = np.arange(len(directions) - 1)
+    for _ in range(ROUNDS):
+        for _ in range(BISECTIONS):
+            if not len(left):
+                break
+            middle = (directions[left] + directions[left + 1]) / 2.0
+            between = _ends(found, middle, period)
+            off = _off_chord(between, ends[left], ends[left + 1])
+            directions, ends = np.insert(directions, left + 1, middle), np.insert(ends, left + 1, between)
+            left = (left + np.arange(len(left)))[off]
+            left = np.sort(np.concatenate([left, left + 1]))
+        bites = _bites(found, directions, ends, period)
+        if not len(bites):
             break
-        middle = (directions[left] + directions[left + 1]) / 2.0
-        between = _reach(found, middle, period)
-        ends = reach * np.exp(1j * directions)
-        off = _distance(between * np.exp(1j * middle), ends[left], ends[left + 1])
-        keep = off > CHORD * np.max(reach)
-        after = np.zeros(len(coarse) + len(left), dtype=bool)
-        at = left + np.arange(len(left))
-        after[at], after[at + 1] = keep, keep
-        directions, reach = np.insert(directions, left + 1, middle), np.insert(reach, left + 1, between)
-        coarse = after
-    return directions, reach
+        at = np.searchsorted(directions, bites)
+        directions = np.insert(directions, at, bites)
+        ends = np.insert(ends, at, _ends(found, bites, period))
+        at += np.arange(len(bites))
+        left = np.unique(np.concatenate([at - 1, at]))
+    return directions, ends
 
 
-def _distance(point: Complexes, first: Complexes, last: Complexes) -> Floats:
-    """Of points from the chords between two others, all (k,)."""
+def _bites(found: Gauge, directions: Floats, ends: Complexes, period: float) -> Floats:
+    """Directions in which some angle's disk reaches into the outline's chords, where it reaches farthest."""
+    if found.conics is None:
+        return np.zeros(0)
+    tip = found.conics.tips(period)
+    right = np.clip(np.searchsorted(directions, np.angle(tip)), 1, len(directions) - 1)
+    first, last = ends[right - 1], ends[right]
     along = last - first
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.real((point - first) * along.conj()) / np.abs(along) ** 2
-    return np.asarray(np.abs(point - first - np.clip(np.nan_to_num(share), 0.0, 1.0) * along))
+    depth = np.imag(along.conj() * (tip - first)) / np.maximum(np.abs(along), 1e-300) / np.abs(tip)
+    deep = (depth > OUTSIDE) & (directions[right] - directions[right - 1] > NARROW)
+    depth = np.where(deep, depth, 0.0)
+    farthest = deep & (depth >= np.append(0.0, depth[:-1])) & (depth > np.append(depth[1:], 0.0))
+    return np.unique(np.angle(tip[farthest]))
 
 
-def _denser(loop: Loop, held: Floats, found: Gauge, directions: Floats) -> Gauge:
-    """The gauge with more angles in the intervals that limit rays in these directions, and beside them."""
-    _, worst = found.largest(*_walls(directions, np.ones(len(directions)), loop.period))
-    angles = found.disks.angles
-    first = np.unique(np.clip(worst[:, None] + np.arange(-1, 2), 0, len(angles) - 2))
-    inner = angles[first, None] + (angles[first + 1] - angles[first])[:, None] * SPLIT
-    return gauge(loop, held, np.unique(np.concatenate([angles, inner.ravel()])))
+def _off_chord(between: Complexes, first: Complexes, last: Complexes) -> NDArray[np.bool_]:
+    """Whether walls between two others, all (k,), lie off their chord, or between a wall and none."""
+    along = last - first
+    length = np.maximum(np.abs(along), 1e-300)
+    inwards = np.imag(along.conj() * (between - first)) / length
+    allowed = np.where(inwards > 0.0, OUTSIDE, CHORD) * np.abs(between)
+    return np.asarray((np.abs(inwards) > allowed) | ((first == 0.0) != (last == 0.0)))
 
 
-def _stiffest(loop: Loop, held: Floats, found: Gauge, low: float, high: float) -> tuple[float, float]:
-    """The largest K between two directions and its B, by golden section, on angles made denser where it fails."""
-    for _ in range(REFINEMENTS):
-        best = _golden(found, loop.period, low, high)
-        found = _denser(loop, held, found, best + np.linspace(-1e-6, 1e-6, 5))
-    top = np.array([_golden(found, loop.period, low, high)])
-    K, B = _walls(top, _reach(found, top, loop.period), loop.period)
+def _stiffest(found: Gauge, period: float, low: float, high: float) -> tuple[float, float]:
+    """The largest K between two directions and its B."""
+    top = np.array([_golden(found, period, low, high)])
+    K, B = _walls(top, 1.0 / _mu(found, top, period), period)
     return float(K[0]), float(B[0])
 
 
@@ -136,7 +151,7 @@ def _golden(found: Gauge, period: float, low: float, high: float) -> float:
     ends = (low, high)
 
     def stiffness(direction: float) -> float:
-        return float(_reach(found, np.array([direction]), period)[0] * np.cos(direction))
+        return float(np.cos(direction) / _mu(found, np.array([direction]), period)[0])
 
     a, b = high - ratio * (high - low), low + ratio * (high - low)
     at_a, at_b = stiffness(a), stiffness(b)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from zwidth.model.modes import undamped_modes
@@ -37,8 +38,8 @@ class Port:
     lagged: tuple[LaggedDamper, ...]
 
     @property
-    def poles(self) -> Complexes:
-        """All poles s [1/s], conjugates included."""
+    def generator(self) -> Floats:
+        """A of the states: positions, velocities, forces of lagged dampers."""
         n, m = len(self.squared), len(self.lagged)
         A = np.zeros((2 * n + m, 2 * n + m))
         A[:n, n : 2 * n] = np.eye(n)
@@ -47,7 +48,36 @@ class Port:
             A[n : 2 * n, i] = -damper.along
             A[i, n : 2 * n] = damper.damping / damper.time_constant * damper.along
             A[i, i] = -1.0 / damper.time_constant
-        return np.asarray(np.linalg.eigvals(A), dtype=complex)
+        return A
+
+    @property
+    def poles(self) -> Complexes:
+        """All poles s [1/s], conjugates included."""
+        return np.asarray(np.linalg.eigvals(self.generator), dtype=complex)
+
+    @property
+    def spectral_zeros(self) -> Complexes:
+        """Where the port takes in no power, Y(s) + Y(-s) = 0 for its mobility Y = s G_hh [1/s]; those at hand.
+
+        With Y = c (s - A)^-1 b they are generalised eigenvalues s of
+
+            [ A   0   b  ]       [ 1  0  0 ]
+            [ 0  -A^T -c^T]  - s [ 0  1  0 ]
+            [ c   b^T 0  ]       [ 0  0  0 ]
+        """
+        A, n = self.generator, len(self.squared)
+        N = len(A)
+        b = np.zeros(N)
+        b[n : 2 * n] = self.hold
+        pencil = np.zeros((2 * N + 1, 2 * N + 1))
+        pencil[:N, :N], pencil[N:-1, N:-1] = A, -A.T
+        pencil[:N, -1], pencil[N:-1, -1] = b, -b
+        pencil[-1, :N], pencil[-1, N:-1] = b, b
+        zeros, scale = scipy.linalg.eigvals(
+            pencil, np.diag(np.append(np.ones(2 * N), 0.0)), homogeneous_eigvals=True
+        )
+        finite = np.abs(scale) > 0.0
+        return np.asarray(zeros[finite] / scale[finite], dtype=complex)
 
 
 def port(plant: Plant, held: Floats) -> Port:
@@ -87,6 +117,8 @@ def port_response(held: Port, frequency: Floats) -> PortResponse:
     """
     w = np.asarray(frequency, dtype=float)
     stiff = held.squared - w[..., None] ** 2
+    # a rounding beside the frequency of an undamped mode, where it would respond without end
+    stiff = np.where(stiff == 0.0, 1e-16 * w[..., None] ** 2, stiff)
     damping: Complexes = np.broadcast_to(held.damping, (*w.shape, *held.damping.shape)).astype(complex)
     for damper in held.lagged:
         share = damper.damping / (1.0 + 1j * w * damper.time_constant)

@@ -1,0 +1,236 @@
+"""What each angle asks of a wall, as polynomials in the angle's logarithm.
+
+The disk |P - C| <= R of an angle keeps clear of -1/H, H = K + B w, if and only if  1 + 2 a + b > 0  with
+
+    a = Re(H C)           = K Re C + B Re(w C)
+    b = |H|^2 (|C|^2 - R^2) = (K^2 + 2 K B Re w + B^2 |w|^2) (|C|^2 - R^2)
+
+a conic in the plane of walls. Its coefficients are smooth functions of the angle: they are computed at Chebyshev
+points of panels, panels are halved until polynomials through the points are exact to TOLERANCE, and each panel is
+cut into short pieces with a quartic each. Panels start narrow across resonances of the plant and of the radii.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from zwidth.guarantees.disks import Aliases, force_filter_response, one_less_z_inverse
+from zwidth.guarantees.port import Floats, Port, port
+from zwidth.loop.loop import Loop
+from zwidth.loop.response import product, window_response
+
+Complexes = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+# Functions of the angle, in this order.
+A_K, A_B, C_K, C_B, B_KK, B_KB, B_BB, R_KK, R_KB, R_BB = range(10)
+# Points of a panel, and pieces it is cut into, with the points of each.
+POINTS, PIECES, QUARTIC = 11, 8, 5
+# Last Chebyshev coefficients of a panel, in shares of the function's size there, and what rounding leaves of them.
+TOLERANCE, NOISE = 1e-9, 2e-13
+# Within a resonance rounding counts more by this share of its quality.
+LIGHT = 0.1
+# A panel is halved at most so often.
+HALVINGS = 24
+# Disks are wide from the first share of their centre's size on; a panel of wide disks has none below the second.
+WIDE, THIN = 0.3, 0.03
+# Least radius in shares of the centre's size, so that rays meet the disks in spite of rounding.
+LEAST = 1e-10
+# A limit at zero smaller than this share of what is near zero is none. Octaves below the lowest angle.
+VANISHING, OCTAVES = 1e-9, 16
+# Lowest angle, if no pole is slow: limits at zero are extrapolated from there. Slow poles are seen from below.
+LOWEST, BELOW, SLOWEST = 1e-5, 0.02, 1e-11
+
+
+@dataclass(frozen=True)
+class Conics:
+    """The conics of a loop held at a port.
+
+    angles  (n + 1,)    ascending ends of the pieces; the last is pi
+    pieces  (n, 10, 5)  coefficients of powers of s, the part of the way through a piece in log(angle), of
+                        Re C, Re wC, Im C, Im wC;   X, 2 X Re w, X |w|^2 with X = |C|^2 - R^2;   the same of R^2
+    wide    (n,)        whether the disks of a piece are wide
+    limit   (6,)        the conic at angle 0 up to scale: coefficients of 1, of a (2,) and of b (3,)
+    """
+
+    angles: Floats
+    pieces: Floats
+    wide: Flags
+    limit: Floats
+
+    def tips(self, period: float) -> Complexes:
+        """The wall K T + j B that each angle forbids nearest to 0 on the ray to its disk's middle (n,).
+
+        There H C is real and negative, and mu = |H| (|C| + R).
+        """
+        at = self.pieces[:, :, 0]
+        K, B = at[:, C_B], -at[:, C_K]
+        way = -np.sign(K * at[:, A_K] + B * at[:, A_B])
+        K, B = way * K, way * B
+        square = K * K * at[:, R_KK] + K * B * at[:, R_KB] + B * B * at[:, R_BB]
+        mu = np.sqrt(np.maximum(square, 0.0)) - K * at[:, A_K] - B * at[:, A_B]
+        return np.asarray((K * period + 1j * B)[mu > 0.0] / mu[mu > 0.0], dtype=complex)
+
+
+def conics(loop: Loop, held: Floats) -> Conics | None:
+    """The conics of a loop held along `held` (n,); None where nothing is dissipated at some angle."""
+    at = port(loop.plant, held)
+    aliases = Aliases.of(loop, at)
+    singular = _singularities(loop, at)
+    ends = np.log(panel_ends(loop, at))
+    nodes = (1.0 + chebyshev.chebpts2(POINTS)) / 2.0
+    left, right = ends[:-1], ends[1:]
+    done: list[tuple[Floats, Floats, Floats, Flags]] = []
+    for halving in range(HALVINGS + 1):
+        x = left[:, None] + (right - left)[:, None] * nodes
+        x[:, -1] = right
+        angles = np.minimum(np.exp(x), np.pi)
+        both = _functions(loop, aliases, angles.ravel())
+        if not np.all(np.isfinite(both)):
+            return None
+        values, rounding = both.reshape(2, 10, len(left), POINTS).swapaxes(1, 2)
+        wide, good = _resolved(values, np.max(_noise(singular, angles)[:, None] * rounding, axis=-1))
+        good |= halving == HALVINGS
+        done.append((left[good], right[good], values[good], wide[good]))
+        left, right = left[~good], right[~good]
+        if not len(left):
+            break
+        middle = (left + right) / 2.0
+        left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
+    left, right, values, wide = (np.concatenate(part) for part in zip(*done, strict=True))
+    order = np.argsort(left)
+    left, right, values, wide = left[order], right[order], values[order], wide[order]
+    limit, below = _towards_zero(left[0] + (right[0] - left[0]) * nodes, values[0], nodes)
+    left = np.append(left[0] - np.log(2.0) * np.arange(len(below), 0, -1), left)
+    values, wide = np.concatenate([below, values]), np.append(np.ones(len(below), dtype=bool), wide)
+    parts = left[:, None] + np.diff(np.append(left, right[-1]))[:, None] * np.arange(PIECES) / PIECES
+    angles = np.exp(np.append(parts.ravel(), right[-1]))
+    pieces = np.einsum("mqp,nfp->nmfq", _cutting(nodes), values).reshape(-1, 10, QUARTIC)
+    return Conics(angles, np.ascontiguousarray(pieces), np.repeat(wide, PIECES), limit)
+
+
+def panel_ends(loop: Loop, held: Port) -> Floats:
+    """Ascending ends of the first panels, from the lowest angle to pi.
+
+    Panels grow geometrically away from zero and from each singularity.
+    """
+    poles = np.abs(held.poles) * loop.period
+    lowest = min(LOWEST, BELOW * float(np.min(poles[poles > SLOWEST], initial=1.0)))
+    centre, width, turns = _singularities(loop, held)
+    seen = turns > 1e-3 * lowest
+    centre, width = centre[seen], np.maximum(width, 1e-9 * turns)[seen]
+    steps = 2.0 ** np.arange(0, 31)
+    across = width[:, None] * steps
+    near = across < np.minimum(0.3, 0.5 * centre)[:, None]
+    sides = [(centre[:, None] + way * across)[near] for way in (-1.0, 1.0)]
+    low = 0.4 * 2.0 ** -np.arange(0, np.ceil(np.log2(0.4 / lowest)))
+    ends = np.concatenate([*sides, low, np.linspace(0.4, np.pi, 8)])
+    ends = np.unique(ends[(ends > 1.2 * lowest) & (ends < np.pi * 0.999)])
+    apart = np.append(True, np.diff(ends) > 1e-9 * ends[1:])
+    return np.concatenate([[lowest], ends[apart], [np.pi]])
+
+
+def _singularities(loop: Loop, held: Port) -> tuple[Floats, Floats, Floats]:
+    """Where centres and radii have poles: at those of the plant, and the radii where the port takes in no power.
+
+    Angles folded into (0, pi), distances from the circle and angles not folded, each (n,).
+    """
+    singular = np.append(held.poles, held.spectral_zeros) * loop.period
+    singular = singular[singular.imag > 0.0]
+    turn = np.mod(singular.imag, 2.0 * np.pi)
+    centre = np.where(turn > np.pi, 2.0 * np.pi - turn, turn)
+    return centre, np.maximum(np.abs(singular.real), 1e-12 * singular.imag), singular.imag
+
+
+def _noise(singular: tuple[Floats, Floats, Floats], angles: Floats) -> Floats:
+    """What rounding leaves of functions at angles (...), in shares: more within light resonances."""
+    centre, width, turns = singular
+    near = turns / np.hypot(angles[..., None] - centre, width)
+    return np.asarray(NOISE * np.maximum(1.0, LIGHT * np.max(near, axis=-1, initial=0.0)))
+
+
+def _functions(loop: Loop, aliases: Aliases, angles: Floats) -> Floats:
+    """The ten functions at angles (k,), and the sizes of what is rounded: (2, 10, k); inf where disks are."""
+    disks, w, T = aliases.disks(angles), velocity_estimate(loop, angles), loop.period
+    C, X, V = disks.centre, disks.power, w * disks.centre
+    R2 = np.maximum(disks.radius, LEAST * np.abs(C)) ** 2
+    of_H = np.array([np.ones(len(w)), 2.0 * w.real, np.abs(w) ** 2])
+    # zeros of filters are exact to roundings of what the filters are given
+    passed = np.maximum(np.abs(force_filter_response(loop, angles)), 1e-300)
+    speed = np.maximum(np.abs(w), np.abs(one_less_z_inverse(angles)) / T)
+    size = np.sqrt(np.abs(C) ** 2 + R2) / passed
+    linear = np.array([size, speed * size])
+    square = np.array([size**2, speed * size**2, (speed * size) ** 2])
+    values = np.concatenate([[C.real, V.real, C.imag, V.imag], of_H * X, of_H * R2])
+    return np.array([values, np.concatenate([linear, linear, square, square])])
+
+
+def velocity_estimate(loop: Loop, angles: Floats) -> Complexes:
+    """w at angles (k,), to full accuracy near zero."""
+    z, own = np.exp(1j * angles), loop.estimator
+    d = z * one_less_z_inverse(angles)
+    return np.asarray(product(own.numerator, own.denominator, d) * window_response(own.window, z), dtype=complex)
+
+
+def _resolved(values: Floats, rounding: Floats) -> tuple[Flags, Flags]:
+    """Which panels (n,) of values (n, 10, POINTS) are wide, and which are followed by their polynomials.
+
+    rounding  (n, 10) of the values
+    """
+    grid = chebyshev.chebpts2(POINTS)
+    to_coefficients = np.linalg.inv(chebyshev.chebvander(grid, POINTS - 1))
+    tail = np.abs((values @ to_coefficients.T)[..., -2:]).max(axis=-1)
+    size = np.abs(values).max(axis=-1)
+    centre = np.hypot(values[:, [A_K, A_B]], values[:, [C_K, C_B]])
+    radius = np.sqrt(values[:, R_KK])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(radius > 0.0, radius / centre[:, 0], 0.0)
+    wide = ratio.max(axis=-1) > WIDE
+    # of wide disks a and b count, of the others H C and H R
+    linear, across = centre.max(axis=-1), size[:, R_KK:] / np.maximum(ratio.max(axis=-1), 1e-9)[:, None]
+    allowed = np.full_like(tail, np.inf)
+    allowed[:, A_K:C_K] = np.where(wide[:, None], size[:, A_K:C_K], linear)
+    allowed[:, C_K:B_KK] = np.where(wide[:, None], np.inf, linear)
+    allowed[:, B_KK:R_KK] = np.where(wide[:, None], size[:, B_KK:R_KK], np.inf)
+    allowed[:, R_KK:] = np.where(wide[:, None], np.inf, across)
+    good = np.all(tail <= TOLERANCE * allowed + rounding, axis=-1)
+    return wide, good & ~(wide & (ratio.min(axis=-1) < THIN))
+
+
+def _cutting(nodes: Floats) -> Floats:
+    """From values at a panel's points to powers of s in each of its pieces (PIECES, QUARTIC, POINTS)."""
+    basis = np.linalg.inv(chebyshev.chebvander(2.0 * nodes - 1.0, POINTS - 1))
+    inner = np.linspace(0.0, 1.0, QUARTIC)
+    at = (np.arange(PIECES)[:, None] + inner) / PIECES
+    powers = np.linalg.inv(np.vander(inner, increasing=True))
+    return np.asarray(powers @ chebyshev.chebvander(2.0 * at - 1.0, POINTS - 1) @ basis)
+
+
+def _towards_zero(x: Floats, values: Floats, nodes: Floats) -> tuple[Floats, Floats]:
+    """The conic at angle 0 (6,), and panels below the lowest (m, 10, POINTS), extrapolated from that one.
+
+    x, values  log(angle) (POINTS,) of the lowest panel and the functions there (10, POINTS)
+
+    The coefficients of a and b are even functions of the angle. Where a free motion is not damped they grow with a
+    power of 1/angle; divided by that power they have a limit, and the constant 1 of the conic vanishes. How they
+    come near it decides on walls beside the limit: panels of one octave each go down to where nothing is left.
+    """
+    rows = [A_K, A_B, B_KK, B_KB, B_BB]
+    ends = np.maximum(np.abs(values[rows][:, [0, -1]]), 1e-300)
+    growth = np.max(np.log(ends[:, 0] / ends[:, 1])) / (x[-1] - x[0])
+    power = 2 * max(round(float(growth) / 2.0), 0)
+    terms = values[rows] * np.exp(power * (x - x[-1]))
+    even = np.vander(np.exp(2.0 * (x - x[-1])), 3, increasing=True)
+    fit = np.linalg.lstsq(even, terms.T, rcond=None)[0]
+    limit = np.where(np.abs(fit[0]) > VANISHING * np.abs(terms).max(axis=1), fit[0], 0.0)
+    octaves = np.arange(OCTAVES if power else 0, 0, -1)
+    down = x[0] - x[-1] + np.log(2.0) * (nodes - octaves[:, None])
+    below = np.zeros((len(octaves), 10, POINTS))
+    below[:, rows] = (
+        (np.exp(2.0 * down[..., None] * np.arange(3)) @ fit) * np.exp(-power * down)[..., None]
+    ).swapaxes(1, 2)
+    return np.append(0.0 if power else 1.0, limit), below
