@@ -18,6 +18,7 @@ from zwidth.guarantees.port import port, reached
 from zwidth.guarantees.spring_family import Springs, spring_for
 from zwidth.loop.controller import Butterworth
 from zwidth.loop.loop import Loop
+from zwidth.model.modes import undamped_modes
 
 # Walls are taken this share nearer to K = B = 0 than the outline has them.
 INSIDE = 1e-6
@@ -75,6 +76,12 @@ def walls_inside(region, count):
     return walls[np.any(walls != 0.0, axis=1)]
 
 
+def resolved(loop, walls):
+    """Walls that double precision can judge: K < 0 not where a mode, too soft beside others, counts as rigid."""
+    rigid = np.any(undamped_modes(loop.plant.mass, loop.plant.stiffness)[0] == 0.0)
+    return (walls[:, 0] >= 0.0) | (not rigid)
+
+
 def check_stable(seed, weak, operators=6, springs=20):
     """No wall of a random device's passive set is unstable by itself, in a chain, or on a spring."""
     rng = np.random.default_rng(seed)
@@ -88,6 +95,7 @@ def check_stable(seed, weak, operators=6, springs=20):
     ]
     for one in held:
         some = walls[:: 1 if one is loop else 4]
+        some = some[resolved(one, some)]
         radius = np.abs(eigenvalues(one, *some.T)).max(axis=-1)
         # only where an eigenvalue is outside at all is its own rounding error asked for
         verdicts = judge(one, *some[radius > 1.0 + 1e-9].T)
@@ -97,7 +105,9 @@ def check_stable(seed, weak, operators=6, springs=20):
     K, B = np.ascontiguousarray(walls.T)
     for share in [0.0, *family.shares(k[k > 0.0]).tolist(), 1.0]:
         tracer = family.tracer(share)
-        assert tracer is None or not np.any(unstable(tracer.polynomials, K, B)), (seed, share)
+        bad = [] if tracer is None else walls[unstable(tracer.polynomials, K, B) & resolved(tracer.loop, walls)]
+        # expanded polynomials lose digits where modes are far apart: eigenvalues decide
+        assert not len(bad) or not np.any(judge(tracer.loop, *bad.T).verdict == UNSTABLE), (seed, share)
     return len(walls)
 
 

@@ -34,8 +34,8 @@ POINTS, PIECES, QUARTIC = 11, 8, 5
 TOLERANCE, NOISE = 1e-9, 2e-13
 # Within a resonance rounding counts more by this share of its quality.
 LIGHT = 0.1
-# A panel is halved at most so often.
-HALVINGS = 24
+# A panel is halved at most so often; where panels become so many times as many as at first, rounding limits them.
+HALVINGS, MOST = 24, 4
 # Disks are wide from the first share of their centre's size on; a panel of wide disks has none below the second.
 WIDE, THIN = 0.3, 0.03
 # Least radius in shares of the centre's size, so that rays meet the disks in spite of rounding.
@@ -94,7 +94,7 @@ def conics(loop: Loop, held: Floats) -> Conics | None:
             return None
         values, rounding = both.reshape(2, 10, len(left), POINTS).swapaxes(1, 2)
         wide, good = _resolved(values, np.max(_noise(singular, angles)[:, None] * rounding, axis=-1))
-        good |= halving == HALVINGS
+        good |= halving == HALVINGS or len(left) > MOST * len(ends)
         done.append((left[good], right[good], values[good], wide[good]))
         left, right = left[~good], right[~good]
         if not len(left):
