@@ -166,9 +166,9 @@ def test_the_lowest_versions_are_those_that_the_package_allows():
         canonicalize_name(Requirement(name).name): Requirement(name).specifier for name in PROJECT["dependencies"]
     }
     lowest = {canonicalize_name(pin.name): pin.specifier for pin in map(Requirement, lines)}
-    assert lowest.keys() == wanted.keys()
-    for name, (pin,) in lowest.items():
-        (bound,) = wanted[name]
+    assert lowest.keys() >= wanted.keys()
+    for name, (bound,) in wanted.items():
+        (pin,) = lowest[name]
         assert (bound.operator, pin.operator) == (">=", "=="), name
         assert Version(bound.version) == Version(pin.version), name
 

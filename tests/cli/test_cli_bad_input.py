@@ -164,7 +164,8 @@ def test_a_wrong_command_line_is_refused_on_one_line_each(words, says):
     lines = refused(*words)
     assert len(lines) == len(says)
     for line, text in zip(lines, says, strict=True):
-        assert text.lower() in line.lower()
+        # click's releases differ in their quotes
+        assert text.lower().replace("'", "") in line.lower().replace("'", "")
 
 
 NO_OUTPUT = [

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+from threading import Thread
 
 import numpy as np
 import pytest
 
 from tests import systems
-from tests.cli.cli_run import TWO_MASS, refused
+from tests.cli.cli_run import TWO_MASS, refused, zwidth
 from tests.measured_cases import measured
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
@@ -17,8 +18,9 @@ from zwidth.study.study_file import read_study
 
 DEVICE = 'name = "measured"\n[response]\n{}\n[loop]\nsampling_period_s = 0.00125\n'
 STUDY = 'device = "{}"\nmeasures = ["stiffness_max"]\n[[axis]]\nkey = "loop.delay_samples"\nvalues = [0, 1]\n'
+MASS = DEVICE.replace("[response]\n{}", "[plant]\nmass_kg = 0.1\ndamping_Ns_per_m = 1.0")
 SECRET = "root:swordfish:0"
-HANG = 20  # seconds after which a reading counts as one that waits for ever
+HANG = 900  # seconds after which a reading counts as one that waits for ever
 
 
 @pytest.fixture
@@ -99,10 +101,7 @@ def test_a_pipe_for_a_response_is_refused(folder):
 @pytest.mark.parametrize(
     "words",
     [
-        ("chart", "{}"),
         ("chart", TWO_MASS, "--operator", "{}"),
-        ("check", TWO_MASS, "--points", "{}"),
-        ("experiment", TWO_MASS, "--measured", "{}"),
         ("robust", TWO_MASS, "--operator-list", "{}"),
         ("simulate", TWO_MASS, "--environment", "{}:wall"),
         ("map", "five-bar", "--measures-file", "{}", "--measure", "isotropy"),
@@ -110,11 +109,32 @@ def test_a_pipe_for_a_response_is_refused(folder):
         ("experiment", TWO_MASS, "--resume", "{}", "--output", "never.csv"),
     ],
 )
-def test_a_pipe_for_any_file_is_one_line(tmp_path, words):
+def test_a_pipe_for_a_file_that_is_read_again_is_one_line(tmp_path, words):
     pipe = tmp_path / "pipe.py"
     os.mkfifo(pipe)
     (line,) = refused(*(word.format(pipe) for word in words))
     assert "no plain file" in line
+
+
+@pytest.mark.usefixtures("no_waiting")
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("check", "{}", "--stiffness", 100, "--damping", 1), MASS),
+        (("check", TWO_MASS, "--points", "{}"), "stiffness_N_per_m,damping_Ns_per_m\n4000,10\n"),
+    ],
+    ids=["device", "points"],
+)
+def test_a_pipe_that_the_user_names_is_read(tmp_path, words, text):
+    """As the shell makes one for <(program)."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = Thread(target=pipe.write_text, args=(text,))
+    writer.start()
+    ran = zwidth(*(str(word).format(pipe) for word in words))
+    writer.join()
+    assert (ran.code, ran.err) == (0, "")
+    assert "stable" in ran.out
 
 
 @pytest.mark.usefixtures("no_waiting")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -139,12 +140,19 @@ def segment_integral(first: tuple[float, float], last: tuple[float, float]) -> f
 
 def quadrant_area(tracer: Tracer, rings: Rings) -> float:
     """Area of the stable set within K >= 0, B >= 0 [N^2 s/m^2]."""
+    return sum(walk_area([(tracer, arc) for arc in ring]) for ring in rings)
+
+
+def walk_area(walk: Sequence[tuple[Tracer, Arc]]) -> float:
+    """Green's integral along a closed walk of arcs, each with its own tracer, within K >= 0, B >= 0 [N^2 s/m^2].
+
+    A blurred corner has two walls, the end of one arc and the beginning of the next: the chord between them counts.
+    """
     total = 0.0
-    for ring in rings:
-        for arc, following in zip(ring, ring[1:] + ring[:1], strict=True):
-            if arc.kind == "pair":
-                total += quadrant_integral(tracer.factors, tracer.radius, arc_angles(arc))
-            else:
-                total += segment_integral(arc.first, arc.last)
-            total += segment_integral(arc.last, following.first)
+    for n, (tracer, arc) in enumerate(walk):
+        if arc.kind == "pair":
+            total += quadrant_integral(tracer.factors, tracer.radius, arc_angles(arc))
+        else:
+            total += segment_integral(arc.first, arc.last)
+        total += segment_integral(arc.last, walk[(n + 1) % len(walk)][1].first)
     return total

@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.cells import Samples, cells, outline
-from zwidth.chart.outline import CHORD, quadrant_area, sample_arc
+from zwidth.chart.outline import CHORD, quadrant_area, sample_arc, walk_area
 from zwidth.chart.region import ChartError
 from zwidth.chart.robust_common import Shapes, common, excluding
 from zwidth.chart.robust_edges import Piece, pieces
@@ -188,7 +188,7 @@ def _lost(left: float, whole: float) -> float:
 
 def _area(rings: list[list[Piece]]) -> float:
     """Area within K >= 0, B >= 0 [N^2 s/m^2], by Green's integral along the arcs."""
-    return max(sum(quadrant_area(piece.member.tracer, ((piece.arc,),)) for ring in rings for piece in ring), 0.0)
+    return max(sum(walk_area([(piece.member.tracer, piece.arc) for piece in ring]) for ring in rings), 0.0)
 
 
 def _best_by_area(charted: dict[int, Member], shapes: Shapes) -> tuple[int, float]:

@@ -46,7 +46,7 @@ def load(
     if isinstance(settings, str):
         raise refusal("settings", "a list or a dictionary", settings, f"write [{settings!r}]")
     changes = list(settings.items()) if isinstance(settings, Mapping) else settings
-    document, label = read(name_or_path)
+    document, label = read(name_or_path, pipes=True)
     device = from_document(address.apply(held_by(document, operator), changes), label)
     warn_of_implausible(device)
     return device

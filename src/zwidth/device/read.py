@@ -54,10 +54,13 @@ def bundled(shelf: Shelf = DEVICES) -> list[tuple[str, str, str]]:
     return listing
 
 
-def read(name_or_path: str | os.PathLike[str], shelf: Shelf = DEVICES) -> tuple[dict[str, Any], str]:
+def read(
+    name_or_path: str | os.PathLike[str], shelf: Shelf = DEVICES, *, pipes: bool = False
+) -> tuple[dict[str, Any], str]:
     """The document of a bundled device (or operator) or of a file, and what to call it in messages.
 
     A bundled name wins over a file of the same name; write ./name for the file.
+    pipes  are read, too: where the user names the file himself
     Raises DeviceError  if there is no such file, it cannot be read, or it is not TOML
     """
     label = os.fspath(name_or_path)
@@ -67,7 +70,7 @@ def read(name_or_path: str | os.PathLike[str], shelf: Shelf = DEVICES) -> tuple[
         raise fail(shelf.noun, "", message)
     if label in names:
         return parse(_bundled_text(label, shelf), label, shelf), label
-    return parse(_text(label, shelf), label, shelf), label
+    return parse(_text(label, shelf, pipes), label, shelf), label
 
 
 def parse(text: str, label: str, shelf: Shelf = DEVICES) -> dict[str, Any]:
@@ -103,9 +106,9 @@ def within_depth(value: Any, deepest: int = DEEPEST) -> bool:
     return False
 
 
-def _text(label: str, shelf: Shelf) -> str:
+def _text(label: str, shelf: Shelf, pipes: bool) -> str:
     try:
-        return read_text(label, LARGEST_FILE)
+        return read_text(label, LARGEST_FILE, pipes=pipes)
     except Unreadable as error:
         wrong = _not_found(label, shelf) if error.missing else f"{error}; give {shelf.file} or a bundled name"
         raise fail(label, "", wrong) from None

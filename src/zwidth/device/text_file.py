@@ -1,4 +1,4 @@
-"""Plain files with text: read whole, up to a size. A folder, a pipe or a device is refused before it is opened."""
+"""Plain files with text: read whole, up to a size. What is none is refused before it is opened."""
 
 from __future__ import annotations
 
@@ -23,14 +23,15 @@ class Unreadable(ValueError):
         super().__init__(text)
 
 
-def read_plain(path: str | os.PathLike[str], largest: int) -> bytes:
+def read_plain(path: str | os.PathLike[str], largest: int, *, pipes: bool = False) -> bytes:
     """Bytes of a plain file, found by its path, of at most `largest` bytes; links are followed.
 
+    pipes   are waited for, too: only where the user names the file, as in `--points <(program)`
     Raises  Unreadable  where there is none, for anything else than a plain file, for one that is larger, and
                         where the system refuses to read it
     """
     try:
-        if wrong := _no_plain_file(os.stat(path).st_mode):
+        if wrong := _no_plain_file(os.stat(path).st_mode, pipes):
             raise Unreadable(wrong)
         with open(path, "rb") as stream:
             data = stream.read(largest + 1)
@@ -48,9 +49,9 @@ def read_plain(path: str | os.PathLike[str], largest: int) -> bytes:
     return data
 
 
-def _no_plain_file(mode: int) -> str:
-    """What something other than a plain file is; "" for a plain file."""
-    if stat.S_ISREG(mode):
+def _no_plain_file(mode: int, pipes: bool) -> str:
+    """What something other than a plain file is; "" for a plain file, or a pipe where those are taken."""
+    if stat.S_ISREG(mode) or (pipes and stat.S_ISFIFO(mode)):
         return ""
     if stat.S_ISDIR(mode):
         return "is a directory"
@@ -58,12 +59,13 @@ def _no_plain_file(mode: int) -> str:
     return f"is a {kind}, no plain file"
 
 
-def read_text(path: str | os.PathLike[str], largest: int) -> str:
+def read_text(path: str | os.PathLike[str], largest: int, *, pipes: bool = False) -> str:
     """Text of a plain file in UTF-8, with or without a byte order mark.
 
+    pipes   as in `read_plain`
     Raises  Unreadable  as `read_plain`, and for what is not such text
     """
-    return decode(read_plain(path, largest))
+    return decode(read_plain(path, largest, pipes=pipes))
 
 
 def decode(data: bytes) -> str:

@@ -156,6 +156,6 @@ def _places(file: str, header: list[str], optional: Collection[str]) -> dict[str
 
 def _text(file: str) -> str:
     try:
-        return read_text(file, LARGEST_TABLE)
+        return read_text(file, LARGEST_TABLE, pipes=True)
     except Unreadable as error:
         raise BadInput(f"{file}: {error}; give a CSV file") from None
