@@ -385,8 +385,9 @@ def test_a_model_that_fits_everywhere_between_or_not_at_all():
 
     assert said((low, high)).endswith(f"There is {ALIKE}: rigid everywhere.")
     assert said((3.0, 9.0)).endswith("rigid between 3.000 Hz and 9.000 Hz.")
-    both = said((low, 5.0), (150.0, high))
-    assert both.endswith("below 5.000 Hz (3.825 % of that) and above 150.0 Hz (114.7 % of that).")
+    assert said((low, 5.0), (150.0, high)).endswith(
+        "below 5.000 Hz (3.825 % of that) and above 150.0 Hz (114.7 % of that)."
+    )
     assert said().endswith(f"None of the simpler models is {ALIKE}, at any frequency.")
     assert "natural" not in said((low, 5.0), natural=np.nan)
     assert said((low, 5.0), natural=np.nan).endswith("rigid below 5.000 Hz.")
@@ -394,9 +395,8 @@ def test_a_model_that_fits_everywhere_between_or_not_at_all():
 
 def test_what_is_not_linear_is_said_to_be_left_out():
     assert sentences.left_out(facts("hapkit-course")) == ""
-    rubbing = facts("hapkit-course", "friction.coulomb_N=0.1")
-    said = "All of this is linear and leaves out dry friction; zwidth simulate has them."
-    assert sentences.left_out(rubbing) == said
+    said = sentences.left_out(facts("hapkit-course", "friction.coulomb_N=0.1"))
+    assert said == "All of this is linear and leaves out dry friction; zwidth simulate has them."
     both = facts("hapkit-course", "friction.coulomb_N=0.1", "loop.saturation.force_N=5")
     assert "leaves out dry friction and the force limit;" in sentences.left_out(both)
     assert sentences.summary(both)[-1] == sentences.left_out(both)

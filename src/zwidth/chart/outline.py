@@ -146,7 +146,7 @@ def quadrant_area(tracer: Tracer, rings: Rings) -> float:
 def walk_area(walk: Sequence[tuple[Tracer, Arc]]) -> float:
     """Green's integral along a closed walk of arcs, each with its own tracer, within K >= 0, B >= 0 [N^2 s/m^2].
 
-    A blurred corner has two walls, the end of one arc and the beginning of the next: the chord between them counts.
+    A blurred corner has two walls, the end of one arc and the beginning of the next: their chord counts.
     """
     total = 0.0
     for n, (tracer, arc) in enumerate(walk):

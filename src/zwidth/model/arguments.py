@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import inf, isfinite
-from typing import Any, Final, TypeVar
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+if TYPE_CHECKING:  # the commands that need no numbers import this, too
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+    Floats = NDArray[np.float64]
+
 T = TypeVar("T")
 
 LONGEST: Final = 40  # characters of a text that are repeated
@@ -64,7 +67,7 @@ def told(value: object) -> str:
     if isinstance(value, str):
         return f"the text {_quoted(value)}"
     if value is None or _is_number(value) or isinstance(value, bool):
-        return f"{value:.10g}" if isinstance(value, float | np.floating) else str(value)
+        return f"{value:.10g}" if isinstance(value, Real) and not isinstance(value, Integral) else str(value)
     return f"{_article(type(value).__name__)} {type(value).__name__}"
 
 
@@ -105,6 +108,8 @@ def walls(wall_stiffness: ArrayLike, wall_damping: ArrayLike, *, finite: bool = 
     >>> walls([1000.0, 2000.0], 5.0)
     (array([1000., 2000.]), array([5., 5.]))
     """
+    import numpy as np
+
     given = {"wall_stiffness": (wall_stiffness, "N/m"), "wall_damping": (wall_damping, "N s/m")}
     arrays = []
     for name, (value, unit) in given.items():
@@ -135,7 +140,7 @@ def check_choice(name: str, value: object, choices: Iterable[str]) -> None:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool | np.complexfloating)
+    return isinstance(value, Real) and not isinstance(value, bool)  # numpy's numbers are registered as such
 
 
 def _quoted(text: str) -> str:
