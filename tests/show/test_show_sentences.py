@@ -36,11 +36,10 @@ def one_mass(mass, damping=0.0, stiffness=0.0, period=0.001, delay=0.0):
 
 @cache
 def far_sensor(stiffness=2000.0):
-    k = stiffness
     plant = {
         "mass_kg": [[0.2, 0.0], [0.0, 0.1]],
         "damping_Ns_per_m": [[0.6, -0.1], [-0.1, 0.1]],
-        "stiffness_N_per_m": [[2 * k, -k], [-k, k]],
+        "stiffness_N_per_m": [[2 * stiffness, -stiffness], [-stiffness, stiffness]],
         "actuator": [1.0, 0.0],
         "sensor": [0.0, 1.0],
     }
@@ -385,9 +384,8 @@ def test_a_model_that_fits_everywhere_between_or_not_at_all():
 
     assert said((low, high)).endswith(f"There is {ALIKE}: rigid everywhere.")
     assert said((3.0, 9.0)).endswith("rigid between 3.000 Hz and 9.000 Hz.")
-    assert said((low, 5.0), (150.0, high)).endswith(
-        "below 5.000 Hz (3.825 % of that) and above 150.0 Hz (114.7 % of that)."
-    )
+    both = said((low, 5.0), (150.0, high))
+    assert both.endswith("below 5.000 Hz (3.825 % of that) and above 150.0 Hz (114.7 % of that).")
     assert said().endswith(f"None of the simpler models is {ALIKE}, at any frequency.")
     assert "natural" not in said((low, 5.0), natural=np.nan)
     assert said((low, 5.0), natural=np.nan).endswith("rigid below 5.000 Hz.")
