@@ -227,9 +227,6 @@ def _lines(command: str, device: Device, wall: Walls, index: int) -> Iterator[tu
             if device.word == "hapkit-course":
                 yield "coupling", ("--coupling", "--stiffness", "5000")
         case "limit-cycles":
-            # several drives with dry friction take minutes
-            if device.drives > 1:
-                return
             limited = ("--set", f"loop.saturation.force_N={K * 1e-4:g}")
             yield "predicted", (*beyond, *limited, "--no-simulation")
             if device.kind == "plant":
