@@ -26,9 +26,12 @@ def _corner(one: BoundaryArc, other: BoundaryArc) -> tuple[float, float, float, 
     ends = [
         (float(a.stiffness[i]), float(a.damping[i]), float(a.frequency[i])) for a in (one, other) for i in (0, -1)
     ]
-    first, second = min(
-        ((p, q) for p in ends[:2] for q in ends[2:]), key=lambda pair: abs(pair[0][0] - pair[1][0])
-    )
+
+    def apart(pair) -> float:
+        (K, B, _), (other_K, other_B, _) = pair
+        return abs(K - other_K) / chart.stiffness_max + abs(B - other_B) / chart.damping_max
+
+    first, second = min(((p, q) for p in ends[:2] for q in ends[2:]), key=apart)
     return first[0], first[1], first[2], second[2]
 
 

@@ -97,4 +97,4 @@ def test_what_needs_no_velocity_is_shown_with_the_method():
 def test_the_method_is_told_with_its_parameters(device):
     ran = zwidth("show", device)
     assert ran.code == 0
-    assert "velocity by foaw (samples 20, position noise 5e-06, best-fit)" in ran.out
+    assert "velocity by foaw (samples 20, position noise 5 × 10⁻⁶, best-fit)" in ran.out

@@ -76,7 +76,7 @@ def test_what_is_farther_than_the_device_moves_is_grey():
     draw_balance(ax, found)
     assert ax.get_xlim()[1] == pytest.approx(3.0 * large.amplitude)
     said = texts(ax)
-    assert any(line.startswith("larger ones grow, smaller ones die: 2.02 mm") for line in said)
+    assert any(line.startswith("larger ones grow, smaller ones die: 2.015 mm") for line in said)
     assert any(line.startswith("beyond the range: ") for line in said)
-    assert "farther than the device moves, 2.50 mm" in said
+    assert "farther than the device moves, 2.500 mm" in said
     made.draw_without_rendering()

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from zwidth.chart.loci import Loci
 from zwidth.chart.loci_arcs import LocusArc
-from zwidth.chart.peak import Peak
+from zwidth.chart.peak import Peak, topmost
 from zwidth.loop.multi import MultiLoop
 
 Floats = NDArray[np.float64]
@@ -80,9 +80,7 @@ def candidates(loci: Loci, ring: list[LocusArc]) -> Iterator[Peak]:
 
 def stiffest(loci: Loci, rings: Rings, width: float) -> Peak | None:
     """The largest stiffness over the stable set within K > 0, B >= 0; None if there is no such wall."""
-    peaks = (peak for ring in rings for peak in candidates(loci, ring))
-    usable = (peak for peak in peaks if peak.stiffness > 1e-10 * width and peak.damping >= 0.0)
-    return max(usable, key=lambda peak: peak.stiffness, default=None)
+    return topmost((peak for ring in rings for peak in candidates(loci, ring)), width)
 
 
 def largest_damping(

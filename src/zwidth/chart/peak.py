@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Final, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,22 @@ from zwidth.compiled import compiled
 from zwidth.loop.evaluate import Factors
 
 Floats = NDArray[np.float64]
+
+# Walls whose stiffnesses differ by a smaller share are as stiff as each other.
+AS_STIFF: Final = 1e-13
+
+
+class Wall(Protocol):
+    """What `topmost` asks of a wall."""
+
+    @property
+    def stiffness(self) -> float: ...
+
+    @property
+    def damping(self) -> float: ...
+
+
+W = TypeVar("W", bound=Wall)
 
 
 @dataclass(frozen=True)
@@ -55,14 +73,21 @@ def stiffest(tracer: Tracer, rings: Rings, width: float) -> Peak | None:
 
     width  largest |K| on the edge: a corner on the axis K = 0 is no wall, whatever rounding leaves of it
     """
-    best: Peak | None = None
-    for ring in rings:
-        for n, arc in enumerate(ring):
-            for peak in _candidates(tracer, arc, ring[(n + 1) % len(ring)]):
-                usable = peak.stiffness > 1e-10 * width and peak.damping >= 0.0
-                if usable and (best is None or peak.stiffness > best.stiffness):
-                    best = peak
-    return best
+    pairs = ((arc, ring[(n + 1) % len(ring)]) for ring in rings for n, arc in enumerate(ring))
+    return topmost((peak for pair in pairs for peak in _candidates(tracer, *pair)), width)
+
+
+def topmost(walls: Iterable[W], width: float) -> W | None:
+    """The stiffest of several walls with K > 0 and B >= 0, and of those as stiff the most damped; None without any.
+
+    Where the edge stands upright at its largest stiffness, rounding would choose among its ends otherwise.
+
+    width  largest |K| on the edge: what is stiff by rounding of this is no wall
+    """
+    usable = [wall for wall in walls if wall.stiffness > 1e-10 * width and wall.damping >= 0.0]
+    highest = max((wall.stiffness for wall in usable), default=0.0)
+    as_stiff = (wall for wall in usable if wall.stiffness >= highest * (1.0 - AS_STIFF))
+    return max(as_stiff, key=lambda wall: wall.damping, default=None)
 
 
 def _candidates(tracer: Tracer, arc: Arc, following: Arc) -> list[Peak]:

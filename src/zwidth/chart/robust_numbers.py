@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from zwidth.chart.outline import arc_angles
-from zwidth.chart.peak import crossings
+from zwidth.chart.peak import crossings, topmost
 from zwidth.chart.robust_edges import Piece
 from zwidth.chart.robust_members import Member
 
@@ -33,14 +33,8 @@ def robust_stiffest(rings: Sequence[Sequence[Piece]]) -> RobustPeak | None:
     As in a single chart it is at a smooth maximum of K, at a corner, or where the edge crosses B = 0.
     """
     width = _width(rings)
-    best: RobustPeak | None = None
-    for ring in rings:
-        for n, piece in enumerate(ring):
-            for peak in _candidates(piece, ring[(n + 1) % len(ring)]):
-                usable = peak.stiffness > 1e-10 * width and peak.damping >= 0.0
-                if usable and (best is None or peak.stiffness > best.stiffness):
-                    best = peak
-    return best
+    pairs = ((piece, ring[(n + 1) % len(ring)]) for ring in rings for n, piece in enumerate(ring))
+    return topmost((peak for pair in pairs for peak in _candidates(*pair)), width)
 
 
 def robust_largest_damping(rings: Sequence[Sequence[Piece]], members: Sequence[Member]) -> float:
