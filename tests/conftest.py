@@ -9,6 +9,9 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+# Read when NumPy is loaded, which no import above does. Threads for matrices of a few rows take more than twice the
+# processor time, and the workers of a test run fight over the cores as it is.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # The same examples in every run, on every machine, whatever an earlier run has found. The first one may compile a
 # kernel, and a busy machine draws them slowly.
@@ -18,6 +21,14 @@ settings.register_profile(
 settings.load_profile("zwidth")
 
 NO_SKIPS = "ZWIDTH_NO_SKIPS"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread() -> None:
+    """Kernels run on one core in each worker; tests of several threads ask for them."""
+    import numba
+
+    numba.set_num_threads(1)
 
 
 @pytest.fixture(scope="session", autouse=True)
