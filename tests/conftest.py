@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
-# Read when NumPy is loaded, which no import above does. Threads for matrices of a few rows take more than twice the
-# processor time, and the workers of a test run fight over the cores as it is.
+# Read when NumPy is loaded, which no import above does. Threads for matrices of a few rows take more than twice
+# the processor time, and the workers of a test run fight over the cores as it is.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # The same examples in every run, on every machine, whatever an earlier run has found. The first one may compile a

@@ -78,7 +78,7 @@ def stiffest(tracer: Tracer, rings: Rings, width: float) -> Peak | None:
 
 
 def topmost(walls: Iterable[W], width: float) -> W | None:
-    """The stiffest of several walls with K > 0 and B >= 0, and of those as stiff the most damped; None without any.
+    """The stiffest of several walls with K > 0 and B >= 0, of those as stiff the most damped; None without any.
 
     Where the edge stands upright at its largest stiffness, rounding would choose among its ends otherwise.
 

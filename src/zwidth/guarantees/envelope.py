@@ -138,12 +138,20 @@ def stretch(
     if whole is not None and halves[0] is not None and halves[1] is not None:
         off = shapely.distance(shapely.LineString(whole), shapely.Point(middle.wall))
         if off < CUBIC * size:
-            return [np.vstack([halves[0], halves[1][1:]])[:: _way(one, other)]]
+            walk = np.vstack([halves[0], halves[1][1:]])
+            # rounding can put the middle beyond an end, and a walk that turns back has its outside on both sides
+            return [(walk if _goes_ahead(walk) else whole)[:: _way(one, other)]]
     if depth == 0:
         lost.append(share)
         return []
     first = stretch(springs, one, middle, shape, size, lost, depth - 1)
     return first + stretch(springs, middle, other, shape, size, lost, depth - 1)
+
+
+def _goes_ahead(walk: Floats) -> bool:
+    """Whether no step of a walk (k, 2) turns back on the one before."""
+    steps = np.diff(walk, axis=0)
+    return bool(np.all(np.sum(steps[1:] * steps[:-1], axis=1) >= 0.0))
 
 
 def _way(one: Touch, other: Touch) -> int:
