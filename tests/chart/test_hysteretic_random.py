@@ -23,7 +23,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.sections import HysteresisError
 
 SMALLEST = 1e-5
-CLEAR = 1e-6  # of |1 + L| over 1 + |L|
+CLEAR = 1e-9  # least |1 + L| over 1 + |L| that is counted
 
 
 def undamped_loop(seed):
@@ -109,27 +109,41 @@ class AliasSum:
         thetas = np.unique(np.concatenate(parts))
         return thetas[(thetas > 0.0) & (thetas < np.pi)]
 
-    def outside(self, wall_stiffness, wall_damping):
-        """Roots outside the circle: 1 + L turns by -pi for each along the upper half from z = 1 + 0; nan near to
-        the boundary."""
+    def outside(self, walls):
+        """Roots outside the circle at walls (n, 2); nan next to the boundary.
+
+        1 + L turns by -pi for each along the upper half from z = 1 + 0.
+        An angle is added where the middle of a chord of 1 + L is off by a fifth of its distance from 0: a tip is
+        where 1 + L passes 0 and turns back between two angles at which it is all but the same.
+        """
         thetas = self.angles()
         P, w = self.plant(thetas), self.velocity(thetas)
-        for _ in range(40):
-            F = 1.0 + P * (wall_stiffness + wall_damping * w)
-            turns = np.angle(F[1:] / F[:-1])
-            wide = (np.abs(turns) > 0.7) & (np.diff(thetas) > 1e-13)
-            if not wide.any():
-                break
-            middle, at = 0.5 * (thetas[1:] + thetas[:-1])[wide], np.flatnonzero(wide) + 1
-            thetas = np.insert(thetas, at, middle)
-            P, w = np.insert(P, at, self.plant(middle)), np.insert(w, at, self.velocity(middle))
+        unsure = np.ones(len(thetas) - 1, dtype=bool)
+        while unsure.any():
+            at = np.flatnonzero(unsure) + 1
+            middle = 0.5 * (thetas[at - 1] + thetas[at])
+            P_middle, w_middle = self.plant(middle), self.velocity(middle)
+            a, m, b = (
+                1.0 + p * (walls[:, :1] + walls[:, 1:] * v)
+                for p, v in ((P[at - 1], w[at - 1]), (P_middle, w_middle), (P[at], w[at]))
+            )
+            nearest = np.minimum(np.minimum(np.abs(a), np.abs(m)), np.abs(b))
+            bent = np.any((np.abs(m - 0.5 * (a + b)) > 0.2 * nearest) | (np.abs(b - a) > nearest), axis=0)
+            bent &= thetas[at] - thetas[at - 1] > 1e-13
+            new = at[bent]
+            thetas = np.insert(thetas, new, middle[bent])
+            P, w = np.insert(P, new, P_middle[bent]), np.insert(w, new, w_middle[bent])
+            unsure = np.zeros(len(thetas) - 1, dtype=bool)
+            right = new + np.arange(len(new))
+            unsure[right - 1] = unsure[right] = True
+        F = 1.0 + P * (walls[:, :1] + walls[:, 1:] * w)
         if np.any(self.squared == 0.0):  # two integrators, passed on a small half circle: half a turn
-            first = np.angle(-F[0] * np.sign(wall_stiffness)) - np.pi
+            first = np.angle(-F[:, 0] * np.sign(walls[:, 0])) - np.pi
         else:
-            first = np.angle(F[0] * np.sign(F[0].real))
-        if np.min(np.abs(F) / (1.0 + np.abs(F - 1.0))) < CLEAR:
-            return np.nan
-        return -(first + np.sum(turns) + np.angle(np.sign(F[-1].real) / F[-1])) / np.pi
+            first = np.angle(F[:, 0] * np.sign(F[:, 0].real))
+        turns = np.sum(np.angle(F[:, 1:] / F[:, :-1]), axis=1) + np.angle(np.sign(F[:, -1].real) / F[:, -1])
+        clear = np.min(np.abs(F) / (1.0 + np.abs(F - 1.0)), axis=1)
+        return np.where(clear < CLEAR, np.nan, -(first + turns) / np.pi)
 
 
 def counts_at_the_tip(loop, chart, factor):
@@ -144,10 +158,10 @@ def counts_at_the_tip(loop, chart, factor):
     middle = shapely.get_coordinates(circle)[0] * size * scale
     judge = AliasSum(loop, factor)
     inside = np.array([K, B]) + 1e-3 * (middle - [K, B])
-    return judge.outside(*inside), judge.outside(1.001 * K, B), judge.outside(*middle)
+    return judge.outside(np.array([inside, [1.001 * K, B], middle]))
 
 
-@pytest.mark.parametrize("seed", [1, 15, 140])
+@pytest.mark.parametrize("seed", [1, 8, 15, 115, 140])
 def test_the_tip_with_the_smallest_loss_is_where_roots_leave_the_circle(seed):
     loop = undamped_loop(seed)
     inside, beyond, middle = counts_at_the_tip(loop, lossy_chart(loop, SMALLEST), SMALLEST)
@@ -177,7 +191,7 @@ def test_two_hundred_plants_with_the_smallest_loss_are_charted_rightly():
             empty.append(seed)
             continue
         inside, beyond, middle = counts_at_the_tip(loop, chart, SMALLEST)
-        if max(abs(inside), abs(middle)) > 0.05 or beyond < 0.95:
+        if not (abs(inside) < 0.05 and abs(middle) < 0.05 and beyond > 0.95):  # nan too
             wrong.append(seed)
     assert len(refused) <= 10
     assert len(empty) <= 10
