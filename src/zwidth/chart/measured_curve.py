@@ -21,6 +21,7 @@ NEAREST = 1e-5  # to an end of the curve or an asymptote, of the spacing there
 FAR = 1e9  # how far lines are drawn, in `sizes`
 COARSE = 0.02  # of its distance from K = B = 0, to which the whole curve is kept
 CLEAR = 0.8  # of the clearest wall's distance from the boundary: clear too
+LIKELY, SURE = 28, 7  # clearest walls: counted at every angle; counts of which must agree
 MOST = 200_000  # angles on the curve
 
 
@@ -249,10 +250,15 @@ def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
     K = np.quantile(h, shares)[:, None] * sizes
     B = np.quantile(h / w, shares)[:, None] * sizes
     walls = np.array([(k, b) for k in K.ravel() for b in B.ravel()])
-    every = max(1, len(found.angles) // 4000)
-    counts, clear = nyquist_count(loop, found.angles[::every], walls)
-    order = np.argsort(-clear)[:7]
-    enough = np.flatnonzero(clear >= (CLEAR if loop.between.closed else 1.0) * clear[order[0]])
+    # all walls at some angles, and the clear ones at every angle: between few a resonance may turn 1 + L
+    _, clear = nyquist_count(loop, found.angles[:: max(1, len(found.angles) // 4000)], walls)
+    least, order = CLEAR if loop.between.closed else 1.0, np.argsort(-clear)
+    enough = np.flatnonzero(clear >= least * clear[order[0]])
+    softest = enough[np.argsort(walls[enough, 0], kind="stable")]
+    walls = walls[np.union1d(order[:LIKELY], softest[:SURE])]
+    counts, clear = nyquist_count(loop, found.angles, walls)
+    order = np.argsort(-clear)[:SURE]
+    enough = np.flatnonzero(clear >= least * clear[order[0]])
     best = enough[np.argmin(walls[enough, 0])]
     made = Boundary(
         found.angles,
@@ -265,7 +271,7 @@ def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
         int(counts[best]),
     )
     sure = order[clear[order] > 0.2]
-    if counts[best] < 0 or np.mean(made.outside(walls[sure]) != counts[sure]) > 0.5:
+    if counts[best] < 0 or 2 * np.count_nonzero(made.outside(walls[sure]) != counts[sure]) > len(sure):
         raise ResponseError(
             "does not turn as that of a device would: counts of unstable roots disagree; is it a response from "
             "force to position with all its frequencies, closely enough spaced, and is `integrators` right?"
