@@ -161,7 +161,10 @@ def counts_at_the_tip(loop, chart, factor):
     return judge.outside(np.array([inside, [1.001 * K, B], middle]))
 
 
-@pytest.mark.parametrize("seed", [1, 8, 13, 15, 115, 140])
+LOST = pytest.mark.xfail(strict=True, reason="counts lose their digits on the way from a wall far away")
+
+
+@pytest.mark.parametrize("seed", [1, 8, 13, 15, 115, pytest.param(125, marks=LOST), 140])
 def test_the_tip_with_the_smallest_loss_is_where_roots_leave_the_circle(seed):
     loop = undamped_loop(seed)
     inside, beyond, middle = counts_at_the_tip(loop, lossy_chart(loop, SMALLEST), SMALLEST)
