@@ -161,10 +161,7 @@ def counts_at_the_tip(loop, chart, factor):
     return judge.outside(np.array([inside, [1.001 * K, B], middle]))
 
 
-LOST = pytest.mark.xfail(strict=True, reason="counts lose their digits on the way from a wall far away")
-
-
-@pytest.mark.parametrize("seed", [1, 8, 13, 15, 115, pytest.param(125, marks=LOST), 140])
+@pytest.mark.parametrize("seed", [1, 8, 13, 15, 115, 125, 140])
 def test_the_tip_with_the_smallest_loss_is_where_roots_leave_the_circle(seed):
     loop = undamped_loop(seed)
     inside, beyond, middle = counts_at_the_tip(loop, lossy_chart(loop, SMALLEST), SMALLEST)
@@ -196,6 +193,5 @@ def test_two_hundred_plants_with_the_smallest_loss_are_charted_rightly():
         inside, beyond, middle = counts_at_the_tip(loop, chart, SMALLEST)
         if not (abs(inside) < 0.05 and abs(middle) < 0.05 and beyond > 0.95):  # nan too
             wrong.append(seed)
-    assert len(refused) <= 10
-    assert len(empty) <= 10
-    assert wrong == []
+    assert len(refused) <= 2  # clear walls far away, to which counts lose their digits
+    assert (empty, wrong) == ([], [])

@@ -20,7 +20,7 @@ Whole = NDArray[np.int64]
 NEAREST = 1e-5  # to an end of the curve or an asymptote, of the spacing there
 FAR = 1e9  # how far lines are drawn, in `sizes`
 COARSE = 0.02  # of its distance from K = B = 0, to which the whole curve is kept
-CLEAR = 0.8  # of the clearest wall's distance from the boundary: clear too
+CLEAR = 0.2  # least |1 + L| / (1 + |L|) of a wall that is clear of the boundary
 LIKELY, SURE = 28, 7  # clearest walls: counted at every angle; counts of which must agree
 MOST = 200_000  # angles on the curve
 
@@ -239,9 +239,9 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Wh
 
 
 def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
-    """The boundary with the softest clear one of many walls as its reference, the clearest counted against it.
+    """The boundary with the smallest clear one of many walls as its reference, the clearest counted against it.
 
-    From a soft one, since the way from a wall many powers of ten beyond the stable ones loses their digits; where
+    From a small one, since the way from a wall many powers of ten beyond the stable ones loses their digits; where
     the data end early, the clearest one.
     """
     h, w = np.abs(loop.h(loop.inner)), np.abs(loop.w(loop.inner))
@@ -252,14 +252,15 @@ def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
     walls = np.array([(k, b) for k in K.ravel() for b in B.ravel()])
     # all walls at some angles, and the clear ones at every angle: between few a resonance may turn 1 + L
     _, clear = nyquist_count(loop, found.angles[:: max(1, len(found.angles) // 4000)], walls)
-    least, order = CLEAR if loop.between.closed else 1.0, np.argsort(-clear)
-    enough = np.flatnonzero(clear >= least * clear[order[0]])
-    softest = enough[np.argsort(walls[enough, 0], kind="stable")]
-    walls = walls[np.union1d(order[:LIKELY], softest[:SURE])]
+    order, size = np.argsort(-clear), np.max(walls / np.min(walls, axis=0), axis=1)
+    small = np.argsort(np.where(clear > CLEAR, size, np.inf), kind="stable")
+    chosen = np.union1d(order[:LIKELY], small[:SURE])
+    walls, size = walls[chosen], size[chosen]
     counts, clear = nyquist_count(loop, found.angles, walls)
     order = np.argsort(-clear)[:SURE]
-    enough = np.flatnonzero(clear >= least * clear[order[0]])
-    best = enough[np.argmin(walls[enough, 0])]
+    least = min(CLEAR, clear[order[0]]) if loop.between.closed else clear[order[0]]
+    enough = np.flatnonzero(clear >= least)
+    best = enough[np.argmin(size[enough])]
     made = Boundary(
         found.angles,
         found.walls,
@@ -270,7 +271,7 @@ def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
         walls[best],
         int(counts[best]),
     )
-    sure = order[clear[order] > 0.2]
+    sure = order[clear[order] > CLEAR]
     if counts[best] < 0 or 2 * np.count_nonzero(made.outside(walls[sure]) != counts[sure]) > len(sure):
         raise ResponseError(
             "does not turn as that of a device would: counts of unstable roots disagree; is it a response from "
