@@ -142,9 +142,13 @@ def _bisected(
 
 
 def own_sizes(loop: MeasuredLoop, theta: Floats) -> Floats:
-    """|h| and |h / w| (n, 2) at angles (n,): the sizes of K and of B that count there, since K + B w = h."""
+    """|h| and |h / w| (n, 2) at angles (n,): the sizes of K and of B that count there, since K + B w = h.
+
+    Inf where the velocity estimate is blind: no damping matters there.
+    """
     h, w = np.abs(loop.h(theta)), np.abs(loop.w(theta))
-    return np.column_stack([h, h / w])
+    with np.errstate(divide="ignore"):
+        return np.column_stack([h, h / w])
 
 
 def sizes(loop: MeasuredLoop) -> Floats:
@@ -193,7 +197,8 @@ def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[
         return np.empty((0, 4)), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     theta = np.array([near])
     Im_h, Im_w = float(loop.h(theta)[0].imag), float(loop.w(theta)[0].imag)
-    cut = float(np.clip(Im_h / Im_w, -far, far))
+    # a velocity estimate may be blind there, to the last digit on some processors
+    cut = float(np.clip(Im_h / Im_w, -far, far)) if Im_w else float(np.copysign(far, Im_h))
     # both from the cut outwards: seen from the far end, rounding would hide on which side a wall lies
     ends = np.unique([-far, far])
     ends = ends[ends != cut]
