@@ -48,8 +48,10 @@ report: $(VENV)/.installed
 test: $(VENV)/.kernels
 	$(BIN)/python -m pytest -n auto --dist worksteal $(TESTS)
 
-# Kernels for another processor stand beside this one's.
-older-processor: $(VENV)/.kernels
+# Kernels for the older processor only: those for this one are compiled again by whoever wants them next.
+older-processor: $(VENV)/.installed-test
+	@$(DROP_KERNELS)
+	@rm -f $(VENV)/.kernels
 	$(BIN)/python tests/older_processor.py AVX2 -n auto --dist worksteal $(or $(TESTS),$(NUMERICAL))
 
 record: $(VENV)/.installed-test

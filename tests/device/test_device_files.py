@@ -11,6 +11,7 @@ import pytest
 
 from tests import systems
 from tests.cli.cli_run import TWO_MASS, refused, zwidth
+from tests.interruption import HANGS
 from tests.measured_cases import measured
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
@@ -20,7 +21,6 @@ DEVICE = 'name = "measured"\n[response]\n{}\n[loop]\nsampling_period_s = 0.00125
 STUDY = 'device = "{}"\nmeasures = ["stiffness_max"]\n[[axis]]\nkey = "loop.delay_samples"\nvalues = [0, 1]\n'
 MASS = DEVICE.replace("[response]\n{}", "[plant]\nmass_kg = 0.1\ndamping_Ns_per_m = 1.0")
 SECRET = "root:swordfish:0"
-HANG = 900  # seconds after which a reading counts as one that waits for ever
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def no_waiting():
         raise TimeoutError("it waits for ever")
 
     before = signal.signal(signal.SIGALRM, late)
-    signal.alarm(HANG)
+    signal.alarm(int(HANGS))
     yield
     signal.alarm(0)
     signal.signal(signal.SIGALRM, before)

@@ -153,8 +153,7 @@ def own_sizes(loop: MeasuredLoop, theta: Floats) -> Floats:
 
 def sizes(loop: MeasuredLoop) -> Floats:
     """(2,) what is large for |h| and |h / w|: exceeded at a tenth of the measured frequencies."""
-    h, w = np.abs(loop.h(loop.inner)), np.abs(loop.w(loop.inner))
-    return np.array([np.quantile(h, 0.9), np.quantile(h / w, 0.9)])
+    return np.asarray(np.quantile(own_sizes(loop, loop.inner), 0.9, axis=0))
 
 
 def boundary(loop: MeasuredLoop, angles: Floats, known: Boundary | None = None) -> Boundary:

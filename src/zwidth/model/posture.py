@@ -30,6 +30,7 @@ __all__ = [
     "Posture",
     "PostureError",
     "Singular",
+    "handle_motions",
     "handle_range",
     "inertia_terms",
     "joint_position",
@@ -208,6 +209,12 @@ def joint_position(mechanism: Mechanism, angles: Mapping[str, float], assembly: 
             "ask for angles nearer to those of the reference"
         )
     return found
+
+
+def handle_motions(posture: Posture) -> Floats:
+    """Orthonormal directions (3, r) in which the handle can move, at a single posture."""
+    left, singular, _ = np.linalg.svd(posture.jacobian, full_matrices=False)
+    return np.asarray(left[:, singular > 1e-9 * singular[0]])
 
 
 def handle_range(mechanism: Mechanism, posture: Posture, direction: ArrayLike) -> tuple[float, float]:

@@ -8,8 +8,8 @@ import numpy as np
 
 from zwidth.contact.mechanism.surfaces import Surface, depth_and_normal
 from zwidth.model.arrays import Arrays
-from zwidth.model.mechanism import Floats, Mechanism
-from zwidth.model.posture import OK, Posture, solve_posture
+from zwidth.model.mechanism import Mechanism
+from zwidth.model.posture import OK, Posture, handle_motions, solve_posture
 from zwidth.model.roadmap import roadmap
 
 TRIED: Final = 64  # postures nearest to the surface from which it is tried to touch it
@@ -34,7 +34,7 @@ def check_reach(mechanism: Mechanism, mech: Arrays, posture: Posture, surface: S
     best = np.argsort(-depth)[:TRIED]
     nearest, least = here[best[0]], -depth[best[0]]
     at, depth, normal = here[best], depth[best], normal[best]
-    plane = _moves(posture)
+    plane = handle_motions(posture)
     for _ in range(REACHES):
         ways = normal @ plane @ plane.T
         gain = np.sum(ways * normal, axis=1)
@@ -55,9 +55,3 @@ def check_reach(mechanism: Mechanism, mech: Arrays, posture: Posture, surface: S
         f"the handle never touches the surface in assembly {posture.assembly!r}: the nearest it comes is about "
         f"{least:.3g} m, at {where}; move the surface into the workspace"
     )
-
-
-def _moves(posture: Posture) -> Floats:
-    """Orthonormal directions (3, r) in which the handle can move."""
-    left, singular, _ = np.linalg.svd(posture.jacobian, full_matrices=False)
-    return np.asarray(left[:, singular > 1e-9 * singular[0]])

@@ -245,16 +245,13 @@ def _check_reach(question: Question, device: Device, position: float, what: str)
     """
     if device.mechanism is None:
         return None
-    import numpy as np
-
-    from zwidth.model.posture import PostureError
+    from zwidth.model.posture import PostureError, handle_motions
 
     posture, along = device.posture(question.at, question.assembly), device.direction(question.direction)
     if position == 0.0:
         return 0.0
     # without forces across, a handle with few drives moves by the part of the direction that it can move along
-    left, singular, _ = np.linalg.svd(posture.jacobian, full_matrices=False)
-    moves = left[:, singular > 1e-9 * singular[0]]
+    moves = handle_motions(posture)
     way = moves @ (moves.T @ along)
     try:
         reached = device.posture(list(posture.position + position / (way @ along) * way), question.assembly)
