@@ -19,7 +19,7 @@ BIN     := $(VENV)/bin
 NUMERICAL := $(addprefix tests/,chart conditions contact guarantees loop measures model reproduction study)
 OUTPUT   = out/$(basename $(notdir $(DEVICE))).html
 # Those of this environment's Python; another's stay.
-DROP_KERNELS = find src -name "*.$$($(BIN)/python -c 'import sys; print("py%d%d" % sys.version_info[:2])').nb?" -delete
+DROP_KERNELS = find src -name "*.$$($(BIN)/python -c 'import sys; print("py%d%d" % sys.version_info[:2])')*.nb?" -delete
 
 # Relative on purpose: pip splits this variable at blanks, and a folder's name may hold one.
 # Newer releases of pip read the second for the build backend, older ones the first.
