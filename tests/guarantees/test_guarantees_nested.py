@@ -122,7 +122,7 @@ def check_inclusions(seed):
 
 
 # some other seeds take long, have no chart, or hardly move what they read: there sets meet within rounding only
-@pytest.mark.parametrize("seed", [3, 9, 10, 14, 17])
+@pytest.mark.parametrize("seed", [3, 9, 10, 14, 17, 242])
 def test_guarantees_of_random_devices_lie_within_one_another(seed):
     check_inclusions(seed)
 

@@ -28,6 +28,9 @@ CUBIC, CHORD = 2e-7, 1e-8
 HALVINGS, SHORT = 9, 1e-7
 # A tangent steeper than this against the chord is too far away to join to.
 STEEPEST = 0.7
+# Halves of a stretch are this alike in length at least: where touching points jump to another envelope one of them
+# is all of it, and a cubic across the jump would pass the point in the middle.
+ALIKE = 0.05
 # Pieces of curve between which its turning is looked for.
 PIECES = 24
 # The touching point nearest to an angle is looked for within these parts of the reach, one after the other: light
@@ -135,7 +138,9 @@ def stretch(
         return []
     halves = _cubic(one, middle, size), _cubic(middle, other, size)
     whole = _cubic(one, other, size)
-    if whole is not None and halves[0] is not None and halves[1] is not None:
+    lengths = np.hypot(*(middle.wall - one.wall)), np.hypot(*(other.wall - middle.wall))
+    joined = min(lengths) > ALIKE * max(lengths)
+    if joined and whole is not None and halves[0] is not None and halves[1] is not None:
         off = shapely.distance(shapely.LineString(whole), shapely.Point(middle.wall))
         if off < CUBIC * size:
             walk = np.vstack([halves[0], halves[1][1:]])
