@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.guarantees.test_guarantees_nested import scaled
 from tests.guarantees.test_guarantees_passive import random_operator, resonators_at
 from tests.systems import random_controller, random_method, random_plant
+from zwidth.chart.region import ChartError
 from zwidth.chart.robust_check import unstable
 from zwidth.chart.verdict import UNSTABLE, eigenvalues, judge
 from zwidth.guarantees.disks import response_disks
@@ -16,6 +18,7 @@ from zwidth.guarantees.gauge import gauge
 from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import port, reached
 from zwidth.guarantees.spring_family import Springs, spring_for
+from zwidth.guarantees.springs import spring_stable_region
 from zwidth.loop.controller import Butterworth
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import undamped_modes
@@ -160,6 +163,36 @@ def test_just_outside_most_of_many_random_passive_sets_an_operator_vibrates():
     tried = [found for seed in range(60) if (found := vibrates_outside(seed)) is not None]
     assert len(tried) >= 20
     assert np.mean(tried) >= 0.6  # two thirds; the construction aims at one angle only
+
+
+def outside_the_spring_stable_set(seed):
+    """Share of a random device's passive set outside its spring-stable one; nan where either is undecided.
+
+    The spring-stable edge is known to 1e-5 of its size, with light modes to 5e-5.
+    """
+    loop = random_device(np.random.default_rng(seed), weak=seed % 10 == 0)
+    passive = passive_region(loop)
+    try:
+        springs = spring_stable_region(loop)
+    except ChartError:
+        return np.nan
+    if not passive.rings:
+        return np.nan
+    K, B = np.ptp(np.vstack(passive.rings), axis=0)
+    core = scaled(passive.rings, B / K).buffer(-1e-4 * B)
+    return core.difference(scaled(springs.rings, B / K)).area / core.area
+
+
+@pytest.mark.parametrize("seed", [2, 14])  # 14: one narrow band of springs leaves half of what the others leave
+def test_a_random_passive_set_lies_within_the_spring_stable_one(seed):
+    assert outside_the_spring_stable_set(seed) < 1e-9
+
+
+@pytest.mark.slow
+def test_many_random_passive_sets_lie_within_the_spring_stable_ones():
+    outside = np.array([outside_the_spring_stable_set(seed) for seed in range(240)])
+    assert np.nanmax(outside) < 1e-9
+    assert np.mean(np.isfinite(outside)) > 0.85
 
 
 @pytest.mark.parametrize("seed", [3, 5])

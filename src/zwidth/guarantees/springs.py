@@ -111,10 +111,9 @@ def spring_stable_region(loop: Loop) -> Region:
         tried = np.unique(
             np.concatenate([tried, _alike(springs, edge, turn), _between(members, edge), sweep.lost])
         )
-        left = _confirmed(springs, left, tried)
+        left, new = _tried(springs, left, tried)
         if left.is_empty:
             return empty(NOTHING)
-        new = _failing(springs, left, tried)
         clean = 0 if len(new) else clean + 1
         if clean == CLEAN:
             break
@@ -205,14 +204,6 @@ def _edge(springs: Springs, members: dict[float, Member]) -> Edge:
     return [(shares[piece.member.index], piece) for ring in rings for piece in ring]
 
 
-def _confirmed(springs: Springs, left: shapely.Geometry, tried: Floats) -> shapely.MultiPolygon:
-    """Cells, but for crumbs, of which some wall is stable with every spring tried."""
-    cells = [cell for cell in parts(left) if cell.area > CRUMB * left.area]
-    walls = np.array([cell.representative_point().coords[0] for cell in cells]).reshape(-1, 2)
-    lost = np.asarray(_unstable(springs, walls, tried).any(axis=0))
-    return shapely.MultiPolygon([cell for cell, bad in zip(cells, lost, strict=True) if not bad])
-
-
 def _unstable(springs: Springs, walls: Floats, tried: Floats) -> NDArray[np.bool_]:
     """Which walls (n, 2) [K unit, B] are unstable with which springs (m,): (m, n)."""
     K, B = np.ascontiguousarray((walls / (springs.unit, 1.0)).T)
@@ -224,15 +215,33 @@ def _unstable(springs: Springs, walls: Floats, tried: Floats) -> NDArray[np.bool
     return out
 
 
-def _failing(springs: Springs, left: shapely.Geometry, tried: Floats) -> Floats:
-    """Springs that make walls just inside the edge unstable, the worst of each run of neighbours; () if none."""
+def _tried(springs: Springs, left: shapely.Geometry, tried: Floats) -> tuple[shapely.MultiPolygon, Floats]:
+    """Cells of a shape, without crumbs, of which some wall is stable with every spring tried, and the springs that
+    make walls of theirs unstable: the worst of each run of neighbours; () if none.
+
+    Walls just inside the edge of a cell and one in its middle stand for it.
+    """
     low, bottom, right, top = left.bounds
-    inner = parts(left.buffer(-INSIDE * max(right - low, top - bottom), join_style="mitre"))
-    walls = np.vstack([_along(np.asarray(cell.exterior.coords)) for cell in inner] or [np.zeros((0, 2))])
-    count = _unstable(springs, walls, tried).sum(axis=1)
+    depth = INSIDE * max(right - low, top - bottom)
+    cells = [cell for cell in parts(left) if cell.area > CRUMB * left.area]
+    if not cells:
+        return shapely.MultiPolygon(), np.zeros(0)
+    walls = [_walls(cell, depth) for cell in cells]
+    bad = np.split(
+        _unstable(springs, np.vstack(walls), tried), np.cumsum([len(some) for some in walls])[:-1], axis=1
+    )
+    kept = [k for k in range(len(cells)) if not bad[k].any(axis=0).all()]
+    count = sum((bad[k].sum(axis=1) for k in kept), np.zeros(len(tried), dtype=int))
     worst = [i for i in range(len(tried)) if count[i] and count[i] == count[max(i - 1, 0) : i + 2].max()]
     worst = sorted(worst, key=lambda i: -count[i])[:JOINING]
-    return np.asarray(tried[np.array(worst, dtype=int)])
+    return shapely.MultiPolygon([cells[k] for k in kept]), np.asarray(tried[np.array(worst, dtype=int)])
+
+
+def _walls(cell: shapely.Polygon, depth: float) -> Floats:
+    """Walls so far inside the edge of a cell, and one in its middle (k, 2)."""
+    inner = parts(cell.buffer(-depth, join_style="mitre"))
+    middle = np.array(cell.representative_point().coords)
+    return np.vstack([middle, *(_along(np.asarray(part.exterior.coords)) for part in inner)])
 
 
 def _along(ring: Floats) -> Floats:
