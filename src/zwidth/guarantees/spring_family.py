@@ -7,7 +7,9 @@ from functools import cached_property
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
+from zwidth.chart.robust_check import unstable
 from zwidth.chart.robust_members import Member, chart_member, polygons
 from zwidth.chart.tracer import Tracer
 from zwidth.guarantees.port import Floats, fixed
@@ -123,6 +125,16 @@ class Springs:
         if share not in self._members:
             self._members[share] = chart_member(len(self._members), tracer.loop)
         return self._members[share]
+
+    def unstable(self, walls: Floats, shares: Floats) -> NDArray[np.bool_]:
+        """Which walls (n, 2) [K unit, B] are certainly unstable with which springs (m,): (m, n)."""
+        K, B = np.ascontiguousarray((walls / (self.unit, 1.0)).T)
+        out = np.zeros((len(shares), len(walls)), dtype=bool)
+        for i, share in enumerate(shares.tolist()):
+            tracer = self.tracer(share)
+            if tracer is not None:
+                out[i] = unstable(tracer.polynomials, K, B)
+        return out
 
 
 def parts(shape: shapely.Geometry) -> list[shapely.Polygon]:

@@ -6,10 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from zwidth.chart.robust_check import unstable
 from zwidth.chart.robust_common import common
 from zwidth.chart.robust_edges import Piece, pieces
 from zwidth.chart.robust_members import Member, polygons
@@ -204,17 +202,6 @@ def _edge(springs: Springs, members: dict[float, Member]) -> Edge:
     return [(shares[piece.member.index], piece) for ring in rings for piece in ring]
 
 
-def _unstable(springs: Springs, walls: Floats, tried: Floats) -> NDArray[np.bool_]:
-    """Which walls (n, 2) [K unit, B] are unstable with which springs (m,): (m, n)."""
-    K, B = np.ascontiguousarray((walls / (springs.unit, 1.0)).T)
-    out = np.zeros((len(tried), len(walls)), dtype=bool)
-    for i, share in enumerate(tried.tolist()):
-        tracer = springs.tracer(share)
-        if tracer is not None:
-            out[i] = unstable(tracer.polynomials, K, B)
-    return out
-
-
 def _tried(springs: Springs, left: shapely.Geometry, tried: Floats) -> tuple[shapely.MultiPolygon, Floats]:
     """Cells of a shape, without crumbs, of which some wall is stable with every spring tried, and the springs that
     make walls of theirs unstable: the worst of each run of neighbours; () if none.
@@ -228,7 +215,7 @@ def _tried(springs: Springs, left: shapely.Geometry, tried: Floats) -> tuple[sha
         return shapely.MultiPolygon(), np.zeros(0)
     walls = [_walls(cell, depth) for cell in cells]
     bad = np.split(
-        _unstable(springs, np.vstack(walls), tried), np.cumsum([len(some) for some in walls])[:-1], axis=1
+        springs.unstable(np.vstack(walls), tried), np.cumsum([len(some) for some in walls])[:-1], axis=1
     )
     kept = [k for k in range(len(cells)) if not bad[k].any(axis=0).all()]
     count = sum((bad[k].sum(axis=1) for k in kept), np.zeros(len(tried), dtype=int))

@@ -11,7 +11,7 @@ import shapely
 from zwidth.chart.robust_edges import Piece
 from zwidth.guarantees.envelope import Touch, nearest_touch, stretch, touches
 from zwidth.guarantees.port import Floats
-from zwidth.guarantees.spring_family import Springs
+from zwidth.guarantees.spring_family import Springs, parts
 
 # In shares of the set's size: touching points further away do not matter, nor do sweeps wider than this.
 NEAR, WIDEST = 0.05, 0.05
@@ -27,7 +27,7 @@ class Sweep:
     """What has been found swept so far; walls are [K unit, B].
 
     found   touching points of each spring
-    strips  between the envelope and the arcs that it touches
+    strips  what is between the envelope and the arcs that it touches, of the shapes cut
     lost    springs between which an envelope was lost
     done    stretches and ways that have been looked at
     """
@@ -105,7 +105,12 @@ class Sweep:
 def _strips(
     springs: Springs, one: Touch, other: Touch, shape: shapely.Geometry, size: float, lost: list[float]
 ) -> list[shapely.Polygon]:
-    """Strips outside the envelope between two touching points, wide enough for all that their arcs leave."""
+    """What strips outside the envelope between two touching points take from a shape.
+
+    They are wide enough for all that the arcs of the two leave. Where the envelope is outside the shape and its
+    stable side turned away, strips reach over what is swept: parts whose middle is stable with the springs of
+    their own stretch are left out.
+    """
     gap = other.wall - one.wall
     length = float(np.hypot(*gap))
     if length == 0.0:
@@ -113,9 +118,13 @@ def _strips(
     aside = max(abs(end.along[0] * gap[1] - end.along[1] * gap[0]) for end in (one, other))
     wide = min(2.0 * aside + 1e-4 * length, WIDEST * size)
     strips = []
-    for walk in stretch(springs, one, other, shape, size, lost):
+    for walk, shares in stretch(springs, one, other, shape, size, lost):
         along = np.gradient(walk, axis=0)
         along /= np.maximum(np.hypot(*along.T), 1e-300)[:, None]
         outwards = np.column_stack([along[:, 1], -along[:, 0]])
-        strips.append(shapely.make_valid(shapely.Polygon(np.vstack([walk, (walk + wide * outwards)[::-1]]))))
+        strip = shapely.make_valid(shapely.Polygon(np.vstack([walk, (walk + wide * outwards)[::-1]])))
+        for part in parts(shapely.intersection(shape, strip)):
+            middle = np.array(part.representative_point().coords)
+            if springs.unstable(middle, shares).any():
+                strips.append(part)
     return strips
