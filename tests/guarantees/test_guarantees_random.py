@@ -167,10 +167,10 @@ def test_just_outside_most_of_many_random_passive_sets_an_operator_vibrates():
 
 
 def outside_the_spring_stable_set(seed):
-    """Share of a random device's passive set outside its spring-stable one; nan where either is undecided, or what is
-    passive is too small for charts.
+    """Share of a random device's passive set outside its spring-stable one; nan where there is nothing to compare.
 
-    The spring-stable edge is known to 1e-5 of its size, with light modes to 5e-5.
+    That is where either set is empty or undecided, or what is passive is too small for charts. The spring-stable
+    edge is known to 1e-5 of its size, with light modes to 5e-5.
     """
     loop = random_device(np.random.default_rng(seed), weak=seed % 10 == 0)
     passive = passive_region(loop)
