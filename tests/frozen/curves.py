@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 BETWEEN = 16  # points of the interpolation for each step of the line
+SAME = 1e-10  # points nearer than this are one: cubics through both would divide by next to nothing
 
 
 def distance(first: np.ndarray, second: np.ndarray) -> float:
@@ -21,7 +22,7 @@ def distance(first: np.ndarray, second: np.ndarray) -> float:
 
 def _one_way(points: np.ndarray, line: np.ndarray) -> float:
     step = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    line = line[np.concatenate([[True], step > 0.0])]
+    line = line[np.concatenate([[True], step > SAME])]
     nearest = _from_line(points, line)
     if len(line) >= 4:
         for shift in (-2, -1, 0):

@@ -174,6 +174,14 @@ def test_distance_of_two_lines_is_where_they_are_farthest_apart():
     assert distance(first, first[:1]) == 1.0
 
 
+def test_points_that_rounding_keeps_apart_are_one():
+    angles = np.linspace(0.0, np.pi, 50)
+    once = np.column_stack([np.sin(angles), np.cos(angles)])
+    twice = np.insert(once, 20, once[20] + [0.0, 5e-17], axis=0)
+    assert np.any(twice[20] != twice[21])
+    assert distance(once, twice) < 1e-12
+
+
 # --- motions --------------------------------------------------------------------------------------------
 
 
