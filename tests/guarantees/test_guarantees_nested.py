@@ -10,11 +10,13 @@ import shapely
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize_scalar
 
+from tests.frozen.devices import random_devices
 from tests.guarantees.test_guarantees_passive import random_device, random_operator
 from tests.systems import mass, published
 from zwidth.chart.region import ChartError
 from zwidth.chart.robust_check import unstable
 from zwidth.chart.verdict import spectral_radius
+from zwidth.device.load import load
 from zwidth.guarantees.coupling import coupling_angles, coupling_region, couplings, softest_limit
 from zwidth.guarantees.nested import nested
 from zwidth.guarantees.spring_family import Springs
@@ -77,6 +79,20 @@ def test_unseen_springs_leave_spring_stable_walls_stable(found):
     depth = 1e-5 if springs.loop.plant.size == 1 else 5e-5  # narrow bites of lightly damped modes
     assert growing(springs, region, 2000, depth, np.random.default_rng(1)) == 0
     assert growing(springs, region, 200, -3e-3, np.random.default_rng(1)) > 0  # and the edge is not far
+
+
+def test_springs_with_which_two_modes_have_one_alias_are_found(tmp_path):
+    """Two modes at 3.48 and 11.47 times Nyquist's: springs within half a percent make walls vibrate."""
+    (device,) = (one for one in random_devices() if one.word == "plant-23.toml")
+    (tmp_path / device.word).write_text(device.files[device.word])
+    described = load(tmp_path / device.word)
+    loop = Loop(described.plant(), described.controller)
+    springs, region = Springs.of(loop), spring_stable_region(loop)
+    K, B = np.ascontiguousarray(inside(region, 5e-5)[::20].T)
+    shares = np.linspace(0.98545, 0.98585, 41)
+    assert not any(unstable(springs.tracer(share).polynomials, K, B).any() for share in shares.tolist())
+    K, B = np.ascontiguousarray(inside(region, -3e-3)[::20].T)
+    assert any(unstable(springs.tracer(share).polynomials, K, B).any() for share in shares.tolist())
 
 
 @pytest.mark.parametrize("depth", [-1e-6, 1e-6])

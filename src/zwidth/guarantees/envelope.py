@@ -122,17 +122,17 @@ def stretch(
     size: float,
     lost: list[float],
     depth: int = HALVINGS,
-) -> list[tuple[Floats, Floats]]:
+) -> list[tuple[Floats, float, float]]:
     """The envelope between two touching points where it is near a shape.
 
-    Walks (n, 2), the stable side on their left, each with the shares of springs that touch it. Where the envelope
-    does not join the points there is nothing, and a spring between joins the lost ones.
+    Walks (n, 2), the stable side on their left, each with the shares of the springs at its ends. Where the
+    envelope does not join the points there is nothing, and a spring between joins the lost ones.
     """
     length = float(np.hypot(*(other.wall - one.wall)))
     if shapely.distance(shape, shapely.LineString([one.wall, other.wall])) > length:
         return []
     if length < SHORT * size:
-        return [(np.array([one.wall, other.wall])[:: _way(one, other)], np.array([one.share, other.share]))]
+        return [(np.array([one.wall, other.wall])[:: _way(one, other)], one.share, other.share)]
     share = 0.5 * (one.share + other.share)
     reach = 0.75 * abs(other.theta - one.theta) + 1e-9
     middle = nearest_touch(springs, share, 0.5 * (one.theta + other.theta), reach)
@@ -148,8 +148,7 @@ def stretch(
         if off < CUBIC * size:
             walk = np.vstack([halves[0], halves[1][1:]])
             # rounding can put the middle beyond an end, and a walk that turns back has its outside on both sides
-            walk = walk if _goes_ahead(walk) else whole
-            return [(walk[:: _way(one, other)], np.array([one.share, share, other.share]))]
+            return [((walk if _goes_ahead(walk) else whole)[:: _way(one, other)], one.share, other.share)]
     if depth == 0:
         lost.append(share)
         return []

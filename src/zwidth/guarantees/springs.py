@@ -13,7 +13,7 @@ from zwidth.chart.robust_edges import Piece, pieces
 from zwidth.chart.robust_members import Member, polygons
 from zwidth.guarantees.port import Floats, reached
 from zwidth.guarantees.region import Region, empty, rings_of, stiffest_corner
-from zwidth.guarantees.spring_family import Springs, parts, spring_for
+from zwidth.guarantees.spring_family import Springs, handle_of, parts, spring_for
 from zwidth.guarantees.sweep import Sweep
 from zwidth.loop.loop import Loop
 from zwidth.model.arguments import require
@@ -25,6 +25,8 @@ TRIED, WALLS, ROUNDS = 90, 600, 10
 # Springs whose mode looks, sampled, like the vibration at the edge are tried too: to so many times the sampling
 # rate, and this far beside it.
 ALIASES, BESIDE, VIBRATIONS = 2, np.array([-0.003, -0.0003, 0.0003, 0.003]), 12
+# Springs are looked through for two modes of one alias: so many, as far as a mode at so many times Nyquist's.
+MODES_AT, FARTHEST = 6000, 16.0
 # Springs between those that bind are tried too, at these parts of the way.
 BETWEEN = np.arange(1, 6) / 6.0
 # Places of the edge are chosen anew each round, by the golden section, and so many rounds must find nothing.
@@ -96,7 +98,7 @@ def spring_stable_region(loop: Loop) -> Region:
     require("loop", loop, Loop)
     springs = Springs.of(Loop(reached(loop.plant), loop.controller))
     new = _spread(np.union1d(springs.shares(_grid(springs.loop, SPRINGS)), _alternating(springs)))
-    tried = springs.shares(_grid(springs.loop, TRIED))
+    tried = np.union1d(springs.shares(_grid(springs.loop, TRIED)), _colliding(springs))
     members: dict[float, Member] = {}
     sweep = Sweep(springs)
     clean = 0
@@ -258,3 +260,23 @@ def _alike(springs: Springs, edge: Edge, turn: int) -> Floats:
     w = np.concatenate([(turns[:, None] + theta).ravel(), (turns[1:, None] - theta).ravel()])
     k = spring_for(springs.loop.plant, (w[:, None] * (1.0 + BESIDE)).ravel() / springs.loop.period)
     return springs.shares(np.unique(k[np.isfinite(k) & (k > 0.0)]))
+
+
+def _colliding(springs: Springs) -> Floats:
+    """Shares of springs with which two modes have all but one alias.
+
+    Such modes, though far apart, exchange their damping: within a narrow band of springs one of them may lose it.
+    """
+    plant, T = springs.loop.plant, springs.loop.period
+    top = np.max(np.abs(spring_for(plant, np.pi / T * np.array([FARTHEST, FARTHEST + 0.1]))))
+    if not 0.0 < top < np.inf:
+        return np.zeros(0)
+    k = np.geomspace(1e-9 * top, top, MODES_AT)
+    root = np.linalg.inv(np.linalg.cholesky(plant.mass))
+    handle = root @ handle_of(plant)
+    squared = np.linalg.eigvalsh(root @ plant.stiffness @ root.T + k[:, None, None] * np.outer(handle, handle))
+    alias = np.abs((np.sqrt(np.maximum(squared, 0.0)) * T + np.pi) % (2.0 * np.pi) - np.pi)
+    first, second = np.triu_indices(alias.shape[1], 1)
+    apart = alias[:, first] - alias[:, second]
+    at, _ = np.nonzero(apart[1:] * apart[:-1] < 0.0)
+    return springs.shares(np.unique(k[at, None] * (1.0 + 2.0 * BESIDE)))

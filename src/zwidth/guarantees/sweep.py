@@ -20,6 +20,8 @@ NEAR, WIDEST = 0.05, 0.05
 STEPS = (0.02, 0.15, 0.5, 1.0)
 # ... and there it is an envelope found already if its touching point is this near.
 SAME = 1e-6
+# Springs of a stretch, its ends' among them, of which one must make what it cuts off unstable.
+ASKED = 7
 
 
 @dataclass(frozen=True)
@@ -118,13 +120,13 @@ def _strips(
     aside = max(abs(end.along[0] * gap[1] - end.along[1] * gap[0]) for end in (one, other))
     wide = min(2.0 * aside + 1e-4 * length, WIDEST * size)
     strips = []
-    for walk, shares in stretch(springs, one, other, shape, size, lost):
+    for walk, first, last in stretch(springs, one, other, shape, size, lost):
         along = np.gradient(walk, axis=0)
         along /= np.maximum(np.hypot(*along.T), 1e-300)[:, None]
         outwards = np.column_stack([along[:, 1], -along[:, 0]])
         strip = shapely.make_valid(shapely.Polygon(np.vstack([walk, (walk + wide * outwards)[::-1]])))
         for part in parts(shapely.intersection(shape, strip)):
             middle = np.array(part.representative_point().coords)
-            if springs.unstable(middle, shares).any():
+            if springs.unstable(middle, np.linspace(first, last, ASKED)).any():
                 strips.append(part)
     return strips
