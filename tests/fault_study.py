@@ -25,8 +25,10 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parent.parent
-FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
+FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 LIMIT = 900  # seconds for what covers one fault; a run that takes longer has caught it, as an endless loop
 
 
@@ -163,6 +165,8 @@ def caught_by(tree: Path, tests: list[str]) -> str | None:
         )
     except subprocess.TimeoutExpired:
         return "took too long"
+    if done.returncode == pytest.ExitCode.USAGE_ERROR:  # a test that is not there any more
+        raise SystemExit(done.stderr)
     failed = FAILED.search(done.stdout)
     return failed[1] if failed else None if done.returncode in (0, 5) else done.stdout[-300:] + done.stderr[-300:]
 
