@@ -63,13 +63,15 @@ def test_the_tip_is_the_largest_stiffness_along_the_exact_curve(factor):
     sampled = SampledResponse.of(loop)
     (tip,) = chart.frequencies_at_stiffness_max
 
-    def stiffness(frequency):
+    def wall(frequency):
         theta = np.array([2.0 * np.pi * frequency * loop.period])
         h, w = -1.0 / sampled(theta), loop.velocity_response(np.exp(1j * theta))
-        return float((h.real - h.imag / w.imag * w.real)[0])
+        damping = (h.imag / w.imag)[0]
+        return float(h.real[0] - damping * w.real[0]), float(damping)
 
-    best = minimize_scalar(lambda f: -stiffness(f), bounds=(0.98 * tip, 1.02 * tip), method="bounded")
+    best = minimize_scalar(lambda f: -wall(f)[0], bounds=(0.98 * tip, 1.02 * tip), method="bounded")
     assert chart.stiffness_max == pytest.approx(-best.fun, rel=1e-7)
+    assert chart.damping_at_stiffness_max == pytest.approx(wall(tip)[1], rel=1e-6)  # that is what tip belongs to
 
 
 def test_little_loss_is_like_dampers_that_lose_as_much_at_the_tip():
