@@ -1,14 +1,16 @@
 """One truth, two routes: the traced chart and eigenvalues of independently built transition matrices."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
-from tests.systems import mass, random_loop, second_matrix
+from tests.systems import mass, random_loop, second_matrix, two_mass
 from zwidth.chart.chart import boundary_points, stability_chart
 from zwidth.chart.hurwitz import QUOTIENT, hurwitz, working_room
 from zwidth.chart.region import ChartError
-from zwidth.loop.controller import Controller, FirstOrder
+from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import CentralDifference
 from zwidth.loop.loop import Loop
 
@@ -69,6 +71,18 @@ def test_regions_agree_with_eigenvalues_over_thousands_of_loops(kind):
     rng = np.random.default_rng(11)
     for _ in range(2000):
         assert disagreements(rng, random_loop(rng, DAMPED, kind)) == 0
+
+
+def test_a_cell_with_an_edge_of_one_angle_is_closed():
+    """Where the estimate is all but blind, a whole edge passes within 7e-11 of one angle, to sharp corners."""
+    free = two_mass(1.123138284296466, 2.4704904047083764, 48841649.79394397)
+    damping = np.array([[146.35935099396968, -48.93965110809506], [-48.93965110809506, 262.86672177309123]])
+    stiffness = np.array([[49012013.55136604, -48841649.79394397], [-48841649.79394397, 48841649.79394397]])
+    plant = replace(free, damping=damping, stiffness=stiffness)
+    low_pass = Butterworth(4, 397.83867578933115, "tustin-prewarped")
+    loop = Loop(plant, Controller(0.00040261150977465916, 0.06287673312834141, low_pass))
+    assert len(stability_chart(loop).regions) == 2
+    assert disagreements(np.random.default_rng(0), loop, 300) == 0
 
 
 def test_undamped_loops_agree_or_say_that_rounding_hides_the_edge():

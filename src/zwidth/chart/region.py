@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 SAME_CORNER = 1e-7
 # How far a corner may be blurred where a mode so weakly coupled that rounding hides it touches the edge.
 BLURRED = (1e-6, 1e-5, 1e-4, 1e-3)
+# Share of an arc over which its direction is taken.
+APART = 1e-3
 
 
 class ChartError(RuntimeError):
@@ -65,16 +67,23 @@ def closed_rings(tracer: Tracer, seen: Floats | None = None) -> tuple[Rings, flo
 
 
 def _hold(tracer: Tracer, rings: Rings) -> bool:
-    """Whether walls just inside the middle of each arc are stable, by eigenvalues."""
+    """Whether walls just inside the middle of each arc are stable, by eigenvalues.
+
+    An arc's direction there is that between samples farther apart than APART: where the estimate is all but blind,
+    neighbouring samples can stand in the wrong order. And no wall is taken deeper than a tenth of its arc: beside
+    a bridge in a sharp corner it would be on the other side of the cell.
+    """
     inside = []
     for ring in rings:
         walks = [arc_walls(tracer, arc) * (tracer.period, 1.0) for arc in ring]
-        depth = 1e-3 * float(np.min(np.ptp(np.vstack(walks), axis=0)))
+        deepest = 1e-3 * float(np.min(np.ptp(np.vstack(walks), axis=0)))
         for points in walks:
-            middle = len(points) // 2
-            along = points[middle] - points[middle - 1]
+            middle, length = len(points) // 2, float(np.max(np.ptp(points, axis=0)))
+            before = np.max(np.abs(points[:middle] - points[middle]), axis=1) > APART * length
+            first = int(np.flatnonzero(before)[-1]) if before.any() else 0
+            along = points[middle] - points[first]
             left = np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-300)
-            inside.append((points[middle] + points[middle - 1]) / 2.0 + depth * left)
+            inside.append((points[middle] + points[first]) / 2.0 + min(deepest, 0.1 * length) * left)
     K, B = (np.array(inside).reshape(-1, 2) / (tracer.period, 1.0)).T
     z = np.linalg.eigvals(tracer.loop.transition_matrix(K, B))
     return bool(np.all(np.abs(z) < tracer.radius + UNDECIDED))
