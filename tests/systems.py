@@ -215,7 +215,7 @@ def velocity_weights(method, T):
             times = -np.arange(n) * T
             return (times - times.mean()) / np.sum((times - times.mean()) ** 2)
         case SavitzkyGolay(n, order, centred):
-            at = (n - 1) // 2 if centred else n - 1
+            at = (n - 1) / 2 if centred else n - 1
             return scipy.signal.savgol_coeffs(n, order, deriv=1, delta=T, pos=at, use="dot")[::-1]
     return None
 

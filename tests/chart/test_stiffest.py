@@ -86,6 +86,15 @@ def test_a_corner_has_the_angles_of_both_its_roots():
     assert found.stiffness[0] == pytest.approx(1101.30206608, rel=1e-9)
 
 
+def test_an_edge_that_goes_on_to_softer_dampings_is_cut_at_no_damping():
+    """Between its last sample, where B < 0, and its corner, where B > 0, the curve crosses B = 0."""
+    plant = mass(0.9347989059773463, 1448.8225717821992, 10332245.294673104)
+    loop = Loop(plant, Controller(0.0005254763058013773, delay=3.0))
+    found, peak = asked(loop), largest_stiffness(loop)
+    assert found.stiffness[0] == pytest.approx(peak.stiffness, rel=1e-12)
+    assert found.damping[0] == peak.damping == 0.0
+
+
 def test_a_braked_mass_is_limited_on_the_line_of_the_real_root():
     """Beyond b T/m = 3.659 the root z = -1 binds (thesis 4.10 overlooks it)."""
     loop = Loop(mass(1.0, damping=5.0), Controller(1.0))
