@@ -178,7 +178,7 @@ def outside_the_spring_stable_set(seed):
         springs, stiffest = spring_stable_region(loop), stability_chart(loop, decay=False).stiffness_max
     except ChartError:
         return np.nan
-    if not passive.rings or passive.stiffness_max < 1e-9 * stiffest:
+    if not passive.rings or not passive.stiffness_max >= 1e-9 * stiffest:
         return np.nan
     K, B = np.ptp(np.vstack(passive.rings), axis=0)
     core = scaled(passive.rings, B / K).buffer(-1e-4 * B)

@@ -38,6 +38,8 @@ AROUND, DOUBLE, FAR = np.array([0.95, 1.05]), 1e-5, 1e200
 INSIDE, JOINING = 1e-5, 12
 # A cell smaller than this share of the whole is a crumb that strips have left between them.
 CRUMB = 1e-6
+# Rounds after which a cell goes of which no wall tried is stable.
+LATE = 4
 NOTHING = "no wall at all is stable with every spring at the handle"
 NO_SPRING = "no wall with K > 0 and B >= 0 is stable with every spring at the handle"
 UNSETTLED = "{} springs of those tried make walls just inside the edge unstable: modes are damped too lightly"
@@ -111,7 +113,7 @@ def spring_stable_region(loop: Loop) -> Region:
         tried = np.unique(
             np.concatenate([tried, _alike(springs, edge, turn), _between(members, edge), sweep.lost])
         )
-        left, new = _tried(springs, left, tried)
+        left, new = _tried(springs, left, tried, late=turn >= LATE)
         if left.is_empty:
             return empty(NOTHING)
         clean = 0 if len(new) else clean + 1
@@ -186,8 +188,12 @@ def _charted(springs: Springs, new: Floats, members: dict[float, Member]) -> sha
         member = springs.member(share)
         if member is None:
             continue
-        members[share] = member
         shape = polygons(member.outlines, unit)
+        if shape.is_empty and left is not None:  # lost in rounding if no wall is certainly unstable: a double root
+            middles = np.array([cell.representative_point().coords[0] for cell in parts(left)])
+            if not springs.unstable(middles, np.array([share])).any():
+                continue
+        members[share] = member
         left = shape if left is None else shapely.MultiPolygon(parts(shapely.intersection(left, shape)))
         if left.is_empty:
             break
@@ -204,11 +210,14 @@ def _edge(springs: Springs, members: dict[float, Member]) -> Edge:
     return [(shares[piece.member.index], piece) for ring in rings for piece in ring]
 
 
-def _tried(springs: Springs, left: shapely.Geometry, tried: Floats) -> tuple[shapely.MultiPolygon, Floats]:
-    """Cells of a shape, without crumbs, of which some wall is stable with every spring tried, and the springs that
-    make walls of theirs unstable: the worst of each run of neighbours; () if none.
+def _tried(
+    springs: Springs, left: shapely.Geometry, tried: Floats, late: bool
+) -> tuple[shapely.MultiPolygon, Floats]:
+    """Cells of a shape, without crumbs, and the springs that make walls of theirs unstable: the worst of each run
+    of neighbours; () if none.
 
-    Walls just inside the edge of a cell and one in its middle stand for it.
+    Walls just inside the edge of a cell and one in its middle stand for it. If it is late, cells of which none is
+    stable with every spring tried are left out; before, all of the edge may be what a few springs cut off.
     """
     low, bottom, right, top = left.bounds
     depth = INSIDE * max(right - low, top - bottom)
@@ -219,7 +228,7 @@ def _tried(springs: Springs, left: shapely.Geometry, tried: Floats) -> tuple[sha
     bad = np.split(
         springs.unstable(np.vstack(walls), tried), np.cumsum([len(some) for some in walls])[:-1], axis=1
     )
-    kept = [k for k in range(len(cells)) if not bad[k].any(axis=0).all()]
+    kept = [k for k in range(len(cells)) if not (late and bad[k].any(axis=0).all())]
     count = sum((bad[k].sum(axis=1) for k in kept), np.zeros(len(tried), dtype=int))
     worst = [i for i in range(len(tried)) if count[i] and count[i] == count[max(i - 1, 0) : i + 2].max()]
     worst = sorted(worst, key=lambda i: -count[i])[:JOINING]
