@@ -100,7 +100,7 @@ def spring_stable_region(loop: Loop) -> Region:
     require("loop", loop, Loop)
     springs = Springs.of(Loop(reached(loop.plant), loop.controller))
     new = _spread(np.union1d(springs.shares(_grid(springs.loop, SPRINGS)), _alternating(springs)))
-    tried = np.union1d(springs.shares(_grid(springs.loop, TRIED)), _colliding(springs))
+    tried = np.union1d(springs.shares(_grid(springs.loop, TRIED)), _springs_of_one_alias(springs))
     members: dict[float, Member] = {}
     sweep = Sweep(springs)
     clean = 0
@@ -113,7 +113,7 @@ def spring_stable_region(loop: Loop) -> Region:
         tried = np.unique(
             np.concatenate([tried, _alike(springs, edge, turn), _between(members, edge), sweep.lost])
         )
-        left, new = _tried(springs, left, tried, late=turn >= LATE)
+        left, new = _cells_and_failing(springs, left, tried, late=turn >= LATE)
         if left.is_empty:
             return empty(NOTHING)
         clean = 0 if len(new) else clean + 1
@@ -210,7 +210,7 @@ def _edge(springs: Springs, members: dict[float, Member]) -> Edge:
     return [(shares[piece.member.index], piece) for ring in rings for piece in ring]
 
 
-def _tried(
+def _cells_and_failing(
     springs: Springs, left: shapely.Geometry, tried: Floats, late: bool
 ) -> tuple[shapely.MultiPolygon, Floats]:
     """Cells of a shape, without crumbs, and the springs that make walls of theirs unstable: the worst of each run
@@ -271,7 +271,7 @@ def _alike(springs: Springs, edge: Edge, turn: int) -> Floats:
     return springs.shares(np.unique(k[np.isfinite(k) & (k > 0.0)]))
 
 
-def _colliding(springs: Springs) -> Floats:
+def _springs_of_one_alias(springs: Springs) -> Floats:
     """Shares of springs with which two modes have all but one alias.
 
     Such modes, though far apart, exchange their damping: within a narrow band of springs one of them may lose it.

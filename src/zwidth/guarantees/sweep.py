@@ -21,7 +21,7 @@ STEPS = (0.02, 0.15, 0.5, 1.0)
 # ... and there it is an envelope found already if its touching point is this near.
 SAME = 1e-6
 # Springs of a stretch, its ends' among them, of which one must make what it cuts off unstable.
-ASKED = 7
+PROBES = 7
 
 
 @dataclass(frozen=True)
@@ -127,6 +127,6 @@ def _strips(
         strip = shapely.make_valid(shapely.Polygon(np.vstack([walk, (walk + wide * outwards)[::-1]])))
         for part in parts(shapely.intersection(shape, strip)):
             middle = np.array(part.representative_point().coords)
-            if springs.unstable(middle, np.linspace(first, last, ASKED)).any():
+            if springs.unstable(middle, np.linspace(first, last, PROBES)).any():
                 strips.append(part)
     return strips
