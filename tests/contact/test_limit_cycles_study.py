@@ -101,6 +101,12 @@ def test_between_the_two_limits():
 
 
 @pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="the search does not come to the growing rattle of one of the devices")
+def test_between_the_two_limits_a_cycle_is_predicted_for_each():
+    assert [len(pairs) for pairs, _ in between_counts(12, 0.52)] == [1] * 12
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("ratio", "count"), [(0.97, 0), (1.3, 0), (2.0, 7)])
 def test_the_quiet_limit(ratio, count):
     assert beyond_the_quiet_limit(80, ratio) == count
