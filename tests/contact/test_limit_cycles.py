@@ -10,8 +10,10 @@ from tests.systems import mass, random_loop
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.verdict import eigenvalues, judge
 from zwidth.contact import describing
+from zwidth.contact.equivalent import equivalent_loop
 from zwidth.contact.limit_cycles import harmonic_balance, limit_cycles
 from zwidth.contact.plane import BOTH, LARGE, PASSIVE, SMALL, device_plane, quiet_limit, region, resting_limit
+from zwidth.contact.swing_kernel import vibrations
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear, Spring
@@ -89,6 +91,26 @@ def test_the_linear_loop_of_a_cycle_is_on_its_edge(what, seed):
         roots = eigenvalues(Loop(plant, loop.controller), gain * K, gain * B)
         on_circle = np.exp(2j * np.pi * cycle.frequency_Hz * loop.period)
         assert np.min(np.abs(roots - on_circle)) < 5e-7
+
+
+def test_every_growing_root_is_a_vibration():
+    """Those on the negative real axis too, which rounding may put on either side of it."""
+    real = 0
+    for seed in range(40):
+        rng = np.random.default_rng([seed, 8])
+        loop = random_loop(rng, (0.01, 0.05, 0.3))
+        inertia = float(1.0 / (loop.plant.sensor @ np.linalg.solve(loop.plant.mass, loop.plant.actuator)))
+        K, B = 0.1 * inertia / loop.period**2, rng.uniform(3.0, 300.0) * inertia / loop.period
+        roots = eigenvalues(loop, K, B)
+        roots = roots[(np.abs(roots) > 1.001) & (roots.imag >= 0.0) & (np.angle(roots) > 1e-4)]
+        own = equivalent_loop(loop, K, B, Nonlinear(friction=(Friction(loop.plant.sensor, 1e-9),)))
+        start = own.first_guess(1e3)  # so large that friction is nothing
+        found, _ = vibrations(own._arrays, np.array([1e3, 1.0, 1e9]), 1e3, False)
+        for root in roots:
+            assert np.min(np.abs(found - root)) < 1e-6 * abs(root)
+        assert abs(start.root) == pytest.approx(np.max(np.abs(found)), rel=1e-9)
+        real += int(np.sum(roots.imag == 0.0))
+    assert real >= 20
 
 
 def test_most_of_these_loops_have_cycles():

@@ -93,17 +93,11 @@ def test_between_two_counts_with_friction():
 def test_between_the_two_limits():
     devices = list(between_counts(12, 0.52))
     predicted = [pair for pairs, _ in devices for pair in pairs]
-    assert len(predicted) == 11
+    assert [len(pairs) for pairs, _ in devices] == [1] * 12
     assert all(np.isnan(pair.amplitude) for pair in predicted)
-    says("(0 of 11; for the twelfth none was predicted)")
+    says("(0 of 12)")
     assert sum(moving for _, moving in devices) == 9
     says("from other starts 9 of the 12 kept moving")
-
-
-@pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="the search does not come to the growing rattle of one of the devices")
-def test_between_the_two_limits_a_cycle_is_predicted_for_each():
-    assert [len(pairs) for pairs, _ in between_counts(12, 0.52)] == [1] * 12
 
 
 @pytest.mark.slow

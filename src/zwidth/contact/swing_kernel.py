@@ -294,7 +294,9 @@ def vibrations(own: Arrays, sizes: Floats, size: float, by_velocity: bool) -> tu
         most = max(most, abs(own.sensor[i]))
     found_roots, found, count = np.zeros(M, np.complex128), np.zeros((M, len(sizes))), 0
     for k in range(M):
-        if not (np.angle(roots[k]) > CREEPS and abs(roots[k]) > 1e-6):
+        # of a pair the one above the real axis; a root on its negative side may be rounded to below it
+        root = roots[k] if np.angle(roots[k]) > CREEPS - np.pi else np.conj(roots[k])
+        if not (np.angle(root) > CREEPS and abs(root) > 1e-6):
             continue
         reading, whole = 0.0j, 0.0
         for i in range(2 * n):
@@ -304,7 +306,7 @@ def vibrations(own: Arrays, sizes: Floats, size: float, by_velocity: bool) -> tu
         if not abs(reading) > UNREAD * most * whole:
             continue
         here = sizes_of(own, vectors[:, k] / reading, inside, command, mean)
-        found_roots[count] = roots[k]
+        found_roots[count] = root
         found[count] = here * (size / measured(own, here, by_velocity))
         count += 1
     return found_roots[:count], found[:count]
