@@ -5,7 +5,7 @@
 
 DEVICE  ?= five-bar
 PYTHON  ?= python3 python3.13 python3.12 python3.11 python
-# The tests to run; none named: all of the everyday suite.
+# The tests to run; none named: all, of the everyday suite or of the longer studies.
 TESTS   ?=
 
 # What `record` compares with what is here, or with the commit NEW.
@@ -34,7 +34,7 @@ help:
 	@echo 'make test     the test suite, or TESTS=... of it'
 	@echo 'make older-processor  the numerical tests, or TESTS=..., as a processor without AVX2 runs them'
 	@echo 'make record   every number of two commits beside each other: BASE=$(BASE), and NEW or what is here'
-	@echo 'make slow     the longer studies: thousands of random loops'
+	@echo 'make slow     the longer studies, or those in TESTS=...: thousands of random loops'
 	@echo 'make lint     style and types'
 	@echo 'make bench    how fast, beside what a competent user would write otherwise'
 	@echo 'make docs     write the generated pages and pictures of docs/ again'
@@ -58,7 +58,7 @@ record: $(VENV)/.installed-test
 	$(BIN)/python -m tests.frozen $(BASE) $(NEW)
 
 slow: $(VENV)/.kernels
-	$(BIN)/python -m pytest -n auto --dist worksteal -m slow
+	$(BIN)/python -m pytest -n auto --dist worksteal -m slow $(TESTS)
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .
