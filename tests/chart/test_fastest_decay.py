@@ -8,6 +8,8 @@ from scipy.optimize import minimize
 
 from tests.systems import FEATURES, mass, published, random_loop
 from zwidth.chart.chart import stability_chart
+from zwidth.chart.decay import coalesced
+from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import spectral_radius
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
@@ -30,6 +32,23 @@ def test_where_the_fastest_of_all_has_a_spring_and_a_damper_it_is_the_one():
 def a_loop(seed):
     rng = np.random.default_rng(seed)
     return random_loop(rng, features=tuple(feature for feature in FEATURES if rng.random() < 0.25))
+
+
+@pytest.mark.parametrize(
+    ("seed", "positive", "low", "high"),
+    [(0, True, 0.93, 0.97), (14, True, 0.9, 0.94), (129, False, 0.94, 0.96), (307, False, 0.93, 0.95)],
+)
+def test_where_a_real_root_is_double_another_is_as_large(seed, positive, low, high):
+    loop = a_loop(seed)
+    K, B, radius = coalesced(Tracer.of(loop).factors, positive, low, high)
+    assert low < radius < high
+    roots = np.linalg.eigvals(loop.transition_matrix(K, B))
+    roots = roots[np.argsort(np.abs(roots - (radius if positive else -radius)))]
+    # a double root is split by the square root of the rounding, a threefold one by its cube root
+    assert np.max(np.abs(np.abs(roots[:2]) - radius)) < 1e-5
+    assert np.max(np.abs(roots[:2].imag)) < 1e-5
+    assert np.sign(roots[:2].real).tolist() == [1.0 if positive else -1.0] * 2
+    assert np.max(np.abs(roots[2:])) == pytest.approx(radius, abs=1e-5)
 
 
 def smallest_by_eigenvalues(loop, regions):

@@ -38,6 +38,7 @@ def test_the_impedances_are_drawn_as_they_are():
     draw_impedance(ax, f, *curves)
     for line, values in zip(ax.lines, curves, strict=True):
         assert line.get_ydata() == pytest.approx(np.abs(values))
+    assert ax.get_xlim() == pytest.approx((1.0, 300.0))
     assert len(texts(ax)) == 3
     made.draw_without_rendering()
 

@@ -62,6 +62,12 @@ def test_a_fault_is_told_with_its_key_and_what_is_allowed(change, line):
     assert any(one.startswith(line) or f": {line}" in one for one in told), told
 
 
+@pytest.mark.parametrize("fault", [{"assembly": "elbows-up"}, {"seed": 3}, {"workspace": {"count": 1}}])
+def test_one_fault_is_not_taken_for_a_second_of_the_workspace(fault):
+    change = {"measures": ["average(isotropy)"], **fault}
+    assert len(faults({**tables(DELAY), **change})) == 1
+
+
 R = {"range": [0.1, 0.2]}
 WRONG_AXES = [
     ({}, "axis.0.key: is missing"),
