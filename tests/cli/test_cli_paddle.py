@@ -26,6 +26,21 @@ def test_a_contact_is_simulated_from_a_start_beside_the_circle(file):
     assert "the nearest that it has is (0.0437079, 0.0786742, 0) m" in line
 
 
+def test_a_motion_that_leaves_the_handles_range_is_said_to(file):
+    far = ("--stiffness", 2000, "--damping", 1, "--duration", 1)
+    document = found("simulate", file, *far)
+    back, forth = document["range_m"]
+    assert (back, forth) == pytest.approx((-LENGTH, LENGTH), rel=1e-3)
+    motion = zip(document["time_s"], document["handle_m"], strict=True)
+    assert document["left_range_at_s"] == next(time for time, x in motion if not back <= x <= forth) > 0.0
+    told = zwidth("simulate", file, *far).out
+    assert "leaves the range of the handle" in told
+    assert "its handle gets from -90.00 mm to 90.00 mm" in told
+    within = found("simulate", file, *WALL)
+    assert within["range_m"] is within["left_range_at_s"] is None
+    assert "range" not in zwidth("simulate", file, *WALL).out
+
+
 def test_a_position_beside_the_circle_is_projected_and_said_to_be(file):
     for command in ("chart", "show"):
         words = (command, file, "--at", f"0.0001,{LENGTH}")

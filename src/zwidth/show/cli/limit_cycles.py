@@ -139,12 +139,10 @@ def _largest_motion(question: Question, device: Device) -> float:
     in its assembly; a [plant] as far as any device does."""
     from zwidth.contact.simulate import LARGEST_MOTION
 
-    if device.mechanism is None:
+    reached = question.handle_range(device)
+    if reached is None:
         return LARGEST_MOTION
-    from zwidth.model.posture import handle_range
-
-    posture, along = device.posture(question.at, question.assembly), device.direction(question.direction)
-    back, forth = handle_range(device.mechanism, posture, along)
+    back, forth = reached
     # at the edge of the workspace it moves to one side only, and about a middle within that
     return min(-back, forth) or max(-back, forth) / 2.0
 

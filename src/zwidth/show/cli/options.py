@@ -52,6 +52,16 @@ class Question:
         """The rendered direction's dynamics, held by the device's operator. Raises what `Device.plant` raises."""
         return device.plant(self.at, self.direction, self.assembly, self.model, held=held)
 
+    def handle_range(self, device: Device) -> tuple[float, float] | None:
+        """How far the handle can be from its posture along the direction, backwards and forwards [m]; None for a
+        device without a mechanism. Raises what `Device.posture` raises."""
+        if device.mechanism is None:
+            return None
+        from zwidth.model.posture import handle_range
+
+        posture, along = device.posture(self.at, self.assembly), device.direction(self.direction)
+        return handle_range(device.mechanism, posture, along)
+
     def as_measured(self, device: Device) -> None:
         """Raises DeviceError for whatever is asked of a [response] that needs a model."""
         if any((self.at, self.direction, self.assembly, self.model)):

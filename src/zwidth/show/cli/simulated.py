@@ -37,12 +37,22 @@ SWINGS: Final = 10  # of a tremor that a run has at least
 
 
 @dataclass(frozen=True)
+class Left:
+    """The handle is where it cannot get: from when on [s], and how far it can be, backwards and forwards [m]."""
+
+    time: float
+    back: float
+    forth: float
+
+
+@dataclass(frozen=True)
 class Simulated:
     """One contact simulated.
 
     loop         the device without the operator;   values  of the environment
     predicted    ln rho of the linear loop on the two-sided wall; None where there is none
     start        of the reading [m], [m/s];   off_path  how far from it the handle's path passes [m]; None: unknown
+    left         where the motion leaves the range of the handle; None where it does not, or none is known
     length       how long, and why
     without      the same without the passivity controller; None where there is none
     substeps     taken between samples
@@ -55,6 +65,7 @@ class Simulated:
     predicted: float | None
     start: tuple[float, float]
     off_path: float | None
+    left: Left | None
     length: Length
     response: TimeResponse
     judgement: Judgement
@@ -146,6 +157,7 @@ def simulated(
                 length = longer
                 done = _responses(runs, environment, length.seconds, substeps, trail=trail)
         _check_numbers(done, environment)
+        left = _left(question, device, done[0])
     return Simulated(
         environment=environment,
         values=values,
@@ -154,6 +166,7 @@ def simulated(
         predicted=predicted,
         start=(start, contact.start_velocity),
         off_path=off_path,
+        left=left,
         length=length,
         response=done[0],
         judgement=judge_response(done[0]),
@@ -240,12 +253,22 @@ def _bound(offset: float, predicted: float | None) -> float:
 def _check_reach(question: Question, device: Device, position: float, what: str) -> float | None:
     """How far from a position of the reading the handle's path passes [m]; None for a device without a mechanism.
 
-    The model moves along the tangent, and the handle on a curve if it has few drives. Raises BadInput where the
-    handle of a mechanism cannot be moved so far along the direction.
+    Raises BadInput where the handle of a mechanism cannot be moved so far along the direction.
     """
+    from zwidth.model.posture import PostureError
+
+    try:
+        return _off_path(question, device, position)
+    except PostureError as error:
+        raise BadInput(f"{what} lies {position:g} m along the direction, out of the workspace: {error}") from None
+
+
+def _off_path(question: Question, device: Device, position: float) -> float | None:
+    """The same; raises PostureError. The model moves along the tangent, and the handle on a curve if it has few
+    drives."""
     if device.mechanism is None:
         return None
-    from zwidth.model.posture import PostureError, handle_motions
+    from zwidth.model.posture import handle_motions
 
     posture, along = device.posture(question.at, question.assembly), device.direction(question.direction)
     if position == 0.0:
@@ -253,11 +276,23 @@ def _check_reach(question: Question, device: Device, position: float, what: str)
     # without forces across, a handle with few drives moves by the part of the direction that it can move along
     moves = handle_motions(posture)
     way = moves @ (moves.T @ along)
-    try:
-        reached = device.posture(list(posture.position + position / (way @ along) * way), question.assembly)
-    except PostureError as error:
-        raise BadInput(f"{what} lies {position:g} m along the direction, out of the workspace: {error}") from None
+    reached = device.posture(list(posture.position + position / (way @ along) * way), question.assembly)
     return float(reached.projected)
+
+
+def _left(question: Question, device: Device, response: TimeResponse) -> Left | None:
+    """Where a motion leaves the range of the handle; if its extremes can be reached it does not."""
+    from zwidth.model.posture import PostureError
+
+    handle = response.handle
+    try:
+        for end in (handle.min(), handle.max()):
+            _off_path(question, device, float(end))
+    except PostureError:
+        back, forth = question.handle_range(device) or (-float("inf"), float("inf"))
+        outside = (handle < back) | (handle > forth)
+        return Left(float(response.time[outside.argmax()]), back, forth) if outside.any() else None
+    return None
 
 
 def numbers(found: Simulated, seed: int) -> dict[str, Any]:
@@ -290,6 +325,8 @@ def numbers(found: Simulated, seed: int) -> dict[str, Any]:
         "contact_share": judged.contact,
         "limited_share": limited_share(found),
         "given_up": response.given_up,
+        "range_m": found.left and (found.left.back, found.left.forth),
+        "left_range_at_s": found.left and found.left.time,
         "ledger_J": ledger(response),
         "ledger_imbalance": response.imbalance,
         "passivity": passivity(found),

@@ -32,7 +32,7 @@ NEAR_NYQUIST: Final = 0.9
 def pages(question: Question, device: Device, found: Simulated, document: dict[str, Any]) -> Iterator[Any]:
     """The verdict, the circumstances, the numbers, the energies, and what is worth a remark."""
     yield heading(question, device, linear=False)
-    yield SAYS[found.behaviour]
+    yield _verdict(found)
     yield sheet([*_circumstances(found, document), *_results(found, document)])
     yield table(HEADINGS, list(_energies(found, document)))
     yield from _remarks(found, document)
@@ -40,6 +40,12 @@ def pages(question: Question, device: Device, found: Simulated, document: dict[s
         yield _sound(document["sound"])
     if "file" in document:
         yield f"written: {document['file']}"
+
+
+def _verdict(found: Simulated) -> str:
+    if found.behaviour == "undecided" and found.left is not None:
+        return "undecided: the motion leaves the range of the handle before the run tells"
+    return SAYS[found.behaviour]
 
 
 def _circumstances(found: Simulated, document: dict[str, Any]) -> Iterator[Row]:
@@ -132,6 +138,12 @@ def _remarks(found: Simulated, document: dict[str, Any]) -> Iterator[str]:
         yield "nothing moves it: give --push, --start-velocity or --start-position"
     if response.given_up:
         yield "given up: the device is farther from the wall than any device goes"
+    if found.left is not None:
+        back, forth = amount(found.left.back, "m"), amount(found.left.forth, "m")
+        yield (
+            f"from {amount(found.left.time, 's')} on the run says nothing of this device: along this direction "
+            f"its handle gets from {back} to {forth}, and the model knows no end of the way; `zwidth move` does"
+        )
     if response.quantum > 2.0 * judged.amplitude > 0.0:
         yield f"the motion is smaller than the encoder's step of {amount(response.quantum, 'm')}"
     if judged.frequency > NEAR_NYQUIST * 0.5 / found.loop.period:
