@@ -37,12 +37,13 @@ SWINGS: Final = 10  # of a tremor that a run has at least
 
 
 @dataclass(frozen=True)
-class Left:
-    """The handle is where it cannot get: from when on [s], and how far it can be, backwards and forwards [m]."""
+class RangeExit:
+    """A motion leaves the range of a mechanism's handle: when [s], and how far that can be from its posture along
+    the direction, backward (not positive) and forward [m]."""
 
     time: float
-    back: float
-    forth: float
+    backward: float
+    forward: float
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Simulated:
     loop         the device without the operator;   values  of the environment
     predicted    ln rho of the linear loop on the two-sided wall; None where there is none
     start        of the reading [m], [m/s];   off_path  how far from it the handle's path passes [m]; None: unknown
-    left         where the motion leaves the range of the handle; None where it does not, or none is known
+    range_exit   where the motion leaves the handle's range; None where it stays within, or without a mechanism
     length       how long, and why
     without      the same without the passivity controller; None where there is none
     substeps     taken between samples
@@ -65,7 +66,7 @@ class Simulated:
     predicted: float | None
     start: tuple[float, float]
     off_path: float | None
-    left: Left | None
+    range_exit: RangeExit | None
     length: Length
     response: TimeResponse
     judgement: Judgement
@@ -157,7 +158,7 @@ def simulated(
                 length = longer
                 done = _responses(runs, environment, length.seconds, substeps, trail=trail)
         _check_numbers(done, environment)
-        left = _left(question, device, done[0])
+        range_exit = _range_exit(question, device, done[0])
     return Simulated(
         environment=environment,
         values=values,
@@ -166,7 +167,7 @@ def simulated(
         predicted=predicted,
         start=(start, contact.start_velocity),
         off_path=off_path,
-        left=left,
+        range_exit=range_exit,
         length=length,
         response=done[0],
         judgement=judge_response(done[0]),
@@ -251,10 +252,7 @@ def _bound(offset: float, predicted: float | None) -> float:
 
 
 def _check_reach(question: Question, device: Device, position: float, what: str) -> float | None:
-    """How far from a position of the reading the handle's path passes [m]; None for a device without a mechanism.
-
-    Raises BadInput where the handle of a mechanism cannot be moved so far along the direction.
-    """
+    """`_off_path` of a typed position. Raises BadInput where the handle cannot be moved so far."""
     from zwidth.model.posture import PostureError
 
     try:
@@ -264,8 +262,11 @@ def _check_reach(question: Question, device: Device, position: float, what: str)
 
 
 def _off_path(question: Question, device: Device, position: float) -> float | None:
-    """The same; raises PostureError. The model moves along the tangent, and the handle on a curve if it has few
-    drives."""
+    """How far from a position of the reading the handle's path passes [m]; None for a device without a mechanism.
+
+    The model moves along the tangent, and the handle on a curve if it has few drives. Raises PostureError where
+    the handle cannot be moved so far along the direction.
+    """
     if device.mechanism is None:
         return None
     from zwidth.model.posture import handle_motions
@@ -280,18 +281,18 @@ def _off_path(question: Question, device: Device, position: float) -> float | No
     return float(reached.projected)
 
 
-def _left(question: Question, device: Device, response: TimeResponse) -> Left | None:
-    """Where a motion leaves the range of the handle; if its extremes can be reached it does not."""
+def _range_exit(question: Question, device: Device, response: TimeResponse) -> RangeExit | None:
+    """Where a motion leaves the handle's range; the whole range is asked only if an extreme cannot be reached."""
     from zwidth.model.posture import PostureError
 
     handle = response.handle
     try:
-        for end in (handle.min(), handle.max()):
-            _off_path(question, device, float(end))
+        for extreme in (handle.min(), handle.max()):
+            _off_path(question, device, float(extreme))
     except PostureError:
-        back, forth = question.handle_range(device) or (-float("inf"), float("inf"))
-        outside = (handle < back) | (handle > forth)
-        return Left(float(response.time[outside.argmax()]), back, forth) if outside.any() else None
+        if reached := question.handle_range(device):
+            outside = (handle < reached[0]) | (handle > reached[1])
+            return RangeExit(float(response.time[outside.argmax()]), *reached) if outside.any() else None
     return None
 
 
@@ -325,8 +326,8 @@ def numbers(found: Simulated, seed: int) -> dict[str, Any]:
         "contact_share": judged.contact,
         "limited_share": limited_share(found),
         "given_up": response.given_up,
-        "range_m": found.left and (found.left.back, found.left.forth),
-        "left_range_at_s": found.left and found.left.time,
+        "range_m": found.range_exit and (found.range_exit.backward, found.range_exit.forward),
+        "left_range_at_s": found.range_exit and found.range_exit.time,
         "ledger_J": ledger(response),
         "ledger_imbalance": response.imbalance,
         "passivity": passivity(found),

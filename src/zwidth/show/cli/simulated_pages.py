@@ -43,7 +43,7 @@ def pages(question: Question, device: Device, found: Simulated, document: dict[s
 
 
 def _verdict(found: Simulated) -> str:
-    if found.behaviour == "undecided" and found.left is not None:
+    if found.behaviour == "undecided" and found.range_exit is not None:
         return "undecided: the motion leaves the range of the handle before the run tells"
     return SAYS[found.behaviour]
 
@@ -138,10 +138,10 @@ def _remarks(found: Simulated, document: dict[str, Any]) -> Iterator[str]:
         yield "nothing moves it: give --push, --start-velocity or --start-position"
     if response.given_up:
         yield "given up: the device is farther from the wall than any device goes"
-    if found.left is not None:
-        back, forth = amount(found.left.back, "m"), amount(found.left.forth, "m")
+    if (beyond := found.range_exit) is not None:
+        back, forth = amount(beyond.backward, "m"), amount(beyond.forward, "m")
         yield (
-            f"from {amount(found.left.time, 's')} on the run says nothing of this device: along this direction "
+            f"from {amount(beyond.time, 's')} on the run says nothing of this device: along this direction "
             f"its handle gets from {back} to {forth}, and the model knows no end of the way; `zwidth move` does"
         )
     if response.quantum > 2.0 * judged.amplitude > 0.0:
