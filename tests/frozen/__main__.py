@@ -18,10 +18,11 @@ from pathlib import Path
 from tests.frozen.accepted import read_accepted, sort_out
 from tests.frozen.answers import Answers, Worker, commands_of, fill, together, warm_up
 from tests.frozen.cases import Case, Walls, cases, chart_case, commands_asked, points_files
-from tests.frozen.commits import CACHE, WORKING_TREE, Side, side
+from tests.frozen.commits import CACHE, Side, side
 from tests.frozen.compare import Difference, Tally, compare
 from tests.frozen.devices import Device, faulty_devices, random_devices, studies
 from tests.frozen.summary import summary
+from tests.revisions import WORKING_TREE
 
 
 def options(words: list[str] | None = None) -> argparse.Namespace:

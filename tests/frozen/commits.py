@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import platform
-import subprocess
 import sys
-import tempfile
 import tomllib
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import distributions
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from tests.revisions import ROOT, export, git, tree_of
+
 CACHE = ROOT / "out" / "record"
-WORKING_TREE = "."
 Environment = tuple[tuple[str, str], ...]
 
 
@@ -45,16 +42,10 @@ def side(label: str, environment: Environment, repeat: bool = False) -> Side:
     repeat: keep the answers apart from those of the same sources on the other side.
     Raises SystemExit where git knows no such commit.
     """
-    tree = _tree(label)
-    sources = _git("rev-parse", f"{tree}:src")
+    tree = tree_of(label)
+    sources = git("rev-parse", f"{tree}:src")
     folder = CACHE / sources[:16]
-    if not (folder / "complete").exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        archive = subprocess.run(
-            ["git", "archive", tree, "src", "pyproject.toml"], cwd=ROOT, stdout=subprocess.PIPE, check=True
-        )
-        subprocess.run(["tar", "-x", "-C", str(folder)], input=archive.stdout, check=True)
-        (folder / "complete").touch()
+    export(tree, ("src", "pyproject.toml"), folder)
     project = tomllib.loads((folder / "pyproject.toml").read_text())
     answers = folder / f"answers-{installation(environment)}{'-repeat' * repeat}.jsonl"
     return Side(label, folder, project["project"]["scripts"]["zwidth"], answers, environment)
@@ -77,23 +68,3 @@ def _processor() -> str:
     except OSError:
         return platform.processor()
     return "\n".join(sorted({line for line in lines if line.startswith(("model name", "flags"))}))
-
-
-def _tree(label: str) -> str:
-    """The tree of a commit, or of the working tree with all that git does not ignore."""
-    if label != WORKING_TREE:
-        return _git("rev-parse", "--verify", "--quiet", f"{label}^{{tree}}")
-    with tempfile.TemporaryDirectory() as folder:
-        own_index = {"GIT_INDEX_FILE": str(Path(folder) / "index")}
-        _git("read-tree", "HEAD", **own_index)
-        _git("add", "--all", **own_index)
-        return _git("write-tree", **own_index)
-
-
-def _git(*words: str, **environment: str) -> str:
-    done = subprocess.run(
-        ["git", *words], cwd=ROOT, env={**os.environ, **environment}, capture_output=True, text=True
-    )
-    if done.returncode:
-        raise SystemExit(f"git {' '.join(words)}: {done.stderr.strip() or 'no such commit'}")
-    return done.stdout.strip()

@@ -6,6 +6,7 @@ import subprocess
 
 import pytest
 
+from tests import revisions
 from tests.frozen import commits
 from tests.frozen.commits import installation, side
 
@@ -23,7 +24,7 @@ def repository(tmp_path, monkeypatch):
     who = ["-c", "user.name=a", "-c", "user.email=a@example.org"]
     for words in (["init", "--quiet"], ["add", "--all"], [*who, "commit", "--quiet", "-m", "one"]):
         subprocess.run(["git", *words], cwd=root, check=True)
-    monkeypatch.setattr(commits, "ROOT", root)
+    monkeypatch.setattr(revisions, "ROOT", root)
     monkeypatch.setattr(commits, "CACHE", tmp_path / "cache")
     return root
 
