@@ -8,7 +8,7 @@ PYTHON  ?= python3 python3.13 python3.12 python3.11 python
 # The tests to run; none named: all, of the everyday suite or of the longer studies.
 TESTS   ?=
 
-# What `record` compares with what is here, or with the commit NEW.
+# What `record` and `structure` compare with what is here, or with the commit NEW.
 BASE    ?= main
 
 # Another environment beside the first, with another Python or other versions of what zwidth needs:
@@ -27,13 +27,14 @@ export PIP_CONSTRAINT := $(CONSTRAINTS)
 export PIP_BUILD_CONSTRAINT := $(CONSTRAINTS)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help report test older-processor record slow lint bench docs clean
+.PHONY: help report test older-processor record structure slow lint bench docs clean
 
 help:
 	@echo 'make report   the report on a device (DEVICE=$(DEVICE)), into $(OUTPUT)'
 	@echo 'make test     the test suite, or TESTS=... of it'
 	@echo 'make older-processor  the numerical tests, or TESTS=..., as a processor without AVX2 runs them'
 	@echo 'make record   every number of two commits beside each other: BASE=$(BASE), and NEW or what is here'
+	@echo 'make structure  files, lines, import circles and names of two commits beside each other: BASE, NEW'
 	@echo 'make slow     the longer studies, or those in TESTS=...: thousands of random loops'
 	@echo 'make lint     style and types'
 	@echo 'make bench    how fast, beside what a competent user would write otherwise'
@@ -56,6 +57,9 @@ older-processor: $(VENV)/.installed-test
 
 record: $(VENV)/.installed-test
 	$(BIN)/python -m tests.frozen $(BASE) $(NEW)
+
+structure: $(VENV)/bin/python
+	$(BIN)/python -m tests.structure $(BASE) $(NEW)
 
 slow: $(VENV)/.kernels
 	$(BIN)/python -m pytest -n auto --dist worksteal -m slow $(TESTS)

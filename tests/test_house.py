@@ -220,7 +220,11 @@ def test_a_stiffer_drive_helps_where_the_readme_says(period, helps):
 
 @needs_make
 @pytest.mark.parametrize(
-    "line", [*typed("make"), "make help", "make slow", "make lint", "make bench", "make docs"]
+    "line",
+    [
+        *typed("make"),
+        *(f"make {name}" for name in ("help", "slow", "lint", "bench", "docs", "record", "structure")),
+    ],
 )
 def test_make_knows_the_target(line):
     done = subprocess.run(
