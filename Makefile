@@ -8,8 +8,11 @@ PYTHON  ?= python3 python3.13 python3.12 python3.11 python
 # The tests to run; none named: all, of the everyday suite or of the longer studies.
 TESTS   ?=
 
-# What `record` and `structure` compare with what is here, or with the commit NEW.
+# What `record`, `structure` and `bench-pairs` compare with what is here, or with the commit NEW. Left out, pairs
+# are timed with the commit at which main was left.
 BASE    ?= main
+# What else `bench-pairs` is told: --only 'maps: *' --pairs 5
+PAIRS   ?=
 
 # Another environment beside the first, with another Python or other versions of what zwidth needs:
 #     make test VENV=.venv-lowest PYTHON=python3.11 CONSTRAINTS=constraints-lowest.txt
@@ -27,7 +30,7 @@ export PIP_CONSTRAINT := $(CONSTRAINTS)
 export PIP_BUILD_CONSTRAINT := $(CONSTRAINTS)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help report test older-processor record structure slow lint bench docs clean
+.PHONY: help report test older-processor record structure slow lint bench bench-pairs docs clean
 
 help:
 	@echo 'make report   the report on a device (DEVICE=$(DEVICE)), into $(OUTPUT)'
@@ -38,6 +41,7 @@ help:
 	@echo 'make slow     the longer studies, or those in TESTS=...: thousands of random loops'
 	@echo 'make lint     style and types'
 	@echo 'make bench    how fast, beside what a competent user would write otherwise'
+	@echo 'make bench-pairs  our own part of it at two commits in turn: BASE, and NEW or what is here'
 	@echo 'make docs     write the generated pages and pictures of docs/ again'
 	@echo 'make clean    remove what was made, all but $(VENV)'
 
@@ -71,6 +75,10 @@ lint: $(VENV)/.installed-test
 
 bench: $(VENV)/.kernels
 	@set -e; for script in benchmarks/[!_]*.py; do echo "== $$script"; $(BIN)/python "$$script"; done
+
+bench-pairs: $(VENV)/.installed-test
+	$(BIN)/python -m benchmarks._pairs $(if $(filter file,$(origin BASE)),,--base $(BASE)) \
+	  $(if $(NEW),--new $(NEW)) $(PAIRS)
 
 docs: $(VENV)/.installed-test
 	@set -e; for script in docs/[!_]*.py; do echo "== $$script"; $(BIN)/python "$$script"; done

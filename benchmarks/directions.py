@@ -20,6 +20,7 @@ from scipy.optimize import minimize_scalar
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from benchmarks._own import Case, Cases, run
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.eigenloci import multi_chart
@@ -65,6 +66,30 @@ def by_bisection(plant: Plant, period: float) -> float:
 
     found = minimize_scalar(lambda B: -stiffest(B), bounds=(0.1, 30.0), method="bounded", options={"xatol": 1e-6})
     return float(-found.fun)
+
+
+def own() -> Cases:
+    """All directions at once, different ones and pairs; one by one; the chart of one law over the plane."""
+    device = load("five-bar")
+    posture, controller = device.posture(), device.controller
+
+    def together(directions: np.ndarray) -> float:
+        found = largest_stiffness_by_direction(
+            device.mechanism, posture, directions, controller, "full", device.damping
+        )
+        return found.stiffness.sum()
+
+    def one_by_one(directions: np.ndarray) -> float:
+        return sum(largest_stiffness(Loop(device.plant(direction=u), controller)).stiffness for u in directions)
+
+    half, full = circle(2 * COUNT)[:COUNT], circle(COUNT)
+    plane = reduce_directions(device.mechanism, posture, np.eye(3)[:2], "full", device.damping)
+    return {
+        "72 different directions": Case(lambda: together(half)),
+        "72 directions over a full turn": Case(lambda: together(full)),
+        "72 different directions, one by one": Case(lambda: one_by_one(half)),
+        "chart of one law over the plane": Case(lambda: multi_chart(MultiLoop(plane, controller)).stiffness_max),
+    }
 
 
 def main() -> None:
@@ -115,4 +140,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run(main, own))

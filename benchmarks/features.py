@@ -18,6 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from benchmarks._own import Case, Cases, run
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.device.load import load
@@ -53,6 +54,13 @@ def loops() -> dict[str, tuple[Plant, Controller]]:
         "electrical damping": (replace(plant, lagged_dampers=(brake,)), plain),
         "sensor on the link": (replace(plant, sensor=plant.handle), plain),
         "operator": (attach(plant, Operator(0.8, 580.0, 5.5, 10000.0, 5.0)), plain),
+    }
+
+
+def own() -> Cases:
+    """The chart of each loop."""
+    return {
+        name: Case(lambda loop=loop: stability_chart(Loop(*loop)).stiffness_max) for name, loop in loops().items()
     }
 
 
@@ -100,4 +108,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run(main, own))

@@ -22,6 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from benchmarks._own import Case, Cases, run
 from benchmarks._peers import held
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.device.device import Device
@@ -49,6 +50,18 @@ def positions(count: int) -> np.ndarray:
 def stiffness_map(device: Device, at: np.ndarray) -> Measured:
     """Ours: postures, modes, stiffest walls."""
     return evaluate(find_measure("stiffness_max"), place_of(device, at))
+
+
+def own() -> Cases:
+    """Maps up to the size that is wanted; the largest takes too long to be repeated often."""
+    device = load("five-bar")
+
+    def mean(at: np.ndarray) -> float:
+        found = stiffness_map(device, at)
+        return found.values[found.status == OK].mean()
+
+    grids = {size: positions(size) for size in SIZES if size <= WANTED}
+    return {f"map of {size} x {size}": Case(lambda at=at: mean(at)) for size, at in grids.items()}
 
 
 def by_bisection(plant: Plant, period: float) -> float:
@@ -125,4 +138,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run(main, own))

@@ -18,15 +18,14 @@ import sys
 import time
 from pathlib import Path
 
-import mujoco
 import numpy as np
-import pinocchio as pin
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "model"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "model"))
 
 from model_cases import five_bar, two_bar_angles
-from model_engines import mjcf
 
+from benchmarks._own import Case, Cases, run
 from zwidth.model.effective import effective_parameters
 from zwidth.model.posture import OK, solve_posture
 
@@ -49,6 +48,12 @@ def this_engine(at):
     found = effective_parameters(MECHANISM, posture, ALONG_Y)
     assert (posture.status == OK).all()
     return np.stack([found.link_side_mass, found.motor_side_mass, found.stiffness], axis=-1)
+
+
+def own() -> Cases:
+    """All postures in one call."""
+    at = positions(POSTURES)
+    return {f"{POSTURES} postures": Case(lambda: this_engine(at).mean())}
 
 
 def angles_of(at):
@@ -99,6 +104,9 @@ def to_driven(A):
 
 
 def by_mujoco(at):
+    import mujoco
+    from model_engines import mjcf
+
     model = mujoco.MjModel.from_xml_string(mjcf(MECHANISM))
     data, M, J = mujoco.MjData(model), np.zeros((4, 4)), np.zeros((3, 4))
     site = model.site("the handle").id
@@ -114,6 +122,8 @@ def by_mujoco(at):
 
 
 def by_pinocchio(at):
+    import pinocchio as pin
+
     links, model = MECHANISM.links, pin.Model()
     carrier = {-1: 0}
     for i, name in enumerate(links.names):
@@ -178,4 +188,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run(main, own))

@@ -19,6 +19,7 @@ import shapely
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from benchmarks._own import Case, Cases, run
 from benchmarks._timing import machine, print_table, seconds
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.robust import robust_chart
@@ -30,14 +31,23 @@ MEMBERS, GRID, GRIDDED = 1000, 100, 20
 TARGET = 3.0
 
 
-def loops() -> list[Loop]:
-    """The members, with nothing derived yet."""
+def loops(count: int = MEMBERS) -> list[Loop]:
+    """The first members, with nothing derived yet."""
     device = load("published-two-mass")
     random = np.random.default_rng(1)
     arms = random.uniform((0.3, 100.0, 2.0), (3.0, 2000.0, 20.0), (MEMBERS, 3))
     grasps = random.uniform((1e3, 1.0), (3e4, 50.0), (MEMBERS, 2))
     operators = [Operator(*arm, *grasp) for arm, grasp in zip(arms.tolist(), grasps.tolist(), strict=True)]
-    return [Loop(attach(device.plant(), operator), device.controller) for operator in operators]
+    return [Loop(attach(device.plant(), operator), device.controller) for operator in operators[:count]]
+
+
+def own() -> Cases:
+    """The robust chart, each time of new loops."""
+
+    def chart(members: list[Loop]) -> float:
+        return robust_chart(members).stiffness_max
+
+    return {f"robust chart of {MEMBERS} members": Case(chart, fresh=loops, warm=lambda: chart(loops(10)))}
 
 
 def by_grid(members: list[Loop], K, B) -> np.ndarray:
@@ -95,4 +105,4 @@ def disagreement(chart, K, B, stable) -> int:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run(main, own))

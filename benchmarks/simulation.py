@@ -21,6 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from benchmarks._own import Case, Cases, run
 from benchmarks._simulators import Bench, by_events, by_mujoco
 from benchmarks._timing import machine, print_table, seconds
 from zwidth.contact.environments import wall
@@ -37,24 +38,48 @@ def prepared() -> tuple[Loop, Bench]:
     """The device for us and for the others."""
     device = load("published-two-mass")
     plant, controller = device.plant(), device.controller
-    own = Nonlinear((Friction(plant.actuator, FRICTION),), (Counter(plant.sensor, STEP),), force_limit=LIMIT)
+    rough = Nonlinear((Friction(plant.actuator, FRICTION),), (Counter(plant.sensor, STEP),), force_limit=LIMIT)
     masses, stiffness = np.diag(plant.mass), -plant.stiffness[0, 1]
     motor = int(np.argmax(plant.actuator))
     damping = -plant.damping[0, 1]
     numbers = (masses[1 - motor], masses[motor], stiffness, damping, FRICTION, STEP, LIMIT)
-    return Loop(replace(plant, nonlinear=own), controller), Bench(*map(float, numbers), controller.sampling_period)
+    return Loop(replace(plant, nonlinear=rough), controller), Bench(
+        *map(float, numbers), controller.sampling_period
+    )
+
+
+def simulated(loop: Loop, duration: float, walls: int = 1):
+    """Responses at walls of different stiffness."""
+    values = [wall.values(stiffness=K, damping=DAMPING) for K in np.linspace(STIFFNESS, 0.5 * STIFFNESS, walls)]
+    runs = [Run(loop, each, start_position=START) for each in values]
+    return simulate_batch(runs, wall, duration=duration, substeps=SUBSTEPS)
 
 
 def ours(loop: Loop, duration: float, walls: int = 1, repeats: int = 7):
     """Readings of the first run, and the median seconds."""
-    values = [wall.values(stiffness=K, damping=DAMPING) for K in np.linspace(STIFFNESS, 0.5 * STIFFNESS, walls)]
-    runs = [Run(loop, own, start_position=START) for own in values]
     times = []
     for _ in range(repeats + 1):
         begun = perf_counter()
-        found = simulate_batch(runs, wall, duration=duration, substeps=SUBSTEPS)
+        found = simulated(loop, duration, walls)
         times.append(perf_counter() - begun)
     return found[0].truth, median(times[1:])
+
+
+def own() -> Cases:
+    """A minute on one core, and a thousand walls on all."""
+    loop, _ = prepared()
+
+    def on_one_core() -> float:
+        numba.set_num_threads(1)
+        try:
+            return simulated(loop, 60.0)[0].truth.size
+        finally:
+            numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+
+    return {
+        "a minute on one core": Case(on_one_core),
+        "1000 walls for 2 s": Case(lambda: sum(response.truth.size for response in simulated(loop, 2.0, 1000))),
+    }
 
 
 def swing(readings: np.ndarray, period: float) -> str:
@@ -68,14 +93,14 @@ def simulators() -> tuple[list[tuple[str, ...]], list[str]]:
     loop, bench = prepared()
     T = bench.period
     numba.set_num_threads(1)
-    fine, own = ours(loop, 60.0)
+    fine, mine = ours(loop, 60.0)
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     readings, muj = by_mujoco(bench, STIFFNESS, DAMPING, START, round(4.0 / T), SUBSTEPS)
     located, ode = by_events(bench, STIFFNESS, DAMPING, START, round(0.5 / T))
     _, batch = ours(loop, 2.0, 1000, 3)
     cores = numba.get_num_threads()
     found = [
-        ("zwidth, one core", 60.0, own, swing(fine, T)),
+        ("zwidth, one core", 60.0, mine, swing(fine, T)),
         ("MuJoCo, the same step", 4.0, muj, swing(readings, T)),
         ("solve_ivp with events", 0.5, ode, swing(located, T)),
         (f"zwidth, 1000 walls, {cores} core{'s' * (cores > 1)}", 2000.0, batch, ""),
@@ -86,14 +111,14 @@ def simulators() -> tuple[list[tuple[str, ...]], list[str]]:
             f"{length:g} s",
             seconds(took),
             f"{length / took:.4g}",
-            f"{(took / length) / (own / 60.0):.3g}",
+            f"{(took / length) / (mine / 60.0):.3g}",
             size,
         )
         for name, length, took, size in found
     ]
-    ratio = (muj / 4.0) / (own / 60.0)
+    ratio = (muj / 4.0) / (mine / 60.0)
     says = [
-        f"times real time on one core, {SUBSTEPS} substeps: {60.0 / own:.0f} (at least 2000 wanted)",
+        f"times real time on one core, {SUBSTEPS} substeps: {60.0 / mine:.0f} (at least 2000 wanted)",
         f"faster than MuJoCo at the same step: {ratio:.1f} (at least 50 wanted)",
     ]
     return rows, says
@@ -111,4 +136,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run(main, own))

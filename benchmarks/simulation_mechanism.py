@@ -19,11 +19,13 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from contact.mechanism_cases import sampled, uncoupled_five_bar, with_drives, with_friction
 from contact.mechanism_judge import judged
 
+from benchmarks._own import Case, Cases, run
 from zwidth.contact.mechanism.simulate import SurfaceWall, simulate_mechanism
 from zwidth.contact.mechanism.surfaces import Plane
 from zwidth.model.damping import ModalDamping
@@ -51,6 +53,24 @@ def real_time_factor(mechanism, substeps):
         found = motion(mechanism, substeps)
         times.append(time.process_time() - start)
     return float(found.time[-1]) / min(times)
+
+
+def own() -> Cases:
+    """The motion at each step, and with friction and counts."""
+
+    def depth(mechanism, substeps) -> float:
+        return motion(mechanism, substeps).depth.max()
+
+    everything = rough_five_bar()
+    return {
+        **{f"{n} steps a sample": Case(lambda n=n: depth(FIVE_BAR, n)) for n in STEPS},
+        "with friction and counts, 4 steps a sample": Case(lambda: len(motion(everything, 4).time)),
+    }
+
+
+def rough_five_bar():
+    """The five-bar with friction and encoder counts."""
+    return with_friction(with_drives(FIVE_BAR, encoder_counts=4000.0), 1e-3)
 
 
 def truth():
@@ -91,8 +111,7 @@ def main() -> int:
     for step, error, factor in found:
         print(f"step {step * 1e6:7.1f} us   peak error {error * 1e6:9.2e} um   {factor:6.1f} x real time")
     print(f"the judge                                   {judge:6.3f} x real time")
-    everything = with_friction(with_drives(FIVE_BAR, encoder_counts=4000.0), 1e-3)
-    factor = real_time_factor(everything, 4)
+    factor = real_time_factor(rough_five_bar(), 4)
     print(f"with friction and counts, 4 steps a sample  {factor:6.1f} x real time")
     best = best_step(found)
     met = best is not None and best[2] >= TARGET
@@ -105,4 +124,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run(main, own))

@@ -7,6 +7,7 @@ import os
 import subprocess
 import tarfile
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -34,21 +35,25 @@ def tree_of(label: str) -> str:
         return git("write-tree", **own_index)
 
 
-def export(tree: str, paths: tuple[str, ...], folder: Path) -> None:
-    """Write the files below some paths of a tree into a folder, once: a folder that is complete stays as it is."""
+def export(trees: Mapping[str, str], folder: Path) -> None:
+    """Write files into a folder, once: a folder that is complete stays as it is.
+
+    trees  a path from the project's root, of a file or of all files below it -> the tree that it is taken from
+    """
     complete = folder / "complete"
     if complete.exists():
         return
     folder.mkdir(parents=True, exist_ok=True)
-    with tarfile.open(fileobj=io.BytesIO(_archive(tree, paths))) as archive:
-        archive.extractall(folder, filter="data")
+    for path, tree in trees.items():
+        with tarfile.open(fileobj=io.BytesIO(_archive(tree, path))) as archive:
+            archive.extractall(folder, filter="data")
     complete.touch()
 
 
 def texts_below(tree: str, path: str, suffix: str) -> dict[str, str]:
     """Texts of a tree's files below a path, by their paths from there. Raises SystemExit where there are none."""
     texts = {}
-    with tarfile.open(fileobj=io.BytesIO(_archive(tree, (path,)))) as archive:
+    with tarfile.open(fileobj=io.BytesIO(_archive(tree, path))) as archive:
         for member in archive.getmembers():
             content = archive.extractfile(member)
             if content is not None and member.name.endswith(suffix):
@@ -58,9 +63,9 @@ def texts_below(tree: str, path: str, suffix: str) -> dict[str, str]:
     return texts
 
 
-def _archive(tree: str, paths: tuple[str, ...]) -> bytes:
+def _archive(tree: str, path: str) -> bytes:
     """Files of a tree in the format of tar."""
-    done = subprocess.run(["git", "archive", tree, *paths], cwd=ROOT, capture_output=True, check=False)
+    done = subprocess.run(["git", "archive", tree, path], cwd=ROOT, capture_output=True, check=False)
     if done.returncode:
-        raise SystemExit(f"git archive {tree[:12]} {' '.join(paths)}: {done.stderr.decode().strip()}")
+        raise SystemExit(f"git archive {tree[:12]} {path}: {done.stderr.decode().strip()}")
     return done.stdout

@@ -223,7 +223,10 @@ def test_a_stiffer_drive_helps_where_the_readme_says(period, helps):
     "line",
     [
         *typed("make"),
-        *(f"make {name}" for name in ("help", "slow", "lint", "bench", "docs", "record", "structure")),
+        *(
+            f"make {name}"
+            for name in ("help", "slow", "lint", "bench", "docs", "record", "structure", "bench-pairs")
+        ),
     ],
 )
 def test_make_knows_the_target(line):

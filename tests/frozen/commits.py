@@ -45,7 +45,7 @@ def side(label: str, environment: Environment, repeat: bool = False) -> Side:
     tree = tree_of(label)
     sources = git("rev-parse", f"{tree}:src")
     folder = CACHE / sources[:16]
-    export(tree, ("src", "pyproject.toml"), folder)
+    export({"src": tree, "pyproject.toml": tree}, folder)
     project = tomllib.loads((folder / "pyproject.toml").read_text())
     answers = folder / f"answers-{installation(environment)}{'-repeat' * repeat}.jsonl"
     return Side(label, folder, project["project"]["scripts"]["zwidth"], answers, environment)
