@@ -34,7 +34,7 @@ BAND = 2e-6
 def fresh_loop() -> Loop:
     """The published plant, with nothing derived yet."""
     device = load("published-two-mass")
-    return Loop(device.plant(), device.controller)
+    return device.at().loop
 
 
 def grid_axes(chart: StabilityChart, count: int) -> tuple[np.ndarray, np.ndarray]:

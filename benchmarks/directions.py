@@ -28,7 +28,6 @@ from zwidth.chart.polar import circle, largest_stiffness_by_direction
 from zwidth.device.load import load
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi import MultiLoop
-from zwidth.model.directions import reduce_directions
 from zwidth.model.plant import Plant
 
 COUNT = 72
@@ -71,19 +70,16 @@ def by_bisection(plant: Plant, period: float) -> float:
 def own() -> Cases:
     """All directions at once, different ones and pairs; one by one; the chart of one law over the plane."""
     device = load("five-bar")
-    posture, controller = device.posture(), device.controller
+    point, controller = device.at(), device.controller
 
     def together(directions: np.ndarray) -> float:
-        found = largest_stiffness_by_direction(
-            device.mechanism, posture, directions, controller, "full", device.damping
-        )
-        return found.stiffness.sum()
+        return largest_stiffness_by_direction(point, directions).stiffness.sum()
 
     def one_by_one(directions: np.ndarray) -> float:
-        return sum(largest_stiffness(Loop(device.plant(direction=u), controller)).stiffness for u in directions)
+        return sum(largest_stiffness(device.at(direction=u).loop).stiffness for u in directions)
 
     half, full = circle(2 * COUNT)[:COUNT], circle(COUNT)
-    plane = reduce_directions(device.mechanism, posture, np.eye(3)[:2], "full", device.damping)
+    plane = device.at(directions=np.eye(3)[:2]).plant_of_directions
     return {
         "72 different directions": Case(lambda: together(half)),
         "72 directions over a full turn": Case(lambda: together(full)),
@@ -94,16 +90,14 @@ def own() -> Cases:
 
 def main() -> None:
     device = load("five-bar")
-    posture = device.posture()
+    point = device.at()
     directions = circle(2 * COUNT)[:COUNT]
 
     def plant(u: np.ndarray) -> Plant:
-        return device.plant(direction=u)
+        return device.at(direction=u).plant
 
     def ours():
-        return largest_stiffness_by_direction(
-            device.mechanism, posture, directions, device.controller, "full", device.damping
-        )
+        return largest_stiffness_by_direction(point, directions)
 
     def one_by_one():
         return [largest_stiffness(Loop(plant(u), device.controller)).stiffness for u in directions]
@@ -111,9 +105,7 @@ def main() -> None:
     together = median_time(ours, repeats=20)
     turn = circle(COUNT)
     full_turn = median_time(
-        lambda: largest_stiffness_by_direction(
-            device.mechanism, posture, turn, device.controller, "full", device.damping
-        ),
+        lambda: largest_stiffness_by_direction(point, turn),
         repeats=20,
     )
     single = median_time(one_by_one, repeats=5)
@@ -123,15 +115,15 @@ def main() -> None:
     theirs = [by_bisection(plant(u), device.controller.sampling_period) for u in directions[:: COUNT // SAMPLE]]
     bisection = (perf_counter() - start) * COUNT / SAMPLE
     worst = float(np.max(np.abs(np.array(theirs) / exact[:: COUNT // SAMPLE] - 1.0)))
-    plane = reduce_directions(device.mechanism, posture, np.eye(3)[:2], "full", device.damping)
-    chart = median_time(lambda: multi_chart(MultiLoop(plane, device.controller)), repeats=5)
+    plane = device.at(directions=np.eye(3)[:2])
+    chart = median_time(lambda: multi_chart(MultiLoop(plane.plant_of_directions, plane.controller)), repeats=5)
     print(machine("numpy", "scipy", "numba"))
     print_table(
         ("largest stiffness along 72 directions", "time", "beside ours"),
         [
             ("largest_stiffness_by_direction, 72 different", seconds(together), "1"),
             ("the same, 72 over a full turn (36 pairs)", seconds(full_turn), f"{full_turn / together:.2f}"),
-            ("device.plant and largest_stiffness, one by one", seconds(single), f"{single / together:.2f}"),
+            ("device.at(...).loop and largest_stiffness, one by one", seconds(single), f"{single / together:.2f}"),
             (f"bisection on eigenvalues (of {SAMPLE}, scaled)", seconds(bisection), f"{bisection / together:.0f}"),
         ],
     )

@@ -35,7 +35,7 @@ MILLION = 1_000_000
 def loops() -> dict[str, tuple[Plant, Controller]]:
     """The plain loop, and each with one feature more."""
     device = load("published-two-mass")
-    plant, plain = device.plant(), device.controller
+    plant, plain = device.at().plant, device.controller
     T = plain.sampling_period
     brake = LaggedDamper(plant.actuator, 2.0, 0.5 * T)
     coupled = plant.damping + np.diag([0.0, 0.4])

@@ -31,7 +31,6 @@ from zwidth.measures.catalogue import find_measure
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import OK, Measured
 from zwidth.model.plant import Plant
-from zwidth.study.places import place_of
 
 SIZES = (50, 100, 200, 400)
 WANTED = 200
@@ -49,7 +48,7 @@ def positions(count: int) -> np.ndarray:
 
 def stiffness_map(device: Device, at: np.ndarray) -> Measured:
     """Ours: postures, modes, stiffest walls."""
-    return evaluate(find_measure("stiffness_max"), place_of(device, at))
+    return evaluate(find_measure("stiffness_max"), device.at(at))
 
 
 def own() -> Cases:
@@ -100,7 +99,7 @@ def peer(device: Device, at: np.ndarray, ours: Measured) -> tuple[float, float]:
     """Seconds per cell of the peer, and the largest difference from ours, in shares, over some cells."""
     cells = np.argwhere(ours.status == OK)
     chosen = cells[np.linspace(0, len(cells) - 1, SAMPLE).astype(int)]
-    plants = [device.plant(at[tuple(cell)]) for cell in chosen]
+    plants = [device.at(at[tuple(cell)]).plant for cell in chosen]
     by_bisection(plants[0], device.controller.sampling_period)
     start = perf_counter()
     found = np.array([by_bisection(plant, device.controller.sampling_period) for plant in plants])

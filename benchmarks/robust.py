@@ -38,7 +38,7 @@ def loops(count: int = MEMBERS) -> list[Loop]:
     arms = random.uniform((0.3, 100.0, 2.0), (3.0, 2000.0, 20.0), (MEMBERS, 3))
     grasps = random.uniform((1e3, 1.0), (3e4, 50.0), (MEMBERS, 2))
     operators = [Operator(*arm, *grasp) for arm, grasp in zip(arms.tolist(), grasps.tolist(), strict=True)]
-    return [Loop(attach(device.plant(), operator), device.controller) for operator in operators[:count]]
+    return [Loop(attach(device.at().plant, operator), device.controller) for operator in operators[:count]]
 
 
 def own() -> Cases:

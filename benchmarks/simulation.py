@@ -37,7 +37,7 @@ FRICTION, STEP, LIMIT = 0.1, 1e-5, 20.0
 def prepared() -> tuple[Loop, Bench]:
     """The device for us and for the others."""
     device = load("published-two-mass")
-    plant, controller = device.plant(), device.controller
+    plant, controller = device.at().plant, device.controller
     rough = Nonlinear((Friction(plant.actuator, FRICTION),), (Counter(plant.sensor, STEP),), force_limit=LIMIT)
     masses, stiffness = np.diag(plant.mass), -plant.stiffness[0, 1]
     motor = int(np.argmax(plant.actuator))

@@ -33,8 +33,7 @@ def own() -> Cases:
 
 def ungripped_loop() -> Loop:
     """The published plant without an operator."""
-    device = load("published-two-mass")
-    return Loop(device.plant(held=False), device.controller)
+    return load("published-two-mass").at().without_operator.loop
 
 
 def warm_up(loop: Loop) -> None:

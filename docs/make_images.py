@@ -12,7 +12,6 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from gallery import fig_5_4_common_area, fig_5_10_eigenvalues
 from zwidth.chart.chart import stability_chart
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
 from zwidth.show.figures.stability import draw_chart
 from zwidth.show.figures.style import context, figure, save
 
@@ -22,7 +21,7 @@ IMAGES = Path(__file__).parent / "images"
 def main() -> None:
     IMAGES.mkdir(exist_ok=True)
     device = load("five-bar")
-    chart = stability_chart(Loop(device.plant(), device.controller))
+    chart = stability_chart(device.at().loop)
     with context():
         made, ax = figure(6.2, 3.7)
         draw_chart(ax, chart)

@@ -130,7 +130,7 @@ mechanism = load("five-bar", [*rods, *on_the_axes]).mechanism
 POSITIONS = ((0.0, 0.25), (0.05, 0.2), (-0.08, 0.27))
 RATES = np.array([1.3, -0.7])  # rad/s
 device = load("five-bar", [*rods, *on_the_axes])
-postures = [device.posture(position) for position in POSITIONS]
+postures = [device.at(position).posture for position in POSITIONS]
 printed = [AppendixB(mechanism, posture.angles) for posture in postures]
 both = list(zip(printed, postures, strict=True))
 

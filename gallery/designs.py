@@ -13,11 +13,10 @@ import numpy as np
 from gallery.five_bar import SIDES, bundled
 from zwidth.device.device import Device
 from zwidth.device.load import load
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import Measured
-from zwidth.measures.place import Place
-from zwidth.study.places import place_of
 
 device = load("five-bar")
 LINKS = device.mechanism.links.names
@@ -71,12 +70,14 @@ def with_lengths(right: np.ndarray, left: np.ndarray, law: str = "kept") -> Devi
     return replace(device, mechanism=mechanism)
 
 
-def felt(designs: Device, assembly: str, model: str = "full", position: tuple[float, float] = REFERENCE) -> Place:
+def felt(
+    designs: Device, assembly: str, model: str = "full", position: tuple[float, float] = REFERENCE
+) -> OperatingPoint:
     """All designs with their handle at one position."""
-    return place_of(designs, np.array([*position, 0.0]), assembly=assembly, model=model)
+    return designs.at(np.array([*position, 0.0]), assembly=assembly, model=model)
 
 
-def measured(name: str, place: Place) -> Measured:
+def measured(name: str, place: OperatingPoint) -> Measured:
     """A measure of the catalogue."""
     return evaluate(find_measure(name), place)
 

@@ -39,7 +39,7 @@ def loop_without_hand() -> Loop:
     """The two masses with 7.5 % damping."""
     b = damper(ASSUMED)
     device = load(PUBLISHED, [("plant.damping_Ns_per_m", [[b, -b], [-b, b]])])
-    return Loop(device.plant(), device.controller)
+    return device.at().loop
 
 
 def lower_edge(hand: Hand) -> np.ndarray:

@@ -54,7 +54,7 @@ def held(ratio: float, operator: str = OPERATOR, **changes: float) -> Loop:
     settings = [("plant.damping_Ns_per_m", [[b, -b], [-b, b]])]
     settings += [(f"operator.{key}", value) for key, value in changes.items()]
     device = load(PUBLISHED, settings, operator)
-    return Loop(device.plant(), device.controller)
+    return device.at().loop
 
 
 def judge_of(ratio: float) -> Judge:

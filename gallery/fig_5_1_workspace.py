@@ -23,7 +23,6 @@ from gallery.designs import REFERENCE, device, measured
 from gallery.five_bar import bundled, judge
 from gallery.models import write_page
 from zwidth.measures.impedance_range import rigid_range, sprung_range
-from zwidth.study.places import place_of
 from zwidth.study.plane import plane_of
 from zwidth.study.workspace import workspace_map
 
@@ -117,7 +116,7 @@ def at_largest(name: str) -> tuple[float, float]:
 
 
 # At the reference position: what zwidth has there, and the same by hand and by brute force.
-_place = place_of(device)
+_place = device.at()
 _felt = bundled().at(REFERENCE, ASSEMBLY)
 PERIOD = device.controller.sampling_period
 _whole = _felt.mass_matrix + np.diag(bundled().rotor)

@@ -30,7 +30,6 @@ from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.measures.impedance_range import rigid_range, sprung_range
 from zwidth.model.posture import PostureError
-from zwidth.study.places import place_of
 
 Y = designs.REFERENCE[1]
 REACH = float(designs.device.mechanism.links.tip[[designs.RIGHT, designs.DISTAL_RIGHT], 0].sum())
@@ -51,7 +50,7 @@ def apart(distance: float) -> Device:
 def reaches(distance: float) -> bool:
     """Whether the handle gets to (0, 0.25) m; farther apart the arms do not even meet (DeviceError)."""
     try:
-        apart(distance).posture((0.0, Y))
+        apart(distance).at((0.0, Y))
     except (PostureError, DeviceError):
         return False
     return True
@@ -74,7 +73,7 @@ def curves(of: Device) -> dict[str, np.ndarray]:
     links = replace(mechanism.links, origin=mechanism.links.origin[..., None, :, :])
     assemblies = {name: angles[..., None, :] for name, angles in mechanism.assemblies.items()}
     spread = replace(of, mechanism=replace(mechanism, links=links, assemblies=assemblies))
-    full = place_of(spread, line, assembly="elbows-out")
+    full = spread.at(line, assembly="elbows-out")
     felt = full.effective
     return {
         "rigid": rigid_range(felt.rigid_mass, PERIOD).stiffness_max,

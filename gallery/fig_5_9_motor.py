@@ -28,7 +28,6 @@ from gallery.brute_force import Judge
 from gallery.five_bar import bundled, closed_form
 from gallery.models import write_page
 from zwidth.measures.impedance_range import sprung_range
-from zwidth.study.places import place_of
 
 device = designs.device
 PERIOD = device.controller.sampling_period
@@ -47,7 +46,7 @@ def judged(frequency: float) -> float:
     return Judge([[1.0]], [[0.0]], [[frequency**2]], [1.0], 1.0).largest_stiffness(1.0, 2.0)[0]
 
 
-felt = place_of(device).effective
+felt = device.at().effective
 W_of_the_device = float(np.sqrt(felt.stiffness / felt.motor_side_mass) * PERIOD)
 p_of_the_device = float(
     sprung_range(felt.motor_side_mass, felt.stiffness, PERIOD).stiffness_max * PERIOD**2 / felt.motor_side_mass
@@ -69,7 +68,7 @@ def over_inertia(assembly: str) -> tuple[np.ndarray, np.ndarray]:
     """(5.7) and the full model's largest stiffness at each inertia [N/m]."""
     rows = []
     for value in inertia:
-        place = place_of(with_first_motor(float(value)), POSITION, assembly=assembly)
+        place = with_first_motor(float(value)).at(POSITION, assembly=assembly)
         closed = sprung_range(place.effective.motor_side_mass, place.effective.stiffness, PERIOD).stiffness_max
         rows.append((float(closed), float(designs.measured("stiffness_max", place).values)))
     closed, exact = np.array(rows).T
@@ -88,7 +87,7 @@ at_present = len(inertia) // 2
 # One rotor alone: the first one endlessly heavy.
 levels_off = float(
     sprung_range(
-        place_of(with_first_motor(1e6 * BUNDLED), POSITION).effective.motor_side_mass, felt.stiffness, PERIOD
+        with_first_motor(1e6 * BUNDLED).at(POSITION).effective.motor_side_mass, felt.stiffness, PERIOD
     ).stiffness_max
 )
 doubled = tuple(

@@ -28,7 +28,7 @@ def published(model: str | None = None, stiffness_damping: float | None = None, 
         b = stiffness_damping * load(PUBLISHED).document["plant"]["stiffness_N_per_m"][0][0]
         settings.append(("plant.damping_Ns_per_m", [[b, -b], [-b, b]]))
     device = load(PUBLISHED, settings)
-    return Loop(device.plant(model=model), Controller(device.controller.sampling_period, **controller))
+    return Loop(device.at(model=model).plant, Controller(device.controller.sampling_period, **controller))
 
 
 def unit_mass(damping: float = 0.0, stiffness: float = 0.0, delay: float = 0.0) -> Loop:

@@ -39,7 +39,7 @@ def _blocks(m: int, n: int) -> tuple[float, float, float]:
 coupling, outside, elsewhere = (max(values) for values in zip(*(_blocks(m, n) for m, n in SIZES), strict=True))
 
 device = load("five-bar")
-posture = device.posture()
+posture = device.at().posture
 masses = reduce_directions(device.mechanism, posture, np.eye(3)[:2], "two-mass", device.damping)
 full = reduce_directions(device.mechanism, posture, np.eye(3)[:2], "full", device.damping)
 

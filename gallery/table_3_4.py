@@ -32,7 +32,7 @@ UPPER = ("upper-right", "upper-left")
 def at_the_handle(*settings: tuple[str, object]) -> EffectiveParameters:
     """Effective parameters of the five-bar at its reference, after settings."""
     changed = load(DEVICE, settings)
-    return effective_parameters(changed.mechanism, changed.posture(), changed.direction())
+    return effective_parameters(changed.mechanism, changed.at().posture, changed.direction())
 
 
 device = load(DEVICE)
@@ -48,12 +48,12 @@ motor_side_mass = float(effective.motor_side_mass)
 rigid_mass = float(effective.rigid_mass)
 stiffness = float(effective.stiffness)
 
-frequencies = natural_frequencies(device.plant())[2:]
+frequencies = natural_frequencies(device.at().plant)[2:]
 average_stiffness = [
     ("mechanism.drives.motor-right.stiffness_Nm_per_rad", 0.40),
     ("mechanism.drives.motor-left.stiffness_Nm_per_rad", 0.65),
 ]
-frequencies_at_average_stiffness = natural_frequencies(load(DEVICE, average_stiffness).plant())[2:]
+frequencies_at_average_stiffness = natural_frequencies(load(DEVICE, average_stiffness).at().plant)[2:]
 
 # The readings that do not give the printed numbers.
 on_the_axes = [(f"mechanism.links.{name}.center_of_mass_m.1", 0.0) for name in (*UPPER, *DISTAL)]
@@ -77,7 +77,7 @@ motor_side_mass_with_the_pulleys_ratio = float(masses_with_the_pulleys_ratio.mot
 motor_side_mass_with_the_printed_inertia = motor_side_mass * 1.186e-4 / motor_inertia_at_the_joint
 
 # The printed 15 620 N/m puts the two-mass model at the device's second frequency.
-published = load("published-two-mass").plant()
+published = load("published-two-mass").at().plant
 published_stiffness = float(plant_effective_parameters(published).stiffness)
 frequency_of_the_published_plant = float(natural_frequencies(published)[-1])
 frequency_with_the_computed_stiffness = frequency_of_the_published_plant * float(

@@ -11,7 +11,7 @@ from gallery.models import PUBLISHED
 from zwidth.device.load import load
 from zwidth.study.validity import validity
 
-found = validity(load(PUBLISHED))
+found = validity(load(PUBLISHED).at())
 fits = {fit.key: fit for fit in found.fits}
 natural = found.first_natural
 lowest, highest = float(found.frequency[0]), float(found.frequency[-1])

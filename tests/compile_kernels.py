@@ -19,10 +19,9 @@ import numpy as np
 from zwidth.device.load import load
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.evaluate import evaluate
-from zwidth.study.places import place_of
 
 x, y = np.meshgrid(np.linspace(-0.04, 0.04, 9), np.linspace(0.2, 0.28, 9))
-evaluate(find_measure("stiffness_max"), place_of(load("five-bar"), np.stack([x, y], axis=-1), (0.0, 1.0, 0.0)))
+evaluate(find_measure("stiffness_max"), load("five-bar").at(np.stack([x, y], axis=-1), (0.0, 1.0, 0.0)))
 """
 ZWIDTH = str(Path(sys.executable).with_name("zwidth"))
 MOVE = "move five-bar --plane 0,0.28,0,-1 --stiffness 2000 --damping 5 --push 0,2 --duration 0.3"

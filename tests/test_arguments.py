@@ -24,7 +24,7 @@ def device():
 
 @cache
 def loop():
-    return zwidth.Loop(device().plant(), device().controller)
+    return device().at().loop
 
 
 @cache
@@ -43,7 +43,7 @@ def multi():
 KINDS = [
     (
         lambda: zwidth.Loop(device(), device().controller),
-        "plant must be a Plant, got a Device; write Loop(device.plant(), device.controller)",
+        "plant must be a Plant, got a Device; write device.at().loop",
     ),
     (lambda: zwidth.Loop("my.toml", device().controller), "plant must be a Plant, got the text 'my.toml'"),
     (
@@ -64,11 +64,14 @@ KINDS = [
     ),
     (
         lambda: zwidth.stability_chart(device()),
-        "loop must be a Loop, got a Device; write Loop(device.plant(), device.controller)",
+        "loop must be a Loop, got a Device; write device.at().loop",
     ),
     (lambda: zwidth.stability_chart(plant()), "loop must be a Loop, got a Plant; write Loop(plant, controller)"),
     (lambda: zwidth.largest_stiffness("my.toml"), "loop must be a Loop, got the text 'my.toml'"),
-    (lambda: zwidth.judge(device(), 1.0, 1.0), "loop must be a Loop, got a Device; write Loop(device.plant(), "),
+    (
+        lambda: zwidth.judge(device(), 1.0, 1.0),
+        "loop must be a Loop, got a Device; write device.at().loop",
+    ),
     (lambda: zwidth.multi_chart(loop()), "loop must be a MultiLoop, got a Loop; stability_chart takes a Loop"),
     (lambda: zwidth.hysteretic_chart(device()), "loop must be a Loop, got a Device"),
     (lambda: zwidth.robust_chart(loop()), "members must be a list of Loops, got a Loop; write [loop]"),
@@ -85,9 +88,15 @@ KINDS = [
     (lambda: zwidth.felt_impedance(device(), 1.0, 1.0, [1.0]), "loop must be a Loop, got a Device"),
     (lambda: zwidth.felt_chart(device()), "chart must be a StabilityChart, got a Device"),
     (lambda: zwidth.felt_chart(loop()), "chart must be a StabilityChart, got a Loop; write stability_chart(loop)"),
-    (lambda: zwidth.static_stiffness(device(), 1.0), "plant must be a Plant, got a Device; write device.plant()"),
-    (lambda: zwidth.natural_frequencies(device()), "plant must be a Plant, got a Device; write device.plant()"),
-    (lambda: zwidth.reduce_plant(device(), "rigid"), "plant must be a Plant, got a Device; write device.plant()"),
+    (
+        lambda: zwidth.static_stiffness(device(), 1.0),
+        "plant must be a Plant, got a Device; write device.at().plant",
+    ),
+    (lambda: zwidth.natural_frequencies(device()), "plant must be a Plant, got a Device; write device.at().plant"),
+    (
+        lambda: zwidth.reduce_plant(device(), "rigid"),
+        "plant must be a Plant, got a Device; write device.at().plant",
+    ),
     (lambda: zwidth.attach(plant(), "firm"), "operator must be an Operator, got the text 'firm'"),
     (lambda: zwidth.wall_paths(device(), 1.0, [0.0, 1.0]), "loop must be a Loop, got a Device"),
     (
@@ -99,8 +108,7 @@ KINDS = [
         lambda: zwidth.sensitivities("my.toml"),
         "device must be a Device, got the text 'my.toml'; write load('my.toml')",
     ),
-    (lambda: zwidth.validity(loop()), "device must be a Device, got a Loop"),
-    (lambda: zwidth.place_of("my.toml"), "device must be a Device, got the text 'my.toml'; write load('my.toml')"),
+    (lambda: zwidth.validity(loop()), "point must be an OperatingPoint, got a Loop"),
     (lambda: zwidth.plane_of("my.toml"), "device must be a Device, got the text 'my.toml'; write load('my.toml')"),
     (
         lambda: zwidth.workspace_map("my.toml", ["isotropy"]),
@@ -118,7 +126,7 @@ KINDS = [
     ),
     (
         lambda: zwidth.evaluate(zwidth.find_measure("isotropy"), device()),
-        "place must be a Place, got a Device; write place_of(device)",
+        "point must be an OperatingPoint, got a Device; write device.at()",
     ),
     (
         lambda: zwidth.solve_posture(device(), (0.0, 0.25)),

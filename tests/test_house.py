@@ -214,7 +214,7 @@ def test_a_stiffer_drive_helps_where_the_readme_says(period, helps):
     reached = []
     for more in ([], ["drives.motor-right.stiffness_Nm_per_rad=0.9"]):
         device = zwidth.load("five-bar", [*sampled, *more])
-        reached.append(zwidth.largest_stiffness(zwidth.Loop(device.plant(), device.controller)).stiffness)
+        reached.append(zwidth.largest_stiffness(device.at().loop).stiffness)
     assert (reached[1] > reached[0]) == helps
 
 

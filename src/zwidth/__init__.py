@@ -79,6 +79,7 @@ if TYPE_CHECKING:
     from zwidth.loop.estimators.running import velocity_of as velocity_of
     from zwidth.loop.loop import Loop as Loop
     from zwidth.loop.multi import MultiLoop as MultiLoop
+    from zwidth.loop.operating_point import OperatingPoint as OperatingPoint
     from zwidth.measures.catalogue import find_measure as find_measure
     from zwidth.measures.dexterity import dynamic_isotropy as dynamic_isotropy
     from zwidth.measures.dexterity import dynamic_manipulability as dynamic_manipulability
@@ -112,14 +113,13 @@ if TYPE_CHECKING:
     from zwidth.measures.measure import Measure as Measure
     from zwidth.measures.measure import Measured as Measured
     from zwidth.measures.measure import MeasureError as MeasureError
+    from zwidth.measures.measure import WantedWall as WantedWall
     from zwidth.measures.overall import Overall as Overall
     from zwidth.measures.overall import global_conditioning_index as global_conditioning_index
     from zwidth.measures.overall import global_isotropy_index as global_isotropy_index
     from zwidth.measures.overall import overall as overall
     from zwidth.measures.own import load_measures as load_measures
     from zwidth.measures.own import measure as measure
-    from zwidth.measures.place import Place as Place
-    from zwidth.measures.place import Wanted as Wanted
     from zwidth.measures.structural import deformation_ratio as deformation_ratio
     from zwidth.measures.structural import structural_distortion as structural_distortion
     from zwidth.model.directions import MultiPlant as MultiPlant
@@ -145,7 +145,6 @@ if TYPE_CHECKING:
     from zwidth.model.response import ResponseError as ResponseError
     from zwidth.model.sweep import sweep_response as sweep_response
     from zwidth.study.common_area import common_area as common_area
-    from zwidth.study.places import place_of as place_of
     from zwidth.study.plane import plane_of as plane_of
     from zwidth.study.requirement import parse_requirement as parse_requirement
     from zwidth.study.robust import RobustError as RobustError
@@ -255,6 +254,7 @@ _HOME = {
     "loop.estimators.running": ("velocity_of",),
     "loop.loop": ("Loop",),
     "loop.multi": ("MultiLoop",),
+    "loop.operating_point": ("OperatingPoint",),
     "measures.catalogue": ("find_measure",),
     "measures.dexterity": (
         "dynamic_isotropy",
@@ -303,6 +303,7 @@ _HOME = {
         "Measure",
         "MeasureError",
         "Measured",
+        "WantedWall",
     ),
     "measures.overall": (
         "Overall",
@@ -313,10 +314,6 @@ _HOME = {
     "measures.own": (
         "load_measures",
         "measure",
-    ),
-    "measures.place": (
-        "Place",
-        "Wanted",
     ),
     "measures.structural": (
         "deformation_ratio",
@@ -359,7 +356,6 @@ _HOME = {
     ),
     "model.sweep": ("sweep_response",),
     "study.common_area": ("common_area",),
-    "study.places": ("place_of",),
     "study.plane": ("plane_of",),
     "study.requirement": ("parse_requirement",),
     "study.robust": (

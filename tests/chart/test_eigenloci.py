@@ -160,7 +160,7 @@ def test_several_directions_agree_with_eigenvalues(seed):
 @pytest.mark.parametrize("model", ["full", "two-mass", "motor-mass", "rigid"])
 def test_the_stiffest_wall_is_on_the_edge_to_1e_9(model):
     device = load("five-bar")
-    plant = reduce_directions(device.mechanism, device.posture(), np.eye(3)[:2], model, device.damping)
+    plant = reduce_directions(device.mechanism, device.at().posture, np.eye(3)[:2], model, device.damping)
     loop = MultiLoop(plant, device.controller)
     chart = multi_chart(loop)
     K, B = chart.stiffness_max, chart.damping_at_stiffness_max
@@ -172,7 +172,7 @@ def test_the_stiffest_wall_is_on_the_edge_to_1e_9(model):
 
 def test_the_basis_of_a_plane_does_not_matter():
     device = load("five-bar")
-    posture, loops = device.posture((0.03, 0.22)), []
+    posture, loops = device.at((0.03, 0.22)).posture, []
     for angle in (0.0, 0.7):
         c, s = np.cos(angle), np.sin(angle)
         basis = [[c, s, 0.0], [-s, c, 0.0]]
@@ -186,7 +186,7 @@ def test_the_basis_of_a_plane_does_not_matter():
 
 def test_a_plane_is_no_stiffer_than_any_of_its_directions_with_uncoupled_loops():
     device = load("five-bar")
-    plant = reduce_directions(device.mechanism, device.posture(), np.eye(3)[:2], "full", device.damping)
+    plant = reduce_directions(device.mechanism, device.at().posture, np.eye(3)[:2], "full", device.damping)
     chart = multi_chart(MultiLoop(plant, device.controller))
     assert chart.stiffness_max == pytest.approx(4148.658573678898, rel=1e-9)
 
@@ -217,10 +217,8 @@ def test_lag_and_force_filter_are_those_of_the_single_loop():
 
 def test_each_direction_of_a_polar_is_its_own_largest_stiffness():
     device = load("five-bar")
-    posture, directions = device.posture(), circle(10)
-    found = largest_stiffness_by_direction(
-        device.mechanism, posture, directions, device.controller, "full", device.damping
-    )
+    posture, directions = device.at().posture, circle(10)
+    found = largest_stiffness_by_direction(device.at(), directions)
     for k, u in enumerate(directions):
         plant = reduce_mechanism(device.mechanism, posture, u, "full", device.damping)
         peak = largest_stiffness(Loop(plant, device.controller))
@@ -231,9 +229,7 @@ def test_each_direction_of_a_polar_is_its_own_largest_stiffness():
 
 def test_a_direction_without_an_answer_is_data():
     device = load("five-bar")
-    found = largest_stiffness_by_direction(
-        device.mechanism, device.posture(), np.eye(3), device.controller, "full", device.damping
-    )
+    found = largest_stiffness_by_direction(device.at(), np.eye(3))
     assert found.status == ("ok", "ok", "out of motion: the handle cannot move along the direction")
     assert np.isnan(found.stiffness[2])
     assert np.isfinite(found.stiffness[:2]).all()
@@ -250,5 +246,5 @@ def test_the_page_says_what_its_examples_give():
     assert f"# {names['found'].stiffness.min():.0f} and {names['found'].stiffness.max():.0f} N/m" in page
     chart = names["chart"]
     assert f"# {chart.stiffness_max:.2f} N/m at {chart.damping_at_stiffness_max:.3f} N s/m" in page
-    along_x = largest_stiffness(Loop(names["device"].plant(direction=(1.0, 0.0)), names["device"].controller))
+    along_x = largest_stiffness(names["device"].at(direction=(1.0, 0.0)).loop)
     assert f"({along_x.stiffness:.2f} N/m along x)" in page

@@ -10,7 +10,6 @@ from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, refused, zwi
 from zwidth.conditions import compare
 from zwidth.conditions.abbott_okamura import stiffness_limit
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
 
 PROMISED = {"name", "source", "kind", "stiffness_max_N_per_m", "assumptions", "violated"}
 PLAIN_PADDLE = """
@@ -38,7 +37,7 @@ def paddle(tmp_path):
 def test_every_condition_is_listed_with_the_promised_keys(device):
     document = found("bounds", device)
     loaded = load(device)
-    told = compare(Loop(loaded.plant(), loaded.controller), wall_damping=document["damping_Ns_per_m"])
+    told = compare(loaded.at().loop, wall_damping=document["damping_Ns_per_m"])
     assert [bound["name"] for bound in document["bounds"]] == [bound.name for bound in told]
     for entry, bound in zip(document["bounds"], told, strict=True):
         assert set(entry) >= PROMISED

@@ -105,7 +105,7 @@ def test_settings_are_applied_in_turn_and_checked_together():
     assert both["delay_samples"] == 1.0
     setting = "drives.motor-left.stiffness_Nm_per_rad=0.9"
     device = zw.load(MECHANISM, [setting])
-    ours = zw.stability_chart(zw.Loop(device.plant(), device.controller)).stiffness_max
+    ours = zw.stability_chart(device.at().loop).stiffness_max
     assert found("chart", MECHANISM, "--set", setting)["stiffness_max_N_per_m"] == ours
     assert found("chart", MECHANISM)["stiffness_max_N_per_m"] != ours
 

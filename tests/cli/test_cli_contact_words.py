@@ -76,7 +76,7 @@ def test_a_free_motion_has_no_empty_panels_and_its_path_is_no_links_colour():
     scene = (device.mechanism, device.damping, device.controller, None, None)
     motion = package.simulate_mechanism(*scene, push=(0.02, 1.0, 0.0), duration=0.1)
     made, axes = path_figure()
-    draw_path(axes, device.mechanism, device.posture(), motion, None)
+    draw_path(axes, device.mechanism, device.at().posture, motion, None)
     made.canvas.draw()
     assert [ax.get_visible() for ax in axes] == [True, True, False, False, True]
     path = next(line for line in axes[0].lines if line.get_label() == "path")

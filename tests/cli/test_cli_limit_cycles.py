@@ -11,7 +11,6 @@ from tests.cli.test_cli_docs import PAGE, keys
 from tests.paddle import LENGTH, paddle
 from zwidth.contact.limit_cycles import limit_cycles
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
 
 LIMITED = ("--set", "loop.saturation.force_N=5")
 WALL = ("--stiffness", "8000", "--damping", "10")
@@ -48,7 +47,7 @@ def test_the_numbers_are_those_of_the_package(both):
     document, *_ = both
     settings = [word for word in (*ROUGH, *LIMITED) if word != "--set"]
     device = load(ONE_MASS, settings)
-    expected = limit_cycles(Loop(device.plant(), device.controller), 2600.0, 0.0)
+    expected = limit_cycles(device.at().loop, 2600.0, 0.0)
     told = document["limit_cycles"]
     assert [cycle["amplitude_m"] for cycle in told] == pytest.approx([cycle.amplitude for cycle in expected])
     assert [cycle["stable"] for cycle in told] == [False, True]

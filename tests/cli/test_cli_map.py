@@ -17,7 +17,6 @@ from zwidth.measures.catalogue import MEASURES
 from zwidth.measures.measure import STATUS
 from zwidth.show.cli.options import EXTREMES
 from zwidth.study import worst
-from zwidth.study.places import place_of
 
 FEW = ("--cells", "7,5")
 DOCS = Path(__file__).parents[2] / "docs"
@@ -33,7 +32,7 @@ def test_values_stand_at_their_places():
     assert (np.isnan(values) == (status != "ok")).all()
     device = load(MECHANISM)
     for i, j in ((1, 3), (2, 1), (3, 4)):
-        place = place_of(device, (document["x_m"][j], document["y_m"][i], 0.0), (1.0, 1.0))
+        place = device.at((document["x_m"][j], document["y_m"][i], 0.0), (1.0, 1.0))
         assert values[i, j] == pytest.approx(float(MEASURES["rigid_mass"].compute(place)), rel=1e-9)
     assert document["plane"] == "xy"
     assert "position_m" not in document

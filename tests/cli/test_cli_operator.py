@@ -45,7 +45,7 @@ def test_every_bundled_operator_holds_every_bundled_device(device, operator):
     assert told["operator"] == operator
     bare = package.load(device)
     held = package.load(device, operator=operator)
-    loop = package.Loop(attach(bare.plant(), held.operator), bare.controller)
+    loop = package.Loop(attach(bare.at().plant, held.operator), bare.controller)
     wall = told["stiffness_max_N_per_m"], told["damping_at_stiffness_max_Ns_per_m"]
     assert package.largest_stiffness(loop).stiffness == pytest.approx(wall[0], rel=1e-9)
     roots = np.linalg.eigvals(second_matrix(loop, *wall))
@@ -68,7 +68,7 @@ def test_a_random_operator_of_a_file_is_on_the_edge_where_the_chart_says(folder)
         (folder / "random.toml").write_text("\n".join(lines))  # bare keys
         device = package.load(TWO_MASS, operator="random.toml")
         assert device.operator == own
-        loop = package.Loop(device.plant(), device.controller)
+        loop = device.at().loop
         chart = package.stability_chart(loop, decay=False)
         for arc in chart.boundary:
             i = len(arc.stiffness) // 2
@@ -240,7 +240,7 @@ def test_the_pages_table_says_what_is_bundled_and_what_comes_out(folder):
             assert ("rigid" in grasp) == own.rigid_grasp
         for said, which, digits in ((two_mass, TWO_MASS, 1.0), (one_mass, ONE_MASS, 1000.0)):
             held = package.load(which, operator=name)
-            peak = package.largest_stiffness(package.Loop(held.plant(), held.controller))
+            peak = package.largest_stiffness(held.at().loop)
             assert float(said) == pytest.approx(peak.stiffness / digits, rel=2e-4)
 
 
@@ -248,6 +248,6 @@ def test_the_pages_python_runs_and_its_number_comes_out(capsys):
     names = {}
     exec(compile(blocks("python")[0], "operators.md", "exec"), names)
     assert f"{names['stiffest'].stiffness:.1f} N/m" in PAGE
-    held = names["device"].plant()
+    held = names["device"].at().plant
     assert np.array_equal(held.stiffness, names["held"].stiffness)
     assert np.array_equal(held.damping, names["held"].damping)

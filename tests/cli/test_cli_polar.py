@@ -7,7 +7,6 @@ from cli_run import MECHANISM, TWO_MASS, zwidth
 
 import zwidth as package
 from zwidth.chart.chart import largest_stiffness
-from zwidth.loop.loop import Loop
 
 
 def test_each_direction_is_the_chart_of_its_own():
@@ -18,7 +17,7 @@ def test_each_direction_is_the_chart_of_its_own():
     assert document["angle_deg"] == [0.0, 60.0, 120.0, 180.0, 240.0, 300.0]
     device = package.load(MECHANISM)
     for k, direction in enumerate(document["directions"]):
-        peak = largest_stiffness(Loop(device.plant(direction=direction), device.controller))
+        peak = largest_stiffness(device.at(direction=direction).loop)
         assert document["stiffness_max_N_per_m"][k] == pytest.approx(peak.stiffness, rel=1e-12)
         assert document["damping_at_stiffness_max_Ns_per_m"][k] == pytest.approx(peak.damping, rel=1e-9)
     assert document["status"] == ["ok"] * 6

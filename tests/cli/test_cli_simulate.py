@@ -64,7 +64,7 @@ def test_the_promised_keys_with_their_units():
 def test_random_walls_are_stable_and_unstable_as_the_eigenvalues_say_and_grow_so_fast(device, operator, tmp_path):
     given = package.load(device, operator=operator)
     held = (device, "--operator", operator)
-    loop = package.Loop(given.plant(), given.controller)
+    loop = given.at().loop
     chart = package.stability_chart(loop, decay=False)
     rng = np.random.default_rng(12)
     walls = [(rng.uniform(0.0, 1.6) * chart.stiffness_max, rng.uniform(0.0, 1.1) * chart.damping_max)
@@ -112,7 +112,7 @@ def test_friction_gives_the_limit_cycle_of_harmonic_balance(folder):
     """Beyond the linear edge small motions stick and large ones grow; between them is the one predicted."""
     wall = (1500.0, 0.2)
     device = package.load("rubbing.toml")
-    (predicted,) = limit_cycles(package.Loop(device.plant(), device.controller), *wall)
+    (predicted,) = limit_cycles(device.at().loop, *wall)
     assert not predicted.stable
     words = ("rubbing.toml", "--stiffness", wall[0], "--damping", wall[1], "--duration", 1.5, "--start-position")
     assert simulated(*words, 0.96 * predicted.amplitude)["stable"] is True
@@ -123,7 +123,7 @@ def test_a_force_limit_gives_the_limit_cycle_of_harmonic_balance(folder):
     """The limit stops growth where the balance says; it is good to a few per cent where little is cut off."""
     (folder / "limited.toml").write_text(RUBBING + "[loop.saturation]\nforce_N = 10.0\n")
     limited = package.load("limited.toml")
-    cycles = limit_cycles(package.Loop(limited.plant(), limited.controller), 900.0, 0.2)
+    cycles = limit_cycles(limited.at().loop, 900.0, 0.2)
     (stable,) = [cycle for cycle in cycles if cycle.stable]
     assert stable.force_amplitude < 1.25 * 10.0
     words = ("limited.toml", "--stiffness", 900, "--damping", 0.2, "--duration", 5)

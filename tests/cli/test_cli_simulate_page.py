@@ -42,7 +42,7 @@ def test_the_pages_paddle_sticks_and_grows_where_it_says(tmp_path):
     assert found(*words, 0.00100)["stable"] is True
     assert found(*words, 0.00109)["behaviour"] == "growing"
     device = package.load(tmp_path / "paddle.toml")
-    (between,) = limit_cycles(package.Loop(device.plant(), device.controller), 1500.0, 0.2)
+    (between,) = limit_cycles(device.at().loop, 1500.0, 0.2)
     assert f"{between.amplitude * 1e3:.3f} mm" in PAGE
 
 

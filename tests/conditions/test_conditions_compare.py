@@ -381,7 +381,7 @@ def test_a_pure_spring_says_nothing_about_damped_walls():
 @pytest.mark.parametrize("model", ["full", "rigid"])
 def test_bundled_devices(name, model):
     device = load(name)
-    loop = Loop(device.plant(model=model), device.controller)
+    loop = device.at(model=model).loop
     for bound in compare(loop):
         assert set(bound.violated) <= set(bound.assumptions)
         assert bound.stiffness_max_at(np.zeros((2, 3))).shape == (2, 3)

@@ -80,7 +80,7 @@ def arm(tmp_path_factory):
     file = tmp_path_factory.mktemp("arm") / "arm.toml"
     file.write_text(ARM)
     device = load(str(file))
-    return Loop(device.plant(), device.controller)
+    return device.at().loop
 
 
 @pytest.fixture(scope="module")

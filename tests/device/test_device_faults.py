@@ -12,7 +12,6 @@ from zwidth.chart.chart import largest_stiffness
 from zwidth.device.device import Device
 from zwidth.device.load import from_document
 from zwidth.device.schema.bounds import HEAVIEST, LIGHTEST
-from zwidth.loop.loop import Loop
 
 NAN, INF = float("nan"), float("inf")
 
@@ -258,7 +257,7 @@ def test_a_mass_that_no_device_has_is_refused(mass):
 def test_at_the_bounds_the_chart_is_still_the_one_of_a_mass(mass):
     """A mass scales the walls and nothing else: the largest stiffness is 0.686292 m / T^2 (thesis)."""
     device = from_document(changed(ONE_MASS, plant__mass_kg=mass))
-    stiffest = largest_stiffness(Loop(device.plant(), device.controller)).stiffness
+    stiffest = largest_stiffness(device.at().loop).stiffness
     assert stiffest * 0.001**2 / mass == pytest.approx(0.686292, abs=5e-7)
 
 

@@ -132,9 +132,9 @@ def test_a_feature_of_the_file_is_the_loop_built_by_hand(feature):
     """And its eigenvalues are those of a matrix built from nothing but the differential equations."""
     changes, plant, controller = FEATURES[feature]
     device = from_document(changed(PLANT, **changes))
-    ours = Loop(device.plant(), device.controller)
+    ours = device.at().loop
     bare = Controller(0.001, 0.5, Butterworth(2, 20.0))
-    theirs = Loop(plant(BARE.plant()), controller(bare))
+    theirs = Loop(plant(BARE.at().plant), controller(bare))
     for K, B in ((800.0, 3.0), (-200.0, 12.0)):
         assert ours.transition_matrix(K, B) == pytest.approx(theirs.transition_matrix(K, B), rel=1e-12, abs=1e-13)
         found = np.max(np.abs(eigenvalues(ours, K, B)))
@@ -157,7 +157,7 @@ def arm(**drive):
 
 def test_a_drives_winding_brakes_its_motor():
     """n^2 k^2/R at the joint, lagging by L/R, on the motor of the flexible drive."""
-    plant = from_document(arm(**WINDING, winding_inductance_H=0.005)).plant()
+    plant = from_document(arm(**WINDING, winding_inductance_H=0.005)).at().plant
     (damper,) = plant.lagged_dampers
     assert damper.damping == pytest.approx(100.0 * 0.05**2 / 2.5)
     assert damper.time_constant == pytest.approx(0.002)
@@ -166,25 +166,25 @@ def test_a_drives_winding_brakes_its_motor():
         "elbow link": 0.0,
         "shoulder motor": 1.0,  # the elbow's drive is rigid
     }
-    plain = from_document(arm()).plant()
-    without = from_document(arm(**WINDING)).plant()
+    plain = from_document(arm()).at().plant
+    without = from_document(arm(**WINDING)).at().plant
     assert without.lagged_dampers == ()
     assert without.damping - plain.damping == pytest.approx(np.diag([0.0, 0.0, 0.1]))
 
 
 def test_a_rigid_drives_winding_brakes_its_link():
-    plant = from_document(arm(**WINDING, stiffness_Nm_per_rad=np.inf)).plant()
-    plain = from_document(arm(stiffness_Nm_per_rad=np.inf)).plant()
+    plant = from_document(arm(**WINDING, stiffness_Nm_per_rad=np.inf)).at().plant
+    plain = from_document(arm(stiffness_Nm_per_rad=np.inf)).at().plant
     assert plant.damping - plain.damping == pytest.approx(np.diag([0.1, 0.0]))
 
 
 @pytest.mark.parametrize("at", ["link", "handle"])
 def test_encoders_on_the_links_read_the_handle(at):
     device = from_document(changed(ARM, loop__encoder={"at": at}))
-    plant = device.plant()
+    plant = device.at().plant
     assert plant.sensor == pytest.approx(plant.handle)
-    assert device.plant(model="two-mass").sensor.tolist() == [1.0, 0.0]
-    motor = from_document(changed(ARM, loop__encoder={"at": "motor"})).plant()
+    assert device.at(model="two-mass").plant.sensor.tolist() == [1.0, 0.0]
+    motor = from_document(changed(ARM, loop__encoder={"at": "motor"})).at().plant
     assert motor.sensor == pytest.approx(motor.actuator)
 
 

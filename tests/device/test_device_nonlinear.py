@@ -18,7 +18,7 @@ ONE = {"plant": {"mass_kg": 0.1}, "name": "m", "loop": {"sampling_period_s": 0.0
 
 
 def parts(text=PLANT, **values):
-    return from_document(changed(text, **values)).plant().nonlinear
+    return from_document(changed(text, **values)).at().plant.nonlinear
 
 
 def arm(**keys):
@@ -32,7 +32,7 @@ def test_friction_works_along_each_coordinate_that_has_any():
     assert (rubbing.coulomb, rubbing.model) == (0.1, "coulomb")
     both = parts(friction={"coulomb_N": [0.2, 0.1]}).friction
     assert [f.coulomb for f in both] == [0.2, 0.1]
-    (single,) = from_document(ONE | {"friction": {"coulomb_N": 0.3}}).plant().nonlinear.friction
+    (single,) = from_document(ONE | {"friction": {"coulomb_N": 0.3}}).at().plant.nonlinear.friction
     assert (single.along.tolist(), single.coulomb) == ([1.0], 0.3)
 
 
@@ -65,7 +65,7 @@ def test_a_kalman_filter_takes_its_noise_from_the_step_only_where_it_is_given_no
         changed(PLANT, loop__velocity=velocity | {"position_noise_m": 1e-4}, loop__encoder=step)
     )
     assert beside.controller.velocity == Kalman(10.0, 1e-4)
-    assert beside.plant().nonlinear.counters[0].step == 1e-5
+    assert beside.at().plant.nonlinear.counters[0].step == 1e-5
 
 
 def test_the_force_is_limited_where_it_is_commanded():
@@ -104,7 +104,7 @@ def test_a_two_link_arm_by_hand():
     device = from_document(changed(text, **arm(**keys), mechanism__drives__1__encoder_counts_per_rev=500.0))
     assert device.mechanism.drives.continuous_torque == pytest.approx([0.04, np.nan], nan_ok=True)
     # shoulder at the origin, elbow at (0.2, 0): the handle's x moves by -0.2 per radian of either
-    plant = device.plant()  # phi_1, phi_2, theta_1; the elbow's drive is rigid
+    plant = device.at().plant  # phi_1, phi_2, theta_1; the elbow's drive is rigid
     found = plant.nonlinear
     assert plant.handle == pytest.approx([-0.2, -0.2, 0.0])
     (rubbing,), (spring,), (brake,) = found.friction, found.springs, found.brakes
@@ -119,7 +119,7 @@ def test_a_two_link_arm_by_hand():
     assert (brake.along.tolist(), brake.damping) == ([0.0, 0.0, 1.0], pytest.approx(0.01))
     assert brake.time_constant == 0.005
     linked = from_document(changed(text, **arm(**keys), loop__encoder={"at": "link"}))
-    assert linked.plant().nonlinear.counters[0].along.tolist() == [1.0, 0.0, 0.0]
+    assert linked.at().plant.nonlinear.counters[0].along.tolist() == [1.0, 0.0, 0.0]
 
 
 def test_the_drives_friction_may_have_bristles():
@@ -160,16 +160,16 @@ def test_what_is_set_is_what_linear_answers_leave_out(device, setting, words):
     assert load(device).left_out == ()
     found = load(device, [setting])
     assert found.left_out == words
-    plant = found.plant()
+    plant = found.at().plant
     assert plant.nonlinear.left_out in (words, ())  # a limit of the computer's is not the plant's
-    before = load(device).plant()
+    before = load(device).at().plant
     assert plant.mass.tolist() == before.mass.tolist()
     assert plant.stiffness.tolist() == before.stiffness.tolist()
 
 
 def test_a_level_is_addressed_like_any_number():
     document = address.apply(changed(PLANT), ["friction.coulomb_N=[0.0, 0.1]", "friction.coulomb_N.1=0.2"])
-    assert from_document(document).plant().nonlinear.friction[0].coulomb == 0.2
+    assert from_document(document).at().plant.nonlinear.friction[0].coulomb == 0.2
     assert "friction" not in address.apply(document, ["friction=unset"])
 
 
@@ -299,16 +299,18 @@ def test_a_fault_is_one_line_at_its_key(document, key, words):
 
 
 def test_friction_against_the_ground_is_what_a_metre_of_free_motion_costs():
-    two = load("published-two-mass", ["friction.coulomb_N=[0.3, 0.1]", "loop.encoder.resolution_m=1e-5"]).plant()
+    two = (
+        load("published-two-mass", ["friction.coulomb_N=[0.3, 0.1]", "loop.encoder.resolution_m=1e-5"]).at().plant
+    )
     assert ground_friction(two) == pytest.approx(0.4)  # both masses move by a metre
     assert reading_step(two) == 1e-5
-    one = from_document(ONE | {"friction": {"coulomb_N": 0.3}}).plant()
+    one = from_document(ONE | {"friction": {"coulomb_N": 0.3}}).at().plant
     assert ground_friction(one) == 0.3
     tied = from_document(
         ONE | {"plant": {"mass_kg": 0.1, "stiffness_N_per_m": 50.0}, "friction": {"coulomb_N": 0.3}}
     )
-    assert ground_friction(tied.plant()) == pytest.approx(0.3)
-    assert ground_friction(load("hapkit-course").plant()) == 0.0
+    assert ground_friction(tied.at().plant) == pytest.approx(0.3)
+    assert ground_friction(load("hapkit-course").at().plant) == 0.0
 
 
 def test_friction_of_drives_against_the_ground_by_the_rigid_mechanism():
@@ -317,8 +319,8 @@ def test_friction_of_drives_against_the_ground_by_the_rigid_mechanism():
     device = load(
         "five-bar", [*settings, *(f"drives.motor-{s}.encoder_counts_per_rev=2000" for s in ("left", "right"))]
     )
-    posture, u = device.posture((0.05, 0.28)), np.array([0.6, 0.8, 0.0])
-    plant = device.plant((0.05, 0.28), (0.6, 0.8))
+    posture, u = device.at((0.05, 0.28)).posture, np.array([0.6, 0.8, 0.0])
+    plant = device.at((0.05, 0.28), (0.6, 0.8)).plant
     n = 18.6
     M = posture.mass_matrix + np.eye(2) * n**2 * 12.1e-7
     pushed = np.linalg.solve(M, posture.jacobian.T @ u)
@@ -331,9 +333,9 @@ def test_friction_of_drives_against_the_ground_by_the_rigid_mechanism():
 def test_what_a_file_is_silent_on_is_not_known():
     bare = load("hapkit-course")
     assert not bare.friction_known
-    assert not bare.steps_known
+    assert not bare.resolution_known
     told = load("hapkit-course", ["friction.coulomb_N=0.0", "loop.encoder.resolution_m=0.0"])
     assert told.friction_known
-    assert told.steps_known
+    assert told.resolution_known
     half = load("five-bar", ["drives.motor-left.encoder_counts_per_rev=2000"])
-    assert not half.steps_known
+    assert not half.resolution_known

@@ -11,6 +11,7 @@ from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPointError
 
 T = 0.00125
 HEAD = "frequency_Hz,real_m_per_N,imag_m_per_N"
@@ -53,10 +54,11 @@ def test_a_response_stands_beside_its_device_file(write, spectrum):
     assert len(device.response.frequency) == 100
     assert device.response.integrators == 2
     assert device.response.value[0] == pytest.approx(complex(*map(float, spectrum[1].split(",")[1:])))
-    with pytest.raises(DeviceError, match=r"has a measured \[response\] and no model"):
-        device.plant()
+    point = device.at()
+    with pytest.raises(OperatingPointError, match="the device has a measured response and no model"):
+        _ = point.plant
     with pytest.raises(DeviceError, match=r"direction: does not apply to a device given by its \[response\]"):
-        device.plant(direction=(1.0, 0.0))
+        device.at(direction=(1.0, 0.0))
 
 
 def test_coherence_and_repeated_sweeps_are_read(write, spectrum):

@@ -46,7 +46,7 @@ def test_the_listing_is_what_loading_says(name, description, source):
 
 def test_the_published_plant():
     device = load("published-two-mass")
-    plant = device.plant()
+    plant = device.at().plant
     assert plant is device.given_plant
     assert plant.mass.tolist() == [[0.2616, 0.0], [0.0, 0.0254]]
     assert plant.damping == pytest.approx(0.00012 * plant.stiffness)
@@ -56,13 +56,13 @@ def test_the_published_plant():
 
 
 def test_one_coordinate_is_driven_read_and_held():
-    plant = load("hapkit-course").plant()
+    plant = load("hapkit-course").at().plant
     assert (plant.mass.item(), plant.damping.item(), plant.stiffness.item()) == (0.03, 1.0, 0.0)
     assert plant.actuator.tolist() == plant.sensor.tolist() == plant.handle.tolist() == [1.0]
 
 
 def test_no_handle_is_made_up_for_several_coordinates():
-    assert from_document(changed(PLANT)).plant().handle is None
+    assert from_document(changed(PLANT)).at().plant.handle is None
 
 
 def test_effective_masses_of_the_device_of_the_thesis():
@@ -71,7 +71,7 @@ def test_effective_masses_of_the_device_of_the_thesis():
     m = 1/(u^T J M^-1 J^T u) with M of the links, of the rotors, of both (thesis eq. 2.18-2.20, 2.28).
     """
     device = load("five-bar")
-    posture = device.posture()
+    posture = device.at().posture
     u, J = device.direction(), posture.jacobian
     drives = device.mechanism.drives
     rotors = np.diag(drives.motor_inertia * drives.transmission**2)
@@ -93,7 +93,7 @@ def test_the_elbows_are_where_the_assembly_says(assembly):
     """With the base joints apart every assembly exists; a right elbow lies right of its arm's chord."""
     apart = ["links.upper-right.origin_m=[0.02, 0, 0]", "links.upper-left.origin_m=[-0.02, 0, 0]"]
     device = load("five-bar", apart)
-    posture = device.posture(assembly=assembly)
+    posture = device.at(assembly=assembly).posture
     passive = dict(zip(device.mechanism.links.names, posture.angles, strict=True))
     right, left = passive["distal-right"] > 0, passive["distal-left"] > 0  # turning left: the elbow is right
     wanted = {"elbows-out": (True, False), "elbows-in": (False, True)}
@@ -107,7 +107,7 @@ def test_what_a_file_is_checked_by_agrees_with_the_solver(seed):
     rng = np.random.default_rng(seed)
     device = load("five-bar")
     mechanism = device.mechanism
-    posture = device.posture(at=[rng.uniform(-0.1, 0.1), rng.uniform(0.15, 0.3)])
+    posture = device.at([rng.uniform(-0.1, 0.1), rng.uniform(0.15, 0.3)]).posture
     gap, closing = geometry._loops(mechanism, posture.angles)
     assert gap == pytest.approx(np.zeros(3), abs=1e-12)
     motions = geometry._null_space(closing)
@@ -181,8 +181,8 @@ def test_ways_of_damping(section, kind, numbers):
         ({"direction": [math.nan, 1]}, "direction: must be finite, got the list [nan, 1]"),
         ({"direction": [math.inf, 1]}, "direction: must be finite"),
         ({"direction": "up"}, "direction: must be 2 or 3 numbers, got the text 'up'"),
-        ({"at": 3}, "at: must be 2 or 3 numbers, got 3"),
-        ({"at": [0.1, math.nan]}, "at: must be finite"),
+        ({"position": 3}, "at: must be 2 or 3 numbers, got 3"),
+        ({"position": [0.1, math.nan]}, "at: must be finite"),
         (
             {"assembly": "elbows-outt"},
             "assembly: names no assembly, got 'elbows-outt'; did you mean 'elbows-out'?",
@@ -192,17 +192,17 @@ def test_ways_of_damping(section, kind, numbers):
 )
 def test_what_cannot_be_meant_is_told(asked, words):
     with pytest.raises(DeviceError) as caught:
-        load("five-bar").plant(**asked)
+        load("five-bar").at(**asked)
     assert str(caught.value) == f"five-bar: {words}" or words in str(caught.value)
 
 
 def test_a_given_plant_has_no_posture_or_direction():
     device = load("published-two-mass")
     with pytest.raises(DeviceError) as caught:
-        device.plant(at=[0, 1], direction=[0, 1], assembly="a")
+        device.at([0, 1], direction=[0, 1], assembly="a")
     assert [fault.key for fault in caught.value.faults] == ["at", "direction", "assembly"]
     with pytest.raises(DeviceError, match="has a \\[plant\\] and no \\[mechanism\\]"):
-        device.posture()
+        device.position()
 
 
 def test_two_coordinates_lie_at_the_height_of_the_reference():
@@ -212,9 +212,9 @@ def test_two_coordinates_lie_at_the_height_of_the_reference():
     assert high.position([0.05, 0.2]).tolist() == [0.05, 0.2, 0.3]
     assert high.position([0.05, 0.2, 0.1]).tolist() == [0.05, 0.2, 0.1]
     assert high.position().tolist() == [0.0, 0.25, 0.3]
-    posture = high.posture([0.05, 0.2])
+    posture = high.at([0.05, 0.2]).posture
     assert posture.position.tolist() == [0.05, 0.2, 0.3]
-    assert posture.angles == pytest.approx(low.posture([0.05, 0.2]).angles, abs=1e-12)
+    assert posture.angles == pytest.approx(low.at([0.05, 0.2]).posture.angles, abs=1e-12)
     assert high.direction([1, 0]).tolist() == [1.0, 0.0, 0.0]
 
 
@@ -230,7 +230,7 @@ def test_a_posture_out_of_reach_is_no_fault_of_the_file(settings):
 
     device = load("five-bar", settings)
     with pytest.raises(OutOfReach):
-        device.posture(at=None if settings else [0.5, 0.5])
+        device.at(None if settings else [0.5, 0.5])
 
 
 def test_arms_that_lie_on_each_other_are_not_driven():
@@ -238,13 +238,13 @@ def test_arms_that_lie_on_each_other_are_not_driven():
     from zwidth.model.posture import Singular
 
     with pytest.raises(Singular, match="do not determine the other joints"):
-        load("five-bar").posture(assembly="elbows-left")
+        load("five-bar").at(assembly="elbows-left")
 
 
 @pytest.mark.parametrize("model", [None, "full", "two-mass", "motor-mass", "rigid"])
 def test_every_model_of_the_bundled_devices(model):
     for name in ("five-bar", "published-two-mass"):
-        plant = load(name).plant(model=model)
+        plant = load(name).at(model=model).plant
         n = plant.size
         assert plant.mass.shape == plant.damping.shape == plant.stiffness.shape == (n, n)
         assert n == {None: n, "full": n, "two-mass": 2}.get(model, 1)

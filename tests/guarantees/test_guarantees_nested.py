@@ -86,7 +86,7 @@ def test_springs_with_which_two_modes_have_one_alias_are_found(tmp_path):
     (device,) = (one for one in random_devices() if one.word == "plant-23.toml")
     (tmp_path / device.word).write_text(device.files[device.word])
     described = load(tmp_path / device.word)
-    loop = Loop(described.plant(), described.controller)
+    loop = described.at().loop
     springs, region = Springs.of(loop), spring_stable_region(loop)
     K, B = np.ascontiguousarray(inside(region, 5e-5)[::20].T)
     shares = np.linspace(0.98545, 0.98585, 41)

@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.model.model_cases import rotation_about
 from zwidth.loop.controller import Controller
-from zwidth.measures.place import Place
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.mechanism import DriveNonlinearity, Mechanism
 from zwidth.model.posture import solve_posture
 
@@ -44,7 +44,8 @@ def place_at(mechanism, positions, direction):
     """The mechanism with its handle at positions (..., 3), rendering directions (..., 3) of any length."""
     posture = solve_posture(mechanism, np.asarray(positions, float))
     u = np.broadcast_to(np.asarray(direction, float), (*posture.status.shape, 3))
-    return Place(Controller(0.001), mechanism, posture, u / np.linalg.norm(u, axis=-1, keepdims=True))
+    units = u / np.linalg.norm(u, axis=-1, keepdims=True)
+    return OperatingPoint(Controller(0.001), mechanism, posture, units[..., None, :])
 
 
 def moved(mechanism: Mechanism) -> Mechanism:

@@ -15,39 +15,38 @@ from zwidth.chart.verdict import spectral_radius
 from zwidth.loop.controller import Controller, FirstOrder
 from zwidth.loop.estimators import WindowedDifference
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import MEASURES
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.fidelity import optimal_mass
-from zwidth.measures.measure import NO_VALUE, OK, OUT_OF_REACH, MeasureError
-from zwidth.measures.place import Place, Wanted
+from zwidth.measures.measure import NO_VALUE, OK, OUT_OF_REACH, MeasureError, WantedWall
 from zwidth.measures.structural import structural_distortion
 from zwidth.model.operator import Operator
-from zwidth.study.places import place_of
 
 CLOSED = ("stiffness_max_closed_form", "damping_max_closed_form", "stable_area_closed_form")
 OPTIMAL = ("optimal_spectral_radius", "optimal_motor_side_mass")
-WANTED = Wanted(3000.0, 15.0, 10.0)
+WANTED = WantedWall(3000.0, 15.0, 10.0)
 POSITIONS = [
     [[0.0, 0.25, 0.0], [0.05, 0.2, 0.0]],
     [[-0.1, 0.22, 0.0], [0.9, 0.9, 0.0]],
 ]  # the last is out of reach
 
 
-def five_bar(model="full", wanted=WANTED):
-    return place_of(zwidth.load("five-bar"), POSITIONS, model=model, wanted=wanted)
+def five_bar(model="full"):
+    return zwidth.load("five-bar").at(POSITIONS, model=model)
 
 
-def given(plant, wanted=WANTED, model=None, operator=None, **controller):
-    return Place(Controller(0.00125, **controller), given=plant, model=model, operator=operator, wanted=wanted)
+def given(plant, model=None, operator=None, **controller):
+    return OperatingPoint(Controller(0.00125, **controller), given_plant=plant, model=model, operator=operator)
 
 
-def ask(name, place):
-    return evaluate(MEASURES[name], place)
+def ask(name, point, wanted=WANTED):
+    return evaluate(MEASURES[name].at_wall(wanted), point)
 
 
-def refused(name, place, match):
+def refused(name, point, match, wanted=WANTED):
     with pytest.raises(MeasureError, match=match):
-        ask(name, place)
+        ask(name, point, wanted)
 
 
 # --- closed forms of the impedance range ---
@@ -58,7 +57,7 @@ def test_they_are_exact_for_the_device_without_damping(model):
     place = five_bar(model)
     found = [ask(name, place) for name in CLOSED]
     for index in ((0, 0), (0, 1), (1, 0)):
-        plant = place.at(*index).plant
+        plant = place[index].plant
         assert (plant.damping[0, 0] > 0.0) == (model == "motor-mass")
         chart = stability_chart(Loop(replace(plant, damping=0.0 * plant.damping), place.controller), decay=False)
         ours = [one.values[index] for one in found]
@@ -71,8 +70,8 @@ def test_they_are_exact_for_the_device_without_damping(model):
 @pytest.mark.parametrize("model", ["full", "two-mass"])
 def test_other_models_have_none(model):
     for name in CLOSED:
-        refused(name, five_bar(model), "two models only; give --model rigid or --model motor-mass")
-    refused(CLOSED[0], given(two_mass(0.26, 0.0254, 15620.0)), "give --model")
+        refused(name, five_bar(model), "two models only; give model='rigid' or model='motor-mass'")
+    refused(CLOSED[0], given(two_mass(0.26, 0.0254, 15620.0)), "give model=")
 
 
 def test_a_given_plant_is_seen_for_what_it_is():
@@ -116,7 +115,7 @@ def test_what_only_one_of_them_refuses():
     refused(CLOSED[0], replace(motors, controller=replace(motors.controller, delay=1.0)), "without delay")
     refused(CLOSED[0], replace(motors, encoders="link"), "encoders read the links")
     hand = Operator(0.8, 580.0, 5.5, 1e4, 5.0)
-    refused(CLOSED[0], replace(five_bar("rigid"), operator=hand), "--operator none")
+    refused(CLOSED[0], replace(five_bar("rigid"), operator=hand), "operator='none'")
     refused(CLOSED[0], given(replace(mass(0.287), sensor=np.array([-1.0]))), "where the encoder reads")
     assert ask(CLOSED[0], replace(motors, operator=hand)).status[0, 0] == OK  # the link side is held still anyhow
 
@@ -153,7 +152,7 @@ def test_the_optimum_of_a_mechanism_takes_its_stiffness():
         assert ours.status.tolist() == [[OK, OK], [OK, OUT_OF_REACH]]
         for model in ("rigid", "two-mass", "motor-mass"):
             assert_allclose(ask(name, five_bar(model)).values, values)
-    little = ask(OPTIMAL[0], five_bar(wanted=Wanted(3000.0, 1.0)))
+    little = ask(OPTIMAL[0], five_bar(), WantedWall(3000.0, 1.0))
     assert little.status[0, 0] == NO_VALUE
     assert "B > K T/2" in little.notes[0].reason
 
@@ -172,27 +171,30 @@ def test_the_radius_and_decay_of_any_loop():
     place = five_bar()
     radius, decay = ask("spectral_radius", place), ask("decay_time", place)
     for index in ((0, 0), (0, 1), (1, 0)):
-        expected = float(spectral_radius(place.at(*index).loop, 3000.0, 15.0))
+        expected = float(spectral_radius(place[index].loop, 3000.0, 15.0))
         assert radius.values[index] == expected
         assert np.exp(-place.controller.sampling_period / decay.values[index]) == pytest.approx(
             expected, rel=1e-12
         )
     assert radius.status[1, 1] == decay.status[1, 1] == OUT_OF_REACH
-    unstable = ask("decay_time", given(published().plant, Wanted(20000.0, 10.0)))
+    unstable = ask("decay_time", given(published().plant), WantedWall(20000.0, 10.0))
     assert unstable.status == NO_VALUE
     assert unstable.notes[0].reason == "the wanted wall is unstable here, so that vibration does not decay"
-    assert float(ask("spectral_radius", given(published().plant, Wanted(20000.0, 10.0))).values) > 1.0
+    assert float(ask("spectral_radius", given(published().plant), WantedWall(20000.0, 10.0)).values) > 1.0
 
 
 def test_felt_at_low_frequency_is_felt_at_rest():
     """K k/(K + k), and the mass in free motion, jw m."""
-    slow = Wanted(4000.0, 15.0, 0.01)
-    place = given(published().plant, slow)
+    slow = WantedWall(4000.0, 15.0, 0.01)
+    place = given(published().plant)
     series = 4000.0 * 15620.0 / 19620.0
-    assert float(ask("felt_stiffness", place).values) == pytest.approx(series, rel=1e-5)
-    assert float(ask("free_motion_force", place).values) == pytest.approx(2.0 * np.pi * 0.01 * 0.287, rel=1e-5)
-    for name, wanted in (("felt_stiffness", Wanted(20000.0, 10.0, 1.0)), ("decay_time", Wanted(20000.0, 10.0))):
-        found = ask(name, given(published().plant, wanted))
+    assert float(ask("felt_stiffness", place, slow).values) == pytest.approx(series, rel=1e-5)
+    assert float(ask("free_motion_force", place, slow).values) == pytest.approx(
+        2.0 * np.pi * 0.01 * 0.287, rel=1e-5
+    )
+    unstable = WantedWall(20000.0, 10.0, 1.0)
+    for name, wanted in (("felt_stiffness", unstable), ("decay_time", unstable)):
+        found = ask(name, given(published().plant), wanted)
         assert found.status == NO_VALUE
         assert "unstable here" in found.notes[0].reason
 
@@ -211,25 +213,25 @@ def test_what_is_felt_and_deforms_is_the_device_without_the_hand():
 def test_the_distortion_of_a_place():
     place = five_bar()
     found = ask("structural_distortion", place)
-    assert found.values[0, 1] == structural_distortion(place.at(0, 1).plant, 10.0)
-    assert float(ask("structural_distortion", five_bar("rigid").at(0, 0)).values) == 0.0
+    assert found.values[0, 1] == structural_distortion(place[0, 1].plant, 10.0)
+    assert float(ask("structural_distortion", five_bar("rigid")[0, 0]).values) == 0.0
 
 
 @pytest.mark.parametrize("name", [*OPTIMAL, "spectral_radius", "decay_time", "felt_stiffness"])
 def test_a_wall_has_to_be_told(name):
-    for wanted in (Wanted(frequency=1.0), Wanted(100.0, None, 1.0), Wanted(None, 1.0, 1.0)):
-        refused(name, five_bar(wanted=wanted), "needs a wanted wall; give --stiffness and --damping")
+    for wanted in (WantedWall(frequency=1.0), WantedWall(100.0, None, 1.0), WantedWall(None, 1.0, 1.0)):
+        refused(name, five_bar(), "needs a wanted wall; give stiffness and damping", wanted)
 
 
 @pytest.mark.parametrize("name", ["felt_stiffness", "free_motion_force", "structural_distortion"])
 def test_a_frequency_has_to_be_told_and_a_handle_to_be_there(name):
-    refused(name, five_bar(wanted=Wanted(100.0, 1.0)), "needs a frequency .* give --frequency")
-    refused(name, five_bar(wanted=Wanted(100.0, 1.0, -1.0)), "above 0 Hz")
+    refused(name, five_bar(), "needs a frequency .* give frequency", WantedWall(100.0, 1.0))
+    refused(name, five_bar(), "above 0 Hz", WantedWall(100.0, 1.0, -1.0))
     refused(name, five_bar("motor-mass"), "needs a handle, and the model motor-mass has none")
     refused(name, given(replace(published().plant, handle=None)), "needs a handle, and the device has none")
 
 
 def test_only_below_half_the_sampling_frequency_a_wall_is_felt():
     refused(
-        "felt_stiffness", five_bar(wanted=Wanted(100.0, 1.0, 400.0)), "below half the sampling frequency, 400 Hz"
+        "felt_stiffness", five_bar(), "below half the sampling frequency, 400 Hz", WantedWall(100.0, 1.0, 400.0)
     )

@@ -222,7 +222,7 @@ def five_bar_by_hand(position):
 @pytest.mark.parametrize("position", [(0.0, 0.25), (0.1, 0.15), (-0.2, 0.22), (0.0, 0.1)])
 def test_the_bundled_device_in_closed_form(position):
     turning, reaching = five_bar_by_hand(position)
-    posture = load("five-bar").posture(position)
+    posture = load("five-bar").at(position).posture
     assert_allclose(manipulability(posture.jacobian), turning * reaching, rtol=1e-10)
     kappa = max(turning, reaching) / min(turning, reaching)
     assert_allclose(isotropy(posture.jacobian), kappa, rtol=1e-10)

@@ -193,12 +193,12 @@ def test_one_mass_feels_its_wall_and_its_spring():
 
 def test_a_mechanism_that_slides_along_its_wall_is_felt_across_it():
     device = load("five-bar")
-    plant = device.plant()
-    k = float(effective_parameters(device.mechanism, device.posture(), device.direction()).stiffness)
+    plant = device.at().plant
+    k = float(effective_parameters(device.mechanism, device.at().posture, device.direction()).stiffness)
     for K in (0.0, 500.0, 7800.0):
         assert float(static_stiffness(plant, K)) == pytest.approx(K * k / (K + k), rel=1e-9, abs=1e-9)
     assert hardest_static_stiffness(plant) == pytest.approx(k, rel=1e-9)
-    rigid = float(effective_parameters(device.mechanism, device.posture(), device.direction()).rigid_mass)
+    rigid = float(effective_parameters(device.mechanism, device.at().posture, device.direction()).rigid_mass)
     assert free_motion_mass(plant) == pytest.approx(rigid, rel=1e-9)
 
 
@@ -233,7 +233,7 @@ def test_a_fast_soft_wall_feels_as_commanded():
 
 
 def test_without_a_handle_nothing_is_felt():
-    plant = load("five-bar").plant(model="motor-mass")
+    plant = load("five-bar").at(model="motor-mass").plant
     with pytest.raises(HandleError, match="no handle"):
         static_stiffness(plant, 100.0)
     with pytest.raises(HandleError):

@@ -12,7 +12,6 @@ from zwidth.measures.bindings import impedance
 from zwidth.measures.catalogue import MEASURES, find_measure
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import NO_VALUE, OK, OUT_OF_REACH
-from zwidth.study.places import place_of
 
 AT = np.array([[[0.0, 0.25, 0.0], [0.08, 0.2, 0.0]], [[-0.12, 0.22, 0.0], [0.9, 0.9, 0.0]]])
 SETTINGS = (
@@ -35,10 +34,10 @@ CASES += [(model, settings) for model in ("two-mass", "motor-mass", "rigid") for
 def test_the_largest_stiffness_of_many_places_is_each_chart_s_own(model, settings):
     device = load("five-bar", settings)
     direction = (0.6, 0.8)
-    found = evaluate(find_measure("stiffness_max"), place_of(device, AT, direction, model=model))
+    found = evaluate(find_measure("stiffness_max"), device.at(AT, direction, model=model))
     assert found.status[1, 1] == OUT_OF_REACH
     for index in ((0, 0), (0, 1), (1, 0)):
-        plant = device.plant(AT[index], direction, model=model)
+        plant = device.at(AT[index], direction, model=model).plant
         peak = largest_stiffness(Loop(plant, device.controller))
         if peak is None:
             assert found.status[index] == NO_VALUE
@@ -49,31 +48,31 @@ def test_the_largest_stiffness_of_many_places_is_each_chart_s_own(model, setting
 
 def test_a_model_that_does_not_apply_is_a_note_and_no_failure():
     device = load("five-bar", ["loop.encoder.at=link"])
-    found = evaluate(find_measure("stiffness_max"), place_of(device, AT[0], model="motor-mass"))
+    found = evaluate(find_measure("stiffness_max"), device.at(AT[0], model="motor-mass"))
     assert (found.status == NO_VALUE).all()
     assert "the sensor reads nothing of what moves in this model" in found.notes[0].reason
 
 
 def test_places_without_a_stable_wall_say_so():
     device = load("five-bar", ["mechanism.damping.mode_ratio=0", "loop.delay_samples=2"])
-    found = evaluate(find_measure("stiffness_max"), place_of(device, AT))
+    found = evaluate(find_measure("stiffness_max"), device.at(AT))
     assert (found.status[found.status != OUT_OF_REACH] == NO_VALUE).all()
     (note,) = found.notes
     assert (note.reason, note.count, note.first) == (impedance.NO_WALL, 3, (0, 0))
 
 
 def test_a_direction_in_which_the_handle_cannot_move_has_no_value_and_says_why():
-    found = evaluate(find_measure("stiffness_max"), place_of(load("five-bar"), AT, (0.0, 0.0, 1.0)))
+    found = evaluate(find_measure("stiffness_max"), load("five-bar").at(AT, (0.0, 0.0, 1.0)))
     assert (found.status[found.status != OUT_OF_REACH] == NO_VALUE).all()
     assert "cannot move along the direction" in found.notes[0].reason
 
 
 def test_an_operator_counts():
     held = load("five-bar", operator="thesis-arm")
-    alone = evaluate(find_measure("stiffness_max"), place_of(load("five-bar"), AT[0]))
-    found = evaluate(find_measure("stiffness_max"), place_of(held, AT[0]))
+    alone = evaluate(find_measure("stiffness_max"), load("five-bar").at(AT[0]))
+    found = evaluate(find_measure("stiffness_max"), held.at(AT[0]))
     for i in range(2):
-        peak = largest_stiffness(Loop(held.plant(AT[0, i]), held.controller))
+        peak = largest_stiffness(held.at(AT[0, i]).loop)
         assert found.values[i] == pytest.approx(peak.stiffness, rel=1e-9)
     assert (np.abs(found.values / alone.values - 1.0) > 1e-3).all()
 
@@ -81,8 +80,8 @@ def test_an_operator_counts():
 @pytest.mark.parametrize("name", ["stiffness_max", "damping_max", "stable_area", "fastest_decay"])
 def test_a_given_plant_is_one_place(name):
     device = load("published-two-mass")
-    found = evaluate(MEASURES[name], place_of(device))
-    chart = stability_chart(Loop(device.plant(), device.controller))
+    found = evaluate(MEASURES[name], device.at())
+    chart = stability_chart(device.at().loop)
     wanted = chart.fastest_decay.spectral_radius if name == "fastest_decay" else getattr(chart, name)
     assert found.status == OK
     assert found.values == pytest.approx(wanted, rel=1e-9)
@@ -90,7 +89,7 @@ def test_a_given_plant_is_one_place(name):
 
 def test_the_answers_of_a_batch_do_not_depend_on_who_else_is_in_it():
     device = load("five-bar")
-    whole = evaluate(find_measure("stiffness_max"), place_of(device, AT))
+    whole = evaluate(find_measure("stiffness_max"), device.at(AT))
     for index in ((0, 0), (0, 1), (1, 0)):
-        alone = evaluate(find_measure("stiffness_max"), place_of(device, AT[index][None]))
+        alone = evaluate(find_measure("stiffness_max"), device.at(AT[index][None]))
         assert alone.values[0] == whole.values[index]

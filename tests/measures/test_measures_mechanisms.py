@@ -19,7 +19,6 @@ from zwidth.measures.measure import NO_VALUE, OK, OUT_OF_REACH, MeasureError
 from zwidth.model.damping import GivenDamping
 from zwidth.model.directions import reduce_directions
 from zwidth.model.effective import effective_parameters
-from zwidth.study.places import place_of
 
 MINE = [name for name, m in MEASURES.items() if str(m.function).split(":")[0].endswith(("dexterity", "forces"))]
 # Exponents of lengths and masses in each measure, r being the number of drives; all others have none of either.
@@ -119,7 +118,7 @@ def test_the_masses_felt_at_the_handle_lie_within_what_its_isotropy_says(kind):
     said = values("handle_mass_isotropy", place)
     rng = np.random.default_rng(0)
     for k in range(4):
-        one = place.at(k)
+        one = place[k]
         span = np.linalg.qr(one.jacobian)[0]
         directions = rng.normal(size=(20000, span.shape[1])) @ span.T
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -150,7 +149,7 @@ def test_where_there_is_no_posture_there_is_no_value():
         assert np.array_equal(np.isnan(found.values), found.status != OK)
         assert np.array_equal(found.status, place.status)
         index = tuple(np.argwhere(place.status == OK)[0])
-        assert_allclose(find_measure(name).compute(place.at(*index)), found.values[index])
+        assert_allclose(find_measure(name).compute(place[index]), found.values[index])
 
 
 def test_across_the_plane_friction_has_no_value_and_the_handle_no_acceleration():
@@ -209,7 +208,7 @@ def test_a_two_link_arm_by_hand():
     motion along x alone turns the elbow by -5 rad/m, one along y the shoulder by 5 and the elbow by -5.
     """
     device = arm(**FULL)
-    along = {axis: place_of(device, [0.2, 0.2, 0.0], axis) for axis in ((1.0, 0.0), (0.0, 1.0))}
+    along = {axis: device.at([0.2, 0.2, 0.0], axis) for axis in ((1.0, 0.0), (0.0, 1.0))}
     step = 2.0 * np.pi / (2000.0 * 10.0)
     by_hand = {
         "peak_force": (10 * 0.2 / 0.2, 10 * 0.2 / 0.2),
@@ -241,27 +240,27 @@ def test_a_two_link_arm_by_hand():
 def test_what_the_file_does_not_tell_is_asked_for_by_its_key(name, key):
     measure = find_measure(name)
     with pytest.raises(MeasureError, match=rf"^needs .*give mechanism\.drives\.shoulder\.{key}"):
-        evaluate(measure, place_of(arm()))
+        evaluate(measure, arm().at())
     half = from_document(changed(ARM, **{f"mechanism__drives__0__{key}": 0.01 if "Nm" in key else 100.0}))
     if name == "friction_force":  # a drive without the key has none
-        assert values(name, place_of(half)) > 0.0
+        assert values(name, half.at()) > 0.0
     else:
         with pytest.raises(MeasureError, match=rf"give mechanism\.drives\.elbow\.{key}"):
-            evaluate(measure, place_of(half))
+            evaluate(measure, half.at())
 
 
 def test_a_limit_of_inf_is_none():
     with pytest.raises(MeasureError, match="needs a finite torque_limit_Nm of every drive"):
-        evaluate(find_measure("peak_force"), place_of(arm(torque_limit_Nm=float("inf"))))
+        evaluate(find_measure("peak_force"), arm(torque_limit_Nm=float("inf")).at())
 
 
 def test_a_plant_has_no_drives_and_reads_and_rubs_where_the_wall_acts():
-    given = place_of(from_document(changed(PLANT)))
+    given = from_document(changed(PLANT)).at()
     for name in set(MINE) - {"link_side_mass", "motor_side_mass", "rigid_mass", "stiffness"}:
         with pytest.raises(MeasureError):
             evaluate(find_measure(name), given)
     told = {"friction__coulomb_N": [0.0, 0.1], "loop__encoder": {"resolution_m": 2e-5}}
-    place = place_of(from_document(changed(PLANT, **told)))
+    place = from_document(changed(PLANT, **told)).at()
     assert_allclose(values("position_resolution", place), 2e-5)
     assert_allclose(values("friction_force", place), 0.1)
     assert_allclose(values("rigid_mass", place), 0.32)
@@ -269,8 +268,8 @@ def test_a_plant_has_no_drives_and_reads_and_rubs_where_the_wall_acts():
 
 def test_the_bundled_devices_continuous_force_is_what_its_source_gives():
     """Nominal current times torque constant, geared, along y where the handle's lever is in closed form."""
-    place = place_of(load("five-bar"))
-    lever = np.abs(place.along)
+    place = load("five-bar").at()
+    lever = np.abs(place.lever_arms)
     torque = 0.659 * 0.0502 * 18.6
     assert_allclose(values("continuous_force", place), torque / lever.max(), rtol=1e-3)
     with pytest.raises(MeasureError, match=r"give mechanism\.drives\.motor-right\.torque_limit_Nm"):

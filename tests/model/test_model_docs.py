@@ -88,4 +88,4 @@ def test_the_pages_damping_of_the_pair(names, model):
     felt = names["felt"]
     m1, m2, k = (float(x) for x in (felt.link_side_mass, felt.motor_side_mass, felt.stiffness))
     b = 2 * names["device"].damping.ratio * np.sqrt(k * m1 * m2 / (m1 + m2))
-    assert names["device"].plant(model=model).damping[-1, -1] == pytest.approx(b, rel=1e-12)
+    assert names["device"].at(model=model).plant.damping[-1, -1] == pytest.approx(b, rel=1e-12)

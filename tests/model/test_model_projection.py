@@ -17,21 +17,21 @@ def test_a_position_beside_the_circle_is_projected_along_the_radius(device):
     rng = np.random.default_rng(5)
     for turn, off in zip(rng.uniform(0.2, 2.9, 4), rng.uniform(-0.009, 0.009, 4) * LENGTH, strict=True):
         out = np.array([np.cos(turn), np.sin(turn), 0.0])
-        posture = device.posture((LENGTH + off) * out)
+        posture = device.at((LENGTH + off) * out).posture
         assert posture.position == pytest.approx(LENGTH * out, abs=1e-12)
         assert posture.projected == pytest.approx(abs(off), rel=1e-9)
         assert posture.angles[0] == pytest.approx(turn, abs=1e-10)
 
 
 def test_a_position_that_is_had_is_not_moved(device):
-    posture = device.posture((0.0, LENGTH))
+    posture = device.at((0.0, LENGTH)).posture
     assert posture.position.tolist() == [0.0, LENGTH, 0.0]
     assert posture.projected == 0.0
 
 
 def test_far_off_the_nearest_position_is_named(device):
     with pytest.raises(OutOfReach, match=r"the nearest that it has is \(0.054, 0.072, 0\) m, 10 mm away"):
-        device.posture((0.06, 0.08))
+        device.at((0.06, 0.08))
     with pytest.raises(OutOfReach, match="the nearest that it has"):
         solve_posture(device.mechanism, (0.0, LENGTH + 1e-6))  # without a tolerance
 
@@ -49,21 +49,21 @@ def test_beyond_the_edge_of_a_plane_nothing_is_projected_and_what_is_named_can_b
     """At the edge the drives lose the handle: the nearest is a little within."""
     arms = load("five-bar")
     with pytest.raises(OutOfReach, match="the nearest that it has is") as caught:
-        arms.posture((0.02, 0.35))
+        arms.at((0.02, 0.35))
     named = str(caught.value).split("is (")[1].split(")")[0]
     nearest = np.array([float(number) for number in named.split(",")])
-    assert arms.posture(nearest).status == OK
+    assert arms.at(nearest).posture.status == OK
     assert np.linalg.norm(nearest - [0.02, 0.35, 0.0]) < 0.02
 
 
 def test_a_posture_is_given_by_its_driven_joints(device):
-    posture = device.posture({"lever": 1.2})
+    posture = device.at({"lever": 1.2}).posture
     assert posture.angles[0] == pytest.approx(1.2, abs=1e-12)
     assert posture.position == pytest.approx(LENGTH * np.array([np.cos(1.2), np.sin(1.2), 0.0]), abs=1e-15)
     arms = load("five-bar")
-    reference = arms.posture()
+    reference = arms.at().posture
     names = [arms.mechanism.links.names[joint] for joint in arms.mechanism.drives.joint]
     turned = dict(zip(names, reference.angles[arms.mechanism.drives.joint] + [0.1, -0.2], strict=True))
-    posture = arms.posture(turned)
+    posture = arms.at(turned).posture
     assert posture.angles[arms.mechanism.drives.joint] == pytest.approx(list(turned.values()), abs=1e-9)
     assert posture.closure_residual < 1e-14

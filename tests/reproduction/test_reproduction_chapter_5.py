@@ -9,7 +9,6 @@ import pytest
 from later import Later
 
 from zwidth.device.load import load
-from zwidth.study.places import place_of
 
 five_bar = Later("gallery.five_bar")
 designs = Later("gallery.designs")
@@ -42,7 +41,7 @@ def test_the_five_bar_by_hand():
     position = np.stack(np.meshgrid([-0.2, -0.03, 0.11], [0.07, 0.15, 0.27]), axis=-1)
     in_space = np.concatenate([position, np.zeros((3, 3, 1))], axis=-1)
     for name in ("elbows-out", "elbows-in"):
-        place = place_of(load("five-bar"), in_space, assembly=name)
+        place = load("five-bar").at(in_space, assembly=name)
         felt = five_bar.bundled().at(position, name)
         same(place, felt)
         np.testing.assert_allclose(place.mass_matrix, felt.mass_matrix, rtol=1e-10, atol=1e-16)
@@ -273,12 +272,10 @@ def test_the_motors():
 def test_another_motor_by_hand():
     bar = five_bar.bundled()
     felt = replace(bar, rotor=(3.0 * bar.rotor[0], bar.rotor[1])).at(designs.REFERENCE, "elbows-in")
-    place = place_of(motor.with_first_motor(3.0 * motor.BUNDLED), motor.POSITION, assembly="elbows-in")
+    place = motor.with_first_motor(3.0 * motor.BUNDLED).at(motor.POSITION, assembly="elbows-in")
     same(place, felt)
     asked = load("five-bar", [("mechanism.drives.motor-right.motor_inertia_kg_m2", 3.0 * motor.BUNDLED)])
-    assert place_of(asked, motor.POSITION, assembly="elbows-in").effective.rigid_mass == pytest.approx(
-        felt.rigid_mass
-    )
+    assert asked.at(motor.POSITION, assembly="elbows-in").effective.rigid_mass == pytest.approx(felt.rigid_mass)
 
 
 # Figs. 5.10 to 5.14

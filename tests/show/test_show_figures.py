@@ -31,7 +31,7 @@ from zwidth.show.output import OutputError
 
 def loop_of(name, changes=()):
     device = load(name, changes)
-    return Loop(device.plant(), device.controller)
+    return device.at().loop
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_nothing_stable_is_said_and_has_no_scale():
 
 def test_models_lie_over_each_other_with_unlike_lines(chart):
     _, ax = figure()
-    rigid = stability_chart(Loop(load("five-bar").plant(model="rigid"), chart.loop.controller))
+    rigid = stability_chart(Loop(load("five-bar").at(model="rigid").plant, chart.loop.controller))
     draw_models(ax, {"full": chart, "rigid": rigid})
     drawn = [line for line in ax.lines if line.get_label() in ("full", "rigid")]
     assert [line.get_xdata().max() for line in drawn] == pytest.approx([chart.stiffness_max, rigid.stiffness_max])
@@ -188,7 +188,7 @@ def test_a_tenth_is_left_after_the_tenfold_time(radius, period):
 
 def test_the_mechanism_is_drawn_to_scale():
     device = load("five-bar")
-    posture = device.posture((0.03, 0.22))
+    posture = device.at((0.03, 0.22)).posture
     made, ax = figure(5.0, 4.0)
     draw_mechanism(ax, device, posture, device.direction((1.0, 0.0)))
     made.draw_without_rendering()
@@ -204,7 +204,7 @@ def test_the_mechanism_is_drawn_to_scale():
 def test_names_of_drives_keep_clear_of_the_links():
     device = load("five-bar")
     made, ax = figure(6.2, 4.4)
-    draw_mechanism(ax, device, device.posture(), device.direction())
+    draw_mechanism(ax, device, device.at().posture, device.direction())
     made.draw_without_rendering()
     box = ax.texts[0].get_window_extent()
     assert ax.texts[0].get_path_effects()
@@ -220,7 +220,7 @@ def test_names_of_drives_keep_clear_of_the_links():
 def test_drives_apart_are_named_apart():
     device = load("five-bar", ["links.upper-left.origin_m=[-0.05, 0, 0]"])
     _, ax = figure(5.0, 4.0)
-    draw_mechanism(ax, device, device.posture(), device.direction())
+    draw_mechanism(ax, device, device.at().posture, device.direction())
     assert {"motor-right", "motor-left"} == {text.get_text() for text in ax.texts}
 
 

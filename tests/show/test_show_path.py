@@ -20,7 +20,7 @@ def drawn(surface=BALL, **settings):
     scene = (device.mechanism, device.damping, device.controller, wall, surface)
     motion = zwidth.simulate_mechanism(*scene, **({"push": (0.02, 1.0, 0.0), "duration": 0.25} | settings))
     made, axes = path_figure()
-    draw_path(axes, device.mechanism, device.posture(), motion, surface)
+    draw_path(axes, device.mechanism, device.at().posture, motion, surface)
     made.canvas.draw()
     return motion, made, axes
 

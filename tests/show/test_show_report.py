@@ -180,7 +180,7 @@ def test_the_same_device_makes_the_same_page(report_of):
 
 def test_questions_reach_the_page(tmp_path):
     device = load("five-bar")
-    found = write_report(device, tmp_path / "a.html", at=(0.02, 0.2), direction=(1.0, 0.0), model="two-mass")
+    found = write_report(device, tmp_path / "a.html", device.at((0.02, 0.2), (1.0, 0.0), model="two-mass"))
     assert found["position_m"] == pytest.approx([0.02, 0.2, 0.0])
     assert found["model"] == "two-mass"
     assert found["summary"][0].startswith("Along x at (0.02, 0.2)\u00a0m the two-mass model")
@@ -188,7 +188,7 @@ def test_questions_reach_the_page(tmp_path):
 
 def test_a_posture_out_of_reach_writes_nothing(tmp_path):
     with pytest.raises(OutOfReach):
-        write_report(load("five-bar"), tmp_path / "a.html", at=(5.0, 5.0))
+        write_report(load("five-bar"), tmp_path / "a.html", load("five-bar").at((5.0, 5.0)))
     assert list(tmp_path.iterdir()) == []
 
 

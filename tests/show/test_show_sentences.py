@@ -17,14 +17,14 @@ from zwidth.show.report.facts import gather
 
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"
 FIRST_ORDER = "loop.velocity.filter={type='first-order', time_constant_s=0.002}"
-RIGID = ("drives.motor-right.stiffness_Nm_per_rad=unset", "drives.motor-left.stiffness_Nm_per_rad=unset")
+RIGID = tuple(f"drives.motor-{side}.stiffness_Nm_per_rad=unset" for side in ("right", "left"))
 LATE = "loop.delay_samples=1"
 UNDAMPED = "plant.damping_Ns_per_m=unset"
 
 
 @cache
 def facts(name, *changes, **question):
-    return gather(load(name, changes), **question)
+    return gather(device := load(name, changes), device.at(**question))
 
 
 @cache
@@ -80,7 +80,7 @@ RENDERS = [
     (lambda: facts("five-bar"), f"{HERE} 7.849 kN/m, at 10.82 Ns/m of virtual damping."),
     (lambda: facts("five-bar", LATE), f"{HERE} 1.708 kN/m, at 3.216 Ns/m of virtual damping."),
     (
-        lambda: facts("five-bar", at=(0.02, 0.2), direction=(-1.0, 0.0)),
+        lambda: facts("five-bar", position=(0.02, 0.2), direction=(-1.0, 0.0)),
         "Along −x at (0.02, 0.2) m this device renders walls of up to ",
     ),
     (

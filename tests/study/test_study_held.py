@@ -29,13 +29,13 @@ def stiffest(device, plant):
 
 
 def test_twice_the_damping_is_the_devices_and_not_the_arms(device, variants):
-    alone = device.plant(held=False)
+    alone = device.at().unheld_plant
     twice = attach(replace(alone, damping=2.0 * alone.damping), device.operator)
     assert find(variants, "twice-damping").stiffness_max == pytest.approx(stiffest(device, twice), rel=1e-12)
 
 
 def test_a_model_without_damping_keeps_the_operators(device, variants):
-    alone = device.plant(model="rigid", held=False)
+    alone = device.at(model="rigid").unheld_plant
     bare = replace(alone, damping=0.0 * alone.damping)
     expected = stiffest(device, attach(bare, device.operator))
     assert find(variants, "model-rigid-undamped").stiffness_max == pytest.approx(expected, rel=1e-12)
@@ -44,11 +44,11 @@ def test_a_model_without_damping_keeps_the_operators(device, variants):
 def test_the_motor_mass_holds_the_operator_fixed(device, variants):
     fixed = find(variants, "model-motor-mass")
     assert fixed.loop.plant.size == 1
-    assert fixed.stiffness_max == pytest.approx(stiffest(device, device.plant(model="motor-mass", held=False)))
+    assert fixed.stiffness_max == pytest.approx(stiffest(device, device.at(model="motor-mass").unheld_plant))
 
 
 def test_a_model_that_the_device_is_already_is_seen_to_be(device, variants):
-    assert device.plant() is device.plant(model="two-mass")
+    assert device.at().unheld_plant is device.at(model="two-mass").unheld_plant
     assert find(variants, "model-two-mass").reason == "the device as described is this model"
 
 

@@ -30,7 +30,7 @@ def plain(**plant):
 
 
 def family(device, *ranges, operators=()):
-    return Family(device, ranges, operators, lambda one, held: one.plant(held=held))
+    return Family(device, ranges, operators, device.at())
 
 
 def held():

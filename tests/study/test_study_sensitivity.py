@@ -41,7 +41,7 @@ def answered(name, *settings):
 
 
 def largest(device):
-    peak = largest_stiffness(Loop(device.plant(), device.controller))
+    peak = largest_stiffness(device.at().loop)
     return peak.stiffness
 
 

@@ -63,7 +63,7 @@ def test_a_scaled_mass_is_off_by_its_scale():
 
 def test_slow_vibrations_see_one_mass_and_fast_ones_the_motor_on_its_spring():
     """Fig. 4.4 of the thesis: the two ends of the edge."""
-    found = validity(load("published-two-mass"))
+    found = validity(load("published-two-mass").at())
     of = fits(found)
     assert found.first_natural == pytest.approx(130.727, abs=1e-3)
     ((low, high),) = of["rigid"].within
@@ -76,11 +76,11 @@ def test_slow_vibrations_see_one_mass_and_fast_ones_the_motor_on_its_spring():
 
 def test_the_rigid_model_leaves_the_tolerance_where_its_impedance_does():
     """At low frequency h = -1/P is m w^2 (1 + m1 w^2/k + ...): the same frequency bounds the error from above."""
-    found = validity(load("published-two-mass"), tolerance=0.02)
+    found = validity(load("published-two-mass").at(), tolerance=0.02)
     limit = fits(found)["rigid"].within[0][1]
     error = (M1**2 / (M1 + M2)) * (2 * np.pi * limit) ** 2 / K_E
     assert 0.02 < error < 0.08  # e may trade stiffness, damping and frequency against each other
-    wider = fits(validity(load("published-two-mass"), tolerance=0.1))["rigid"].within[0][1]
+    wider = fits(validity(load("published-two-mass").at(), tolerance=0.1))["rigid"].within[0][1]
     assert wider > limit
 
 
@@ -89,30 +89,30 @@ def test_a_stiffer_drive_keeps_the_rigid_model_valid_further():
     for factor in (1.0, 4.0):
         k = factor * K_E
         changed = load("published-two-mass", [("plant.stiffness_N_per_m", [[k, -k], [-k, k]])])
-        found = validity(changed)
+        found = validity(changed.at())
         ends.append(fits(found)["rigid"].within[0][1] / found.first_natural)
     assert ends[1] == pytest.approx(ends[0], rel=0.1)  # the same share of twice the natural frequency
 
 
 def test_the_five_bar_has_all_models_and_says_where():
-    found = validity(load("five-bar"))
+    found = validity(load("five-bar").at())
     of = fits(found)
     assert list(of) == ["rigid", "motor-mass", "motor-mass-undamped", "two-mass", "two-mass-undamped"]
     assert of["two-mass"].error.max() == pytest.approx(0.117, abs=0.003)
     assert not of["two-mass"].everywhere
-    assert fits(validity(load("five-bar"), tolerance=0.2))["two-mass"].everywhere
+    assert fits(validity(load("five-bar").at(), tolerance=0.2))["two-mass"].everywhere
     assert np.all(np.diff(found.frequency) >= 0.0)
 
 
 def test_a_rigid_device_has_no_simpler_models():
-    found = validity(load("hapkit-course"))
+    found = validity(load("hapkit-course").at())
     assert np.isnan(found.first_natural)
     assert "rigid" not in fits(found)
     assert all(fit.reason and fit.within == () and not fit.everywhere for fit in found.fits)
 
 
 def test_a_device_that_renders_nothing_is_nowhere_like_its_models():
-    found = validity(load("published-two-mass", ["plant.damping_Ns_per_m=unset", "loop.delay_samples=1"]))
+    found = validity(load("published-two-mass", ["plant.damping_Ns_per_m=unset", "loop.delay_samples=1"]).at())
     assert len(found.frequency) == 0
     assert all(fit.within == () and not fit.everywhere for fit in found.fits)
 
@@ -122,6 +122,6 @@ def test_without_a_handle_the_sided_models_say_why():
         "mass_kg": [[0.3, 0.0], [0.0, 0.1]], "damping_Ns_per_m": [[5.0, -5.0], [-5.0, 5.0]],
         "stiffness_N_per_m": [[9e3, -9e3], [-9e3, 9e3]], "actuator": [0.0, 1.0], "sensor": [0.0, 1.0],
     }  # fmt: skip
-    of = fits(validity(from_document({"name": "n", "plant": plant, "loop": {"sampling_period_s": 0.001}})))
+    of = fits(validity(from_document({"name": "n", "plant": plant, "loop": {"sampling_period_s": 0.001}}).at()))
     assert "no handle" in of["two-mass"].reason
     assert of["rigid"].within

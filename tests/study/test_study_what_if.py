@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from zwidth.chart.chart import stability_chart
 from zwidth.device.load import from_document, load
 from zwidth.loop.controller import Butterworth
-from zwidth.loop.loop import Loop
 from zwidth.study.what_if import (
     BASE,
     MODELS,
@@ -28,7 +27,7 @@ RIGID = ["drives.motor-right.stiffness_Nm_per_rad=unset", "drives.motor-left.sti
 
 def stiffest(name, changes=(), model=None):
     device = load(name, changes)
-    return stability_chart(Loop(device.plant(model=model), device.controller), decay=False)
+    return stability_chart(device.at(model=model).loop, decay=False)
 
 
 def one_mass(mass, damping=0.0, stiffness=0.0, **loop):

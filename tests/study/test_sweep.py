@@ -12,9 +12,8 @@ from tests.study.study_cases import FIVE_BAR, LENGTH, OTHER, TWO_MASS, axis, kep
 from zwidth.chart.chart import largest_stiffness
 from zwidth.device.device import Device
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS, Measure, MeasureError
+from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS, Measure, MeasureError, WantedWall
 from zwidth.model.effective import effective_parameters
 from zwidth.study.executor import run
 from zwidth.study.store import Store
@@ -31,8 +30,8 @@ def asked(*axes, **more) -> Sweep:
     return sweep(study(*axes, **more), workers=1)
 
 
-def stiffest(device: Device, *plant) -> float:
-    peak = largest_stiffness(Loop(device.plant(*plant), device.controller))
+def stiffest(device: Device, *asked, **circumstances) -> float:
+    peak = largest_stiffness(device.at(*asked, **circumstances).loop)
     assert peak is not None
     return peak.stiffness
 
@@ -46,8 +45,8 @@ def test_each_design_is_the_device_file_with_its_numbers():
         device = load(FIVE_BAR, settings)
         for name in found["assembly"].values:
             cell = found.sel({LENGTH: length, "assembly": name})
-            assert float(cell["stiffness_max"]) == pytest.approx(stiffest(device, None, None, name), rel=1e-9)
-            posture = device.posture(None, name)
+            assert float(cell["stiffness_max"]) == pytest.approx(stiffest(device, assembly=name), rel=1e-9)
+            posture = device.at(assembly=name).posture
             assert device.mechanism is not None
             mass_here = effective_parameters(device.mechanism, posture, device.direction()).rigid_mass
             assert float(cell["rigid_mass"]) == pytest.approx(float(mass_here), rel=1e-12)
@@ -68,7 +67,7 @@ def test_circumstances_are_those_asked_for():
             for k, model in enumerate(["full", "rigid"]):
                 for m, operator in enumerate(["none", "thesis-arm"]):
                     device = load(FIVE_BAR, (), operator)
-                    expected = stiffest(device, at, direction, None, model)
+                    expected = stiffest(device, at, direction, model=model)
                     assert values[i, j, k, m] == pytest.approx(expected, rel=1e-9)
 
 
@@ -100,11 +99,11 @@ def test_a_posture_that_is_known_is_not_another_design_s():
 
 
 def test_the_wanted_wall_may_be_an_axis():
-    wanted = Measure("wanted", "", "N/m", None, "", lambda place: place.wanted.stiffness, each=True)
+    wanted = Measure("wanted", "", "N/m", None, "", lambda point, wall: wall.stiffness, each=True, of_wall=True)
     job = sweep_job(study(axis("stiffness_N_per_m", range=[1e3, 2e3], count=3), damping_Ns_per_m=5.0))
-    place = job.place(2)
-    assert (place.wanted.stiffness, place.wanted.damping, place.wanted.frequency) == (2000.0, 5.0, None)
-    assert evaluate(wanted, place).values == 2000.0
+    design = job.design(2)
+    assert design.wall == WantedWall(2000.0, 5.0, None)
+    assert evaluate(wanted.at_wall(design.wall), design.point()).values == 2000.0
 
 
 def test_over_the_workspace_a_design_has_what_its_map_has():

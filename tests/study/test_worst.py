@@ -7,11 +7,10 @@ import pytest
 
 from tests.model.model_cases import random_five_bar, spatial_arm, spatial_loop
 from zwidth.device.load import load
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import MEASURES
 from zwidth.measures.measure import NO_VALUE, OK, Measure, MeasureError, NoValueError
-from zwidth.measures.place import Place
 from zwidth.model.posture import solve_posture
-from zwidth.study.places import place_of
 from zwidth.study.requirement import Requirement, parse_requirement
 from zwidth.study.share import share_measure, share_of_directions
 from zwidth.study.worst import along_extreme, sphere
@@ -25,7 +24,8 @@ def places(kind, seed, count=12):
     spread = 0.02 * rng.normal(size=(count, 3)) * ([1, 1, 0] if kind == "planar" else [1, 1, 1])
     posture = solve_posture(mechanism, mechanism.reference_position + spread)
     controller = load("five-bar").controller
-    return Place(controller, mechanism, posture, np.broadcast_to([0.0, 1.0, 0.0], (count, 3)), model="full")
+    along = np.broadcast_to([0.0, 1.0, 0.0], (count, 1, 3))
+    return OperatingPoint(controller, mechanism, posture, along, model="full")
 
 
 def forms(place, name):
@@ -79,12 +79,12 @@ def test_worst_and_best_follow_what_a_designer_wants():
 
 def test_the_exact_stiffness_is_lowest_where_no_direction_is_lower():
     device = load("five-bar")
-    place = place_of(device, [[0.05, 0.2], [-0.1, 0.15]])
+    place = device.at([[0.05, 0.2], [-0.1, 0.15]])
     found = along_extreme(MEASURES["stiffness_max"], place, "worst")
     around = np.deg2rad(np.arange(0.0, 180.0, 3.0))
     for k in range(2):
         u = np.stack([np.cos(around), np.sin(around), 0.0 * around], axis=-1)
-        one = place_of(device, np.broadcast_to(place.posture.position[k], (60, 3))).towards(u)
+        one = device.at(np.broadcast_to(place.posture.position[k], (60, 3))).towards(u)
         sampled = MEASURES["stiffness_max"].compute(one).values
         assert found.measured.values[k] <= sampled.min() * (1.0 + 1e-9)
         assert found.measured.values[k] > 0.99 * sampled.min()
@@ -149,7 +149,7 @@ def test_what_does_not_depend_on_the_direction_is_asked_once():
 
 def test_a_plant_has_one_direction_only():
     with pytest.raises(MeasureError, match="given by its plant"):
-        along_extreme(MEASURES["stiffness"], place_of(load("published-two-mass")), "worst")
+        along_extreme(MEASURES["stiffness"], load("published-two-mass").at(), "worst")
 
 
 # --- share of directions ---------------------------------------------------------------------------------
@@ -164,7 +164,7 @@ def test_the_share_in_a_plane_is_the_arc(seed, part):
     values = np.linalg.eigvalsh(forms(place, "rigid_mass"))[:3]
     for i, (low, high) in zip(ok, values, strict=True):
         bound = 1.0 / (low + part * (high - low))
-        share = share_of_directions(Requirement(MEASURES["rigid_mass"], True, bound), place.at(i))
+        share = share_of_directions(Requirement(MEASURES["rigid_mass"], True, bound), place[i])
         assert share == pytest.approx(2.0 / np.pi * np.arcsin(np.sqrt(part)), abs=1e-6)
 
 

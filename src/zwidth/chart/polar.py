@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,13 +12,12 @@ from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.region import ChartError
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint, check_several_directions
 from zwidth.loop.sections import UnmovedError
-from zwidth.model.damping import Damping
-from zwidth.model.directions import DEPENDENT, reduce_directions
-from zwidth.model.mechanism import Mechanism
+from zwidth.model.arguments import require
+from zwidth.model.directions import DEPENDENT
 from zwidth.model.plant import Plant
-from zwidth.model.posture import Posture
-from zwidth.model.reduction import DirectionError, Model, ModelError, reduce_mechanism
+from zwidth.model.reduction import DirectionError, ModelError
 
 Floats = NDArray[np.float64]
 
@@ -56,14 +55,7 @@ def circle(count: int, first: ArrayLike = (1.0, 0.0, 0.0), second: ArrayLike = (
     return np.asarray(np.round(turned, 15) + 0.0)  # what rounding leaves of a zero is none
 
 
-def largest_stiffness_by_direction(
-    mechanism: Mechanism,
-    posture: Posture,
-    directions: ArrayLike,
-    controller: Controller,
-    model: Model,
-    damping: Damping,
-) -> ByDirection:
+def largest_stiffness_by_direction(point: OperatingPoint, directions: ArrayLike) -> ByDirection:
     """The largest stiffness along each direction, each traced exactly as `largest_stiffness` does.
 
     A direction and its opposite render the same walls: actuator and sensor both change sign, the loop does not.
@@ -71,17 +63,18 @@ def largest_stiffness_by_direction(
     that leaves the motions of the handle, the range of its Jacobian, has none: only its shadow within them could
     be rendered, whose stiffness 1/cos^2 would let appear as large as one likes.
 
-    posture     a single one, OK
+    point       a single posture of a mechanism, whatever its own direction
     directions  (k, 3)  of any length but zero
-    Raises      ValueError  for a direction without length, an unknown model, a posture that is not a single OK one
+    Raises      ValueError  for a direction without length, and what `OperatingPoint.plant_of_directions` raises
     """
+    require("point", point, OperatingPoint)
     given = np.atleast_2d(np.asarray(directions, dtype=float))
     length = np.linalg.norm(given, axis=1, keepdims=True)
     if given.shape[1] != 3 or not (length > 0.0).all():
         raise ValueError("directions must be an array (k, 3) of vectors that have a length")
     units = given / length
-    plant = _plants(mechanism, posture, model, damping)
-    moving = _motions(posture)
+    plant = _plants(point)
+    moving = _motions(point.jacobian)
     results: dict[tuple[float, ...], tuple[float, float, float, str]] = {}
     rows = []
     for unit in units:
@@ -89,7 +82,7 @@ def largest_stiffness_by_direction(
         if key not in results:
             off = np.linalg.norm(unit - moving.T @ (moving @ unit)) > OFF
             none = float("nan")
-            results[key] = (none, none, none, OUT_OF_MOTION) if off else _stiffest(plant, unit, controller)
+            results[key] = (none, none, none, OUT_OF_MOTION) if off else _stiffest(plant, unit, point.controller)
         rows.append(results[key])
     stiffness, damper, frequency, status = zip(*rows, strict=True)
     return ByDirection(units, np.array(stiffness), np.array(damper), np.array(frequency), status)
@@ -102,18 +95,19 @@ def _either_way(unit: Floats) -> tuple[float, ...]:
     return tuple((rounded * np.sign(lead) + 0.0).tolist())
 
 
-def _motions(posture: Posture) -> Floats:
+def _motions(jacobian: Floats) -> Floats:
     """Orthonormal directions (m, 3) that span all along which the handle can move."""
-    basis, size, _ = np.linalg.svd(posture.jacobian)
+    basis, size, _ = np.linalg.svd(jacobian)
     return np.asarray(basis.T[: len(size)][size > DEPENDENT * size[0]])
 
 
-def _plants(mechanism: Mechanism, posture: Posture, model: Model, damping: Damping) -> Callable[[Floats], Plant]:
+def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
     """The plant along a unit vector. Directions share the full model's matrices and differ in their actuator."""
-    if model != "full":
-        return lambda unit: reduce_mechanism(mechanism, posture, unit, model, damping)
-    axes = _motions(posture)
-    everywhere = reduce_directions(mechanism, posture, axes, "full", damping)
+    check_several_directions(point.mechanism, point.operator, point.encoders)
+    if point.model != "full":
+        return lambda unit: point.towards(unit).plant
+    axes = _motions(point.jacobian)
+    everywhere = replace(point, directions=axes).plant_of_directions
     return lambda unit: everywhere.along(axes @ unit)
 
 

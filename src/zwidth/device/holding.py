@@ -14,6 +14,7 @@ from zwidth.device.schema.numbers import VERSION, Section, WholeNumber
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.translate import sentences
 from zwidth.device.version import KEY, without_version
+from zwidth.model.operator import Operator
 
 NOBODY: Final = "none"
 
@@ -25,16 +26,34 @@ class OperatorFile(Section):
     operator: OperatorSection
 
 
-def held_by(document: dict[str, Any], operator: str | os.PathLike[str] | None) -> dict[str, Any]:
+def held_by(document: dict[str, Any], operator: Operator | str | os.PathLike[str] | None) -> dict[str, Any]:
     """The device's document with another operator.
 
-    operator  a bundled operator's name, a file with an [operator], "none" for nobody; None: as the document says
+    operator  an Operator; a bundled operator's name, a file with an [operator], "none" for nobody; None: as the
+              document says
     Raises DeviceError  with all faults of the operator's file
     """
     if operator is None:
         return document
     without = {key: value for key, value in document.items() if key != "operator"}
+    if isinstance(operator, Operator):
+        return without | {"operator": table_of(operator)}
     return without if operator == NOBODY else without | {"operator": operator_table(operator)}
+
+
+def table_of(operator: Operator) -> dict[str, Any]:
+    """An operator as the [operator] of a device file."""
+    table: dict[str, Any] = {
+        "arm_mass_kg": operator.arm_mass,
+        "arm_stiffness_N_per_m": operator.arm_stiffness,
+        "arm_damping_Ns_per_m": operator.arm_damping,
+    }
+    if operator.grasp_stiffness is None:
+        return table | {"grasp": "rigid"}
+    return table | {
+        "grasp_stiffness_N_per_m": operator.grasp_stiffness,
+        "grasp_damping_Ns_per_m": operator.grasp_damping or 0.0,
+    }
 
 
 def operator_table(name_or_path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from pydantic import ValidationError
 
@@ -22,12 +22,14 @@ from zwidth.model.arguments import refusal
 
 AS_GIVEN: Final = "as given"  # an operator without a name
 
+Settings: TypeAlias = Mapping[str, Any] | Sequence[str | tuple[str, Any]]
+
 __all__ = ["bundled", "from_document", "load", "schema"]
 
 
 def load(
     name_or_path: str | os.PathLike[str],
-    settings: Mapping[str, Any] | Sequence[str | tuple[str, Any]] = (),
+    settings: Settings = (),
     operator: str | os.PathLike[str] | None = None,
 ) -> Device:
     """The device of a bundled name or a file, with settings applied before it is checked.
@@ -43,13 +45,30 @@ def load(
     """
     if not isinstance(name_or_path, str | os.PathLike):
         raise refusal("name_or_path", "a bundled name or a path", name_or_path)
-    if isinstance(settings, str):
-        raise refusal("settings", "a list or a dictionary", settings, f"write [{settings!r}]")
-    changes = list(settings.items()) if isinstance(settings, Mapping) else settings
+    changes = _listed(settings)
     document, label = read(name_or_path, pipes=True)
     device = from_document(address.apply(held_by(document, operator), changes), label)
     warn_of_implausible(device)
     return device
+
+
+def changed(device: Device, settings: Settings) -> Device:
+    """The device with settings applied, checked again; see `Device.with_`.
+
+    Whether the mechanism can be put together is asked again only where one of its numbers has changed.
+    """
+    document = address.apply(device.document, _listed(settings))
+    same = document.get("mechanism") == device.document.get("mechanism")
+    made = from_document(document, device.label, put_together=same)
+    warn_of_implausible(made)
+    return made
+
+
+def _listed(settings: Settings) -> Sequence[str | tuple[str, Any]]:
+    """Settings as a sequence. Raises TypeError for a single text."""
+    if isinstance(settings, str):
+        raise refusal("settings", "a list or a dictionary", settings, f"write [{settings!r}]")
+    return list(settings.items()) if isinstance(settings, Mapping) else settings
 
 
 def from_document(document: dict[str, Any], label: str = "device", *, put_together: bool = False) -> Device:

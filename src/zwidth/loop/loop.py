@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _INSTEAD = {
-    "Device": "write Loop(device.plant(), device.controller)",
+    "Device": "write device.at().loop",
     "MultiPlant": "write MultiLoop(plant, controller) for several directions",
 }
 

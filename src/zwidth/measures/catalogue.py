@@ -11,6 +11,7 @@ from zwidth.model.arguments import refusal
 
 _BINDINGS: Final = "zwidth.measures.bindings"
 _OF_THE_MECHANISM: Final = ("dexterity", "forces")  # in these files nothing is asked of a loop
+_OF_A_WALL: Final = "fidelity"  # in this file every measure is about a wanted wall
 
 
 def _of(
@@ -25,7 +26,8 @@ def _of(
     along: bool = True,
 ) -> Measure:
     linear = file not in _OF_THE_MECHANISM
-    return Measure(name, title, unit, better, source, f"{_BINDINGS}.{file}:{name}", each, along, linear)
+    function = f"{_BINDINGS}.{file}:{name}"
+    return Measure(name, title, unit, better, source, function, each, along, linear, of_wall=file == _OF_A_WALL)
 
 
 _YOSHIKAWA = "Yoshikawa 1985"

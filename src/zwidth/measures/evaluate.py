@@ -1,4 +1,4 @@
-"""Measures over places: values where there are any, and what became of the rest."""
+"""Measures at operating points: values where there are any, and what became of the rest."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.region import ChartError
 from zwidth.loop.estimator import NonlinearError
+from zwidth.loop.operating_point import NoMechanismError, OperatingPoint
 from zwidth.loop.sections import HysteresisError, UnmovedError
 from zwidth.measures.measure import (
     FAILED,
@@ -22,74 +23,76 @@ from zwidth.measures.measure import (
     Note,
     NoValueError,
 )
-from zwidth.measures.place import Place
 from zwidth.model.arguments import require
 from zwidth.model.reduction import ModelError
 
 NUMBERS = "biuf"  # kinds of arrays that are numbers: bool, signed, unsigned, floating
 FAILURES = (Exception, SystemExit)  # a user's own measure that ends the program has failed, and nothing else has
+NO_MECHANISM = "speaks of a mechanism, and the device is given by its plant"
 NONE = (NoValueError, ModelError, UnmovedError, HysteresisError, NonlinearError)
 
 
-def evaluate(measure: Measure, place: Place) -> Measured:
-    """A measure's values in all places, nan with a status where it has none.
+def evaluate(measure: Measure, point: OperatingPoint) -> Measured:
+    """A measure's values at all points, nan with a status where it has none.
 
-    What a measure raises, or returns in another shape, in one place is that place's status FAILED with a note: the
+    What a measure raises, or returns in another shape, at one point is that point's status FAILED with a note: the
     others keep their values.
     Raises  MeasureError  where it cannot be asked of this device at all
     """
     require("measure", measure, Measure)
-    require("place", place, Place)
+    require("point", point, OperatingPoint)
     if measure.each:
-        return one_by_one(measure.compute, place)
+        return one_by_one(measure.compute, point)
     try:
-        found = measure.compute(place)
+        found = measure.compute(point)
     except MeasureError:
         raise
+    except NoMechanismError:
+        raise MeasureError(NO_MECHANISM) from None
     except FAILURES as error:
-        return _everywhere(place, FAILED, _said(error))
+        return _everywhere(point, FAILED, _said(error))
     if isinstance(found, Measured):
         return found
     values = np.asarray(found)
-    if values.shape != place.shape:
-        return _everywhere(place, FAILED, f"returned an array of shape {values.shape} for places of {place.shape}")
+    if values.shape != point.shape:
+        return _everywhere(point, FAILED, f"returned an array of shape {values.shape} for points of {point.shape}")
     if values.dtype.kind not in NUMBERS:
-        return _everywhere(place, FAILED, f"returned {values.dtype} instead of numbers")
-    return measured(place, values.astype(np.float64))
+        return _everywhere(point, FAILED, f"returned {values.dtype} instead of numbers")
+    return measured(point, values.astype(np.float64))
 
 
-def measured(place: Place, values: NDArray[np.float64], reason: str = "has no value here") -> Measured:
-    """Values with the places' status; NO_VALUE with a reason where they are nan though the place is OK."""
-    none: NDArray[np.bool_] = np.asarray((place.status == OK) & np.isnan(values))
-    status = np.where(none, NO_VALUE, place.status).astype(np.uint8)
+def measured(point: OperatingPoint, values: NDArray[np.float64], reason: str = "has no value here") -> Measured:
+    """Values with the points' status; NO_VALUE with a reason where they are nan though the point is OK."""
+    none: NDArray[np.bool_] = np.asarray((point.status == OK) & np.isnan(values))
+    status = np.where(none, NO_VALUE, point.status).astype(np.uint8)
     notes = (_note(none, NO_VALUE, reason),) if none.any() else ()
     return Measured(np.where(status == OK, values, np.nan), status, notes)
 
 
-def _everywhere(place: Place, status: int, reason: str) -> Measured:
-    failed = place.status == OK
+def _everywhere(point: OperatingPoint, status: int, reason: str) -> Measured:
+    failed = point.status == OK
     told = (_note(failed, status, reason),) if failed.any() else ()
-    return Measured(np.full(place.shape, np.nan), np.where(failed, status, place.status).astype(np.uint8), told)
+    return Measured(np.full(point.shape, np.nan), np.where(failed, status, point.status).astype(np.uint8), told)
 
 
-def _note(places: NDArray[np.bool_], status: int, reason: str) -> Note:
-    return Note(status, reason, int(places.sum()), tuple(int(i) for i in np.argwhere(places)[0]))
+def _note(points: NDArray[np.bool_], status: int, reason: str) -> Note:
+    return Note(status, reason, int(points.sum()), tuple(int(i) for i in np.argwhere(points)[0]))
 
 
-def one_by_one(ask: Callable[[Place], Any], place: Place) -> Measured:
-    """What is asked of one place at a time, in all places."""
-    values, status = np.full(place.shape, np.nan), place.status.copy()
+def one_by_one(ask: Callable[[OperatingPoint], Any], point: OperatingPoint) -> Measured:
+    """What is asked of one point at a time, at all points."""
+    values, status = np.full(point.shape, np.nan), point.status.copy()
     why: dict[tuple[int, ...], tuple[int, str]] = {}
-    for index in np.ndindex(place.shape):
+    for index in np.ndindex(point.shape):
         if status[index] == OK:
-            values[index], status[index], reason = answered(lambda: ask(place.at(*index)))  # noqa: B023
+            values[index], status[index], reason = answered(lambda: ask(point[index]))  # noqa: B023
             if reason:
                 why[index] = (int(status[index]), reason)
     return Measured(values, status, reasons(why))
 
 
 def reasons(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, ...]:
-    """Notes from the status and reason of each place without value, in the order of the places."""
+    """Notes from the status and reason of each point without value, in the order of the points."""
     seen: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
     for index, key in why.items():
         count, first = seen.get(key, (0, index))
@@ -104,6 +107,8 @@ def answered(ask: Callable[[], Any]) -> tuple[float, int, str]:
         value = np.asarray(found)
     except MeasureError:
         raise
+    except NoMechanismError:
+        raise MeasureError(NO_MECHANISM) from None
     except NONE as error:
         return float("nan"), NO_VALUE, str(error)
     except ChartError as error:

@@ -1,10 +1,10 @@
-"""A measure: one number for a device in a place, with its unit, its source, and what a larger number means."""
+"""A measure: one number for a device at an operating point, its unit, its source, and whether more is better."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from zwidth.measures.place import Place
+    from zwidth.loop.operating_point import OperatingPoint
 
 Better = Literal["higher", "lower"]
 
@@ -35,8 +35,49 @@ STATUS: Final = {
 }
 
 
+Spelling = Callable[[str, str | None], str]
+
+
+def as_argument(name: str, value: str | None) -> str:
+    """An argument as Python spells it.
+
+    >>> as_argument("stiffness", None), as_argument("model", "rigid")
+    ('stiffness', "model='rigid'")
+    """
+    return name if value is None else f"{name}={value!r}"
+
+
 class MeasureError(ValueError):
-    """A measure that cannot be asked of this device, wherever it is; the text follows the measure's name."""
+    """A measure that cannot be asked of this device, wherever it is; the text follows the measure's name.
+
+    reason        why not
+    arguments     what to give instead: name and value, None for any value
+    alternatives  is one of the arguments enough?
+    """
+
+    def __init__(
+        self, reason: str, arguments: Sequence[tuple[str, str | None]] = (), alternatives: bool = False
+    ) -> None:
+        super().__init__(reason, arguments, alternatives)
+        self.reason, self.arguments, self.alternatives = reason, tuple(arguments), alternatives
+
+    def __str__(self) -> str:
+        return self.spelled(as_argument)
+
+    def spelled(self, spelling: Spelling) -> str:
+        """The sentence, with arguments spelled as the asker gives them: in Python, as options, as keys of a file.
+
+        >>> MeasureError("needs a wanted wall", [("stiffness", None), ("damping", None)]).spelled(as_argument)
+        'needs a wanted wall; give stiffness and damping'
+        """
+        if not self.arguments:
+            return self.reason
+        joined = " or " if self.alternatives else " and "
+        return f"{self.reason}; give {joined.join(spelling(*argument) for argument in self.arguments)}"
+
+    def of(self, measure: str) -> MeasureError:
+        """The same with the measure's name before it."""
+        return MeasureError(f"{measure} {self.reason}", self.arguments, self.alternatives)
 
 
 class NoValueError(ValueError):
@@ -74,18 +115,33 @@ class Measured:
 
 
 @dataclass(frozen=True)
+class WantedWall:
+    """The wall that is to be rendered, which some measures are about; None where it is not told.
+
+    stiffness, damping  [N/m], [N s/m]
+    frequency           at which the hand moves on it [Hz]
+    """
+
+    stiffness: float | None = None
+    damping: float | None = None
+    frequency: float | None = None
+
+
+@dataclass(frozen=True)
 class Measure:
-    """One number for a device in a place.
+    """One number for a device at an operating point.
 
     name      as in commands and study files
     title     what it is called in a figure
     unit      "" for none
     better    what a designer wants; None where it depends
     source    where its formula stands
-    function  of a `Place`; as text, "module:name", imported when it is first asked
-    each      True: asked of one place at a time; False: of all at once, returning an array or a `Measured`
+    function  of an `OperatingPoint`; as text, "module:name", imported when it is first asked
+    each      True: asked of one point at a time; False: of all at once, returning an array or a `Measured`
     along     whether it depends on the rendered direction
     linear    whether it is read off the linear loop, which leaves out friction, encoder steps and limits
+    of_wall   whether it is about a wanted wall, which its function takes as a second argument
+    wall      the wanted wall
     """
 
     name: str
@@ -93,10 +149,12 @@ class Measure:
     unit: str
     better: Better | None
     source: str
-    function: Callable[[Place], Any] | str
+    function: Callable[..., Any] | str
     each: bool = False
     along: bool = True
     linear: bool = True
+    of_wall: bool = False
+    wall: WantedWall = WantedWall()
 
     @property
     def key(self) -> str:
@@ -110,9 +168,14 @@ class Measure:
         plain = re.fullmatch(r"[A-Za-z0-9_]+", written) and "^r" not in self.unit
         return f"{self.name}_{written}" if plain else self.name
 
-    def compute(self, place: Place) -> Any:
+    def at_wall(self, wall: WantedWall) -> Measure:
+        """The same measure about a wanted wall; itself if it is about none."""
+        return replace(self, wall=wall) if self.of_wall else self
+
+    def compute(self, point: OperatingPoint) -> Any:
         """What the function says; see `evaluate` for values with status."""
-        if isinstance(self.function, str):
-            module, _, name = self.function.partition(":")
-            return getattr(import_module(module), name)(place)
-        return self.function(place)
+        function = self.function
+        if isinstance(function, str):
+            module, _, name = function.partition(":")
+            function = getattr(import_module(module), name)
+        return function(point, self.wall) if self.of_wall else function(point)

@@ -3,11 +3,11 @@
     from zwidth.measures.own import measure
 
     @measure(unit="N", title="Force for an acceleration of 10 m/s^2", better="lower")
-    def inertial_force(place):
-        return 10.0 * place.effective.rigid_mass
+    def inertial_force(point):
+        return 10.0 * point.effective.rigid_mass
 
-A function is asked of one `Place` at a time and returns a number; with each=False it is asked of many at once and
-returns an array of their shape.
+A function is asked of one `OperatingPoint` at a time and returns a number; with each=False it is asked of many at
+once and returns an array of their shape. One with a second argument gets the wanted wall there (`WantedWall`).
 """
 
 from __future__ import annotations
@@ -19,18 +19,19 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
+from inspect import signature
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final
 from zlib import compress, decompress
 
 from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.measure import Better, Measure
+from zwidth.measures.measure import Better, Measure, WantedWall
 
 if TYPE_CHECKING:
-    from zwidth.measures.place import Place
+    from zwidth.loop.operating_point import OperatingPoint
 
-Function = Callable[["Place"], Any]
+Function = Callable[..., Any]
 
 BETTER: Final = ("higher", "lower", None)
 
@@ -48,10 +49,10 @@ class Own:
     text: str
     name: str
 
-    def __call__(self, place: Place) -> Any:
-        measures = _measures(self.file, self.text)
+    def __call__(self, point: OperatingPoint, wall: WantedWall | None = None) -> Any:
+        own = _measures(self.file, self.text)[self.name]
         with redirect_stdout(sys.stderr):
-            return measures[self.name].compute(place)
+            return (own if wall is None else own.at_wall(wall)).compute(point)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # a text that speaks of __main__ must not look like a function that only this process has
@@ -67,22 +68,22 @@ def measure(
     each: bool = True,
     source: str = "",
 ) -> Callable[[Function], Measure]:
-    """Make a measure of a function of one place; its name is the function's.
+    """Make a measure of a function of one operating point; its name is the function's.
 
     unit    "" for none
     title   what it is called in figures; left out: the first line of the function's docstring, or its name
     better  "higher", "lower", or None where it depends
     along   False: it does not depend on the rendered direction
-    each    True: asked of one place at a time; False: of many at once, returning an array of their shape
+    each    True: asked of one point at a time; False: of many at once, returning an array of their shape
     source  where its formula stands
     Raises  ValueError  for another `better`, and for texts that are none, or of more than one line
 
     What it prints goes to standard error, as that of the file does: standard output is the answer's.
 
     >>> @measure(unit="kg")
-    ... def moved_mass(place):
+    ... def moved_mass(point):
     ...     "Mass of links and rotors"
-    ...     return place.effective.rigid_mass
+    ...     return point.effective.rigid_mass
     >>> moved_mass.name, moved_mass.title, moved_mass.unit
     ('moved_mass', 'Mass of links and rotors', 'kg')
     """
@@ -97,7 +98,10 @@ def measure(
     def made(function: Function) -> Measure:
         lines = (function.__doc__ or function.__name__.replace("_", " ")).strip().splitlines()
         told = title or lines[0].rstrip(".")
-        return Measure(function.__name__, told, unit, better, source or "your own", function, each, along)
+        of_wall = len(signature(function).parameters) > 1
+        return Measure(
+            function.__name__, told, unit, better, source or "your own", function, each, along, of_wall=of_wall
+        )
 
     return made
 
@@ -117,7 +121,9 @@ def load_measures(path: str) -> dict[str, Measure]:
         raise ValueError(f"{file.name}: cannot be read: {error}") from None
     found = _measures(str(file.resolve()), text)
     if not found:
-        raise ValueError(f"{file.name} has no measure; put @measure(unit=...) above a function of one place")
+        raise ValueError(
+            f"{file.name} has no measure; put @measure(unit=...) above a function of one operating point"
+        )
     taken = sorted(MEASURES.keys() & found.keys())
     if taken:
         raise ValueError(f"{file.name}: the name {taken[0]} is taken by a measure of ours; rename the function")

@@ -19,9 +19,11 @@ LONGEST: Final = 40  # characters of a text that are repeated
 
 # (wanted, given) -> what to type; `given` is what is called by that name in the sentence
 HINTS: Final = {
-    ("Plant", "Device"): "device.plant()",
+    ("Plant", "Device"): "device.at().plant",
+    ("Plant", "OperatingPoint"): "point.plant",
     ("Plant", "Loop"): "loop.plant",
-    ("Loop", "Device"): "Loop(device.plant(), device.controller)",
+    ("Loop", "Device"): "device.at().loop",
+    ("Loop", "OperatingPoint"): "point.loop",
     ("Loop", "Plant"): "Loop(plant, controller)",
     ("MultiLoop", "MultiPlant"): "MultiLoop(plant, controller)",
     ("Controller", "Device"): "device.controller",
@@ -29,7 +31,7 @@ HINTS: Final = {
     ("Response", "Device"): "device.response",
     ("Mechanism", "Device"): "device.mechanism",
     ("StabilityChart", "Loop"): "stability_chart(loop)",
-    ("Place", "Device"): "place_of(device)",
+    ("OperatingPoint", "Device"): "device.at()",
     ("Device", "text"): "load({})",
     ("Measure", "text"): "find_measure({})",
 }

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -78,6 +79,19 @@ class Posture:
     jacobian: Floats
     closure_residual: Floats
     projected: Floats
+
+    def with_axes(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Posture:
+        """The postures with a change of the leading axes made to each of their arrays, such as an index."""
+        arrays = {one.name: np.asarray(getattr(self, one.name)) for one in fields(self) if one.name != "assembly"}
+        return Posture(self.assembly, **{name: np.asarray(change(array)) for name, array in arrays.items()})
+
+    def broadcast_to(self, shape: tuple[int, ...]) -> Posture:
+        """The same postures with these leading axes; itself where it has them. Raises ValueError as numpy does."""
+        own = self.status.ndim
+        if shape == self.status.shape:
+            return self
+        # copies: what cannot be written to is another type for the kernels, compiled anew
+        return self.with_axes(lambda array: np.array(np.broadcast_to(array, shape + array.shape[own:])))
 
 
 @dataclass(frozen=True)

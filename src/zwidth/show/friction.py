@@ -6,8 +6,7 @@ from math import nan
 from typing import TypedDict
 
 from zwidth.conditions.dry import ground_friction, reading_step
-from zwidth.device.device import Device
-from zwidth.model.plant import Plant
+from zwidth.loop.operating_point import OperatingPoint
 
 
 class Dry(TypedDict):
@@ -17,9 +16,10 @@ class Dry(TypedDict):
     resolution: float
 
 
-def told_of(device: Device, plant: Plant) -> Dry:
+def told_of(point: OperatingPoint) -> Dry:
     """Both numbers of a device's plant; nan where its file does not tell."""
+    plant = point.plant
     return {
-        "coulomb_friction": ground_friction(plant) if device.friction_known else nan,
-        "resolution": reading_step(plant) if device.steps_known else nan,
+        "coulomb_friction": ground_friction(plant) if point.friction_known else nan,
+        "resolution": reading_step(plant) if point.resolution_known else nan,
     }

@@ -9,39 +9,39 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import OK, Measure, Measured
-from zwidth.measures.place import Place
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 STILL: Final = 1e-9  # share of the fastest motion below which a direction is none of the handle's
-TRIED: Final = 16  # places in which a direction is asked against its opposite
+TRIED: Final = 16  # points in which a direction is asked against its opposite
 SAME: Final = 1e-9  # relative difference that rounding makes
 ROWS: Final = 100_000  # questions asked at once
 
 
 @dataclass(frozen=True)
 class Around:
-    """A measure to be asked along many directions of places that are OK, all of one freedom to move.
+    """A measure to be asked along many directions of points that are OK, all of one freedom to move.
 
-    place     flat, of shape (n,), all OK
+    point     flat, of shape (n,), all OK
     basis     (n, 3, r)  orthonormal, spanning the directions in which the handle can move, r = 1, 2 or 3
     one_sided along a direction and its opposite the measure says two things
     """
 
     measure: Measure
-    place: Place
+    point: OperatingPoint
     basis: Floats
     one_sided: bool
 
     def asked(self, which: Ints, components: Floats) -> Measured:
-        """The measure in places `which` (k,), along directions of these components (k, r) in each one's basis."""
+        """The measure in points `which` (k,), along directions of these components (k, r) in each one's basis."""
         parts = []
         for first in range(0, max(1, len(which)), ROWS):
             rows = slice(first, first + ROWS)
-            there = self.place.at(which[rows])
+            there = self.point[which[rows]]
             parts.append(evaluate(self.measure, there.towards(self.directions(which[rows], components[rows]))))
         if len(parts) == 1:
             return parts[0]
@@ -57,26 +57,26 @@ class Around:
         return np.asarray(u / np.linalg.norm(u, axis=-1, keepdims=True))
 
 
-def arounds(measure: Measure, place: Place) -> Iterator[tuple[Ints, Around]]:
-    """Those places of a flat one that are OK, by their freedom to move: which they are, and how to ask there."""
-    ok = np.flatnonzero(place.status == OK)
+def arounds(measure: Measure, point: OperatingPoint) -> Iterator[tuple[Ints, Around]]:
+    """Those points of a flat one that are OK, by their freedom to move: which they are, and how to ask there."""
+    ok = np.flatnonzero(point.status == OK)
     if not len(ok):
         return
-    left, speeds, _ = np.linalg.svd(place.jacobian[ok])
+    left, speeds, _ = np.linalg.svd(point.jacobian[ok])
     freedom = (speeds > STILL * speeds[:, :1]).sum(axis=1)
     for r in np.unique(freedom):
         mine = np.flatnonzero(freedom == r)
-        some = place.at(ok[mine])
+        some = point[ok[mine]]
         basis = left[mine][:, :, :r]
         yield ok[mine], Around(measure, some, basis, _one_sided(measure, some, basis))
 
 
-def _one_sided(measure: Measure, place: Place, basis: Floats) -> bool:
-    """Does the opposite direction have another value, in some places along a direction like no other?"""
+def _one_sided(measure: Measure, point: OperatingPoint, basis: Floats) -> bool:
+    """Does the opposite direction have another value, in some points along a direction like no other?"""
     n, r = len(basis), basis.shape[2]
     which = np.unique(np.linspace(0, n - 1, min(n, TRIED)).astype(np.int64))
     like_no_other = np.broadcast_to(np.array([0.5403, 0.8415, 0.3907])[:r], (len(which), r))
-    around = Around(measure, place, basis, one_sided=False)
+    around = Around(measure, point, basis, one_sided=False)
     there = around.asked(which, like_no_other).values
     back = around.asked(which, -like_no_other).values
     with np.errstate(invalid="ignore"):

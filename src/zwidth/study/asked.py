@@ -1,23 +1,23 @@
-"""What a study asks of each design: a measure in its place, or over its workspace."""
+"""What a study asks of each design: a measure at its operating point, or over its workspace."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.faults import listed, nearest
 from zwidth.measures.catalogue import find_measure
-from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure, Measured, MeasureError
+from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure, Measured
 from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
 from zwidth.study.whole import CONDITIONS
 
 if TYPE_CHECKING:
-    from zwidth.measures.place import Place
+    from zwidth.loop.operating_point import OperatingPoint
 
 # What is said of it in a figure; does it keep the measure's unit?
 OVER: Final[dict[str, tuple[str, bool]]] = {
@@ -40,7 +40,7 @@ class Asked:
 
     name     as written: "stiffness_max", "worst(isotropy)"
     measure  the one asked cell by cell
-    over     what is made of its values over the workspace; None: asked in one place
+    over     what is made of its values over the workspace; None: asked at one point
     """
 
     name: str
@@ -76,7 +76,7 @@ class Asked:
         return f"{self.over}_{self.measure.key if self.unit or not self.measure.unit else self.measure.name}"
 
     def reduced(
-        self, found: Measured, place: Place, weights: NDArray[np.float64] | None = None
+        self, found: Measured, point: OperatingPoint, weights: NDArray[np.float64] | None = None
     ) -> tuple[float, int, str]:
         """Value, status and reason of this design, from the measure's values over its workspace.
 
@@ -88,7 +88,7 @@ class Asked:
             if self.over == "conditioning_index":
                 value = global_conditioning_index(found.values, found.status, weights)
             elif self.over == "isotropy_index":
-                value = global_isotropy_index(place.jacobian, found.status, len(place.drives.names))
+                value = global_isotropy_index(point.jacobian, found.status, len(point.drives.names))
             else:
                 whole = overall(found.values, found.status, weights, self.measure.better)
                 value = float(getattr(whole, self.over))
@@ -129,14 +129,3 @@ def asked(name: str, own: Mapping[str, Measure] | None = None) -> Asked:
     if measure.name not in OF.get(over, (measure.name,)):
         raise ValueError(f"{over}({measure.name}): is of {listed(OF[over])} only; ask for average({measure.name})")
     return Asked(f"{over}({measure.name})", measure, over)
-
-
-def probe(each: tuple[Asked, ...], ask: Callable[[Measure], Any]) -> dict[str, str]:
-    """Name -> why a measure cannot be asked of this device at all."""
-    refused = {}
-    for one in each:
-        try:
-            ask(one.measure)
-        except MeasureError as error:
-            refused[one.name] = str(error)
-    return refused

@@ -112,7 +112,7 @@ def robust_study(
     >>> from zwidth.study.robust_family import Family, Range
     >>> plain = from_document({"name": "m", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}})
     >>> mass = Range("plant.mass_kg", 0.1, 0.3)
-    >>> study = robust_study(Family(plain, (mass,), (), lambda device, held: device.plant(held=held)), 8, 100)
+    >>> study = robust_study(Family(plain, (mass,), (), plain.at()), 8, 100)
     >>> round(study.chart.stiffness_max, 2), study.violation.violating    # the lightest mass binds
     (68629.15, 0)
     """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite
@@ -19,6 +19,7 @@ from zwidth.device.relations import operator_relations
 from zwidth.device.schema import file as schema
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.plant import Plant
 
 OPTION: Final = "--range"
@@ -67,16 +68,16 @@ class Point:
 class Family:
     """What the members have in common, and in what they differ.
 
-    device     the device itself
-    ranges     the numbers that differ
-    operators  names or files of those who may hold it, "none" for nobody; (): as the device says
-    asked      how a device's plant is taken: device -> plant, held or not (`Device.plant` with its arguments)
+    device           the device itself
+    ranges           the numbers that differ
+    operators        names or files of those who may hold it, "none" for nobody; (): as the device says
+    operating_point  where the device is asked about; the members are asked about there, too
     """
 
     device: Device
     ranges: tuple[Range, ...]
     operators: tuple[str, ...]
-    asked: Callable[[Device, bool], Plant]
+    operating_point: OperatingPoint
 
     @property
     def free(self) -> tuple[int, ...]:
@@ -91,7 +92,7 @@ class Family:
     def _held_alone(self) -> Plant | None:
         """The device's plant with nobody at it, where the members differ in the operator alone; else None."""
         operator_only = all(found.path.split(".")[0] == "operator" for found in self.ranges)
-        return self.asked(self.device, False) if operator_only else None
+        return self.operating_point.unheld_plant if operator_only else None
 
     def values(self, point: Point) -> dict[str, Any]:
         """Path -> value of a member; the operator's name under "operator" where there are several."""
@@ -117,21 +118,20 @@ class Family:
             held = self._held(document)
             if held is not None:
                 return Loop(held.hold(self._held_alone), self.device.controller)
-        device = from_document(document, self.device.label)
-        return Loop(self.asked(device, True), device.controller)
+        return from_document(document, self.device.label).like(self.operating_point).loop
 
-    def _held(self, document: dict[str, Any]) -> Device | None:
-        """The device with a document's operator, without reading the rest again; None where he has faults."""
+    def _held(self, document: dict[str, Any]) -> OperatingPoint | None:
+        """The point with a document's operator, without reading the rest again; None where he has faults."""
         table = document.get("operator")
         if table is None:
-            return replace(self.device, operator=None, operator_name=None)
+            return self.operating_point.without_operator
         try:
             section = OperatorSection.model_validate(table)
         except ValidationError:
             return None
         if list(operator_relations(document)):
             return None
-        return replace(self.device, operator=build.operator(section))
+        return replace(self.operating_point, operator=build.operator(section))
 
     def faults(self) -> list[Fault]:
         """What is wrong with the ranges: each by itself, then at its two ends with the others in their middle."""

@@ -10,7 +10,7 @@ little larger and smaller (`study.slope`).
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import isfinite, isnan, nan
 from typing import Any, Final
@@ -20,12 +20,13 @@ import numpy as np
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.peak import Peak
 from zwidth.device import address
-from zwidth.device.device import At, Device
+from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Path, dotted
 from zwidth.device.load import from_document
 from zwidth.device.parts import outside_linear
 from zwidth.device.schema import file as schema
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.arguments import require
 from zwidth.study.optimum import Kind, Optimum, OptimumError, optimum
 from zwidth.study.rivals import rival_stiffness
@@ -118,34 +119,30 @@ class Sensitivities:
         return self.peak is not None and bool(self.rival >= (1.0 - TIE) * self.peak.stiffness)
 
 
-def sensitivities(
-    device: Device,
-    at: At | None = None,
-    direction: Sequence[float] | None = None,
-    assembly: str | None = None,
-    model: str | None = None,
-) -> Sensitivities:
+def sensitivities(device: Device, point: OperatingPoint | None = None) -> Sensitivities:
     """Sensitivity of the largest stiffness to every number of the device file, and to the delay if it gives none.
 
-    Arguments are those of `Device.plant`; the handle stays where it is while links grow. Numbers that cannot be
-    varied, such as whole ones, are reported with the reason. Accuracy: derivatives are extrapolated differences
-    at relative steps of 2e-3 and less, good to about 1e-9 of d ln K_max / d ln p where the device's modes are
-    damped; `error` estimates it for each.
+    point  where the device is asked about, one point of one direction; left out: its reference. The handle stays
+           at the position asked for while links grow, and joints at the angles asked for
 
-    Raises  what `Device.plant` raises; ChartError if the device itself cannot be charted
+    Numbers that cannot be varied, such as whole ones, are reported with the reason. Accuracy: derivatives are
+    extrapolated differences at relative steps of 2e-3 and less, good to about 1e-9 of d ln K_max / d ln p where
+    the device's modes are damped; `error` estimates it for each.
+
+    Raises  what `Device.at` and `OperatingPoint.plant` raise; ChartError if the device itself cannot be charted
 
     >>> from zwidth.device.load import from_document
     >>> plain = from_document({"name": "m", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}})
     >>> [(n.path, round(n.logarithmic, 6)) for n in sensitivities(plain).numbers][:2]
     [('loop.sampling_period_s', -2.0), ('plant.mass_kg', 1.0)]
     """
-
     require("device", device, Device)
+    asked = point or device.at()
 
     def loop_of(changed: Device) -> Loop:
-        return Loop(changed.plant(at, direction, assembly, model), changed.controller)
+        return changed.like(asked).loop
 
-    loop = loop_of(device)
+    loop = asked.loop
     peak = largest_stiffness(loop)
     left_out = dict(_left_out(device.document))
     if peak is None:

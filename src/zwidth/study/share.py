@@ -13,8 +13,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.measures.measure import Measure
-from zwidth.measures.place import Place
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.evaluate import NO_MECHANISM
+from zwidth.measures.measure import Measure, MeasureError
 from zwidth.study.around import Around, Floats, Ints, arounds
 from zwidth.study.requirement import Requirement
 
@@ -24,17 +25,17 @@ NAME: Final = "share_of_directions"
 SAMPLES: Final = 24  # of a half circle
 HALVINGS: Final = 22  # of 7.5 degrees: 3e-8 rad
 LATITUDES: Final = 16  # of a half sphere
-CHUNK: Final = 2048  # places at once
+CHUNK: Final = 2048  # points at once
 
 
 @dataclass(frozen=True)
 class Share:
-    """A function of places: which share of their directions meets a requirement."""
+    """A function of points: which share of their directions meets a requirement."""
 
     requirement: Requirement
 
-    def __call__(self, place: Place) -> Floats:
-        return share_of_directions(self.requirement, place)
+    def __call__(self, point: OperatingPoint) -> Floats:
+        return share_of_directions(self.requirement, point)
 
 
 def share_measure(requirement: Requirement) -> Measure:
@@ -54,7 +55,7 @@ def share_measure(requirement: Requirement) -> Measure:
     )
 
 
-def share_of_directions(requirement: Requirement, place: Place) -> Floats:
+def share_of_directions(requirement: Requirement, point: OperatingPoint) -> Floats:
     """Share (...) of the directions, from 0 to 1, along which the requirement is met; nan where not OK.
 
     Directions are those in which the handle can move, by angle in the plane and by solid angle in space. One along
@@ -63,14 +64,16 @@ def share_of_directions(requirement: Requirement, place: Place) -> Floats:
 
     Raises  MeasureError  for a device given by its plant
     """
-    row = place.flat
+    if point.posture is None:
+        raise MeasureError(NO_MECHANISM)
+    row = point.flat
     share: Floats = np.full(row.shape, np.nan)
     for which, around in arounds(requirement.measure, row):
         r = around.basis.shape[2]
         for first in range(0, len(which), CHUNK):
             mine = np.arange(first, min(first + CHUNK, len(which)))
             share[which[mine]] = _SHARES[r](requirement, around, mine)
-    return np.asarray(share.reshape(place.shape))
+    return np.asarray(share.reshape(point.shape))
 
 
 def _of_line(requirement: Requirement, around: Around, mine: Ints) -> Floats:
@@ -119,7 +122,7 @@ def _of_latitude(requirement: Requirement, around: Around, mine: Ints, height: f
 
 
 def _hidden(m: Floats) -> tuple[Ints, Ints, Floats]:
-    """Where three neighbours of one sign lie on a parabola of both: sample, place, offset in steps (+-0.5)."""
+    """Where three neighbours of one sign lie on a parabola of both: sample, point, offset in steps (+-0.5)."""
     left, right = np.roll(m, 1, axis=0), np.roll(m, -1, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         bend = left - 2.0 * m + right

@@ -319,7 +319,7 @@ def circumstance_fault(key: str, value: Any, device: Device | None) -> str:
 
 def _assembly(device: Device, name: str) -> None:
     if device.mechanism is None:
-        device.posture(None, name)  # raises that it does not apply
+        device.at(assembly=name)  # raises that it does not apply
     elif name not in device.mechanism.assemblies:
         near = suggestion(name, set(device.mechanism.assemblies))
         raise fail(device.label, "assembly", f"names no assembly, got '{name}'; {near}")

@@ -23,9 +23,8 @@ from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, Shelf, bundled_
 from zwidth.device.text_file import Unreadable, read_text
 from zwidth.device.translate import sentences
 from zwidth.device.version import refuse_newer
-from zwidth.measures.measure import Measure
+from zwidth.measures.measure import Measure, WantedWall
 from zwidth.measures.own import load_measures
-from zwidth.measures.place import Wanted
 from zwidth.study.asked import Asked, asked
 from zwidth.study.axes import CIRCUMSTANCES, Axis, Sampling
 from zwidth.study.plane import Plane, PlaneError, plane_of
@@ -48,7 +47,7 @@ class Study:
     sampling   the designs
     asked      the columns
     at, direction, assembly, model   circumstances that no axis sets; None: the file's
-    wanted     the wall that some measures are asked about, as far as no axis sets it
+    wall       the wanted one, which some measures are asked about, as far as no axis sets it
     plane      the workspace; None where nothing is asked over it
     """
 
@@ -62,7 +61,7 @@ class Study:
     direction: tuple[float, ...] | None = None
     assembly: str | None = None
     model: str | None = None
-    wanted: Wanted = Wanted()  # noqa: RUF009  frozen
+    wall: WantedWall = WantedWall()  # noqa: RUF009  frozen
     plane: Plane | None = None
 
 
@@ -118,7 +117,7 @@ def study_of(document: dict[str, Any], label: str = "study") -> Study:
         direction=checked.direction,
         assembly=checked.assembly,
         model=checked.model,
-        wanted=Wanted(checked.stiffness_N_per_m, checked.damping_Ns_per_m, checked.frequency_Hz),
+        wall=WantedWall(checked.stiffness_N_per_m, checked.damping_Ns_per_m, checked.frequency_Hz),
         plane=plane,
     )
 

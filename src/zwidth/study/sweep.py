@@ -10,7 +10,6 @@ or cannot get where it is asked about, has a status instead of values, and the o
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,17 +21,26 @@ from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.evaluate import answered, evaluate
-from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, SINGULAR, MeasureError, Note
-from zwidth.measures.place import Place, Wanted
+from zwidth.measures.measure import (
+    FAILED,
+    NO_VALUE,
+    OK,
+    OUT_OF_REACH,
+    SINGULAR,
+    Measure,
+    MeasureError,
+    Note,
+    WantedWall,
+)
 from zwidth.model.arguments import refusal
 from zwidth.model.posture import OutOfReach, PostureError, Singular
-from zwidth.study.asked import Asked, probe
+from zwidth.study.asked import Asked
 from zwidth.study.axes import CIRCUMSTANCES, WANTED, Sampling, settings
 from zwidth.study.executor import Progress, run
 from zwidth.study.job import Cells
 from zwidth.study.journal import fingerprint
-from zwidth.study.places import place_of
 from zwidth.study.study_file import Study, read_study
 from zwidth.study.whole import areas
 
@@ -45,7 +53,7 @@ if TYPE_CHECKING:
 NAMES: Final = dict(zip(WANTED, ("stiffness", "damping", "frequency"), strict=True))
 
 
-class _NoPlace(Exception):
+class _NoPoint(Exception):
     """A design that cannot be asked anything: its status, and why."""
 
     def __init__(self, status: int, reason: str = "") -> None:
@@ -107,20 +115,20 @@ class SweepJob:
         notes = [tuple(Note(*key, len(at), (at[0],)) for key, at in kinds.items()) for kinds in seen]
         return Cells(values, status, tuple(notes))
 
-    def place(self, design: int) -> Place:
-        """Where a design is asked measures. Raises _NoPlace."""
-        return _Design(self, design).place()
+    def design(self, number: int) -> Design:
+        """One of the designs, with the operating points that it is asked about."""
+        return Design(self, number)
 
     def _row(self, number: int) -> Iterator[tuple[float, int, str]]:
         """Value, status and reason of each column."""
-        design = _Design(self, number)
+        design = self.design(number)
         for one in self.asked:
             try:
-                place = design.place() if one.over is None else design.workspace()
-            except _NoPlace as none:
+                point = design.point() if one.over is None else design.workspace()
+            except _NoPoint as none:
                 yield np.nan, none.status, none.reason
                 continue
-            yield _answer(one, place, self.weights)
+            yield _answer(one, one.measure.at_wall(design.wall), point, self.weights)
 
     @cached_property
     def _in_mechanism(self) -> frozenset[str]:
@@ -149,57 +157,64 @@ class SweepJob:
         return self._last["device"]  # type: ignore[no-any-return]
 
 
-class _Design:
-    """One design; its places are solved once, when they are first asked for."""
+class Design:
+    """One design; its operating points are solved once, when they are first asked for."""
 
     def __init__(self, job: SweepJob, number: int) -> None:
         self.job = job
         self.chosen = dict(settings(job.sampling.axes, job.sampling.values(number)))
-        self.known: dict[str, Place | _NoPlace] = {}
+        self.known: dict[str, OperatingPoint | _NoPoint] = {}
 
-    def place(self) -> Place:
-        """The posture asked about."""
-        at = self._circumstance("at")
-        return self._solved("place", lambda device: None if at is None else device.position(at))
+    @property
+    def wall(self) -> WantedWall:
+        """The wanted wall."""
+        return WantedWall(**{NAMES[key]: self._circumstance(key) for key in WANTED})
 
-    def workspace(self) -> Place:
-        """All postures of the workspace."""
-        return self._solved("workspace", lambda _: self.job.positions)
+    def point(self) -> OperatingPoint:
+        """The posture asked about. Raises _NoPoint."""
+        return self._solved("point", self._circumstance("at"))
 
-    def _solved(self, name: str, positions: Any) -> Place:
+    def workspace(self) -> OperatingPoint:
+        """All postures of the workspace. Raises _NoPoint."""
+        return self._solved("workspace", self.job.positions)
+
+    def _solved(self, name: str, positions: Any) -> OperatingPoint:
         if name not in self.known:
             try:
                 self.known[name] = self._solve(name, positions)
-            except _NoPlace as none:
+            except _NoPoint as none:
                 self.known[name] = none
         found = self.known[name]
-        if isinstance(found, _NoPlace):
+        if isinstance(found, _NoPoint):
             raise found
         return found
 
-    def _solve(self, name: str, positions: Any) -> Place:
+    def _solve(self, name: str, positions: Any) -> OperatingPoint:
         try:
             device = self.job.device(self.chosen)
-            at, assembly = positions(device), self._circumstance("assembly")
-            wanted = {NAMES[key]: self._circumstance(key) for key in WANTED}
-            held = self._circumstance("direction"), assembly, self._circumstance("model"), Wanted(**wanted)
+            assembly = self._circumstance("assembly")
             # what changes the computer or the operator alone leaves the posture as it is
             same = name, self._circumstance("at"), assembly, self.job.of_mechanism(self.chosen)
             known = self.job._last.get(name, (None, None))
-            place = place_of(device, at, *held, known[1] if known[0] == same else None)
+            point = device.at(
+                known[1] if known[0] == same else positions,
+                self._circumstance("direction"),
+                assembly=assembly,
+                model=self._circumstance("model"),
+            )
             if known[0] != same:
-                if not _moves_mass(place):
+                if not _moves_mass(point):
                     from_document(device.document, device.label)  # says what is wrong
-                self.job._last[name] = same, place.posture
+                self.job._last[name] = same, point.posture
         except OutOfReach as error:
-            raise _NoPlace(OUT_OF_REACH) from error
+            raise _NoPoint(OUT_OF_REACH) from error
         except Singular as error:
-            raise _NoPlace(SINGULAR) from error
+            raise _NoPoint(SINGULAR) from error
         except (PostureError, DeviceError) as error:
-            raise _NoPlace(FAILED, _said(error)) from error
+            raise _NoPoint(FAILED, _said(error)) from error
         except ValueError as error:
-            raise _NoPlace(FAILED, str(error)) from error
-        return place
+            raise _NoPoint(FAILED, str(error)) from error
+        return point
 
     def _circumstance(self, key: str) -> Any:
         return self.chosen.get(key, self.job.fixed.get(key))
@@ -211,27 +226,29 @@ def _said(error: Exception) -> str:
     return "; ".join(": ".join(filter(None, (fault.key, fault.message))) for fault in error.faults)
 
 
-def _moves_mass(place: Place) -> bool:
+def _moves_mass(point: OperatingPoint) -> bool:
     """Has every motion a mass, wherever there is a posture?"""
-    if place.posture is None:
+    if point.posture is None:
         return True
-    M = place.mass_matrix[place.status == OK]
+    M = point.mass_matrix[point.status == OK]
     eigenvalues = np.linalg.eigvalsh(M)
     least = M.shape[-1] * np.finfo(float).eps * eigenvalues[..., -1]
     return bool((eigenvalues[..., 0] > least).all())
 
 
-def _answer(one: Asked, place: Place, weights: NDArray[np.float64] | None) -> tuple[float, int, str]:
-    """Value, status and reason of one column."""
+def _answer(
+    one: Asked, measure: Measure, point: OperatingPoint, weights: NDArray[np.float64] | None
+) -> tuple[float, int, str]:
+    """Value, status and reason of one column; its measure is about the design's wanted wall."""
     try:
         if one.over is not None:
-            return one.reduced(evaluate(one.measure, place), place, weights)
-        if one.measure.each:
-            status = int(place.status)
-            return (np.nan, status, "") if status != OK else answered(lambda: one.measure.compute(place))
-        found = evaluate(one.measure, place)
+            return one.reduced(evaluate(measure, point), point, weights)
+        if measure.each:
+            status = int(point.status)
+            return (np.nan, status, "") if status != OK else answered(lambda: measure.compute(point))
+        found = evaluate(measure, point)
     except MeasureError as error:
-        return np.nan, NO_VALUE, _in_keys(str(error))
+        return np.nan, NO_VALUE, error.spelled(as_key)
     return float(found.values), int(found.status), found.notes[0].reason if found.notes else ""
 
 
@@ -282,7 +299,7 @@ def sweep_job(study: Study) -> SweepJob:
 
     Raises  MeasureError  for measures that cannot be asked of this device, all of them
     """
-    wanted = {key: getattr(study.wanted, name) for key, name in NAMES.items()}
+    wanted = {key: getattr(study.wall, name) for key, name in NAMES.items()}
     told = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
     fixed = {key: value for key, value in told.items() if value is not None}
     plane = study.plane
@@ -297,25 +314,29 @@ def sweep_job(study: Study) -> SweepJob:
 
 def _check_measures(job: SweepJob) -> None:
     """Raises MeasureError where a measure can be asked of no design, as far as a few of them tell."""
-    refused: dict[str, str] = {}
-    pending = job.asked
+    pending, refused = job.asked, dict[str, str]()
     for number in sorted({0, job.count // 2, job.count - 1}):
+        design = job.design(number)
         try:
-            place = job.place(number)
-        except _NoPlace:
+            point = design.point()
+        except _NoPoint:
             continue
-        refused = probe(pending, lambda measure: evaluate(measure, place))  # noqa: B023
+        refused = {}
+        for one in pending:
+            try:
+                evaluate(one.measure.at_wall(design.wall), point)
+            except MeasureError as error:
+                refused[one.name] = error.spelled(as_key)
         pending = tuple(one for one in pending if one.name in refused)
     if refused:
-        raise MeasureError("\n".join(f"{name} {_in_keys(why)}" for name, why in refused.items()))
+        raise MeasureError("\n".join(f"{name} {why}" for name, why in refused.items()))
 
 
-def _in_keys(reason: str) -> str:
-    """A measure's reason with a study's keys for the options that commands have.
+def as_key(name: str, value: str | None) -> str:
+    """An argument as a study's file spells it.
 
-    >>> _in_keys("needs a wanted wall; give --stiffness and --damping")
-    'needs a wanted wall; give stiffness_N_per_m and damping_Ns_per_m'
+    >>> as_key("stiffness", None), as_key("model", "rigid")
+    ('stiffness_N_per_m', 'model = "rigid"')
     """
-    for key, name in NAMES.items():
-        reason = reason.replace(f"--{name}", key)
-    return re.sub(r"--(operator|model) ([\w-]+)", r'\1 = "\2"', reason)
+    key = next((key for key, argument in NAMES.items() if argument == name), name)
+    return key if value is None else f'{key} = "{value}"'

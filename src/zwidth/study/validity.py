@@ -12,7 +12,7 @@ same. Without the frequency the edges of two models would count as alike where t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import nan, pi
@@ -24,13 +24,13 @@ from numpy.typing import NDArray
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.region import ChartError
 from zwidth.chart.tracer import Tracer
-from zwidth.device.device import At, Device
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.arguments import require
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.plant import Plant
-from zwidth.model.reduction import ModelError
+from zwidth.model.reduction import Model, ModelError
 
 Floats = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -40,7 +40,12 @@ WALLS: Final = 160  # of the full model's edge that are compared; ends of interv
 NEGLIGIBLE: Final = 1e-4  # share of the edge's extent below which K or B is 0, and no relative error is one
 NEAR: Final = 0.2  # error at the same frequency below which no farther piece of a model's edge can be nearer
 CLOSE: Final = np.linspace(-1.0, 1.0, 33)
-MODELS: Final = (("rigid", "rigid"), ("motor-mass", "motor mass"), ("two-mass", "two masses"))  # simplest first
+# Models simpler than the full one, and what they are called; the simplest first.
+SIMPLER: Final[tuple[tuple[Model, str], ...]] = (
+    ("rigid", "rigid"),
+    ("motor-mass", "motor mass"),
+    ("two-mass", "two masses"),
+)
 
 
 @dataclass(frozen=True)
@@ -88,31 +93,21 @@ class Validity:
     fits: tuple[Fit, ...]
 
 
-def validity(
-    device: Device,
-    at: At | None = None,
-    direction: Sequence[float] | None = None,
-    assembly: str | None = None,
-    tolerance: float = TOLERANCE,
-) -> Validity:
+def validity(point: OperatingPoint, tolerance: float = TOLERANCE) -> Validity:
     """Compare the rigid, the motor-mass and the two-mass model, with and without damping, with the full one; each
     with the operator at the handle, if there is one.
 
-    at, direction, assembly  as for `Device.plant`
-    tolerance                the largest e that still counts as the same
-    Raises  what `Device.plant` raises, and ChartError if the full model cannot be charted
+    point      one point of one direction, whatever its model
+    tolerance  the largest e that still counts as the same
+    Raises  what `OperatingPoint.plant` raises, and ChartError if the full model cannot be charted
     """
-    require("device", device, Device)
-    full = device.plant(at, direction, assembly, "full")
-    chart = stability_chart(Loop(full, device.controller), decay=False)
-    natural = natural_frequencies(device.plant(at, direction, assembly, "full", held=False))
+    require("point", point, OperatingPoint)
+    full = point.in_model("full")
+    chart = stability_chart(full.loop, decay=False)
+    natural = natural_frequencies(full.unheld_plant)
     flexible = natural[natural > 0.0]
     edge = _Edge(chart)
-
-    def reduce(model: str) -> Plant:
-        return device.plant(at, direction, assembly, model)
-
-    fits = [_fit(edge, device.controller, *model, tolerance) for model in _models(full, reduce)]
+    fits = [_fit(edge, point.controller, *model, tolerance) for model in _models(full)]
     return Validity(
         tolerance=tolerance,
         first_natural=float(flexible[0]) if len(flexible) else nan,
@@ -243,15 +238,16 @@ def _runs(good: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
         yield int(start), int(end) - 1
 
 
-def _models(full: Plant, reduce: Callable[[str], Plant]) -> Iterator[tuple[str, str, Plant | None, str]]:
+def _models(full: OperatingPoint) -> Iterator[tuple[str, str, Plant | None, str]]:
     """Key, label, plant and reason of each model; without damping only where it has some."""
-    for key, label in MODELS:
+    for key, label in SIMPLER:
+        reduced = full.in_model(key)
         try:
-            plant = reduce(key)
+            itself, plant = reduced.unheld_plant is full.unheld_plant, reduced.plant
         except ModelError as error:
             yield key, label, None, str(error)
             continue
-        if plant is full:
+        if itself:
             continue
         damped = bool(plant.damping.any() or plant.lagged_dampers)
         yield key, label + (" with damping" if damped else ""), plant, ""

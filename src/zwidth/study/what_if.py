@@ -9,17 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import isnan, nan
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.region import ChartError
-from zwidth.device.device import At, Device
+from zwidth.device.device import Device
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.arguments import require
 from zwidth.model.plant import Plant
-from zwidth.model.reduction import ModelError
+from zwidth.model.reduction import Model, ModelError
 
 BASE: Final = "as-described"
 # The changes a designer may hope for, of which the one that gains most names what limits the device.
@@ -72,27 +74,17 @@ class Variant:
         return 0.0 if isnan(self.chart.stiffness_max) else self.chart.stable_area
 
 
-def what_if(
-    device: Device,
-    at: At | None = None,
-    direction: Sequence[float] | None = None,
-    assembly: str | None = None,
-    model: str | None = None,
-) -> list[Variant]:
+def what_if(device: Device, point: OperatingPoint | None = None) -> list[Variant]:
     """The device as described, with each change, and in each of the models of thesis Fig. 4.4.
 
-    Arguments are those of `Device.plant`. A change that does not apply has no chart and says why; the device as
-    described comes first and always has one.
-    Raises  what `Device.plant` raises, and ChartError if the device itself cannot be charted
+    point  where it is asked about, one point of one direction; left out: the device's reference
+    A change that does not apply has no chart and says why; the device as described comes first and always has one.
+    Raises  what `Device.at` and `OperatingPoint.plant` raise; ChartError if the device itself cannot be charted
     """
-
-    def reduce(to: str | None, *, held: bool = True) -> Plant:
-        return device.plant(at, direction, assembly, to, held=held)
-
-    plant, alone = reduce(model), reduce(model, held=False)
-    here = Loop(plant, device.controller)
-    variants = [Variant(BASE, "as described", here, stability_chart(here))]
-    steps = [*_changes(device, plant, alone, reduce), *_models(device, reduce)]
+    require("device", device, Device)
+    point = point or device.at()
+    variants = [Variant(BASE, "as described", point.loop, stability_chart(point.loop))]
+    steps = [*_changes(device, point), *_models(point)]
     return variants + [_charted(*step) for step in steps]
 
 
@@ -119,12 +111,6 @@ def find(variants: Sequence[Variant], key: str) -> Variant:
 Step = tuple[str, str, str, Callable[[], Loop]]
 
 
-class Reduce(Protocol):
-    """The device in a model, held by its operator or by itself."""
-
-    def __call__(self, to: str | None, *, held: bool = True) -> Plant: ...
-
-
 def _charted(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> Variant:
     if obstacle:
         return Variant(key, label, None, None, obstacle)
@@ -135,9 +121,9 @@ def _charted(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
         return Variant(key, label, None, None, str(error))
 
 
-def _changes(device: Device, plant: Plant, alone: Plant, reduce: Reduce) -> Iterator[Step]:
-    """plant: held by the operator; alone: the same device without him, whose own damping is told from his."""
-    controller = device.controller
+def _changes(device: Device, point: OperatingPoint) -> Iterator[Step]:
+    controller, plant = point.controller, point.plant
+    alone = point.unheld_plant  # so that the device's own damping is told from the operator's
 
     def computed(**changes: Any) -> Callable[[], Loop]:
         return lambda: Loop(plant, replace(controller, **changes))
@@ -150,9 +136,9 @@ def _changes(device: Device, plant: Plant, alone: Plant, reduce: Reduce) -> Iter
     usual = usual_filter(controller.sampling_period)
     own = "structural damping" if flexible else "friction"
 
-    rigid = only(flexible, f"its {'drives are' if device.mechanism is not None else 'structure is'} rigid already")
-    name = "rigid drives" if device.mechanism is not None else "rigid structure"
-    yield "rigid-drives", name, rigid, lambda: Loop(reduce("rigid"), controller)
+    rigid = only(flexible, f"its {'drives are' if point.mechanism is not None else 'structure is'} rigid already")
+    name = "rigid drives" if point.mechanism is not None else "rigid structure"
+    yield "rigid-drives", name, rigid, lambda: point.in_model("rigid").loop
     faster = half_period(device)
     yield "half-period", "half the sampling period", _no_estimate(faster), lambda: Loop(plant, faster)
     yield "no-delay", "no delay", only(delay != 0.0, "the device has no delay"), computed(delay=0.0)
@@ -165,7 +151,7 @@ def _changes(device: Device, plant: Plant, alone: Plant, reduce: Reduce) -> Iter
     yield "with-filter", through, filtered, computed(velocity_filter=usual)
     twice = replace(alone, damping=2.0 * alone.damping)
     lossless = only(damped, f"the device has no {own}")
-    yield "twice-damping", f"twice the {own}", lossless, lambda: Loop(device.hold(twice), controller)
+    yield "twice-damping", f"twice the {own}", lossless, lambda: Loop(point.hold(twice), controller)
     there = only(not _collocated(plant), "the sensor reads where the wall acts already")
     moved = replace(plant, sensor=plant.actuator)
     yield "collocated", "sensor at the actuator", there, lambda: Loop(moved, controller)
@@ -178,34 +164,34 @@ def _collocated(plant: Plant) -> bool:
     return bool(np.max(np.abs(sensor - along * actuator)) <= 1e-9 * np.max(np.abs(sensor)))
 
 
-def _models(device: Device, reduce: Reduce) -> Iterator[Step]:
+def _models(point: OperatingPoint) -> Iterator[Step]:
     """The models of Fig. 4.4: the full one, and what is left of it by and by."""
-    full = reduce("full")
-    alone = reduce("full", held=False)
-    damped = " with damping" if alone.damping.any() or alone.lagged_dampers else ""
+    full = point.in_model("full").unheld_plant
+    damped = " with damping" if full.damping.any() or full.lagged_dampers else ""
     undamped_only = "" if damped else "there is no damping to leave out"
 
-    def same(name: str) -> str:
+    def same(name: Model) -> str:
         # a plant that is this model already is returned as it is
         return "the device as described is this model" if reduces_to_itself(name) else ""
 
-    def reduces_to_itself(name: str) -> bool:
+    def reduces_to_itself(name: Model) -> bool:
         try:
-            return reduce(name) is full
+            return point.in_model(name).unheld_plant is full
         except ModelError:
             return False
 
-    def of(name: str, *, lossless: bool = False) -> Callable[[], Loop]:
+    def of(name: Model, *, lossless: bool = False) -> Callable[[], Loop]:
         def make() -> Loop:
+            reduced = point.in_model(name)
             if not lossless:
-                return Loop(reduce(name), device.controller)
-            reduced = reduce(name, held=False)
-            kept = replace(reduced, damping=0.0 * reduced.damping, lagged_dampers=())
-            return Loop(device.hold(kept), device.controller)
+                return reduced.loop
+            plant = reduced.unheld_plant
+            kept = replace(plant, damping=0.0 * plant.damping, lagged_dampers=())
+            return Loop(point.hold(kept), point.controller)
 
         return make
 
-    given = "full model, all flexible coordinates" if device.mechanism is not None else "plant as given"
+    given = "full model, all flexible coordinates" if point.mechanism is not None else "plant as given"
     yield "model-full", given, "", of("full")
     yield "model-two-mass", f"two masses{damped}", same("two-mass"), of("two-mass")
     yield "model-motor-mass", f"motor mass{damped}", "", of("motor-mass")

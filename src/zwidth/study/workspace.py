@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.device import Device
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.measure import OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note
-from zwidth.measures.place import Place, Wanted
+from zwidth.measures.measure import OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note, WantedWall
 from zwidth.model.arguments import refusal, require
 from zwidth.study.executor import Progress, run
 from zwidth.study.job import Cells
 from zwidth.study.journal import fingerprint
-from zwidth.study.places import place_of
 from zwidth.study.plane import Plane, PlaneError, plane_of, reach_of
 from zwidth.study.worst import EXTREMES, along_extreme, sense
 
@@ -39,7 +38,9 @@ BATCHES: Final = 16
 class MapJob:
     """The cells of a map: rows of the plane's grid one after the other; columns are measures.
 
+    asked      the measures, about the wanted wall where they are about one
     direction  a vector of any length but zero; one of EXTREMES; None: the file's
+    wall       the wanted one
     """
 
     device: Device
@@ -48,7 +49,7 @@ class MapJob:
     direction: Direction = None
     assembly: str | None = None
     model: str | None = None
-    wanted: Wanted = Wanted()  # noqa: RUF009  frozen
+    wall: WantedWall = WantedWall()  # noqa: RUF009  frozen
 
     @property
     def count(self) -> int:
@@ -73,7 +74,7 @@ class MapJob:
             direction if isinstance(direction, str) or direction is None else tuple(map(float, direction)),
             self.assembly,
             self.model,
-            self.wanted,
+            self.wall,
         )
 
     @property
@@ -93,13 +94,14 @@ class MapJob:
         Raises  MeasureError  where a measure cannot be asked of this device, with its name
         """
         vector = None if isinstance(self.direction, str) else self.direction
-        place = place_of(self.device, self._positions[first:last], vector, self.assembly, self.model, self.wanted)
+        positions = self._positions[first:last]
+        points = self.device.at(positions, vector, assembly=self.assembly, model=self.model)
         values, status, notes = [], [], []
         for measure in self.asked:
             try:
-                v, s, n = self._column(measure, place)
+                v, s, n = self._column(measure, points)
             except MeasureError as error:
-                raise MeasureError(f"{measure.name} {error}") from None
+                raise error.of(measure.name) from None
             values.append(v)
             status += [s] * v.shape[1]
             here = tuple(Note(a.status, a.reason, a.count, (a.first[0] + first,)) for a in n)
@@ -111,13 +113,13 @@ class MapJob:
         return (measure.name, *(f"{measure.name}_direction_{c}" for c in COMPONENTS if directed))
 
     def _column(
-        self, measure: Measure, place: Place
+        self, measure: Measure, points: OperatingPoint
     ) -> tuple[NDArray[np.float64], NDArray[np.uint8], tuple[Note, ...]]:
         if not isinstance(self.direction, str) or not measure.along:
-            found = evaluate(measure, place)
+            found = evaluate(measure, points)
             return found.values[:, None], found.status, found.notes
         extreme: Any = self.direction
-        directed = along_extreme(measure, place, extreme)
+        directed = along_extreme(measure, points, extreme)
         found = directed.measured
         return np.column_stack([found.values, directed.direction]), found.status, found.notes
 
@@ -129,7 +131,7 @@ def workspace_map(
     direction: Direction = None,
     assembly: str | None = None,
     model: str | None = None,
-    wanted: Wanted | None = None,
+    wall: WantedWall | None = None,
     *,
     own: Mapping[str, Measure] | None = None,
     store: Store | None = None,
@@ -142,6 +144,7 @@ def workspace_map(
     plane      left out: `plane_of(device)`
     direction  rendered in every cell; "worst" or "best": in each cell the direction in which the measure is so,
                "lowest" or "highest": in which it is so; left out: the file's
+    wall       the wanted wall, for measures that are about one
     own        measures of a user's own, by name (`measures.own.load_measures`)
     Returns    a dataset over (y_m, x_m): for each measure NAME its values, nan where there is none, NAME_status,
                and with an extreme direction NAME_direction (y_m, x_m, component). Why cells have no value stands
@@ -149,10 +152,10 @@ def workspace_map(
     Raises     PlaneError    where the handle reaches no cell, and as `plane_of` does
                ValueError    for an unknown measure, or two of one name
                MeasureError  for a measure that cannot be asked of this device
-               DeviceError   as `Device.plant` does
+               DeviceError   as `Device.at` does
                what `executor.run` raises
     """
-    job = map_job(device, measures, plane, direction, assembly, model, wanted, own=own)
+    job = map_job(device, measures, plane, direction, assembly, model, wall, own=own)
     return as_dataset(job, run(job, store, progress, workers, batch=job.batch, stage="mapping"))
 
 
@@ -163,7 +166,7 @@ def map_job(
     direction: Direction = None,
     assembly: str | None = None,
     model: str | None = None,
-    wanted: Wanted | None = None,
+    wall: WantedWall | None = None,
     *,
     own: Mapping[str, Measure] | None = None,
 ) -> MapJob:
@@ -185,11 +188,13 @@ def map_job(
                 try:
                     sense(one, extreme)
                 except MeasureError as error:
-                    raise MeasureError(f"{one.name} {error}") from None
+                    raise error.of(one.name) from None
     else:
         device.direction(direction)  # raises what is wrong with it
     plane = plane or plane_of(device, assembly=assembly)
-    return MapJob(device, asked, plane, direction, assembly, model, wanted or Wanted())
+    wanted = wall or WantedWall()
+    asked = tuple(one.at_wall(wanted) for one in asked)
+    return MapJob(device, asked, plane, direction, assembly, model, wanted)
 
 
 def as_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
@@ -271,9 +276,9 @@ def _circumstances(job: MapJob) -> dict[str, Any]:
     device, plane, direction = job.device, job.plane, job.direction
     asked = direction if isinstance(direction, str) else device.direction(direction).tolist()
     wanted = {
-        "wanted_stiffness_N_per_m": job.wanted.stiffness,
-        "wanted_damping_Ns_per_m": job.wanted.damping,
-        "wanted_frequency_Hz": job.wanted.frequency,
+        "wanted_stiffness_N_per_m": job.wall.stiffness,
+        "wanted_damping_Ns_per_m": job.wall.damping,
+        "wanted_frequency_Hz": job.wall.frequency,
     }
     return {
         "name": device.name,

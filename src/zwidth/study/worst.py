@@ -1,8 +1,8 @@
-"""The worst, or the best, direction of each place.
+"""The worst, or the best, direction of each point.
 
 A measure m(u) of a direction u is asked all round: along the directions that the handle can move in, a line, a
 plane, or space. Between the samples the extreme is refined, by golden sections in the plane and by a compass
-search on the sphere, for all places at once. Where a second extreme comes near the first in the samples, both are
+search on the sphere, for all points at once. Where a second extreme comes near the first in the samples, both are
 refined, since the samples do not tell which is the larger.
 """
 
@@ -14,9 +14,9 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.measures.evaluate import evaluate
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.evaluate import NO_MECHANISM, evaluate
 from zwidth.measures.measure import MISSING, OK, Measure, Measured, MeasureError, Note
-from zwidth.measures.place import Place
 from zwidth.study.around import Around, Floats, Ints, arounds
 
 Extreme = Literal["worst", "best", "lowest", "highest"]
@@ -38,7 +38,7 @@ Bools = NDArray[np.bool_]
 class Directed:
     """An extreme over directions.
 
-    measured   its values, with the places' leading axes
+    measured   its values, with the points' leading axes
     direction  (..., 3) unit vectors along which they are reached; nan where there is none, or none counts
     """
 
@@ -46,11 +46,11 @@ class Directed:
     direction: Floats
 
 
-def along_extreme(measure: Measure, place: Place, extreme: Extreme) -> Directed:
-    """A measure along that direction of each place in which it is worst, best, lowest or highest.
+def along_extreme(measure: Measure, point: OperatingPoint, extreme: Extreme) -> Directed:
+    """A measure along that direction of each point in which it is worst, best, lowest or highest.
 
     Directions are those in which the handle can move. A direction and its opposite count as one unless the measure
-    tells them apart; then both are asked. A place in which one direction has no value has no worst one; otherwise
+    tells them apart; then both are asked. A point at which one direction has no value has no worst one; otherwise
     such directions are left out. Either is told in a note. The direction is found to 1e-5 rad, and so a smooth
     measure's extreme to 1e-10 of its curvature; where a measure grows beyond bounds about a direction, as
     stiffness does along a rigid drive, a very large number stands for it.
@@ -58,9 +58,11 @@ def along_extreme(measure: Measure, place: Place, extreme: Extreme) -> Directed:
     Raises  MeasureError  for a device given by its plant, or "worst" and "best" of a measure of which neither more
                           nor less is better
     """
-    row = place.flat
+    if point.posture is None:
+        raise MeasureError(NO_MECHANISM)
+    row = point.flat
     if not measure.along:
-        return Directed(evaluate(measure, place), np.full((*place.shape, 3), np.nan))
+        return Directed(evaluate(measure, point), np.full((*point.shape, 3), np.nan))
     goal = _Goal(sense(measure, extreme), extreme == "worst")
     values, direction = np.full(row.shape, np.nan), np.full((*row.shape, 3), np.nan)
     status = row.status.copy()
@@ -69,7 +71,7 @@ def along_extreme(measure: Measure, place: Place, extreme: Extreme) -> Directed:
             mine = np.arange(first, min(first + CHUNK, len(which)))
             found = _SEARCH[around.basis.shape[2]](around, mine, goal, which)
             values[which[mine]], direction[which[mine]], status[which[mine]] = found
-    shape = place.shape
+    shape = point.shape
     told = goal.told(shape)
     return Directed(Measured(values.reshape(shape), status.reshape(shape), told), direction.reshape((*shape, 3)))
 
@@ -120,7 +122,7 @@ class _Goal:
         return np.where(none.any(axis=0) if self.strict else everywhere, kind, OK).astype(np.uint8)
 
     def told(self, shape: tuple[int, ...]) -> tuple[Note, ...]:
-        """A note for each reason, with the places' leading axes."""
+        """A note for each reason, with the points' leading axes."""
         return tuple(
             Note(status, reason, len(places), tuple(int(i) for i in np.unravel_index(min(places), shape)))
             for (status, reason), places in self.seen.items()

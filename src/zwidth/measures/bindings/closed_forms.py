@@ -1,4 +1,4 @@
-"""The catalogue's closed forms of the impedance range, asked of places: see `measures.impedance_range`.
+"""The catalogue's closed forms of the impedance range, asked of operating points: see `measures.impedance_range`.
 
 They are those of the thesis's maps (Figs. 5.2, 5.3), which leave damping out although the device is damped; so do
 these, and say so in their titles. Whatever else a closed form assumes must hold, or it is refused: the model is
@@ -11,49 +11,50 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from zwidth.conditions.assumptions import AT_ONCE, RIGID, SPRUNG, WHOLE
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.bindings.common import computer, meets, reads_motors
 from zwidth.measures.evaluate import measured
 from zwidth.measures.impedance_range import ImpedanceRange, rigid_range, sprung_range
 from zwidth.measures.measure import Measured, MeasureError
-from zwidth.measures.place import Place
 
 _NONE = "no wall of positive stiffness is stable, or the mass or the spring of the model is not there"
 
 
-def stiffness_max_closed_form(place: Place) -> Measured:
+def stiffness_max_closed_form(point: OperatingPoint) -> Measured:
     """Thesis eq. 5.4, 5.6 and 5.7."""
-    return measured(place, _range(place).stiffness_max, _NONE)
+    return measured(point, _range(point).stiffness_max, _NONE)
 
 
-def damping_max_closed_form(place: Place) -> Measured:
+def damping_max_closed_form(point: OperatingPoint) -> Measured:
     """Thesis eq. 5.4, 5.6 and 5.7, for stiffnesses near 0."""
-    return measured(place, _range(place).damping_max, _NONE)
+    return measured(point, _range(point).damping_max, _NONE)
 
 
-def stable_area_closed_form(place: Place) -> Measured:
+def stable_area_closed_form(point: OperatingPoint) -> Measured:
     """Thesis eq. 5.5 and 5.8."""
-    return measured(place, _range(place).stable_area, _NONE)
+    return measured(point, _range(point).stable_area, _NONE)
 
 
-def _range(place: Place) -> ImpedanceRange:
-    if place.operator is not None and place.model != "motor-mass":
-        raise MeasureError("has a closed form for the device alone; give --operator none")
-    case = computer(place)
-    T, late = place.controller.sampling_period, place.controller.whole_delay
+def _range(point: OperatingPoint) -> ImpedanceRange:
+    if point.operator is not None and point.model != "motor-mass":
+        raise MeasureError("has a closed form for the device alone", [("operator", "none")])
+    case = computer(point)
+    T, late = point.controller.sampling_period, point.controller.whole_delay
     mass: ArrayLike
     motor: ArrayLike
     stiffness: ArrayLike
-    if place.mechanism is None:
+    if point.mechanism is None:
         found, rigid, sprung = case.traits, RIGID not in case.unmet, SPRUNG not in case.unmet
         mass, motor, stiffness = found.rigid_mass, found.side_mass, found.side_stiffness
     else:
-        numbers, rigid, sprung = place.effective, place.model == "rigid", place.model == "motor-mass"
+        numbers, rigid, sprung = point.effective, point.model == "rigid", point.model == "motor-mass"
         mass, motor, stiffness = numbers.rigid_mass, numbers.motor_side_mass, numbers.stiffness
     if rigid:
         meets(case, WHOLE)
         return rigid_range(mass, T, late)
     if sprung:
-        reads_motors(place)
+        reads_motors(point)
         meets(case, AT_ONCE)
         return sprung_range(motor, stiffness, T)
-    raise MeasureError("has a closed form for two models only; give --model rigid or --model motor-mass")
+    models = [("model", "rigid"), ("model", "motor-mass")]
+    raise MeasureError("has a closed form for two models only", models, True)

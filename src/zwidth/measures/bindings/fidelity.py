@@ -1,4 +1,4 @@
-"""The catalogue's measures of how a wanted wall feels, asked of places.
+"""The catalogue's measures of how a wanted wall feels, asked of operating points.
 
 See `measures.fidelity`, `measures.structural` and `measures.felt` for the formulas. An operator decides with the
 device whether the wall is stable; what is felt, and what deforms, is the device without him.
@@ -11,18 +11,18 @@ import numpy as np
 from zwidth.chart.verdict import STABLE, Verdicts, judge
 from zwidth.conditions.assumptions import AT_ONCE, SPRUNG
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures import felt, fidelity, structural
 from zwidth.measures.bindings.common import (
     computer,
+    frequency_of,
     held_plant,
     meets,
     reads_motors,
-    wanted_frequency,
-    wanted_wall,
+    wall_of,
 )
 from zwidth.measures.evaluate import measured
-from zwidth.measures.measure import Measured, MeasureError, NoValueError
-from zwidth.measures.place import Place
+from zwidth.measures.measure import Measured, MeasureError, NoValueError, WantedWall
 
 _NOT_REACHED = (
     "no motor-side mass reaches (5.15) at this wall: it needs B > K T/2 and a remaining real root that is not "
@@ -30,68 +30,68 @@ _NOT_REACHED = (
 )
 
 
-def optimal_spectral_radius(place: Place) -> Measured:
+def optimal_spectral_radius(point: OperatingPoint, wanted: WantedWall) -> Measured:
     """Thesis eq. 5.15, of the motor side on the structure's spring; the masses of the device do not count."""
-    return measured(place, _optimal(place).spectral_radius, _NOT_REACHED)
+    return measured(point, _optimal(point, wanted).spectral_radius, _NOT_REACHED)
 
 
-def optimal_motor_side_mass(place: Place) -> Measured:
+def optimal_motor_side_mass(point: OperatingPoint, wanted: WantedWall) -> Measured:
     """Thesis eq. 5.14 with 5.15."""
-    return measured(place, _optimal(place).mass, _NOT_REACHED)
+    return measured(point, _optimal(point, wanted).mass, _NOT_REACHED)
 
 
-def spectral_radius(place: Place) -> float:
+def spectral_radius(point: OperatingPoint, wanted: WantedWall) -> float:
     """Of the wanted wall, by eigenvalues, for whatever model and loop."""
-    return float(_judged(place).spectral_radius[0])
+    return float(_judged(point, wanted).spectral_radius[0])
 
 
-def decay_time(place: Place) -> float:
+def decay_time(point: OperatingPoint, wanted: WantedWall) -> float:
     """In which the slowest vibration at the wanted wall shrinks to 1/e."""
-    found = _judged(place)
+    found = _judged(point, wanted)
     if found.verdict[0] != STABLE:
         raise NoValueError(f"the wanted wall is {found.names[0]} here, so that vibration does not decay")
-    return float(fidelity.decay_time(found.spectral_radius[0], place.controller.sampling_period))
+    return float(fidelity.decay_time(found.spectral_radius[0], point.controller.sampling_period))
 
 
-def structural_distortion(place: Place) -> float:
+def structural_distortion(point: OperatingPoint, wanted: WantedWall) -> float:
     """Largest share of the motors' motion that deforms the structure, up to the wanted frequency."""
-    return structural.structural_distortion(held_plant(place), wanted_frequency(place))
+    return structural.structural_distortion(held_plant(point), frequency_of(wanted))
 
 
-def felt_stiffness(place: Place) -> float:
+def felt_stiffness(point: OperatingPoint, wanted: WantedWall) -> float:
     """Real part of force per displacement at the handle, at the wanted wall and frequency."""
-    wall, frequency = wanted_wall(place), wanted_frequency(place)
-    nyquist = 0.5 / place.controller.sampling_period
+    wall, frequency = wall_of(wanted), frequency_of(wanted)
+    nyquist = 0.5 / point.controller.sampling_period
     if frequency >= nyquist:
         raise MeasureError(
             f"needs a frequency below half the sampling frequency, {nyquist:g} Hz, got {frequency:g} Hz"
         )
-    plant, found = held_plant(place), _judged(place)
+    plant, found = held_plant(point), _judged(point, wanted)
     if found.verdict[0] != STABLE:
         raise NoValueError(f"the wanted wall is {found.names[0]} here, so that there is no steady motion to feel")
-    Z = felt.felt_impedance(Loop(plant, place.controller), *wall, frequency)
+    Z = felt.felt_impedance(Loop(plant, point.controller), *wall, frequency)
     return float((2j * np.pi * frequency * Z).real)
 
 
-def free_motion_force(place: Place) -> float:
+def free_motion_force(point: OperatingPoint, wanted: WantedWall) -> float:
     """Size of force per velocity at the handle without any wall, at the wanted frequency."""
-    frequency = wanted_frequency(place)
-    return float(np.abs(felt.free_motion_impedance(held_plant(place), frequency)))
+    frequency = frequency_of(wanted)
+    return float(np.abs(felt.free_motion_impedance(held_plant(point), frequency)))
 
 
-def _judged(place: Place) -> Verdicts:
-    K, B = wanted_wall(place)
-    return judge(place.loop, [K], [B])
+def _judged(point: OperatingPoint, wanted: WantedWall) -> Verdicts:
+    K, B = wall_of(wanted)
+    return judge(point.loop, [K], [B])
 
 
-def _optimal(place: Place) -> fidelity.OptimalMass:
-    K, B = wanted_wall(place)
-    case = computer(place)
+def _optimal(point: OperatingPoint, wanted: WantedWall) -> fidelity.OptimalMass:
+    K, B = wall_of(wanted)
+    case = computer(point)
     meets(case, AT_ONCE)
-    reads_motors(place)
-    stiffness = place.effective.stiffness
-    if place.mechanism is None and np.isnan(stiffness):
+    reads_motors(point)
+    stiffness = point.effective.stiffness
+    if point.mechanism is None and np.isnan(stiffness):
         if SPRUNG in case.unmet:
             raise MeasureError("needs the stiffness between motors and handle, which the device does not have")
         stiffness = np.asarray(case.traits.side_stiffness)
-    return fidelity.optimal_mass(K, B, stiffness, place.controller.sampling_period)
+    return fidelity.optimal_mass(K, B, stiffness, point.controller.sampling_period)

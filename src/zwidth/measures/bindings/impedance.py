@@ -1,4 +1,4 @@
-"""Which walls a device can render, exactly, as measures of a place."""
+"""Which walls a device can render, exactly, as measures of a point."""
 
 from __future__ import annotations
 
@@ -8,67 +8,67 @@ from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.stiffest import FOUND, Stiffest, stiffest_walls
 from zwidth.loop.evaluate import computer_factors
 from zwidth.loop.modal_rows import modal_rows
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.evaluate import answered, one_by_one, reasons
 from zwidth.measures.measure import OK, Measured, NoValueError
-from zwidth.measures.place import Place
 from zwidth.model.rendered_modes import rendered_modes
 
 NO_WALL = "no wall with K > 0 and B >= 0 is stable"
 
 
-def stiffness_max(place: Place) -> Measured:
-    """Supremum of K over the stable walls with K > 0, B >= 0, of the place's model and loop [N/m].
+def stiffness_max(point: OperatingPoint) -> Measured:
+    """Supremum of K over the stable walls with K > 0, B >= 0, of the point's model and loop [N/m].
 
     Postures of classically damped mechanisms go through compiled code together (`chart.stiffest`); what is in
     doubt there, and what has no wall there, is asked by itself, as every other device is.
     """
-    fast = _together(place)
+    fast = _together(point)
     if fast is None:
-        return one_by_one(_largest, place)
-    values, status = fast.stiffness.reshape(place.shape), place.status.copy()
+        return one_by_one(_largest, point)
+    values, status = fast.stiffness.reshape(point.shape), point.status.copy()
     why = {}
-    for index in np.argwhere((status == OK) & (fast.status.reshape(place.shape) != FOUND)):
+    for index in np.argwhere((status == OK) & (fast.status.reshape(point.shape) != FOUND)):
         at = tuple(int(i) for i in index)
-        values[at], status[at], reason = answered(lambda: _largest(place.at(*at)))  # noqa: B023
+        values[at], status[at], reason = answered(lambda: _largest(point[at]))  # noqa: B023
         if reason:
             why[at] = (int(status[at]), reason)
     return Measured(np.where(status == OK, values, np.nan), status, reasons(why))
 
 
-def _together(place: Place) -> Stiffest | None:
-    """The stiffest walls of all places, flat; None for what has no modes that compiled code knows."""
-    controller = place.controller
-    if place.mechanism is None or place.direction is None or controller.actuator_time_constant > 0.0:
+def _together(point: OperatingPoint) -> Stiffest | None:
+    """The stiffest walls of all points, flat; None for what has no modes that compiled code knows."""
+    controller = point.controller
+    if point.mechanism is None or point.posture is None or controller.actuator_time_constant > 0.0:
         return None
-    model = place.model or "full"
-    if place.operator is not None and model != "motor-mass":  # which holds him fixed
+    model = point.model or "full"
+    if point.operator is not None and model != "motor-mass":  # which holds him fixed
         return None
-    modes = rendered_modes(place.mechanism, place.placed, place.direction, model, place.damping, place.encoders)
+    modes = rendered_modes(point.mechanism, point.posture, point.direction, model, point.damping, point.encoders)
     if modes is None:
         return None
     return stiffest_walls(computer_factors(controller), *modal_rows(modes, controller))
 
 
-def _largest(place: Place) -> float:
-    peak = largest_stiffness(place.loop)
+def _largest(point: OperatingPoint) -> float:
+    peak = largest_stiffness(point.loop)
     if peak is None:
         raise NoValueError(NO_WALL)
     return peak.stiffness
 
 
-def damping_max(place: Place) -> float:
-    """Supremum of B >= 0 that is stable for all sufficiently small K > 0, of one place [N s/m]; 0 if none is."""
-    return stability_chart(place.loop, decay=False).damping_max
+def damping_max(point: OperatingPoint) -> float:
+    """Supremum of B >= 0 that is stable for all sufficiently small K > 0, of one point [N s/m]; 0 if none is."""
+    return stability_chart(point.loop, decay=False).damping_max
 
 
-def stable_area(place: Place) -> float:
-    """Area of the stable walls with K >= 0, B >= 0 of one place [N^2 s/m^2]."""
-    return stability_chart(place.loop, decay=False).stable_area
+def stable_area(point: OperatingPoint) -> float:
+    """Area of the stable walls with K >= 0, B >= 0 of one point [N^2 s/m^2]."""
+    return stability_chart(point.loop, decay=False).stable_area
 
 
-def fastest_decay(place: Place) -> float:
-    """Spectral radius of the wall whose slowest motion decays fastest, of one place."""
-    found = stability_chart(place.loop).fastest_decay
+def fastest_decay(point: OperatingPoint) -> float:
+    """Spectral radius of the wall whose slowest motion decays fastest, of one point."""
+    found = stability_chart(point.loop).fastest_decay
     if found is None:
         raise NoValueError("no wall is stable")
     return found.spectral_radius

@@ -108,10 +108,10 @@ def _compared(question: Question, device: Device, damping: float | None) -> Foun
     from zwidth.chart.region import ChartError
     from zwidth.conditions import compare
     from zwidth.conditions.exact import stiffness_limit
-    from zwidth.loop.loop import Loop
     from zwidth.show.friction import told_of
 
-    loop = Loop(question.plant(device), device.controller)
+    point = question.point(device)
+    loop = point.loop
     chart, undrawn = None, ""
     try:
         chart = stability_chart(loop, decay=False)
@@ -121,7 +121,7 @@ def _compared(question: Question, device: Device, damping: float | None) -> Foun
         known = chart is not None and chart.stiffness_max > 0.0
         damping = chart.damping_at_stiffness_max if chart is not None and known else 0.0
     exact = stiffness_limit(chart, damping) if chart is not None else float("nan")
-    told = compare(loop, wall_damping=damping, **told_of(device, loop.plant))
+    told = compare(loop, wall_damping=damping, **told_of(point))
     return Found(told, chart, undrawn, damping, exact)
 
 

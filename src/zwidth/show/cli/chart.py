@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from zwidth.chart.decay import FastestDecay
     from zwidth.chart.eigenloci import MultiChart
     from zwidth.device.device import Device
-    from zwidth.model.reduction import Model
 
 KEYS: Final = (
     "regions",
@@ -87,7 +86,7 @@ def chart(
         raise BadInput(
             f"{question.name}: has no [mechanism], and so one direction only; leave out --with-direction"
         )
-    if device.by_response:
+    if question.charted_by_response(device):
         return measured.answer_chart(question, device, path, window, as_json)
     if others:
         question.of_several_directions(device)
@@ -107,21 +106,16 @@ def chart(
 
 def _charted(question: Question, device: Device) -> StabilityChart:
     from zwidth.chart.chart import stability_chart
-    from zwidth.loop.loop import Loop
 
-    return stability_chart(Loop(question.plant(device), device.controller))
+    return stability_chart(question.point(device).loop)
 
 
 def _charted_together(question: Question, device: Device, along: list[Any]) -> MultiChart:
     """One wall law over several directions."""
     from zwidth.chart.eigenloci import multi_chart
-    from zwidth.loop.multi import MultiLoop
-    from zwidth.model.directions import reduce_directions
 
-    assert device.mechanism is not None
-    posture, model = device.posture(question.at, question.assembly), cast("Model", question.model or "full")
-    plant = reduce_directions(device.mechanism, posture, along, model, device.damping)
-    return multi_chart(MultiLoop(plant, device.controller))
+    point = device.at(question.at, directions=along, assembly=question.assembly, model=question.model)
+    return multi_chart(point.loop_of_directions)
 
 
 def numbers(chart: StabilityChart | MultiChart) -> dict[str, Any]:

@@ -64,12 +64,11 @@ def check(
 
 def _judged(question: Question, device: Device, walls: Walls) -> list[dict[str, Any]]:
     """One entry per wall: the wall, its verdict, spectral radius and frequency."""
-    if device.by_response:
+    if question.charted_by_response(device):
         return measured.judged(question, device, walls)
     from zwidth.chart.verdict import judge
-    from zwidth.loop.loop import Loop
 
-    loop = Loop(question.plant(device), device.controller)
+    loop = question.point(device).loop
     entries = []
     for start in range(0, len(walls), AT_ONCE):
         batch = walls[start : start + AT_ONCE]
@@ -116,7 +115,7 @@ def _pages(question: Question, device: Device, document: dict[str, Any]) -> Sequ
         for point in points[:SHOWN]
     ]
     pages: list[Any] = [heading(question, device)]
-    frequency = "nearest edge at" if device.by_response else "its frequency"
+    frequency = "nearest edge at" if question.charted_by_response(device) else "its frequency"
     pages.append(table(["stiffness", "damping", "verdict", "spectral radius", frequency], rows))
     if len(points) > SHOWN:
         pages.append(f"and {len(points) - SHOWN} more; --json or --output holds them all")

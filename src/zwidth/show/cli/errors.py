@@ -57,3 +57,12 @@ def _internal(error: Exception) -> list[str]:
         f"zwidth: an error in zwidth itself ({type(error).__name__}: {text}); please report it with the "
         f"command and the device file ({DEBUG}=1 shows the traceback)"
     ]
+
+
+def as_option(name: str, value: str | None) -> str:
+    """An argument as the command line spells it.
+
+    >>> as_option("stiffness", None), as_option("model", "rigid")
+    ('--stiffness', '--model rigid')
+    """
+    return f"--{name}" if value is None else f"--{name} {value}"

@@ -158,12 +158,11 @@ def _measured(
     question: Question, device: Device, asked: dict[str, Any], path: Path | None, resume: str | None
 ) -> Experiment:
     from zwidth.contact.bench import BenchError
-    from zwidth.loop.loop import Loop
     from zwidth.study.experiment import measure
     from zwidth.study.experiment import question as known_by
 
     with computing(question):
-        loop = Loop(question.plant(device, held=False), device.controller)
+        loop = question.point(device).without_operator.loop
     operator = device.operator if loop.plant.handle is not None and question.operator_of(device) else None
     try:
         plan = _plan(asked)

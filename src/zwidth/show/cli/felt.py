@@ -97,20 +97,19 @@ def _computed(question: Question, device: Device, K: float, B: float) -> Felt:
 
     from zwidth.chart.chart import largest_stiffness
     from zwidth.chart.verdict import judge
-    from zwidth.loop.loop import Loop
     from zwidth.measures import felt as measures
 
-    held = question.plant(device)  # by the operator, if there is one: with him the wall is stable or not
-    plant = device.plant(question.at, question.direction, question.assembly, question.model, held=False)
+    point = question.point(device)  # with the operator, if there is one, the wall is stable or not
+    plant = point.unheld_plant
     if plant.handle is None:
         where = f"model {question.model}: " if question.model else ""
         raise BadInput(
             f"{question.name}: {where}there is no handle at which a hand could feel the wall; give plant.handle, "
             "or use another model"
         )
-    verdict = judge(Loop(held, device.controller), [K], [B]).names[0]
-    peak = largest_stiffness(Loop(held, device.controller))
-    loop = Loop(plant, device.controller)
+    verdict = judge(point.loop, [K], [B]).names[0]
+    peak = largest_stiffness(point.loop)
+    loop = point.without_operator.loop
     frequency = np.geomspace(LOWEST, HIGHEST, COUNT) * 0.5 / loop.period
     return Felt(
         stiffness=K,

@@ -89,9 +89,8 @@ def _computed(
 ) -> tuple[Guarantees, Couplings | None]:
     from zwidth.guarantees.coupling import couplings
     from zwidth.guarantees.nested import nested
-    from zwidth.loop.loop import Loop
 
-    loop = Loop(question.plant(device, held=False), device.controller)
+    loop = question.point(device).without_operator.loop
     handle = loop.plant.handle
     coupled = None if not coupling or handle is None else couplings(loop, handle, wall)
     return nested(loop), coupled

@@ -127,9 +127,7 @@ def limit_cycles(
 
 
 def _loop(question: Question, device: Device) -> Loop:
-    from zwidth.loop.loop import Loop
-
-    loop = Loop(question.plant(device), device.controller)
+    loop = question.point(device).loop
     _ = loop.sections  # refuses plants that no wall moves, or not in time
     return loop
 
@@ -139,7 +137,7 @@ def _largest_motion(question: Question, device: Device) -> float:
     in its assembly; a [plant] as far as any device does."""
     from zwidth.contact.simulate import LARGEST_MOTION
 
-    reached = question.handle_range(device)
+    reached = question.point(device).handle_range
     if reached is None:
         return LARGEST_MOTION
     back, forth = reached

@@ -12,7 +12,7 @@ import click
 from zwidth.measures.catalogue import MEASURES
 from zwidth.show.cli.answer import Answer, deliver
 from zwidth.show.cli.computing import NoAnswer, computing
-from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import (
     Command,
     Finite,
@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from zwidth.device.device import Device
-    from zwidth.measures.measure import Measure
-    from zwidth.measures.place import Wanted
+    from zwidth.measures.measure import Measure, WantedWall
     from zwidth.study.common_area import CommonArea
     from zwidth.study.plane import Plane
     from zwidth.study.requirement import Requirement
@@ -201,12 +200,12 @@ def _measures(
     return list(every.values()), required
 
 
-def _wanted(stiffness: float | None, damping: float | None, frequency: float | None) -> Wanted:
-    from zwidth.measures.place import Wanted
+def _wanted(stiffness: float | None, damping: float | None, frequency: float | None) -> WantedWall:
+    from zwidth.measures.measure import WantedWall
 
     if frequency is not None and not (math.isfinite(frequency) and frequency > 0.0):
         raise BadInput(f"--frequency: must be positive, got {frequency:g}")
-    return Wanted(stiffness, damping, frequency)
+    return WantedWall(stiffness, damping, frequency)
 
 
 def _mapped(
@@ -214,7 +213,7 @@ def _mapped(
     device: Device,
     extreme: str | None,
     asked: list[Measure],
-    wanted: Wanted,
+    wanted: WantedWall,
     grid: dict[str, Any],
 ) -> xr.Dataset:
     from zwidth.contact.room import TooLarge
@@ -235,7 +234,9 @@ def _mapped(
                 wanted,
                 progress=progress,
             )
-    except (PlaneError, MeasureError, TooLarge) as error:
+    except MeasureError as error:
+        raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
+    except (PlaneError, TooLarge) as error:
         raise BadInput(f"{question.name}: {error}") from None
 
 
@@ -244,7 +245,7 @@ def _plane(question: Question, device: Device, grid: dict[str, Any]) -> Plane:
     from zwidth.study.plane import plane_of
 
     with suppress(PostureError):  # an assembly that does not reach the reference position may reach others
-        device.posture(None, question.assembly)  # raises what is wrong with its name
+        device.at(assembly=question.assembly)  # raises what is wrong with its name
     return plane_of(
         device,
         grid["plane"],

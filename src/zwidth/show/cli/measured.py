@@ -71,10 +71,9 @@ def without_model(question: Question, device: Device, unanswered: Mapping[str, A
 def _charted(question: Question, device: Device) -> MeasuredChart:
     if device.response is None:
         from zwidth.chart.hysteretic import hysteretic_chart
-        from zwidth.loop.loop import Loop
 
         with computing(question):
-            return hysteretic_chart(Loop(question.plant(device), device.controller))
+            return hysteretic_chart(question.point(device).loop)
     from zwidth.chart.measured import measured_chart
 
     question.as_measured(device)

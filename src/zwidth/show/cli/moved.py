@@ -71,7 +71,8 @@ def moved(question: Question, device: Device, asked: Motion) -> Moved:
     drives = len(mechanism.drives.names)
     samples = asked.duration / device.controller.sampling_period
     with computing(question):
-        posture = device.posture(question.at, question.assembly)
+        posture = question.point(device).posture
+        assert posture is not None
         try:
             told = samples * (SHOWN[0] + SHOWN[1] * drives)
             check_room((1 + AS_TEXT) * told, f"{samples:.4g} samples", "move for a shorter time")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from zwidth.device.device import Device
-    from zwidth.model.plant import Plant
+    from zwidth.loop.operating_point import OperatingPoint
 
     Floats = NDArray[np.float64]
     ParamType = click.ParamType[Any]
@@ -48,41 +48,37 @@ class Question:
 
         return load(self.name, self.settings, self.operator)
 
-    def plant(self, device: Device, *, held: bool = True) -> Plant:
-        """The rendered direction's dynamics, held by the device's operator. Raises what `Device.plant` raises."""
-        return device.plant(self.at, self.direction, self.assembly, self.model, held=held)
+    def point(self, device: Device) -> OperatingPoint:
+        """Where the device is asked about. Raises what `Device.at` raises."""
+        return device.at(self.at, self.direction, assembly=self.assembly, model=self.model)
 
-    def handle_range(self, device: Device) -> tuple[float, float] | None:
-        """How far the handle can be from its posture along the direction, backwards and forwards [m]; None for a
-        device without a mechanism. Raises what `Device.posture` raises."""
-        if device.mechanism is None:
-            return None
-        from zwidth.model.posture import handle_range
-
-        posture, along = device.posture(self.at, self.assembly), device.direction(self.direction)
-        return handle_range(device.mechanism, posture, along)
+    def charted_by_response(self, device: Device) -> bool:
+        """Is the device charted by its frequency response? Raises DeviceError as `Device.at` does."""
+        return device.mechanism is None and self.point(device).charted_by_response
 
     def as_measured(self, device: Device) -> None:
         """Raises DeviceError for whatever is asked of a [response] that needs a model."""
-        if any((self.at, self.direction, self.assembly, self.model)):
-            self.plant(device)
+        self.point(device)
 
     def of_several_directions(self, device: Device) -> None:
         """Raises BadInput for what directions computed together leave out."""
+        from zwidth.loop.operating_point import SeveralDirectionsError, check_several_directions
         from zwidth.show.cli.errors import BadInput
 
-        windings = None if device.mechanism is None else device.mechanism.drives.winding_damping
-        lines = [
-            f"{self.name}: {what} is not supported over several directions; {instead}, or ask for one direction"
-            for there, what, instead in (
-                (device.operator is not None, "an operator", "use --operator none"),
-                (device.encoders != "motor", "an encoder on the link", "use --set loop.encoder.at=motor"),
-                (windings is not None and windings.any(), "electrical damping", "unset damping_resistance_ohm"),
-            )
-            if there
-        ]
-        if lines:
-            raise BadInput(*lines)
+        instead = {
+            "an operator": "use --operator none",
+            "an encoder on the link": "use --set loop.encoder.at=motor",
+            "electrical damping": "unset damping_resistance_ohm",
+        }
+        try:
+            check_several_directions(device.mechanism, device.operator, device.encoders)
+        except SeveralDirectionsError as error:
+            several = "is not supported over several directions"
+            lines = [
+                f"{self.name}: {what} {several}; {instead[what]}, or ask for one direction"
+                for what in error.obstacles
+            ]
+            raise BadInput(*lines) from None
 
     def model_of(self, device: Device) -> str:
         """The model's name, also where none was asked for."""
@@ -101,9 +97,10 @@ class Question:
         from zwidth.model.posture import PostureError
 
         try:
-            posture = device.posture(self.at, self.assembly)
+            posture = device.at(self.at, assembly=self.assembly).posture
         except PostureError:
             return (None if isinstance(self.at, dict) else device.position(self.at)), None
+        assert posture is not None
         return posture.position, float(posture.projected)
 
     def circumstances(self, device: Device) -> dict[str, Any]:

@@ -93,15 +93,11 @@ def _computed(question: Question, device: Device, plane: str | None, count: int)
 
     from zwidth.chart.polar import circle, largest_stiffness_by_direction
 
-    assert device.mechanism is not None
-    posture = device.posture(question.at, question.assembly)
-    chosen = plane or _movable(posture.jacobian)
+    point = question.point(device)
+    chosen = plane or _movable(point.jacobian)
     first, second = np.eye(3)[list(AXES[chosen])]
     directions = circle(count, first, second)
-    model: Any = question.model or "full"
-    return chosen, largest_stiffness_by_direction(
-        device.mechanism, posture, directions, device.controller, model, device.damping
-    )
+    return chosen, largest_stiffness_by_direction(point, directions)
 
 
 def _movable(jacobian: Any) -> str:

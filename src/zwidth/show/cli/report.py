@@ -16,6 +16,7 @@ from zwidth.show.units import typed
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
+    from zwidth.loop.operating_point import OperatingPoint
 
 PAGE: Final = (".html", ".htm")
 
@@ -35,8 +36,9 @@ def report(question: Question, output: str | None, as_json: bool) -> int:
         return without_model(question, device, {"file": None, "decided": True}, as_json)
     try:
         with computing(question):
-            question.plant(device)  # whether it can be meant, before the heavy parts are imported
-            found = _written(question, device, path)
+            point = question.point(device)
+            _ = point.plant  # whether it can be meant, before the heavy parts are imported
+            found = _written(device, path, point)
     except NoAnswer as none:
         unanswered = question.facts(device) | {"file": None, "decided": none.decided}
         return deliver(Answer(unanswered, reason=str(none)), as_json)
@@ -51,15 +53,8 @@ def default_name(device: str) -> str:
     return f"{Path(device).name.removesuffix('.toml')}-report.html"
 
 
-def _written(question: Question, device: Device, path: Path) -> dict[str, Any]:
+def _written(device: Device, path: Path, point: OperatingPoint) -> dict[str, Any]:
     """Write the report; the numbers in it."""
     from zwidth.show.report.report import write_report
 
-    return write_report(
-        device,
-        path,
-        at=question.at,
-        direction=question.direction,
-        assembly=question.assembly,
-        model=question.model,
-    )
+    return write_report(device, path, point)

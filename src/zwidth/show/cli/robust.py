@@ -174,7 +174,7 @@ def _computed(
     from zwidth.study.robust import robust_study
     from zwidth.study.robust_family import Family
 
-    family = Family(device, ranges, operators, lambda one, held: question.plant(one, held=held))
+    family = Family(device, ranges, operators, question.point(device))
     members, unseen, seed = counts
     return robust_study(family, members, unseen, seed, progress=progress)
 

@@ -67,7 +67,7 @@ def sensitivity(question: Question, top: int, output: str | None, as_json: bool)
 def _computed(question: Question, device: Device) -> Sensitivities:
     from zwidth.study.sensitivity import sensitivities
 
-    return sensitivities(device, question.at, question.direction, question.assembly, question.model)
+    return sensitivities(device, question.point(device))
 
 
 def numbers(found: Sensitivities) -> dict[str, Any]:

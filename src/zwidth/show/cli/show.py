@@ -17,10 +17,10 @@ from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
+    from zwidth.loop.operating_point import OperatingPoint
     from zwidth.model.effective import EffectiveParameters
     from zwidth.model.mechanism import Floats, Mechanism
     from zwidth.model.plant import Plant
-    from zwidth.model.posture import Posture
 
 KEYS: Final = (
     "link_side_mass_kg",
@@ -54,11 +54,11 @@ def show(question: Question, output: str | None, as_json: bool) -> int:
         return without_model(question, device, dict.fromkeys(KEYS) | {"sources": device.sources}, as_json)
     try:
         with computing(question):
-            plant = question.plant(device, held=False)
-            posture = device.posture(question.at, question.assembly) if device.mechanism else None
+            point = question.point(device)
+            _ = point.unheld_plant  # whether the model applies
     except NoAnswer as none:
         return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(none)), as_json)
-    document = question.facts(device) | _numbers(question, device, plant, posture)
+    document = question.facts(device) | _numbers(device, point)
     if path is not None:
         document["file"] = str(path)
         write_data(path, document, flat(document))
@@ -80,23 +80,15 @@ def _entries(value: Any, key: str) -> Iterator[tuple[str, Any]]:
         yield from _entries(part, f"{key}.{step}" if key else str(step))
 
 
-def _numbers(question: Question, device: Device, plant: Plant, posture: Posture | None) -> dict[str, Any]:
+def _numbers(device: Device, point: OperatingPoint) -> dict[str, Any]:
     """What --json shows beyond the facts; None where inapplicable."""
-    from zwidth.model.effective import effective_parameters
     from zwidth.model.modes import natural_frequencies
-    from zwidth.model.reduction import plant_effective_parameters
 
-    mechanism = device.mechanism
-    if mechanism is not None and posture is not None:
-        felt = effective_parameters(mechanism, posture, device.direction(question.direction))
-        dexterity = _dexterity(mechanism, posture)
-    else:
-        assert device.given_plant is not None
-        felt = plant_effective_parameters(device.given_plant)
-        dexterity = {}
+    plant = point.unheld_plant
+    dexterity = {} if point.mechanism is None else _dexterity(point.mechanism, point)
     return (
         dict.fromkeys(KEYS)
-        | _felt(felt)
+        | _felt(point.effective)
         | {"natural_frequencies_Hz": natural_frequencies(plant), "damping_ratios": _damping_ratios(plant)}
         | dexterity
         | {"sources": device.sources}
@@ -112,20 +104,17 @@ def _felt(felt: EffectiveParameters) -> dict[str, Any]:
     }
 
 
-def _dexterity(mechanism: Mechanism, posture: Posture) -> dict[str, Any]:
-    import numpy as np
-
+def _dexterity(mechanism: Mechanism, point: OperatingPoint) -> dict[str, Any]:
     from zwidth.measures.dexterity import dynamic_manipulability, isotropy, manipulability
 
-    drives = mechanism.drives
-    rotors = np.diag(drives.transmission**2 * drives.motor_inertia)
-    J, M = posture.jacobian, posture.mass_matrix
+    assert point.posture is not None
+    angles, J = point.posture.angles, point.jacobian
     return {
-        "joints_rad": dict(zip(mechanism.links.names, posture.angles.tolist(), strict=True)),
+        "joints_rad": dict(zip(mechanism.links.names, angles.tolist(), strict=True)),
         "jacobian": J,
-        "mass_matrix": M,
+        "mass_matrix": point.mass_matrix,
         "manipulability": manipulability(J),
-        "dynamic_manipulability": dynamic_manipulability(J, M + rotors),
+        "dynamic_manipulability": dynamic_manipulability(J, point.whole_mass_matrix),
         "isotropy": isotropy(J),
     }
 

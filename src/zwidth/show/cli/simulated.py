@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from zwidth.contact.verdict import Judgement
     from zwidth.device.device import Device
     from zwidth.loop.loop import Loop
+    from zwidth.loop.operating_point import OperatingPoint
     from zwidth.show.cli.contact_options import Contact
     from zwidth.show.cli.options import Question
 
@@ -112,18 +113,18 @@ def simulated(
     from zwidth.contact.passivity import PassivityController
     from zwidth.contact.simulate import Run
     from zwidth.contact.verdict import judge_response
-    from zwidth.loop.loop import Loop
     from zwidth.show.sound import seconds_to_hear
 
     environment, values = contact.touched()
     with computing(question):
-        plant = device.plant(question.at, question.direction, question.assembly, question.model, held=False)
+        point = question.point(device)
+        plant = point.unheld_plant
         hand = contact.hand(environment, device.operator if plant.handle is not None else None)
         start = contact.start(environment)
-        _check_reach(question, device, contact.wall_position, "--wall-position: the wall")
-        off_path = _check_reach(question, device, start, "--start-position: the start")
-        loop = Loop(plant, device.controller)
-        predicted, frequency = _predicted(Loop(question.plant(device), device.controller), environment, values)
+        _check_reach(point, contact.wall_position, "--wall-position: the wall")
+        off_path = _check_reach(point, start, "--start-position: the start")
+        loop = point.without_operator.loop
+        predicted, frequency = _predicted(point.loop, environment, values)
         if duration is None:
             free = hand.tremor is None and hand.reach is None and largest_damping is None
             linear = predicted is not None and free and not loop.nonlinear
@@ -158,7 +159,7 @@ def simulated(
                 length = longer
                 done = _responses(runs, environment, length.seconds, substeps, trail=trail)
         _check_numbers(done, environment)
-        range_exit = _range_exit(question, device, done[0])
+        range_exit = _range_exit(point, done[0])
     return Simulated(
         environment=environment,
         values=values,
@@ -251,46 +252,27 @@ def _bound(offset: float, predicted: float | None) -> float:
     return max(LARGEST_MOTION, 10.0 * offset, min(grown, FARTHEST))
 
 
-def _check_reach(question: Question, device: Device, position: float, what: str) -> float | None:
-    """`_off_path` of a typed position. Raises BadInput where the handle cannot be moved so far."""
+def _check_reach(point: OperatingPoint, position: float, what: str) -> float | None:
+    """How far from a typed position the handle's path passes [m]; None for a device without a mechanism. Raises
+    BadInput where the handle cannot be moved so far."""
     from zwidth.model.posture import PostureError
 
     try:
-        return _off_path(question, device, position)
+        return point.distance_from_path(position)
     except PostureError as error:
         raise BadInput(f"{what} lies {position:g} m along the direction, out of the workspace: {error}") from None
 
 
-def _off_path(question: Question, device: Device, position: float) -> float | None:
-    """How far from a position of the reading the handle's path passes [m]; None for a device without a mechanism.
-
-    The model moves along the tangent, and the handle on a curve if it has few drives. Raises PostureError where
-    the handle cannot be moved so far along the direction.
-    """
-    if device.mechanism is None:
-        return None
-    from zwidth.model.posture import handle_motions
-
-    posture, along = device.posture(question.at, question.assembly), device.direction(question.direction)
-    if position == 0.0:
-        return 0.0
-    # without forces across, a handle with few drives moves by the part of the direction that it can move along
-    moves = handle_motions(posture)
-    way = moves @ (moves.T @ along)
-    reached = device.posture(list(posture.position + position / (way @ along) * way), question.assembly)
-    return float(reached.projected)
-
-
-def _range_exit(question: Question, device: Device, response: TimeResponse) -> RangeExit | None:
+def _range_exit(point: OperatingPoint, response: TimeResponse) -> RangeExit | None:
     """Where a motion leaves the handle's range; the whole range is asked only if an extreme cannot be reached."""
     from zwidth.model.posture import PostureError
 
     handle = response.handle
     try:
         for extreme in (handle.min(), handle.max()):
-            _off_path(question, device, float(extreme))
+            point.distance_from_path(float(extreme))
     except PostureError:
-        if reached := question.handle_range(device):
+        if reached := point.handle_range:
             outside = (handle < reached[0]) | (handle > reached[1])
             return RangeExit(float(response.time[outside.argmax()]), *reached) if outside.any() else None
     return None

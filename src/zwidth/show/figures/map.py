@@ -209,10 +209,11 @@ def _mechanism(dataset: xr.Dataset, device: Device | None) -> Drawn | None:
     from zwidth.model.posture import PostureError, link_points
 
     try:
-        posture = device.posture(None, str(dataset.attrs["assembly"]) or None)
+        posture = device.at(assembly=str(dataset.attrs["assembly"]) or None).posture
     except PostureError:
         return None
     mechanism = device.mechanism
+    assert posture is not None
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
     placed = link_points(mechanism, posture)
     strokes = [link_stroke(mechanism, placed, i) @ axes.T for i in range(len(mechanism.links.names))]

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.region import ChartError
 from zwidth.conditions import Bound, compare
-from zwidth.device.device import At, Device
+from zwidth.device.device import Device
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.felt_chart import FeltChart, felt_chart
-from zwidth.model.effective import EffectiveParameters, effective_parameters
+from zwidth.model.effective import EffectiveParameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
-from zwidth.model.reduction import plant_effective_parameters
 from zwidth.show.friction import told_of
 from zwidth.study.hidden import hidden_instability
 from zwidth.study.sensitivity import Sensitivities, sensitivities
@@ -29,26 +27,39 @@ from zwidth.study.what_if import BASE, Variant, find, what_if
 class Facts:
     """A device in one posture and direction, and all that was found about its walls.
 
-    posture, direction  None for a device given by its plant
-    model               "full", "two-mass", "motor-mass" or "rigid"
-    variants            the device as described first, then what_if's changes and models
-    effective           masses and stiffness felt along the direction
-    natural             undamped natural frequencies of the device by itself [Hz]; rigid modes 0
-    bounds              the published conditions on the loop
-    runs_away           a motion that no wall moves grows by itself
-    asked               at, direction and assembly as they were asked for
+    point      where it is asked about
+    variants   the device as described first, then what_if's changes and models
+    natural    undamped natural frequencies of the device by itself [Hz]; rigid modes 0
+    bounds     the published conditions on the loop
+    runs_away  a motion that no wall moves grows by itself
     """
 
     device: Device
-    posture: Posture | None
-    direction: Floats | None
-    model: str
+    point: OperatingPoint
     variants: tuple[Variant, ...]
-    effective: EffectiveParameters
     natural: Floats
     bounds: tuple[Bound, ...]
     runs_away: bool
-    asked: dict[str, Any]
+
+    @property
+    def posture(self) -> Posture | None:
+        """None for a device given by its plant."""
+        return self.point.posture
+
+    @property
+    def direction(self) -> Floats | None:
+        """None for a device given by its plant."""
+        return None if self.posture is None else self.point.direction
+
+    @property
+    def model(self) -> str:
+        """The model's name: "full", "two-mass", "motor-mass" or "rigid"."""
+        return self.point.model or "full"
+
+    @property
+    def effective(self) -> EffectiveParameters:
+        """Masses and stiffness felt along the direction."""
+        return self.point.effective
 
     @property
     def base(self) -> Variant:
@@ -72,7 +83,7 @@ class Facts:
     @property
     def operator(self) -> str | None:
         """Who holds the handle; None where nobody does, or a model that holds the link side fixed."""
-        return None if self.model == "motor-mass" else self.device.operator_name
+        return None if self.model == "motor-mass" else self.point.operator_name
 
     @property
     def renders(self) -> bool:
@@ -82,51 +93,31 @@ class Facts:
     @cached_property
     def answers(self) -> Sensitivities:
         """How the largest stiffness answers to each number."""
-        return sensitivities(self.device, **self.asked, model=None if self.model == "full" else self.model)
+        return sensitivities(self.device, self.point)
 
     @cached_property
     def fits(self) -> Validity | None:
         """Which simpler model holds where along the edge of the full one; None if that has no chart."""
         try:
-            return validity(self.device, **self.asked)
+            return validity(self.point)
         except ChartError:
             return None
 
     @cached_property
     def felt(self) -> FeltChart | None:
         """The chart at the stiffness that the hand feels; None without a handle."""
-        model = None if self.model == "full" else self.model
-        alone = self.device.plant(**self.asked, model=model, held=False)
+        alone = self.point.unheld_plant
         return None if alone.handle is None else felt_chart(self.chart, alone)
 
 
-def gather(
-    device: Device,
-    at: At | None = None,
-    direction: Sequence[float] | None = None,
-    assembly: str | None = None,
-    model: str | None = None,
-) -> Facts:
+def gather(device: Device, point: OperatingPoint | None = None) -> Facts:
     """All facts of a report; arguments and errors are those of `study.what_if.what_if`."""
-    variants = what_if(device, at, direction, assembly, model)
-    loop = find(variants, BASE).loop
-    assert loop is not None
-    posture = along = None
-    if device.mechanism is not None:
-        posture, along = device.posture(at, assembly), device.direction(direction)
-        effective = effective_parameters(device.mechanism, posture, along)
-    else:
-        assert device.given_plant is not None
-        effective = plant_effective_parameters(device.given_plant)
+    point = point or device.at()
     return Facts(
         device=device,
-        posture=posture,
-        direction=along,
-        model=model or "full",
-        variants=tuple(variants),
-        effective=effective,
-        natural=natural_frequencies(device.plant(at, direction, assembly, model, held=False)),
-        bounds=tuple(compare(loop, **told_of(device, loop.plant))),
-        runs_away=hidden_instability(loop),
-        asked={"at": at, "direction": direction, "assembly": assembly},
+        point=point,
+        variants=tuple(what_if(device, point)),
+        natural=natural_frequencies(point.unheld_plant),
+        bounds=tuple(compare(point.loop, **told_of(point))),
+        runs_away=hidden_instability(point.loop),
     )

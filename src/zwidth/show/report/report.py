@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from zwidth import __version__
-from zwidth.device.device import At, Device
+from zwidth.device.device import Device
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.show.output import write_text
 from zwidth.show.report import answers, sentences, tables
 from zwidth.show.report.facts import Facts, gather
@@ -19,23 +19,17 @@ from zwidth.show.report.pictures import pictures
 
 
 def write_report(
-    device: Device,
-    path: str | os.PathLike[str],
-    *,
-    at: At | None = None,
-    direction: Sequence[float] | None = None,
-    assembly: str | None = None,
-    model: str | None = None,
+    device: Device, path: str | os.PathLike[str], point: OperatingPoint | None = None
 ) -> dict[str, Any]:
     """Write the report on a device, whole or not at all; the numbers in it.
 
-    at, direction, assembly, model   as for `Device.plant`
+    point    where it is asked about, one point of one direction; left out: the device's reference
     Returns  a dict under the names of the command line's --json, `file` and `summary` (its first sentences)
              among them; with a `reason` where no wall is stable
-    Raises   what `Device.plant` raises; ChartError if the device cannot be charted
+    Raises   what `Device.at` and `OperatingPoint.plant` raise; ChartError if the device cannot be charted
              OutputError (show.output)  where the file cannot be written
     """
-    facts = gather(device, at, direction, assembly, model)
+    facts = gather(device, point)
     target = Path(path)
     write_text(target, page(facts))
     return {"file": str(target), **tables.document(facts)}

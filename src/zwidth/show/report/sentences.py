@@ -173,7 +173,7 @@ def unobserved(facts: Facts) -> str:
 
 def left_out(facts: Facts) -> str:
     """What of the device all of this leaves out; "" where it leaves out nothing."""
-    words = facts.device.left_out
+    words = facts.point.left_out
     if not words:
         return ""
     return f"All of this is linear and leaves out {listed(words)}; zwidth simulate has them."

@@ -1,0 +1,75 @@
+"""Positions and directions as users give them, checked: arrays in metres, joint angles, vectors of any length."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import nan, pi
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from zwidth.device.faults import fail, quote
+from zwidth.model.mechanism import Floats, Mechanism
+
+
+def vectors(label: str, name: str, value: Any) -> Floats:
+    """Vectors (..., 2) or (..., 3) of finite numbers.
+
+    label, name  of the device and the argument, for messages
+    Raises  DeviceError  for anything else
+    """
+    try:
+        given = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise fail(label, name, f"must be 2 or 3 numbers, got {quote(value)}") from None
+    if given.ndim == 0:
+        raise fail(label, name, f"must be 2 or 3 numbers, got {quote(value)}")
+    if given.shape[-1] not in (2, 3):
+        raise fail(label, name, f"must be 2 or 3 numbers x, y or x, y, z, got {given.shape[-1]}")
+    if not np.isfinite(given).all():
+        raise fail(label, name, f"must be finite, got {quote(given.tolist())}")
+    return given
+
+
+def positions(label: str, value: Any, height: float) -> Floats:
+    """Positions (..., 3) [m]; those of two numbers lie at a height. Raises DeviceError as `vectors`."""
+    given = vectors(label, "at", value)
+    return given if given.shape[-1] == 3 else _completed(given, height)
+
+
+def unit_vectors(label: str, name: str, value: Any) -> Floats:
+    """Unit vectors (..., 3) along vectors of any length; those of two numbers lie in the x-y plane.
+
+    Raises  DeviceError  as `vectors`, and for a vector of no length
+    """
+    given = vectors(label, name, value)
+    given = given if given.shape[-1] == 3 else _completed(given, 0.0)
+    largest = np.abs(given).max(axis=-1, keepdims=True, initial=0.0)
+    if not largest.all():
+        raise fail(label, name, "has zero length; give any vector along it, such as 0,1")
+    given = given / largest  # so that the squares neither overflow nor vanish
+    return np.asarray(given / np.linalg.norm(given, axis=-1, keepdims=True))
+
+
+def joint_angles(label: str, mechanism: Mechanism, at: Mapping[str, float]) -> dict[str, float]:
+    """Angles of all driven joints by the names of their links [rad].
+
+    Raises  DeviceError  for other joints than the driven ones, and for what is no angle
+    """
+    driven = [mechanism.links.names[joint] for joint in mechanism.drives.joint]
+    if set(at) != set(driven):
+        message = f"must be the angle of every driven joint, {', '.join(driven)}, got {', '.join(map(str, at))}"
+        raise fail(label, "at", message)
+    angles = {}
+    for joint, value in at.items():
+        angle = float(value) if isinstance(value, Real) else nan
+        if not abs(angle) <= 2.0 * pi:
+            message = f"{joint}: must be an angle from -2 pi to 2 pi rad, got {quote(value)}; is it in degrees?"
+            raise fail(label, "at", message)
+        angles[joint] = angle
+    return angles
+
+
+def _completed(given: Floats, third: float) -> Floats:
+    return np.concatenate([given, np.full((*given.shape[:-1], 1), third)], axis=-1)

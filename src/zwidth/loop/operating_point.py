@@ -1,0 +1,365 @@
+"""The operating point: where a device is linearised, with all that a question adds to the device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.loop.controller import Controller
+from zwidth.loop.left_out import left_out
+from zwidth.loop.loop import Loop
+from zwidth.loop.multi import MultiLoop
+from zwidth.model.damping import Damping, GivenDamping
+from zwidth.model.directions import MultiPlant, reduce_directions
+from zwidth.model.effective import EffectiveParameters, effective_parameters
+from zwidth.model.mechanism import Drives, Floats, Mechanism
+from zwidth.model.operator import Operator, attach
+from zwidth.model.plant import Plant
+from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solve_posture
+from zwidth.model.reduction import Encoders, Model, plant_effective_parameters, reduce_mechanism, reduce_plant
+from zwidth.model.response import Response
+
+# Where the handle is: x, y or x, y, z [m], or the angle of every driven joint by the name of its link [rad].
+Position: TypeAlias = Sequence[float] | Mapping[str, float]
+
+# Share of the arm's length within which a single position is projected onto the nearest that the handle has.
+PROJECTED: Final = 0.01
+
+
+class OperatingPointError(ValueError):
+    """What was asked of an operating point does not exist for this device; the text says what does."""
+
+
+class NoMechanismError(OperatingPointError):
+    """The question is about a mechanism, and the device is given by its plant or a measured response."""
+
+    def __init__(self) -> None:
+        super().__init__("the device has no mechanism, and so neither postures nor directions")
+
+
+class SeveralDirectionsError(OperatingPointError):
+    """Several directions rendered together leave out something that the device has.
+
+    obstacles  what: "an operator", "an encoder on the link", "electrical damping"
+    """
+
+    def __init__(self, obstacles: Sequence[str]) -> None:
+        self.obstacles = tuple(obstacles)
+        super().__init__(f"{' and '.join(obstacles)} cannot be rendered over several directions; ask for one")
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A device in one posture or in many, rendering one direction or several at once in each, and who holds it.
+
+    Just one of mechanism, given_plant and response is there. A mechanism comes with postures and directions, whose
+    leading axes broadcast to `shape`; a given plant and a response have one posture, of shape ().
+
+    controller     the computer that closes the loop
+    mechanism      links, joints, loops and drives
+    posture        (...) solved postures
+    directions     (..., m, 3) unit vectors; the m directions of one posture are rendered together, under one law
+    given_plant    dynamics of the rendered direction, as given
+    response       measured response from force command to reading
+    model          "full", "two-mass", "motor-mass" or "rigid"; None: full, or the plant as given
+    damping        of the mechanism's flexible modes
+    encoders       what a mechanism's encoders read: "motor" or "link"
+    operator       the arm and grasp at the handle; None: nobody
+    operator_name  what he is called; None: nobody
+    friction_known, resolution_known   is the dry friction told, and the encoders' step, be they 0?
+    name           what the device is called in results and figures
+    asked          the position asked for, before it was projected; None: the device's reference
+    """
+
+    controller: Controller
+    mechanism: Mechanism | None = None
+    posture: Posture | None = None
+    directions: Floats | None = None
+    given_plant: Plant | None = None
+    response: Response | None = None
+    model: Model | None = None
+    damping: Damping = field(default_factory=GivenDamping)
+    encoders: Encoders = "motor"
+    operator: Operator | None = None
+    operator_name: str | None = None
+    friction_known: bool = True
+    resolution_known: bool = True
+    name: str = ""
+    asked: Position | Floats | None = None
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for what does not go together."""
+        kinds = (self.mechanism, self.given_plant, self.response)
+        if sum(kind is not None for kind in kinds) != 1:
+            raise ValueError(
+                "an operating point has a mechanism, a given plant or a response, and just one of them"
+            )
+        if (self.mechanism is None) != (self.posture is None) or (self.posture is None) != (
+            self.directions is None
+        ):
+            raise ValueError("postures and directions are those of a mechanism, which has both")
+
+    # --- which postures and directions ----------------------------------------------------------------
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Leading axes of everything; () for a single posture with its directions."""
+        return () if self.posture is None else self.posture.status.shape
+
+    @property
+    def status(self) -> NDArray[np.uint8]:
+        """(...) OK, OUT_OF_REACH or SINGULAR (model.posture)."""
+        return np.array(OK, dtype=np.uint8) if self.posture is None else self.posture.status
+
+    @property
+    def direction_count(self) -> int:
+        """Number m of directions rendered together."""
+        return 1 if self.directions is None else int(self.directions.shape[-2])
+
+    @property
+    def direction(self) -> Floats:
+        """(..., 3) unit vector. Raises OperatingPointError where several directions are rendered together, and
+        NoMechanismError for a device without a mechanism."""
+        if self.directions is None:
+            raise NoMechanismError
+        if self.direction_count > 1:
+            raise OperatingPointError(
+                f"{self.direction_count} directions are rendered together here; ask for .directions"
+            )
+        return np.asarray(self.directions[..., 0, :])
+
+    def __getitem__(self, index: Any) -> OperatingPoint:
+        """One of the points, of shape (), or several, by leading axes; a device without a mechanism has one."""
+        return self if self.posture is None else self._indexed(lambda array: array[index])
+
+    @property
+    def flat(self) -> OperatingPoint:
+        """All points along one leading axis. Raises NoMechanismError for a device without a mechanism."""
+        axes = self._posture.status.ndim
+        return self._indexed(lambda array: array.reshape(-1, *array.shape[axes:]))
+
+    def _indexed(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> OperatingPoint:
+        """The points with a change of the leading axes made to all their arrays."""
+        assert self.directions is not None
+        return replace(self, posture=self._posture.with_axes(change), directions=change(self.directions))
+
+    def towards(self, direction: Floats) -> OperatingPoint:
+        """The same postures rendering another direction, unit vectors (..., 3)."""
+        directions = np.broadcast_to(np.asarray(direction, dtype=np.float64), (*self.shape, 3))
+        return replace(self, directions=directions[..., None, :])
+
+    def in_model(self, model: Model | None) -> OperatingPoint:
+        """The same device, reduced to another model."""
+        return self if model == self.model else replace(self, model=model)
+
+    @cached_property
+    def without_operator(self) -> OperatingPoint:
+        """The device by itself, with nobody at its handle."""
+        return self if self.operator is None else replace(self, operator=None, operator_name=None)
+
+    # --- the mechanism there --------------------------------------------------------------------------
+
+    @property
+    def _posture(self) -> Posture:
+        if self.posture is None:
+            raise NoMechanismError
+        return self.posture
+
+    @property
+    def drives(self) -> Drives:
+        """The mechanism's drives. Raises NoMechanismError for a device without a mechanism."""
+        if self.mechanism is None:
+            raise NoMechanismError
+        return self.mechanism.drives
+
+    @property
+    def jacobian(self) -> Floats:
+        """J (..., 3, d) in the driven coordinates [m/rad]; nan where the posture is not OK.
+
+        Raises  NoMechanismError  for a device without a mechanism
+        """
+        return self._posture.jacobian
+
+    @property
+    def mass_matrix(self) -> Floats:
+        """M (..., d, d) of the links in the driven coordinates [kg m^2]. Raises NoMechanismError as `jacobian`."""
+        return self._posture.mass_matrix
+
+    @property
+    def whole_mass_matrix(self) -> Floats:
+        """M (..., d, d) of links and rotors in the driven coordinates [kg m^2]. Raises NoMechanismError as
+        `jacobian`."""
+        drives = self.drives
+        rotors = drives.transmission**2 * drives.motor_inertia
+        return self.mass_matrix + rotors[..., None] * np.eye(rotors.shape[-1])
+
+    @property
+    def lever_arms(self) -> Floats:
+        """h = J^T u (..., d): handle motion along the direction by each driven joint [m/rad].
+
+        Raises  NoMechanismError  for a device without a mechanism
+        """
+        return np.asarray(np.einsum("...i,...id->...d", self.direction, self.jacobian))
+
+    @cached_property
+    def effective(self) -> EffectiveParameters:
+        """Masses and stiffness felt along the direction (...); nan where inapplicable."""
+        if self.mechanism is not None:
+            return effective_parameters(self.mechanism, self._posture, self.direction)
+        if self.given_plant is None:
+            raise OperatingPointError(_NO_MODEL)
+        return plant_effective_parameters(self.given_plant)
+
+    @property
+    def handle_range(self) -> tuple[float, float] | None:
+        """How far the handle can be from its posture along the direction [m]: backwards (not positive), forwards.
+
+        None for a device without a mechanism. Raises OperatingPointError for several points.
+        """
+        if self.mechanism is None:
+            return None
+        self._check_single("handle_range")
+        return handle_range(self.mechanism, self._posture, self.direction)
+
+    def distance_from_path(self, displacement: float) -> float | None:
+        """How far from a displacement along the direction the handle's path passes [m].
+
+        The linear plant moves along the tangent, the handle along a curve if it has few drives.
+
+        displacement  from the posture, along the direction [m]
+        Returns  None for a device without a mechanism
+        Raises   PostureError  (model.posture) where the handle cannot be moved so far
+        """
+        if self.mechanism is None:
+            return None
+        self._check_single("distance_from_path")
+        if displacement == 0.0:
+            return 0.0
+        # without forces across, a handle with few drives moves by the part of the direction that it can move along
+        moves = handle_motions(self._posture)
+        way = moves @ (moves.T @ self.direction)
+        goal = self._posture.position + displacement / (way @ self.direction) * way
+        reached = solve_posture(self.mechanism, goal, self._posture.assembly, tolerance=PROJECTED)
+        return float(reached.projected)
+
+    # --- the next stages ------------------------------------------------------------------------------
+
+    @cached_property
+    def plant(self) -> Plant:
+        """The rendered direction's dynamics, held by the operator; of one posture and one direction.
+
+        Raises  OperatingPointError  for several points or directions, and for a measured response
+                ModelError, DirectionError  (model.reduction) where the model, or the direction, does not apply
+        """
+        return self.hold(self.unheld_plant)
+
+    @cached_property
+    def unheld_plant(self) -> Plant:
+        """The rendered direction's dynamics without the operator. Raises what `plant` raises."""
+        if self.response is not None:
+            raise OperatingPointError(_NO_MODEL)
+        if self.given_plant is not None:
+            return self.given_plant if self.model is None else reduce_plant(self.given_plant, self.model)
+        self._check_single("plant")
+        assert self.mechanism is not None
+        return reduce_mechanism(
+            self.mechanism, self._posture, self.direction, self.model or "full", self.damping, self.encoders
+        )
+
+    def hold(self, plant: Plant) -> Plant:
+        """A plant of this device with the operator at its handle.
+
+        Returns  the plant itself where there is no operator, or no handle: a model that holds the link side fixed
+                 holds the operator, too
+        """
+        return plant if self.operator is None or plant.handle is None else attach(plant, self.operator)
+
+    @cached_property
+    def plant_of_directions(self) -> MultiPlant:
+        """The dynamics of all directions that are rendered together, m of them, in one posture.
+
+        Raises  SeveralDirectionsError  for what such plants leave out: an operator, encoders on the links,
+                                        electrical damping
+                OperatingPointError     for several postures
+                NoMechanismError        for a device without a mechanism
+                ModelError, DirectionError  (model.reduction) as `plant`
+        """
+        posture = self._posture
+        self._check_single("plant")
+        check_several_directions(self.mechanism, self.operator, self.encoders)
+        assert self.mechanism is not None
+        assert self.directions is not None
+        return reduce_directions(self.mechanism, posture, self.directions, self.model or "full", self.damping)
+
+    @cached_property
+    def loop(self) -> Loop:
+        """The plant under the sampled wall law. Raises what `plant` raises."""
+        return Loop(self.plant, self.controller)
+
+    @cached_property
+    def loop_of_directions(self) -> MultiLoop:
+        """All directions under one sampled wall law. Raises what `plant_of_directions` raises."""
+        return MultiLoop(self.plant_of_directions, self.controller)
+
+    def _check_single(self, what: str) -> None:
+        if self.shape:
+            raise OperatingPointError(
+                f"{_counted(self.shape)} have no .{what} in common; take one of them by its index, or ask for "
+                ".measure(name), which answers for all"
+            )
+
+    # --- what results say of it -----------------------------------------------------------------------
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What of the device a linear answer leaves out, in words; () if it leaves out nothing."""
+        return left_out(self.mechanism, self.given_plant, self.controller)
+
+    @property
+    def charted_by_response(self) -> bool:
+        """Is the chart that of a frequency response: a measured one, or that of a loss factor?"""
+        hysteretic = self.given_plant is not None and self.given_plant.hysteresis is not None
+        return self.response is not None or hysteretic
+
+    def document(self) -> dict[str, Any]:
+        """Name, posture, direction, model, operator and sampling as results state them; None: inapplicable."""
+        posture, single = self.posture, self.direction_count == 1
+        return {
+            "name": self.name,
+            "position_m": None if posture is None else posture.position,
+            "projected_m": None if posture is None else posture.projected,
+            "direction": None if posture is None or not single else self.direction,
+            **({} if single else {"directions": self.directions}),
+            "assembly": None if posture is None else posture.assembly,
+            "model": self.model or (AS_GIVEN if posture is None else "full"),
+            "operator": None if self.model == "motor-mass" else self.operator_name,
+            "sampling_period_s": self.controller.sampling_period,
+            "delay_samples": self.controller.delay,
+            "left_out": list(self.left_out),
+        }
+
+
+def check_several_directions(mechanism: Mechanism | None, operator: Operator | None, encoders: Encoders) -> None:
+    """Raise SeveralDirectionsError for all that a device has and several directions together leave out."""
+    windings = None if mechanism is None else mechanism.drives.winding_damping
+    present = {
+        "an operator": operator is not None,
+        "an encoder on the link": encoders != "motor",
+        "electrical damping": windings is not None and bool(windings.any()),
+    }
+    if any(present.values()):
+        raise SeveralDirectionsError([what for what, there in present.items() if there])
+
+
+AS_GIVEN: Final = "as given"  # the model of a plant that is not reduced
+_NO_MODEL: Final = "the device has a measured response and no model; ask for .chart(), or .check(...)"
+
+
+def _counted(shape: tuple[int, ...]) -> str:
+    """Operating points by their number: 12 operating points of shape (3, 4)."""
+    return f"{int(np.prod(shape))} operating points of shape {shape}"
