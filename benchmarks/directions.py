@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks._own import Case, Cases, run
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.chart.chart import largest_stiffness
-from zwidth.chart.eigenloci import multi_chart
 from zwidth.chart.polar import circle, largest_stiffness_by_direction
+from zwidth.chart.several_directions.chart import multi_chart
 from zwidth.device.load import load
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi import MultiLoop

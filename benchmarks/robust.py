@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks._own import Case, Cases, run
 from benchmarks._timing import machine, print_table, seconds
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.robust import robust_chart
+from zwidth.chart.robust.chart import robust_chart
 from zwidth.device.load import load
 from zwidth.loop.loop import Loop
 from zwidth.model.operator import Operator, attach

@@ -58,7 +58,7 @@ def short(path: Path) -> str:
 
 def test_every_way_of_importing_is_seen():
     source = """
-import zwidth.chart.region as r, numpy
+import zwidth.chart.arc_joining as r, numpy
 from zwidth import show
 from ..loop import hold
 from . import closure
@@ -66,7 +66,7 @@ def lazily():
     from ..study.sweep import run
 """
     assert set(imports(source, "zwidth.model.posture")) == {
-        "zwidth.chart.region",
+        "zwidth.chart.arc_joining",
         "numpy",
         "zwidth.show",
         "zwidth.loop.hold",

@@ -11,7 +11,7 @@ import pytest
 import zwidth
 from tests import systems
 from tests.measured_cases import measured
-from zwidth.chart.measured import measured_chart
+from zwidth.chart.measured.chart import measured_chart
 
 ONE = np.ones(1)
 NONE = np.zeros((1, 1))

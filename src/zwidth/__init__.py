@@ -14,19 +14,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from zwidth.chart.arc_joining import ChartError as ChartError
     from zwidth.chart.chart import BoundaryArc as BoundaryArc
     from zwidth.chart.chart import StabilityChart as StabilityChart
     from zwidth.chart.chart import largest_stiffness as largest_stiffness
     from zwidth.chart.chart import stability_chart as stability_chart
-    from zwidth.chart.eigenloci import MultiChart as MultiChart
-    from zwidth.chart.eigenloci import multi_chart as multi_chart
     from zwidth.chart.hysteretic import hysteretic_chart as hysteretic_chart
-    from zwidth.chart.measured import MeasuredChart as MeasuredChart
-    from zwidth.chart.measured import measured_chart as measured_chart
+    from zwidth.chart.measured.chart import MeasuredChart as MeasuredChart
+    from zwidth.chart.measured.chart import measured_chart as measured_chart
     from zwidth.chart.polar import largest_stiffness_by_direction as largest_stiffness_by_direction
-    from zwidth.chart.region import ChartError as ChartError
-    from zwidth.chart.robust import RobustChart as RobustChart
-    from zwidth.chart.robust import robust_chart as robust_chart
+    from zwidth.chart.robust.chart import RobustChart as RobustChart
+    from zwidth.chart.robust.chart import robust_chart as robust_chart
+    from zwidth.chart.several_directions.chart import MultiChart as MultiChart
+    from zwidth.chart.several_directions.chart import multi_chart as multi_chart
     from zwidth.chart.verdict import eigenvalues as eigenvalues
     from zwidth.chart.verdict import judge as judge
     from zwidth.chart.verdict import spectral_radius as spectral_radius
@@ -161,26 +161,26 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
+    "chart.arc_joining": ("ChartError",),
     "chart.chart": (
         "BoundaryArc",
         "StabilityChart",
         "largest_stiffness",
         "stability_chart",
     ),
-    "chart.eigenloci": (
-        "MultiChart",
-        "multi_chart",
-    ),
     "chart.hysteretic": ("hysteretic_chart",),
-    "chart.measured": (
+    "chart.measured.chart": (
         "MeasuredChart",
         "measured_chart",
     ),
     "chart.polar": ("largest_stiffness_by_direction",),
-    "chart.region": ("ChartError",),
-    "chart.robust": (
+    "chart.robust.chart": (
         "RobustChart",
         "robust_chart",
+    ),
+    "chart.several_directions.chart": (
+        "MultiChart",
+        "multi_chart",
     ),
     "chart.verdict": (
         "eigenvalues",

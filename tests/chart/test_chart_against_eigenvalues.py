@@ -7,9 +7,9 @@ import pytest
 import shapely
 
 from tests.systems import mass, random_loop, second_matrix, two_mass
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import boundary_points, stability_chart
 from zwidth.chart.hurwitz import QUOTIENT, hurwitz, working_room
-from zwidth.chart.region import ChartError
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import CentralDifference
 from zwidth.loop.loop import Loop

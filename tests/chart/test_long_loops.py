@@ -5,9 +5,9 @@ import pytest
 
 from tests.chart.test_chart_against_eigenvalues import DAMPED, disagreements
 from tests.systems import published, random_plant
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.nyquist import phase_flags, terms_along
-from zwidth.chart.region import ChartError
 from zwidth.chart.tracer import LONG, Tracer
 from zwidth.loop.controller import Controller
 from zwidth.loop.estimators import LeastSquaresSlope, SavitzkyGolay, WindowedDifference

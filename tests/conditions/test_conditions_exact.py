@@ -7,8 +7,8 @@ import pytest
 import shapely
 from systems import published, random_loop
 
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.region import ChartError
 from zwidth.chart.verdict import STABLE, judge
 from zwidth.conditions.exact import stiffness_limit
 

@@ -13,8 +13,8 @@ from scipy.optimize import minimize_scalar
 from tests.frozen.devices import random_devices
 from tests.guarantees.test_guarantees_passive import random_device, random_operator
 from tests.systems import mass, published
-from zwidth.chart.region import ChartError
-from zwidth.chart.robust_check import unstable
+from zwidth.chart.arc_joining import ChartError
+from zwidth.chart.robust.instability import unstable
 from zwidth.chart.verdict import spectral_radius
 from zwidth.device.load import load
 from zwidth.guarantees.coupling import coupling_angles, coupling_region, couplings, softest_limit

@@ -8,7 +8,7 @@ import pytest
 from tests import systems
 from tests.measured_cases import chirp, moved, sampled_response
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.measured import measured_chart
+from zwidth.chart.measured.chart import measured_chart
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.response import ResponseError

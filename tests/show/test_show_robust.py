@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.systems import mass
-from zwidth.chart.robust import robust_chart
+from zwidth.chart.robust.chart import robust_chart
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.show.figures.robust import NAMED, draw_robust

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from tests.systems import random_loop
+from zwidth.chart.arc_joining import ChartError, closed_rings
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.peak import Peak
-from zwidth.chart.region import ChartError, closed_rings
 from zwidth.chart.tracer import Tracer
 from zwidth.device import address
 from zwidth.device.load import from_document, load

@@ -8,12 +8,12 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.chart.arc_joining import closed_rings
 from zwidth.chart.arcs import Rings
 from zwidth.chart.cells import Box, Samples, box_of, cells, outline
 from zwidth.chart.decay import FastestDecay, fastest_decay, fastest_decay_in_first_quadrant
 from zwidth.chart.outline import quadrant_area, sample_arc
 from zwidth.chart.peak import Peak, largest_damping, stiffest
-from zwidth.chart.region import closed_rings
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop

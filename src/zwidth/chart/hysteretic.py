@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.aliases import SampledResponse
-from zwidth.chart.between import between
 from zwidth.chart.grid import angles
-from zwidth.chart.measured import MeasuredChart, measured_chart
+from zwidth.chart.measured.chart import MeasuredChart, measured_chart
+from zwidth.chart.measured.response_interpolation import interpolate_response
 from zwidth.chart.tracer import Tracer
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import HysteresisError
@@ -95,7 +95,7 @@ def _resolved(
     while unsure.any() and len(thetas) < MOST:
         middle = 0.5 * (thetas[:-1] + thetas[1:])[unsure]
         exact = sampled(middle)
-        curve = between(thetas, P, integrators, closed=True)
+        curve = interpolate_response(thetas, P, integrators, closed=True)
         allowed = CLOSE + sampled.rounding(middle) / np.abs(exact)
         missed = np.abs(exact * curve.inverse(middle) - 1.0) > allowed
         wide = np.diff(thetas)[unsure] > FINEST * middle

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import largest_stiffness
-from zwidth.chart.region import ChartError
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint, check_several_directions

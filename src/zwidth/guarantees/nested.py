@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.chart.region import ChartError
 from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import Floats
 from zwidth.guarantees.region import Region, empty, stiffest_corner

@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.robust_check import unstable
-from zwidth.chart.robust_members import Member, chart_member, polygons
+from zwidth.chart.robust.instability import unstable
+from zwidth.chart.robust.members import Member, chart_member, polygons
 from zwidth.chart.tracer import Tracer
 from zwidth.guarantees.port import Floats, fixed
 from zwidth.loop.loop import Loop

@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 from scipy.optimize import minimize_scalar
 
-from zwidth.chart.robust_common import common
-from zwidth.chart.robust_edges import Piece, pieces
-from zwidth.chart.robust_members import Member, polygons
+from zwidth.chart.robust.common_set import common
+from zwidth.chart.robust.edges import Piece, pieces
+from zwidth.chart.robust.members import Member, polygons
 from zwidth.guarantees.port import Floats, reached
 from zwidth.guarantees.region import Region, empty, rings_of, stiffest_corner
 from zwidth.guarantees.spring_family import Springs, handle_of, parts, spring_for

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from zwidth.chart.robust_edges import Piece
+from zwidth.chart.robust.edges import Piece
 from zwidth.guarantees.envelope import Touch, nearest_touch, stretch, touches
 from zwidth.guarantees.port import Floats
 from zwidth.guarantees.spring_family import Springs, parts

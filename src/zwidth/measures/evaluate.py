@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.region import ChartError
+from zwidth.chart.arc_joining import ChartError
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.operating_point import NoMechanismError, OperatingPoint
 from zwidth.loop.sections import HysteresisError, UnmovedError

@@ -16,8 +16,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.chart.region import ChartError
 from zwidth.conditions.dry import reading_noise, reading_step
 from zwidth.contact.bench import Bench, BenchError
 from zwidth.contact.experiment import (

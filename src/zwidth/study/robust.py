@@ -20,10 +20,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.region import ChartError
-from zwidth.chart.robust import RobustChart, robust_of
-from zwidth.chart.robust_check import softening, unstable
-from zwidth.chart.robust_members import Member, chart_member
+from zwidth.chart.arc_joining import ChartError
+from zwidth.chart.robust.chart import RobustChart, robust_of
+from zwidth.chart.robust.instability import softening, unstable
+from zwidth.chart.robust.members import Member, chart_member
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.device.faults import DeviceError

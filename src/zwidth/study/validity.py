@@ -21,8 +21,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.chart.region import ChartError
 from zwidth.chart.tracer import Tracer
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.chart.chart import largest_stiffness, stability_chart
-from zwidth.chart.stiffest import FOUND, Stiffest, stiffest_walls
+from zwidth.chart.stiffest_batch import FOUND, Stiffest, stiffest_walls
 from zwidth.loop.evaluate import computer_factors
 from zwidth.loop.modal_rows import modal_rows
 from zwidth.loop.operating_point import OperatingPoint
@@ -19,8 +19,8 @@ NO_WALL = "no wall with K > 0 and B >= 0 is stable"
 def stiffness_max(point: OperatingPoint) -> Measured:
     """Supremum of K over the stable walls with K > 0, B >= 0, of the point's model and loop [N/m].
 
-    Postures of classically damped mechanisms go through compiled code together (`chart.stiffest`); what is in
-    doubt there, and what has no wall there, is asked by itself, as every other device is.
+    Postures of classically damped mechanisms go through compiled code together (`chart.stiffest_batch`); what is
+    in doubt there, and what has no wall there, is asked by itself, as every other device is.
     """
     fast = _together(point)
     if fast is None:

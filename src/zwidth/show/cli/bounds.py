@@ -104,8 +104,8 @@ def bounds(question: Question, damping: float | None, output: str | None, as_jso
 
 
 def _compared(question: Question, device: Device, damping: float | None) -> Found:
+    from zwidth.chart.arc_joining import ChartError
     from zwidth.chart.chart import stability_chart
-    from zwidth.chart.region import ChartError
     from zwidth.conditions import compare
     from zwidth.conditions.exact import stiffness_limit
     from zwidth.show.friction import told_of

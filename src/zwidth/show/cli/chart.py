@@ -22,7 +22,7 @@ from zwidth.show.units import amount, radius, vector
 if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
     from zwidth.chart.decay import FastestDecay
-    from zwidth.chart.eigenloci import MultiChart
+    from zwidth.chart.several_directions.chart import MultiChart
     from zwidth.device.device import Device
 
 KEYS: Final = (
@@ -112,7 +112,7 @@ def _charted(question: Question, device: Device) -> StabilityChart:
 
 def _charted_together(question: Question, device: Device, along: list[Any]) -> MultiChart:
     """One wall law over several directions."""
-    from zwidth.chart.eigenloci import multi_chart
+    from zwidth.chart.several_directions.chart import multi_chart
 
     point = device.at(question.at, directions=along, assembly=question.assembly, model=question.model)
     return multi_chart(point.loop_of_directions)

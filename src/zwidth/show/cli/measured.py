@@ -15,8 +15,8 @@ from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
-    from zwidth.chart.measured import MeasuredChart
-    from zwidth.chart.trust import Stretch
+    from zwidth.chart.measured.chart import MeasuredChart
+    from zwidth.chart.measured.usable_frequencies import Stretch
     from zwidth.device.device import Device
     from zwidth.show.cli.chart import Window
     from zwidth.show.cli.options import Question
@@ -74,7 +74,7 @@ def _charted(question: Question, device: Device) -> MeasuredChart:
 
         with computing(question):
             return hysteretic_chart(question.point(device).loop)
-    from zwidth.chart.measured import measured_chart
+    from zwidth.chart.measured.chart import measured_chart
 
     question.as_measured(device)
     with computing(question):

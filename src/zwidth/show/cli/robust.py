@@ -23,7 +23,7 @@ from zwidth.show.output import DATA, FIGURES, destination, replacing, shown, wri
 from zwidth.show.units import amount, percent, radius, typed, uncertain
 
 if TYPE_CHECKING:
-    from zwidth.chart.robust import RobustChart
+    from zwidth.chart.robust.chart import RobustChart
     from zwidth.device.device import Device
     from zwidth.study.robust import Progress, RobustStudy
     from zwidth.study.robust_family import Range

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
-from zwidth.chart.measured import MeasuredChart
-from zwidth.chart.trust import Stretch
+from zwidth.chart.measured.chart import MeasuredChart
+from zwidth.chart.measured.usable_frequencies import Stretch
 from zwidth.show.figures.stability import Window, frame, mark_stiffest
 from zwidth.show.figures.style import BLACK, BLUE, GREY, ORANGE, STABLE, VERMILION, legend_above
 from zwidth.show.units import quantity

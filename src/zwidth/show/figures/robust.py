@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Polygon
 
-from zwidth.chart.robust import RobustChart
+from zwidth.chart.robust.chart import RobustChart
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import GREY, LINES, STABLE, legend_above
 from zwidth.study.robust_family import in_words

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 from zwidth.chart.chart import StabilityChart
-from zwidth.chart.measured import MeasuredChart
+from zwidth.chart.measured.chart import MeasuredChart
 from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above
 from zwidth.show.units import quantity
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.systems import random_loop
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.robust_check import softening, unstable
+from zwidth.chart.robust.instability import softening, unstable
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import spectral_radius
 

@@ -3,7 +3,7 @@
 The polygons say only which arcs follow each other round the common set. Where two arcs run closer to each other
 than chords follow them, polygons change from one to the other and back; such runs are found out by asking at their
 middle whether the other members are stable there. Where one member's arc gives way to another's, the corner is
-solved for (`robust_corner`).
+solved for (`corner`).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import shapely
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import Arc
-from zwidth.chart.robust_corner import Run, corner
-from zwidth.chart.robust_members import Member
+from zwidth.chart.robust.corner import Run, corner
+from zwidth.chart.robust.members import Member
 
 Floats = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def pieces(shape: shapely.MultiPolygon, members: Sequence[Member], unit: float) 
     """The rings of a common set as pieces of the members' arcs, and the share of its size to which corners are
     known: rounding, but more where two arcs all but coincide.
 
-    shape    [K unit, B], see `robust_common.common`
+    shape    [K unit, B], see `common_set.common`
     members  those that cut it out; where several have the same edge, the first of them gets it
     """
     if shape.is_empty:

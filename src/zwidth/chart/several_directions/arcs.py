@@ -13,8 +13,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.loci import Loci
-from zwidth.chart.loci_cells import Line
+from zwidth.chart.several_directions.cells import Line
+from zwidth.chart.several_directions.eigenloci import Loci
 
 Floats = NDArray[np.float64]
 Wall = tuple[float, float]

@@ -9,12 +9,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.arcs import Arc, Rings
 from zwidth.chart.cells import Samples, signed_area
 from zwidth.chart.chart import traced, widest
 from zwidth.chart.hurwitz import is_stable, working_room
 from zwidth.chart.peak import Peak, stiffest
-from zwidth.chart.region import ChartError
 from zwidth.chart.tracer import ROOTS, Tracer
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import UnmovedError

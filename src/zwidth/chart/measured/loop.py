@@ -8,8 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.between import FEWEST, Between, around_one, between
-from zwidth.chart.trust import Stretch, reaches_the_end, stretches, usable
+from zwidth.chart.measured.response_interpolation import (
+    FEWEST,
+    ResponseInterpolation,
+    around_one,
+    interpolate_response,
+)
+from zwidth.chart.measured.usable_frequencies import Stretch, reaches_the_end, stretches, usable
 from zwidth.loop.controller import Controller
 from zwidth.loop.filters import force_filter, velocity_estimator
 from zwidth.loop.response import product, window_response
@@ -77,27 +82,27 @@ class MeasuredLoop:
         return self.angles[self.angles < np.pi]
 
     @cached_property
-    def between(self) -> Between:
-        """The response between them."""
+    def interpolation(self) -> ResponseInterpolation:
+        """The response between these angles."""
         P = self.response.value[self.good]
-        return between(self.angles, P, self.integrators, closed=reaches_the_end(self.angles)[0])
+        return interpolate_response(self.angles, P, self.integrators, closed=reaches_the_end(self.angles)[0])
 
     @cached_property
     def unusable(self) -> tuple[Stretch, ...]:
         """Stretches of frequency that cannot be relied on, ascending."""
-        return tuple(stretches(self.response, self.good, self.period, self.between))
+        return tuple(stretches(self.response, self.good, self.period, self.interpolation))
 
     @property
     def last(self) -> float:
         """The largest angle that the response reaches: pi, or that of the last frequency."""
-        return float(np.pi if self.between.closed else self.angles[-1])
+        return float(np.pi if self.interpolation.closed else self.angles[-1])
 
     def h(self, theta: Floats) -> Complexes:
         """h = -1/P (...) at angles in (0, pi], software delay and force filter in P; inf where P is 0."""
         delay, force = round(self.controller.delay), force_filter(self.controller)
         with np.errstate(divide="ignore", invalid="ignore"):
             passed = product(force.numerator, force.denominator, around_one(theta))
-            return np.asarray(-self.between.inverse(theta) * np.exp(1j * theta * delay) / passed)
+            return np.asarray(-self.interpolation.inverse(theta) * np.exp(1j * theta * delay) / passed)
 
     def w(self, theta: Floats) -> Complexes:
         """The velocity estimate w (...) at angles in (0, pi]."""

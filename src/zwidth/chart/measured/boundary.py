@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.cells import Box
-from zwidth.chart.count import curve_segments, roots_outside
-from zwidth.chart.measured_loop import MeasuredLoop
+from zwidth.chart.measured.loop import MeasuredLoop
+from zwidth.chart.measured.root_count import curve_segments, roots_outside
 from zwidth.model.response import ResponseError
 
 Floats = NDArray[np.float64]
@@ -56,7 +56,7 @@ def first_angles(loop: MeasuredLoop) -> Floats:
     inner = (measured[:-1, None] + np.diff(measured)[:, None] * shares).ravel()
     closing = np.geomspace(NEAREST, 0.9, 30)
     parts = [closing * measured[0], inner, measured[-1:]]
-    if loop.between.closed:
+    if loop.interpolation.closed:
         parts.append(np.pi - closing[::-1] * (np.pi - measured[-1]))
     angles = np.unique(np.concatenate(parts))
     dense = np.union1d(angles, np.linspace(angles[0], loop.last, 4097)[:-1])
@@ -164,7 +164,9 @@ def boundary(loop: MeasuredLoop, angles: Floats, known: Boundary | None = None) 
     at = np.flatnonzero(whole[:-1] & whole[1:] & (orientation[:-1] == orientation[1:]))
     far = FAR * float(sizes(loop)[1])
     more = [_real_line(loop, angles[0], -1, far)]
-    more.append(_real_line(loop, angles[-1], -2, far) if loop.between.closed else _open_end(segments, jumps, far))
+    more.append(
+        _real_line(loop, angles[-1], -2, far) if loop.interpolation.closed else _open_end(segments, jumps, far)
+    )
     segments = np.vstack([segments, *(s for s, _, _ in more)])
     jumps = np.concatenate([jumps, *(j for _, j, _ in more)])
     at = np.concatenate([at, *(k for _, _, k in more)])
@@ -233,7 +235,7 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Wh
     start = np.where(static > 0.0, 0.0, np.pi)
     first = np.angle(F[:, 0] * np.exp(-1j * (start - 0.5 * np.pi * loop.integrators)))
     turn = first - 0.5 * np.pi * loop.integrators + np.sum(np.angle(F[:, 1:] / F[:, :-1]), axis=1)
-    if loop.between.closed:
+    if loop.interpolation.closed:
         h, w = real_root(loop, -2)
         end = 1.0 - (walls[:, 0] + walls[:, 1] * w) / h
         turn += np.angle(end / F[:, -1])
@@ -250,7 +252,7 @@ def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
     """
     h, w = np.abs(loop.h(loop.inner)), np.abs(loop.w(loop.inner))
     sizes = np.geomspace(1e-3, 3.0, 9)
-    shares = [0.0, 0.05, 0.25, 0.5, 0.75] if loop.between.closed else [0.25, 0.5, 0.75]
+    shares = [0.0, 0.05, 0.25, 0.5, 0.75] if loop.interpolation.closed else [0.25, 0.5, 0.75]
     K = np.quantile(h, shares)[:, None] * sizes
     B = np.quantile(h / w, shares)[:, None] * sizes
     walls = np.array([(k, b) for k in K.ravel() for b in B.ravel()])
@@ -262,7 +264,7 @@ def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
     walls, size = walls[chosen], size[chosen]
     counts, clear = nyquist_count(loop, found.angles, walls)
     order = np.argsort(-clear)[:SURE]
-    least = min(CLEAR, clear[order[0]]) if loop.between.closed else clear[order[0]]
+    least = min(CLEAR, clear[order[0]]) if loop.interpolation.closed else clear[order[0]]
     enough = np.flatnonzero(clear >= least)
     best = enough[np.argmin(size[enough])]
     made = Boundary(

@@ -9,9 +9,9 @@ import pytest
 import shapely
 from systems import mass, random_loop, second_matrix, two_mass
 
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.region import ChartError
-from zwidth.chart.robust import robust_chart
+from zwidth.chart.robust.chart import robust_chart
 from zwidth.chart.verdict import judge
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop

@@ -9,13 +9,13 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.cells import Samples, cells, outline
 from zwidth.chart.outline import CHORD, quadrant_area, sample_arc, walk_area
-from zwidth.chart.region import ChartError
-from zwidth.chart.robust_common import Shapes, common, excluding
-from zwidth.chart.robust_edges import Piece, pieces
-from zwidth.chart.robust_members import Member, chart_members, polygons
-from zwidth.chart.robust_numbers import robust_largest_damping, robust_stiffest
+from zwidth.chart.robust.common_set import Shapes, common, excluding
+from zwidth.chart.robust.edges import Piece, pieces
+from zwidth.chart.robust.members import Member, chart_members, polygons
+from zwidth.chart.robust.numbers import robust_largest_damping, robust_stiffest
 from zwidth.chart.verdict import judge
 from zwidth.loop.loop import Loop
 from zwidth.model.arguments import refusal, require
@@ -55,7 +55,7 @@ class RobustChart:
     best_by_area, best_by_stiffness  members that would have the most of each if they were the only ones
     lost_share      1 - stable_area / that of the best by area
     lost_stiffness_share  1 - stiffness_max / that of the best by stiffness
-    excluding       members that leave no wall in common (see `robust_common.excluding`); () where there is one
+    excluding       members that leave no wall in common (see `common_set.excluding`); () where there is one
     outlines        index -> the member's own closed walks (k, 2) of [stiffness, damping]
     corner_blur     share of the set's size to which its edge is known: 0 for rounding; more where rounding hides
                     a corner, and 1e-6 where a member cuts off less than chords of the arcs see

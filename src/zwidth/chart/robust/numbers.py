@@ -9,8 +9,8 @@ import numpy as np
 
 from zwidth.chart.outline import arc_angles
 from zwidth.chart.peak import crossings, topmost
-from zwidth.chart.robust_edges import Piece
-from zwidth.chart.robust_members import Member
+from zwidth.chart.robust.edges import Piece
+from zwidth.chart.robust.members import Member
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.between import Between, around_one
+from zwidth.chart.measured.response_interpolation import ResponseInterpolation, around_one
 from zwidth.model.response import Response
 
 Floats = NDArray[np.float64]
@@ -53,14 +53,16 @@ def reaches_the_end(theta: Floats) -> tuple[bool, bool]:
     return measured or bool(theta[-1] >= CONTINUED * np.pi), measured
 
 
-def stretches(response: Response, good: Flags, period: float, between: Between) -> Iterator[Stretch]:
+def stretches(
+    response: Response, good: Flags, period: float, interpolation: ResponseInterpolation
+) -> Iterator[Stretch]:
     """The unusable stretches from low to high frequency."""
     f = response.frequency[good]
     theta = 2.0 * np.pi * f * period
     half = 0.5 / period
-    m = between.integrators
+    m = interpolation.integrators
     phase = float(np.angle(response.value[good][0] * around_one(theta[0]) ** m))
-    errors = between.relative_error(0.5 * (np.append(0.0, theta[:-1]) + theta))
+    errors = interpolation.relative_error(0.5 * (np.append(0.0, theta[:-1]) + theta))
     if abs(phase) > LARGEST_PHASE or errors[0] > COARSEST:
         yield Stretch(
             0.0,

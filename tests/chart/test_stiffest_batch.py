@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from systems import FEATURES, mass, published, random_loop
 
+from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import largest_stiffness
-from zwidth.chart.region import ChartError
-from zwidth.chart.stiffest import DOUBTFUL, FOUND, NO_WALL, stiffest_walls
+from zwidth.chart.stiffest_batch import DOUBTFUL, FOUND, NO_WALL, stiffest_walls
 from zwidth.loop.controller import Controller
 from zwidth.loop.evaluate import factor_arrays
 from zwidth.loop.loop import Loop

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import shapely
 
-from zwidth.chart.robust_members import Member, beyond_lines, curved_edges, polygonal
+from zwidth.chart.robust.members import Member, beyond_lines, curved_edges, polygonal
 
 Shapes = Mapping[int, shapely.MultiPolygon]
 

@@ -11,10 +11,10 @@ from shapely.geometry.polygon import orient
 
 from zwidth.chart.cells import Box, box_of, cells, outline
 from zwidth.chart.chart import BoundaryArc
-from zwidth.chart.loci import Loci, refine_loci, trace_loci, with_angles
-from zwidth.chart.loci_arcs import ring_arcs, sample_arc
-from zwidth.chart.loci_cells import Line, cut_lines, reach, real_root_lines, stable_polygons
-from zwidth.chart.loci_numbers import is_stable, largest_damping, quadrant_area, stiffest
+from zwidth.chart.several_directions.arcs import ring_arcs, sample_arc
+from zwidth.chart.several_directions.cells import Line, cut_lines, reach, real_root_lines, stable_polygons
+from zwidth.chart.several_directions.eigenloci import Loci, refine_loci, trace_loci, with_angles
+from zwidth.chart.several_directions.numbers import is_stable, largest_damping, quadrant_area, stiffest
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi import MultiLoop
 from zwidth.model.arguments import require
@@ -82,7 +82,7 @@ class MultiChart:
 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")  # walls at infinity are data
 def multi_chart(loop: MultiLoop) -> MultiChart:
-    """The exact chart of det(1 + P(z) (K + B w(z))) = 0 over walls K, B (see `chart.loci` for the derivation).
+    """The exact chart of det(1 + P(z) (K + B w(z))) = 0 over walls K, B (see `eigenloci` for the derivation).
 
     The plane of walls is cut by the eigenloci and the lines of real roots, a wall in each piece is judged by
     eigenvalues of the transition matrix, and the corners and peaks of what is stable are solved on the curves.

@@ -10,13 +10,13 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.chart.band import Band, uncertainty
 from zwidth.chart.cells import Box, box_of, cut
-from zwidth.chart.measured_cells import Cells, cells_within, edges_stable_set, window
-from zwidth.chart.measured_curve import Boundary, boundary, coarse, real_root
-from zwidth.chart.measured_loop import MeasuredLoop
-from zwidth.chart.measured_verdict import MeasuredVerdicts, NearestEdge, judge_measured
-from zwidth.chart.trust import Stretch
+from zwidth.chart.measured.boundary import Boundary, boundary, coarse, real_root
+from zwidth.chart.measured.cells import Cells, cells_within, edges_stable_set, window
+from zwidth.chart.measured.loop import MeasuredLoop
+from zwidth.chart.measured.uncertainty_band import Band, uncertainty
+from zwidth.chart.measured.usable_frequencies import Stretch
+from zwidth.chart.measured.verdict import MeasuredVerdicts, NearestEdge, judge_measured
 from zwidth.chart.verdict import UNDECIDED
 from zwidth.loop.controller import Controller
 from zwidth.model.arguments import require
@@ -104,7 +104,7 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
 
         h = -1/P,   B = Im h / Im w,   K = Re h - B Re w          at every measured frequency
 
-    The stable cells are those without a root outside the unit circle (`chart.count`). Assumed of the device:
+    The stable cells are those without a root outside the unit circle (`root_count`). Assumed of the device:
     without a wall it is stable but for its integrators.
 
     response    force command sample -> encoder sample, hold and hardware delay included
@@ -227,7 +227,7 @@ def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
     angles = _angles_at(loop, zoomed, peak)
     at_peak = np.array([a for a in angles if 0.0 < a < np.pi])
     h, w = loop.h(at_peak), loop.w(at_peak)
-    errors = loop.between.relative_error(at_peak) * np.abs(h * w / w.imag)
+    errors = loop.interpolation.relative_error(at_peak) * np.abs(h * w / w.imag)
     return MeasuredChart(
         loop=loop,
         edge=cells.edge,
@@ -353,7 +353,7 @@ def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
             w = loop.w(theta)
             reach = loop.error(theta) * np.abs(w) / np.abs(w.imag)
             yield MeasuredArc(K, B, given, K - reach, K + reach)
-    lines = [(-1, 0.0), (-2, half)] if loop.between.closed else [(-1, 0.0)]
+    lines = [(-1, 0.0), (-2, half)] if loop.interpolation.closed else [(-1, 0.0)]
     for kind, frequency in lines:
         static, turned = real_root(loop, kind)
         if not np.isfinite(static):
@@ -384,5 +384,5 @@ def _told(loop: MeasuredLoop, cells: Cells) -> Iterator[Stretch]:
         within[:-1] = (f >= stretch.low) & (f < stretch.high)
         which = np.flatnonzero((edge.at >= 0) & within[edge.at])
         touched = bool(np.any(edges_stable_set(edge, which[:: max(1, len(which) // 200)], scale)))
-        beyond = not loop.between.closed and stretch.high >= 0.5 / loop.period * (1.0 - 1e-9)
+        beyond = not loop.interpolation.closed and stretch.high >= 0.5 / loop.period * (1.0 - 1e-9)
         yield replace(stretch, on_edge=touched or (beyond and cells.open))

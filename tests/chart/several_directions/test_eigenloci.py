@@ -10,8 +10,8 @@ import shapely
 from systems import random_controller, random_loop, random_plant, two_mass, velocity_filter
 
 from zwidth.chart.chart import largest_stiffness, stability_chart
-from zwidth.chart.eigenloci import multi_chart
 from zwidth.chart.polar import circle, largest_stiffness_by_direction
+from zwidth.chart.several_directions.chart import multi_chart
 from zwidth.device.load import load
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
@@ -239,7 +239,7 @@ def test_a_direction_without_an_answer_is_data():
 
 
 def test_the_page_says_what_its_examples_give():
-    page = (Path(__file__).parents[2] / "docs" / "directions.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "directions.md").read_text(encoding="utf-8")
     names: dict = {}
     for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
         exec(compile(block, "directions.md", "exec"), names)

@@ -15,7 +15,7 @@ import scipy.linalg
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.loci import Loci
+from zwidth.chart.several_directions.eigenloci import Loci
 from zwidth.loop.multi import MultiLoop
 
 Floats = NDArray[np.float64]

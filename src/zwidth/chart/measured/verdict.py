@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.chart.measured_curve import Boundary
-from zwidth.chart.measured_loop import MeasuredLoop
+from zwidth.chart.measured.boundary import Boundary
+from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.verdict import NAMES, STABLE, UNDECIDED, UNSTABLE
 from zwidth.model.arguments import walls as broadcast_walls
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from tests.cli.cli_run import found
-from zwidth.chart.measured import MeasuredChart
+from zwidth.chart.measured.chart import MeasuredChart
 
-PAGE = (Path(__file__).parents[2] / "docs" / "measured.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "measured.md").read_text(encoding="utf-8")
 
 
 def block(language):

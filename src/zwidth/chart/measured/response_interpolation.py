@@ -24,7 +24,7 @@ FEWEST = 6  # frequencies; fewer make no curve
 
 
 @dataclass(frozen=True)
-class Between:
+class ResponseInterpolation:
     """Cubic pieces of G, 1/G and log G over ascending nodes theta, and which of them each interval uses.
 
     values, slopes  (3, n) at the nodes;   kind (n - 1,) 0, 1 or 2
@@ -78,7 +78,7 @@ def smooth_part(theta: Floats, P: Complexes, integrators: int) -> tuple[Complexe
     return G * np.exp(1j * delay * theta), delay
 
 
-def between(theta: Floats, P: Complexes, integrators: int, *, closed: bool) -> Between:
+def interpolate_response(theta: Floats, P: Complexes, integrators: int, *, closed: bool) -> ResponseInterpolation:
     """The interpolation through a response P (n,) at ascending angles (n,) in (0, pi].
 
     closed  whether the last angle is near enough to pi for its mirror image to be the next point
@@ -106,7 +106,7 @@ def between(theta: Floats, P: Complexes, integrators: int, *, closed: bool) -> B
     missed = np.maximum(missed[:, :-1], missed[:, 1:])
     kind = np.argmin(missed, axis=0)
     slopes, error = np.array([_slopes(x, v) for v in kinds]), np.min(missed, axis=0) / 64.0
-    return Between(x, kinds, slopes, kind, error, integrators, delay, closed)
+    return ResponseInterpolation(x, kinds, slopes, kind, error, integrators, delay, closed)
 
 
 def _windows(n: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import Arc
-from zwidth.chart.robust_members import Member
+from zwidth.chart.robust.members import Member
 from zwidth.chart.tracer import Wall
 
 Floats = NDArray[np.float64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
 from zwidth.chart.cells import Box
-from zwidth.chart.measured_curve import Boundary, boundary, own_sizes, real_root, refine
-from zwidth.chart.measured_loop import MeasuredLoop
+from zwidth.chart.measured.boundary import Boundary, boundary, own_sizes, real_root, refine
+from zwidth.chart.measured.loop import MeasuredLoop
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -130,7 +130,7 @@ def _lines_cross(loop: MeasuredLoop, beside: float) -> Floats:
     beside  their distance from it, in damping
     """
     (h0, w0), (h1, w1) = real_root(loop, -1), real_root(loop, -2)
-    if not loop.between.closed or not np.isfinite(h1) or abs(w1 - w0) * loop.period < 1e-9:
+    if not loop.interpolation.closed or not np.isfinite(h1) or abs(w1 - w0) * loop.period < 1e-9:
         return np.empty((0, 2))
     B = (h1 - h0) / (w1 - w0)
     along = beside * np.array([[-w0, 1.0], [-w1, 1.0]])

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from zwidth.chart.loci import Loci
-from zwidth.chart.loci_arcs import LocusArc
 from zwidth.chart.peak import Peak, topmost
+from zwidth.chart.several_directions.arcs import LocusArc
+from zwidth.chart.several_directions.eigenloci import Loci
 from zwidth.loop.multi import MultiLoop
 
 Floats = NDArray[np.float64]

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 from tests import systems
 from tests.measured_cases import dense, measured, sampled_response
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.measured import measured_chart
-from zwidth.chart.measured_curve import boundary, coarse, nyquist_count
-from zwidth.chart.measured_loop import MeasuredLoop
+from zwidth.chart.measured.boundary import boundary, coarse, nyquist_count
+from zwidth.chart.measured.chart import measured_chart
+from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.verdict import eigenvalues
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.estimators import CentralDifference, LeastSquaresSlope, SavitzkyGolay
@@ -96,7 +96,7 @@ def test_interpolation_has_the_fourth_order():
     errors, told = [], []
     for count in (200, 400, 800):
         f = np.linspace(400.0 / count, 400.0, count)
-        between = MeasuredLoop(*measured(loop, frequency=f)).between
+        between = MeasuredLoop(*measured(loop, frequency=f)).interpolation
         middle = np.linspace(20.0, 380.0, 5000)
         P = sampled_response(loop, middle)
         errors.append(np.max(np.abs(P * between.inverse(2.0 * np.pi * middle * loop.period) - 1.0)))

@@ -12,8 +12,8 @@ import shapely
 from numpy.typing import NDArray
 
 from zwidth.chart.cells import cut
-from zwidth.chart.measured_cells import Cells, edges_stable_set
-from zwidth.chart.measured_loop import MeasuredLoop
+from zwidth.chart.measured.cells import Cells, edges_stable_set
+from zwidth.chart.measured.loop import MeasuredLoop
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
