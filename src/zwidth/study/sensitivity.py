@@ -18,7 +18,6 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.chart.chart import largest_stiffness, stability_chart
-from zwidth.chart.peak import Peak
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Path, dotted
@@ -28,8 +27,9 @@ from zwidth.device.schema import file as schema
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.arguments import require
-from zwidth.study.optimum import Kind, Optimum, OptimumError, optimum
+from zwidth.study.optimum import Optimum, OptimumError, optimum
 from zwidth.study.rivals import rival_stiffness
+from zwidth.study.sensitivities import Group, Sensitivities, Sensitivity
 from zwidth.study.slope import Slope, central_slope, one_sided_slope
 
 # Numbers of a device file that say where it is asked about, or how its posture is found, and not what it is.
@@ -40,83 +40,6 @@ NO_PROPERTY: Final = {
 }
 ZERO: Final = "0 has no logarithm; the derivative by the number itself stands beside it"
 WORTHLESS: Final = 1e-3  # a derivative with a larger estimated error, per relative change, is not given
-NOTHING: Final = 1e-8  # a sensitivity that is rounding of none
-TIE: Final = 1e-5  # relative difference of two stiffest walls that are one
-
-
-@dataclass(frozen=True)
-class Sensitivity:
-    """How the largest stiffness answers to one number.
-
-    path         where it stands in the device file; an element of a symmetric matrix moves with its mirror image
-    value        the number
-    unit         as the schema names it; "" if it has none
-    logarithmic  d ln K_max / d ln value; nan for the value 0, and where it could not be computed
-    derivative   dK_max/dvalue [N/m per unit of the value]; nan where it could not be computed
-    error        estimated error of `logarithmic`, for the value 0 of `derivative`
-    side         "both"; "above" or "below" where the derivative is that of a growing or falling number alone
-    reason       why a number is missing; "" where none is
-    """
-
-    path: str
-    value: float
-    unit: str
-    logarithmic: float
-    derivative: float
-    error: float
-    side: str = "both"
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class Group:
-    """Numbers scaled together: a whole list or matrix, or one key of all links (a * in its path).
-
-    path         of the list, or with * for the names
-    members      paths of its numbers
-    logarithmic  d ln K_max / d ln of the common factor: the sum of the members'; nan where it is not known
-    """
-
-    path: str
-    members: tuple[str, ...]
-    logarithmic: float
-
-
-@dataclass(frozen=True)
-class Sensitivities:
-    """All of them, with the wall they speak of.
-
-    peak      the stiffest wall; None where no wall is stable, and then nothing else is there
-    kind      what holds it (see `study.optimum`); None where that is not known
-    numbers   largest |logarithmic| first, then those without a logarithm
-    groups    largest first
-    left_out  path -> why the number is none of the device
-    rival     largest stiffness of another, separate extreme point of the edge [N/m]; nan if there is none. It
-              takes over as soon as a change makes it the stiffer one.
-    """
-
-    peak: Peak | None
-    kind: Kind | None
-    numbers: tuple[Sensitivity, ...]
-    groups: tuple[Group, ...]
-    left_out: dict[str, str]
-    rival: float
-
-    @property
-    def wholes(self) -> tuple[tuple[str, float], ...]:
-        """Path and logarithmic sensitivity with lists and matrices as wholes, as those who build a device think of
-        them; largest first, without those that are not known or have no influence."""
-        lists = [group for group in self.groups if "*" not in group.path]
-        members = {path for group in lists for path in group.members}
-        single = [(number.path, number.logarithmic) for number in self.numbers if number.path not in members]
-        found = [*single, *((group.path, group.logarithmic) for group in lists)]
-        told = [(path, value) for path, value in found if abs(value) > NOTHING]
-        return tuple(sorted(told, key=lambda pair: -abs(pair[1])))
-
-    @property
-    def tie(self) -> bool:
-        """Are two walls stiffest at once? Then each number's derivative is one-sided: that of this one."""
-        return self.peak is not None and bool(self.rival >= (1.0 - TIE) * self.peak.stiffness)
 
 
 def sensitivities(device: Device, point: OperatingPoint | None = None) -> Sensitivities:

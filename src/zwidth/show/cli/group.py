@@ -12,6 +12,7 @@ from zwidth import __version__
 from zwidth.show.cli.bounds import bounds
 from zwidth.show.cli.chart import chart
 from zwidth.show.cli.check import check
+from zwidth.show.cli.command import Command
 from zwidth.show.cli.devices import devices
 from zwidth.show.cli.experiment import experiment
 from zwidth.show.cli.felt import felt
@@ -20,11 +21,11 @@ from zwidth.show.cli.limit_cycles import limit_cycles
 from zwidth.show.cli.map import map_command
 from zwidth.show.cli.move import move
 from zwidth.show.cli.polar import polar
-from zwidth.show.cli.report import report
+from zwidth.show.cli.report import Report
 from zwidth.show.cli.robust import robust
 from zwidth.show.cli.schema import schema
-from zwidth.show.cli.sensitivity import sensitivity
-from zwidth.show.cli.show import show
+from zwidth.show.cli.sensitivity import SensitivityCommand
+from zwidth.show.cli.show import Show
 from zwidth.show.cli.simulate import simulate
 from zwidth.show.cli.sweep import sweep
 
@@ -52,14 +53,14 @@ def zwidth(context: click.Context) -> None:
 COMMANDS = (
     devices,
     schema,
-    show,
+    Show(),
     chart,
     check,
     polar,
     map_command,
     sweep,
-    report,
-    sensitivity,
+    Report(),
+    SensitivityCommand(),
     felt,
     bounds,
     guarantees,
@@ -70,7 +71,7 @@ COMMANDS = (
     move,
 )
 for command in COMMANDS:
-    zwidth.add_command(command)
+    zwidth.add_command(command.for_click() if isinstance(command, Command) else command)
 
 
 def invoke(arguments: Sequence[str]) -> int:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from zwidth.show.cli.answer import Answer, deliver, sheet
+from zwidth.show.cli.command import NO_MODEL
 from zwidth.show.cli.computing import computing
 from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, replacing, write_data
@@ -27,10 +28,6 @@ MOST_UNMEASURED: Final = 0.1  # of the frequencies up to half the sampling rate,
 OPEN: Final = (
     "the measured edge does not close round the stable walls: frequencies are missing; measure up to half the "
     "sampling rate"
-)
-NO_MODEL: Final = (
-    "a measured response has no masses, stiffnesses, modes or postures to show; `zwidth chart` and `zwidth check` "
-    "answer for it, a [plant] or [mechanism] answers the rest"
 )
 
 

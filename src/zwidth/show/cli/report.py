@@ -2,59 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any
 
-import click
-
-from zwidth.show.cli.answer import Answer, deliver
-from zwidth.show.cli.computing import NoAnswer, computing
-from zwidth.show.cli.measured import without_model
-from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
-from zwidth.show.output import destination
+from zwidth.show.cli.command import Case, Command
+from zwidth.show.cli.options import Question
 from zwidth.show.units import typed
 
-if TYPE_CHECKING:
-    from zwidth.device.device import Device
-    from zwidth.loop.operating_point import OperatingPoint
 
-PAGE: Final = (".html", ".htm")
-
-
-@click.command(
-    short_help="Write a report on DEVICE as an HTML file.",
-    epilog=example("zwidth report my-device.toml", "zwidth report my-device.toml --at 0.1,0.2 --output here.html"),
-)
-@about_a_device
-@output_option("Where to write it (.html). Default: NAME-report.html in this folder.")
-@as_json
-def report(question: Question, output: str | None, as_json: bool) -> int:
+class Report(Command):
     """Write a report on DEVICE: its chart, what limits it, what to change; one HTML file that also prints."""
-    path = destination(output or default_name(question.name), PAGE)
-    device = question.device()
-    if device.response is not None:
-        return without_model(question, device, {"file": None, "decided": True}, as_json)
-    try:
-        with computing(question):
-            point = question.point(device)
-            _ = point.plant  # whether it can be meant, before the heavy parts are imported
-            found = _written(device, path, point)
-    except NoAnswer as none:
-        unanswered = question.facts(device) | {"file": None, "decided": none.decided}
-        return deliver(Answer(unanswered, reason=str(none)), as_json)
-    reason = found.pop("reason", None)
-    document = found | question.facts(device) | {"decided": True}
-    pages = [*(typed(sentence) for sentence in found["summary"]), f"written: {path}"]
-    return deliver(Answer(document, lambda: pages, reason), as_json)
+
+    name = "report"
+    summary = "Write a report on DEVICE as an HTML file."
+    examples = ("zwidth report my-device.toml", "zwidth report my-device.toml --at 0.1,0.2 --output here.html")
+    outputs = (".html", ".htm")
+    output_help = "Where to write it (.html). Default: NAME-report.html in this folder."
+    keys = ("file",)
+    decides = True
+
+    def default_output(self, question: Question) -> str:
+        return default_name(question.name)
+
+    def compute(self, case: Case) -> dict[str, Any]:
+        _ = case.point.plant  # whether it can be meant, before the heavy parts are imported
+        from zwidth.show.report.report import write_report
+
+        assert case.path is not None
+        return write_report(case.device, case.path, case.point)
+
+    def document(self, case: Case, result: dict[str, Any]) -> dict[str, Any]:
+        # what the command line was asked for is stated as typed
+        return result | self.circumstances(case)
+
+    def reason(self, case: Case, result: dict[str, Any]) -> str | None:
+        reason: str | None = result.pop("reason", None)
+        return reason
+
+    def write(self, case: Case, result: Any, document: dict[str, Any], reason: str | None) -> str | None:
+        return reason  # written as it was computed
+
+    def heading(self, case: Case) -> str:
+        return ""
+
+    def pages(self, case: Case, result: dict[str, Any], document: Mapping[str, Any]) -> Iterator[Any]:
+        yield from (typed(sentence) for sentence in result["summary"])
 
 
 def default_name(device: str) -> str:
     """The report's name from the device's name or file."""
     return f"{Path(device).name.removesuffix('.toml')}-report.html"
-
-
-def _written(device: Device, path: Path, point: OperatingPoint) -> dict[str, Any]:
-    """Write the report; the numbers in it."""
-    from zwidth.show.report.report import write_report
-
-    return write_report(device, path, point)

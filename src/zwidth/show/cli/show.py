@@ -3,168 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
-import click
-
-from zwidth.show.cli.answer import Answer, deliver, sheet, table
-from zwidth.show.cli.computing import NoAnswer, computing
-from zwidth.show.cli.measured import without_model
-from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
-from zwidth.show.cli.place import heading
-from zwidth.show.output import DATA, destination, plain, write_data
+from zwidth.show.cli.answer import sheet, table
+from zwidth.show.cli.command import Case, Command
+from zwidth.show.output import DATA, plain
 from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
-    from zwidth.device.device import Device
-    from zwidth.loop.operating_point import OperatingPoint
-    from zwidth.model.effective import EffectiveParameters
-    from zwidth.model.mechanism import Floats, Mechanism
-    from zwidth.model.plant import Plant
-
-KEYS: Final = (
-    "link_side_mass_kg",
-    "motor_side_mass_kg",
-    "rigid_mass_kg",
-    "stiffness_N_per_m",
-    "natural_frequencies_Hz",
-    "damping_ratios",
-    "joints_rad",
-    "jacobian",
-    "mass_matrix",
-    "manipulability",
-    "dynamic_manipulability",
-    "isotropy",
-    "sources",
-)
+    from zwidth.measures.description import Description
+    from zwidth.model.mechanism import Floats
 
 
-@click.command(
-    short_help="Show masses, stiffness, frequencies and dexterity of DEVICE.",
-    epilog=example("zwidth show my-device.toml", "zwidth show my-device.toml --at 0.1,0.2 --direction 1,0 --json"),
-)
-@about_a_device
-@output_option("Write the numbers (.csv .json).")
-@as_json
-def show(question: Question, output: str | None, as_json: bool) -> int:
+class Show(Command):
     """Show DEVICE at a posture: masses and stiffness felt along the direction, frequencies, dexterity."""
-    path = None if output is None else destination(output, DATA)
-    device = question.device()
-    if device.response is not None:
-        return without_model(question, device, dict.fromkeys(KEYS) | {"sources": device.sources}, as_json)
-    try:
-        with computing(question):
-            point = question.point(device)
-            _ = point.unheld_plant  # whether the model applies
-    except NoAnswer as none:
-        return deliver(Answer(question.facts(device) | dict.fromkeys(KEYS), reason=str(none)), as_json)
-    document = question.facts(device) | _numbers(device, point)
-    if path is not None:
-        document["file"] = str(path)
-        write_data(path, document, flat(document))
-    return deliver(Answer(document, lambda: list(_pages(question, device, document))), as_json)
 
-
-def flat(document: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Every single value of a document with its dotted key, in the columns `key` and `value`."""
-    entries = list(_entries(plain(document), ""))
-    return {"key": [key for key, _ in entries], "value": [value for _, value in entries]}
-
-
-def _entries(value: Any, key: str) -> Iterator[tuple[str, Any]]:
-    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
-    if inner is None:
-        yield key, value
-        return
-    for step, part in inner:
-        yield from _entries(part, f"{key}.{step}" if key else str(step))
-
-
-def _numbers(device: Device, point: OperatingPoint) -> dict[str, Any]:
-    """What --json shows beyond the facts; None where inapplicable."""
-    from zwidth.model.modes import natural_frequencies
-
-    plant = point.unheld_plant
-    dexterity = {} if point.mechanism is None else _dexterity(point.mechanism, point)
-    return (
-        dict.fromkeys(KEYS)
-        | _felt(point.effective)
-        | {"natural_frequencies_Hz": natural_frequencies(plant), "damping_ratios": _damping_ratios(plant)}
-        | dexterity
-        | {"sources": device.sources}
+    name = "show"
+    summary = "Show masses, stiffness, frequencies and dexterity of DEVICE."
+    examples = ("zwidth show my-device.toml", "zwidth show my-device.toml --at 0.1,0.2 --direction 1,0 --json")
+    outputs = DATA
+    output_help = "Write the numbers (.csv .json)."
+    keys = (
+        "link_side_mass_kg",
+        "motor_side_mass_kg",
+        "rigid_mass_kg",
+        "stiffness_N_per_m",
+        "natural_frequencies_Hz",
+        "damping_ratios",
+        "joints_rad",
+        "jacobian",
+        "mass_matrix",
+        "manipulability",
+        "dynamic_manipulability",
+        "isotropy",
+        "sources",
     )
 
+    def compute(self, case: Case) -> Description:
+        from zwidth.measures.description import describe
 
-def _felt(felt: EffectiveParameters) -> dict[str, Any]:
-    return {
-        "link_side_mass_kg": felt.link_side_mass,
-        "motor_side_mass_kg": felt.motor_side_mass,
-        "rigid_mass_kg": felt.rigid_mass,
-        "stiffness_N_per_m": felt.stiffness,
-    }
+        return describe(case.point)
 
+    def document(self, case: Case, result: Description) -> dict[str, Any]:
+        return result.document() | {"sources": case.device.sources}
 
-def _dexterity(mechanism: Mechanism, point: OperatingPoint) -> dict[str, Any]:
-    from zwidth.measures.dexterity import dynamic_manipulability, isotropy, manipulability
+    def table(self, case: Case, result: Description, document: Mapping[str, Any]) -> dict[str, list[Any]]:
+        from zwidth.measures.description import entries
 
-    assert point.posture is not None
-    angles, J = point.posture.angles, point.jacobian
-    return {
-        "joints_rad": dict(zip(mechanism.links.names, angles.tolist(), strict=True)),
-        "jacobian": J,
-        "mass_matrix": point.mass_matrix,
-        "manipulability": manipulability(J),
-        "dynamic_manipulability": dynamic_manipulability(J, point.whole_mass_matrix),
-        "isotropy": isotropy(J),
-    }
+        return entries(plain(document))
 
-
-def _damping_ratios(plant: Plant) -> list[float | None] | None:
-    """Damping ratio a/w of each natural frequency, None for rigid ones; None where damping couples modes.
-
-    Hysteresis L adds what it loses per cycle at that frequency: x^T L x / (2 w^2), half the loss factor.
-    """
-    import numpy as np
-
-    from zwidth.model.modes import real_modes
-
-    modes = real_modes(plant)
-    if modes is None:
-        return None
-    L = np.zeros_like(plant.stiffness) if plant.hysteresis is None else plant.hysteresis
-    loss = np.einsum("ij,ik,kj->j", modes.shapes, L, modes.shapes)
-    each = zip(modes.decay.tolist(), loss.tolist(), modes.frequency_squared.tolist(), strict=True)
-    return [a / squared**0.5 + lost / (2.0 * squared) if squared > 0.0 else None for a, lost, squared in each]
-
-
-def _pages(question: Question, device: Device, document: Mapping[str, Any]) -> Iterator[Any]:
-    found = plain(document)
-    yield heading(question, device)
-    yield sheet(
-        [
-            ("link side", amount(found["link_side_mass_kg"], "kg")),
-            ("motor side", amount(found["motor_side_mass_kg"], "kg")),
-            ("both, rigid", amount(found["rigid_mass_kg"], "kg")),
-            ("stiffness between", amount(found["stiffness_N_per_m"], "N/m")),
-            ("natural frequencies", ", ".join(_modes(found))),
-        ]
-    )
-    if found["joints_rad"]:
-        units = _dexterity_units(document["jacobian"])
+    def pages(self, case: Case, result: Description, document: Mapping[str, Any]) -> Iterator[Any]:
+        found = plain(document)
         yield sheet(
             [
-                ("manipulability", amount(found["manipulability"], units[0])),
-                ("dynamic manipulability", amount(found["dynamic_manipulability"], units[1])),
-                ("isotropy (1 is best)", amount(found["isotropy"])),
+                ("link side", amount(found["link_side_mass_kg"], "kg")),
+                ("motor side", amount(found["motor_side_mass_kg"], "kg")),
+                ("both, rigid", amount(found["rigid_mass_kg"], "kg")),
+                ("stiffness between", amount(found["stiffness_N_per_m"], "N/m")),
+                ("natural frequencies", ", ".join(_modes(found))),
             ]
         )
-        yield table(
-            ["joint", "angle [rad]"], [(name, amount(angle)) for name, angle in found["joints_rad"].items()]
-        )
-    if found["sources"]:
-        yield table(["numbers", "source"], list(found["sources"].items()))
-    if "file" in found:
-        yield f"written: {found['file']}"
+        if result.jacobian is not None:
+            units = _dexterity_units(result.jacobian)
+            yield sheet(
+                [
+                    ("manipulability", amount(found["manipulability"], units[0])),
+                    ("dynamic manipulability", amount(found["dynamic_manipulability"], units[1])),
+                    ("isotropy (1 is best)", amount(found["isotropy"])),
+                ]
+            )
+            angles = [(name, amount(angle)) for name, angle in found["joints_rad"].items()]
+            yield table(["joint", "angle [rad]"], angles)
+        if found["sources"]:
+            yield table(["numbers", "source"], list(found["sources"].items()))
 
 
 def _dexterity_units(jacobian: Floats) -> tuple[str, str]:

@@ -18,7 +18,8 @@ from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
 from zwidth.show.friction import told_of
 from zwidth.study.hidden import hidden_instability
-from zwidth.study.sensitivity import Sensitivities, sensitivities
+from zwidth.study.sensitivities import Sensitivities
+from zwidth.study.sensitivity import sensitivities
 from zwidth.study.validity import Validity, validity
 from zwidth.study.what_if import BASE, Variant, find, what_if
 

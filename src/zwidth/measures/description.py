@@ -1,0 +1,122 @@
+"""A device at one operating point in numbers: what moves, how stiffly, at which frequencies, how freely."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.dexterity import dynamic_manipulability, isotropy, manipulability
+from zwidth.model.arguments import require
+from zwidth.model.effective import EffectiveParameters
+from zwidth.model.mechanism import Floats
+from zwidth.model.modes import natural_frequencies, real_modes
+from zwidth.model.plant import Plant
+
+
+@dataclass(frozen=True)
+class Description:
+    """Masses and stiffness felt along the direction, frequencies, and the mechanism's dexterity.
+
+    effective            masses [kg] and stiffness [N/m]; nan where inapplicable
+    natural_frequencies  (n,)  of the device by itself [Hz]; rigid modes exactly 0
+    damping_ratios       of each frequency, None for rigid ones; None where damping couples the modes
+    joints               angle of each joint by its link [rad]; None for a device without a mechanism, as all below
+    jacobian             (3, d)  [m/rad];   mass_matrix  (d, d)  of the links [kg m^2]
+    manipulability, dynamic_manipulability, isotropy   see `measures.dexterity`
+    """
+
+    effective: EffectiveParameters
+    natural_frequencies: Floats
+    damping_ratios: list[float | None] | None
+    joints: dict[str, float] | None = None
+    jacobian: Floats | None = None
+    mass_matrix: Floats | None = None
+    manipulability: float | None = None
+    dynamic_manipulability: float | None = None
+    isotropy: float | None = None
+
+    def document(self) -> dict[str, Any]:
+        """The numbers by key and unit; None where inapplicable."""
+        felt = self.effective
+        return {
+            "link_side_mass_kg": felt.link_side_mass,
+            "motor_side_mass_kg": felt.motor_side_mass,
+            "rigid_mass_kg": felt.rigid_mass,
+            "stiffness_N_per_m": felt.stiffness,
+            "natural_frequencies_Hz": self.natural_frequencies,
+            "damping_ratios": self.damping_ratios,
+            "joints_rad": self.joints,
+            "jacobian": self.jacobian,
+            "mass_matrix": self.mass_matrix,
+            "manipulability": self.manipulability,
+            "dynamic_manipulability": self.dynamic_manipulability,
+            "isotropy": self.isotropy,
+        }
+
+    def table(self) -> dict[str, list[Any]]:
+        """Every single number with its dotted key, in the columns `key` and `value`."""
+        return entries(self.document())
+
+
+def describe(point: OperatingPoint) -> Description:
+    """The device by itself at one operating point, without its operator.
+
+    Raises  what `OperatingPoint.plant` raises
+    """
+    require("point", point, OperatingPoint)
+    plant = point.unheld_plant
+    common = point.effective, natural_frequencies(plant), damping_ratios(plant)
+    if point.mechanism is None or point.posture is None:
+        return Description(*common)
+    J, names = point.jacobian, point.mechanism.links.names
+    return Description(
+        *common,
+        joints=dict(zip(names, point.posture.angles.tolist(), strict=True)),
+        jacobian=J,
+        mass_matrix=point.mass_matrix,
+        manipulability=float(manipulability(J)),
+        dynamic_manipulability=float(dynamic_manipulability(J, point.whole_mass_matrix)),
+        isotropy=float(isotropy(J)),
+    )
+
+
+def damping_ratios(plant: Plant) -> list[float | None] | None:
+    """Damping ratio a/w of each natural frequency, None for rigid ones; None where damping couples modes.
+
+    Hysteresis L adds what it loses per cycle at that frequency: x^T L x / (2 w^2), half the loss factor.
+    """
+    modes = real_modes(plant)
+    if modes is None:
+        return None
+    L = np.zeros_like(plant.stiffness) if plant.hysteresis is None else plant.hysteresis
+    loss = np.einsum("ij,ik,kj->j", modes.shapes, L, modes.shapes)
+    each = zip(modes.decay.tolist(), loss.tolist(), modes.frequency_squared.tolist(), strict=True)
+    return [a / squared**0.5 + lost / (2.0 * squared) if squared > 0.0 else None for a, lost, squared in each]
+
+
+def entries(document: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Every single value of a nested document with its dotted key, in the columns `key` and `value`.
+
+    >>> entries({"a": {"b": [1, 2]}, "c": None})
+    {'key': ['a.b.0', 'a.b.1', 'c'], 'value': [1, 2, None]}
+    """
+    pairs = list(_entries(document, ""))
+    return {"key": [key for key, _ in pairs], "value": [value for _, value in pairs]}
+
+
+def _entries(value: Any, key: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        inner: Any = value.items()
+    elif isinstance(value, list | tuple):
+        inner = enumerate(value)
+    else:
+        yield key, value
+        return
+    for step, part in inner:
+        yield from _entries(part, f"{key}.{step}" if key else str(step))

@@ -1,0 +1,210 @@
+"""One command of `zwidth` as a declaration, and the runner that carries it out.
+
+A command says which options it has, what it computes, which keys its answer has, how that is told to people and
+how it is drawn. The runner does the rest, the same for all: it finds the file to be written writable first, loads
+the device, turns what cannot be answered into nulls with a reason, prints pages or one JSON object, writes data or
+a figure, and chooses the exit code. A command that does not fit overrides the one step in which it differs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+import click
+
+from zwidth.show.cli.answer import Answer, deliver
+from zwidth.show.cli.computing import NoAnswer, computing
+from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
+from zwidth.show.cli.place import heading
+from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from zwidth.device.device import Device
+    from zwidth.loop.operating_point import OperatingPoint
+
+NO_MODEL: Final = (
+    "a measured response has no masses, stiffnesses, modes or postures to show; `zwidth chart` and `zwidth check` "
+    "answer for it, a [plant] or [mechanism] answers the rest"
+)
+
+
+@dataclass
+class Case:
+    """What one command line asks for.
+
+    question  the device and the circumstances that it is asked about, as typed
+    options   the command's own, by name
+    path      file to be written; None: none
+    """
+
+    question: Question
+    options: Mapping[str, Any]
+    path: Path | None
+
+    @cached_property
+    def device(self) -> Device:
+        """The device, loaded and checked. Raises DeviceError."""
+        return self.question.device()
+
+    @cached_property
+    def point(self) -> OperatingPoint:
+        """Where it is asked about. Raises what `Device.at` raises."""
+        return self.question.point(self.device)
+
+    def __getitem__(self, option: str) -> Any:
+        return self.options[option]
+
+    def writes(self, endings: Sequence[str]) -> bool:
+        """Is a file with one of these endings to be written?"""
+        return self.path is not None and self.path.suffix.lower() in endings
+
+
+class Command:
+    """A command about one device at one operating point.
+
+    Its docstring is the command's help.
+
+    name, summary  as typed, and its line in the list of commands
+    examples       command lines
+    options        click's decorators of its own options
+    outputs        endings that --output takes;   output_help  what they are
+    keys           of its answer, beside the circumstances: null where there is no answer
+    linear         does the answer leave out what is not linear?
+    decides        may double precision leave it undecided? Then the answer has the key `decided`
+    of_responses   does it answer for a measured response, too?
+    """
+
+    name: ClassVar[str]
+    summary: ClassVar[str]
+    examples: ClassVar[tuple[str, ...]]
+    options: ClassVar[tuple[Callable[[Any], Any], ...]] = ()
+    outputs: ClassVar[tuple[str, ...]] = FIGURES + DATA
+    output_help: ClassVar[str] = "Write a figure (.png .svg .pdf) or the data (.csv .json)."
+    keys: ClassVar[tuple[str, ...]] = ()
+    linear: ClassVar[bool] = True
+    decides: ClassVar[bool] = False
+    of_responses: ClassVar[bool] = False
+
+    # --- what a command says of itself ----------------------------------------------------------------
+
+    def check(self, case: Case) -> None:
+        """Refuse options that do not go together, before anything is loaded. Raises BadInput."""
+
+    def default_output(self, question: Question) -> str | None:
+        """The file that is written where none is named; None: none is."""
+        return None
+
+    def asked(self, case: Case) -> dict[str, Any]:
+        """What of the options the answer repeats, whether there is an answer or not."""
+        return {}
+
+    def compute(self, case: Case) -> Any:
+        """The result. Raises NoAnswer, BadInput, and what the computation raises (see `computing`)."""
+        raise NotImplementedError
+
+    def document(self, case: Case, result: Any) -> dict[str, Any]:
+        """Keys and values of --json, beside the circumstances."""
+        return dict(result.document())
+
+    def table(self, case: Case, result: Any, document: Mapping[str, Any]) -> Mapping[str, Sequence[Any]]:
+        """Columns of a .csv file."""
+        return dict(result.table())
+
+    def reason(self, case: Case, result: Any) -> str | None:
+        """Why the result holds no answer; None where it holds one."""
+        return None
+
+    def heading(self, case: Case) -> str:
+        """The first lines for people: device, posture and computer."""
+        return heading(case.question, case.device, linear=self.linear)
+
+    def pages(self, case: Case, result: Any, document: Mapping[str, Any]) -> Iterable[Any]:
+        """The answer for people, below the heading: texts and tables of rich."""
+        raise NotImplementedError
+
+    def draw(self, case: Case, result: Any) -> Figure:
+        """The answer as a figure."""
+        raise NotImplementedError
+
+    # --- what is done for all -------------------------------------------------------------------------
+
+    def circumstances(self, case: Case) -> dict[str, Any]:
+        """What the answer states first: device, posture, model, computer, and what it leaves out."""
+        question = case.question
+        stated = question.facts(case.device) if self.linear else question.circumstances(case.device)
+        return stated | self.asked(case)
+
+    def write(self, case: Case, result: Any, document: dict[str, Any], reason: str | None) -> str | None:
+        """Write the file, by its ending. Returns why there is no answer, be it that nothing can be written."""
+        assert case.path is not None
+        if case.writes(DATA):
+            stated = document | ({} if reason is None else {"reason": reason})
+            write_data(case.path, stated, self.table(case, result, document) if case.writes([".csv"]) else {})
+            return reason
+        from zwidth.show.figures.style import save
+
+        with replacing(case.path) as draft:
+            save(self.draw(case, result), draft)
+        return reason
+
+    def unanswered(self, case: Case, none: NoAnswer) -> Answer:
+        """The answer where there is none: every key null, and why."""
+        decided = {"decided": none.decided} if self.decides else {}
+        return Answer(self.circumstances(case) | dict.fromkeys(self.keys) | decided, reason=str(none))
+
+    def answer(self, case: Case) -> Answer:
+        """Compute, and write the file that is asked for. Raises BadInput."""
+        if case.device.response is not None and not self.of_responses:
+            case.question.as_measured(case.device)
+            return self.unanswered(case, NoAnswer(NO_MODEL))
+        try:
+            with computing(case.question):
+                result = self.compute(case)
+        except NoAnswer as none:
+            return self.unanswered(case, none)
+        reason = self.reason(case, result)
+        document = self.circumstances(case) | self.document(case, result)
+        document |= {"decided": True} if self.decides and "decided" not in document else {}
+        if case.path is not None:
+            document["file"] = str(case.path)
+            reason = self.write(case, result, document, reason)
+
+        def pages() -> Iterator[Any]:
+            if first := self.heading(case):
+                yield first
+            yield from self.pages(case, result, document)
+            if "file" in document:
+                yield f"written: {document['file']}"
+
+        return Answer(document, lambda: list(pages()), reason)
+
+    def run(self, question: Question, as_json: bool, output: str | None = None, **options: Any) -> int:
+        """Carry out one command line; returns the exit code."""
+        named = output or self.default_output(question)
+        case = Case(question, options, None if named is None else destination(named, self.outputs))
+        self.check(case)
+        return deliver(self.answer(case), as_json)
+
+    def for_click(self) -> click.Command:
+        """The command as click knows it."""
+        decorators: list[Callable[[Any], Any]] = [
+            about_a_device,
+            *self.options,
+            *([output_option(self.output_help)] if self.outputs else []),
+            as_json,
+        ]
+
+        def run(*arguments: Any, **options: Any) -> int:
+            return self.run(*arguments, **options)
+
+        run.__doc__ = self.__doc__
+        command: Any = run
+        for decorate in reversed(decorators):
+            command = decorate(command)
+        return click.command(self.name, short_help=self.summary, epilog=example(*self.examples))(command)

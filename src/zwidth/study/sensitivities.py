@@ -1,0 +1,139 @@
+"""What sensitivities come to: each number's, those of numbers scaled together, and the wall they are about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import nan
+from typing import Any, Final
+
+from zwidth.chart.peak import Peak
+from zwidth.study.optimum import Kind
+
+COLUMNS: Final = (
+    "path",
+    "value",
+    "unit",
+    "d_ln_stiffness_max_d_ln_value",
+    "d_stiffness_max_d_value_N_per_m",
+    "one_percent_gives_N_per_m",
+    "error",
+    "side",
+    "reason",
+)
+NOTHING: Final = 1e-8  # a sensitivity that is rounding of none
+TIE: Final = 1e-5  # relative difference of two stiffest walls that are one
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """How the largest stiffness answers to one number.
+
+    path         where it stands in the device file; an element of a symmetric matrix moves with its mirror image
+    value        the number
+    unit         as the schema names it; "" if it has none
+    logarithmic  d ln K_max / d ln value; nan for the value 0, and where it could not be computed
+    derivative   dK_max/dvalue [N/m per unit of the value]; nan where it could not be computed
+    error        estimated error of `logarithmic`, for the value 0 of `derivative`
+    side         "both"; "above" or "below" where the derivative is that of a growing or falling number alone
+    reason       why a number is missing; "" where none is
+    """
+
+    path: str
+    value: float
+    unit: str
+    logarithmic: float
+    derivative: float
+    error: float
+    side: str = "both"
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Numbers scaled together: a whole list or matrix, or one key of all links (a * in its path).
+
+    path         of the list, or with * for the names
+    members      paths of its numbers
+    logarithmic  d ln K_max / d ln of the common factor: the sum of the members'; nan where it is not known
+    """
+
+    path: str
+    members: tuple[str, ...]
+    logarithmic: float
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """All of them, with the wall they speak of.
+
+    peak      the stiffest wall; None where no wall is stable, and then nothing else is there
+    kind      what holds it (see `study.optimum`); None where that is not known
+    numbers   largest |logarithmic| first, then those without a logarithm
+    groups    largest first
+    left_out  path -> why the number is none of the device
+    rival     largest stiffness of another, separate extreme point of the edge [N/m]; nan if there is none. It
+              takes over as soon as a change makes it the stiffer one.
+    """
+
+    peak: Peak | None
+    kind: Kind | None
+    numbers: tuple[Sensitivity, ...]
+    groups: tuple[Group, ...]
+    left_out: dict[str, str]
+    rival: float
+
+    def document(self) -> dict[str, Any]:
+        """The sensitivities by key and unit, with the wall they are about; None where there is none."""
+        peak = self.peak
+        groups = (
+            {"path": one.path, "members": one.members, "d_ln_stiffness_max_d_ln_value": one.logarithmic}
+            for one in self.groups
+        )
+        return {
+            "sensitivities": self._entries(),
+            "groups": list(groups),
+            "left_out": [{"path": path, "reason": reason} for path, reason in self.left_out.items()],
+            "stiffness_max_N_per_m": None if peak is None else peak.stiffness,
+            "damping_at_stiffness_max_Ns_per_m": None if peak is None else peak.damping,
+            "held_by": self.kind,
+            "rival_stiffness_N_per_m": self.rival,
+            "one_sided": self.tie,
+        }
+
+    def table(self) -> dict[str, list[Any]]:
+        """The sensitivities as columns, one number a row."""
+        rows = self._entries()
+        return {column: [row[column] for row in rows] for column in COLUMNS}
+
+    def _entries(self) -> list[dict[str, Any]]:
+        stiffness = nan if self.peak is None else self.peak.stiffness
+        return [
+            {
+                "path": one.path,
+                "value": one.value,
+                "unit": one.unit or None,
+                "d_ln_stiffness_max_d_ln_value": one.logarithmic,
+                "d_stiffness_max_d_value_N_per_m": one.derivative,
+                "one_percent_gives_N_per_m": 0.01 * one.logarithmic * stiffness,
+                "error": one.error,
+                "side": one.side or None,
+                "reason": one.reason or None,
+            }
+            for one in self.numbers
+        ]
+
+    @property
+    def wholes(self) -> tuple[tuple[str, float], ...]:
+        """Path and logarithmic sensitivity with lists and matrices as wholes, as those who build a device think of
+        them; largest first, without those that are not known or have no influence."""
+        lists = [group for group in self.groups if "*" not in group.path]
+        members = {path for group in lists for path in group.members}
+        single = [(number.path, number.logarithmic) for number in self.numbers if number.path not in members]
+        found = [*single, *((group.path, group.logarithmic) for group in lists)]
+        told = [(path, value) for path, value in found if abs(value) > NOTHING]
+        return tuple(sorted(told, key=lambda pair: -abs(pair[1])))
+
+    @property
+    def tie(self) -> bool:
+        """Are two walls stiffest at once? Then each number's derivative is one-sided: that of this one."""
+        return self.peak is not None and bool(self.rival >= (1.0 - TIE) * self.peak.stiffness)
