@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
-from copy import deepcopy
 from typing import Any, Final
 
 from zwidth.device.faults import DeviceError, Fault, Path, dotted, fail, listed, nearest, quote
+from zwidth.device.plain import copied
 from zwidth.device.read import within_depth
 from zwidth.device.schema import file as schema
 
@@ -78,7 +78,7 @@ def assign_all(document: dict[str, Any], settings: Iterable[tuple[str, Any]]) ->
     >>> assign_all({"loop": {"delay_s": 0.1}}, [("loop.sampling_period_s", 0.01), ("loop.delay_samples", 2.0)])
     {'loop': {'sampling_period_s': 0.01, 'delay_samples': 2.0}}
     """
-    document = deepcopy(document)
+    document = copied(document)
     for path, value in settings:
         _set(document, path, value)
     return document

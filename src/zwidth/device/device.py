@@ -233,13 +233,12 @@ class Device:
 
     def _posture(self, position: Position | ArrayLike | Posture | None, assembly: str | None) -> Posture:
         from zwidth.loop.operating_point import PROJECTED
-        from zwidth.model.arrays import design_shape
         from zwidth.model.posture import Posture, solve_posture
 
         if isinstance(position, Posture):
             return position
         mechanism, goal = self._mechanism(), self.position(position, assembly)
-        single = goal.ndim == 1 and not design_shape(mechanism)
+        single = goal.ndim == 1 and not mechanism.design_shape
         with self._solving(assembly) as name:
             return solve_posture(mechanism, goal, name, tolerance=PROJECTED if single else 0.0)
 

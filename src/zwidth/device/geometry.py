@@ -5,6 +5,7 @@ Plain NumPy, for one mechanism at a time: a file is checked before anything is c
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Final
 
@@ -24,9 +25,14 @@ PARALLEL: Final = 1e-9  # sine of the angle below which two axes are parallel
 Found = Iterator[tuple[Path, str]]
 
 
-def disagreements(mechanism: Mechanism, section: MechanismSection) -> Found:
-    """Path and sentence of every way in which the numbers of a mechanism do not fit together."""
+def disagreements(mechanism: Mechanism, section: MechanismSection, *, assembled: bool = False) -> Found:
+    """Path and sentence of every way in which the numbers of a mechanism do not fit together.
+
+    assembled  True: it is known to close and to move mass (`assembled.assembles`)
+    """
     yield from _moments_left_open(mechanism, section)
+    if assembled:
+        return
     angles, gaps = _closed(mechanism)
     size = _size(mechanism)
     open_loops = [k for k, gap in enumerate(gaps) if gap > CLOSED * size]
@@ -89,13 +95,19 @@ def _moments_left_open(mechanism: Mechanism, section: MechanismSection) -> Found
         if len(given.inertia_kg_m2) != 1 or given.inertia_kg_m2[0][0] == 0:
             continue
         for j in _ancestors(mechanism, i):
-            if links.joint[j] == REVOLUTE and np.linalg.norm(np.cross(axis[j], own)) > PARALLEL:
+            if links.joint[j] == REVOLUTE and _across(axis[j], own) > PARALLEL:
                 yield (
                     ("mechanism", "links", index, "inertia_kg_m2"),
                     f"is one number, the moment about the link's axis, but '{links.names[j]}' turns the link "
                     "about another; give three moments [Ixx, Iyy, Izz] or a 3 x 3 matrix",
                 )
                 break
+
+
+def _across(a: Floats, b: Floats) -> float:
+    """Sine of the angle between two unit vectors; numpy's cross is for many."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return math.hypot(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
 
 
 def _closed(mechanism: Mechanism) -> tuple[Floats, Floats]:

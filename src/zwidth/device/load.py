@@ -55,11 +55,12 @@ def load(
 def changed(device: Device, settings: Settings) -> Device:
     """The device with settings applied, checked again; see `Device.with_`.
 
-    Whether the mechanism can be put together is asked again only where one of its numbers has changed.
+    Whether the mechanism can be put together is asked again only where one of its numbers has changed, and of
+    compiled code first.
     """
     document = address.apply(device.document, _listed(settings))
     same = document.get("mechanism") == device.document.get("mechanism")
-    made = from_document(document, device.label, put_together=same)
+    made = from_document(document, device.label, put_together=same, compiled=True)
     warn_of_implausible(made)
     return made
 
@@ -71,13 +72,16 @@ def _listed(settings: Settings) -> Sequence[str | tuple[str, Any]]:
     return list(settings.items()) if isinstance(settings, Mapping) else settings
 
 
-def from_document(document: dict[str, Any], label: str = "device", *, put_together: bool = False) -> Device:
+def from_document(
+    document: dict[str, Any], label: str = "device", *, put_together: bool = False, compiled: bool = False
+) -> Device:
     """The device that a document describes; `label` is what messages call it.
 
     Single keys and what they say about each other are checked together; whether the mechanism can be put
     together is asked once all of that is right, which takes most of the time.
 
     put_together  True: it is known that it can, since it is a device already checked with numbers little changed
+    compiled      True: ask compiled code first, which takes a tenth of the time and half a second to load
     Raises DeviceError  with all faults found
     """
     if not isinstance(document, dict):
@@ -95,10 +99,18 @@ def from_document(document: dict[str, Any], label: str = "device", *, put_togeth
         raise DeviceError(in_order(found, document, label))
     device = _device(checked, without_version(document), label)
     if device.mechanism is not None and checked.mechanism is not None and not put_together:
-        found += geometry.disagreements(device.mechanism, checked.mechanism)
+        assembled = compiled and _assembled(device)
+        found += geometry.disagreements(device.mechanism, checked.mechanism, assembled=assembled)
     if found:
         raise DeviceError(in_order(found, document, label))
     return device
+
+
+def _assembled(device: Device) -> bool:
+    from zwidth.device.assembled import assembles
+
+    assert device.mechanism is not None
+    return assembles(device.mechanism, device.reference_assembly)
 
 
 def _device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from copy import deepcopy
 from typing import Any, Final
 
 from zwidth.device.faults import Path
+from zwidth.device.plain import copied
 
 VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str, frozenset[str] | None]]] = {
     ("loop", "velocity", "method"): (
@@ -38,7 +38,7 @@ beside it that are checked with it (None: all); what is left out are parameters 
 
 def refuse(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[Path, str]]]:
     """The document without what is not supported yet, and a sentence for each thing taken out."""
-    document = deepcopy(document)
+    document = copied(document)
     refused: list[tuple[Path, str]] = []
     for pattern, (names, stand_in, beside) in VALUES.items():
         for path, table in _places(document, pattern):

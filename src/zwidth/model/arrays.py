@@ -50,23 +50,9 @@ class Arrays(NamedTuple):
     size: Floats
 
 
-def design_shape(mechanism: Mechanism) -> tuple[int, ...]:
-    """Leading axes of the mechanism's numbers: () for one design."""
-    links, closures, drives = mechanism.links, mechanism.closures, mechanism.drives
-    return np.broadcast_shapes(
-        *(array.shape[:-2] for array in (links.origin, links.axis, links.center_of_mass, links.tip)),
-        *(array.shape[:-3] for array in (links.rotation, links.inertia)),
-        *(array.shape[:-2] for array in (closures.point_a, closures.point_b)),
-        *(array.shape[:-1] for array in (links.mass, drives.motor_inertia, drives.transmission)),
-        *(array.shape[:-1] for array in (drives.stiffness, drives.damping)),
-        *(array.shape[:-1] for array in (mechanism.handle_point, mechanism.reference_position)),
-        *(np.shape(angles)[:-1] for angles in mechanism.assemblies.values()),
-    )
-
-
 def per_design(mechanism: Mechanism, array: Floats, trailing: int) -> Floats:
     """An array of the mechanism with its leading axes flattened to one axis of designs: (P, ...)."""
-    shape = design_shape(mechanism)
+    shape = mechanism.design_shape
     tail = array.shape[array.ndim - trailing :]
     full = np.broadcast_to(np.asarray(array, dtype=np.float64), shape + tail)
     # always a copy: kernels are compiled once for writable arrays and once more for read-only ones

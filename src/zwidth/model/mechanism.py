@@ -7,6 +7,7 @@ Every number may carry leading batch axes (a set of designs that share one topol
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -145,3 +146,17 @@ class Mechanism:
     assemblies: dict[str, Floats]
     reference_position: Floats
     workspace: Floats
+
+    @cached_property
+    def design_shape(self) -> tuple[int, ...]:
+        """Leading axes of all numbers: () for one design."""
+        links, closures, drives = self.links, self.closures, self.drives
+        return np.broadcast_shapes(
+            *(array.shape[:-2] for array in (links.origin, links.axis, links.center_of_mass, links.tip)),
+            *(array.shape[:-3] for array in (links.rotation, links.inertia)),
+            *(array.shape[:-2] for array in (closures.point_a, closures.point_b)),
+            *(array.shape[:-1] for array in (links.mass, drives.motor_inertia, drives.transmission)),
+            *(array.shape[:-1] for array in (drives.stiffness, drives.damping)),
+            *(array.shape[:-1] for array in (self.handle_point, self.reference_position)),
+            *(np.shape(angles)[:-1] for angles in self.assemblies.values()),
+        )

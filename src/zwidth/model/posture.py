@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.compiled import compiled
 from zwidth.model.arguments import require
-from zwidth.model.arrays import Arrays, design_shape, pack, per_design
+from zwidth.model.arrays import Arrays, pack, per_design
 from zwidth.model.batch import nowhere, solve
 from zwidth.model.bias import bias_batch
 from zwidth.model.continuation import ASSEMBLED, OK, OUT_OF_REACH, SINGULAR, assemble_batch
@@ -135,7 +135,7 @@ def solve_posture(
     """
     require("mechanism", mechanism, Mechanism)
     name = _assembly_name(mechanism, assembly)
-    mech, designs = pack(mechanism), design_shape(mechanism)
+    mech, designs = pack(mechanism), mechanism.design_shape
     target = _in_space(mechanism, position)
     shape = np.broadcast_shapes(designs, target.shape[:-1])
     # a copy that can be written to, as all that is solved for: one that cannot is another type, compiled anew
@@ -191,7 +191,7 @@ def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Fl
 
 def _single(mechanism: Mechanism, name: str, otherwise: str) -> tuple[Arrays, Floats]:
     """One design packed, and its reference posture (n,) in an assembly; `otherwise` is said of several designs."""
-    if design_shape(mechanism):
+    if mechanism.design_shape:
         raise ValueError(otherwise)
     mech = pack(mechanism)
     reference, gaps = _references(mechanism, mech, name)
@@ -252,7 +252,7 @@ def inertia_terms(mechanism: Mechanism, posture: Posture, driven_rates: ArrayLik
     driven_rates  (..., d)  p' [rad/s], broadcasting with the posture
     Returns       (..., d); nan where the posture is not OK
     """
-    mech, designs = pack(mechanism), design_shape(mechanism)
+    mech, designs = pack(mechanism), mechanism.design_shape
     rates = np.asarray(driven_rates, dtype=np.float64)
     shape = np.broadcast_shapes(designs, posture.status.shape, rates.shape[:-1])
     angles = np.broadcast_to(posture.angles, (*shape, mech.parent.size)).reshape(-1, mech.parent.size)
@@ -266,7 +266,7 @@ def inertia_terms(mechanism: Mechanism, posture: Posture, driven_rates: ArrayLik
 
 def link_points(mechanism: Mechanism, posture: Posture) -> LinkPoints:
     """Origin, tip and axes of every link in the base frame; nan where the posture is not OK."""
-    mech, designs = pack(mechanism), design_shape(mechanism)
+    mech, designs = pack(mechanism), mechanism.design_shape
     shape = np.broadcast_shapes(designs, posture.status.shape)
     n = mech.parent.size
     angles = np.array(np.broadcast_to(posture.angles, (*shape, n)).reshape(-1, n), order="C")

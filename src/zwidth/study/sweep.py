@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from zwidth.device import address
+from zwidth.device.assembled import moves_mass
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document
@@ -203,7 +204,7 @@ class Design:
                 model=self._circumstance("model"),
             )
             if known[0] != same:
-                if not _moves_mass(point):
+                if point.posture is not None and not moves_mass(point.posture):
                     from_document(device.document, device.label)  # says what is wrong
                 self.job._last[name] = same, point.posture
         except OutOfReach as error:
@@ -224,16 +225,6 @@ def _said(error: Exception) -> str:
     if not isinstance(error, DeviceError):
         return str(error)
     return "; ".join(": ".join(filter(None, (fault.key, fault.message))) for fault in error.faults)
-
-
-def _moves_mass(point: OperatingPoint) -> bool:
-    """Has every motion a mass, wherever there is a posture?"""
-    if point.posture is None:
-        return True
-    M = point.mass_matrix[point.status == OK]
-    eigenvalues = np.linalg.eigvalsh(M)
-    least = M.shape[-1] * np.finfo(float).eps * eigenvalues[..., -1]
-    return bool((eigenvalues[..., 0] > least).all())
 
 
 def _answer(

@@ -15,7 +15,7 @@ from zwidth.contact.mechanism.reach import check_reach
 from zwidth.contact.mechanism.surfaces import Surface, packed
 from zwidth.contact.mechanism.system import System, system_of
 from zwidth.loop.controller import Controller
-from zwidth.model.arrays import design_shape, pack
+from zwidth.model.arrays import pack
 from zwidth.model.damping import Damping
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.posture import Posture, solve_posture
@@ -137,8 +137,8 @@ def simulate_mechanism(
     >>> simulate_mechanism(*scene, duration=0.1, start_velocity=device.direction()).status
     'done'
     """
-    if design_shape(mechanism):
-        raise MotionError(f"one design is simulated at a time, got a set of shape {design_shape(mechanism)}")
+    if mechanism.design_shape:
+        raise MotionError(f"one design is simulated at a time, got a set of shape {mechanism.design_shape}")
     check_choice("encoders", encoders, ("motor", "link"))
     check_choice("torque_limits", torque_limits, ("each", "together"))
     if (wall is None) != (surface is None):
