@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.structure.imports import circles, import_graph
+from tests.structure.modules import modules_of
+
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "src" / "zwidth"
 MODULES = sorted(PACKAGE.rglob("*.py"))
@@ -25,14 +28,20 @@ MAY_IMPORT["device"] = {"device", "model", "loop", "compiled"}
 MAY_IMPORT["study"].add("device")
 MAY_IMPORT["show"].add("device")
 
+VERBS = "_verbs"
 FOR_PEOPLE = {"matplotlib", "click", "rich", "jinja2"}
 HEAVY = {"numba", "scipy", "matplotlib"}
 LONGEST_MODULE = 400
 
 
 def imports(source: str, module: str, *, is_package: bool = False) -> Iterator[str]:
-    """Full dotted names of all that `source` imports, inside functions too; `module` resolves the dots."""
-    for node in ast.walk(ast.parse(source)):
+    """Full dotted names of all that `source` imports while it runs, inside functions too; `module` resolves the
+    dots."""
+    tree = ast.parse(source)
+    for_types = {id(node) for guard in ast.walk(tree) if type_only(guard) for node in ast.walk(guard)}
+    for node in ast.walk(tree):
+        if id(node) in for_types:
+            continue
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -40,6 +49,11 @@ def imports(source: str, module: str, *, is_package: bool = False) -> Iterator[s
             base = module.split(".")[: -up or None] if node.level else []
             origin = ".".join([*base, *filter(None, [node.module])])
             yield from (f"{origin}.{alias.name}" for alias in node.names)
+
+
+def type_only(node: ast.AST) -> bool:
+    """Is it a block that only type checkers read?"""
+    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING" and not node.orelse
 
 
 def imports_of(path: Path) -> set[str]:
@@ -64,6 +78,8 @@ from ..loop import hold
 from . import closure
 def lazily():
     from ..study.sweep import run
+if TYPE_CHECKING:
+    from zwidth.show import output
 """
     assert set(imports(source, "zwidth.model.posture")) == {
         "zwidth.chart.arc_joining",
@@ -79,13 +95,33 @@ def lazily():
     }
 
 
-@pytest.mark.parametrize("path", [path for path in MODULES if part(path) != "__init__"], ids=short)
+@pytest.mark.parametrize("path", [path for path in MODULES if part(path) not in ("__init__", VERBS)], ids=short)
 def test_imports_follow_the_flow_of_numbers(path):
     assert part(path) in MAY_IMPORT, f"say in FLOW where {part(path)} stands"
     inner = {name.split(".")[1] for name in imports_of(path) if name.startswith("zwidth.")}
     # `from zwidth import __version__` and the like name attributes, not packages.
     packages = {name for name in inner if (PACKAGE / name).is_dir() or (PACKAGE / f"{name}.py").is_file()}
-    assert packages <= MAY_IMPORT[part(path)]
+    assert packages - {VERBS} <= MAY_IMPORT[part(path)]
+
+
+def test_verbs_forward_and_do_nothing_else():
+    """Each function of the one module that may import upwards imports what it calls, and returns its result."""
+    tree = ast.parse((PACKAGE / f"{VERBS}.py").read_text(encoding="utf-8"))
+    forwards = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    assert forwards
+    for function in forwards:
+        imported, returned = function.body
+        assert isinstance(imported, ast.ImportFrom), function.name
+        assert isinstance(returned, ast.Return), function.name
+        assert isinstance(returned.value, ast.Call), function.name
+        assert [alias.asname or alias.name for alias in imported.names] == [ast.unparse(returned.value.func)]
+    rest = [node for node in tree.body if not isinstance(node, ast.FunctionDef | ast.ImportFrom | ast.Expr)]
+    assert all(type_only(node) for node in rest)
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    texts = {str(path.relative_to(PACKAGE)): path.read_text(encoding="utf-8") for path in MODULES}
+    assert circles(import_graph(modules_of("zwidth", texts), [f"zwidth.{VERBS}"])) == []
 
 
 @pytest.mark.parametrize("path", [path for path in MODULES if part(path) != "show"], ids=short)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
     from zwidth.chart.measured.verdict import MeasuredVerdicts
     from zwidth.chart.verdict import Verdicts
+    from zwidth.contact.environments.environment import Environment
     from zwidth.device.device import Device
     from zwidth.device.load import Settings
     from zwidth.loop.loop import Loop
@@ -90,3 +91,9 @@ def measure(
     from zwidth.measures.evaluate import measure_at
 
     return measure_at(point, measure, stiffness, damping, frequency)
+
+
+def environment_named(source: str) -> Environment:
+    from zwidth.contact.environments.load import load_environment
+
+    return load_environment(source)

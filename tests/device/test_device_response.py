@@ -11,7 +11,7 @@ from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPointError
+from zwidth.loop.point_errors import OperatingPointError
 
 T = 0.00125
 HEAD = "frequency_Hz,real_m_per_N,imag_m_per_N"

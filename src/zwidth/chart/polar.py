@@ -12,7 +12,8 @@ from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import largest_stiffness
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint, check_several_directions
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_errors import check_several_directions
 from zwidth.loop.sections import UnmovedError
 from zwidth.model.arguments import require
 from zwidth.model.directions import DEPENDENT

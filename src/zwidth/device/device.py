@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth import _verbs
 from zwidth.device.faults import DeviceError, fail, quote, suggestion
 from zwidth.device.posture_arguments import joint_angles, positions, unit_vectors
 from zwidth.loop.controller import Controller
@@ -20,11 +21,17 @@ from zwidth.model.plant import Plant
 from zwidth.model.response import Response
 
 if TYPE_CHECKING:
+    from zwidth.chart.at_point import AnyChart
+    from zwidth.chart.measured.verdict import MeasuredVerdicts
+    from zwidth.chart.verdict import Verdicts
     from zwidth.loop.operating_point import OperatingPoint, Position
+    from zwidth.measures.description import Description
+    from zwidth.measures.measure import Measure, Measured
     from zwidth.model.damping import Damping
     from zwidth.model.operator import Operator
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model
+    from zwidth.study.sensitivities import Sensitivities
 
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
 
@@ -172,10 +179,44 @@ class Device:
 
         Raises  DeviceError  with all faults
         """
-        from zwidth.device.holding import held_by
-        from zwidth.device.load import from_document
+        return _verbs.device_held_by(self, operator)
 
-        return from_document(held_by(self.document, operator), self.label, put_together=True)
+    def chart(self, radius: float = 1.0, *, decay: bool = True) -> AnyChart:
+        """The stable walls at the device's reference; `device.at(...).chart()` elsewhere. See `chart_at`."""
+        return self.at().chart(radius, decay=decay)
+
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts | MeasuredVerdicts:
+        """Verdicts on walls at the device's reference; see `OperatingPoint.check`."""
+        return self.at().check(wall_stiffness, wall_damping)
+
+    def describe(self) -> Description:
+        """Masses, stiffness, frequencies and dexterity at the device's reference."""
+        return self.at().describe()
+
+    def measure(
+        self,
+        measure: str | Measure,
+        *,
+        stiffness: float | None = None,
+        damping: float | None = None,
+        frequency: float | None = None,
+    ) -> Measured:
+        """A measure by its name, or one of your own, at the device's reference; see `OperatingPoint.measure`."""
+        return self.at().measure(measure, stiffness=stiffness, damping=damping, frequency=frequency)
+
+    def sensitivities(self, point: OperatingPoint | None = None) -> Sensitivities:
+        """How the largest stiffness answers to each number of the device; see `study.sensitivity.sensitivities`.
+
+        point  where: `device.at(...)`; left out: the reference
+        """
+        return _verbs.device_sensitivities(self, point or self.at())
+
+    def report(self, path: str | os.PathLike[str], point: OperatingPoint | None = None) -> dict[str, Any]:
+        """Write everything about the device into one HTML file; returns the numbers in it. See `write_report`.
+
+        point  where: `device.at(...)`; left out: the reference
+        """
+        return _verbs.device_report(self, path, point or self.at())
 
     def with_(self, settings: Mapping[str, Any] | Sequence[str | tuple[str, Any]]) -> Device:
         """The device with other numbers, checked as a file is; the device itself stays as it is.
@@ -186,9 +227,7 @@ class Device:
         Raises  DeviceError  with all the faults of the settings, or else of the device they make
                 TypeError    for settings of another kind
         """
-        from zwidth.device.load import changed
-
-        return changed(self, settings)
+        return _verbs.device_with(self, settings)
 
     def position(self, position: Position | ArrayLike | None = None, assembly: str | None = None) -> Floats:
         """The handle's position meant, (..., 3) [m]; left out: that of the file.

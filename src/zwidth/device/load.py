@@ -19,6 +19,7 @@ from zwidth.device.schema.file import DeviceFile, schema
 from zwidth.device.translate import sentences
 from zwidth.device.version import refuse_newer, without_version
 from zwidth.model.arguments import refusal
+from zwidth.model.operator import Operator
 
 AS_GIVEN: Final = "as given"  # an operator without a name
 
@@ -63,6 +64,11 @@ def changed(device: Device, settings: Settings) -> Device:
     made = from_document(document, device.label, put_together=same, compiled=True)
     warn_of_implausible(made)
     return made
+
+
+def held(device: Device, operator: Operator | str | os.PathLike[str]) -> Device:
+    """The device with another operator at its handle; see `Device.held_by`."""
+    return from_document(held_by(device.document, operator), device.label, put_together=True)
 
 
 def _listed(settings: Settings) -> Sequence[str | tuple[str, Any]]:

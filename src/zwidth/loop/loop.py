@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth import _verbs
 from zwidth.loop.controller import Controller
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.filters import Filter, force_path, velocity_estimator
@@ -18,6 +20,10 @@ from zwidth.model.arguments import require
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
 
+if TYPE_CHECKING:
+    from zwidth.chart.chart import StabilityChart
+    from zwidth.chart.verdict import Verdicts
+
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
@@ -27,25 +33,50 @@ _INSTEAD = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Loop:
     """A plant under a sampled wall law. Everything that a chart needs is derived once and kept.
 
-    >>> one = np.ones(1)
-    >>> free_mass = Plant(np.array([[0.3]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
-    >>> Loop(free_mass, Controller(sampling_period=0.001)).transition_matrix(1000.0, 1.0).shape
+    >>> Loop(Plant.one_mass(0.3), sampling_period=0.001).transition_matrix(1000.0, 1.0).shape
     (3, 3)
     """
 
     plant: Plant
     controller: Controller
 
-    def __post_init__(self) -> None:
-        """Raise TypeError for what is no plant or controller, ValueError for a plant that holds nan."""
-        hint = _INSTEAD.get(type(self.plant).__name__, "")
-        require("plant", self.plant, Plant, hint)
-        require("controller", self.controller, Controller)
-        self.plant.check_numbers()
+    def __init__(
+        self,
+        plant: Plant,
+        controller: Controller | None = None,
+        *,
+        sampling_period: float | None = None,
+        delay: float = 0.0,
+    ) -> None:
+        """Close the loop of a plant with a controller, or with a plain one of this period and delay.
+
+        sampling_period  T [s];   delay  from reading to force [samples], any real >= 0
+        Raises  TypeError   for what is no plant or controller, or neither controller nor period
+                ValueError  for a plant that holds nan, a controller beside a period or delay, numbers out of range
+        """
+        require("plant", plant, Plant, _INSTEAD.get(type(plant).__name__, ""))
+        if controller is None:
+            if sampling_period is None:
+                raise TypeError("Loop needs a controller or a sampling period; write sampling_period=0.001")
+            controller = Controller(sampling_period, delay)
+        elif sampling_period is not None or delay:
+            raise ValueError("the controller has a sampling period and a delay of its own; leave these out")
+        require("controller", controller, Controller)
+        plant.check_numbers()
+        object.__setattr__(self, "plant", plant)
+        object.__setattr__(self, "controller", controller)
+
+    def chart(self, radius: float = 1.0, *, decay: bool = True) -> StabilityChart:
+        """The stable walls, exactly; see `stability_chart`."""
+        return _verbs.loop_chart(self, radius, decay)
+
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
+        """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, by eigenvalues; see `judge`."""
+        return _verbs.loop_check(self, wall_stiffness, wall_damping)
 
     @property
     def period(self) -> float:

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from zwidth import _verbs
 from zwidth.loop.controller import Controller
 from zwidth.loop.left_out import left_out
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi import MultiLoop
+from zwidth.loop.point_errors import NoMechanismError, OperatingPointError, check_several_directions
 from zwidth.model.damping import Damping, GivenDamping
 from zwidth.model.directions import MultiPlant, reduce_directions
 from zwidth.model.effective import EffectiveParameters, effective_parameters
@@ -24,33 +26,18 @@ from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solv
 from zwidth.model.reduction import Encoders, Model, plant_effective_parameters, reduce_mechanism, reduce_plant
 from zwidth.model.response import Response
 
+if TYPE_CHECKING:
+    from zwidth.chart.at_point import AnyChart
+    from zwidth.chart.measured.verdict import MeasuredVerdicts
+    from zwidth.chart.verdict import Verdicts
+    from zwidth.measures.description import Description
+    from zwidth.measures.measure import Measure, Measured
+
 # Where the handle is: x, y or x, y, z [m], or the angle of every driven joint by the name of its link [rad].
 Position: TypeAlias = Sequence[float] | Mapping[str, float]
 
 # Share of the arm's length within which a single position is projected onto the nearest that the handle has.
 PROJECTED: Final = 0.01
-
-
-class OperatingPointError(ValueError):
-    """What was asked of an operating point does not exist for this device; the text says what does."""
-
-
-class NoMechanismError(OperatingPointError):
-    """The question is about a mechanism, and the device is given by its plant or a measured response."""
-
-    def __init__(self) -> None:
-        super().__init__("the device has no mechanism, and so neither postures nor directions")
-
-
-class SeveralDirectionsError(OperatingPointError):
-    """Several directions rendered together leave out something that the device has.
-
-    obstacles  what: "an operator", "an encoder on the link", "electrical damping"
-    """
-
-    def __init__(self, obstacles: Sequence[str]) -> None:
-        self.obstacles = tuple(obstacles)
-        super().__init__(f"{' and '.join(obstacles)} cannot be rendered over several directions; ask for one")
 
 
 @dataclass(frozen=True)
@@ -313,6 +300,39 @@ class OperatingPoint:
                 ".measure(name), which answers for all"
             )
 
+    # --- what is asked there --------------------------------------------------------------------------
+
+    def chart(self, radius: float = 1.0, *, decay: bool = True) -> AnyChart:
+        """The stable walls at a single point, exactly; see `chart.at_point.chart_at`.
+
+        radius  less than 1 for the walls whose slowest motion shrinks at least by that factor per sample
+        decay   False skips the search for the fastest-decaying walls, most of the time
+        """
+        return _verbs.chart(self, radius, decay)
+
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts | MeasuredVerdicts:
+        """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast; see `chart.at_point`."""
+        return _verbs.check(self, wall_stiffness, wall_damping)
+
+    def describe(self) -> Description:
+        """Masses, stiffness, frequencies and dexterity of the device by itself at a single point."""
+        return _verbs.describe(self)
+
+    def measure(
+        self,
+        measure: str | Measure,
+        *,
+        stiffness: float | None = None,
+        damping: float | None = None,
+        frequency: float | None = None,
+    ) -> Measured:
+        """A measure of the catalogue by its name, or one of your own, at all points; see `measures.evaluate`.
+
+        stiffness, damping  of the wanted wall, for measures about one [N/m], [N s/m]
+        frequency           at which the hand moves [Hz]
+        """
+        return _verbs.measure(self, measure, stiffness, damping, frequency)
+
     # --- what results say of it -----------------------------------------------------------------------
 
     @property
@@ -342,18 +362,6 @@ class OperatingPoint:
             "delay_samples": self.controller.delay,
             "left_out": list(self.left_out),
         }
-
-
-def check_several_directions(mechanism: Mechanism | None, operator: Operator | None, encoders: Encoders) -> None:
-    """Raise SeveralDirectionsError for all that a device has and several directions together leave out."""
-    windings = None if mechanism is None else mechanism.drives.winding_damping
-    present = {
-        "an operator": operator is not None,
-        "an encoder on the link": encoders != "motor",
-        "electrical damping": windings is not None and bool(windings.any()),
-    }
-    if any(present.values()):
-        raise SeveralDirectionsError([what for what, there in present.items() if there])
 
 
 AS_GIVEN: Final = "as given"  # the model of a plant that is not reduced

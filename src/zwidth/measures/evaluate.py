@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from zwidth.chart.arc_joining import ChartError
 from zwidth.loop.estimator import NonlinearError
-from zwidth.loop.operating_point import NoMechanismError, OperatingPoint
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_errors import NoMechanismError
 from zwidth.loop.sections import HysteresisError, UnmovedError
+from zwidth.measures.catalogue import find_measure
 from zwidth.measures.measure import (
     FAILED,
     NO_VALUE,
@@ -22,6 +24,7 @@ from zwidth.measures.measure import (
     MeasureError,
     Note,
     NoValueError,
+    WantedWall,
 )
 from zwidth.model.arguments import require
 from zwidth.model.reduction import ModelError
@@ -59,6 +62,28 @@ def evaluate(measure: Measure, point: OperatingPoint) -> Measured:
     if values.dtype.kind not in NUMBERS:
         return _everywhere(point, FAILED, f"returned {values.dtype} instead of numbers")
     return measured(point, values.astype(np.float64))
+
+
+def measure_at(
+    point: OperatingPoint,
+    measure: str | Measure,
+    stiffness: float | None = None,
+    damping: float | None = None,
+    frequency: float | None = None,
+) -> Measured:
+    """A measure of the catalogue by its name, or one of a user's own, at operating points.
+
+    stiffness, damping, frequency  of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures about it
+    Raises  ValueError    for a name that is no measure's
+            MeasureError  where it cannot be asked of this device, or needs what is not given; text begins with its
+                          name
+    """
+    asked = find_measure(measure) if isinstance(measure, str) else measure
+    require("measure", asked, Measure)
+    try:
+        return evaluate(asked.at_wall(WantedWall(stiffness, damping, frequency)), point)
+    except MeasureError as error:
+        raise error.of(asked.name) from None
 
 
 def measured(point: OperatingPoint, values: NDArray[np.float64], reason: str = "has no value here") -> Measured:

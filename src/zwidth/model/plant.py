@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.arguments import check_number
 from zwidth.model.nonlinear import Nonlinear
 
 Floats = NDArray[np.float64]
@@ -97,3 +98,51 @@ class Plant:
     def size(self) -> int:
         """Number of coordinates n."""
         return int(self.mass.shape[-1])
+
+    @classmethod
+    def one_mass(cls, mass: float, damping: float = 0.0, stiffness: float = 0.0) -> Plant:
+        """A single mass that is driven, read and held where it is, with a damper and a spring to the ground.
+
+        mass, damping, stiffness  [kg], [N s/m], [N/m]
+        Raises  ValueError  for a mass that is not positive, a negative damping, a number that is not finite
+
+        >>> Plant.one_mass(mass=0.03, damping=1.0).damping
+        array([[1.]])
+        """
+        _check_numbers({"mass": mass}, damping, stiffness)
+        one = np.ones(1)
+        M, B, K = (np.array([[value]], dtype=np.float64) for value in (mass, damping, stiffness))
+        return cls(M, B, K, one, one.copy(), one.copy(), ("mass",))
+
+    @classmethod
+    def two_masses(
+        cls, link_side_mass: float, motor_side_mass: float, stiffness: float, damping: float = 0.0
+    ) -> Plant:
+        """A link side, held by the operator, and a motor side, driven and read, joined by a spring and a damper.
+
+        link_side_mass, motor_side_mass  [kg];   stiffness, damping  between them [N/m], [N s/m]
+        Raises  ValueError  for masses that are not positive, a negative damping, a number that is not finite
+
+        >>> Plant.two_masses(0.2616, 0.0254, stiffness=15620.0).names
+        ('link side', 'motor side')
+        """
+        masses = {"link_side_mass": link_side_mass, "motor_side_mass": motor_side_mass}
+        _check_numbers(masses, damping, stiffness)
+        between = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        link, motor = np.eye(2)
+        return cls(
+            mass=np.diag([link_side_mass, motor_side_mass]).astype(np.float64),
+            damping=damping * between,
+            stiffness=stiffness * between,
+            actuator=motor,
+            sensor=motor.copy(),
+            handle=link,
+            names=("link side", "motor side"),
+        )
+
+
+def _check_numbers(masses: dict[str, float], damping: float, stiffness: float) -> None:
+    for name, value in masses.items():
+        check_number(name, value, "kg", above=0.0)
+    check_number("damping", damping, "N s/m", least=0.0)
+    check_number("stiffness", stiffness, "N/m")

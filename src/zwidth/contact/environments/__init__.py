@@ -1,10 +1,6 @@
 """Virtual environments: small compiled functions that say what force a device is to feel; ours by name."""
 
-from __future__ import annotations
-
-from typing import Final
-
-from zwidth.contact.environments.coupled_wall import coupled_wall
+from zwidth.contact.environments.catalogue import ENVIRONMENTS
 from zwidth.contact.environments.environment import (
     MEMORY,
     SIGNATURE,
@@ -13,33 +9,7 @@ from zwidth.contact.environments.environment import (
     environment,
     environment_at,
 )
-from zwidth.contact.environments.friction_patch import friction_patch
-from zwidth.contact.environments.grating import grating
-from zwidth.contact.environments.hunt_crossley import hunt_crossley
-from zwidth.contact.environments.nonlinear_wall import nonlinear_wall
-from zwidth.contact.environments.one_sided_wall import one_sided_wall
-from zwidth.contact.environments.slot import slot
-from zwidth.contact.environments.texture import texture
-from zwidth.contact.environments.virtual_mass import virtual_mass
-from zwidth.contact.environments.wall import wall
-
-ENVIRONMENTS: Final[dict[str, Environment]] = {
-    each.function.__name__: each
-    for each in (
-        wall,
-        one_sided_wall,
-        slot,
-        nonlinear_wall,
-        hunt_crossley,
-        coupled_wall,
-        friction_patch,
-        texture,
-        grating,
-        virtual_mass,
-    )
-}
-
-from zwidth.contact.environments.load import load_environment  # noqa: E402  needs the registry
+from zwidth.contact.environments.load import load_environment
 
 __all__ = [
     "ENVIRONMENTS",

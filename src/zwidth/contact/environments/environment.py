@@ -17,6 +17,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth import _verbs
 from zwidth.contact.function_pointer import address_of, compiled_as, function_at
 
 Floats = NDArray[np.float64]
@@ -161,11 +162,9 @@ class Environment:
         return []
 
     def __reduce__(self) -> tuple[Any, ...]:
-        from zwidth.contact.environments.load import load_environment
-
         if not self.source:
             raise TypeError(f"{self.name} cannot be sent to another process: it is in no file of its own")
-        return load_environment, (self.source,)
+        return _verbs.environment_named, (self.source,)
 
 
 def environment(

@@ -11,7 +11,7 @@ from types import ModuleType
 
 import numpy as np
 
-from zwidth.contact.environments import ENVIRONMENTS
+from zwidth.contact.environments.catalogue import ENVIRONMENTS
 from zwidth.contact.environments.environment import MEMORY, Environment
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from zwidth.show.cli.main import DONE, NO_ANSWER, say
+from zwidth.show.cli.process import DONE, NO_ANSWER, say
 from zwidth.show.output import json_text
 
 Row = tuple[str, str]

@@ -8,7 +8,7 @@ import traceback
 import click
 
 from zwidth.device.faults import DeviceError
-from zwidth.show.cli.main import BAD_INPUT, INTERNAL, INTERRUPTED
+from zwidth.show.cli.process import BAD_INPUT, INTERNAL, INTERRUPTED
 from zwidth.show.output import OutputError, shown
 
 DEBUG = "ZWIDTH_DEBUG"

@@ -12,11 +12,11 @@ import click
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
 from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.main import say
 from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Numbers, Question, about_a_device, as_json, example, named, output_option
 from zwidth.show.cli.place import heading
 from zwidth.show.cli.points import PointFromBench, read_measured
+from zwidth.show.cli.process import say
 from zwidth.show.cli.progress import progress_told
 from zwidth.show.experiment import numbers, point_rows, point_table, sentences
 from zwidth.show.output import DATA, FIGURES, OutputError, destination, replacing, write_data

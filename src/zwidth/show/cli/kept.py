@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.main import say, stopped_in_a_kernel
 from zwidth.show.cli.options import Command, named
+from zwidth.show.cli.process import say, stopped_in_a_kernel
 from zwidth.show.output import shown
 
 if TYPE_CHECKING:

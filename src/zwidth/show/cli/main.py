@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TextIO
 
-DONE, NO_ANSWER, BAD_INPUT, INTERNAL, INTERRUPTED = 0, 1, 2, 70, 130
+from zwidth.show.cli.process import BAD_INPUT, DONE, interrupted, say, stopped_in_a_kernel
 
 
 def main() -> None:
@@ -56,26 +56,6 @@ def run(arguments: Sequence[str]) -> int:
         say(*lines)
         _drop_output()
         return code
-
-
-def stopped_in_a_kernel(error: BaseException) -> bool:
-    """Is it the ctrl-C that came while compiled code was called? Python makes a SystemError of that."""
-    return isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt)
-
-
-def interrupted() -> int:
-    """What an interruption comes to."""
-    say("zwidth: interrupted; nothing was left half-written")
-    return INTERRUPTED
-
-
-def say(*lines: str) -> None:
-    """Lines on standard error, if anybody listens."""
-    if sys.stderr is None:  # for which print would take standard output
-        return
-    with suppress(OSError, ValueError):
-        for line in lines:
-            print(line, file=sys.stderr)
 
 
 def _warn(

@@ -62,7 +62,7 @@ class Question:
 
     def of_several_directions(self, device: Device) -> None:
         """Raises BadInput for what directions computed together leave out."""
-        from zwidth.loop.operating_point import SeveralDirectionsError, check_several_directions
+        from zwidth.loop.point_errors import SeveralDirectionsError, check_several_directions
         from zwidth.show.cli.errors import BadInput
 
         instead = {

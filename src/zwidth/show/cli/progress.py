@@ -9,7 +9,7 @@ from threading import Timer
 from time import monotonic
 from typing import Any, Final
 
-from zwidth.show.cli.main import say
+from zwidth.show.cli.process import say
 
 Progress = Callable[[str, int, int], None]
 

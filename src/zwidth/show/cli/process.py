@@ -1,0 +1,33 @@
+"""Exit codes, standard error, and what an interruption looks like: what every part of the command line shares."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+from typing import Final
+
+DONE: Final = 0
+NO_ANSWER: Final = 1
+BAD_INPUT: Final = 2
+INTERNAL: Final = 70
+INTERRUPTED: Final = 130
+
+
+def stopped_in_a_kernel(error: BaseException) -> bool:
+    """Is it the ctrl-C that came while compiled code was called? Python makes a SystemError of that."""
+    return isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt)
+
+
+def interrupted() -> int:
+    """What an interruption comes to."""
+    say("zwidth: interrupted; nothing was left half-written")
+    return INTERRUPTED
+
+
+def say(*lines: str) -> None:
+    """Lines on standard error, if anybody listens."""
+    if sys.stderr is None:  # for which print would take standard output
+        return
+    with suppress(OSError, ValueError):
+        for line in lines:
+            print(line, file=sys.stderr)
