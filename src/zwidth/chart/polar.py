@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +16,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import check_several_directions
 from zwidth.loop.sections import UnmovedError
-from zwidth.model.arguments import require
+from zwidth.model.arguments import check_choice, require
 from zwidth.model.directions import DEPENDENT
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import DirectionError, ModelError
@@ -24,10 +25,14 @@ Floats = NDArray[np.float64]
 
 OK, NO_WALL = "ok", "no stable wall"
 OUT_OF_MOTION = "out of motion: the handle cannot move along the direction"
+NONE_STABLE = "no direction has a stable wall with K > 0 and B >= 0"
 OFF = 1e-6  # of a direction, outside what the handle can do
 
 
-@dataclass(frozen=True)
+PLANES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+
+@dataclass(frozen=True, repr=False)
 class ByDirection:
     """The stiffest wall along each of k directions.
 
@@ -36,6 +41,7 @@ class ByDirection:
     damping     (k,)    B there [N s/m]
     frequency   (k,)    of the vibration there, the lower one at a corner [Hz]
     status      (k,)    "ok", "no stable wall", "out of motion: ...", or why the direction has no answer
+    plane       "xy", "xz" or "yz" where the directions go evenly round that plane; "" where they are any
     """
 
     directions: Floats
@@ -43,6 +49,46 @@ class ByDirection:
     damping: Floats
     frequency: Floats
     status: tuple[str, ...]
+    plane: str = ""
+
+    @property
+    def angles(self) -> Floats:
+        """(k,) from the plane's first axis towards its second [deg]; nan where the directions are any."""
+        count = len(self.stiffness)
+        return 360.0 * np.arange(count) / count if self.plane else np.full(count, np.nan)
+
+    @property
+    def reason(self) -> str | None:
+        """Why no direction has a stable wall: what they share, or all of it; None where one has."""
+        if np.isfinite(self.stiffness).any():
+            return None
+        reasons = sorted(set(self.status))
+        return NONE_STABLE if reasons == [NO_WALL] else "; ".join(reasons)
+
+    def document(self) -> dict[str, Any]:
+        """The walls by key and unit, lists of one entry for each direction."""
+        return {
+            "plane": self.plane or None,
+            "directions": self.directions,
+            "angle_deg": self.angles,
+            "stiffness_max_N_per_m": self.stiffness,
+            "damping_at_stiffness_max_Ns_per_m": self.damping,
+            "frequency_at_stiffness_max_Hz": self.frequency,
+            "status": list(self.status),
+        }
+
+    def table(self) -> dict[str, Any]:
+        """The walls as columns, one direction a row."""
+        columns = self.document()
+        del columns["plane"], columns["directions"]
+        return {f"direction_{axis}": self.directions[:, k] for k, axis in enumerate("xyz")} | columns
+
+    def __repr__(self) -> str:
+        count, around = len(self.stiffness), f" round the {self.plane} plane" if self.plane else ""
+        if self.reason is not None:
+            return f"ByDirection: {count} directions{around}: {self.reason}"
+        low, high = float(np.nanmin(self.stiffness)), float(np.nanmax(self.stiffness))
+        return f"ByDirection: {count} directions{around}, largest stiffness {low:.4g} to {high:.4g} N/m"
 
 
 def circle(count: int, first: ArrayLike = (1.0, 0.0, 0.0), second: ArrayLike = (0.0, 1.0, 0.0)) -> Floats:
@@ -54,6 +100,33 @@ def circle(count: int, first: ArrayLike = (1.0, 0.0, 0.0), second: ArrayLike = (
     angles = 2.0 * np.pi * np.arange(count)[:, None] / count
     turned = np.cos(angles) * np.asarray(first, float) + np.sin(angles) * np.asarray(second, float)
     return np.asarray(np.round(turned, 15) + 0.0)  # what rounding leaves of a zero is none
+
+
+def largest_stiffness_around(point: OperatingPoint, plane: str | None = None, count: int = 72) -> ByDirection:
+    """The largest stiffness along directions spread evenly round a plane; see `largest_stiffness_by_direction`.
+
+    plane   "xy", "xz" or "yz"; left out: xy, or where the handle cannot move all over it, one where it can
+    count   of the directions, at least 3
+    Raises  ValueError  for another plane or count, and what `largest_stiffness_by_direction` raises
+    """
+    require("point", point, OperatingPoint)
+    if plane is not None:
+        check_choice("plane", plane, PLANES)
+    if count < 3:
+        raise ValueError(f"count must be at least 3 directions, got {count}")
+    chosen = plane or _movable_plane(point.jacobian)
+    first, second = np.eye(3)[list(PLANES[chosen])]
+    return replace(largest_stiffness_by_direction(point, circle(count, first, second)), plane=chosen)
+
+
+def _movable_plane(jacobian: Floats) -> str:
+    """The first plane in all of whose directions the handle can move; xy where there is none."""
+    whole = np.linalg.norm(jacobian, 2)
+    for plane, axes in PLANES.items():
+        rows = jacobian[list(axes)]
+        if min(rows.shape) == 2 and np.linalg.svd(rows, compute_uv=False)[-1] > 1e-9 * whole:
+            return plane
+    return "xy"
 
 
 def largest_stiffness_by_direction(point: OperatingPoint, directions: ArrayLike) -> ByDirection:

@@ -20,7 +20,7 @@ from zwidth.show.cli.guarantees import guarantees
 from zwidth.show.cli.limit_cycles import limit_cycles
 from zwidth.show.cli.map import map_command
 from zwidth.show.cli.move import move
-from zwidth.show.cli.polar import polar
+from zwidth.show.cli.polar import Polar
 from zwidth.show.cli.report import Report
 from zwidth.show.cli.robust import robust
 from zwidth.show.cli.schema import schema
@@ -56,7 +56,7 @@ COMMANDS = (
     Show(),
     chart,
     check,
-    polar,
+    Polar(),
     map_command,
     sweep,
     Report(),
