@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tests.systems import mass, published
-from zwidth.chart.arcs import find_edges
+from zwidth.chart.arcs import CHORD, PLUS
+from zwidth.chart.edges import find_edges
 from zwidth.chart.gaps import bridged
 from zwidth.chart.grid import angles
 from zwidth.chart.tracer import Tracer
@@ -35,17 +36,17 @@ def without(edges, arc):
 )
 def test_a_straight_piece_is_put_back(loop):
     tracer, edges = traced(loop)
-    (line,) = (arc for arc in edges.arcs if arc.kind == "plus")
+    (line,) = (arc for arc in edges.arcs if arc.kind == PLUS)
     closed, longest = bridged(tracer, *without(edges, line))
     chord = closed.arcs[-1]
-    assert chord.kind == "gap"
+    assert chord.kind == CHORD
     assert np.array([chord.first, chord.last]) == pytest.approx(np.array([line.first, line.last]), abs=1e-9)
     assert longest == pytest.approx(abs(line.last[1] - line.first[1]) / edges.size)
 
 
 def test_a_bent_piece_is_not():
     tracer, edges = traced(published())
-    bent = max((arc for arc in edges.arcs if arc.kind == "pair"), key=lambda arc: len(arc.thetas))
+    bent = max((arc for arc in edges.arcs if arc.curved), key=lambda arc: len(arc.thetas))
     assert bridged(tracer, *without(edges, bent)) is None
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from tests.systems import random_loop
 from zwidth.chart.arc_joining import ChartError, closed_rings
+from zwidth.chart.arcs import MINUS, PAIR, PLUS
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.peak import Peak
 from zwidth.chart.tracer import Tracer
@@ -186,14 +187,14 @@ def test_a_wall_held_by_a_real_root_moves_with_it(damping, kind):
 
 def corners(loop):
     """Every corner of a pair's arc with the line of a real root: the wall, and the angles there."""
-    rings, _ = closed_rings(Tracer.of(loop))
-    for ring in rings:
-        for arc, following in zip(ring, (*ring[1:], ring[0]), strict=True):
-            kinds = {arc.kind, following.kind}
-            angles = sorted({arc.end, following.start})
-            away = abs(arc.last[0]) * loop.period > 1e-6 * abs(arc.last[1])  # no wall is stiffest at K = 0
-            if "pair" in kinds and kinds & {"plus", "minus"} and len(angles) == 2 and away:
-                yield Peak(*arc.last, tuple(angles))
+    arcs, _ = closed_rings(Tracer.of(loop))
+    for arc, number in zip(arcs, arcs.following, strict=True):
+        following = arcs[number]
+        kinds = {arc.kind, following.kind}
+        angles = sorted({arc.end, following.start})
+        away = abs(arc.last[0]) * loop.period > 1e-6 * abs(arc.last[1])  # no wall is stiffest at K = 0
+        if PAIR in kinds and kinds & {PLUS, MINUS} and len(angles) == 2 and away:
+            yield Peak(*arc.last, tuple(angles))
 
 
 def test_corners_on_lines_of_real_roots_move_as_charts_say():

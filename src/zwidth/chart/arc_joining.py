@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import Arc, Edges, Rings, arc_walls, find_edges
+from zwidth.chart.arcs import Arc, Arcs
+from zwidth.chart.edges import Edges, arc_walls, find_edges
 from zwidth.chart.gaps import bridged
 from zwidth.chart.grid import angles, around_crossings
 from zwidth.chart.tracer import UNDECIDED, Tracer
@@ -28,8 +29,8 @@ class ChartError(RuntimeError):
     """The edge of the stable set could not be closed."""
 
 
-def closed_rings(tracer: Tracer, seen: Floats | None = None) -> tuple[Rings, float]:
-    """All closed walks round the stable set, and the share of its size to which corners are known.
+def closed_rings(tracer: Tracer, seen: Floats | None = None) -> tuple[Arcs, float]:
+    """The arcs of all closed walks round the stable set, and the share of its size to which corners are known.
 
     seen  angles to sample besides the grid
 
@@ -47,26 +48,26 @@ def closed_rings(tracer: Tracer, seen: Floats | None = None) -> tuple[Rings, flo
             np.concatenate([thetas, around_crossings(tracer.factors, tracer.radius, thetas), extra])
         )
         edges = find_edges(tracer, thetas)
-        rings = join(edges, tracer.period, SAME_CORNER)
-        if rings is not None:
-            return rings, SAME_CORNER
+        arcs = join(edges, tracer.period, SAME_CORNER)
+        if arcs is not None:
+            return arcs, SAME_CORNER
         extra = np.union1d(extra, _around(edges))
     for blur in BLURRED:
-        rings = join(edges, tracer.period, blur)
-        if rings is not None and _hold(tracer, rings):
-            return rings, blur
+        arcs = join(edges, tracer.period, blur)
+        if arcs is not None and _hold(tracer, arcs):
+            return arcs, blur
     nodes, alive = _corners(edges, tracer.period, SAME_CORNER)
     closed = bridged(tracer, edges, nodes, alive)
-    rings = join(closed[0], tracer.period, SAME_CORNER) if closed else None
-    if closed and rings is not None and _hold(tracer, rings):
-        return rings, closed[1]
+    arcs = join(closed[0], tracer.period, SAME_CORNER) if closed else None
+    if closed and arcs is not None and _hold(tracer, arcs):
+        return arcs, closed[1]
     raise ChartError(
         "the edge of the stable set could not be closed: rounding hides a part of it (undamped modes, or one that "
         "the wall hardly moves); give these modes some damping, or leave them out"
     )
 
 
-def _hold(tracer: Tracer, rings: Rings) -> bool:
+def _hold(tracer: Tracer, arcs: Arcs) -> bool:
     """Whether walls just inside the middle of each arc are stable, by eigenvalues.
 
     An arc's direction there is that between samples farther apart than APART: where the estimate is all but blind,
@@ -74,8 +75,8 @@ def _hold(tracer: Tracer, rings: Rings) -> bool:
     a bridge in a sharp corner it would be on the other side of the cell.
     """
     inside = []
-    for ring in rings:
-        walks = [arc_walls(tracer, arc) * (tracer.period, 1.0) for arc in ring]
+    for ring in arcs.rings:
+        walks = [arc_walls(tracer, arcs[k]) * (tracer.period, 1.0) for k in ring]
         deepest = 1e-3 * float(np.min(np.ptp(np.vstack(walks), axis=0)))
         for points in walks:
             middle, length = len(points) // 2, float(np.max(np.ptp(points, axis=0)))
@@ -91,7 +92,7 @@ def _hold(tracer: Tracer, rings: Rings) -> bool:
 
 def _around(edges: Edges) -> Floats:
     """Angles close to both sides of every branch in a corner, and between each two of them."""
-    at = np.array([theta for arc in edges.arcs if arc.kind == "pair" for theta in (arc.start, arc.end)])
+    at = np.array([theta for arc in edges.arcs if arc.curved for theta in (arc.start, arc.end)])
     centres = np.unique(np.concatenate([at, edges.partners]))
     steps = np.logspace(-13, -2, 23)
     near = (centres[:, None] * (1.0 + np.concatenate([-steps, steps]))).ravel()
@@ -111,10 +112,10 @@ def _corners(edges: Edges, period: float, blur: float) -> tuple[NDArray[np.int64
     return nodes, [k for k in range(len(edges.arcs)) if edges.extents[k] > blur * edges.size]
 
 
-def join(edges: Edges, period: float, blur: float) -> Rings | None:
+def join(edges: Edges, period: float, blur: float) -> Arcs | None:
     """Walks along arcs, or None if one of them does not close; corners within `blur` of the size are one."""
     if not edges.arcs:
-        return ()
+        return Arcs.of(())
     nodes, alive = _corners(edges, period, blur)
     leaving: dict[int, list[int]] = {}
     for k in alive:
@@ -132,8 +133,8 @@ def join(edges: Edges, period: float, blur: float) -> Rings | None:
             k = choices[0] if len(choices) == 1 else _turn(edges.arcs, k, choices, period)
         if k != ring[0]:
             return None
-        rings.append(tuple(edges.arcs[n] for n in ring))
-    return tuple(rings)
+        rings.append([edges.arcs[n] for n in ring])
+    return Arcs.of(rings)
 
 
 def _cluster(points: Floats, reach: float) -> NDArray[np.int64]:

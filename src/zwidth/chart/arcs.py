@@ -1,148 +1,203 @@
-"""The arcs that edge the stable set, between exact corners.
+"""Pieces of a stable set's edge: one flat record for charts of every kind.
 
-A corner is a wall with more than one pair (or real root) on the circle: there an arc stops being an edge. The
-flag of the trace changes at corners, so samples bracket them; the two straight lines of real roots are cut where
-the curve crosses or ends on them, and each piece is tested at its middle.
+An arc runs between two walls with the stable side on its left (K to the right, B up), so that a ring of arcs goes
+counter-clockwise round a cell and clockwise round a hole. It is either straight, or a piece of a curve of walls
+with a pair of roots on the circle. Charts differ in where their curves come from, and each brings its own `Curve`:
+
+    one direction         the loop's factors                     (`tracer.Tracer`)
+    many loops            those of each member                   (`tracer.Tracer`)
+    several directions    an eigenvalue of the plant's response  (`several_directions.branch.Branch`)
+    measured              none: its edge is chords between interpolated points
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Literal
+from functools import cached_property
+from itertools import accumulate
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.corner import cross_line, refine_corner, wall_on_line
-from zwidth.chart.curve import walls
-from zwidth.chart.tracer import ROOTS, RealRoot, Tracer, Wall
-
 Floats = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Wall = tuple[float, float]
+Walk = tuple[Floats, Floats, Floats]  # angles, K and B along an arc
+
+# Kinds: a pair of roots at rho exp(+-i theta); a real root at +rho, at -rho; a chord of a curve, where rounding
+# hides a pair or where the curve was measured.
+PAIR, PLUS, MINUS, CHORD = range(4)
+# Components of walls, and dK/dtheta along a curve.
+STIFFNESS, DAMPING, SLOPE = range(3)
+# By this share of a step an arc's ends are drawn in where sign changes are looked for: there it may touch an axis.
+DRAWN_IN: Final = 1e-6
 
 
-@dataclass(frozen=True)
-class Arc:
-    """A piece of edge; from first to last the stable side is on the left (K to the right, B up).
+class Arc(NamedTuple):
+    """One arc.
 
-    kind         "pair": a pair at rho exp(+-i theta); "plus", "minus": a real root at +rho, -rho; "gap": a
-                 chord where rounding hides a pair
-    first, last  its corner walls (K, B)
-    start, end   their angles theta, falling where the estimate runs backwards; 0 or pi for a real root
-    thetas       angles of the samples that found it, strictly between and in order; empty for a line
+    first, last  its walls (K, B)
+    start, end   their angles, falling where the estimate runs backwards; 0 or pi for a real root
+    thetas       angles of the samples that found it, strictly between and in order; empty if it is straight
+    member       number of the curve or the loop that it belongs to
     """
 
-    kind: Literal["pair", "plus", "minus", "gap"]
+    kind: int
     first: Wall
     last: Wall
     start: float
     end: float
     thetas: Floats
+    member: int = 0
+
+    @property
+    def curved(self) -> bool:
+        """Whether it is a piece of a curve; else it is straight."""
+        return self.kind == PAIR
+
+    @property
+    def angles(self) -> Floats:
+        """The angles that found it with its ends, from first to last."""
+        return np.concatenate([[self.start], self.thetas, [self.end]])
 
 
-# Closed walks of arcs: each cell's outline counter-clockwise, each hole's clockwise.
-Rings = tuple[tuple[Arc, ...], ...]
+class Curve(Protocol):
+    """A curve of walls with a pair of roots on the circle, by the pair's angle in (0, pi)."""
+
+    def walls(self, thetas: Floats) -> tuple[Floats, Floats]:
+        """K and B (k,) at angles (k,)."""
+
+    def zeros(self, arc: Arc, component: int) -> Floats:
+        """Angles on an arc at which K, B or dK/dtheta changes sign, to rounding.
+
+        Looked for between the angles that found the arc, its ends drawn in by DRAWN_IN.
+        """
+
+    def between(self, arc: Arc) -> Floats:
+        """Angles strictly between an arc's ends, from first to last: walls there join to chords on the edge."""
+
+    def integral(self, arc: Arc) -> float:
+        """Integral of K dB over the part of an arc with K > 0 and B > 0 [N^2 s/m^2]."""
+
+
+Curves = Mapping[int, Curve] | Sequence[Curve]  # by `Arc.member`
 
 
 @dataclass(frozen=True)
-class Edges:
-    """All arcs found, and the angles of every branch that meets another in a corner.
+class Arcs:
+    """Rings of n arcs, ring after ring.
 
-    extents  largest distance of each arc's points from its first corner, in K T and B [N s/m]
-    size     largest |K T|, |B| of the whole edge
+    kind, member  (n,)
+    first, last   (n, 2)  walls [K, B]
+    start, end    (n,)    angles there; nan where they are not known
+    following     (n,)    number of the arc that the ring goes on with
+    thetas        (m,)    angles strictly between the ends, arc after arc
+    offsets       (n + 1,)  where each arc's begin in these
     """
 
-    arcs: tuple[Arc, ...]
-    partners: tuple[float, ...]
-    extents: tuple[float, ...]
-    size: float
+    kind: Whole
+    member: Whole
+    first: Floats
+    last: Floats
+    start: Floats
+    end: Floats
+    following: Whole
+    thetas: Floats
+    offsets: Whole
+
+    @classmethod
+    def of(cls, rings: Sequence[Sequence[Arc]]) -> Arcs:
+        """Closed rings of arcs, each in the order of its walk."""
+        arcs = [arc for ring in rings for arc in ring]
+        numbers = np.array([(*arc.first, *arc.last, arc.start, arc.end) for arc in arcs]).reshape(-1, 6)
+        return cls(
+            kind=np.array([arc.kind for arc in arcs], dtype=np.int64),
+            member=np.array([arc.member for arc in arcs], dtype=np.int64),
+            first=numbers[:, :2].copy(),
+            last=numbers[:, 2:4].copy(),
+            start=numbers[:, 4],
+            end=numbers[:, 5],
+            following=_following([len(ring) for ring in rings]),
+            thetas=np.concatenate([np.empty(0), *(arc.thetas for arc in arcs)]),
+            offsets=np.array([0, *accumulate(len(arc.thetas) for arc in arcs)]),
+        )
+
+    @classmethod
+    def chords(cls, rings: Sequence[Floats]) -> Arcs:
+        """Closed rings of walls (k, 2), first one repeated, as chords without angles."""
+        counts = [len(ring) - 1 for ring in rings]
+        n = sum(counts)
+        return cls(
+            kind=np.full(n, CHORD),
+            member=np.zeros(n, dtype=np.int64),
+            first=np.vstack([np.empty((0, 2)), *(ring[:-1] for ring in rings)]),
+            last=np.vstack([np.empty((0, 2)), *(ring[1:] for ring in rings)]),
+            start=np.full(n, np.nan),
+            end=np.full(n, np.nan),
+            following=_following(counts),
+            thetas=np.empty(0),
+            offsets=np.zeros(n + 1, dtype=np.int64),
+        )
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def __getitem__(self, k: int) -> Arc:
+        (K0, B0), (K1, B1) = self.first[k].tolist(), self.last[k].tolist()
+        thetas = self.thetas[self.offsets[k] : self.offsets[k + 1]]
+        start, end = float(self.start[k]), float(self.end[k])
+        return Arc(int(self.kind[k]), (K0, B0), (K1, B1), start, end, thetas, int(self.member[k]))
+
+    def __iter__(self) -> Iterator[Arc]:
+        return (self[k] for k in range(len(self)))
+
+    @cached_property
+    def rings(self) -> tuple[range, ...]:
+        """Numbers of the arcs of each ring."""
+        ends = (np.flatnonzero(self.following <= np.arange(len(self))) + 1).tolist()
+        return tuple(range(low, high) for low, high in zip([0, *ends][:-1], ends, strict=True))
+
+    @property
+    def curved(self) -> list[int]:
+        """Numbers of the arcs that are pieces of curves."""
+        return np.flatnonzero(self.kind == PAIR).tolist()
+
+    def crossings(self, component: int, level: float = 0.0) -> tuple[Whole, Floats]:
+        """Numbers (k,) of the straight arcs whose K or B passes a level, and the walls (k, 2) where they do."""
+        a, b = self.first[:, component] - level, self.last[:, component] - level
+        crossed = np.flatnonzero((self.kind != PAIR) & (a * b < 0.0))
+        share = a[crossed] / (a[crossed] - b[crossed])
+        first, last = self.first[crossed], self.last[crossed]
+        return crossed, first + share[:, None] * (last - first)
 
 
-def find_edges(tracer: Tracer, thetas: Floats) -> Edges:
-    """Every arc of the stable set's edge that the samples at these angles reveal."""
-    K, B, edge = tracer.trace(thetas)
-    arcs, partners = _pair_arcs(tracer, thetas, edge)
-    for root in ROOTS:
-        lines, crossings = _line_arcs(tracer, root, thetas, K, B)
-        arcs += lines
-        partners += crossings
-    units = np.array([tracer.period, 1.0])
-    points = [arc_walls(tracer, arc) * units for arc in arcs]
-    extents = tuple(float(np.max(np.abs(walls - walls[0]))) for walls in points)
-    # nothing smaller than rounding of the whole curve is an edge
-    reach = np.maximum(np.abs(K) * tracer.period, np.abs(B))
-    least = 1e-9 * float(np.median(reach[np.isfinite(reach)]))
-    size = max((float(np.max(np.abs(walls))) for walls in points), default=0.0)
-    size = max(size, least)
-    return Edges(tuple(arcs), tuple(partners), extents, size)
+def _following(counts: Sequence[int]) -> Whole:
+    """For rings of so many arcs, one after the other, the number of the arc after each."""
+    following: list[int] = []
+    for count in counts:
+        first = len(following)
+        following += [*range(first + 1, first + count), first]
+    return np.array(following, dtype=np.int64)
 
 
-def arc_walls(tracer: Tracer, arc: Arc) -> Floats:
-    """An arc's corners and the samples that found it, (k, 2)."""
-    K, B = walls(tracer.factors, tracer.radius, arc.thetas)
-    return np.vstack([arc.first, np.column_stack([K, B]), arc.last])
-
-
-def _pair_arcs(tracer: Tracer, thetas: Floats, edge: NDArray[np.bool_]) -> tuple[list[Arc], list[float]]:
-    """Arcs of complex pairs: runs of flagged samples, refined at both ends."""
-    arcs, partners = [], []
-    padded = np.concatenate([[False], edge, [False]])
-    changes = np.flatnonzero(padded[1:] != padded[:-1])
-    for i, j in zip(changes[::2], changes[1::2], strict=True):  # samples i .. j - 1
-        ends: list[tuple[float, Wall]] = []
-        for (inner, outer), root in zip(((i, i - 1), (j - 1, j)), ROOTS, strict=True):
-            if 0 <= outer < len(thetas):
-                theta, wall, partner = refine_corner(tracer, thetas[inner], thetas[outer])
-                partners.append(partner)
-            else:
-                end = tracer.curve_end(root)
-                theta = thetas[inner] if end is None else (0.0 if root == "plus" else np.pi)
-                wall = tracer.wall(thetas[inner])[:2] if end is None else end
-            ends.append((theta, wall))
-        (start, first), (end_, last) = ends
-        inside = thetas[i:j][(thetas[i:j] > start) & (thetas[i:j] < end_)]
-        if tracer.stable_on_left(thetas[(i + j - 1) // 2]):
-            arcs.append(Arc("pair", first, last, start, end_, inside))
-        else:
-            arcs.append(Arc("pair", last, first, end_, start, inside[::-1]))
-    return arcs, partners
-
-
-def _line_arcs(
-    tracer: Tracer, root: RealRoot, thetas: Floats, K: Floats, B: Floats
-) -> tuple[list[Arc], list[float]]:
-    """Edges on the line of a real root, its pieces between the places where another root meets the circle; and
-    the angles at which the curve crosses it."""
-    a, s, v = tracer.line(root)
-    T = tracer.period
-    length = np.hypot(s / T, v)
-    if not length > 0.0:
-        return [], []
-    # direction with the stable side (gradient) on its left, in the units of (K T, B)
-    along = np.array([v, -s / T]) / length
-    nodes = [wall for wall in (tracer.curve_end("plus"), tracer.curve_end("minus")) if wall is not None]
-    crossing = tracer.line_crossing()
-    nodes = [wall for wall in [*nodes, crossing] if wall is not None and _is_on(tracer, root, wall)]
-    with np.errstate(invalid="ignore"):
-        value = a + s * K + v * B
-        noise = 1e-13 * (abs(a) + np.abs(s * K) + np.abs(v * B))
-        sure = np.flatnonzero(np.abs(value) > noise)
-    turns = np.flatnonzero(np.sign(value[sure[1:]]) != np.sign(value[sure[:-1]]))
-    crossings = [cross_line(tracer, root, thetas[sure[i]], thetas[sure[i + 1]]) for i in turns]
-    nodes += [wall_on_line(tracer, root, theta) for theta in crossings]
-    nodes = [wall for wall in nodes if np.isfinite(wall).all()]
-    nodes.sort(key=lambda wall: float(along @ (wall[0] * T, wall[1])))
-    angle = 0.0 if root == "plus" else np.pi
-    arcs = [
-        Arc(root, one, two, angle, angle, np.empty(0))
-        for one, two in pairwise(nodes)
-        if one != two and tracer.edge_on_line(root, (one[0] + two[0]) / 2, (one[1] + two[1]) / 2)
-    ]
-    return arcs, crossings
-
-
-def _is_on(tracer: Tracer, root: RealRoot, wall: Wall) -> bool:
-    """Whether a wall lies on the line of a real root, to rounding."""
-    a, s, v = tracer.line(root)
-    terms = (a, s * wall[0], v * wall[1])
-    return abs(sum(terms)) <= 1e-10 * sum(map(abs, terms)) or not any(terms)
+def sampled(arcs: Arcs, curves: Curves) -> list[Walk]:
+    """Angles, K and B (k,) along each arc from first to last: chords between them lie on the edge."""
+    walks = []
+    for arc in arcs:
+        (K0, B0), (K1, B1) = arc.first, arc.last
+        if not arc.curved:
+            walks.append((np.array([arc.start, arc.end]), np.array([K0, K1]), np.array([B0, B1])))
+            continue
+        curve = curves[arc.member]
+        thetas = curve.between(arc)
+        K, B = curve.walls(thetas)
+        walks.append(
+            (
+                np.concatenate([[arc.start], thetas, [arc.end]]),
+                np.concatenate([[K0], K, [K1]]),
+                np.concatenate([[B0], B, [B1]]),
+            )
+        )
+    return walks

@@ -9,12 +9,11 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
+from zwidth.chart.arcs import Walk
+
 Floats = NDArray[np.float64]
 # Of a ring's extent: corners blurred by more are drawn from one arc's end to the next one's beginning.
 WIDE_CORNER = 1e-6
-# Angles, K and B along every arc of every ring.
-Samples = list[list[tuple[Floats, Floats, Floats]]]
-
 
 Box = tuple[float, float, float, float]  # KMIN, KMAX, BMIN, BMAX
 
@@ -30,7 +29,7 @@ def box_of(regions: Sequence[Floats]) -> Box:
     return float(K0), float(K1), float(B0), float(B1)
 
 
-def outline(arcs: list[tuple[Floats, Floats, Floats]]) -> Floats:
+def outline(arcs: list[Walk]) -> Floats:
     """A ring's arcs as one closed walk of points (k, 2).
 
     An arc's last point is left out where the next one begins, unless they are farther apart than WIDE_CORNER.

@@ -9,10 +9,10 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arc_joining import closed_rings
-from zwidth.chart.arcs import Rings
-from zwidth.chart.cells import Box, Samples, box_of, cells, outline
+from zwidth.chart.arcs import Arcs, Walk, sampled
+from zwidth.chart.area import quadrant_area
+from zwidth.chart.cells import Box, box_of, cells, outline
 from zwidth.chart.decay import FastestDecay, fastest_decay, fastest_decay_in_first_quadrant
-from zwidth.chart.outline import quadrant_area, sample_arc
 from zwidth.chart.peak import Peak, largest_damping, stiffest
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import Verdicts, judge
@@ -100,21 +100,21 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     if not 0.0 < radius <= 1.0:
         raise ValueError(f"radius must be a number with 0 < radius <= 1, got {radius:g}")
     tracer = Tracer.of(loop, radius)
-    rings, blur, samples, outlines = traced(tracer)
+    arcs, blur, samples, outlines = traced(tracer)
     width = widest(outlines)
-    peak = stiffest(tracer, rings, width)
+    peak = stiffest(arcs, (tracer,), width)
     fastest = fastest_decay(tracer, outlines) if decay else None
     in_hertz = 1.0 / (2.0 * np.pi * loop.period)
     return StabilityChart(
         loop=loop,
         radius=radius,
         regions=cells(outlines),
-        boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for arcs in samples for thetas, K, B in arcs),
+        boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for thetas, K, B in samples),
         stiffness_max=peak.stiffness if peak else float("nan"),
         damping_at_stiffness_max=peak.damping if peak else float("nan"),
         frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
-        damping_max=largest_damping(tracer, rings, width),
-        stable_area=max(quadrant_area(tracer, rings), 0.0) if peak else 0.0,
+        damping_max=largest_damping(arcs, (tracer,), width, tracer.stable),
+        stable_area=quadrant_area(arcs, (tracer,)) if peak else 0.0,
         fastest_decay=fastest,
         fastest_decay_in_first_quadrant=fastest_decay_in_first_quadrant(tracer, outlines, fastest),
         corner_blur=blur,
@@ -125,8 +125,8 @@ def largest_stiffness(loop: Loop) -> Peak | None:
     """Only the stiffest stable wall with K > 0, B >= 0; None if there is none."""
     require("loop", loop, Loop)
     tracer = Tracer.of(loop)
-    rings, _, _, outlines = traced(tracer)
-    return stiffest(tracer, rings, widest(outlines))
+    arcs, _, _, outlines = traced(tracer)
+    return stiffest(arcs, (tracer,), widest(outlines))
 
 
 def boundary_points(
@@ -138,21 +138,21 @@ def boundary_points(
     return K, B, thetas / (2.0 * np.pi * loop.period), edge
 
 
-def traced(tracer: Tracer) -> tuple[Rings, float, Samples, list[Floats]]:
-    """The rings, how far corners are known, angles, K and B along every arc, and each ring's outline.
+def traced(tracer: Tracer) -> tuple[Arcs, float, list[Walk], list[Floats]]:
+    """The edge's arcs, how far corners are known, angles, K and B along every arc, and each ring's outline.
 
     An outline that crosses itself has passed a small loop of the curve between two samples: then the curve is
     traced again through all the angles seen.
     """
     seen = None
     for _ in range(2):
-        rings, blur = closed_rings(tracer, seen)
-        samples = [[sample_arc(tracer, arc) for arc in ring] for ring in rings]
-        outlines = [outline(arcs) for arcs in samples]
+        arcs, blur = closed_rings(tracer, seen)
+        samples = sampled(arcs, (tracer,))
+        outlines = [outline([samples[k] for k in ring]) for ring in arcs.rings]
         if all(shapely.Polygon(outline).is_valid for outline in outlines):
             break
-        seen = np.concatenate([thetas[1:-1] for arcs in samples for thetas, _, _ in arcs])
-    return rings, blur, samples, outlines
+        seen = np.concatenate([thetas[1:-1] for thetas, _, _ in samples])
+    return arcs, blur, samples, outlines
 
 
 def widest(outlines: list[Floats]) -> float:

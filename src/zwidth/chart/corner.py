@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.chart.arcs import Wall
 from zwidth.chart.curve import wall_alone, wall_at, zero_between
 from zwidth.chart.hurwitz import edges_stable_set, working_room
-from zwidth.chart.tracer import ROOTS, RealRoot, Tracer, Wall
+from zwidth.chart.tracer import ROOTS, RealRoot, Tracer
 from zwidth.compiled import compiled
 from zwidth.loop.evaluate import Factors
 

@@ -21,7 +21,7 @@ from zwidth.loop.evaluate import Factors, divide, plant_response, velocity_respo
 
 Floats = NDArray[np.float64]
 
-# Weights of `zero_between` for single components
+# Weights of `zero_between` for K, B and dK/dtheta alone.
 OF_K, OF_B, OF_SLOPE = ((0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0, 0.0))
 
 

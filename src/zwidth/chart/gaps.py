@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import Arc, Edges
+from zwidth.chart.arcs import CHORD, Arc
+from zwidth.chart.edges import Edges
 from zwidth.chart.tracer import Tracer
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,7 @@ def bridged(
         distances = [float(np.max(np.abs((np.array(wall) - other) * units))) for _, other, _ in starts]
         nearest = int(np.argmin(distances))
         _, other, other_angle = starts.pop(nearest)
-        chords.append(Arc("gap", wall, other, angle, other_angle, np.empty(0)))
+        chords.append(Arc(CHORD, wall, other, angle, other_angle, np.empty(0)))
         longest = max(longest, distances[nearest])
     if not all(_on_circle(tracer, chord) for chord in chords):
         return None

@@ -1,20 +1,16 @@
-"""The largest stiffness and the largest damping of the stable set."""
+"""The largest stiffness and the largest damping of a stable set, read off the arcs of its edge."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol, TypeVar
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import Arc, Rings
-from zwidth.chart.curve import OF_B, OF_K, OF_SLOPE, wall_at, zero_between
-from zwidth.chart.outline import arc_angles
-from zwidth.chart.tracer import Tracer
+from zwidth.chart.arcs import DAMPING, SLOPE, STIFFNESS, Arcs, Curves
 from zwidth.compiled import compiled
-from zwidth.loop.evaluate import Factors
 
 Floats = NDArray[np.float64]
 
@@ -22,109 +18,94 @@ Floats = NDArray[np.float64]
 AS_STIFF: Final = 1e-13
 
 
-class Wall(Protocol):
-    """What `topmost` asks of a wall."""
-
-    @property
-    def stiffness(self) -> float: ...
-
-    @property
-    def damping(self) -> float: ...
-
-
-W = TypeVar("W", bound=Wall)
-
-
 @dataclass(frozen=True)
 class Peak:
     """The stiffest wall of the closure of the stable set with K > 0, B >= 0.
 
-    angles  of the roots on the circle there: one, or two at a corner, ascending
+    angles   of the roots on the circle there: one, or two at a corner, ascending
+    members  that have them, in the same order (`Arcs.member`)
     """
 
     stiffness: float
     damping: float
     angles: tuple[float, ...]
+    members: tuple[int, ...] = (0,)
 
 
 @compiled
-def crossings(factors: Factors, radius: float, nodes: Floats, which: int) -> Floats:
-    """Angles along an arc (ascending nodes) where one component of `wall_at` changes sign: 0 K, 1 B, 2 dK."""
-    out, n = np.empty(len(nodes)), 0
-    low = nodes[0] + 1e-6 * (nodes[1] - nodes[0])
-    before = wall_at(factors, radius, low)[which]
-    for i in range(1, len(nodes)):
-        last = i == len(nodes) - 1
-        high = nodes[i] - (1e-6 * (nodes[i] - nodes[i - 1]) if last else 0.0)
-        after = wall_at(factors, radius, high)[which]
-        if before * after < 0.0:
-            weights = OF_K if which == 0 else (OF_B if which == 1 else OF_SLOPE)
-            out[n] = zero_between(factors, radius, weights, low, high)
-            n += 1
-        low, before = high, after
-    return out[:n].copy()
+def prevails(K: float, B: float, stiffness: float, damping: float) -> bool:
+    """Whether a wall is stiffer than another one, or as stiff and more damped.
+
+    Where the edge stands upright at its largest stiffness, rounding would choose among its ends otherwise.
+    """
+    return bool(stiffness * (1.0 + AS_STIFF) < K or (stiffness * (1.0 - AS_STIFF) <= K and damping < B))
 
 
-def stiffest(tracer: Tracer, rings: Rings, width: float) -> Peak | None:
+@compiled
+def topmost(K: Floats, B: Floats, least: float) -> int:
+    """Number of the stiffest of several walls with K > least and B >= 0, by `prevails`; -1 if there is none."""
+    best = -1
+    for k in range(len(K)):
+        if K[k] > least and B[k] >= 0.0 and (best < 0 or prevails(K[k], B[k], K[best], B[best])):
+            best = k
+    return best
+
+
+def stiffest(arcs: Arcs, curves: Curves, width: float) -> Peak | None:
     """The largest stiffness over the whole stable set within K > 0, B >= 0; None if there is no such wall.
 
     It is attained on the edge: at a smooth maximum of K (dK/dtheta = 0), at a corner, or where the edge crosses
     B = 0.
 
-    width  largest |K| on the edge: a corner on the axis K = 0 is no wall, whatever rounding leaves of it
-    """
-    pairs = ((arc, ring[(n + 1) % len(ring)]) for ring in rings for n, arc in enumerate(ring))
-    return topmost((peak for pair in pairs for peak in _candidates(tracer, *pair)), width)
-
-
-def topmost(walls: Iterable[W], width: float) -> W | None:
-    """The stiffest of several walls with K > 0 and B >= 0, of those as stiff the most damped; None without any.
-
-    Where the edge stands upright at its largest stiffness, rounding would choose among its ends otherwise.
-
     width  largest |K| on the edge: what is stiff by rounding of this is no wall
     """
-    usable = [wall for wall in walls if wall.stiffness > 1e-10 * width and wall.damping >= 0.0]
-    highest = max((wall.stiffness for wall in usable), default=0.0)
-    as_stiff = (wall for wall in usable if wall.stiffness >= highest * (1.0 - AS_STIFF))
-    return max(as_stiff, key=lambda wall: wall.damping, default=None)
+    crossed, crossings = arcs.crossings(DAMPING)
+    crossings[:, DAMPING] = 0.0
+    walls = [arcs.last, arcs.first[arcs.following], crossings]
+    before = [np.arange(len(arcs)), np.arange(len(arcs)), crossed]
+    angles = [arcs.end, arcs.end, arcs.start[crossed]]
+    for k in arcs.curved:
+        arc = arcs[k]
+        curve = curves[arc.member]
+        for component in (DAMPING, SLOPE):
+            thetas = curve.zeros(arc, component)
+            if len(thetas):
+                K, B = curve.walls(thetas)
+                walls.append(np.column_stack([K, np.zeros_like(K) if component == DAMPING else B]))
+                before.append(np.full(len(thetas), k))
+                angles.append(thetas)
+    K, B = np.vstack(walls).T
+    best = topmost(K, B, 1e-10 * width)
+    if best < 0:
+        return None
+    last = int(np.concatenate(before)[best])
+    roots = {(float(np.concatenate(angles)[best]), int(arcs.member[last]))}
+    if best < 2 * len(arcs):
+        after = arcs.following[last]
+        roots.add((float(arcs.start[after]), int(arcs.member[after])))
+    ordered = sorted(roots)
+    return Peak(float(K[best]), float(B[best]), tuple(a for a, _ in ordered), tuple(m for _, m in ordered))
 
 
-def _candidates(tracer: Tracer, arc: Arc, following: Arc) -> list[Peak]:
-    """Walls of an arc and its last corner where the largest stiffness can be."""
-    angles = tuple(sorted({arc.end, following.start}))
-    peaks = [Peak(*wall, angles) for wall in (arc.last, following.first)]
-    if arc.kind == "pair":
-        nodes = np.sort(arc_angles(arc))
-        for which in (1, 2):
-            for theta in crossings(tracer.factors, tracer.radius, nodes, which):
-                K, B, *_ = tracer.wall(theta)
-                peaks.append(Peak(K, 0.0 if which == 1 else B, (float(theta),)))
-    elif arc.first[1] * arc.last[1] < 0.0:
-        share = arc.first[1] / (arc.first[1] - arc.last[1])
-        peaks.append(Peak(arc.first[0] + share * (arc.last[0] - arc.first[0]), 0.0, (arc.start,)))
-    return peaks
-
-
-def largest_damping(tracer: Tracer, rings: Rings, width: float) -> float:
+def largest_damping(arcs: Arcs, curves: Curves, width: float, stable: Callable[[float, float], bool]) -> float:
     """Supremum of B >= 0 that is stable for all sufficiently small K > 0; 0 if there is none.
 
     The stable intervals of the line K = 0+ end where the edge crosses or touches K = 0; each interval is tested at
     its middle.
+
+    width   largest |K| on the edge
+    stable  whether a wall (K, B) is
     """
-    stops = {0.0}
-    for arc in (arc for ring in rings for arc in ring):
-        stops.update(wall[1] for wall in (arc.first, arc.last) if abs(wall[0]) <= 1e-8 * width)
-        if arc.kind == "pair":
-            nodes = np.sort(arc_angles(arc))
-            for theta in crossings(tracer.factors, tracer.radius, nodes, 0):
-                stops.add(float(tracer.wall(theta)[1]))
-        elif arc.first[0] * arc.last[0] < 0.0:
-            share = arc.first[0] / (arc.first[0] - arc.last[0])
-            stops.add(arc.first[1] + share * (arc.last[1] - arc.first[1]))
+    walls = np.vstack([arcs.first, arcs.last])
+    stops: set[float] = {0.0, *walls[np.abs(walls[:, 0]) <= 1e-8 * width, 1].tolist()}
+    stops.update(arcs.crossings(STIFFNESS)[1][:, 1].tolist())
+    for k in arcs.curved:
+        arc = arcs[k]
+        curve = curves[arc.member]
+        stops.update(curve.walls(curve.zeros(arc, STIFFNESS))[1].tolist())
     ordered = sorted(stop for stop in stops if stop >= 0.0)
     spacing = 1e-9 * (ordered[-1] or 1.0)
     for low, high in zip(ordered[-2::-1], ordered[:0:-1], strict=True):
-        if high - low > spacing and tracer.stable(1e-7 * width, 0.5 * (low + high)):
+        if high - low > spacing and stable(1e-7 * width, 0.5 * (low + high)):
             return high
     return 0.0

@@ -25,7 +25,7 @@ from zwidth.chart.corner import meet, steadier
 from zwidth.chart.curve import OF_B, OF_SLOPE, wall_alone, wall_at, zero_between
 from zwidth.chart.grid import MOST_ANGLES, angles_among, around_crossings, computer_points
 from zwidth.chart.hurwitz import combine, deflate, edges_on_line, edges_stable_set, is_stable, working_room
-from zwidth.chart.peak import AS_STIFF
+from zwidth.chart.peak import prevails
 from zwidth.chart.roots import find_roots, spread_roots
 from zwidth.chart.tracer import LONG
 from zwidth.compiled import compiled, compiled_parallel
@@ -207,7 +207,7 @@ def stiffest_wall(
             unsure = max(unsure, K[i])
         if flags[i] > 0 and B[i] >= 0.0:
             widest = max(widest, B[i])
-            if _prevails(K[i], B[i], best, damping):
+            if prevails(K[i], B[i], best, damping):
                 best, damping, at, partner = K[i], B[i], thetas[i], thetas[i]
     for i in range(n):
         if flags[i] <= 0:
@@ -227,13 +227,13 @@ def stiffest_wall(
                 if B[i] * B[j] < 0.0 and max(K[i], K[j]) * SLACK > best:
                     theta = zero_between(factors, 1.0, OF_B, thetas[i], thetas[j])
                     wall = wall_at(factors, 1.0, theta)
-                    if _prevails(wall[0], 0.0, best, damping):
+                    if prevails(wall[0], 0.0, best, damping):
                         best, damping, at, partner = wall[0], 0.0, theta, theta
                 back = -step * wall_at(factors, 1.0, thetas[j])[2] * h
                 if rise > 0.0 and back > 0.0 and min(K[i] + rise, K[j] + back) * SLACK > best:
                     theta = zero_between(factors, 1.0, OF_SLOPE, thetas[i], thetas[j])
                     wall = wall_at(factors, 1.0, theta)
-                    if wall[1] >= 0.0 and _prevails(wall[0], wall[1], best, damping):
+                    if wall[1] >= 0.0 and prevails(wall[0], wall[1], best, damping):
                         best, damping, at, partner = wall[0], wall[1], theta, theta
                 continue
             if max(K[i], K[i] + rise, K[j]) * SLACK < best:
@@ -245,14 +245,14 @@ def stiffest_wall(
             if wall[1] * B[i] < 0.0:
                 crossing = zero_between(factors, 1.0, OF_B, min(thetas[i], theta), max(thetas[i], theta))
                 stiff = wall_at(factors, 1.0, crossing)[0]
-                if _prevails(stiff, 0.0, best, damping):
+                if prevails(stiff, 0.0, best, damping):
                     best, damping, at, partner = stiff, 0.0, crossing, crossing
-            if wall[1] >= 0.0 and _prevails(wall[0], wall[1], best, damping):
+            if wall[1] >= 0.0 and prevails(wall[0], wall[1], best, damping):
                 best, damping, at, partner = wall[0], wall[1], theta, other
             if rise > 0.0 and step * wall_at(factors, 1.0, theta)[2] < 0.0:
                 top = zero_between(factors, 1.0, OF_SLOPE, min(thetas[i], theta), max(thetas[i], theta))
                 wall = wall_at(factors, 1.0, top)
-                if wall[1] >= 0.0 and _prevails(wall[0], wall[1], best, damping):
+                if wall[1] >= 0.0 and prevails(wall[0], wall[1], best, damping):
                     best, damping, at, partner = wall[0], wall[1], top, top
     if n > 0 and flags[n - 1] > 0 and _end_beyond(polynomials, best):
         return DOUBTFUL, np.nan, np.nan, np.nan, np.nan
@@ -263,12 +263,6 @@ def stiffest_wall(
     if best < NOTHING * np.abs(polynomials[0]).sum() / np.abs(polynomials[1]).sum():
         return DOUBTFUL, np.nan, np.nan, np.nan, np.nan
     return FOUND, best, damping, at, partner
-
-
-@compiled
-def _prevails(K: float, B: float, stiffness: float, damping: float) -> bool:
-    """Whether a wall is stiffer than the stiffest so far, or as stiff and more damped: `peak.topmost`."""
-    return bool(stiffness * (1.0 + AS_STIFF) < K or (stiffness * (1.0 - AS_STIFF) <= K and damping < B))
 
 
 @compiled

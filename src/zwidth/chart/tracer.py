@@ -9,7 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.chart.arcs import Arc, Wall
 from zwidth.chart.curve import trace, wall_at, walls
+from zwidth.chart.curve_pieces import CHORD, MOST_POINTS, quadrant_integral, refined_angles, sign_changes
 from zwidth.chart.grid import LONGEST_STEP, angles, singular_points
 from zwidth.chart.hurwitz import edges_on_line, is_stable, working_room
 from zwidth.chart.nyquist import phase_flags, terms_along
@@ -21,7 +23,6 @@ Floats = NDArray[np.float64]
 UNDECIDED = 1e-9
 # Degree from which coefficients have too few digits left, and the phase along the circle is followed instead.
 LONG = 24
-Wall = tuple[float, float]
 RealRoot = Literal["plus", "minus"]
 ROOTS: tuple[RealRoot, RealRoot] = ("plus", "minus")
 
@@ -64,6 +65,23 @@ class Tracer:
     def wall(self, theta: float) -> tuple[float, float, float, float]:
         """K, B, dK/dtheta, dB/dtheta at one angle in (0, pi)."""
         return wall_at(self.factors, self.radius, theta)
+
+    def walls(self, thetas: Floats) -> tuple[Floats, Floats]:
+        """K and B (k,) at angles (k,) in (0, pi)."""
+        return walls(self.factors, self.radius, thetas)
+
+    def zeros(self, arc: Arc, component: int) -> Floats:
+        """Ascending angles on an arc at which K, B or dK/dtheta changes sign, to rounding."""
+        return sign_changes(self.factors, self.radius, np.sort(arc.angles), component)
+
+    def between(self, arc: Arc) -> Floats:
+        """Angles strictly between an arc's ends, from first to last, with chords within CHORD of the arc."""
+        thetas = refined_angles(self.factors, self.radius, np.sort(arc.angles), CHORD, MOST_POINTS)
+        return thetas if arc.start < arc.end else thetas[::-1].copy()
+
+    def integral(self, arc: Arc) -> float:
+        """Integral of K dB over the part of an arc with K > 0 and B > 0 [N^2 s/m^2]."""
+        return quadrant_integral(self.factors, self.radius, arc.angles)
 
     def trace(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """K, B and stable-edge flag at ascending angles in (0, pi).

@@ -8,8 +8,9 @@ import numpy as np
 import shapely
 from scipy.optimize import minimize_scalar
 
+from zwidth.chart.arcs import Arc
 from zwidth.chart.robust.common_set import common
-from zwidth.chart.robust.edges import Piece, pieces
+from zwidth.chart.robust.edges import common_edge
 from zwidth.chart.robust.members import Member, polygons
 from zwidth.guarantees.port import Floats, reached
 from zwidth.guarantees.region import Region, empty, rings_of, stiffest_corner
@@ -45,7 +46,7 @@ NO_SPRING = "no wall with K > 0 and B >= 0 is stable with every spring at the ha
 UNSETTLED = "{} springs of those tried make walls just inside the edge unstable: modes are damped too lightly"
 UNDAMPED = "this is undecided: nothing damps the mode that the Nyquist spring makes"
 NO_NYQUIST = "no wall with K > 0 and B >= 0 is stable with the Nyquist spring"
-Edge = list[tuple[float, Piece]]
+Edge = list[tuple[float, Arc]]
 
 
 def nyquist_spring(loop: Loop) -> float:
@@ -201,13 +202,13 @@ def _charted(springs: Springs, new: Floats, members: dict[float, Member]) -> sha
 
 
 def _edge(springs: Springs, members: dict[float, Member]) -> Edge:
-    """The edge of the common set, each piece with its spring."""
+    """The edge of the common set, each arc with the share of its spring."""
     unit = springs.unit
     shares = {member.index: share for share, member in members.items()}
     shapes = {member.index: polygons(member.outlines, unit) for member in members.values()}
     left, cutters = common(list(members.values()), shapes, unit)
-    rings, _ = pieces(left, cutters, unit)
-    return [(shares[piece.member.index], piece) for ring in rings for piece in ring]
+    arcs, _ = common_edge(left, cutters, unit)
+    return [(shares[arc.member], arc) for arc in arcs]
 
 
 def _cells_and_failing(
@@ -261,8 +262,7 @@ def _between(members: dict[float, Member], edge: Edge) -> Floats:
 
 def _alike(springs: Springs, edge: Edge, turn: int) -> Floats:
     """Shares of springs whose mode has an alias just beside vibrations at the edge, at other places each turn."""
-    arcs = [piece.arc for _, piece in edge if piece.arc.kind == "pair"]
-    ends = np.array([(arc.start, arc.end) for arc in arcs]).reshape(-1, 2)
+    ends = np.array([(arc.start, arc.end) for _, arc in edge if arc.curved]).reshape(-1, 2)
     ends = ends[np.unique(np.linspace(0, len(ends) - 1, VIBRATIONS).astype(int))] if len(ends) else ends
     theta = ends[:, 0] + (0.5 + GOLDEN * turn) % 1.0 * (ends[:, 1] - ends[:, 0])
     turns = 2.0 * np.pi * np.arange(ALIASES + 1)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from zwidth.chart.robust.edges import Piece
+from zwidth.chart.arcs import Arc
 from zwidth.guarantees.envelope import Touch, nearest_touch, stretch, touches
 from zwidth.guarantees.port import Floats
 from zwidth.guarantees.spring_family import Springs, parts
@@ -40,10 +40,10 @@ class Sweep:
     lost: list[float] = field(default_factory=list)
     done: set[tuple[float, float, float, float]] = field(default_factory=set)
 
-    def cut(self, shape: shapely.Geometry, edge: list[tuple[float, Piece]], shares: Floats) -> shapely.Geometry:
+    def cut(self, shape: shapely.Geometry, edge: list[tuple[float, Arc]], shares: Floats) -> shapely.Geometry:
         """A shape without what springs between sweep over.
 
-        edge    of the shape in pieces, each with the share of its spring
+        edge    of the shape, each arc with the share of its spring
         shares  (n,) of the springs charted, ascending
         """
         low, bottom, right, top = shape.bounds
@@ -60,8 +60,8 @@ class Sweep:
     def _touching(self, share: float) -> list[Touch]:
         """Touching points on the edge of one spring's chart."""
         member, found = self.springs.member(share), []
-        for _, _, arc in member.arcs() if member else ():
-            if arc.kind == "pair":
+        for arc in member.arcs if member else ():
+            if arc.curved:
                 found += touches(self.springs, share, arc.start, arc.end)
         return found
 

@@ -10,6 +10,8 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.chart.arcs import DAMPING, STIFFNESS, Arcs
+from zwidth.chart.area import quadrant_area
 from zwidth.chart.cells import Box, box_of, cut
 from zwidth.chart.measured.boundary import Boundary, boundary, coarse, real_root
 from zwidth.chart.measured.cells import Cells, cells_within, edges_stable_set, window
@@ -17,6 +19,7 @@ from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.measured.uncertainty_band import Band, uncertainty
 from zwidth.chart.measured.usable_frequencies import Stretch
 from zwidth.chart.measured.verdict import MeasuredVerdicts, NearestEdge, judge_measured
+from zwidth.chart.peak import stiffest
 from zwidth.chart.verdict import UNDECIDED
 from zwidth.loop.controller import Controller
 from zwidth.model.arguments import require
@@ -220,8 +223,7 @@ def _nothing_near(loop: MeasuredLoop) -> str:
 
 def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
     """The chart from its cells."""
-    quadrant = [cell for cell in map(_in_quadrant, cells.polygons) if not cell.is_empty]
-    peak, zoomed = ((nan, nan), cells) if opened else _peak(loop, cells, quadrant)
+    peak, zoomed = ((nan, nan), cells) if opened else _peak(loop, cells)
     arcs = tuple(_arcs(loop, cells))
     points = [(K, B) for arc in arcs for K, B in zip(arc.stiffness, arc.damping, strict=True)]
     angles = _angles_at(loop, zoomed, peak)
@@ -237,7 +239,7 @@ def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
         damping_at_stiffness_max=peak[1],
         frequencies_at_stiffness_max=tuple(a / (2.0 * np.pi * loop.period) for a in angles),
         damping_max=nan if opened else _largest_damping(loop, cells),
-        stable_area=nan if opened else float(sum(cell.area for cell in quadrant)),
+        stable_area=nan if opened else quadrant_area(_chords(cells), ()),
         interpolation_error=float(np.max(errors, initial=0.0) / peak[0]) + ZOOMED,
         measured_stiffness_max=max((K for K, B in points if K > 0.0 and B >= 0.0), default=nan),
         band=None if opened else _holding(uncertainty(loop, cells), peak[0]),
@@ -257,33 +259,29 @@ def _holding(band: Band | None, stiffest: float) -> Band | None:
     return replace(band, stiffness_low=low, stiffness_high=float(np.fmax(band.stiffness_high, stiffest)))
 
 
-def _in_quadrant(cell: shapely.Geometry) -> shapely.Geometry:
-    """The part with K >= 0, B >= 0."""
-    _, _, high_K, high_B = cell.bounds
-    if high_K <= 0.0 or high_B <= 0.0:
-        return shapely.Polygon()
-    return cell.intersection(shapely.box(0.0, 0.0, 2.0 * high_K, 2.0 * high_B))
+def _chords(cells: Cells) -> Arcs:
+    """The edge of the cells, side by side."""
+    return Arcs.chords(
+        [np.array(ring.coords) for cell in cells.polygons for ring in (cell.exterior, *cell.interiors)]
+    )
 
 
-def _stiffest(parts: list[shapely.Geometry], box: Box) -> tuple[float, float]:
-    """The vertex of largest K; nan where no part has K > 0."""
-    corners = np.vstack([np.empty((0, 2)), *(shapely.get_coordinates(part) for part in parts)])
-    corners = corners[corners[:, 0] > 1e-9 * (box[1] - box[0])]
-    if not len(corners):
-        return nan, nan
-    K, B = corners[np.argmax(corners[:, 0])]
-    return float(K), float(B)
+def _stiffest(cells: Cells) -> tuple[float, float]:
+    """The corner or crossing of B = 0 of largest K, with K > 0 and B >= 0; nan where there is none."""
+    # corners are noded to a share of the window that is coarser than rounding of the stiffest wall
+    found = stiffest(_chords(cells), (), 10.0 * (cells.box[1] - cells.box[0]))
+    return (found.stiffness, found.damping) if found else (nan, nan)
 
 
-def _peak(loop: MeasuredLoop, cells: Cells, quadrant: list[shapely.Geometry]) -> tuple[tuple[float, float], Cells]:
+def _peak(loop: MeasuredLoop, cells: Cells) -> tuple[tuple[float, float], Cells]:
     """The largest stiffness with K > 0, B >= 0: found among the cells' corners, then in a window on its own."""
-    peak, seen = _stiffest(quadrant, cells.box), cells
+    peak, seen = _stiffest(cells), cells
     for _ in range(2):
         if isnan(peak[0]):
             break
         near = _around(peak, seen.box, 1e-3, 2e-2)
         closer = cells_within(loop, cells.edge, near)
-        better = _stiffest([_in_quadrant(cell) for cell in closer.polygons], near)
+        better = _stiffest(closer)
         if isnan(better[0]) or better[0] > near[1] - 1e-6 * (near[1] - near[0]):
             break
         peak, seen = better, closer
@@ -326,13 +324,11 @@ def _largest_damping(loop: MeasuredLoop, cells: Cells) -> float:
     """Supremum of B >= 0 stable for all small K > 0: on a line close to K = 0, then in a window there."""
     found, seen = 0.0, cells
     for _ in range(2):
-        K0, K1, B0, B1 = seen.box
-        upright = shapely.LineString([(1e-6 * (K1 - K0), min(B0, 0.0)), (1e-6 * (K1 - K0), B1)])
-        tops = [shapely.intersection(cell, upright).bounds for cell in seen.polygons]
-        top = max((bounds[3] for bounds in tops if not isnan(bounds[3])), default=0.0)
+        _, walls = _chords(seen).crossings(STIFFNESS, 1e-6 * (seen.box[1] - seen.box[0]))
+        top = float(np.max(walls[:, DAMPING], initial=0.0))
         if top <= 0.0:
             break
-        found = float(top)
+        found = top
         seen = cells_within(loop, cells.edge, _around((0.0, found), cells.box, 1e-3, 1e-3))
     return found
 

@@ -10,12 +10,15 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arc_joining import ChartError
-from zwidth.chart.cells import Samples, cells, outline
-from zwidth.chart.outline import CHORD, quadrant_area, sample_arc, walk_area
+from zwidth.chart.arcs import Walk, sampled
+from zwidth.chart.area import quadrant_area
+from zwidth.chart.cells import cells, outline
+from zwidth.chart.chart import widest
+from zwidth.chart.curve_pieces import CHORD
+from zwidth.chart.peak import largest_damping, stiffest
 from zwidth.chart.robust.common_set import Shapes, common, excluding
-from zwidth.chart.robust.edges import Piece, pieces
+from zwidth.chart.robust.edges import common_edge
 from zwidth.chart.robust.members import Member, chart_members, polygons
-from zwidth.chart.robust.numbers import robust_largest_damping, robust_stiffest
 from zwidth.chart.verdict import judge
 from zwidth.loop.loop import Loop
 from zwidth.model.arguments import refusal, require
@@ -128,29 +131,35 @@ def robust_of(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart
     unit = max(member.tracer.period for member in charted.values())
     shapes = {index: polygons(member.outlines, unit) for index, member in charted.items()}
     shape, cutters = common(list(charted.values()), shapes, unit)
-    rings, blur = pieces(shape, cutters, unit)
-    samples = [[sample_arc(piece.member.tracer, piece.arc) for piece in ring] for ring in rings]
-    peak = robust_stiffest(rings)
+    arcs, blur = common_edge(shape, cutters, unit)
+    tracers = {index: member.tracer for index, member in charted.items()}
+    samples = sampled(arcs, tracers)
+    outlines = [outline([samples[k] for k in ring]) for ring in arcs.rings]
+    width = widest(outlines)
+    peak = stiffest(arcs, tracers, width)
     if _passed_over(samples, list(charted.values()), unit):
         blur = max(blur, CHORD)
-    area = _area(rings) if peak else 0.0
+    area = quadrant_area(arcs, tracers) if peak else 0.0
+    in_radians = {index: 2.0 * np.pi * tracer.period for index, tracer in tracers.items()}
+    roots = zip(peak.angles, peak.members, strict=True) if peak else ()
     by_area, largest_area = _best_by_area(charted, shapes)
     by_stiffness = max(charted, key=lambda index: (_stiffness(charted[index]), -index))
     return RobustChart(
         members={index: member.tracer.loop for index, member in charted.items()},
         failed=failed,
-        regions=cells([outline(arcs) for arcs in samples]),
+        regions=cells(outlines),
         boundary=tuple(
-            RobustArc(piece.member.index, K, B, thetas / (2.0 * np.pi * piece.member.tracer.period))
-            for ring, arcs in zip(rings, samples, strict=True)
-            for piece, (thetas, K, B) in zip(ring, arcs, strict=True)
+            RobustArc(index, K, B, thetas / in_radians[index])
+            for index, (thetas, K, B) in zip(arcs.member.tolist(), samples, strict=True)
         ),
-        binding=tuple(sorted({piece.member.index for ring in rings for piece in ring})),
+        binding=tuple(np.unique(arcs.member).tolist()),
         stiffness_max=peak.stiffness if peak else float("nan"),
         damping_at_stiffness_max=peak.damping if peak else float("nan"),
-        frequencies_at_stiffness_max=peak.frequencies if peak else (),
-        members_at_stiffness_max=peak.members if peak else (),
-        damping_max=robust_largest_damping(rings, list(charted.values())),
+        frequencies_at_stiffness_max=tuple(sorted({angle / in_radians[index] for angle, index in roots})),
+        members_at_stiffness_max=tuple(sorted(set(peak.members))) if peak else (),
+        damping_max=largest_damping(
+            arcs, tracers, width, lambda K, B: all(tracer.stable(K, B) for tracer in tracers.values())
+        ),
         stable_area=area,
         best_by_area=by_area,
         best_by_stiffness=by_stiffness,
@@ -162,10 +171,10 @@ def robust_of(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart
     )
 
 
-def _passed_over(samples: Samples, members: list[Member], unit: float) -> bool:
+def _passed_over(samples: list[Walk], members: list[Member], unit: float) -> bool:
     """Whether a member cuts a piece of edge, asked at its quarters 1e-9 of its length inside, by less than chords
     see."""
-    for _, K, B in (arc for ring in samples for arc in ring):
+    for _, K, B in samples:
         walk = np.column_stack([K * unit, B])
         depth = 1e-9 * float(np.max(np.ptp(walk, axis=0)))
         middles = walk if len(K) > 2 else np.vstack([walk[0], walk.mean(axis=0), walk[1]])
@@ -186,11 +195,6 @@ def _lost(left: float, whole: float) -> float:
     return max(1.0 - left / whole, 0.0) if whole > 0.0 else float("nan")
 
 
-def _area(rings: list[list[Piece]]) -> float:
-    """Area within K >= 0, B >= 0 [N^2 s/m^2], by Green's integral along the arcs."""
-    return max(sum(walk_area([(piece.member.tracer, piece.arc) for piece in ring]) for ring in rings), 0.0)
-
-
 def _best_by_area(charted: dict[int, Member], shapes: Shapes) -> tuple[int, float]:
     """The member of the largest area within K >= 0, B >= 0 and that area; the polygons choose, to 1e-6."""
     cells = [shapes[index] for index in charted]
@@ -200,5 +204,4 @@ def _best_by_area(charted: dict[int, Member], shapes: Shapes) -> tuple[int, floa
         areas = shapely.area(shapely.clip_by_rect(cells, 0.0, 0.0, right, top))
     best = list(charted)[int(np.argmax(areas))]
     member = charted[best]
-    area = quadrant_area(member.tracer, member.rings) if member.peak else 0.0
-    return best, max(area, 0.0)
+    return best, quadrant_area(member.arcs, {best: member.tracer}) if member.peak else 0.0

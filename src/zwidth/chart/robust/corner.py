@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import Arc
+from zwidth.chart.arcs import Arc, Wall
 from zwidth.chart.robust.members import Member
-from zwidth.chart.tracer import Wall
 
 Floats = NDArray[np.float64]
 
@@ -26,11 +25,15 @@ SETTLED, ROUNDING, BLURRED = 1e-14, 1e-11, 1e-7
 
 @dataclass(frozen=True)
 class Run:
-    """Successive edges of a polygon on one arc, from the point `first` to the point `last` [K unit, B]."""
+    """Successive edges of a polygon on one arc, from the point `first` to the point `last` [K unit, B].
+
+    number  of the arc among the member's
+    whole   the arc
+    """
 
     member: Member
-    ring: int
-    place: int
+    number: int
+    whole: Arc
     first: Floats
     last: Floats
     angles: tuple[float, float]
@@ -40,14 +43,9 @@ class Run:
         """Distance of its ends [K unit, B]."""
         return float(np.hypot(*(self.last - self.first)))
 
-    @property
-    def whole(self) -> Arc:
-        """The arc that it is a part of."""
-        return self.member.rings[self.ring][self.place]
-
     def same_arc(self, other: Run) -> bool:
         """Whether two runs are parts of one arc."""
-        return (self.member.index, self.ring, self.place) == (other.member.index, other.ring, other.place)
+        return (self.member.index, self.number) == (other.member.index, other.number)
 
     def joined(self, later: Run) -> Run:
         """This run up to the end of a later one on the same arc."""
@@ -56,7 +54,7 @@ class Run:
     def at(self, u: float, unit: float) -> tuple[Floats, Floats]:
         """The wall at a parameter of the arc (angle, or share of the way along a line) and its derivative by it,
         in [K unit, B]."""
-        if self.whole.kind == "pair":
+        if self.whole.curved:
             K, B, dK, dB = self.member.tracer.wall(u)
             return np.array([K * unit, B]), np.array([dK * unit, dB])
         first, last = np.array([self.whole.first, self.whole.last]) * (unit, 1.0)
@@ -64,7 +62,7 @@ class Run:
 
     def parameter(self, angle: float, point: Floats, unit: float) -> float:
         """The parameter of a point [K unit, B] on the arc, at about this angle."""
-        if self.whole.kind == "pair":
+        if self.whole.curved:
             return min(max(angle, 1e-9), np.pi - 1e-9)
         first, last = np.array([self.whole.first, self.whole.last]) * (unit, 1.0)
         return float((point - first) @ (last - first) / ((last - first) @ (last - first)))
@@ -96,8 +94,7 @@ class Corner:
 
 def corner(one: Run, two: Run, unit: float, size: float) -> Corner:
     """Where one run gives way to the next."""
-    arcs = one.member.rings[one.ring]
-    follows = one.member is two.member and one.ring == two.ring and two.place == (one.place + 1) % len(arcs)
+    follows = one.member is two.member and two.number == one.member.arcs.following[one.number]
     if follows and np.hypot(*(one.last - np.multiply(one.whole.last, (unit, 1.0)))) <= 1e-6 * size:
         return Corner(one.whole.last, (one.whole.end, two.whole.start), 0.0)
     found = _meeting(one, two, unit, size)
@@ -130,8 +127,8 @@ def _meeting(one: Run, two: Run, unit: float, size: float) -> Corner | None:
         return None
     K, B = at / (unit, 1.0)
     angles = (
-        u if one.whole.kind == "pair" else one.whole.start,
-        v if two.whole.kind == "pair" else two.whole.start,
+        u if one.whole.curved else one.whole.start,
+        v if two.whole.curved else two.whole.start,
     )
     return Corner(
         (float(K), float(B)), (float(angles[0]), float(angles[1])), least if least > ROUNDING * size else 0.0
@@ -140,7 +137,7 @@ def _meeting(one: Run, two: Run, unit: float, size: float) -> Corner | None:
 
 def _within(run: Run, u: float) -> bool:
     """Whether a parameter lies on the arc, or next to it."""
-    if run.whole.kind != "pair":
+    if not run.whole.curved:
         return -1.0 <= u <= 2.0
     low, high = sorted((run.whole.start, run.whole.end))
     margin = 1e-9 + 1e-3 * (high - low)

@@ -9,13 +9,13 @@ solved for (`corner`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import Arc
+from zwidth.chart.arcs import Arc, Arcs
 from zwidth.chart.robust.corner import Run, corner
 from zwidth.chart.robust.members import Member
 
@@ -30,26 +30,12 @@ INSIDE = 1e-9
 
 
 @dataclass(frozen=True)
-class Piece:
-    """Part of a member's arc that edges the common set, the common set on its left.
-
-    ring, place  where the arc stands in the member's rings
-    arc          the part, its ends included
-    """
-
-    member: Member
-    ring: int
-    place: int
-    arc: Arc
-
-
-@dataclass(frozen=True)
 class _Segments:
     """All chords of some members' outlines with where they come from.
 
     ends    (n, 2, 2)  first and last point [K unit, B]
     angles  (n, 2)     theta there
-    origin  (n, 3)     place among the members, ring, place in the ring
+    origin  (n, 2)     place among the members, number of the arc
     """
 
     ends: Floats
@@ -57,15 +43,15 @@ class _Segments:
     origin: NDArray[np.int64]
 
 
-def pieces(shape: shapely.MultiPolygon, members: Sequence[Member], unit: float) -> tuple[list[list[Piece]], float]:
-    """The rings of a common set as pieces of the members' arcs, and the share of its size to which corners are
+def common_edge(shape: shapely.MultiPolygon, members: Sequence[Member], unit: float) -> tuple[Arcs, float]:
+    """The edge of a common set as pieces of the members' arcs, and the share of its size to which corners are
     known: rounding, but more where two arcs all but coincide.
 
     shape    [K unit, B], see `common_set.common`
     members  those that cut it out; where several have the same edge, the first of them gets it
     """
     if shape.is_empty:
-        return [], 0.0
+        return Arcs.of(()), 0.0
     low, bottom, right, top = shape.bounds
     size = max(right - low, top - bottom)
     segments = _segments(members, unit)
@@ -80,18 +66,17 @@ def pieces(shape: shapely.MultiPolygon, members: Sequence[Member], unit: float) 
             ring, blurred = _joined(runs, unit, size)
             rings.append(ring)
             blur = max(blur, blurred / size)
-    return rings, blur
+    return Arcs.of(rings), blur
 
 
 def _segments(members: Sequence[Member], unit: float) -> _Segments:
     ends, angles, origin = [], [], []
     for number, member in enumerate(members):
-        for ring, place, _ in member.arcs():
-            thetas, K, B = member.samples[ring][place]
+        for arc, (thetas, K, B) in enumerate(member.samples):
             points = np.column_stack([K * unit, B])
             ends.append(np.stack([points[:-1], points[1:]], axis=1))
             angles.append(np.column_stack([thetas[:-1], thetas[1:]]))
-            origin.append(np.broadcast_to([number, ring, place], (len(K) - 1, 3)))
+            origin.append(np.broadcast_to([number, arc], (len(K) - 1, 2)))
     return _Segments(np.concatenate(ends), np.concatenate(angles), np.concatenate(origin))
 
 
@@ -102,16 +87,16 @@ def _runs(points: Floats, members: Sequence[Member], segments: _Segments, near: 
     angles = np.array([[_angle(segments, k, point) for point in points[i : i + 2]] for i, k in enumerate(found)])
     changes = np.any(own != np.roll(own, 1, axis=0), axis=1)
     for i in np.flatnonzero(~changes):  # an arc that ends where it begins: past its own corner it is another run
-        number, ring, place = own[i]
-        changes[i] = _starts_anew(members[number].rings[ring][place], angles[i - 1, 1], angles[i, 0])
+        number, arc = own[i]
+        changes[i] = _starts_anew(members[number].arcs[arc], angles[i - 1, 1], angles[i, 0])
     starts = np.flatnonzero(changes) if changes.any() else np.array([0])
     runs = []
     for one, following in zip(starts, np.append(starts[1:], starts[0] + len(found)), strict=True):
         edges = np.arange(one, following) % len(found)
-        number, ring, place = (int(part) for part in own[edges[0]])
+        number, arc = own[edges[0]].tolist()
         first, last = points[edges[0]], points[edges[-1] + 1]
         ends = (float(angles[edges[0], 0]), float(angles[edges[-1], 1]))
-        runs.append(Run(members[number], ring, place, first, last, ends))
+        runs.append(Run(members[number], arc, members[number].arcs[arc], first, last, ends))
     return runs
 
 
@@ -197,24 +182,15 @@ def _merged(runs: list[Run]) -> list[Run]:
     return out
 
 
-def _joined(runs: list[Run], unit: float, size: float) -> tuple[list[Piece], float]:
-    """Runs as pieces between exact corners; and how far a corner that could not be solved for may be off."""
+def _joined(runs: list[Run], unit: float, size: float) -> tuple[list[Arc], float]:
+    """Runs as arcs between exact corners; and how far a corner that could not be solved for may be off."""
     if len(runs) == 1:
-        (run,) = runs
-        return [Piece(run.member, run.ring, run.place, run.whole)], 0.0
+        return [runs[0].whole], 0.0
     corners = [corner(run, runs[(k + 1) % len(runs)], unit, size) for k, run in enumerate(runs)]
-    out = []
-    for k, run in enumerate(runs):
-        before, after = corners[k - 1], corners[k]
-        whole, start, end = run.whole, before.angles[1], after.angles[0]
-        low, high = min(start, end), max(start, end)
-        thetas = whole.thetas[(whole.thetas > low) & (whole.thetas < high)]
-        out.append(
-            Piece(
-                run.member,
-                run.ring,
-                run.place,
-                replace(whole, first=before.wall, last=after.wall, start=start, end=end, thetas=thetas),
-            )
-        )
-    return out, max(corner.blur for corner in corners)
+    arcs = []
+    for run, before, after in zip(runs, [corners[-1], *corners[:-1]], corners, strict=True):
+        start, end = before.angles[1], after.angles[0]
+        thetas = run.whole.thetas
+        thetas = thetas[(thetas > min(start, end)) & (thetas < max(start, end))]
+        arcs.append(run.whole._replace(first=before.wall, last=after.wall, start=start, end=end, thetas=thetas))
+    return arcs, max(corner.blur for corner in corners)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from zwidth.chart.arc_joining import ChartError
-from zwidth.chart.arcs import Arc, Rings
-from zwidth.chart.cells import Samples, signed_area
+from zwidth.chart.arcs import MINUS, PLUS, Arcs, Walk
+from zwidth.chart.cells import signed_area
 from zwidth.chart.chart import traced, widest
 from zwidth.chart.hurwitz import is_stable, working_room
 from zwidth.chart.peak import Peak, stiffest
@@ -35,7 +35,7 @@ class Member:
 
     index     its place among the loops
     tracer    the loop on the unit circle
-    rings     arcs round each cell and hole
+    arcs      round each cell and hole, this index their member
     samples   angles, K and B along every arc
     outlines  (k, 2) closed walks of [K, B], one for each ring
     peak      its stiffest wall with K > 0, B >= 0; None if there is none
@@ -43,8 +43,8 @@ class Member:
 
     index: int
     tracer: Tracer
-    rings: Rings
-    samples: Samples
+    arcs: Arcs
+    samples: list[Walk]
     outlines: tuple[Floats, ...]
     peak: Peak | None
 
@@ -54,12 +54,6 @@ class Member:
             return False
         radius = np.abs(np.linalg.eigvals(self.tracer.loop.transition_matrix(K, B))).max()
         return bool(radius > 1.0 + BEYOND_DOUBT)
-
-    def arcs(self) -> Iterator[tuple[int, int, Arc]]:
-        """Ring, place in it, arc."""
-        for ring, arcs in enumerate(self.rings):
-            for place, arc in enumerate(arcs):
-                yield ring, place, arc
 
 
 def chart_members(loops: Sequence[Loop]) -> tuple[dict[int, Member], dict[int, str]]:
@@ -77,8 +71,9 @@ def chart_members(loops: Sequence[Loop]) -> tuple[dict[int, Member], dict[int, s
 def chart_member(index: int, loop: Loop) -> Member:
     """One loop's arcs, outlines and stiffest wall. Raises ChartError."""
     tracer = Tracer.of(loop)
-    rings, _, samples, outlines = traced(tracer)
-    return Member(index, tracer, rings, samples, tuple(outlines), stiffest(tracer, rings, widest(outlines)))
+    arcs, _, samples, outlines = traced(tracer)
+    arcs = replace(arcs, member=np.full(len(arcs), index))
+    return Member(index, tracer, arcs, samples, tuple(outlines), stiffest(arcs, {index: tracer}, widest(outlines)))
 
 
 def polygons(outlines: Sequence[Floats], unit: float) -> shapely.MultiPolygon:
@@ -110,10 +105,9 @@ def polygonal(geometry: shapely.Geometry) -> list[shapely.Polygon]:
 def curved_edges(member: Member, unit: float) -> shapely.MultiLineString:
     """The arcs of complex pairs, and chords over gaps, without their very ends; in [K unit, B]."""
     lines = []
-    for ring, place, arc in member.arcs():
-        if arc.kind in ROOTS:
+    for kind, (_, K, B) in zip(member.arcs.kind, member.samples, strict=True):
+        if kind in (PLUS, MINUS):
             continue
-        _, K, B = member.samples[ring][place]
         points = np.column_stack([K * unit, B])
         first, last = points[0] + TRIM * (points[1] - points[0]), points[-1] + TRIM * (points[-2] - points[-1])
         lines.append(np.vstack([first, points[1:-1], last]))

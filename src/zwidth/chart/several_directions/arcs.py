@@ -13,36 +13,18 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from zwidth.chart.arcs import CHORD, MINUS, PAIR, PLUS, Arc, Wall
 from zwidth.chart.several_directions.cells import Line
 from zwidth.chart.several_directions.eigenloci import Loci
 
 Floats = NDArray[np.float64]
-Wall = tuple[float, float]
 
 # Runs of sides shorter than this share of a ring's size are rounding of its corners.
 SHORT = 1e-7
 # A corner solved for lies within this share of the ring's size of the polygon's.
 STRAY = 1e-2
-# Largest distance of a chord from its arc, in shares of the ring's size.
-CHORD = 1e-6
-MOST_PIECES = 64
 # Sides on steps of a branch no further apart than this belong together.
 NEIGHBOURS = 3
-
-
-@dataclass(frozen=True)
-class LocusArc:
-    """A piece of edge from corner to corner, the stable side on its left (K to the right, B up).
-
-    branch       number of the eigenlocus; None for a line of real roots
-    first, last  its corners (K, B)
-    thetas       (k,)  angles from first to last, corners included, rising or falling; two for a line
-    """
-
-    branch: int | None
-    first: Wall
-    last: Wall
-    thetas: Floats
 
 
 @dataclass(frozen=True)
@@ -57,7 +39,7 @@ class _Run:
     length: float
 
 
-def ring_arcs(loci: Loci, lines: list[Line], ring: Floats) -> list[LocusArc]:
+def ring_arcs(loci: Loci, lines: list[Line], ring: Floats) -> list[Arc]:
     """A closed ring (k, 2) of walls [K T, B] as arcs in its order."""
     size = float(np.max(np.ptp(ring, axis=0)))
     runs = _long_runs(_runs(loci, lines, ring), SHORT * size)
@@ -71,11 +53,11 @@ def ring_arcs(loci: Loci, lines: list[Line], ring: Floats) -> list[LocusArc]:
         (first, _, start), (last, end, _) = before, after
         if run.curve >= m:
             angle = lines[run.curve - m].angle
-            arcs.append(LocusArc(None, first, last, np.array([angle, angle])))
+            arcs.append(Arc(MINUS if angle > 0.0 else PLUS, first, last, angle, angle, np.empty(0)))
             continue
         inner = loci.thetas[(loci.thetas > min(start, end)) & (loci.thetas < max(start, end))]
         inner = inner if start < end else inner[::-1]
-        arcs.append(LocusArc(run.curve, first, last, np.concatenate([[start], inner, [end]])))
+        arcs.append(Arc(PAIR if start != end else CHORD, first, last, start, end, inner, run.curve))
     return arcs
 
 
@@ -227,31 +209,3 @@ def _meet(loci: Loci, one: _Run, other: _Run) -> tuple[Floats, float, float] | N
         if abs(step[0]) <= 4e-15 * a and abs(step[1]) <= 4e-15 * b:
             break
     return 0.5 * (_walls(loci, one.curve, a)[0] + _walls(loci, other.curve, b)[0]), a, b
-
-
-def sample_arc(loci: Loci, arc: LocusArc, size: Floats) -> tuple[Floats, Floats, Floats]:
-    """Angles, K and B (k,) from corner to corner, with chords within CHORD of the size (2,) in K and B."""
-    if arc.branch is None or len(arc.thetas) < 2 or arc.thetas[0] == arc.thetas[-1]:
-        K, B = np.array([arc.first, arc.last]).T
-        return arc.thetas[[0, -1]], K, B
-    thetas = arc.thetas
-    middles = 0.5 * (thetas[1:] + thetas[:-1])
-    K, B = _on_arc(loci, arc, thetas)
-    Km, Bm, *_ = loci.at(arc.branch, middles)
-    sag = np.maximum(np.abs(Km - 0.5 * (K[1:] + K[:-1])) / size[0], np.abs(Bm - 0.5 * (B[1:] + B[:-1])) / size[1])
-    # beside theta = 0 and pi the curve is straight, and its evaluation all rounding
-    sag[(thetas[1:] * thetas[:-1] == 0.0) | (np.maximum(thetas[1:], thetas[:-1]) == np.pi)] = 0.0
-    pieces = np.clip(np.ceil(np.sqrt(sag / CHORD)), 1, MOST_PIECES).astype(int)
-    steps = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(thetas[:-1], thetas[1:], pieces, strict=True)]
-    fine = np.concatenate([*steps, thetas[-1:]])
-    K, B = _on_arc(loci, arc, fine)
-    return fine, K, B
-
-
-def _on_arc(loci: Loci, arc: LocusArc, thetas: Floats) -> tuple[Floats, Floats]:
-    """K and B at angles from corner to corner; the corners as they were solved for."""
-    assert arc.branch is not None
-    K, B = np.empty(len(thetas)), np.empty(len(thetas))
-    K[1:-1], B[1:-1], *_ = loci.at(arc.branch, thetas[1:-1])
-    (K[0], B[0]), (K[-1], B[-1]) = arc.first, arc.last
-    return K, B

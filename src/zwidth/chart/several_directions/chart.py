@@ -9,12 +9,15 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.polygon import orient
 
+from zwidth.chart.arcs import Arcs, sampled
+from zwidth.chart.area import quadrant_area
 from zwidth.chart.cells import Box, box_of, cells, outline
-from zwidth.chart.chart import BoundaryArc
-from zwidth.chart.several_directions.arcs import ring_arcs, sample_arc
+from zwidth.chart.chart import BoundaryArc, widest
+from zwidth.chart.peak import largest_damping, stiffest
+from zwidth.chart.several_directions.arcs import ring_arcs
+from zwidth.chart.several_directions.branch import Branch
 from zwidth.chart.several_directions.cells import Line, cut_lines, reach, real_root_lines, stable_polygons
 from zwidth.chart.several_directions.eigenloci import Loci, refine_loci, trace_loci, with_angles
-from zwidth.chart.several_directions.numbers import is_stable, largest_damping, quadrant_area, stiffest
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi import MultiLoop
 from zwidth.model.arguments import require
@@ -111,7 +114,7 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
         low, high = found + MARGIN * (found[1] - found[0]) * np.array([[-1.0], [1.0]])
         loci = refine_loci(loci, low, high, CLOSE)
         polygons = stable_polygons(loop, cut_lines(loci, lines, low, high))
-    return _measured(loop, loci, lines, polygons)
+    return _charted(loop, loci, lines, polygons)
 
 
 def _missed(loop: MultiLoop, polygons: list[shapely.Polygon]) -> Floats:
@@ -134,24 +137,33 @@ def _missed(loop: MultiLoop, polygons: list[shapely.Polygon]) -> Floats:
     return np.unique(centres[:, None] * (1.0 + np.concatenate([-steps, [0.0], steps])))
 
 
-def _measured(loop: MultiLoop, loci: Loci, lines: list[Line], polygons: list[shapely.Polygon]) -> MultiChart:
-    rings = [
-        ring_arcs(loci, lines, np.array(ring.coords))
-        for polygon in polygons
-        for ring in (orient(polygon).exterior, *orient(polygon).interiors)
-    ]
-    walls = shapely.get_coordinates(np.array(polygons)) / (loop.period, 1.0)
-    size, (width, height) = np.ptp(walls, axis=0), np.abs(walls).max(axis=0).tolist()
-    samples = [[sample_arc(loci, arc, size) for arc in ring] for ring in rings]
+def _charted(loop: MultiLoop, loci: Loci, lines: list[Line], polygons: list[shapely.Polygon]) -> MultiChart:
+    arcs = Arcs.of(
+        [
+            ring_arcs(loci, lines, np.array(ring.coords))
+            for polygon in polygons
+            for ring in (orient(polygon).exterior, *orient(polygon).interiors)
+        ]
+    )
+    size = np.ptp(shapely.get_coordinates(np.array(polygons)) / (loop.period, 1.0), axis=0)
+    branches = [Branch(loci, number, size) for number in range(loop.count)]
+    samples = sampled(arcs, branches)
+    outlines = [outline([samples[k] for k in ring]) for ring in arcs.rings]
+    width = widest(outlines)
     in_hertz = 1.0 / (2.0 * np.pi * loop.period)
-    peak = stiffest(loci, rings, width)
+    peak = stiffest(arcs, branches, width)
     return MultiChart(
         loop=loop,
-        regions=cells([outline(arcs) for arcs in samples]),
-        boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for arcs in samples for thetas, K, B in arcs),
+        regions=cells(outlines),
+        boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for thetas, K, B in samples),
         stiffness_max=peak.stiffness if peak else np.nan,
         damping_at_stiffness_max=peak.damping if peak else np.nan,
-        frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
-        damping_max=largest_damping(loci, rings, width, height, lambda K, B: is_stable(loop, K, B)),
-        stable_area=quadrant_area(loci, rings) if peak else 0.0,
+        frequencies_at_stiffness_max=tuple(sorted({a * in_hertz for a in peak.angles})) if peak else (),
+        damping_max=largest_damping(arcs, branches, width, lambda K, B: _is_stable(loop, K, B)),
+        stable_area=quadrant_area(arcs, branches) if peak else 0.0,
     )
+
+
+def _is_stable(loop: MultiLoop, wall_stiffness: float, wall_damping: float) -> bool:
+    """Whether all eigenvalues of the transition matrix lie inside the unit circle."""
+    return bool(np.abs(np.linalg.eigvals(loop.transition_matrix(wall_stiffness, wall_damping))).max() < 1.0)

@@ -1,16 +1,12 @@
-"""Arcs as points: dense enough that chords lie on the edge, and exact integrals along them."""
+"""Compiled along a piece of the curve: points dense enough that chords lie on it, sign changes, the integral."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import Arc, Rings
-from zwidth.chart.curve import wall_at, walls
-from zwidth.chart.tracer import Tracer
+from zwidth.chart.arcs import DRAWN_IN
+from zwidth.chart.curve import OF_B, OF_K, OF_SLOPE, wall_at, zero_between
 from zwidth.compiled import compiled
 from zwidth.loop.evaluate import Factors
 
@@ -20,29 +16,6 @@ Floats = NDArray[np.float64]
 CHORD = 1e-6
 MOST_POINTS = 4000
 HALVINGS = 60
-
-
-def arc_angles(arc: Arc) -> Floats:
-    """The angles that found an arc with its ends, from first to last (two for a line)."""
-    return np.concatenate([[arc.start], arc.thetas, [arc.end]])
-
-
-def sample_arc(tracer: Tracer, arc: Arc) -> tuple[Floats, Floats, Floats]:
-    """Angles, K and B (k,) from first to last corner, with chords within CHORD of the arc."""
-    if arc.kind != "pair":
-        K, B = np.array([arc.first, arc.last]).T
-        return np.array([arc.start, arc.end]), K, B
-    nodes = np.sort(arc_angles(arc))
-    inner = refined_angles(tracer.factors, tracer.radius, nodes, CHORD, MOST_POINTS)
-    K, B = walls(tracer.factors, tracer.radius, inner)
-    thetas = np.concatenate([nodes[:1], inner, nodes[-1:]])
-    if arc.start > arc.end:
-        thetas, K, B = thetas[::-1], K[::-1], B[::-1]
-    return (
-        thetas,
-        np.concatenate([[arc.first[0]], K, [arc.last[0]]]),
-        np.concatenate([[arc.first[1]], B, [arc.last[1]]]),
-    )
 
 
 @compiled
@@ -74,6 +47,24 @@ def refined_angles(factors: Factors, radius: float, nodes: Floats, tolerance: fl
                 out[count] = theta
                 count += 1
     return out[:count].copy()
+
+
+@compiled
+def sign_changes(factors: Factors, radius: float, nodes: Floats, component: int) -> Floats:
+    """Angles between ascending nodes, the outermost drawn in, where K (0), B (1) or dK/dtheta (2) changes sign."""
+    out, n = np.empty(len(nodes)), 0
+    low = nodes[0] + DRAWN_IN * (nodes[1] - nodes[0])
+    before = wall_at(factors, radius, low)[component]
+    for i in range(1, len(nodes)):
+        last = i == len(nodes) - 1
+        high = nodes[i] - (DRAWN_IN * (nodes[i] - nodes[i - 1]) if last else 0.0)
+        after = wall_at(factors, radius, high)[component]
+        if before * after < 0.0:
+            weights = OF_K if component == 0 else (OF_B if component == 1 else OF_SLOPE)
+            out[n] = zero_between(factors, radius, weights, low, high)
+            n += 1
+        low, before = high, after
+    return out[:n].copy()
 
 
 @compiled
@@ -118,41 +109,4 @@ def quadrant_integral(factors: Factors, radius: float, nodes: Floats) -> float:
                 low[depth + 1], high[depth + 1], value[depth + 1] = (low[depth], middle, left)
                 low[depth], value[depth] = middle, right
                 depth += 1
-    return total
-
-
-def segment_integral(first: tuple[float, float], last: tuple[float, float]) -> float:
-    """The same integral along a straight edge."""
-    (K0, B0), (K1, B1) = first, last
-    stops = [0.0, 1.0]
-    for a, b in ((K0, K1), (B0, B1)):
-        if a * b < 0.0:
-            stops.append(a / (a - b))
-    stops.sort()
-    total = 0.0
-    for s, t in pairwise(stops):
-        middle = 0.5 * (s + t)
-        K, B = K0 + middle * (K1 - K0), B0 + middle * (B1 - B0)
-        if K > 0.0 and B > 0.0:
-            total += K * (B1 - B0) * (t - s)
-    return total
-
-
-def quadrant_area(tracer: Tracer, rings: Rings) -> float:
-    """Area of the stable set within K >= 0, B >= 0 [N^2 s/m^2]."""
-    return sum(walk_area([(tracer, arc) for arc in ring]) for ring in rings)
-
-
-def walk_area(walk: Sequence[tuple[Tracer, Arc]]) -> float:
-    """Green's integral along a closed walk of arcs, each with its own tracer, within K >= 0, B >= 0 [N^2 s/m^2].
-
-    A blurred corner has two walls, the end of one arc and the beginning of the next: their chord counts.
-    """
-    total = 0.0
-    for n, (tracer, arc) in enumerate(walk):
-        if arc.kind == "pair":
-            total += quadrant_integral(tracer.factors, tracer.radius, arc_angles(arc))
-        else:
-            total += segment_integral(arc.first, arc.last)
-        total += segment_integral(arc.last, walk[(n + 1) % len(walk)][1].first)
     return total
