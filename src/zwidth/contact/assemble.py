@@ -1,4 +1,4 @@
-"""From loops, hands and walls to the arrays of the engine."""
+"""From loops and hands to the arrays of the engine."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SPRING, VARYING
 from zwidth.contact.hand import ARM, BRAKE, GRASP, Hand
-from zwidth.contact.machine import Computers, Devices
+from zwidth.contact.machine import Devices
 from zwidth.contact.stepping import Dynamics, Substep, dynamics, substep
-from zwidth.contact.velocity import velocity_estimate
-from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import undamped_modes, undeformed
 from zwidth.model.nonlinear import Counter
@@ -131,6 +129,7 @@ def devices(rigs: Sequence[Apparatus], substeps: int) -> Devices:
         step=np.zeros((D, C)),
         weight=np.zeros((D, C)),
         noise=np.zeros((D, C)),
+        encoder=np.zeros((D, C), dtype=np.int64),
     )
     for d, (rig, moving) in enumerate(zip(rigs, own, strict=True)):
         m = len(moving.generator)
@@ -160,6 +159,7 @@ def _fill_motions(found: Devices, d: int, rig: Apparatus) -> None:
     for c, counter in enumerate(rig.counters):
         found.channel[d, c, :n] = counter.along
         found.step[d, c], found.weight[d, c], found.noise[d, c] = counter.step, counter.weight, counter.noise
+        found.encoder[d, c] = c if counter.channel is None else counter.channel
 
 
 def _fill_part(found: Devices, d: int, part: int, step: Substep) -> None:
@@ -182,36 +182,3 @@ def motions_of(found: Devices, d: int, m: int) -> Floats:
     rows = np.zeros((E, 2, m))
     rows[:, 0, :n] = rows[:, 1, n : 2 * n] = found.along[d, :, :n]
     return rows.reshape(2 * E, m)
-
-
-def computers(rigs: Sequence[Apparatus]) -> Computers:
-    """What each computer does at a sample."""
-    own = [velocity_estimate(rig.loop.controller) for rig in rigs]
-    windows = [found.linear.window for found in own]
-    factors = [np.stack([found.linear.numerator, found.linear.denominator]) for found in own]
-    filters = [force_filter(rig.loop.controller) for rig in rigs]
-    return Computers(
-        period=np.array([rig.loop.period for rig in rigs]),
-        delay=np.array([rig.loop.whole_delay for rig in rigs]),
-        method=np.array([found.method for found in own]),
-        tuning=_stacked([found.tuning for found in own]),
-        window=_stacked(windows),
-        windowed=np.array([len(window) for window in windows]),
-        memory=np.array([max(found.memory, len(found.linear.window)) for found in own]),
-        estimator=_stacked(factors),
-        estimating=np.array([rows.shape[1] for rows in factors]),
-        filter=_stacked([np.stack([low.numerator, low.denominator]) for low in filters]),
-        filtering=np.array([len(low.numerator) for low in filters]),
-        limit=np.array([rig.limit for rig in rigs]),
-    )
-
-
-def _stacked(arrays: Sequence[Floats]) -> Floats:
-    """Arrays of one rank side by side, padded with zeros to the largest."""
-    shape = np.max([array.shape for array in arrays], axis=0)
-    return np.stack(
-        [
-            np.pad(array, [(0, most - own) for own, most in zip(array.shape, shape, strict=True)])
-            for array in arrays
-        ]
-    )

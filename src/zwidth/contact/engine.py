@@ -13,9 +13,21 @@ import numpy as np
 
 from zwidth.compiled import compiled, compiled_inline, compiled_parallel
 from zwidth.contact.account import Account, account, energy_of, enter_substep, settle
-from zwidth.contact.desk import Desk, commanded, count_encoders, desk_of, dot, estimated
+from zwidth.contact.computer import (
+    Computer,
+    Computers,
+    Signals,
+    arrived_command,
+    clip,
+    computer_at,
+    estimate_velocity,
+    filter_force,
+    read_encoder,
+    send,
+    signals_of,
+)
 from zwidth.contact.elements import COULOMB, VARYING
-from zwidth.contact.environments import environment_at
+from zwidth.contact.environments import MEMORY, environment_at
 from zwidth.contact.hand import follow_varying, hand_force, set_varying
 from zwidth.contact.machine import (
     FORCE,
@@ -23,14 +35,36 @@ from zwidth.contact.machine import (
     READING,
     TRUTH,
     VELOCITY,
-    Computers,
     Devices,
     Members,
     Records,
 )
+from zwidth.contact.passivity import MEMORY as PASSIVITY
 from zwidth.contact.passivity import passivity_force
 from zwidth.contact.plant_step import Motion, answer, hold, look_ahead, motion_from, rub, step
 from zwidth.model.mechanism import Floats, Ints
+
+
+@compiled_inline
+def dot(a: Floats, row: int, b: Floats, start: int, count: int) -> float:
+    """a[row, :count] . b[start:start + count]"""
+    total = 0.0
+    for k in range(count):
+        total += a[row, k] * b[start + k]
+    return total
+
+
+@compiled_inline
+def read_sensor(devices: Devices, d: int, states: Floats, truth: float, seed: np.uint64, sample: int) -> float:
+    """The reading as the encoders count it; the true one where they have neither steps nor noise."""
+    reading, exact = 0.0, True
+    for c in range(devices.weight.shape[1]):
+        place, step, noise = 0.0, devices.step[d, c], devices.noise[d, c]
+        for k in range(devices.size[d]):
+            place += devices.channel[d, c, k] * states[k]
+        exact = exact and step == 0.0 and noise == 0.0
+        reading += devices.weight[d, c] * read_encoder(place, step, noise, seed, sample, devices.encoder[d, c])
+    return truth if exact else reading
 
 
 @compiled_inline
@@ -83,20 +117,19 @@ def through_interval(
     members: Members,
     m: int,
     time: float,
-    period: float,
     j: int,
     records: Records,
     own: Motion,
-    desk: Desk,
+    computer: Computer,
+    signals: Signals,
     book: Account,
     varies: bool,
 ) -> None:
     """From sample j to the next: part 0 with the command of one sample more of delay, then part 1."""
-    d, trail = members.device[m], records.handle
+    d, trail, period = members.device[m], records.handle, computer.period
     early, late = devices.substeps[d, 0], devices.substeps[d, 1]
-    whole = desk.queue.size - 2
     for part in range(2):
-        begun, command = time + part * early * devices.length[d, 0], desk.queue[whole + 1 - part]
+        begun, command = time + part * early * devices.length[d, 0], arrived_command(computer, signals, 0, part)
         count, first, h = devices.substeps[d, part], j * (early + late) + part * early, devices.length[d, part]
         stride = 1 if varies else max(count, 1)
         for k in range(0, count, stride):
@@ -121,34 +154,30 @@ def run_member(
     velocity as it is.
     """
     force, d = environment_at(address), members.device[m]
-    T, n, wall, values = computers.period[d], devices.size[d], members.wall[m], members.values[m]
-    own, desk, exact, ideal = (
-        motion_from(devices, members.start[m]),
-        desk_of(computers, d),
-        desk_of(computers, d),
-        desk_of(computers, d),
-    )
-    states, watch, reflex, traces = own.states, members.observer[m], members.reflex[m], records.traces
+    computer, own = computer_at(computers, d), motion_from(devices, members.start[m])
+    T, n, wall, values = computer.period, devices.size[d], members.wall[m], members.values[m]
+    signals, exact = signals_of(computer, 1, 1), signals_of(computer, 1, 1)
+    memory, sampled_memory, law_memory = np.zeros(MEMORY), np.zeros(MEMORY), np.zeros(MEMORY)
+    states, watch, observer = own.states, members.observer[m], np.zeros(PASSIVITY)
+    reflex, traces = members.reflex[m], records.traces
     watched, booked = not np.isnan(watch[0]), records.ledger.shape[1] > 0
     varies = bool(np.any(devices.kind[d] == VARYING))
     book, started = account(devices, booked), energy_of(devices, d, states)
-    origin, true_origin = 0.0, 0.0
     for j in range(samples):
         time, truth = j * T, dot(devices.sensor, d, states, 0, n)
-        counted = count_encoders(devices, d, states, truth, members.seed[m], j)
-        if j == 0:
-            origin, true_origin = counted, truth
-        speed = estimated(computers, d, counted - origin, desk)
-        asked = force(counted - wall, speed, time, T, values, desk.environment)
-        given = passivity_force(desk.observer, watch, asked, counted, T) if watched else asked
+        counted = read_sensor(devices, d, states, truth, members.seed[m], j)
+        speed = estimate_velocity(computer, signals, 0, counted, j)
+        asked = force(counted - wall, speed, time, T, values, memory)
+        given = passivity_force(observer, watch, asked, counted, T) if watched else asked
         if booked:
-            smooth = estimated(computers, d, truth - true_origin, exact)
-            sampled = force(truth - wall, smooth, time, T, values, exact.environment)
+            smooth = estimate_velocity(computer, exact, 0, truth, j)
+            sampled = force(truth - wall, smooth, time, T, values, sampled_memory)
             true_speed = dot(devices.sensor, d, states, n, n)
-            law = force(truth - wall, true_speed, time, T, values, ideal.environment)
+            law = force(truth - wall, true_speed, time, T, values, law_memory)
             settle(book, truth, law, sampled, asked, given, energy_of(devices, d, states) - started)
             records.ledger[m, j] = book.entries
-        command = commanded(computers, d, given, desk)
+        command = clip(filter_force(computer, signals, 0, given), computer.limit)
+        send(signals, 0, command)
         traces[m, j, READING], traces[m, j, TRUTH], traces[m, j, VELOCITY] = counted, truth, speed
         traces[m, j, FORCE], traces[m, j, HANDLE] = command, dot(devices.handle, d, states, 0, n)
         records.samples[m] = j + 1
@@ -156,7 +185,7 @@ def run_member(
             break
         if varies:
             set_varying(devices, d, reflex, time, T, given, states, own.memory)
-        through_interval(devices, members, m, time, T, j, records, own, desk, book, varies)
+        through_interval(devices, members, m, time, j, records, own, computer, signals, book, varies)
 
 
 @compiled_parallel

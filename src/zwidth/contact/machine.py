@@ -1,4 +1,4 @@
-"""The arrays that the engine works on: devices, their computers, and the members of a batch.
+"""The arrays that the engine works on: devices, and the members of a batch; `computer` has those of the computers.
 
 Leading axis D: devices of the batch, padded to one size with zeros; a member names its device by index.
 """
@@ -37,6 +37,7 @@ class Devices(NamedTuple):
     sensor      (D, n)          what is read, as it is
     handle      (D, n)          where the hand is;   push (D, n)  where its push acts
     channel     (D, C, n)       motions that are counted;   step, weight, noise (D, C)
+    encoder     (D, C)          numbers of the encoders, by which they draw their noise
     """
 
     transition: Floats
@@ -57,32 +58,7 @@ class Devices(NamedTuple):
     step: Floats
     weight: Floats
     noise: Floats
-
-
-class Computers(NamedTuple):
-    """D computers.
-
-    period       (D,)       T [s];   delay (D,)  whole samples
-    method       (D,)       LINEAR, FOAW or LEVANT;   tuning (D, 4)  of the latter two
-    window       (D, W)     weights of the newest readings;   windowed (D,)  how many
-    memory       (D,)       numbers that the estimate remembers
-    estimator    (D, 2, k, 3)  numerators, denominators in d = z - 1;   estimating (D,)  how many
-    filter       (D, 2, k, 3)  of the force;   filtering (D,)
-    limit        (D,)       largest command [N]
-    """
-
-    period: Floats
-    delay: Ints
-    method: Ints
-    tuning: Floats
-    window: Floats
-    windowed: Ints
-    memory: Ints
-    estimator: Floats
-    estimating: Ints
-    filter: Floats
-    filtering: Ints
-    limit: Floats
+    encoder: Ints
 
 
 class Members(NamedTuple):

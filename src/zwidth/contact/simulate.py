@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.conditions.dry import reading_noise, reading_step
-from zwidth.contact.assemble import Apparatus, computers, devices, motions_of
+from zwidth.contact.assemble import Apparatus, devices, motions_of
+from zwidth.contact.computer import computers
 from zwidth.contact.engine import run_batch
 from zwidth.contact.environments.environment import Environment
 from zwidth.contact.hand import PUSH_NUMBERS, REFLEX_NUMBERS, Hand
@@ -124,7 +125,8 @@ def simulate_batch(
         f"{m} run{'s' * (m > 1)} of {S} samples",
         "simulate a shorter time, or fewer runs at once",
     )
-    plants, own = devices(rigs, substeps), computers(rigs)
+    plants = devices(rigs, substeps)
+    own = computers([rig.loop.controller for rig in rigs], [rig.limit for rig in rigs])
     records = Records(
         np.zeros(m, dtype=np.int64),
         np.full((m, S, TRACES), np.nan),

@@ -66,7 +66,8 @@ def _counters(drives: Drives, h: Floats, counted: Floats) -> tuple[Counter, ...]
         return ()
     step = np.where(known, 2.0 * np.pi / np.where(known, counts * n, 1.0), 0.0)
     return tuple(
-        Counter(counted[i], float(step[i]), weight=float(h[i]), noise=float(noise[i])) for i in np.flatnonzero(h)
+        Counter(counted[i], float(step[i]), weight=float(h[i]), noise=float(noise[i]), channel=int(i))
+        for i in np.flatnonzero(h)
     )
 
 

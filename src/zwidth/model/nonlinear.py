@@ -64,14 +64,17 @@ class Friction:
 class Counter:
     """One encoder: its part of the reading is weight * step * round((along . x + noise) / step).
 
-    step    of along . x [m or rad]; 0: as fine as you like
-    noise   standard deviation of what is added before rounding [m or rad]
+    step     of along . x [m or rad]; 0: as fine as you like
+    noise    standard deviation of what is added before rounding [m or rad]
+    channel  number of the encoder, which says what noise it draws: of a mechanism that of its drive; None: its
+             place among the plant's counters
     """
 
     along: Floats
     step: float
     weight: float = 1.0
     noise: float = 0.0
+    channel: int | None = None
 
 
 @dataclass(frozen=True)

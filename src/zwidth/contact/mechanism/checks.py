@@ -48,7 +48,7 @@ def motion_inputs(
         raise MotionError(f"substeps must be a whole number from 1 to {MOST_SUBSTEPS}, got {substeps}")
     samples = int(np.ceil(duration / controller.sampling_period - 1e-9))
     check_room(
-        samples * (20.0 + 12.0 * drives),
+        samples * (23.0 + 12.0 * drives),
         f"{samples} samples of a motion of {duration:g} s",
         "simulate a shorter one",
     )

@@ -7,8 +7,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from zwidth.compiled import compiled, compiled_lean
+from zwidth.contact.computer import Computer, Computers, arrived_command, computer_at
 from zwidth.contact.mechanism.acceleration import configure
-from zwidth.contact.mechanism.computer import Desk, command, desk_of, estimate, look
+from zwidth.contact.mechanism.computer import Rendering, look, render, rendering_of
 from zwidth.contact.mechanism.law import Law
 from zwidth.contact.mechanism.stepping import linearise, prepare, step, turned
 from zwidth.contact.mechanism.surfaces import penetration
@@ -30,13 +31,14 @@ NEAR_SINGULAR: Final = (
 class Trace(NamedTuple):
     """What is kept of each sample, k of them.
 
-    state (k, N);   position, seen, force (k, 3);   torque (k, d) at the joints;   depth (k,)
+    state (k, N);   position, seen, velocity, force (k, 3);   torque (k, d) at the joints;   depth (k,)
     energy (k, 3)  kinetic, elastic, gravitational [J];   work (k, 3)  by the hand, by the motors, against friction
     """
 
     state: Floats
     position: Floats
     seen: Floats
+    velocity: Floats
     force: Floats
     torque: Floats
     depth: Floats
@@ -48,21 +50,21 @@ class Trace(NamedTuple):
 def run(
     system: System,
     law: Law,
+    computers: Computers,
     start: Floats,
     angles: Floats,
     push: Floats,
-    noise: Floats,
-    period: float,
     fraction: float,
     substeps: int,
     trace: Trace,
 ) -> tuple[int, int]:
     """Fill the trace sample by sample; the status, and how many samples were reached.
 
+    computers  the one that renders the law;   fraction  of its delay that is no whole sample
     start (N,) first state, angles (links,) near its posture;   push (1 or samples, 3) at the handle
-    noise (0 or samples + 1, d) of the encoders;   fraction  of the delay that is no whole sample
     """
-    memory, desk = memory_of(system), desk_of(system.mech, law)
+    computer, memory = computer_at(computers, 0), memory_of(system)
+    own, period = rendering_of(system.mech, computer), computer.period
     d, samples = system.mech.driven, trace.depth.size - 1
     x, trial, hand = start.copy(), np.zeros(start.size), np.zeros(3)
     friction, resting, work = np.zeros(d), np.zeros(d), np.zeros(3)
@@ -72,19 +74,18 @@ def run(
         counts[0] = max(1, int(np.ceil(fraction * substeps)))
         counts[1] = max(1, int(np.ceil((1.0 - fraction) * substeps)))
     for i in range(angles.size):
-        memory.angles[i], desk.angles[i] = angles[i], angles[i]
+        memory.angles[i], own.angles[i] = angles[i], angles[i]
     ready(system.mech, memory.angles, memory.work)
-    ready(system.mech, desk.angles, desk.work)
+    ready(system.mech, own.angles, own.work)
     for j in range(samples + 1):
         status = judge(system, memory, x, configure(system, memory, x))
         if status != DONE:
             return status, j
         observe(system, memory, law, x, hand, work, trace, j)
-        if not look(system, law, desk, x, noise, j):
+        if not look(system, law, own, x, j):
             return LOOP_LOST, j
-        estimate(law, desk, j)
-        command(law, desk)
-        note(desk, trace, j)
+        render(law, computer, own, j)
+        note(own, trace, j)
         if j == samples:
             break
         if j == 0 or turned(memory, x):
@@ -99,7 +100,7 @@ def run(
         for part in range(2):
             if counts[part] == 0:
                 continue
-            hold(system, memory, desk.torque, law.whole + 1 - part)
+            hold(system, memory, computer, own, part)
             work[1] -= exchanged(system, memory, x)
             for _ in range(counts[part]):
                 if not configured and configure(system, memory, x) < 0.0:
@@ -186,19 +187,18 @@ def observe(
 
 
 @compiled_lean
-def note(desk: Desk, trace: Trace, j: int) -> None:
-    """What the computer sees and commands."""
-    seen, force, torque = trace.seen, trace.force, trace.torque
+def note(own: Rendering, trace: Trace, j: int) -> None:
+    """What the computer sees, estimates and commands."""
+    seen, velocity, force, torque = trace.seen, trace.velocity, trace.force, trace.torque
     for k in range(3):
-        seen[j, k] = desk.seen[k]
-        force[j, k] = desk.force[k]
+        seen[j, k], velocity[j, k], force[j, k] = own.seen[k], own.speed[k], own.force[k]
     for i in range(torque.shape[1]):
-        torque[j, i] = desk.torque[0, i]
+        torque[j, i] = own.signals.queue[i, 0]
 
 
 @compiled_lean
-def hold(system: System, memory: Memory, torque: Floats, late: int) -> None:
-    """Let the motors take the command of `late` - whole samples ago: at once, or through their lag."""
+def hold(system: System, memory: Memory, computer: Computer, own: Rendering, part: int) -> None:
+    """Let the motors take the command of this part of the interval: at once, or through their lag."""
     held, follow, motor, lagging = memory.hold, memory.command, system.motor, system.lag_command
     for i in range(held.size):
         held[i] = 0.0
@@ -206,11 +206,11 @@ def hold(system: System, memory: Memory, torque: Floats, late: int) -> None:
     for k in range(lagging.size):
         follow[k] = 0.0
         if lagging[k] >= 0:
-            follow[k] = torque[late, lagging[k]]
+            follow[k] = arrived_command(computer, own.signals, lagging[k], part)
             straight = False
     if straight:
         for i in range(motor.size):
-            held[motor[i]] = torque[late, i]
+            held[motor[i]] = arrived_command(computer, own.signals, i, part)
 
 
 @compiled_lean

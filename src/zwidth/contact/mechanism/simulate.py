@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth.contact.computer import computers
 from zwidth.contact.mechanism import run as kernel
 from zwidth.contact.mechanism.checks import MotionError, check_choice, check_wall, motion_inputs, start_rates
 from zwidth.contact.mechanism.law import law_of
@@ -52,6 +53,7 @@ class MechanismMotion:
     time             (k,) [s]
     position         (k, 3)  where the handle is [m]
     counted_position (k, 3)  where the computer sees it, the kinematics of the counted angles [m]
+    velocity         (k, 3)  of the handle as the computer estimates it [m/s]
     depth            (k,)    how deep it truly is in the wall, negative outside; -inf without a surface [m]
     joints, motors   (k, d)  driven joints' angles, and the motors' at the joint [rad]
     joint_rates, motor_rates (k, d)  [rad/s]
@@ -66,6 +68,7 @@ class MechanismMotion:
     time: Floats
     position: Floats
     counted_position: Floats
+    velocity: Floats
     depth: Floats
     joints: Floats
     motors: Floats
@@ -147,7 +150,6 @@ def simulate_mechanism(
         check_wall(wall.stiffness, wall.damping, surface)
     position = mechanism.reference_position if at is None else at
     posture = solve_posture(mechanism, position, assembly)
-    period = controller.sampling_period
     inputs = motion_inputs(mechanism, controller, duration, push, gravity, substeps, len(posture.jacobian[0]))
     rates = start_rates(posture, start_velocity)
     shape, mech = packed(surface), pack(mechanism)
@@ -161,13 +163,12 @@ def simulate_mechanism(
     trace = _room(inputs.samples + 1, len(start), len(system.motor))
     gains = (0.0, 0.0, False) if wall is None else (float(wall.stiffness), float(wall.damping), wall.no_pull)
     read = system.motor if encoders == "motor" else np.arange(len(system.motor))
-    law = law_of(mechanism.drives, controller, shape, gains, read, counted, torque_limits == "together")
-    noise = _noise(mechanism, inputs.samples + 1, seed, counted)
+    law = law_of(mechanism.drives, shape, gains, read, counted, seed, torque_limits == "together")
     status, reached = kernel.run(
-        system, law, start, posture.angles.copy(), inputs.push, noise, period, controller.fractional_delay,
-        substeps, trace,
+        system, law, computers([controller], [controller.saturation]), start, posture.angles.copy(), inputs.push,
+        controller.fractional_delay, substeps, trace,
     )  # fmt: skip
-    return _motion(system, trace, status, reached, period)
+    return _motion(system, trace, status, reached, controller.sampling_period)
 
 
 def _start(mechanism: Mechanism, posture: Posture, system: System, rates: Floats) -> Floats:
@@ -185,22 +186,13 @@ def _room(samples: int, states: int, drives: int) -> kernel.Trace:
         state=np.empty((k, states)),
         position=np.empty((k, 3)),
         seen=np.empty((k, 3)),
+        velocity=np.empty((k, 3)),
         force=np.empty((k, 3)),
         torque=np.empty((k, drives)),
         depth=np.empty(k),
         energy=np.empty((k, 3)),
         work=np.empty((k, 3)),
     )
-
-
-def _noise(mechanism: Mechanism, samples: int, seed: int, counted: bool) -> Floats:
-    """Noise of the encoders at the joints, (samples, d), or (0, d) where there is none."""
-    drives = mechanism.drives
-    parts = drives.nonlinearity
-    if not counted or parts is None or not np.any(parts.encoder_noise > 0.0):
-        return np.zeros((0, len(drives.names)))
-    spread = parts.encoder_noise / drives.transmission
-    return np.random.default_rng(seed).normal(size=(samples, len(spread))) * spread
 
 
 def _motion(system: System, trace: kernel.Trace, status: int, reached: int, period: float) -> MechanismMotion:
@@ -214,6 +206,7 @@ def _motion(system: System, trace: kernel.Trace, status: int, reached: int, peri
         time=np.arange(reached, dtype=np.float64) * period,
         position=trace.position[:reached],
         counted_position=trace.seen[:reached],
+        velocity=trace.velocity[:reached],
         depth=trace.depth[:reached],
         joints=state[:, :d].copy(),
         motors=state[:, motor].copy(),

@@ -1,0 +1,259 @@
+"""The sampled computer of both simulators: encoders, velocity estimate, force filter, force limit, delay.
+
+Each kernel works on one signal. The simulation of one rendered direction reads one coordinate and sends one
+command; that of a whole mechanism reads the three coordinates of the handle, in which it filters the force, too,
+and sends one command to each motor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.compiled import compiled, compiled_inline
+from zwidth.contact.noise import normal
+from zwidth.loop.controller import Controller
+from zwidth.loop.estimator import Estimator
+from zwidth.loop.estimators.foaw import Foaw
+from zwidth.loop.estimators.foaw_kernel import foaw_estimate
+from zwidth.loop.estimators.levant import Levant
+from zwidth.loop.estimators.levant_kernel import levant_estimate
+from zwidth.loop.filters import force_filter, low_pass_factors, velocity_estimator
+from zwidth.model.mechanism import Floats, Ints
+
+LINEAR: Final = 0
+FOAW: Final = 1
+LEVANT: Final = 2
+
+
+class Computer(NamedTuple):
+    """One computer. Factors are rows (c2, c1, c0) of c2 d^2 + c1 d + c0 with d = z - 1, denominators monic.
+
+    period     T [s]
+    delay      whole samples that a command waits; the rest of the delay is the simulator's
+    method     of the velocity estimate: LINEAR, FOAW or LEVANT;   tuning  parameters of the latter two
+    memory     numbers that the estimate remembers of a coordinate
+    window     (w,)       weights of the newest w readings, in a linear estimate
+    estimator  (k, 2, 3)  numerator and denominator of each factor behind the estimate
+    filter     (f, 2, 3)  of the force
+    limit      largest force [N]
+    """
+
+    period: float
+    delay: int
+    method: int
+    tuning: Floats
+    memory: int
+    window: Floats
+    estimator: Floats
+    filter: Floats
+    limit: float
+
+
+class Computers(NamedTuple):
+    """D computers, each number of `Computer` with a leading axis (D, ...), padded to one size with zeros.
+
+    windowed, estimating, filtering  (D,)  how many weights and factors each has
+    """
+
+    period: Floats
+    delay: Ints
+    method: Ints
+    tuning: Floats
+    memory: Ints
+    window: Floats
+    windowed: Ints
+    estimator: Floats
+    estimating: Ints
+    filter: Floats
+    filtering: Ints
+    limit: Floats
+
+
+class Signals(NamedTuple):
+    """What a computer remembers of s coordinates and c commands.
+
+    first     (s,)         the first reading
+    past      (s, memory)  what the estimate looks back on
+    stages    (s, k, 2)    states of the factors behind it
+    filtered  (s, f, 2)    states of the force's filter
+    queue     (c, delay + 2)  commands on their way, the newest first
+    """
+
+    first: Floats
+    past: Floats
+    stages: Floats
+    filtered: Floats
+    queue: Floats
+
+
+class Velocity(NamedTuple):
+    """A velocity estimate in numbers, as in `Computer`; for FOAW and LEVANT `linear` is the filter behind it."""
+
+    method: int
+    tuning: Floats
+    memory: int
+    linear: Estimator
+
+
+def velocity_estimate(controller: Controller) -> Velocity:
+    """How the computer estimates velocities."""
+    own = controller.velocity
+    if not isinstance(own, Foaw | Levant):
+        found = velocity_estimator(controller)
+        return Velocity(LINEAR, np.zeros(1), len(found.window), found)
+    factors = low_pass_factors(controller.velocity_filter, controller.sampling_period)
+    rows = (np.array(part, dtype=np.float64).reshape(-1, 3) for part in factors)
+    return Velocity(FOAW if isinstance(own, Foaw) else LEVANT, own.parameters, own.memory_size, Estimator(*rows))
+
+
+def computers(controllers: Sequence[Controller], limits: Sequence[float]) -> Computers:
+    """The computers of these controllers, whose largest forces are `limits` [N]."""
+    estimates = [velocity_estimate(controller) for controller in controllers]
+    windows = [found.linear.window for found in estimates]
+    factors = [np.stack([found.linear.numerator, found.linear.denominator], axis=1) for found in estimates]
+    low_passes = [force_filter(controller) for controller in controllers]
+    filters = [np.stack([found.numerator, found.denominator], axis=1) for found in low_passes]
+    return Computers(
+        period=np.array([float(controller.sampling_period) for controller in controllers]),
+        delay=np.array([controller.whole_delay for controller in controllers], dtype=np.int64),
+        method=np.array([found.method for found in estimates], dtype=np.int64),
+        tuning=_stacked([found.tuning for found in estimates]),
+        memory=np.array([max(found.memory, 1) for found in estimates], dtype=np.int64),
+        window=_stacked(windows),
+        windowed=np.array([len(window) for window in windows], dtype=np.int64),
+        estimator=_stacked(factors),
+        estimating=np.array([len(rows) for rows in factors], dtype=np.int64),
+        filter=_stacked(filters),
+        filtering=np.array([len(rows) for rows in filters], dtype=np.int64),
+        limit=np.array(limits, dtype=np.float64),
+    )
+
+
+def _stacked(arrays: Sequence[Floats]) -> NDArray[np.float64]:
+    """Arrays of one rank side by side, padded with zeros to the largest."""
+    shape = np.max([array.shape for array in arrays], axis=0)
+    return np.stack(
+        [
+            np.pad(array, [(0, most - own) for own, most in zip(array.shape, shape, strict=True)])
+            for array in arrays
+        ]
+    )
+
+
+@compiled
+def computer_at(batch: Computers, d: int) -> Computer:
+    """Computer d of a batch, without padding."""
+    return Computer(
+        batch.period[d],
+        batch.delay[d],
+        batch.method[d],
+        batch.tuning[d],
+        batch.memory[d],
+        batch.window[d, : batch.windowed[d]],
+        batch.estimator[d, : batch.estimating[d]],
+        batch.filter[d, : batch.filtering[d]],
+        batch.limit[d],
+    )
+
+
+@compiled
+def signals_of(computer: Computer, coordinates: int, commands: int) -> Signals:
+    """The memory of a computer that has just been switched on."""
+    return Signals(
+        np.zeros(coordinates),
+        np.zeros((coordinates, computer.memory)),
+        np.zeros((coordinates, computer.estimator.shape[0], 2)),
+        np.zeros((coordinates, computer.filter.shape[0], 2)),
+        np.zeros((commands, computer.delay + 2)),
+    )
+
+
+@compiled_inline
+def read_encoder(place: float, step: float, noise: float, seed: np.uint64, sample: int, channel: int) -> float:
+    """What an encoder reads at a place: with its noise, rounded to the nearest step, half a step upwards.
+
+    step     0: as fine as you like;   noise  standard deviation of what is added before rounding, in the same unit
+    channel  number of the encoder: each draws noise of its own
+    """
+    if noise > 0.0:
+        place += noise * normal(seed, sample, channel)
+    if step > 0.0:
+        return float(step * np.floor(place / step + 0.5))
+    return place
+
+
+@compiled_inline
+def cascade(factors: Floats, states: Floats, signal: float) -> float:
+    """A signal through factors (k, 2, 3): (c2 d^2 + c1 d + c0)/(D2 d^2 + D1 d + D0), d = z - 1, monic below.
+
+    In observer form, whose states (k, 2) are zero at rest at zero:  y = c x + s1,  d s1 = s2 + ..,  d s2 = ..
+    """
+    for k in range(factors.shape[0]):
+        c2, c1, c0 = factors[k, 0, 0], factors[k, 0, 1], factors[k, 0, 2]
+        lead, d1, d0 = factors[k, 1, 0], factors[k, 1, 1], factors[k, 1, 2]
+        first, second = states[k, 0], states[k, 1]
+        if lead == 0.0:
+            out = c1 * signal + first
+            states[k, 0] = first + c0 * signal - d0 * out
+        else:
+            out = c2 * signal + first
+            states[k, 0] = first + second + c1 * signal - d1 * out
+            states[k, 1] = second + c0 * signal - d0 * out
+        signal = out
+    return signal
+
+
+@compiled_inline
+def weigh_readings(window: Floats, past: Floats, reading: float) -> float:
+    """The reading and those before it, weighed; past[0] is the reading before this one, and is moved on."""
+    total = float(window[0] * reading)
+    for k in range(window.size - 1, 0, -1):
+        total += window[k] * past[k - 1]
+        past[k - 1] = past[k - 2] if k > 1 else reading
+    return total
+
+
+@compiled_inline
+def estimate_velocity(computer: Computer, signals: Signals, s: int, reading: float, sample: int) -> float:
+    """The estimated velocity of coordinate s, which stood where it was first read before sample 0."""
+    if sample == 0:
+        signals.first[s] = reading
+    past, moved = signals.past[s], reading - signals.first[s]
+    if computer.method == FOAW:
+        speed = foaw_estimate(past, computer.tuning, moved, computer.period)
+    elif computer.method == LEVANT:
+        speed = levant_estimate(past, computer.tuning, moved, computer.period)
+    else:
+        speed = weigh_readings(computer.window, past, moved)
+    return cascade(computer.estimator, signals.stages[s], speed)
+
+
+@compiled_inline
+def filter_force(computer: Computer, signals: Signals, s: int, force: float) -> float:
+    """The force along coordinate s behind the force's filter."""
+    return cascade(computer.filter, signals.filtered[s], force)
+
+
+@compiled_inline
+def clip(signal: float, limit: float) -> float:
+    """The signal, cut off at +-limit."""
+    return min(max(signal, -limit), limit)
+
+
+@compiled_inline
+def send(signals: Signals, c: int, command: float) -> None:
+    """Put a command at the head of queue c."""
+    queue = signals.queue
+    for k in range(queue.shape[1] - 1, 0, -1):
+        queue[c, k] = queue[c, k - 1]
+    queue[c, 0] = command
+
+
+@compiled_inline
+def arrived_command(computer: Computer, signals: Signals, c: int, part: int) -> float:
+    """The command that motor c has in part 0 and 1 of an interval; in part 0 it is one sample older."""
+    return float(signals.queue[c, computer.delay + 1 - part])
