@@ -5,8 +5,7 @@ A vibration is its root z and its sizes, one row of numbers:
     [amplitude at the sensor, amplitude of the force, velocities at the frictions, readings, deflections]
 
 From sizes to gains (`contact.describing`), from gains to the transition matrix of the sampled loop, from its
-eigenvectors to sizes again. One wall needs ten thousand small matrices and more. Their exponential is a series
-summed here: a linear algebra library shares even a matrix of five rows among threads that wait for each other.
+eigenvectors to sizes again. One wall needs ten thousand small matrices and more.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from zwidth.compiled import compiled
 from zwidth.contact.describing import bent_spring_gain, damper_gain, quantiser_gain, saturation_gain
-from zwidth.contact.mechanism.stepping import multiply
+from zwidth.contact.exponential import exponential, multiply
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -32,8 +31,6 @@ BLOCK: Final = 25  # iterations, of which the largest change is compared with th
 NEARER: Final = 0.9  # ratio of the two from which nothing comes nearer to agreement
 ROUNDS: Final = 4  # times that a faster vibration of the loop so found is followed
 PARTS: Final = 4  # of a sampling interval, over which the mean square of a velocity is taken (Simpson's rule)
-TERMS: Final = 16  # of the series of an exponential; of a matrix not larger than `SMALL` 0.5^17/17! are left
-SMALL: Final = 0.5
 STOPPED: Final = 1e9  # part of a motion left after a sample is exp(-this): a stronger damper does the same
 LEAST: Final = 1e-300  # a size that gains are taken at instead of 0
 FORCE: Final = 1  # place of the force among the sizes; the amplitude is at 0
@@ -87,32 +84,19 @@ class Arrays(NamedTuple):
 
 @compiled
 def held(A: Floats, b: Floats, share: float) -> tuple[Floats, Floats]:
-    """exp(A share), and what an input held over that share of a sample leaves, both by one series."""
-    k = len(A)
-    X, E, product = np.zeros((k + 1, k + 1)), np.eye(k + 1), np.zeros((k + 1, k + 1))
-    size = 0.0
-    for i in range(k):
-        row = abs(b[i]) * share
-        X[i, k] = b[i] * share
-        for j in range(k):
-            X[i, j] = A[i, j] * share
-            row += abs(X[i, j])
+    """exp(A share), and what an input held over that share of a sample leaves."""
+    N, size = len(A), 0.0
+    for i in range(N):
+        row = 0.0
+        for j in range(N):
+            row += abs(A[i, j]) * share
         size = max(size, row)
-    doublings = 0
-    while size > SMALL and doublings < 60:
-        size *= 0.5
-        doublings += 1
-    X *= 0.5**doublings
-    for term in range(TERMS, 0, -1):  # 1 + X (1 + X/2 (1 + X/3 (...)))
-        multiply(X, E, product)
-        for i in range(k + 1):
-            for j in range(k + 1):
-                E[i, j] = product[i, j] / term
-            E[i, i] += 1.0
-    for _ in range(doublings):
-        multiply(E, E, product)
-        E[:] = product
-    return E[:k, :k].copy(), E[:k, k].copy()
+    E, G, gain = np.zeros((N, N)), np.zeros((N, N)), np.zeros(N)
+    exponential(A, share, size, E, G, np.zeros((3, N, N)))
+    for i in range(N):
+        for j in range(N):
+            gain[i] += G[i, j] * b[j]
+    return E, gain
 
 
 @compiled

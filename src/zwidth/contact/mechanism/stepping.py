@@ -20,13 +20,12 @@ from typing import Final
 import numpy as np
 
 from zwidth.compiled import compiled, compiled_lean
+from zwidth.contact.exponential import exponential
 from zwidth.contact.friction import bristle_force, coulomb_force
 from zwidth.contact.mechanism.acceleration import accelerate, configure, solve
 from zwidth.contact.mechanism.system import BRISTLES, DRY, Memory, System
 from zwidth.model.mechanism import Floats
 
-TERMS: Final = 12  # of the exponential's series, for arguments up to SMALL
-SMALL: Final = 0.25
 TURNED: Final = 0.03  # turn of a joint after which A is taken anew [rad]
 AT_REST: Final = 1e-12  # share of a substep's change of velocity that is rounding
 SWEEPS: Final = 20  # of the drives' frictions against each other
@@ -78,28 +77,8 @@ def linearise(system: System, memory: Memory, x: Floats) -> None:
 
 
 @compiled_lean
-def multiply(a: Floats, b: Floats, out: Floats) -> None:
-    """out = a b"""
-    N = a.shape[0]
-    for i in range(N):
-        for j in range(N):
-            out[i, j] = 0.0
-        for k in range(N):
-            value = a[i, k]
-            if value != 0.0:
-                for j in range(N):
-                    out[i, j] += value * b[k, j]
-
-
-@compiled
-def exponential(memory: Memory, n: int, h: float, part: int) -> None:
-    """Fill `half` and `gain` of one part: exp(A h/2) and its integral, by the series and doubling.
-
-    Velocities are measured in units that balance A, which changes no term of the series; so the size of h A is
-    that of the frequencies, and not of their squares.
-    """
-    A, E, G = memory.linear, memory.half[part], memory.gain[part]
-    step, series, product = memory.scratch[0], memory.scratch[1], memory.scratch[2]
+def rate_of(A: Floats, n: int) -> float:
+    """A norm of A [1/s] in units that balance it, so that it is as large as the frequencies, not their squares."""
     N = A.shape[0]
     stiff, fast = 0.0, 0.0
     for i in range(n, N):
@@ -114,35 +93,7 @@ def exponential(memory: Memory, n: int, h: float, part: int) -> None:
     for k in range(2 * n, N):
         for i in range(n, 2 * n):
             stiff = max(stiff, abs(A[i, k] * A[k, i]))
-    size = (np.sqrt(stiff) + fast) * 0.5 * h
-    doublings = 0
-    while size > SMALL and doublings < 60:
-        size *= 0.5
-        doublings += 1
-    tau = 0.5 * h / 2.0**doublings
-    for i in range(N):
-        for j in range(N):
-            step[i, j] = tau * A[i, j]
-            series[i, j] = 0.0
-        series[i, i] = 1.0
-    for term in range(TERMS, 0, -1):  # 1 + X/2 (1 + X/3 (1 + ...)) is the mean of exp over the interval
-        multiply(step, series, product)
-        for i in range(N):
-            for j in range(N):
-                series[i, j] = product[i, j] / (term + 1.0)
-            series[i, i] += 1.0
-    multiply(step, series, E)
-    for i in range(N):
-        E[i, i] += 1.0
-        for j in range(N):
-            G[i, j] = tau * series[i, j]
-    for _ in range(doublings):
-        multiply(E, G, product)
-        for i in range(N):
-            for j in range(N):
-                G[i, j] += product[i, j]
-                series[i, j] = E[i, j]
-        multiply(series, series, E)
+    return float(np.sqrt(stiff) + fast)
 
 
 @compiled
@@ -151,8 +102,8 @@ def prepare(system: System, memory: Memory, h: float, part: int) -> None:
     n, motor, mobility = system.damping.shape[0], system.motor, memory.mobility
     if h <= 0.0:
         return
-    exponential(memory, n, h, part)
     E, G, rest, stages = memory.half[part], memory.gain[part], memory.rest, memory.stages
+    exponential(memory.linear, 0.5 * h, rate_of(memory.linear, n) * 0.5 * h, E, G, memory.scratch)
     N = E.shape[0]
     for j in range(motor.size):
         for i in range(n):
