@@ -72,6 +72,8 @@ lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/stubtest zwidth --mypy-config-file pyproject.toml --concise \
+	    --allowlist tests/stubtest_allowed.txt --ignore-unused-allowlist
 
 bench: $(VENV)/.kernels
 	@set -e; for script in benchmarks/[!_]*.py; do echo "== $$script"; $(BIN)/python "$$script"; done

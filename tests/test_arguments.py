@@ -11,7 +11,14 @@ import pytest
 import zwidth
 from tests import systems
 from tests.measured_cases import measured
-from zwidth.chart.measured.chart import measured_chart
+from zwidth.chart import eigenvalues, hysteretic_chart, measured_chart, multi_chart, spectral_radius
+from zwidth.conditions import compare
+from zwidth.contact import judge_response, limit_cycles, simulate
+from zwidth.guarantees import nested, passive_region, spring_stable_region
+from zwidth.loop import MultiLoop, velocity_of
+from zwidth.measures import decay_time, evaluate, felt_chart, felt_impedance, static_stiffness, wall_paths
+from zwidth.model import MultiPlant, attach, natural_frequencies, reduce_plant, solve_posture
+from zwidth.study import plane_of, sensitivities, validity
 
 ONE = np.ones(1)
 NONE = np.zeros((1, 1))
@@ -37,7 +44,7 @@ def plant(mass=1.0):
 
 
 def multi():
-    return zwidth.MultiPlant(np.eye(2), *np.zeros((2, 2, 2)), np.eye(2), np.eye(2))
+    return MultiPlant(np.eye(2), *np.zeros((2, 2, 2)), np.eye(2), np.eye(2))
 
 
 KINDS = [
@@ -59,7 +66,7 @@ KINDS = [
         "controller must be a Controller, got 0.001; write Controller(sampling_period=...)",
     ),
     (
-        lambda: zwidth.MultiLoop(plant(), device().controller),
+        lambda: MultiLoop(plant(), device().controller),
         "plant must be a MultiPlant, got a Plant; write Loop(plant, controller) for one direction",
     ),
     (
@@ -72,44 +79,56 @@ KINDS = [
         lambda: zwidth.judge(device(), 1.0, 1.0),
         "loop must be a Loop, got a Device; write device.at().loop",
     ),
-    (lambda: zwidth.multi_chart(loop()), "loop must be a MultiLoop, got a Loop; stability_chart takes a Loop"),
-    (lambda: zwidth.hysteretic_chart(device()), "loop must be a Loop, got a Device"),
+    (
+        lambda: multi_chart(loop()),
+        "loop must be a MultiLoop, got a Loop; stability_chart takes a Loop",
+    ),
+    (lambda: hysteretic_chart(device()), "loop must be a Loop, got a Device"),
     (lambda: zwidth.robust_chart(loop()), "members must be a list of Loops, got a Loop; write [loop]"),
     (lambda: zwidth.robust_chart([device()]), "members[0] must be a Loop, got a Device"),
     (
-        lambda: zwidth.measured_chart(device(), device().controller),
+        lambda: measured_chart(device(), device().controller),
         "response must be a Response, got a Device; write device.response",
     ),
-    (lambda: zwidth.compare(device()), "loop must be a Loop, got a Device"),
-    (lambda: zwidth.passive_region(device()), "loop must be a Loop, got a Device"),
-    (lambda: zwidth.spring_stable_region(device()), "loop must be a Loop, got a Device"),
-    (lambda: zwidth.nested(device()), "loop must be a Loop, got a Device"),
-    (lambda: zwidth.limit_cycles(device(), 1.0, 1.0), "loop must be a Loop, got a Device"),
-    (lambda: zwidth.felt_impedance(device(), 1.0, 1.0, [1.0]), "loop must be a Loop, got a Device"),
-    (lambda: zwidth.felt_chart(device()), "chart must be a StabilityChart, got a Device"),
-    (lambda: zwidth.felt_chart(loop()), "chart must be a StabilityChart, got a Loop; write stability_chart(loop)"),
+    (lambda: compare(device()), "loop must be a Loop, got a Device"),
+    (lambda: passive_region(device()), "loop must be a Loop, got a Device"),
+    (lambda: spring_stable_region(device()), "loop must be a Loop, got a Device"),
+    (lambda: nested(device()), "loop must be a Loop, got a Device"),
+    (lambda: limit_cycles(device(), 1.0, 1.0), "loop must be a Loop, got a Device"),
+    (lambda: felt_impedance(device(), 1.0, 1.0, [1.0]), "loop must be a Loop, got a Device"),
+    (lambda: felt_chart(device()), "chart must be a StabilityChart, got a Device"),
     (
-        lambda: zwidth.static_stiffness(device(), 1.0),
+        lambda: felt_chart(loop()),
+        "chart must be a StabilityChart, got a Loop; write stability_chart(loop)",
+    ),
+    (
+        lambda: static_stiffness(device(), 1.0),
         "plant must be a Plant, got a Device; write device.at().plant",
     ),
-    (lambda: zwidth.natural_frequencies(device()), "plant must be a Plant, got a Device; write device.at().plant"),
     (
-        lambda: zwidth.reduce_plant(device(), "rigid"),
+        lambda: natural_frequencies(device()),
         "plant must be a Plant, got a Device; write device.at().plant",
     ),
-    (lambda: zwidth.attach(plant(), "firm"), "operator must be an Operator, got the text 'firm'"),
-    (lambda: zwidth.wall_paths(device(), 1.0, [0.0, 1.0]), "loop must be a Loop, got a Device"),
     (
-        lambda: zwidth.simulate(device(), None, [], duration=1.0),
+        lambda: reduce_plant(device(), "rigid"),
+        "plant must be a Plant, got a Device; write device.at().plant",
+    ),
+    (lambda: attach(plant(), "firm"), "operator must be an Operator, got the text 'firm'"),
+    (lambda: wall_paths(device(), 1.0, [0.0, 1.0]), "loop must be a Loop, got a Device"),
+    (
+        lambda: simulate(device(), None, [], duration=1.0),
         "loop must be a Loop, got a Device",
     ),
-    (lambda: zwidth.sensitivities(loop()), "device must be a Device, got a Loop"),
+    (lambda: sensitivities(loop()), "device must be a Device, got a Loop"),
     (
-        lambda: zwidth.sensitivities("my.toml"),
+        lambda: sensitivities("my.toml"),
         "device must be a Device, got the text 'my.toml'; write load('my.toml')",
     ),
-    (lambda: zwidth.validity(loop()), "point must be an OperatingPoint, got a Loop"),
-    (lambda: zwidth.plane_of("my.toml"), "device must be a Device, got the text 'my.toml'; write load('my.toml')"),
+    (lambda: validity(loop()), "point must be an OperatingPoint, got a Loop"),
+    (
+        lambda: plane_of("my.toml"),
+        "device must be a Device, got the text 'my.toml'; write load('my.toml')",
+    ),
     (
         lambda: zwidth.workspace_map("my.toml", ["isotropy"]),
         "device must be a Device, got the text 'my.toml'; write load('my.toml')",
@@ -121,15 +140,15 @@ KINDS = [
     (lambda: zwidth.sweep(device()), "study must be a Study or the path of a study file, got a Device"),
     (lambda: zwidth.robust_study(device()), "family must be a Family, got a Device"),
     (
-        lambda: zwidth.evaluate("isotropy", None),
+        lambda: evaluate("isotropy", None),
         "measure must be a Measure, got the text 'isotropy'; write find_measure('isotropy')",
     ),
     (
-        lambda: zwidth.evaluate(zwidth.find_measure("isotropy"), device()),
+        lambda: evaluate(zwidth.find_measure("isotropy"), device()),
         "point must be an OperatingPoint, got a Device; write device.at()",
     ),
     (
-        lambda: zwidth.solve_posture(device(), (0.0, 0.25)),
+        lambda: solve_posture(device(), (0.0, 0.25)),
         "mechanism must be a Mechanism, got a Device; write device.mechanism",
     ),
     (lambda: zwidth.load(3), "name_or_path must be a bundled name or a path, got 3"),
@@ -142,8 +161,8 @@ KINDS = [
         lambda: zwidth.from_document("my.toml"),
         "document must be a dictionary, got the text 'my.toml'; write load(",
     ),
-    (lambda: zwidth.velocity_of("foaw", [0.0, 1.0], 0.001), "method must be a velocity estimate such as"),
-    (lambda: zwidth.judge_response(chart()), "response must be a TimeResponse, got a StabilityChart"),
+    (lambda: velocity_of("foaw", [0.0, 1.0], 0.001), "method must be a velocity estimate such as"),
+    (lambda: judge_response(chart()), "response must be a TimeResponse, got a StabilityChart"),
     (lambda: zwidth.find_measure(3), "name must be a measure's name, got 3"),
     (
         lambda: zwidth.Controller(0.001, velocity="foaw"),
@@ -164,9 +183,18 @@ VALUES = [
         "wall_stiffness has the shape (2,) and wall_damping (3,); give equal shapes, or one number for all",
     ),
     (lambda: zwidth.judge(loop(), nan, nan), "wall_stiffness must be a finite number [N/m], got nan"),
-    (lambda: zwidth.spectral_radius(loop(), 1.0, nan), "wall_damping must be a finite number [N s/m], got nan"),
-    (lambda: zwidth.eigenvalues(loop(), [nan, 1.0], 1.0), "wall_stiffness must be finite numbers [N/m], got nan"),
-    (lambda: zwidth.felt_impedance(loop(), nan, 1.0, [1.0]), "wall_stiffness must be a finite number [N/m]"),
+    (
+        lambda: spectral_radius(loop(), 1.0, nan),
+        "wall_damping must be a finite number [N s/m], got nan",
+    ),
+    (
+        lambda: eigenvalues(loop(), [nan, 1.0], 1.0),
+        "wall_stiffness must be finite numbers [N/m], got nan",
+    ),
+    (
+        lambda: felt_impedance(loop(), nan, 1.0, [1.0]),
+        "wall_stiffness must be a finite number [N/m]",
+    ),
     (
         lambda: zwidth.Controller(-0.001),
         "sampling_period must be a finite number greater than 0 [s], got -0.001; is it a frequency?",
@@ -210,9 +238,12 @@ VALUES = [
     (lambda: zwidth.Loop(plant(-1.0), device().controller), "plant.mass must be positive definite, and its least"),
     (lambda: zwidth.stability_chart(loop(), nan), "radius must be a number with 0 < radius <= 1, got nan"),
     (lambda: zwidth.stability_chart(loop(), 0.0), "radius must be a number with 0 < radius <= 1, got 0"),
-    (lambda: zwidth.hysteretic_chart(loop()), "the plant has no loss factor; stability_chart charts it"),
-    (lambda: zwidth.compare(loop(), wall_damping=inf), "wall_damping must be finite, or nan for none, got inf"),
-    (lambda: zwidth.decay_time(0.9, -0.001), "sampling_period must be greater than 0 s, got -0.001"),
+    (lambda: hysteretic_chart(loop()), "the plant has no loss factor; stability_chart charts it"),
+    (
+        lambda: compare(loop(), wall_damping=inf),
+        "wall_damping must be finite, or nan for none, got inf",
+    ),
+    (lambda: decay_time(0.9, -0.001), "sampling_period must be greater than 0 s, got -0.001"),
     (lambda: zwidth.Operator(nan, 1.0, 1.0), "arm_mass must be a finite number, at least 0 [kg], got nan"),
     (
         lambda: zwidth.Response([1.0, 2.0], [1.0]),

@@ -9,6 +9,7 @@ import pytest
 
 import zwidth as package
 from tests.cli.cli_run import MECHANISM, TWO_MASS, found, refused, strict, zwidth
+from zwidth.contact import Box, Plane, Sphere, SurfaceWall, simulate_mechanism
 from zwidth.show.cli.move import KEYS
 
 WALL = ("--stiffness", 1500, "--damping", 3)
@@ -39,15 +40,15 @@ def ball():
 
 def called(surface, **settings):
     device = package.load(MECHANISM)
-    wall = package.SurfaceWall(1500.0, 3.0)
-    return package.simulate_mechanism(
+    wall = SurfaceWall(1500.0, 3.0)
+    return simulate_mechanism(
         device.mechanism, device.damping, device.controller, wall, surface, at=device.position(),
         encoders=device.encoders, **settings
     )  # fmt: skip
 
 
 def test_the_numbers_are_those_of_the_python_call(ball):
-    motion = called(package.Sphere((0.0, 0.31), 0.05), push=(0.02, 1.0, 0.0), duration=0.3)
+    motion = called(Sphere((0.0, 0.31), 0.05), push=(0.02, 1.0, 0.0), duration=0.3)
     assert set(KEYS) <= set(ball)
     for key, values in (
         ("time_s", motion.time),
@@ -145,11 +146,14 @@ def test_a_wall_pulls_unless_told_not_to():
 
 def test_planes_boxes_and_hollow_boxes_are_those_of_python():
     for words, surface in (
-        (("--plane", "0,0.26,0.1,-1"), package.Plane((0.0, 0.26), (0.1, -1.0))),
-        (("--plane", "0,0.26,0,0.1,-1,0", "--two-sided"), package.Plane((0.0, 0.26), (0.1, -1.0), two_sided=True)),
-        (("--box", "0,0.29,0.05,0.02"), package.Box((0.0, 0.29), (0.05, 0.02))),
-        (("--box", "0,0.29,0,0.05,0.02,0.01"), package.Box((0.0, 0.29, 0.0), (0.05, 0.02, 0.01))),
-        (("--box", "0,0.25,0.05,0.02", "--hollow"), package.Box((0.0, 0.25), (0.05, 0.02), hollow=True)),
+        (("--plane", "0,0.26,0.1,-1"), Plane((0.0, 0.26), (0.1, -1.0))),
+        (
+            ("--plane", "0,0.26,0,0.1,-1,0", "--two-sided"),
+            Plane((0.0, 0.26), (0.1, -1.0), two_sided=True),
+        ),
+        (("--box", "0,0.29,0.05,0.02"), Box((0.0, 0.29), (0.05, 0.02))),
+        (("--box", "0,0.29,0,0.05,0.02,0.01"), Box((0.0, 0.29, 0.0), (0.05, 0.02, 0.01))),
+        (("--box", "0,0.25,0.05,0.02", "--hollow"), Box((0.0, 0.25), (0.05, 0.02), hollow=True)),
     ):
         told = moved(*words, *WALL, "--push", "0,1", "--duration", 0.15)
         motion = called(surface, push=(0.0, 1.0, 0.0), duration=0.15)

@@ -59,7 +59,7 @@ def test_the_models_reach_what_the_page_says(names):
 
 def test_the_cost_of_the_rotors_coupling_is_what_the_page_says(names):
     plain = zwidth.largest_stiffness(zwidth.Loop(names["plant"], names["device"].controller))
-    found = [(zwidth.natural_frequencies(names["plant"]), plain), names["coupled"][1], names["coupled"][-1]]
+    found = [(zwidth.model.natural_frequencies(names["plant"]), plain), names["coupled"][1], names["coupled"][-1]]
     for cell, (frequencies, _) in zip(row("flexible frequencies"), found, strict=True):
         assert [round(f, 2) for f in frequencies[2:]] == cell
     for (said,), (_, peak) in zip(row("largest stiffness"), found, strict=True):

@@ -7,18 +7,19 @@ import pytest
 
 import zwidth
 from tests.show.show_cases import check_legends_lie_beside
+from zwidth.contact import Box, Plane, Sphere, SurfaceWall, simulate_mechanism
 from zwidth.show.figures.motion import DRAWN
 from zwidth.show.figures.path import draw_path, path_figure
 from zwidth.show.figures.style import save
 
-BALL = zwidth.Sphere((0.0, 0.31), 0.05)
+BALL = Sphere((0.0, 0.31), 0.05)
 
 
 def drawn(surface=BALL, **settings):
     device = zwidth.load("five-bar")
-    wall = None if surface is None else zwidth.SurfaceWall(1500.0, 3.0)
+    wall = None if surface is None else SurfaceWall(1500.0, 3.0)
     scene = (device.mechanism, device.damping, device.controller, wall, surface)
-    motion = zwidth.simulate_mechanism(*scene, **({"push": (0.02, 1.0, 0.0), "duration": 0.25} | settings))
+    motion = simulate_mechanism(*scene, **({"push": (0.02, 1.0, 0.0), "duration": 0.25} | settings))
     made, axes = path_figure()
     draw_path(axes, device.mechanism, device.at().posture, motion, surface)
     made.canvas.draw()
@@ -59,14 +60,17 @@ def test_the_wall_is_drawn_where_it_is():
     _, _, (overall, *_) = drawn()
     outline = walls(overall)
     assert np.hypot(*(outline - (0.0, 0.31)).T) == pytest.approx(0.05, abs=1e-4)
-    _, _, (_, close, *_) = drawn(zwidth.Box((0.0, 0.25), (0.03, 0.02), hollow=True))
+    _, _, (_, close, *_) = drawn(Box((0.0, 0.25), (0.03, 0.02), hollow=True))
     assert any(np.all(np.abs(walls(close) - (0.0, 0.27)) < 1e-3, axis=1))
     box = np.abs(walls(close) - (0.0, 0.25)) / (0.03, 0.02)
     assert np.all(np.max(box, axis=1) > 0.99)
 
 
 def test_the_wall_reaches_the_edges_of_what_is_shown():
-    for surface in (zwidth.Plane((0.0, 0.26), (0.0, -1.0)), zwidth.Sphere((0.0, 0.25), 0.012, hollow=True)):
+    for surface in (
+        Plane((0.0, 0.26), (0.0, -1.0)),
+        Sphere((0.0, 0.25), 0.012, hollow=True),
+    ):
         _, _, (overall, close, *_) = drawn(surface)
         for ax in (overall, close):
             low, high = walls(ax).min(axis=0), walls(ax).max(axis=0)
@@ -84,6 +88,6 @@ def test_a_free_motion_to_a_singularity_and_a_long_one_are_drawn():
     assert motion.status == "singular"
     assert not depth.get_visible()
     assert "path" in texts(overall)
-    motion, _, (*_, force, _) = drawn(zwidth.Sphere((0.0, 0.25), 0.02, hollow=True), duration=10.0)
+    motion, _, (*_, force, _) = drawn(Sphere((0.0, 0.25), 0.02, hollow=True), duration=10.0)
     assert len(motion.time) > DRAWN
     assert force.collections

@@ -1,0 +1,5 @@
+"""Which walls are stable: charts, verdicts on single walls, the stiffest wall of each direction."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

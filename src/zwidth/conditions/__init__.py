@@ -1,6 +1,5 @@
 """Published conditions on virtual walls, one file per source, and their comparison on one loop."""
 
-from zwidth.conditions.bound import Bound
-from zwidth.conditions.registry import compare
+import lazy_loader
 
-__all__ = ["Bound", "compare"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -30,10 +30,12 @@ class Shelf:
     needs: str
 
 
-DEVICES: Final = Shelf(
+DEVICES: Final[Shelf] = Shelf(
     "zoo", "device", "a device file", "a device needs a name, [loop], and [mechanism], [plant] or [response]"
 )
-OPERATORS: Final = Shelf("operators", "operator", "an operator file", "an operator needs an [operator] table")
+OPERATORS: Final[Shelf] = Shelf(
+    "operators", "operator", "an operator file", "an operator needs an [operator] table"
+)
 LARGEST_FILE: Final = 10_000_000  # bytes; the bundled ones have a few thousand
 DEEPEST: Final = 20  # tables and lists within each other; a mechanism needs 5
 

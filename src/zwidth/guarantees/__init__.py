@@ -7,3 +7,7 @@
 Each is a set of walls (K, B) inside the next; `nested` puts them side by side. `two_port` and `coupling` ask the
 same of a virtual coupling between the device and an environment that is passive and otherwise unknown.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

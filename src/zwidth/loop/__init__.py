@@ -1,0 +1,5 @@
+"""What the computer does: controllers, filters, velocity estimates, the sampled loop, operating points."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,5 @@
+"""How good a device is: dexterity, forces, impedance range, fidelity, what the hand feels."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

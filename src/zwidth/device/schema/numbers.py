@@ -44,7 +44,7 @@ def quantity(description: str, unit: str | None = None, **limits: Any) -> Any:
     return Field(description=description, json_schema_extra={"unit": unit} if unit else None, **limits)
 
 
-VERSION: Final = quantity("version of the format that the file is written in", ge=1, le=READ, default=READ)
+VERSION: Final[Any] = quantity("version of the format that the file is written in", ge=1, le=READ, default=READ)
 
 
 def _not_nan(value: float) -> float:

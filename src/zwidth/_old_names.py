@@ -1,0 +1,154 @@
+"""Names that stood at the top before 0.2 and still work for one release, with a warning that tells the new one.
+
+This is the one place where two ways to say a thing stand side by side; it goes with the release after the next.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from zwidth.device.device import Device
+    from zwidth.loop.operating_point import OperatingPoint
+
+# Package -> names that moved there from the top.
+MOVED: Final = {
+    "chart": (
+        "BoundaryArc eigenvalues hysteretic_chart measured_chart MeasuredChart multi_chart MultiChart RobustChart "
+        "spectral_radius"
+    ),
+    "conditions": "Bound compare",
+    "contact": (
+        "Box Environment ENVIRONMENTS Hand judge_response limit_cycles load_environment MechanismMotion "
+        "PassivityController Plane Reach Reflex Run simulate simulate_batch simulate_mechanism Sphere "
+        "SurfaceOutOfReach SurfaceWall TimeResponse Tremor"
+    ),
+    "guarantees": "nested passive_region spring_stable_region",
+    "loop": (
+        "AlphaBeta BackwardDifference CentralDifference Foaw Kalman LeastSquaresSlope Levant MultiLoop "
+        "SavitzkyGolay velocity_of WindowedDifference"
+    ),
+    "measures": (
+        "acceleration_along characteristic_length decay_time deformation_ratio dynamic_isotropy "
+        "dynamic_manipulability eigenvalue_paths EigenvaluePaths evaluate fastest_mass felt_chart felt_impedance "
+        "force_along force_component friction_along global_conditioning_index global_isotropy_index "
+        "handle_mass_isotropy homogeneous_jacobian ImpedanceRange isotropy isotropy_frobenius loop_paths "
+        "manipulability Measured optimal_mass OptimalMass Overall overall resolution_along rigid_range "
+        "scaled_jacobian sprung_range static_stiffness structural_distortion wall_paths"
+    ),
+    "model": (
+        "attach Brake Counter effective_parameters Friction LaggedDamper MultiPlant natural_frequencies Nonlinear "
+        "reduce_directions reduce_mechanism reduce_plant solve_posture Spring"
+    ),
+    "study": "common_area parse_requirement plane_of RobustError Store Study Sweep",
+}
+
+
+def old_name(name: str) -> Any:
+    """What a name that once stood at the top means today.
+
+    Warns   DeprecationWarning  with the name to write instead
+    Raises  AttributeError      for a name that never stood there
+    """
+    package = _package_of(name)
+    if package is not None:
+        _warn(f"zwidth.{name}", f"zwidth.{package}.{name}")
+        return getattr(import_module(f"zwidth.{package}"), name)
+    if name in REPLACED:
+        instead, replacement = REPLACED[name]
+        _warn(f"zwidth.{name}", instead)
+        return replacement()
+    raise AttributeError(f"module 'zwidth' has no attribute {name!r}")
+
+
+def old_names() -> list[str]:
+    """All of them."""
+    return sorted([*REPLACED, *(name for names in MOVED.values() for name in names.split())])
+
+
+def _package_of(name: str) -> str | None:
+    return next((package for package, names in MOVED.items() if name in names.split()), None)
+
+
+def _warn(old: str, new: str) -> None:
+    told = f"{old} goes with the next release; write {new}"
+    warnings.warn(told, DeprecationWarning, stacklevel=4)
+
+
+def _operating_point() -> Any:
+    from zwidth.loop.operating_point import OperatingPoint
+
+    return OperatingPoint
+
+
+def _wanted_wall() -> Any:
+    from zwidth.measures.measure import WantedWall
+
+    return WantedWall
+
+
+def _place_of(
+    device: Device,
+    positions: ArrayLike | None = None,
+    direction: Sequence[float] | None = None,
+    assembly: str | None = None,
+    model: str | None = None,
+) -> OperatingPoint:
+    """As `Device.at`."""
+    return device.at(positions, direction, assembly=assembly, model=model)
+
+
+def _sensitivities(
+    device: Device,
+    at: Any = None,
+    direction: Sequence[float] | None = None,
+    assembly: str | None = None,
+    model: str | None = None,
+) -> Any:
+    """As `Device.sensitivities`."""
+    return device.sensitivities(device.at(at, direction, assembly=assembly, model=model))
+
+
+def _validity(
+    device: Device,
+    at: Any = None,
+    direction: Sequence[float] | None = None,
+    assembly: str | None = None,
+    tolerance: float = 0.1,
+) -> Any:
+    """As `study.validity`."""
+    from zwidth.study.validity import validity
+
+    return validity(device.at(at, direction, assembly=assembly), tolerance)
+
+
+def _largest_stiffness_by_direction(
+    mechanism: Any, posture: Any, directions: ArrayLike, controller: Any, model: Any, damping: Any
+) -> Any:
+    """As `chart.largest_stiffness_by_direction` of an operating point."""
+    import numpy as np
+
+    from zwidth.chart.polar import largest_stiffness_by_direction
+    from zwidth.loop.operating_point import OperatingPoint
+
+    point = OperatingPoint(controller, mechanism, posture, np.eye(3)[:1], model=model, damping=damping)
+    return largest_stiffness_by_direction(point, directions)
+
+
+# Old name -> what to write instead, and what it gives meanwhile.
+REPLACED: Final[dict[str, tuple[str, Callable[[], Any]]]] = {
+    "Place": ("zwidth.OperatingPoint", _operating_point),
+    "Wanted": ("zwidth.measures.WantedWall", _wanted_wall),
+    "place_of": ("device.at(position, direction)", lambda: _place_of),
+    "sensitivities": ("device.sensitivities(device.at(...))", lambda: _sensitivities),
+    "validity": ("zwidth.study.validity(device.at(...))", lambda: _validity),
+    "largest_stiffness_by_direction": (
+        "zwidth.chart.largest_stiffness_by_direction(device.at(...), directions)",
+        lambda: _largest_stiffness_by_direction,
+    ),
+}

@@ -1,0 +1,2 @@
+from .bound import Bound as Bound
+from .registry import compare as compare
