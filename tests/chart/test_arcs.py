@@ -7,9 +7,9 @@ import pytest
 import shapely
 
 from tests.systems import published, random_loop
-from zwidth.chart.arcs import CHORD, DAMPING, MINUS, PAIR, PLUS, SLOPE, STIFFNESS, Arc, Arcs, sampled
+from zwidth.chart.arcs import CHORD, DAMPING, MINUS, PAIR, PLUS, SLOPE, STIFFNESS, Arc, Arcs
 from zwidth.chart.area import quadrant_area
-from zwidth.chart.chart import stability_chart, traced
+from zwidth.chart.chart import traced
 from zwidth.chart.peak import largest_damping, stiffest, topmost
 from zwidth.chart.several_directions.branch import Branch
 from zwidth.chart.several_directions.eigenloci import trace_loci
@@ -147,8 +147,8 @@ def test_of_walls_as_stiff_as_each_other_the_most_damped_prevails():
 @pytest.mark.parametrize("seed", range(6))
 def test_zeros_and_integrals_along_a_curve_are_those_of_its_points(seed):
     tracer = Tracer.of(published() if seed == 0 else random_loop(np.random.default_rng(seed)))
-    arcs, *_ = traced(tracer)
-    for arc, (thetas, K, B) in zip(arcs, sampled(arcs, (tracer,)), strict=True):
+    edge, _ = traced(tracer)
+    for arc, (thetas, K, B) in zip(edge.arcs, edge.walks, strict=True):
         if not arc.curved:
             continue
         for component, values in ((STIFFNESS, K), (DAMPING, B)):
@@ -169,11 +169,11 @@ def test_a_branch_of_one_direction_is_the_curve_of_the_single_loop(seed):
     loop = published() if seed == 0 else random_loop(np.random.default_rng(seed))
     tracer, p = Tracer.of(loop), loop.plant
     plant = MultiPlant(p.mass, p.damping, p.stiffness, p.actuator[None], p.sensor[None])
-    arcs, *_ = traced(tracer)
-    size = np.ptp(np.vstack(stability_chart(loop, decay=False).regions), axis=0)
+    edge, _ = traced(tracer)
+    size = np.ptp(np.vstack(edge.outlines), axis=0)
     branch = Branch(trace_loci(MultiLoop(plant, loop.controller)), 0, size)
     seen = 0
-    for arc in arcs:
+    for arc in edge.arcs:
         if not arc.curved or min(arc.start, arc.end) < 1e-6 or max(arc.start, arc.end) > np.pi - 1e-6:
             continue
         seen += 1

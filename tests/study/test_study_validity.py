@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.systems import mass, published
-from zwidth.chart.chart import BoundaryArc, stability_chart
+from zwidth.chart.chart import stability_chart
+from zwidth.chart.result import BoundaryArc
 from zwidth.device.load import from_document, load
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop

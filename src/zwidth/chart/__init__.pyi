@@ -1,7 +1,6 @@
 from .arc_joining import ChartError as ChartError
 from .at_point import chart_at as chart_at
 from .at_point import check_at as check_at
-from .chart import BoundaryArc as BoundaryArc
 from .chart import StabilityChart as StabilityChart
 from .chart import largest_stiffness as largest_stiffness
 from .chart import stability_chart as stability_chart
@@ -14,6 +13,7 @@ from .peak import Peak as Peak
 from .polar import ByDirection as ByDirection
 from .polar import largest_stiffness_around as largest_stiffness_around
 from .polar import largest_stiffness_by_direction as largest_stiffness_by_direction
+from .result import BoundaryArc as BoundaryArc
 from .robust.chart import RobustChart as RobustChart
 from .robust.chart import robust_chart as robust_chart
 from .several_directions.chart import MultiChart as MultiChart

@@ -75,7 +75,7 @@ class Curve(Protocol):
         Looked for between the angles that found the arc, its ends drawn in by DRAWN_IN.
         """
 
-    def between(self, arc: Arc) -> Floats:
+    def dense_angles(self, arc: Arc) -> Floats:
         """Angles strictly between an arc's ends, from first to last: walls there join to chords on the edge."""
 
     def integral(self, arc: Arc) -> float:
@@ -191,7 +191,7 @@ def sampled(arcs: Arcs, curves: Curves) -> list[Walk]:
             walks.append((np.array([arc.start, arc.end]), np.array([K0, K1]), np.array([B0, B1])))
             continue
         curve = curves[arc.member]
-        thetas = curve.between(arc)
+        thetas = curve.dense_angles(arc)
         K, B = curve.walls(thetas)
         walks.append(
             (

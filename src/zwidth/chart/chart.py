@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arc_joining import closed_rings
-from zwidth.chart.arcs import Arcs, Walk, sampled
-from zwidth.chart.area import quadrant_area
-from zwidth.chart.cells import Box, box_of, cells, outline
-from zwidth.chart.decay import FastestDecay, fastest_decay, fastest_decay_in_first_quadrant
-from zwidth.chart.peak import Peak, largest_damping, stiffest
+from zwidth.chart.decay import fastest_decay, fastest_decay_in_first_quadrant
+from zwidth.chart.peak import Peak
+from zwidth.chart.result import Chart
+from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
@@ -22,47 +21,17 @@ from zwidth.model.arguments import require
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class BoundaryArc:
-    """A piece of the stable set's edge, its walls and the frequency of the vibration at which each fails.
-
-    stiffness, damping, frequency  (k,)  [N/m], [N s/m], [Hz]; 0 or 1/(2T) for a real root
-    """
-
-    stiffness: Floats
-    damping: Floats
-    frequency: Floats
-
-
-@dataclass(frozen=True)
-class StabilityChart:
-    """The stable walls of a loop, both signs of K and B, never clipped.
+@dataclass(frozen=True, kw_only=True, repr=False)
+class StabilityChart(Chart):
+    """The stable walls of a loop.
 
     loop, radius    what was asked: walls whose roots all have |z| < radius (1: stable)
-    regions         closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set
-    boundary        arcs of its edge, with frequency
-    stiffness_max   supremum of K over stable walls with K > 0, B >= 0 [N/m]; nan if there is none
-    damping_at_stiffness_max     [N s/m]; nan if there is none
-    frequencies_at_stiffness_max [Hz] one, or two at a corner, ascending; () if there is none
-    damping_max     supremum of B >= 0 stable for all sufficiently small K > 0 [N s/m]; 0 if there is none
-    stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
-    fastest_decay   the wall of smallest spectral radius over the whole set; None if nothing is stable
-    fastest_decay_in_first_quadrant   the same over K >= 0, B >= 0; None if nothing there is stable
     corner_blur     share of the set's size to which its corners are known: 1e-7, more where a mode that the wall
                     hardly moves hides one in rounding
     """
 
     loop: Loop
     radius: float
-    regions: tuple[Floats, ...]
-    boundary: tuple[BoundaryArc, ...]
-    stiffness_max: float
-    damping_at_stiffness_max: float
-    frequencies_at_stiffness_max: tuple[float, ...]
-    damping_max: float
-    stable_area: float
-    fastest_decay: FastestDecay | None
-    fastest_decay_in_first_quadrant: FastestDecay | None
     corner_blur: float
 
     @property
@@ -70,13 +39,8 @@ class StabilityChart:
         """Motions that no wall moves, by name; they were cancelled and do not count."""
         return self.loop.unobserved_modes
 
-    @property
-    def box(self) -> Box:
-        """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
-        return box_of(self.regions)
-
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
-        """Verdicts on single walls by eigenvalues, whatever the regions say."""
+        """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast, by eigenvalues, whatever the regions say."""
         return judge(self.loop, wall_stiffness, wall_damping)
 
 
@@ -100,23 +64,14 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     if not 0.0 < radius <= 1.0:
         raise ValueError(f"radius must be a number with 0 < radius <= 1, got {radius:g}")
     tracer = Tracer.of(loop, radius)
-    arcs, blur, samples, outlines = traced(tracer)
-    width = widest(outlines)
-    peak = stiffest(arcs, (tracer,), width)
-    fastest = fastest_decay(tracer, outlines) if decay else None
-    in_hertz = 1.0 / (2.0 * np.pi * loop.period)
+    edge, blur = traced(tracer)
+    fastest = fastest_decay(tracer, edge.outlines) if decay else None
     return StabilityChart(
         loop=loop,
         radius=radius,
-        regions=cells(outlines),
-        boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for thetas, K, B in samples),
-        stiffness_max=peak.stiffness if peak else float("nan"),
-        damping_at_stiffness_max=peak.damping if peak else float("nan"),
-        frequencies_at_stiffness_max=tuple(angle * in_hertz for angle in peak.angles) if peak else (),
-        damping_max=largest_damping(arcs, (tracer,), width, tracer.stable),
-        stable_area=quadrant_area(arcs, (tracer,)) if peak else 0.0,
+        **edge.readings(loop.period, tracer.stable),
         fastest_decay=fastest,
-        fastest_decay_in_first_quadrant=fastest_decay_in_first_quadrant(tracer, outlines, fastest),
+        fastest_decay_in_first_quadrant=fastest_decay_in_first_quadrant(tracer, edge.outlines, fastest),
         corner_blur=blur,
     )
 
@@ -124,9 +79,8 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
 def largest_stiffness(loop: Loop) -> Peak | None:
     """Only the stiffest stable wall with K > 0, B >= 0; None if there is none."""
     require("loop", loop, Loop)
-    tracer = Tracer.of(loop)
-    arcs, _, _, outlines = traced(tracer)
-    return stiffest(arcs, (tracer,), widest(outlines))
+    edge, _ = traced(Tracer.of(loop))
+    return edge.peak
 
 
 def boundary_points(
@@ -138,23 +92,19 @@ def boundary_points(
     return K, B, thetas / (2.0 * np.pi * loop.period), edge
 
 
-def traced(tracer: Tracer) -> tuple[Arcs, float, list[Walk], list[Floats]]:
-    """The edge's arcs, how far corners are known, angles, K and B along every arc, and each ring's outline.
+def traced(tracer: Tracer, member: int = 0) -> tuple[TracedEdge, float]:
+    """The edge of a loop's stable set, and the share of its size to which corners are known.
 
     An outline that crosses itself has passed a small loop of the curve between two samples: then the curve is
     traced again through all the angles seen.
+
+    member  number of the loop among others
     """
     seen = None
     for _ in range(2):
         arcs, blur = closed_rings(tracer, seen)
-        samples = sampled(arcs, (tracer,))
-        outlines = [outline([samples[k] for k in ring]) for ring in arcs.rings]
-        if all(shapely.Polygon(outline).is_valid for outline in outlines):
+        edge = TracedEdge.of(replace(arcs, member=np.full(len(arcs), member)), {member: tracer})
+        if all(shapely.Polygon(outline).is_valid for outline in edge.outlines):
             break
-        seen = np.concatenate([thetas[1:-1] for thetas, _, _ in samples])
-    return arcs, blur, samples, outlines
-
-
-def widest(outlines: list[Floats]) -> float:
-    """Largest |K| on any outline; 0 if there is none."""
-    return max((float(np.max(np.abs(outline[:, 0]))) for outline in outlines), default=0.0)
+        seen = np.concatenate([thetas[1:-1] for thetas, _, _ in edge.walks])
+    return edge, blur

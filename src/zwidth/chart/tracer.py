@@ -74,7 +74,7 @@ class Tracer:
         """Ascending angles on an arc at which K, B or dK/dtheta changes sign, to rounding."""
         return sign_changes(self.factors, self.radius, np.sort(arc.angles), component)
 
-    def between(self, arc: Arc) -> Floats:
+    def dense_angles(self, arc: Arc) -> Floats:
         """Angles strictly between an arc's ends, from first to last, with chords within CHORD of the arc."""
         thetas = refined_angles(self.factors, self.radius, np.sort(arc.angles), CHORD, MOST_POINTS)
         return thetas if arc.start < arc.end else thetas[::-1].copy()

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.loop.loop import Loop
+from zwidth.loop.multi import MultiLoop
 from zwidth.model.arguments import require, walls
 
 Floats = NDArray[np.float64]
@@ -21,24 +22,32 @@ NAMES = {STABLE: "stable", UNDECIDED: "undecided", UNSTABLE: "unstable"}
 
 
 @dataclass(frozen=True)
-class Verdicts:
-    """What eigenvalues say of walls (...).
+class WallVerdicts:
+    """Verdicts on walls (...).
 
-    verdict          STABLE, UNSTABLE or UNDECIDED
-    spectral_radius  largest |z|
-    frequency        of that root, |arg z| / (2 pi T) [Hz]
-    uncertainty      half-width of the undecided band: 1e-9, more where the root is ill-conditioned
+    verdict    STABLE, UNSTABLE or UNDECIDED
+    frequency  of the vibration that each wall is nearest to, or grows in [Hz]
     """
 
     verdict: NDArray[np.int8]
-    spectral_radius: Floats
     frequency: Floats
-    uncertainty: Floats
 
     @property
     def names(self) -> list[str]:
         """The verdicts in words, flattened."""
         return [NAMES[int(v)] for v in self.verdict.ravel()]
+
+
+@dataclass(frozen=True)
+class Verdicts(WallVerdicts):
+    """What eigenvalues say of walls (...); the frequency is that of the largest root, |arg z| / (2 pi T).
+
+    spectral_radius  largest |z|
+    uncertainty      half-width of the undecided band: 1e-9, more where the root is ill-conditioned
+    """
+
+    spectral_radius: Floats
+    uncertainty: Floats
 
 
 def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.complex128]:
@@ -63,6 +72,11 @@ def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Ver
     Raises  ValueError  for a single wall that is not finite
     """
     require("loop", loop, Loop)
+    return verdicts(loop, wall_stiffness, wall_damping)
+
+
+def verdicts(loop: Loop | MultiLoop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
+    """`judge`, for loops of several directions, too."""
     K, B = walls(wall_stiffness, wall_damping)
     finite = np.isfinite(K) & np.isfinite(B)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -80,7 +94,7 @@ def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Ver
         at = tuple(index)
         width[at] = max(BAND, _rounding(L[at]))
     verdict = np.where(radius < 1.0 - width, STABLE, np.where(radius > 1.0 + width, UNSTABLE, UNDECIDED))
-    return Verdicts(verdict.astype(np.int8), radius, frequency, width)
+    return Verdicts(verdict.astype(np.int8), frequency, radius, width)
 
 
 def _rounding(L: Floats) -> float:

@@ -11,6 +11,9 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.polygon import orient
 
+from zwidth.chart.arcs import Arcs
+from zwidth.chart.peak import stiffest
+
 Floats = NDArray[np.float64]
 
 
@@ -59,17 +62,5 @@ def rings_of(shape: Any) -> tuple[Floats, ...]:
 
 def stiffest_corner(rings: Iterable[Floats]) -> tuple[float, float]:
     """Largest K over the rings within K > 0, B >= 0, and its B; nan where there is none."""
-    best = (float("nan"), float("nan"))
-    for ring in rings:
-        K, B = ring.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = B[:-1] / (B[:-1] - B[1:])
-            crossing = K[:-1] + share * (K[1:] - K[:-1])
-        K, B = np.concatenate([K, crossing]), np.concatenate([B, np.zeros(len(crossing))])
-        usable = (K > 0.0) & (B >= 0.0)
-        usable[len(ring) :] &= (share >= 0.0) & (share <= 1.0)
-        if usable.any():
-            top = int(np.argmax(np.where(usable, K, -np.inf)))
-            if not K[top] <= best[0]:
-                best = float(K[top]), float(B[top])
-    return best
+    found = stiffest(Arcs.chords(list(rings)), (), 0.0)
+    return (found.stiffness, found.damping) if found else (float("nan"), float("nan"))

@@ -80,7 +80,7 @@ class Springs:
     def unit(self) -> float:
         """Seconds by which K is multiplied to be of the size of B over the walls in question, for distances."""
         T = self.loop.period
-        some = [polygons(m.outlines, T) for share in (0.0, 0.45, 1.0) if (m := self.member(share)) is not None]
+        some = [polygons(m, T) for share in (0.0, 0.45, 1.0) if (m := self.member(share)) is not None]
         left, low, right, high = shapely.intersection_all(some).bounds if some else (np.nan,) * 4
         return float(T * (high - low) / (right - left)) if right > left else T
 

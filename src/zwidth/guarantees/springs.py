@@ -72,7 +72,7 @@ def nyquist_region(loop: Loop) -> Region:
     if poles and poles[0] < DOUBLE**2 * max(poles):  # a double root at -1 that takes long to chart
         return empty(UNDAMPED)
     member = springs.member(share)
-    rings = () if member is None else rings_of(polygons(member.outlines, springs.unit))
+    rings = () if member is None else rings_of(polygons(member, springs.unit))
     if not rings:
         return empty(f"nothing is stable with the Nyquist spring of {k:.6g} N/m")
     return _region(rings, springs.unit, NO_NYQUIST)
@@ -182,14 +182,12 @@ def _spread(shares: Floats) -> Floats:
 def _charted(springs: Springs, new: Floats, members: dict[float, Member]) -> shapely.Geometry:
     """What the charts of all springs have in common [K unit, B]; the new ones join the members."""
     unit = springs.unit
-    left = (
-        None if not members else shapely.intersection_all([polygons(m.outlines, unit) for m in members.values()])
-    )
+    left = None if not members else shapely.intersection_all([polygons(m, unit) for m in members.values()])
     for share in new.tolist():
         member = springs.member(share)
         if member is None:
             continue
-        shape = polygons(member.outlines, unit)
+        shape = polygons(member, unit)
         if shape.is_empty and left is not None:  # lost in rounding if no wall is certainly unstable: a double root
             middles = np.array([cell.representative_point().coords[0] for cell in parts(left)])
             if not springs.unstable(middles, np.array([share])).any():
@@ -205,7 +203,7 @@ def _edge(springs: Springs, members: dict[float, Member]) -> Edge:
     """The edge of the common set, each arc with the share of its spring."""
     unit = springs.unit
     shares = {member.index: share for share, member in members.items()}
-    shapes = {member.index: polygons(member.outlines, unit) for member in members.values()}
+    shapes = {member.index: polygons(member, unit) for member in members.values()}
     left, cutters = common(list(members.values()), shapes, unit)
     arcs, _ = common_edge(left, cutters, unit)
     return [(shares[arc.member], arc) for arc in arcs]

@@ -60,7 +60,7 @@ class Sweep:
     def _touching(self, share: float) -> list[Touch]:
         """Touching points on the edge of one spring's chart."""
         member, found = self.springs.member(share), []
-        for arc in member.arcs if member else ():
+        for arc in member.edge.arcs if member else ():
             if arc.curved:
                 found += touches(self.springs, share, arc.start, arc.end)
         return found

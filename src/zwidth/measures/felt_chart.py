@@ -8,7 +8,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.chart import BoundaryArc, StabilityChart
+from zwidth.chart.chart import StabilityChart
+from zwidth.chart.result import BoundaryArc
 from zwidth.measures.felt import hardest_static_stiffness, static_stiffness
 from zwidth.model.arguments import require
 from zwidth.model.plant import Plant

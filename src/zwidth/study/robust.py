@@ -63,6 +63,16 @@ class Violation:
     worst_stiffness_share: float
     worst: dict[str, Any]
 
+    def document(self) -> dict[str, Any]:
+        """The numbers under the keys of --json."""
+        return {
+            "unseen": self.unseen,
+            "violating": self.violating,
+            "worst_spectral_radius": self.worst_spectral_radius,
+            "worst_stiffness_share": self.worst_stiffness_share,
+            "worst_member": self.worst or None,
+        }
+
 
 @dataclass(frozen=True)
 class RobustStudy:
@@ -84,6 +94,19 @@ class RobustStudy:
     moved: float
     settled: bool
     violation: Violation | None
+
+    def document(self) -> dict[str, Any]:
+        """The chart and the search under the keys of `zwidth robust --json`."""
+        return self.chart.document() | {
+            "members": list(self.members),
+            "search": {
+                "sampled": self.sampled,
+                "rounds": self.rounds,
+                "moved_share": self.moved,
+                "settled": self.settled,
+            },
+            "violation": self.violation and self.violation.document(),
+        }
 
 
 class RobustError(ValueError):

@@ -123,7 +123,7 @@ def edge_distance(walls: Floats, chart: StabilityChart) -> Floats:
 
     walls  (k, 3)  K, B and frequency, none of them 0
 
-    >>> from zwidth.chart.chart import BoundaryArc
+    >>> from zwidth.chart.result import BoundaryArc
     >>> from types import SimpleNamespace
     >>> chart = SimpleNamespace(boundary=[BoundaryArc(np.array([0, 100]), np.array([2, 2]), np.array([10, 20]))])
     >>> edge_distance(np.array([[50.0, 1.6, 15.0], [200.0, 2.0, 20.0]]), chart).round(9).tolist()

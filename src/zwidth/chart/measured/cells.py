@@ -9,6 +9,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
+from zwidth.chart.arcs import Arcs
 from zwidth.chart.cells import Box
 from zwidth.chart.measured.boundary import Boundary, boundary, own_sizes, real_root, refine
 from zwidth.chart.measured.loop import MeasuredLoop
@@ -40,6 +41,13 @@ class Cells:
     def only(self, kept: Flags) -> Cells:
         """Some of these cells."""
         return replace(self, polygons=tuple(cell for cell, keep in zip(self.polygons, kept, strict=True) if keep))
+
+    @property
+    def sides(self) -> Arcs:
+        """The edge of the cells, side by side."""
+        return Arcs.chords(
+            [np.array(ring.coords) for cell in self.polygons for ring in (cell.exterior, *cell.interiors)]
+        )
 
     @property
     def open(self) -> bool:

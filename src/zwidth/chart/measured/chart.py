@@ -5,21 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import isnan, nan
+from typing import Any, ClassVar
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.chart.arcs import DAMPING, STIFFNESS, Arcs
+from zwidth.chart.arcs import Arcs
 from zwidth.chart.area import quadrant_area
 from zwidth.chart.cells import Box, box_of, cut
 from zwidth.chart.measured.boundary import Boundary, boundary, coarse, real_root
 from zwidth.chart.measured.cells import Cells, cells_within, edges_stable_set, window
+from zwidth.chart.measured.extreme_walls import angles_at, largest_damping, stiffest_wall
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.measured.uncertainty_band import Band, uncertainty
 from zwidth.chart.measured.usable_frequencies import Stretch
 from zwidth.chart.measured.verdict import MeasuredVerdicts, NearestEdge, judge_measured
-from zwidth.chart.peak import stiffest
+from zwidth.chart.result import BoundaryArc, Chart
+from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.verdict import UNDECIDED
 from zwidth.loop.controller import Controller
 from zwidth.model.arguments import require
@@ -32,27 +35,13 @@ ZOOMED = 2e-8  # of the stiffest wall: chords in the window round it
 FEWEST_ON_EDGE = 3  # measured frequencies, without which the edge is guesswork
 
 
-@dataclass(frozen=True)
-class MeasuredArc:
-    """Measured points along a piece of the stable set's edge.
+@dataclass(frozen=True, kw_only=True, repr=False)
+class MeasuredChart(Chart):
+    """The stable walls of a measured device.
 
-    stiffness, damping, frequency  (k,)  [N/m], [N s/m], [Hz]; a line of real roots by its two ends, 0 or 1/(2T)
-    stiffness_low, stiffness_high  (k,)  [N/m] extent of the band of each point; None where no error is known
-    """
-
-    stiffness: Floats
-    damping: Floats
-    frequency: Floats
-    stiffness_low: Floats | None = None
-    stiffness_high: Floats | None = None
-
-
-@dataclass(frozen=True)
-class MeasuredChart:
-    """The stable walls of a measured device. The names of `StabilityChart` mean here what they mean there.
-
-    boundary              arcs of measured points, ascending in frequency; what is interpolated between them shows
-                          in `regions` only
+    edge                  every wall with a root on the circle, as far as it was measured
+    boundary              arcs of measured points, ascending in frequency, and lines of real roots by their two
+                          ends; what is interpolated between them shows in `regions` only
     interpolation_error   relative error that interpolation is expected to leave in stiffness_max
     measured_stiffness_max  the stiffest of the measured points on the edge with K > 0, B >= 0 [N/m]; nan: none
     band                  walls whose verdict the measurement's error leaves open; None where no error is known
@@ -60,18 +49,10 @@ class MeasuredChart:
     unusable              stretches of frequency that cannot be relied on
     open                  whether the edge does not close, for lack of data: regions then end at a window not their
                           own, and what would be read off them is nan
-    integrators           poles of the response at z = 1
     """
 
     loop: MeasuredLoop
     edge: Boundary
-    regions: tuple[Floats, ...]
-    boundary: tuple[MeasuredArc, ...]
-    stiffness_max: float
-    damping_at_stiffness_max: float
-    frequencies_at_stiffness_max: tuple[float, ...]
-    damping_max: float
-    stable_area: float
     interpolation_error: float
     measured_stiffness_max: float
     band: Band | None
@@ -79,9 +60,12 @@ class MeasuredChart:
     unusable: tuple[Stretch, ...]
     open: bool
     window: Box
-    fastest_decay: None = None
-    fastest_decay_in_first_quadrant: None = None
-    unobserved_modes: tuple[str, ...] = ()
+
+    _edge_columns: ClassVar[dict[str, str]] = {
+        **Chart._edge_columns,
+        "stiffness_low_N_per_m": "stiffness_low",
+        "stiffness_high_N_per_m": "stiffness_high",
+    }
 
     @property
     def integrators(self) -> int:
@@ -89,17 +73,43 @@ class MeasuredChart:
         return self.loop.integrators
 
     @property
+    def measured_up_to_share(self) -> float:
+        """Where the data end, as a share of half the sampling rate; 1 where they reach it."""
+        half = 0.5 / self.loop.period
+        beyond = [stretch.low for stretch in self.unusable if stretch.high >= half * (1.0 - 1e-9)]
+        return min([*(low / half for low in beyond), 1.0])
+
+    @property
     def box(self) -> Box:
         """KMIN, KMAX, BMIN, BMAX of the regions (or the measured points, if they are open) and 5 %."""
-        if not self.regions:
-            return 0.0, 1.0, 0.0, 1.0
+        if not (self.regions and self.open):
+            return super().box
         inner = [arc for arc in self.boundary if 0.0 < arc.frequency[0] < 0.5 / self.loop.period]
-        points = np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in inner])
-        return box_of([points] if self.open else self.regions)
+        return box_of([np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in inner])])
 
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> MeasuredVerdicts:
         """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, by the count of their roots."""
         return judge_measured(self.loop, self.edge, wall_stiffness, wall_damping, nearest_edge(self))
+
+    def document(self) -> dict[str, Any]:
+        """The chart as numbers and lists, under the keys of `zwidth chart --json`; nan where there is none."""
+        return super().document() | {
+            "integrators": self.integrators,
+            "measurement": self.loop.response.note or None,
+            "measured_stiffness_max_N_per_m": self.measured_stiffness_max,
+            "interpolation_error": self.interpolation_error,
+            "band": self.band and self.band.document(),
+            "stiffness_max_of_sweeps_N_per_m": list(self.stiffness_max_of_sweeps) or None,
+            "unusable": [stretch.document() for stretch in self.unusable],
+            "closed": not self.open,
+            "measured_up_to_share": self.measured_up_to_share,
+        }
+
+    def _numbers(self) -> list[str]:
+        if self.band is None:
+            return super()._numbers()
+        low, high = self.band.stiffness_low, self.band.stiffness_high
+        return [*super()._numbers(), f"largest stiffness  {low:.6g} to {high:.6g} N/m within {self.band.meaning}"]
 
 
 def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
@@ -207,9 +217,18 @@ def _empty(loop: MeasuredLoop) -> MeasuredChart:
     """The chart of a device without a stable wall. Raises ResponseError where the data cannot tell."""
     if any(stretch.low == loop.response.frequency[loop.good][-1] for stretch in loop.unusable):
         raise ResponseError(_nothing_near(loop))
-    known = boundary(loop, coarse(loop))
+    none = TracedEdge.of(Arcs.of(()), ())
     return MeasuredChart(
-        loop, known, (), (), nan, nan, (), 0.0, 0.0, nan, nan, None, (), loop.unusable, False, (0.0, 1.0, 0.0, 1.0)
+        **none.readings(loop.period, lambda K, B: False),
+        loop=loop,
+        edge=boundary(loop, coarse(loop)),
+        interpolation_error=nan,
+        measured_stiffness_max=nan,
+        band=None,
+        stiffness_max_of_sweeps=(),
+        unusable=loop.unusable,
+        open=False,
+        window=(0.0, 1.0, 0.0, 1.0),
     )
 
 
@@ -223,10 +242,10 @@ def _nothing_near(loop: MeasuredLoop) -> str:
 
 def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
     """The chart from its cells."""
-    peak, zoomed = ((nan, nan), cells) if opened else _peak(loop, cells)
+    peak, zoomed = ((nan, nan), cells) if opened else stiffest_wall(loop, cells)
     arcs = tuple(_arcs(loop, cells))
     points = [(K, B) for arc in arcs for K, B in zip(arc.stiffness, arc.damping, strict=True)]
-    angles = _angles_at(loop, zoomed, peak)
+    angles = angles_at(zoomed, peak)
     at_peak = np.array([a for a in angles if 0.0 < a < np.pi])
     h, w = loop.h(at_peak), loop.w(at_peak)
     errors = loop.interpolation.relative_error(at_peak) * np.abs(h * w / w.imag)
@@ -238,8 +257,8 @@ def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
         stiffness_max=peak[0],
         damping_at_stiffness_max=peak[1],
         frequencies_at_stiffness_max=tuple(a / (2.0 * np.pi * loop.period) for a in angles),
-        damping_max=nan if opened else _largest_damping(loop, cells),
-        stable_area=nan if opened else quadrant_area(_chords(cells), ()),
+        damping_max=nan if opened else largest_damping(loop, cells),
+        stable_area=nan if opened else quadrant_area(cells.sides, ()),
         interpolation_error=float(np.max(errors, initial=0.0) / peak[0]) + ZOOMED,
         measured_stiffness_max=max((K for K, B in points if K > 0.0 and B >= 0.0), default=nan),
         band=None if opened else _holding(uncertainty(loop, cells), peak[0]),
@@ -259,81 +278,7 @@ def _holding(band: Band | None, stiffest: float) -> Band | None:
     return replace(band, stiffness_low=low, stiffness_high=float(np.fmax(band.stiffness_high, stiffest)))
 
 
-def _chords(cells: Cells) -> Arcs:
-    """The edge of the cells, side by side."""
-    return Arcs.chords(
-        [np.array(ring.coords) for cell in cells.polygons for ring in (cell.exterior, *cell.interiors)]
-    )
-
-
-def _stiffest(cells: Cells) -> tuple[float, float]:
-    """The corner or crossing of B = 0 of largest K, with K > 0 and B >= 0; nan where there is none."""
-    # corners are noded to a share of the window that is coarser than rounding of the stiffest wall
-    found = stiffest(_chords(cells), (), 10.0 * (cells.box[1] - cells.box[0]))
-    return (found.stiffness, found.damping) if found else (nan, nan)
-
-
-def _peak(loop: MeasuredLoop, cells: Cells) -> tuple[tuple[float, float], Cells]:
-    """The largest stiffness with K > 0, B >= 0: found among the cells' corners, then in a window on its own."""
-    peak, seen = _stiffest(cells), cells
-    for _ in range(2):
-        if isnan(peak[0]):
-            break
-        near = _around(peak, seen.box, 1e-3, 2e-2)
-        closer = cells_within(loop, cells.edge, near)
-        better = _stiffest(closer)
-        if isnan(better[0]) or better[0] > near[1] - 1e-6 * (near[1] - near[0]):
-            break
-        peak, seen = better, closer
-        if near[2] < peak[1] < near[3]:
-            break
-    return peak, seen
-
-
-def _around(wall: tuple[float, float], box: Box, of_K: float, of_B: float) -> Box:
-    K, B = wall
-    half_K, half_B = of_K * (box[1] - box[0]), of_B * (box[3] - box[2])
-    return K - half_K, K + half_K, B - half_B, B + half_B
-
-
-def _angles_at(loop: MeasuredLoop, cells: Cells, wall: tuple[float, float]) -> list[float]:
-    """The angles of the branches that pass through a wall, ascending: one, or two at a corner."""
-    if isnan(wall[0]):
-        return []
-    K0, K1, B0, B1 = cells.box
-    scale = np.array([K1 - K0, B1 - B0])
-    ends = (cells.edge.segments.reshape(-1, 2, 2) - np.array(wall)) / scale
-    a, along = ends[:, 0], ends[:, 1] - ends[:, 0]
-    length = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
-    share = np.clip(-np.einsum("ij,ij->i", a, along) / length, 0.0, 1.0)
-    away = np.hypot(*(a + share[:, None] * along).T)
-    found: list[float] = []
-    near = np.flatnonzero(away < 1e-4)
-    for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else []:
-        k = run[np.argmin(away[run])]
-        at = cells.edge.at[k]
-        if at >= 0:
-            low, high = cells.edge.angles[at], cells.edge.angles[at + 1]
-            found.append(float(low + share[k] * (high - low)))
-        elif at > -3:
-            found.append(0.0 if at == -1 else float(np.pi))
-    return sorted(found)
-
-
-def _largest_damping(loop: MeasuredLoop, cells: Cells) -> float:
-    """Supremum of B >= 0 stable for all small K > 0: on a line close to K = 0, then in a window there."""
-    found, seen = 0.0, cells
-    for _ in range(2):
-        _, walls = _chords(seen).crossings(STIFFNESS, 1e-6 * (seen.box[1] - seen.box[0]))
-        top = float(np.max(walls[:, DAMPING], initial=0.0))
-        if top <= 0.0:
-            break
-        found = top
-        seen = cells_within(loop, cells.edge, _around((0.0, found), cells.box, 1e-3, 1e-3))
-    return found
-
-
-def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
+def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[BoundaryArc]:
     """Runs of measured points on the stable set's edge, then its pieces of the lines of real roots."""
     half = 0.5 / loop.period
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
@@ -344,11 +289,11 @@ def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
         theta, given = measured[run], loop.response.frequency[loop.good][run]
         K, B, _ = loop.walls(theta)
         if loop.errors is None:
-            yield MeasuredArc(K, B, given)
+            yield BoundaryArc(K, B, given)
         else:
             w = loop.w(theta)
             reach = loop.error(theta) * np.abs(w) / np.abs(w.imag)
-            yield MeasuredArc(K, B, given, K - reach, K + reach)
+            yield BoundaryArc(K, B, given, stiffness_low=K - reach, stiffness_high=K + reach)
     lines = [(-1, 0.0), (-2, half)] if loop.interpolation.closed else [(-1, 0.0)]
     for kind, frequency in lines:
         static, turned = real_root(loop, kind)
@@ -357,7 +302,7 @@ def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[MeasuredArc]:
         for cell in cells.polygons:
             for low, high in _along(np.array(cell.exterior.coords), static, turned, scale):
                 ends = np.array([low, high])
-                yield MeasuredArc(static - ends * turned, ends, np.full(2, frequency))
+                yield BoundaryArc(static - ends * turned, ends, np.full(2, frequency))
 
 
 def _along(ring: Floats, h: float, w: float, scale: Floats) -> Iterator[tuple[float, float]]:

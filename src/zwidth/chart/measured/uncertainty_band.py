@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from math import nan
+from typing import Any
 
 import numpy as np
 import shapely
@@ -36,6 +37,15 @@ class Band:
     stiffness_low: float
     stiffness_high: float
     meaning: str
+
+    def document(self) -> dict[str, Any]:
+        """The band as numbers and lists."""
+        return {
+            "stiffness_low_N_per_m": self.stiffness_low,
+            "stiffness_high_N_per_m": self.stiffness_high,
+            "meaning": self.meaning,
+            "regions": [ring.tolist() for ring in self.regions],
+        }
 
 
 def uncertainty(loop: MeasuredLoop, cells: Cells) -> Band | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,10 @@ class Stretch:
     high: float
     reason: str
     on_edge: bool | None = None
+
+    def document(self) -> dict[str, Any]:
+        """The stretch as numbers and words."""
+        return {"low_Hz": self.low, "high_Hz": self.high, "reason": self.reason, "on_edge": self.on_edge}
 
 
 def usable(response: Response) -> Flags:

@@ -9,29 +9,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.measured.boundary import Boundary
 from zwidth.chart.measured.loop import MeasuredLoop
-from zwidth.chart.verdict import NAMES, STABLE, UNDECIDED, UNSTABLE
+from zwidth.chart.verdict import STABLE, UNDECIDED, UNSTABLE, WallVerdicts
 from zwidth.model.arguments import walls as broadcast_walls
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class MeasuredVerdicts:
-    """Answers of shape (...) for as many walls.
+class MeasuredVerdicts(WallVerdicts):
+    """What the count of roots says of walls (...).
 
-    verdict    STABLE, UNSTABLE or UNDECIDED (`chart.verdict`)
-    outside    roots outside the unit circle
-    frequency  of the nearest point of the stable set's edge [Hz]; of the least |1 + L| where nothing is stable
+    The frequency is that of the nearest point of the stable set's edge; of the least |1 + L| where nothing is
+    stable.
+
+    outside  roots outside the unit circle
     """
 
-    verdict: NDArray[np.int8]
     outside: NDArray[np.int64]
-    frequency: Floats
-
-    @property
-    def names(self) -> list[str]:
-        """The verdicts in words, flattened."""
-        return [NAMES[int(v)] for v in self.verdict.ravel()]
 
 
 @dataclass(frozen=True)
@@ -86,4 +80,4 @@ def judge_measured(
             frequency[part] = nearest.frequency(safe[part])
     frequency[~finite] = np.nan
     verdict = np.where(doubtful, UNDECIDED, np.where(outside == 0, STABLE, UNSTABLE)).astype(np.int8)
-    return MeasuredVerdicts(verdict.reshape(K.shape), outside.reshape(K.shape), frequency.reshape(K.shape))
+    return MeasuredVerdicts(verdict.reshape(K.shape), frequency.reshape(K.shape), outside.reshape(K.shape))

@@ -4,57 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arc_joining import ChartError
-from zwidth.chart.arcs import Walk, sampled
-from zwidth.chart.area import quadrant_area
-from zwidth.chart.cells import cells, outline
-from zwidth.chart.chart import widest
+from zwidth.chart.arcs import Walk
 from zwidth.chart.curve_pieces import CHORD
-from zwidth.chart.peak import largest_damping, stiffest
+from zwidth.chart.result import Chart
 from zwidth.chart.robust.common_set import Shapes, common, excluding
 from zwidth.chart.robust.edges import common_edge
 from zwidth.chart.robust.members import Member, chart_members, polygons
-from zwidth.chart.verdict import judge
+from zwidth.chart.traced_edge import TracedEdge
+from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
 from zwidth.model.arguments import refusal, require
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class RobustArc:
-    """A piece of the robust set's edge: walls at which one member begins to vibrate.
-
-    member                         index of the loop that binds there; of several the one of the smallest set
-    stiffness, damping, frequency  (k,)  [N/m], [N s/m], [Hz]; 0 or 1/(2T) for a real root
-    """
-
-    member: int
-    stiffness: Floats
-    damping: Floats
-    frequency: Floats
-
-
-@dataclass(frozen=True)
-class RobustChart:
-    """The walls that are stable for every member, both signs of K and B, never clipped.
+@dataclass(frozen=True, kw_only=True, repr=False)
+class RobustChart(Chart):
+    """The walls that are stable for every member, each arc of the edge with the member that binds there.
 
     members         index -> loop, of those that could be charted
     failed          index -> why a member could not be charted; nothing is claimed for these
-    regions         closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set
-    boundary        arcs of its edge, each with the member that binds
-    binding         indices of the members that bind anywhere on the edge, ascending
-    stiffness_max   supremum of K over these walls with K > 0, B >= 0 [N/m]; nan if there is none
-    damping_at_stiffness_max     [N s/m]; nan if there is none
-    frequencies_at_stiffness_max [Hz] one, or two at a corner, ascending; () if there is none
+    binding         indices of the members that bind anywhere on the edge, ascending; of several on one edge the
+                    one of the smallest set
     members_at_stiffness_max     the members that bind there, ascending: one, or two at a corner between them
-    damping_max     supremum of B >= 0 stable for every member for all sufficiently small K > 0 [N s/m]
-    stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
     best_by_area, best_by_stiffness  members that would have the most of each if they were the only ones
     lost_share      1 - stable_area / that of the best by area
     lost_stiffness_share  1 - stiffness_max / that of the best by stiffness
@@ -66,15 +45,8 @@ class RobustChart:
 
     members: dict[int, Loop]
     failed: dict[int, str]
-    regions: tuple[Floats, ...]
-    boundary: tuple[RobustArc, ...]
     binding: tuple[int, ...]
-    stiffness_max: float
-    damping_at_stiffness_max: float
-    frequencies_at_stiffness_max: tuple[float, ...]
     members_at_stiffness_max: tuple[int, ...]
-    damping_max: float
-    stable_area: float
     best_by_area: int
     best_by_stiffness: int
     lost_share: float
@@ -83,15 +55,49 @@ class RobustChart:
     outlines: dict[int, tuple[Floats, ...]]
     corner_blur: float
 
+    _edge_columns: ClassVar[dict[str, str]] = {"member": "member", **Chart._edge_columns}
+
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
         """Motions of any member that no wall moves, each named once; they were cancelled and do not count."""
         return tuple(dict.fromkeys(name for loop in self.members.values() for name in loop.unobserved_modes))
 
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
+        """Verdicts on walls K, B (...) that broadcast, by eigenvalues of every member: stable for all of them,
+        unstable for one, else undecided; radius and frequency are those of the member with the largest radius."""
+        each = [judge(loop, wall_stiffness, wall_damping) for loop in self.members.values()]
+        worst = np.argmax([one.spectral_radius for one in each], axis=0)
+
+        def of_worst(values: list[Floats]) -> Floats:
+            return np.asarray(np.take_along_axis(np.array(values), worst[None], axis=0)[0])
+
+        return Verdicts(
+            verdict=np.min([one.verdict for one in each], axis=0),
+            frequency=of_worst([one.frequency for one in each]),
+            spectral_radius=of_worst([one.spectral_radius for one in each]),
+            uncertainty=of_worst([one.uncertainty for one in each]),
+        )
+
     def spectral_radius(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
         """Largest |z| (...) of any member, by eigenvalues, for walls K, B (...) that broadcast."""
-        radii = [judge(loop, wall_stiffness, wall_damping).spectral_radius for loop in self.members.values()]
-        return np.asarray(np.max(radii, axis=0))
+        return self.check(wall_stiffness, wall_damping).spectral_radius
+
+    def document(self) -> dict[str, Any]:
+        """The chart as numbers and lists, under the keys of `zwidth robust --json`; nan where there is none."""
+        return super().document() | {
+            "members_at_stiffness_max": list(self.members_at_stiffness_max),
+            "failed": [{"member": index, "reason": reason} for index, reason in self.failed.items()],
+            "binding": list(self.binding),
+            "best_by_area": self.best_by_area,
+            "best_by_stiffness": self.best_by_stiffness,
+            "lost_share": self.lost_share,
+            "lost_stiffness_share": self.lost_stiffness_share,
+            "corner_blur": self.corner_blur,
+            "excluding": list(self.excluding) or None,
+        }
+
+    def _summary(self) -> str:
+        return f"{super()._summary()} for all of {len(self.members)} members, {len(self.binding)} of which bind"
 
 
 def robust_chart(members: Sequence[Loop]) -> RobustChart:
@@ -129,44 +135,30 @@ def robust_of(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart
         reason = next(iter(failed.values()), "there is none")
         raise ChartError(f"no member could be charted; the first: {reason}")
     unit = max(member.tracer.period for member in charted.values())
-    shapes = {index: polygons(member.outlines, unit) for index, member in charted.items()}
+    shapes = {index: polygons(member, unit) for index, member in charted.items()}
     shape, cutters = common(list(charted.values()), shapes, unit)
     arcs, blur = common_edge(shape, cutters, unit)
     tracers = {index: member.tracer for index, member in charted.items()}
-    samples = sampled(arcs, tracers)
-    outlines = [outline([samples[k] for k in ring]) for ring in arcs.rings]
-    width = widest(outlines)
-    peak = stiffest(arcs, tracers, width)
-    if _passed_over(samples, list(charted.values()), unit):
+    edge = TracedEdge.of(arcs, tracers)
+    if _passed_over(edge.walks, list(charted.values()), unit):
         blur = max(blur, CHORD)
-    area = quadrant_area(arcs, tracers) if peak else 0.0
-    in_radians = {index: 2.0 * np.pi * tracer.period for index, tracer in tracers.items()}
-    roots = zip(peak.angles, peak.members, strict=True) if peak else ()
     by_area, largest_area = _best_by_area(charted, shapes)
-    by_stiffness = max(charted, key=lambda index: (_stiffness(charted[index]), -index))
+    by_stiffness = max(charted, key=lambda index: (_stiffness(charted[index].edge), -index))
     return RobustChart(
-        members={index: member.tracer.loop for index, member in charted.items()},
+        **edge.readings(
+            {index: tracer.period for index, tracer in tracers.items()},
+            lambda K, B: all(tracer.stable(K, B) for tracer in tracers.values()),
+        ),
+        members={index: tracer.loop for index, tracer in tracers.items()},
         failed=failed,
-        regions=cells(outlines),
-        boundary=tuple(
-            RobustArc(index, K, B, thetas / in_radians[index])
-            for index, (thetas, K, B) in zip(arcs.member.tolist(), samples, strict=True)
-        ),
         binding=tuple(np.unique(arcs.member).tolist()),
-        stiffness_max=peak.stiffness if peak else float("nan"),
-        damping_at_stiffness_max=peak.damping if peak else float("nan"),
-        frequencies_at_stiffness_max=tuple(sorted({angle / in_radians[index] for angle, index in roots})),
-        members_at_stiffness_max=tuple(sorted(set(peak.members))) if peak else (),
-        damping_max=largest_damping(
-            arcs, tracers, width, lambda K, B: all(tracer.stable(K, B) for tracer in tracers.values())
-        ),
-        stable_area=area,
+        members_at_stiffness_max=tuple(sorted(set(edge.peak.members))) if edge.peak else (),
         best_by_area=by_area,
         best_by_stiffness=by_stiffness,
-        lost_share=_lost(area, largest_area),
-        lost_stiffness_share=_lost(peak.stiffness if peak else 0.0, _stiffness(charted[by_stiffness])),
-        excluding=() if peak else excluding(charted, shapes, unit),
-        outlines={index: member.outlines for index, member in charted.items()},
+        lost_share=_lost(edge.area, largest_area),
+        lost_stiffness_share=_lost(_stiffness(edge), _stiffness(charted[by_stiffness].edge)),
+        excluding=() if edge.peak else excluding(charted, shapes, unit),
+        outlines={index: tuple(member.edge.outlines) for index, member in charted.items()},
         corner_blur=blur,
     )
 
@@ -186,8 +178,8 @@ def _passed_over(samples: list[Walk], members: list[Member], unit: float) -> boo
     return False
 
 
-def _stiffness(member: Member) -> float:
-    return member.peak.stiffness if member.peak else 0.0
+def _stiffness(edge: TracedEdge) -> float:
+    return edge.peak.stiffness if edge.peak else 0.0
 
 
 def _lost(left: float, whole: float) -> float:
@@ -203,5 +195,4 @@ def _best_by_area(charted: dict[int, Member], shapes: Shapes) -> tuple[int, floa
     if right > 0.0 and top > 0.0:
         areas = shapely.area(shapely.clip_by_rect(cells, 0.0, 0.0, right, top))
     best = list(charted)[int(np.argmax(areas))]
-    member = charted[best]
-    return best, quadrant_area(member.arcs, {best: member.tracer}) if member.peak else 0.0
+    return best, charted[best].edge.area

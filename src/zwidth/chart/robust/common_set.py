@@ -46,7 +46,7 @@ def _cuts(member: Member, shape: shapely.MultiPolygon, left: shapely.MultiPolygo
 def excluding(members: Mapping[int, Member], shapes: Shapes, unit: float) -> tuple[int, ...]:
     """Indices of a smallest group found that has no wall with K > 0, B >= 0 in common: one member that has none
     itself, two that exclude each other, or more of which none can be spared."""
-    alone = [index for index, member in members.items() if member.peak is None]
+    alone = [index for index, member in members.items() if member.edge.peak is None]
     if alone:
         return (alone[0],)
     _, cutters = common(list(members.values()), shapes, unit)

@@ -94,7 +94,7 @@ class Corner:
 
 def corner(one: Run, two: Run, unit: float, size: float) -> Corner:
     """Where one run gives way to the next."""
-    follows = one.member is two.member and two.number == one.member.arcs.following[one.number]
+    follows = one.member is two.member and two.number == one.member.edge.arcs.following[one.number]
     if follows and np.hypot(*(one.last - np.multiply(one.whole.last, (unit, 1.0)))) <= 1e-6 * size:
         return Corner(one.whole.last, (one.whole.end, two.whole.start), 0.0)
     found = _meeting(one, two, unit, size)

@@ -72,7 +72,7 @@ def common_edge(shape: shapely.MultiPolygon, members: Sequence[Member], unit: fl
 def _segments(members: Sequence[Member], unit: float) -> _Segments:
     ends, angles, origin = [], [], []
     for number, member in enumerate(members):
-        for arc, (thetas, K, B) in enumerate(member.samples):
+        for arc, (thetas, K, B) in enumerate(member.edge.walks):
             points = np.column_stack([K * unit, B])
             ends.append(np.stack([points[:-1], points[1:]], axis=1))
             angles.append(np.column_stack([thetas[:-1], thetas[1:]]))
@@ -88,7 +88,7 @@ def _runs(points: Floats, members: Sequence[Member], segments: _Segments, near: 
     changes = np.any(own != np.roll(own, 1, axis=0), axis=1)
     for i in np.flatnonzero(~changes):  # an arc that ends where it begins: past its own corner it is another run
         number, arc = own[i]
-        changes[i] = _starts_anew(members[number].arcs[arc], angles[i - 1, 1], angles[i, 0])
+        changes[i] = _starts_anew(members[number].edge.arcs[arc], angles[i - 1, 1], angles[i, 0])
     starts = np.flatnonzero(changes) if changes.any() else np.array([0])
     runs = []
     for one, following in zip(starts, np.append(starts[1:], starts[0] + len(found)), strict=True):
@@ -96,7 +96,7 @@ def _runs(points: Floats, members: Sequence[Member], segments: _Segments, near: 
         number, arc = own[edges[0]].tolist()
         first, last = points[edges[0]], points[edges[-1] + 1]
         ends = (float(angles[edges[0], 0]), float(angles[edges[-1], 1]))
-        runs.append(Run(members[number], arc, members[number].arcs[arc], first, last, ends))
+        runs.append(Run(members[number], arc, members[number].edge.arcs[arc], first, last, ends))
     return runs
 
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from zwidth.chart.arc_joining import ChartError
-from zwidth.chart.arcs import MINUS, PLUS, Arcs, Walk
+from zwidth.chart.arcs import MINUS, PLUS
 from zwidth.chart.cells import signed_area
-from zwidth.chart.chart import traced, widest
+from zwidth.chart.chart import traced
 from zwidth.chart.hurwitz import is_stable, working_room
-from zwidth.chart.peak import Peak, stiffest
+from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import ROOTS, Tracer
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import UnmovedError
@@ -35,18 +35,12 @@ class Member:
 
     index     its place among the loops
     tracer    the loop on the unit circle
-    arcs      round each cell and hole, this index their member
-    samples   angles, K and B along every arc
-    outlines  (k, 2) closed walks of [K, B], one for each ring
-    peak      its stiffest wall with K > 0, B >= 0; None if there is none
+    edge      of its stable set, this index the member of its arcs
     """
 
     index: int
     tracer: Tracer
-    arcs: Arcs
-    samples: list[Walk]
-    outlines: tuple[Floats, ...]
-    peak: Peak | None
+    edge: TracedEdge
 
     def unstable(self, K: float, B: float) -> bool:
         """Whether a wall is unstable beyond doubt: by its polynomial, and by its eigenvalues, too."""
@@ -69,19 +63,18 @@ def chart_members(loops: Sequence[Loop]) -> tuple[dict[int, Member], dict[int, s
 
 
 def chart_member(index: int, loop: Loop) -> Member:
-    """One loop's arcs, outlines and stiffest wall. Raises ChartError."""
+    """One loop with its edge. Raises ChartError."""
     tracer = Tracer.of(loop)
-    arcs, _, samples, outlines = traced(tracer)
-    arcs = replace(arcs, member=np.full(len(arcs), index))
-    return Member(index, tracer, arcs, samples, tuple(outlines), stiffest(arcs, {index: tracer}, widest(outlines)))
+    edge, _ = traced(tracer, index)
+    return Member(index, tracer, edge)
 
 
-def polygons(outlines: Sequence[Floats], unit: float) -> shapely.MultiPolygon:
-    """Outlines (k, 2) as one geometry in [K unit, B], clockwise ones as holes.
+def polygons(member: Member, unit: float) -> shapely.MultiPolygon:
+    """A loop's stable set as one geometry in [K unit, B], clockwise outlines as holes.
 
     unit  seconds: K T and B have one unit, in which distances between walls are taken
     """
-    scaled = [outline * (unit, 1.0) for outline in outlines]
+    scaled = [outline * (unit, 1.0) for outline in member.edge.outlines]
     solid = [outline for outline in scaled if signed_area(outline) > 0.0]
     holes = [outline for outline in scaled if signed_area(outline) < 0.0]
     found: list[shapely.Polygon] = []
@@ -105,7 +98,7 @@ def polygonal(geometry: shapely.Geometry) -> list[shapely.Polygon]:
 def curved_edges(member: Member, unit: float) -> shapely.MultiLineString:
     """The arcs of complex pairs, and chords over gaps, without their very ends; in [K unit, B]."""
     lines = []
-    for kind, (_, K, B) in zip(member.arcs.kind, member.samples, strict=True):
+    for kind, (_, K, B) in zip(member.edge.arcs.kind, member.edge.walks, strict=True):
         if kind in (PLUS, MINUS):
             continue
         points = np.column_stack([K * unit, B])

@@ -40,9 +40,10 @@ class Branch:
     def zeros(self, arc: Arc, component: int) -> Floats:
         """Angles on an arc at which K, B or dK/dtheta changes sign, to rounding."""
         thetas = arc.angles
+        inside = _inside(thetas)
         thetas[0] += DRAWN_IN * (thetas[1] - thetas[0])
         thetas[-1] -= DRAWN_IN * (thetas[-1] - thetas[-2])
-        thetas = _evaluated(arc, thetas)
+        thetas = thetas[inside]
         values = self.loci.at(self.number, thetas)[component]
 
         def value(theta: float) -> float:
@@ -51,7 +52,7 @@ class Branch:
         turns = np.flatnonzero(values[1:] * values[:-1] < 0.0)
         return np.array([brentq(value, thetas[k], thetas[k + 1], xtol=1e-300, rtol=1e-14) for k in turns])
 
-    def between(self, arc: Arc) -> Floats:
+    def dense_angles(self, arc: Arc) -> Floats:
         """Angles strictly between an arc's ends, from first to last, with chords within CHORD of the size."""
         thetas = arc.angles
         middles = 0.5 * (thetas[1:] + thetas[:-1])
@@ -59,7 +60,8 @@ class Branch:
         walls = np.vstack([arc.first, inner, arc.last])
         off = np.column_stack(self.walls(middles)) - 0.5 * (walls[1:] + walls[:-1])
         sag = np.max(np.abs(off) / self.size, axis=1)
-        sag[(thetas[1:] * thetas[:-1] == 0.0) | (np.maximum(thetas[1:], thetas[:-1]) == np.pi)] = 0.0
+        inside = _inside(thetas)
+        sag[~(inside[1:] & inside[:-1])] = 0.0
         pieces = np.clip(np.ceil(np.sqrt(sag / CHORD)), 1, MOST_PIECES).astype(int)
         steps = [
             np.linspace(a, b, n, endpoint=False) for a, b, n in zip(thetas[:-1], thetas[1:], pieces, strict=True)
@@ -68,7 +70,8 @@ class Branch:
 
     def integral(self, arc: Arc) -> float:
         """Integral of K dB over the part of an arc with K > 0 and B > 0 [N^2 s/m^2], by Gauss's rule."""
-        inner = _evaluated(arc, arc.angles)
+        inside = _inside(arc.angles)
+        inner = arc.angles[inside]
         if len(inner) < 2:
             return _straight(arc.first, arc.last)
         stops = np.unique(np.concatenate([inner, self.zeros(arc, STIFFNESS), self.zeros(arc, DAMPING)]))
@@ -79,20 +82,16 @@ class Branch:
         value = np.where((K > 0.0) & (B > 0.0), K * dB, 0.0).reshape(-1, len(NODES))
         total = float(np.sum(half * (value @ WEIGHTS)))
         first, last = np.column_stack(self.walls(inner[[0, -1]]))
-        if _at_rim(arc.start):
+        if not inside[0]:
             total += _straight(arc.first, first)
-        if _at_rim(arc.end):
+        if not inside[-1]:
             total += _straight(last, arc.last)
         return total
 
 
-def _at_rim(theta: float) -> bool:
-    return theta in (0.0, np.pi)
-
-
-def _evaluated(arc: Arc, angles: Floats) -> Floats:
-    """An arc's angles without those at 0 and pi."""
-    return angles[slice(1 if _at_rim(arc.start) else None, -1 if _at_rim(arc.end) else None)]
+def _inside(thetas: Floats) -> NDArray[np.bool_]:
+    """Which angles are neither 0 nor pi."""
+    return np.asarray((thetas > 0.0) & (thetas < np.pi))
 
 
 def _straight(first: Floats | tuple[float, float], last: Floats | tuple[float, float]) -> float:

@@ -9,15 +9,14 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.polygon import orient
 
-from zwidth.chart.arcs import Arcs, sampled
-from zwidth.chart.area import quadrant_area
-from zwidth.chart.cells import Box, box_of, cells, outline
-from zwidth.chart.chart import BoundaryArc, widest
-from zwidth.chart.peak import largest_damping, stiffest
+from zwidth.chart.arcs import Arcs
+from zwidth.chart.result import Chart
 from zwidth.chart.several_directions.arcs import ring_arcs
 from zwidth.chart.several_directions.branch import Branch
 from zwidth.chart.several_directions.cells import Line, cut_lines, reach, real_root_lines, stable_polygons
 from zwidth.chart.several_directions.eigenloci import Loci, refine_loci, trace_loci, with_angles
+from zwidth.chart.traced_edge import TracedEdge
+from zwidth.chart.verdict import Verdicts, verdicts
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi import MultiLoop
 from zwidth.model.arguments import require
@@ -34,53 +33,24 @@ RASTER = 24
 OUTSIDE = 1e-9
 
 
-@dataclass(frozen=True)
-class MultiChart:
-    """The stable walls of several directions under one law, both signs of K and B, never clipped.
-
-    loop            what was asked
-    regions         closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set
-    boundary        arcs of its edge, with frequency
-    stiffness_max   supremum of K over stable walls with K > 0, B >= 0 [N/m]; nan if there is none
-    damping_at_stiffness_max     [N s/m]; nan if there is none
-    frequencies_at_stiffness_max [Hz] one, or two at a corner, ascending; () if there is none
-    damping_max     supremum of B >= 0 stable for all sufficiently small K > 0 [N s/m]; 0 if there is none
-    stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
-    """
+@dataclass(frozen=True, kw_only=True, repr=False)
+class MultiChart(Chart):
+    """The stable walls of several directions under one law; `loop` is what was asked."""
 
     loop: MultiLoop
-    regions: tuple[Floats, ...]
-    boundary: tuple[BoundaryArc, ...]
-    stiffness_max: float
-    damping_at_stiffness_max: float
-    frequencies_at_stiffness_max: tuple[float, ...]
-    damping_max: float
-    stable_area: float
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
         """Motions that no wall moves, by name; they were left out and do not count."""
         return self.loop.unobserved_modes
 
-    @property
-    def fastest_decay(self) -> None:
-        """None: the fastest-decaying wall is searched for over one direction only."""
-        return None
-
-    @property
-    def fastest_decay_in_first_quadrant(self) -> None:
-        """None, as `fastest_decay`."""
-        return None
-
-    @property
-    def box(self) -> Box:
-        """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
-        return box_of(self.regions)
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
+        """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast, by eigenvalues, whatever the regions say."""
+        return verdicts(self.loop, wall_stiffness, wall_damping)
 
     def spectral_radius(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
         """Largest |z| of walls K, B (...) that broadcast, by the eigenvalues of the transition matrix."""
-        z = np.linalg.eigvals(self.loop.transition_matrix(wall_stiffness, wall_damping))
-        return np.asarray(np.abs(z).max(axis=-1))
+        return self.check(wall_stiffness, wall_damping).spectral_radius
 
 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")  # walls at infinity are data
@@ -105,7 +75,7 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
     polygons = stable_polygons(loop, cut_lines(loci, lines, -far, far))
     for look in range(MOST_LOOKS):
         if not polygons:
-            return MultiChart(loop, (), (), np.nan, np.nan, (), 0.0, 0.0)
+            break
         missed = _missed(loop, polygons)
         if look >= LOOKS and not len(missed):
             break
@@ -114,7 +84,8 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
         low, high = found + MARGIN * (found[1] - found[0]) * np.array([[-1.0], [1.0]])
         loci = refine_loci(loci, low, high, CLOSE)
         polygons = stable_polygons(loop, cut_lines(loci, lines, low, high))
-    return _charted(loop, loci, lines, polygons)
+    edge = _edge(loop, loci, lines, polygons)
+    return MultiChart(loop=loop, **edge.readings(loop.period, lambda K, B: _is_stable(loop, K, B)))
 
 
 def _missed(loop: MultiLoop, polygons: list[shapely.Polygon]) -> Floats:
@@ -137,7 +108,10 @@ def _missed(loop: MultiLoop, polygons: list[shapely.Polygon]) -> Floats:
     return np.unique(centres[:, None] * (1.0 + np.concatenate([-steps, [0.0], steps])))
 
 
-def _charted(loop: MultiLoop, loci: Loci, lines: list[Line], polygons: list[shapely.Polygon]) -> MultiChart:
+def _edge(loop: MultiLoop, loci: Loci, lines: list[Line], polygons: list[shapely.Polygon]) -> TracedEdge:
+    """The edge of the stable polygons as arcs of the curves that made it."""
+    if not polygons:
+        return TracedEdge.of(Arcs.of(()), ())
     arcs = Arcs.of(
         [
             ring_arcs(loci, lines, np.array(ring.coords))
@@ -146,22 +120,7 @@ def _charted(loop: MultiLoop, loci: Loci, lines: list[Line], polygons: list[shap
         ]
     )
     size = np.ptp(shapely.get_coordinates(np.array(polygons)) / (loop.period, 1.0), axis=0)
-    branches = [Branch(loci, number, size) for number in range(loop.count)]
-    samples = sampled(arcs, branches)
-    outlines = [outline([samples[k] for k in ring]) for ring in arcs.rings]
-    width = widest(outlines)
-    in_hertz = 1.0 / (2.0 * np.pi * loop.period)
-    peak = stiffest(arcs, branches, width)
-    return MultiChart(
-        loop=loop,
-        regions=cells(outlines),
-        boundary=tuple(BoundaryArc(K, B, thetas * in_hertz) for thetas, K, B in samples),
-        stiffness_max=peak.stiffness if peak else np.nan,
-        damping_at_stiffness_max=peak.damping if peak else np.nan,
-        frequencies_at_stiffness_max=tuple(sorted({a * in_hertz for a in peak.angles})) if peak else (),
-        damping_max=largest_damping(arcs, branches, width, lambda K, B: _is_stable(loop, K, B)),
-        stable_area=quadrant_area(arcs, branches) if peak else 0.0,
-    )
+    return TracedEdge.of(arcs, [Branch(loci, number, size) for number in range(loop.count)])
 
 
 def _is_stable(loop: MultiLoop, wall_stiffness: float, wall_damping: float) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -118,39 +117,6 @@ def _charted_together(question: Question, device: Device, along: list[Any]) -> M
     return multi_chart(point.loop_of_directions)
 
 
-def numbers(chart: StabilityChart | MultiChart) -> dict[str, Any]:
-    """The chart under the keys of --json."""
-    frequencies = chart.frequencies_at_stiffness_max
-    fastest, buildable = chart.fastest_decay, chart.fastest_decay_in_first_quadrant
-    return {
-        "regions": list(chart.regions),
-        "boundary": [
-            {"stiffness_N_per_m": arc.stiffness, "damping_Ns_per_m": arc.damping, "frequency_Hz": arc.frequency}
-            for arc in chart.boundary
-        ],
-        "stiffness_max_N_per_m": chart.stiffness_max,
-        "damping_at_stiffness_max_Ns_per_m": chart.damping_at_stiffness_max,
-        "frequency_at_stiffness_max_Hz": min(frequencies, default=None),
-        "frequencies_at_stiffness_max_Hz": frequencies or None,
-        "damping_max_Ns_per_m": chart.damping_max,
-        "stable_area_N2s_per_m2": chart.stable_area,
-        "fastest_decay": fastest and fastest.document(),
-        "fastest_decay_in_first_quadrant": buildable and buildable.document(),
-        "unobserved_modes": chart.unobserved_modes,
-    }
-
-
-def boundary_table(chart: StabilityChart | MultiChart) -> dict[str, list[Any]]:
-    """The stable set's edge as columns, its arcs one after another and counted from 0."""
-    arcs = chart.boundary
-    return {
-        "arc": [index for index, arc in enumerate(arcs) for _ in arc.stiffness],
-        "stiffness_N_per_m": list(chain.from_iterable(arc.stiffness.tolist() for arc in arcs)),
-        "damping_Ns_per_m": list(chain.from_iterable(arc.damping.tolist() for arc in arcs)),
-        "frequency_Hz": list(chain.from_iterable(arc.frequency.tolist() for arc in arcs)),
-    }
-
-
 def _answer(
     question: Question,
     device: Device,
@@ -158,7 +124,7 @@ def _answer(
     path: Path | None,
     facts: dict[str, Any],
 ) -> Answer:
-    document = facts | numbers(chart) | {"decided": True}
+    document = facts | chart.document() | {"decided": True}
     if path is not None:
         document["file"] = str(path)
 
@@ -223,7 +189,7 @@ def _stiffest(chart: StabilityChart | MultiChart) -> str:
 def _write(path: Path, chart: StabilityChart | MultiChart, answer: Answer, window: Window | None) -> None:
     if path.suffix.lower() in DATA:
         reason = {} if answer.reason is None else {"reason": answer.reason}
-        write_data(path, answer.document | reason, boundary_table(chart))
+        write_data(path, answer.document | reason, chart.table())
         return
     from zwidth.show.figures.stability import draw_chart
     from zwidth.show.figures.style import figure, save

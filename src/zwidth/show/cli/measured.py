@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -35,12 +34,11 @@ def answer_chart(
     question: Question, device: Device, path: Path | None, window: Window | None, as_json: bool
 ) -> int:
     """`zwidth chart` for a device with a [response]."""
-    from zwidth.show.cli.chart import NO_WALL, numbers, rows
+    from zwidth.show.cli.chart import NO_WALL, rows
 
     found = _charted(question, device)
     common = cast("StabilityChart", found)  # the fields asked for are the same in both
-    document = question.facts(device) | numbers(common) | {"boundary": arcs(found), "decided": True}
-    document |= more_numbers(found)
+    document = question.facts(device) | found.document() | {"decided": True, "warning": warning(found)}
     if path is not None:
         document["file"] = str(path)
     written = [] if path is None else [f"written: {path}"]
@@ -80,7 +78,7 @@ def _charted(question: Question, device: Device) -> MeasuredChart:
 
 def _write(path: Path, chart: MeasuredChart, document: dict[str, Any], window: Window | None) -> None:
     if path.suffix.lower() in DATA:
-        write_data(path, document, table(chart))
+        write_data(path, document, chart.table())
         return
     from zwidth.show.figures.measured import draw_measured_chart
     from zwidth.show.figures.style import figure, save
@@ -91,41 +89,9 @@ def _write(path: Path, chart: MeasuredChart, document: dict[str, Any], window: W
         save(drawing, draft)
 
 
-def more_numbers(chart: MeasuredChart) -> dict[str, Any]:
-    """The keys of --json that only a measured device has."""
-    band = chart.band
-    return {
-        "integrators": chart.integrators,
-        "measurement": chart.loop.response.note or None,
-        "measured_stiffness_max_N_per_m": chart.measured_stiffness_max,
-        "interpolation_error": chart.interpolation_error,
-        "band": band
-        and {
-            "stiffness_low_N_per_m": band.stiffness_low,
-            "stiffness_high_N_per_m": band.stiffness_high,
-            "meaning": band.meaning,
-            "regions": list(band.regions),
-        },
-        "stiffness_max_of_sweeps_N_per_m": chart.stiffness_max_of_sweeps or None,
-        "unusable": [
-            {"low_Hz": s.low, "high_Hz": s.high, "reason": s.reason, "on_edge": s.on_edge} for s in chart.unusable
-        ],
-        "closed": not chart.open,
-        "measured_up_to_share": measured_up_to(chart),
-        "warning": warning(chart),
-    }
-
-
-def measured_up_to(chart: MeasuredChart) -> float:
-    """Where the data end, as a share of half the sampling rate; 1 where they reach it."""
-    half = 0.5 / chart.loop.period
-    beyond = [stretch.low for stretch in chart.unusable if stretch.high >= half * (1.0 - 1e-9)]
-    return min([*(low / half for low in beyond), 1.0])
-
-
 def warning(chart: MeasuredChart) -> str | None:
     """What a response cut short leaves unseen; None where it reaches nearly up to half the sampling rate."""
-    share, half = measured_up_to(chart), 0.5 / chart.loop.period
+    share, half = chart.measured_up_to_share, 0.5 / chart.loop.period
     if share >= 1.0 - MOST_UNMEASURED:
         return None
     return (
@@ -133,33 +99,6 @@ def warning(chart: MeasuredChart) -> str | None:
         f"({amount(half, 'Hz')}); "
         "walls that fail above are not seen"
     )
-
-
-def arcs(chart: MeasuredChart) -> list[dict[str, Any]]:
-    """The boundary's measured points, with the extent of the band at each."""
-    return [
-        {
-            "stiffness_N_per_m": arc.stiffness,
-            "damping_Ns_per_m": arc.damping,
-            "frequency_Hz": arc.frequency,
-            "stiffness_low_N_per_m": arc.stiffness_low,
-            "stiffness_high_N_per_m": arc.stiffness_high,
-        }
-        for arc in chart.boundary
-    ]
-
-
-def table(chart: MeasuredChart) -> dict[str, list[Any]]:
-    """The same as columns, arcs one after another and counted from 0."""
-    found = arcs(chart)
-    columns: dict[str, list[Any]] = {"arc": [n for n, arc in enumerate(found) for _ in arc["frequency_Hz"]]}
-    for key in found[0] if found else ():
-        columns[key] = list(
-            chain.from_iterable(
-                [None] * len(arc["frequency_Hz"]) if arc[key] is None else arc[key] for arc in found
-            )
-        )
-    return columns
 
 
 def more_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:

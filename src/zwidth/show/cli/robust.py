@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -38,6 +37,8 @@ KEYS: Final = (
     "members_at_stiffness_max",
     "damping_max_Ns_per_m",
     "stable_area_N2s_per_m2",
+    "fastest_decay",
+    "fastest_decay_in_first_quadrant",
     "unobserved_modes",
     "members",
     "failed",
@@ -114,7 +115,7 @@ def robust(
         unanswered = question.facts(device) | dict.fromkeys(KEYS) | {"decided": getattr(none, "decided", True)}
         return deliver(Answer(unanswered, reason=str(none)), as_json)
     reason = None if found.chart.members_at_stiffness_max else _reason(found)
-    document = question.facts(device) | numbers(found) | {"decided": True}
+    document = question.facts(device) | found.document() | {"decided": True}
     if path is not None:
         document["file"] = str(path)
         _write(path, found, document, reason)
@@ -192,66 +193,6 @@ def name_of(found: RobustStudy, index: int) -> str:
     """A member in words: its number and its values."""
     values = ", ".join(f"{path} = {_cell(value)}" for path, value in found.members[index].items())
     return f"{index} ({values})"
-
-
-def numbers(found: RobustStudy) -> dict[str, Any]:
-    """The study under the keys of --json."""
-    chart, violation = found.chart, found.violation
-    return {
-        "regions": list(chart.regions),
-        "boundary": [
-            {
-                "member": arc.member,
-                "stiffness_N_per_m": arc.stiffness,
-                "damping_Ns_per_m": arc.damping,
-                "frequency_Hz": arc.frequency,
-            }
-            for arc in chart.boundary
-        ],
-        "stiffness_max_N_per_m": chart.stiffness_max,
-        "damping_at_stiffness_max_Ns_per_m": chart.damping_at_stiffness_max,
-        "frequency_at_stiffness_max_Hz": min(chart.frequencies_at_stiffness_max, default=None),
-        "frequencies_at_stiffness_max_Hz": chart.frequencies_at_stiffness_max or None,
-        "members_at_stiffness_max": chart.members_at_stiffness_max,
-        "damping_max_Ns_per_m": chart.damping_max,
-        "stable_area_N2s_per_m2": chart.stable_area,
-        "unobserved_modes": chart.unobserved_modes,
-        "members": found.members,
-        "failed": [{"member": index, "reason": reason} for index, reason in chart.failed.items()],
-        "binding": chart.binding,
-        "best_by_area": chart.best_by_area,
-        "best_by_stiffness": chart.best_by_stiffness,
-        "lost_share": chart.lost_share,
-        "lost_stiffness_share": chart.lost_stiffness_share,
-        "corner_blur": chart.corner_blur,
-        "search": {
-            "sampled": found.sampled,
-            "rounds": found.rounds,
-            "moved_share": found.moved,
-            "settled": found.settled,
-        },
-        "violation": violation
-        and {
-            "unseen": violation.unseen,
-            "violating": violation.violating,
-            "worst_spectral_radius": violation.worst_spectral_radius,
-            "worst_stiffness_share": violation.worst_stiffness_share,
-            "worst_member": violation.worst or None,
-        },
-        "excluding": chart.excluding or None,
-    }
-
-
-def edge_table(chart: RobustChart) -> dict[str, list[Any]]:
-    """The robust set's edge as columns, its arcs one after another and counted from 0."""
-    arcs = chart.boundary
-    return {
-        "arc": [index for index, arc in enumerate(arcs) for _ in arc.stiffness],
-        "member": [arc.member for arc in arcs for _ in arc.stiffness],
-        "stiffness_N_per_m": list(chain.from_iterable(arc.stiffness.tolist() for arc in arcs)),
-        "damping_Ns_per_m": list(chain.from_iterable(arc.damping.tolist() for arc in arcs)),
-        "frequency_Hz": list(chain.from_iterable(arc.frequency.tolist() for arc in arcs)),
-    }
 
 
 def _pages(question: Question, device: Device, found: RobustStudy, path: Path | None) -> Iterator[Any]:
@@ -354,7 +295,7 @@ def _violation(found: RobustStudy) -> str:
 
 def _write(path: Path, found: RobustStudy, document: dict[str, Any], reason: str | None) -> None:
     if path.suffix.lower() in DATA:
-        write_data(path, document | ({} if reason is None else {"reason": reason}), edge_table(found.chart))
+        write_data(path, document | ({} if reason is None else {"reason": reason}), found.chart.table())
         return
     from zwidth.show.figures.robust import draw_robust
     from zwidth.show.figures.style import figure, save
