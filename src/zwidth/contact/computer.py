@@ -135,13 +135,11 @@ def computers(controllers: Sequence[Controller], limits: Sequence[float]) -> Com
 
 def _stacked(arrays: Sequence[Floats]) -> NDArray[np.float64]:
     """Arrays of one rank side by side, padded with zeros to the largest."""
-    shape = np.max([array.shape for array in arrays], axis=0)
-    return np.stack(
-        [
-            np.pad(array, [(0, most - own) for own, most in zip(array.shape, shape, strict=True)])
-            for array in arrays
-        ]
-    )
+    largest = np.max([array.shape for array in arrays], axis=0)
+    stacked = np.zeros((len(arrays), *largest))
+    for room, array in zip(stacked, arrays, strict=True):
+        room[tuple(slice(size) for size in array.shape)] = array
+    return stacked
 
 
 @compiled
