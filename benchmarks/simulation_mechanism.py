@@ -26,8 +26,9 @@ from contact.mechanism_cases import sampled, uncoupled_five_bar, with_drives, wi
 from contact.mechanism_judge import judged
 
 from benchmarks._own import Case, Cases, run
-from zwidth.contact.mechanism.simulate import SurfaceWall, simulate_mechanism
+from zwidth.contact.mechanism.simulate import simulate_mechanism
 from zwidth.contact.mechanism.surfaces import Plane
+from zwidth.contact.mechanism.walls import SurfaceWall
 from zwidth.model.damping import ModalDamping
 
 PERIOD, SAMPLES, ALLOWED, TARGET, ROUNDS = 1.25e-3, 400, 1e-6, 20.0, 15

@@ -13,8 +13,9 @@ from contact.mechanism_cases import (
 from model.model_cases import rotation_about
 
 from zwidth.contact.mechanism.reach import SurfaceOutOfReach
-from zwidth.contact.mechanism.simulate import SurfaceWall, simulate_mechanism
+from zwidth.contact.mechanism.simulate import simulate_mechanism
 from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, depth_and_normal
+from zwidth.contact.mechanism.walls import SurfaceWall
 from zwidth.contact.room import TooLarge
 from zwidth.loop.controller import FirstOrder
 from zwidth.loop.estimators import BackwardDifference, Foaw, Kalman, Levant, WindowedDifference

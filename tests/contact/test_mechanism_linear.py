@@ -6,8 +6,9 @@ from contact.mechanism_cases import sampled, uncoupled_five_bar, with_drives
 from model.model_cases import KINDS
 from scipy.linalg import expm
 
-from zwidth.contact.mechanism.simulate import SurfaceWall, simulate_mechanism
+from zwidth.contact.mechanism.simulate import simulate_mechanism
 from zwidth.contact.mechanism.surfaces import Plane
+from zwidth.contact.mechanism.walls import SurfaceWall
 from zwidth.loop.controller import Butterworth, FirstOrder
 from zwidth.loop.loop import Loop
 from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping

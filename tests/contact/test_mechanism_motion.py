@@ -18,8 +18,9 @@ from contact.mechanism_judge import FiveBarByMultipliers, judged
 from model.model_cases import KINDS, five_bar, random_five_bar, some_postures, spatial_arm
 from model.model_engines import mjcf
 
-from zwidth.contact.mechanism.simulate import SurfaceWall, simulate_mechanism
+from zwidth.contact.mechanism.simulate import simulate_mechanism
 from zwidth.contact.mechanism.surfaces import Plane, Sphere
+from zwidth.contact.mechanism.walls import SurfaceWall
 from zwidth.model.arrays import pack
 from zwidth.model.bias import bias_batch
 from zwidth.model.damping import ModalDamping

@@ -10,11 +10,12 @@ from .hand import Tremor as Tremor
 from .limit_cycles import limit_cycles as limit_cycles
 from .mechanism.reach import SurfaceOutOfReach as SurfaceOutOfReach
 from .mechanism.simulate import MechanismMotion as MechanismMotion
-from .mechanism.simulate import SurfaceWall as SurfaceWall
 from .mechanism.simulate import simulate_mechanism as simulate_mechanism
 from .mechanism.surfaces import Box as Box
 from .mechanism.surfaces import Plane as Plane
 from .mechanism.surfaces import Sphere as Sphere
+from .mechanism.walls import SurfaceEnvironment as SurfaceEnvironment
+from .mechanism.walls import SurfaceWall as SurfaceWall
 from .passivity import PassivityController as PassivityController
 from .response import TimeResponse as TimeResponse
 from .simulate import Run as Run

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from zwidth.contact.mechanism.surfaces import Surface
 from zwidth.contact.room import check_room
 from zwidth.loop.controller import Controller
 from zwidth.model.mechanism import Floats, Mechanism
@@ -60,16 +59,6 @@ def check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
     """Is it one of them? Raises MotionError."""
     if value not in choices:
         raise MotionError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
-
-
-def check_wall(stiffness: float, damping: float, surface: Surface) -> None:
-    """Can a wall of these numbers be meant? Raises MotionError."""
-    if not (isfinite(stiffness) and stiffness >= 0.0):
-        raise MotionError(f"the wall's stiffness must be at least 0 and finite [N/m], got {stiffness}")
-    if not isfinite(damping):
-        raise MotionError(f"the wall's damping must be finite [N s/m], of either sign, got {damping}")
-    if not isinstance(surface, Surface):
-        raise MotionError(f"the surface must be a Plane, a Sphere or a Box, got {type(surface).__name__}")
 
 
 def start_rates(posture: Posture, velocity: ArrayLike | None) -> Floats:

@@ -1,4 +1,4 @@
-"""What the computer does in each period of a whole mechanism: place the handle by its counts, push at the surface.
+"""What the computer does in each period of a whole mechanism: place the handle by its counts, render the surface.
 
 Counting, estimating, filtering and delaying one signal are `contact.computer`'s.
 """
@@ -20,9 +20,10 @@ from zwidth.contact.computer import (
     send,
     signals_of,
 )
+from zwidth.contact.environments import MEMORY, environment_at
 from zwidth.contact.mechanism.acceleration import close_at
 from zwidth.contact.mechanism.law import Law
-from zwidth.contact.mechanism.surfaces import penetration
+from zwidth.contact.mechanism.surfaces import NONE, penetration
 from zwidth.contact.mechanism.system import System
 from zwidth.model.arrays import Arrays
 from zwidth.model.inertia import handle_jacobian
@@ -36,6 +37,7 @@ class Rendering(NamedTuple):
     signals               of the handle's three coordinates, and of the d motors' torques
     work, angles (links,), counted (d,), jacobian (1, 3, d)  the posture that is counted
     seen, speed, force (3,)  handle [m], its velocity [m/s], force on it [N]
+    environment (8,)      what the environment remembers
     """
 
     signals: Signals
@@ -46,6 +48,7 @@ class Rendering(NamedTuple):
     seen: Floats
     speed: Floats
     force: Floats
+    environment: Floats
 
 
 @compiled
@@ -60,6 +63,7 @@ def rendering_of(mech: Arrays, computer: Computer) -> Rendering:
         np.zeros(3),
         np.zeros(3),
         np.zeros(3),
+        np.zeros(MEMORY),
     )
 
 
@@ -77,20 +81,24 @@ def look(system: System, law: Law, own: Rendering, x: Floats, sample: int) -> bo
 
 
 @compiled_lean
-def render(law: Law, computer: Computer, own: Rendering, sample: int) -> None:
-    """The wall's force on the handle as it is seen, and the torques that render it, J^T f, within their limits.
+def render(law: Law, computer: Computer, own: Rendering, sample: int) -> bool:
+    """The environment's force on the handle as it is seen, and the torques that render it, J^T f, within limits.
 
-    f = (K depth + B depth') normal,   depth' = -normal . v
+    f = -F(depth, depth') normal,   depth' = -normal . v,   F the environment's force along the way in
+
+    False where the environment answers finite numbers with one that is not.
     """
-    seen, speed, force, surface = own.seen, own.speed, own.force, law.surface
+    seen, speed, force = own.seen, own.speed, own.force
     for k in range(3):
         speed[k] = estimate_velocity(computer, own.signals, k, seen[k], sample)
-    depth, nx, ny, nz = penetration(surface, seen[0], seen[1], seen[2])
-    push = 0.0
-    if depth > 0.0 or surface[1] == 1.0:
-        push = law.stiffness * depth - law.damping * (nx * speed[0] + ny * speed[1] + nz * speed[2])
-        if law.no_pull and push < 0.0:
-            push = 0.0
+    depth, nx, ny, nz = penetration(law.surface, seen[0], seen[1], seen[2])
+    push, answered = 0.0, True
+    if law.surface[0] != NONE:
+        rate, period = -(nx * speed[0] + ny * speed[1] + nz * speed[2]), computer.period
+        environment = environment_at(law.address)
+        # from 0, so that no force is 0 and not -0
+        push = 0.0 - environment(depth, rate, sample * period, period, law.values, own.environment)
+        answered = np.isfinite(push) or not (np.isfinite(depth) and np.isfinite(rate))
     force[0], force[1], force[2] = push * nx, push * ny, push * nz
     for k in range(3):
         force[k] = filter_force(computer, own.signals, k, force[k])
@@ -98,6 +106,7 @@ def render(law: Law, computer: Computer, own: Rendering, sample: int) -> None:
     for k in range(3):
         force[k] *= scale
     command(law, own)
+    return bool(answered)
 
 
 @compiled_lean

@@ -10,10 +10,10 @@ from zwidth.model.mechanism import Drives, Floats, Ints
 
 
 class Law(NamedTuple):
-    """The wall, and the drives as the computer counts and commands them.
+    """The environment at the surface, and the drives as the computer counts and commands them.
 
     surface            as `surfaces.packed` gives it
-    stiffness, damping of the wall along its normal [N/m], [N s/m];   no_pull: it never pulls
+    address            where the environment's machine code begins;   values (P,)  of its parameters
     read     (d,)      coordinates that the encoders read
     step     (d,)      one count [rad at the joint]; 0: as fine as you like
     noise    (d,)      standard deviation of what is added before counting [rad at the joint];   seed  of the noise
@@ -22,9 +22,8 @@ class Law(NamedTuple):
     """
 
     surface: Floats
-    stiffness: float
-    damping: float
-    no_pull: bool
+    address: int
+    values: Floats
     read: Ints
     step: Floats
     noise: Floats
@@ -36,13 +35,14 @@ class Law(NamedTuple):
 def law_of(
     drives: Drives,
     surface: Floats,
-    gains: tuple[float, float, bool],
+    address: int,
+    values: Floats,
     read: Ints,
     counted: bool,
     seed: int,
     together: bool,
 ) -> Law:
-    """The law at a surface; gains are the wall's stiffness and damping and whether it must not pull.
+    """The law at a surface.
 
     counted  False: encoders without steps and noise
     """
@@ -50,9 +50,8 @@ def law_of(
     known = np.isfinite(counts) & counted
     return Law(
         surface=surface,
-        stiffness=gains[0],
-        damping=gains[1],
-        no_pull=gains[2],
+        address=address,
+        values=values,
         read=np.array(read, dtype=np.int64),
         step=np.where(known, 2.0 * np.pi / np.where(known, counts * n, 1.0), 0.0),
         noise=np.zeros(len(n)) if parts is None or not counted else np.array(parts.encoder_noise / n),

@@ -23,6 +23,7 @@ DONE: Final = 0
 SINGULAR: Final = 1
 LOOP_LOST: Final = 2
 DIVERGED: Final = 3
+UNANSWERED: Final = 4
 NEAR_SINGULAR: Final = (
     1e-3  # reciprocal condition of the loops below which the drives hardly hold the other joints
 )
@@ -84,8 +85,10 @@ def run(
         observe(system, memory, law, x, hand, work, trace, j)
         if not look(system, law, own, x, j):
             return LOOP_LOST, j
-        render(law, computer, own, j)
+        answered = render(law, computer, own, j)
         note(own, trace, j)
+        if not answered:
+            return UNANSWERED, j + 1
         if j == samples:
             break
         if j == 0 or turned(memory, x):

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.contact.computer import computers
+from zwidth.contact.environments import Environment
 from zwidth.contact.mechanism import run as kernel
-from zwidth.contact.mechanism.checks import MotionError, check_choice, check_wall, motion_inputs, start_rates
+from zwidth.contact.mechanism.checks import MotionError, check_choice, motion_inputs, start_rates
 from zwidth.contact.mechanism.law import law_of
 from zwidth.contact.mechanism.reach import check_reach
-from zwidth.contact.mechanism.surfaces import Surface, packed
+from zwidth.contact.mechanism.surfaces import Surface, depth_and_normal, packed
 from zwidth.contact.mechanism.system import System, system_of
+from zwidth.contact.mechanism.walls import Wall, rendered_environment
 from zwidth.loop.controller import Controller
 from zwidth.model.arrays import pack
 from zwidth.model.damping import Damping
@@ -30,20 +32,8 @@ REASONS = {
         "the loops no longer close: a singularity is passed, or the steps are too long",
     ),
     kernel.DIVERGED: ("diverged", "the motion has grown beyond all numbers"),
+    kernel.UNANSWERED: ("no force", "the environment gave no finite force"),
 }
-
-
-@dataclass(frozen=True)
-class SurfaceWall:
-    """What the computer renders at a surface: f = (K depth + B depth') normal.
-
-    stiffness K [N/m];   damping B [N s/m], of either sign
-    no_pull   True: the wall never pulls the handle in
-    """
-
-    stiffness: float
-    damping: float = 0.0
-    no_pull: bool = False
 
 
 @dataclass(frozen=True)
@@ -61,8 +51,10 @@ class MechanismMotion:
     torque           (k, d)  as commanded, at the joint [N m]
     kinetic, elastic, gravitational (k,)  energies [J]; the last against the base frame's origin
     hand_work, motor_work, friction_loss (k,)  since the start [J]; motor_work is nan with a lagging actuator
-    status           "done", or why the motion stops: "singular", "loop lost", "diverged"; reason in words
+    status           "done", or why the motion stops: "singular", "loop lost", "diverged", "no force"; reason in
+                     words
     started_inside   was the handle inside the wall at the start?
+    two_sided        does the wall act on both sides of the surface alike?
     """
 
     time: Floats
@@ -85,13 +77,14 @@ class MechanismMotion:
     status: str
     reason: str
     started_inside: bool
+    two_sided: bool
 
 
 def simulate_mechanism(
     mechanism: Mechanism,
     damping: Damping,
     controller: Controller,
-    wall: SurfaceWall | None = None,
+    wall: Wall | None = None,
     surface: Surface | None = None,
     *,
     at: ArrayLike | None = None,
@@ -114,7 +107,8 @@ def simulate_mechanism(
 
     damping         the mechanism's; its matrix is that of the linear full model at the start, kept in the
                     coordinates of joints and motors
-    wall, surface   both or neither; neither: the motors stay without current
+    wall, surface   what is rendered, a `SurfaceWall` or a `SurfaceEnvironment`, and where; both or neither:
+                    without them the motors stay without current
     at              (2,) or (3,)  handle at the start [m]; None: the reference position. No drive is bent there
     duration        [s]
     start_velocity  (2,) or (3,)  of the handle [m/s]; joints and motors move with it
@@ -133,6 +127,7 @@ def simulate_mechanism(
 
     >>> import zwidth
     >>> from zwidth.contact.mechanism.surfaces import Sphere
+    >>> from zwidth.contact.mechanism.walls import SurfaceWall
     >>> devices = (zwidth.load(name) for name, *_ in zwidth.bundled())
     >>> device = next(device for device in devices if device.mechanism)
     >>> hollow = Sphere(device.reference_position, radius=0.01, hollow=True)
@@ -146,8 +141,9 @@ def simulate_mechanism(
     check_choice("torque_limits", torque_limits, ("each", "together"))
     if (wall is None) != (surface is None):
         raise MotionError("a wall needs a surface and a surface a wall; give both, or neither for a free device")
+    environment, values = None, np.zeros(0)
     if wall is not None and surface is not None:
-        check_wall(wall.stiffness, wall.damping, surface)
+        environment, values = rendered_environment(wall, surface)
     position = mechanism.reference_position if at is None else at
     posture = solve_posture(mechanism, position, assembly)
     inputs = motion_inputs(mechanism, controller, duration, push, gravity, substeps, len(posture.jacobian[0]))
@@ -161,14 +157,19 @@ def simulate_mechanism(
     system = system_of(mech, mechanism.drives, plant, inputs.gravity, controller.actuator_time_constant)
     start = _start(mechanism, posture, system, rates)
     trace = _room(inputs.samples + 1, len(start), len(system.motor))
-    gains = (0.0, 0.0, False) if wall is None else (float(wall.stiffness), float(wall.damping), wall.no_pull)
     read = system.motor if encoders == "motor" else np.arange(len(system.motor))
-    law = law_of(mechanism.drives, shape, gains, read, counted, seed, torque_limits == "together")
+    address = 0 if environment is None else environment.address
+    law = law_of(mechanism.drives, shape, address, values, read, counted, seed, torque_limits == "together")
     status, reached = kernel.run(
         system, law, computers([controller], [controller.saturation]), start, posture.angles.copy(), inputs.push,
         controller.fractional_delay, substeps, trace,
     )  # fmt: skip
-    return _motion(system, trace, status, reached, controller.sampling_period)
+    motion = _motion(system, trace, status, reached, controller.sampling_period)
+    if environment is None or surface is None:
+        return motion
+    if status == kernel.UNANSWERED:
+        motion = replace(motion, reason=_unanswered(motion, environment, surface))
+    return replace(motion, two_sided=environment.linear)
 
 
 def _start(mechanism: Mechanism, posture: Posture, system: System, rates: Floats) -> Floats:
@@ -223,4 +224,15 @@ def _motion(system: System, trace: kernel.Trace, status: int, reached: int, peri
         status=name,
         reason=reason,
         started_inside=bool(reached and trace.depth[0] > 0.0),
+        two_sided=False,
+    )
+
+
+def _unanswered(motion: MechanismMotion, environment: Environment, surface: Surface) -> str:
+    """What the environment was told at the last sample, to which it gave no finite force."""
+    depth, normal = depth_and_normal(surface, motion.counted_position[-1])
+    rate = -float(normal @ motion.velocity[-1])
+    return (
+        f"after {motion.time[-1]:.6g} s {environment.name} gave no finite force, where it was told a depth of "
+        f"{float(depth):.6g} m and {rate:.6g} m/s"
     )

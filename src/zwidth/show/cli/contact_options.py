@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from functools import wraps
@@ -108,41 +108,15 @@ class Contact:
             raise usage("a two-sided wall pulls by its nature; --no-pull goes with --wall one-sided")
 
     def touched(self) -> tuple[Environment, NDArray[Any]]:
-        """The environment, and its parameters as it takes them.
-
-        Raises  BadInput  for an unknown environment, a file that does not serve, or parameters that do not
-        """
-        from zwidth.contact.environments import ENVIRONMENTS, load_environment
-
-        if self.environment is None:
-            found = ENVIRONMENTS["one_sided_wall" if self.wall == "one-sided" else "wall"]
-        else:
-            try:
-                found = load_environment(self.environment)
-            except ValueError as error:
-                raise BadInput(*(f"--environment: {line}" for line in str(error).splitlines())) from None
-        given = self._given(found)
-        try:
-            return found, found.values(**given)
-        except ValueError as error:
-            raise BadInput(*(f"--parameter: {line}" for line in str(error).splitlines())) from None
-
-    def _given(self, found: Environment) -> dict[str, float]:
-        """Values by name, the options of walls among them."""
-        pairs = list(self.parameters)
-        pulls = 1.0 if self.no_pull else None
-        for name, value in (("stiffness", self.stiffness), ("damping", self.damping), ("no_pull", pulls)):
-            if value is None:
-                continue
-            if name not in found.names:
-                has = ", ".join(found.names) or "none"
-                raise BadInput(f"--{name.replace('_', '-')}: {found.name} has no such parameter; it has {has}")
-            pairs.append((name, value))
-        names = [name for name, _ in pairs]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise BadInput(*(f"--parameter: {shown(name)} is given twice" for name in twice))
-        return dict(pairs)
+        """The environment, and its parameters as it takes them. Raises BadInput."""
+        wall = "one_sided_wall" if self.wall == "one-sided" else "wall"
+        return named_environment(
+            self.environment or wall,
+            self.parameters,
+            stiffness=self.stiffness,
+            damping=self.damping,
+            no_pull=self.no_pull,
+        )
 
     def start(self, environment: Environment) -> float:
         """Where the reading starts [m]."""
@@ -174,6 +148,52 @@ class Contact:
                 **dict(zip(("latency", "rise"), self.reflex[3:], strict=False)),
             )
         return Hand(operator, push, self.ramp, reach or None, tremor or None, reflex or None)
+
+
+def named_environment(
+    name: str,
+    parameters: Sequence[tuple[str, float]],
+    *,
+    stiffness: float | None,
+    damping: float | None,
+    no_pull: bool,
+) -> tuple[Environment, NDArray[Any]]:
+    """The environment of --environment, and its parameters as it takes them.
+
+    parameters  of --parameter; the others are those that have an option of their own
+    Raises      BadInput  for an unknown environment, a file that does not serve, or parameters that do not
+    """
+    from zwidth.contact.environments import load_environment
+
+    try:
+        found = load_environment(name)
+    except ValueError as error:
+        raise BadInput(*(f"--environment: {line}" for line in str(error).splitlines())) from None
+    options = {"stiffness": stiffness, "damping": damping, "no_pull": 1.0 if no_pull else None}
+    given = _given(found, parameters, options)
+    try:
+        return found, found.values(**given)
+    except ValueError as error:
+        raise BadInput(*(f"--parameter: {line}" for line in str(error).splitlines())) from None
+
+
+def _given(
+    found: Environment, parameters: Sequence[tuple[str, float]], options: Mapping[str, float | None]
+) -> dict[str, float]:
+    """Values by name, the options among them."""
+    pairs = list(parameters)
+    for name, value in options.items():
+        if value is None:
+            continue
+        if name not in found.names:
+            has = ", ".join(found.names) or "none"
+            raise BadInput(f"--{name.replace('_', '-')}: {found.name} has no such parameter; it has {has}")
+        pairs.append((name, value))
+    names = [name for name, _ in pairs]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise BadInput(*(f"--parameter: {shown(name)} is given twice" for name in twice))
+    return dict(pairs)
 
 
 @contextmanager
@@ -221,6 +241,14 @@ def _of_what_is_touched() -> list[Callable[..., Any]]:
             type=click.Choice(("two-sided", "one-sided")),
             help="Does it act on both sides of its position? Default: two-sided.",
         ),
+        *of_environments(),
+        click.option("--no-pull", is_flag=True, help="The wall never pulls the device inwards."),
+    ]
+
+
+def of_environments() -> list[Callable[..., Any]]:
+    """Options that name an environment and its parameters."""
+    return [
         click.option(
             "--environment",
             metavar="NAME|FILE.py:NAME",
@@ -235,7 +263,6 @@ def _of_what_is_touched() -> list[Callable[..., Any]]:
             multiple=True,
             help="A parameter of the environment; repeatable.",
         ),
-        click.option("--no-pull", is_flag=True, help="The wall never pulls the device inwards."),
     ]
 
 

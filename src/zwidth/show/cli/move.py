@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 KEYS: Final = (
     "surface",
+    "environment",
+    "parameters",
     "wall_stiffness_N_per_m",
     "wall_damping_Ns_per_m",
     "no_pull",
@@ -64,6 +66,7 @@ KEYS: Final = (
     epilog=example(
         "zwidth move my-arms.toml --plane 0,0.28,0,-1 --stiffness 2000 --damping 5 --push 0,2",
         "zwidth move my-arms.toml --sphere 0,0.3,0.05 --stiffness 900 --damping 3 --push 2 --output path.svg",
+        "zwidth move my-arms.toml --plane 0,0.28,0,-1 --environment hunt_crossley --parameter dissipation=1",
     ),
 )
 @about_a_device

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from zwidth.contact.environments import Environment
     from zwidth.contact.mechanism.simulate import MechanismMotion
     from zwidth.contact.mechanism.surfaces import Surface
     from zwidth.device.device import Device
@@ -35,6 +36,7 @@ class Moved:
     """One motion.
 
     posture                        at the start
+    environment, values            what is rendered at the surface, and its parameters; None without a surface
     push, start_velocity, gravity  (3,) [N], [m/s], [m/s^2]
     """
 
@@ -43,6 +45,8 @@ class Moved:
     asked: Motion
     posture: Posture
     surface: Surface | None
+    environment: Environment | None
+    values: Floats | None
     push: Floats
     start_velocity: Floats
     gravity: Floats
@@ -60,12 +64,13 @@ def moved(question: Question, device: Device, asked: Motion) -> Moved:
     from zwidth.contact.mechanism.checks import MotionError
     from zwidth.contact.mechanism.reach import SurfaceOutOfReach
     from zwidth.contact.mechanism.simulate import simulate_mechanism
+    from zwidth.contact.mechanism.walls import rendered_environment
     from zwidth.contact.room import TooLarge, check_room
 
     mechanism = device.mechanism
     assert mechanism is not None
     direction = device.direction(question.direction)
-    surface = asked.surface(device)
+    surface, wall = asked.surface(device), asked.wall()
     push, velocity = along(asked.push, direction), along(asked.start_velocity, direction)
     gravity = along(asked.gravity, direction)
     drives = len(mechanism.drives.names)
@@ -76,11 +81,14 @@ def moved(question: Question, device: Device, asked: Motion) -> Moved:
         try:
             told = samples * (SHOWN[0] + SHOWN[1] * drives)
             check_room((1 + AS_TEXT) * told, f"{samples:.4g} samples", "move for a shorter time")
+            environment, values = None, None
+            if wall is not None and surface is not None:
+                environment, values = rendered_environment(wall, surface)
             motion = simulate_mechanism(
                 mechanism,
                 device.damping,
                 device.controller,
-                asked.wall(),
+                wall,
                 surface,
                 at=posture.position,
                 assembly=posture.assembly,
@@ -103,17 +111,18 @@ def moved(question: Question, device: Device, asked: Motion) -> Moved:
             raise BadInput(f"{question.name}: {option}{error}") from None
     if not len(motion.time):
         raise NoAnswer(_reason(mechanism, motion.reason))
-    return Moved(device, mechanism, asked, posture, surface, push, velocity, gravity, motion)
+    if motion.status == "no force":
+        raise NoAnswer(f"{motion.reason}; have it return a number there")
+    scene = (device, mechanism, asked, posture, surface, environment, values)
+    return Moved(*scene, push, velocity, gravity, motion)
 
 
 def numbers(found: Moved) -> dict[str, Any]:
     """What came of it under the keys of --json."""
     asked, motion = found.asked, found.motion
     return {
-        "surface": _surface(found.surface),
-        "wall_stiffness_N_per_m": asked.stiffness,
-        "wall_damping_Ns_per_m": asked.damping,
-        "no_pull": asked.no_pull if found.surface is not None else None,
+        "surface": _surface(found.surface, motion.two_sided),
+        **_environment(found),
         "push_N": found.push,
         "start_velocity_m_per_s": found.start_velocity,
         "gravity_m_per_s2": found.gravity,
@@ -139,7 +148,21 @@ def _reason(mechanism: Mechanism, reason: str) -> str:
     return reason
 
 
-def _surface(surface: Surface | None) -> dict[str, Any] | None:
+def _environment(found: Moved) -> dict[str, Any]:
+    """What is rendered at the surface."""
+    environment, parameters = found.environment, dict[str, float]()
+    if environment is not None and found.values is not None:
+        parameters = dict(zip(environment.names, found.values.tolist(), strict=True))
+    return {
+        "environment": environment and environment.name,
+        "parameters": environment and parameters,
+        "wall_stiffness_N_per_m": parameters.get("stiffness"),
+        "wall_damping_Ns_per_m": parameters.get("damping"),
+        "no_pull": environment and bool(parameters.get("no_pull")),
+    }
+
+
+def _surface(surface: Surface | None, two_sided: bool) -> dict[str, Any] | None:
     from zwidth.contact.mechanism.surfaces import Box, Plane
 
     match surface:
@@ -150,7 +173,7 @@ def _surface(surface: Surface | None) -> dict[str, Any] | None:
                 "kind": "plane",
                 "point_m": surface.point,
                 "normal": surface.normal,
-                "two_sided": surface.two_sided,
+                "two_sided": two_sided,
             }
         case Box():
             kind: dict[str, Any] = {"kind": "box", "center_m": surface.center, "half_sizes_m": surface.half_sizes}
@@ -170,10 +193,9 @@ def _extremes(found: Moved) -> dict[str, Any]:
     if found.surface is None:
         deepest, touching, largest = None, None, None
     else:
-        two_sided = getattr(found.surface, "two_sided", False)
-        depth = np.abs(motion.depth) if two_sided else np.maximum(motion.depth, 0.0)
+        depth = np.abs(motion.depth) if motion.two_sided else np.maximum(motion.depth, 0.0)
         deepest, largest = float(depth.max()), float(size.max())
-        touching = 1.0 if two_sided else float(np.mean(motion.depth > 0.0))
+        touching = 1.0 if motion.two_sided else float(np.mean(motion.depth > 0.0))
     forced = float(np.mean(size >= AT_LIMIT * found.device.controller.saturation))
     return {
         "largest_penetration_m": deepest,

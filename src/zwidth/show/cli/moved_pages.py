@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from zwidth.show.cli.answer import Row, sheet, table
 from zwidth.show.cli.energies import HEADINGS, energy_rows
 from zwidth.show.cli.place import computer
+from zwidth.show.cli.simulated_pages import environment_words
 from zwidth.show.output import shown
 from zwidth.show.units import amount, percent, typed, vector
 
@@ -41,7 +42,7 @@ def _status(document: Mapping[str, Any]) -> str:
 
 
 def _circumstances(found: Moved, document: Mapping[str, Any]) -> Iterator[Row]:
-    yield "surface", _surface(document)
+    yield "surface", _surface(found, document)
     moving = f"with {vector(found.start_velocity, 'm/s')}" if found.start_velocity.any() else "at rest"
     yield "start", moving
     yield "hand", f"pushes with {vector(found.push, 'N')}" if found.push.any() else "does not push"
@@ -53,7 +54,7 @@ def _circumstances(found: Moved, document: Mapping[str, Any]) -> Iterator[Row]:
     yield "simulated", f"{length}, {document['substeps']} {steps} between them"
 
 
-def _surface(document: Mapping[str, Any]) -> str:
+def _surface(found: Moved, document: Mapping[str, Any]) -> str:
     surface = document["surface"]
     if surface is None:
         return "none: the motors stay without current"
@@ -68,6 +69,8 @@ def _surface(document: Mapping[str, Any]) -> str:
         case _:
             sizes = vector(surface["half_sizes_m"], "m")
             place = f"{hollow}box round {vector(surface['center_m'], 'm')}, half sizes {sizes}"
+    if found.asked.environment is not None and found.environment is not None:
+        return f"{place}; {environment_words(found.environment, document['parameters'])}"
     stiffness, damping = document["wall_stiffness_N_per_m"], document["wall_damping_Ns_per_m"]
     pulls = ", never pulls" if document["no_pull"] else ""
     return f"{place}; {amount(stiffness, 'N/m')}, {amount(damping, 'Ns/m')}{pulls}"
@@ -100,8 +103,7 @@ def _without_dust(place: Any, size: float) -> Any:
 def _depths(found: Moved) -> Any:
     import numpy as np
 
-    two_sided = getattr(found.surface, "two_sided", False)
-    return np.abs(found.motion.depth) if two_sided else found.motion.depth
+    return np.abs(found.motion.depth) if found.motion.two_sided else found.motion.depth
 
 
 def _when(value: float, unit: str, course: Any, time: Any) -> str:
@@ -145,8 +147,8 @@ def _remarks(found: Moved, document: Mapping[str, Any]) -> Iterator[str]:
     moved = float(np.max(np.ptp(motion.position, axis=0)))
     still = not moved > DUST * float(np.max(np.abs(motion.position)))
     if document["started_inside"]:
-        side = getattr(found.surface, "two_sided", False)
-        yield f"starts {amount(float(motion.depth[0]), 'm')} {'behind the plane' if side else 'inside the wall'}"
+        side = f"behind the {document['surface']['kind']}" if motion.two_sided else "inside the wall"
+        yield f"starts {amount(float(motion.depth[0]), 'm')} {side}"
     part = [name for name in parts if not (found.asked.exact and name in COUNTED)]
     if part:
         yield f"with what a chart leaves out: {', '.join(part)}"

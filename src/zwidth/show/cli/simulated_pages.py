@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,6 +12,7 @@ from zwidth.show.cli.place import ROUNDING, heading
 from zwidth.show.units import amount, given, percent, signed, typed, uncertain
 
 if TYPE_CHECKING:
+    from zwidth.contact.environments import Environment
     from zwidth.device.device import Device
     from zwidth.show.cli.options import Question
     from zwidth.show.cli.simulated import Simulated
@@ -50,16 +51,20 @@ def _verdict(found: Simulated) -> str:
 
 def _circumstances(found: Simulated, document: dict[str, Any]) -> Iterator[Row]:
     place = f", at {amount(document['wall_position_m'], 'm')}" if document["wall_position_m"] else ""
-    units = {p.name: p.unit for p in found.environment.parameters if not p.switch}
-    values = document["parameters"]
-    told = [f"{name.replace('_', ' ')} {_number(values[name], unit)}" for name, unit in units.items()]
-    told += [name.replace("_", " ") for name, on in values.items() if name not in units and on]
-    name = "two-sided wall" if found.environment.name == "wall" else found.environment.name
-    yield "touched", f"{name}: {', '.join(told)}{place}" if told else f"{name}{place}"
+    yield "touched", f"{environment_words(found.environment, document['parameters'])}{place}"
     yield "start", _start(document)
     yield "hand", _hand(document["hand"])
     why = f" ({found.length.why})"
     yield "simulated", f"{amount(document['duration_s'], 's')}, {len(found.response.time)} samples{why}"
+
+
+def environment_words(environment: Environment, values: Mapping[str, float]) -> str:
+    """An environment and its parameters: "slot: width 5 mm, stiffness 1 kN/m, damping 0 Ns/m"."""
+    units = {p.name: p.unit for p in environment.parameters if not p.switch}
+    told = [f"{name.replace('_', ' ')} {_number(values[name], unit)}" for name, unit in units.items()]
+    told += [name.replace("_", " ") for name, on in values.items() if name not in units and on]
+    name = "two-sided wall" if environment.name == "wall" else environment.name
+    return f"{name}: {', '.join(told)}" if told else name
 
 
 def _number(value: float, unit: str) -> str:

@@ -8,15 +8,23 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.contact_options import LARGEST_FORCE, LARGEST_SEED, Bounded, gathered, usage
+from zwidth.show.cli.contact_options import (
+    LARGEST_FORCE,
+    LARGEST_SEED,
+    Bounded,
+    gathered,
+    named_environment,
+    of_environments,
+    usage,
+)
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import LARGEST_WALL, Finite, Numbers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from zwidth.contact.mechanism.simulate import SurfaceWall
     from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, Surface
+    from zwidth.contact.mechanism.walls import Wall
     from zwidth.device.device import Device
     from zwidth.show.cli.options import Question
 
@@ -25,7 +33,7 @@ if TYPE_CHECKING:
 Command = Callable[..., int]
 
 SURFACES: Final = ("plane", "sphere", "box")
-OF_A_WALL: Final = ("stiffness", "damping", "no_pull", "two_sided", "hollow")
+OF_A_WALL: Final = ("stiffness", "damping", "no_pull", "two_sided", "hollow", "environment", "parameters")
 LONGEST: Final = 1e9  # s
 FASTEST: Final = 1e3  # m/s
 
@@ -41,6 +49,8 @@ class Motion:
     hollow: bool
     stiffness: float | None
     damping: float | None
+    environment: str | None
+    parameters: tuple[tuple[str, float], ...]
     no_pull: bool
     push: tuple[float, ...] | None
     start_velocity: tuple[float, ...] | None
@@ -62,13 +72,20 @@ class Motion:
 
     def _check_wall(self, given: Sequence[str]) -> None:
         if not given:
-            alone = [name for name in OF_A_WALL if getattr(self, name) not in (None, False)]
+            alone = [name for name in OF_A_WALL if getattr(self, name) not in (None, False, ())]
             if alone:
                 raise usage(f"{_option(alone[0])} says what a surface does; add --plane, --sphere or --box")
             return
         missing = [f"--{name}" for name in ("stiffness", "damping") if getattr(self, name) is None]
-        if missing:
+        if self.environment is None and missing:
             raise usage(f"{given[0]} needs --stiffness and --damping; missing: {' and '.join(missing)}")
+        if self.environment is None and self.parameters:
+            raise usage("--parameter belongs to --environment; a wall has --stiffness and --damping")
+        if self.environment is not None and self.two_sided:
+            raise usage(
+                "--two-sided and --environment exclude each other: an environment says itself on which sides it "
+                "acts, as `--environment wall` does on both"
+            )
         if self.two_sided and self.plane is None:
             raise usage("--two-sided goes with --plane; a sphere and a box have one side, or --hollow the other")
         if self.hollow and self.plane is not None:
@@ -128,10 +145,19 @@ class Motion:
             return Box(_raised(self.box[:half], height), self.box[half:], hollow=self.hollow)
         return None
 
-    def wall(self) -> SurfaceWall | None:
-        """What the computer renders at the surface."""
-        from zwidth.contact.mechanism.simulate import SurfaceWall
+    def wall(self) -> Wall | None:
+        """What the computer renders at the surface. Raises BadInput for an environment that cannot be."""
+        from zwidth.contact.mechanism.walls import SurfaceEnvironment, SurfaceWall
 
+        if self.environment is not None:
+            found, values = named_environment(
+                self.environment,
+                self.parameters,
+                stiffness=self.stiffness,
+                damping=self.damping,
+                no_pull=self.no_pull,
+            )
+            return SurfaceEnvironment(found, values)
         if self.stiffness is None or self.damping is None:
             return None
         return SurfaceWall(self.stiffness, self.damping, self.no_pull)
@@ -175,6 +201,7 @@ def _of_surfaces() -> list[Callable[..., Any]]:
             "--stiffness", metavar="K", type=Bounded("N/m", 0.0, LARGEST_WALL), help="Of the wall [N/m]."
         ),
         click.option("--damping", metavar="B", type=Finite(), help="Of the wall [Ns/m]."),
+        *of_environments(),
         click.option("--no-pull", is_flag=True, help="The wall never pulls the handle in."),
     ]
 
@@ -232,4 +259,4 @@ def _raised(numbers: Sequence[float], height: float) -> tuple[float, ...]:
 
 
 def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
+    return "--parameter" if name == "parameters" else f"--{name.replace('_', '-')}"

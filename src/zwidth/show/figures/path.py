@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from zwidth.contact.mechanism.simulate import MechanismMotion
-from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, Surface, depth_and_normal
+from zwidth.contact.mechanism.surfaces import Box, Sphere, Surface, depth_and_normal
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import Posture, PostureError, link_points, solve_posture
 from zwidth.show.figures.mechanism import AXES, flattest, link_stroke, pins
@@ -199,7 +199,7 @@ def _draw_surface(
     points = np.empty((GRID, GRID, 3))
     points[..., flat[0]], points[..., flat[1]], points[..., cut[0]] = x[None, :], y[:, None], cut[1]
     depth = depth_and_normal(surface, points)[0]
-    if isinstance(surface, Plane) and surface.two_sided:
+    if motion.two_sided:
         name = "two-sided wall"
     else:
         name = "wall"
