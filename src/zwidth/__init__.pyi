@@ -21,8 +21,8 @@ from .loop.point_errors import OperatingPointError as OperatingPointError
 from .measures.catalogue import find_measure as find_measure
 from .measures.measure import Measure as Measure
 from .measures.measure import MeasureError as MeasureError
-from .measures.own import load_measures as load_measures
-from .measures.own import measure as measure
+from .measures.user_measures import load_measures as load_measures
+from .measures.user_measures import measure as measure
 from .model.operator import Operator as Operator
 from .model.operator import OperatorError as OperatorError
 from .model.plant import Plant as Plant

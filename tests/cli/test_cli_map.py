@@ -86,7 +86,7 @@ def test_a_share_of_directions_is_mapped_and_required():
 
 
 OWN = """
-from zwidth.measures.own import measure
+from zwidth import measure
 
 @measure(unit="N", better="lower")
 def inertial_force(place):

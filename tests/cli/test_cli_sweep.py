@@ -36,7 +36,7 @@ values = ["elbows-out", "elbows-in"]
 """
 SLOW = """
 from time import sleep
-from zwidth.measures.own import measure
+from zwidth import measure
 
 @measure(unit="s")
 def slow(place):
@@ -285,8 +285,8 @@ def test_the_page_s_python_runs(arms):
 
 
 def test_the_page_names_every_key():
-    from zwidth.study.asked import OVER
     from zwidth.study.axes import CIRCUMSTANCES
+    from zwidth.study.column import OVER
     from zwidth.study.study_schema import AxisSection, StudyFile, TieSection, WorkspaceSection
 
     for section in (StudyFile, AxisSection, TieSection, WorkspaceSection):

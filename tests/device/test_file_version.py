@@ -10,8 +10,8 @@ import pytest
 from zwidth import __version__
 from zwidth.device import address
 from zwidth.device.faults import DeviceError
-from zwidth.device.holding import operator_table
 from zwidth.device.load import from_document, load, schema
+from zwidth.device.operator_choice import operator_table
 from zwidth.study.job import Cells
 from zwidth.study.journal import Journal, JournalError, fingerprint
 from zwidth.study.store import Store, StoreError

@@ -123,7 +123,7 @@ def test_files_lie_beside_the_study(tmp_path, monkeypatch):
     )
     (place / "arm.toml").write_text("arm_mass_kg = 0.8\narm_stiffness_N_per_m = 580.0\ngrasp = 'rigid'\n")
     (place / "own.py").write_text(
-        "from zwidth.measures.own import measure\n@measure(unit='kg')\ndef mass(place):\n    return 0.1\n"
+        "from zwidth import measure\n@measure(unit='kg')\ndef mass(place):\n    return 0.1\n"
     )
     lines = [
         'device = "mine.toml"',

@@ -18,10 +18,10 @@ from zwidth.device import address
 from zwidth.device.load import from_document, load
 from zwidth.loop.loop import Loop
 from zwidth.model.plant import Plant
+from zwidth.study.derivative import central_slope, one_sided_slope
+from zwidth.study.local_maxima import rival_stiffness
 from zwidth.study.optimum import optimum
-from zwidth.study.rivals import rival_stiffness
 from zwidth.study.sensitivity import sensitivities
-from zwidth.study.slope import central_slope, one_sided_slope
 
 LATE = "loop.delay_samples=1"
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"

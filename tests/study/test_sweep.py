@@ -19,8 +19,8 @@ from zwidth.study.executor import run
 from zwidth.study.store import Store
 from zwidth.study.study_file import study_of
 from zwidth.study.sweep import Sweep, sweep, sweep_job
-from zwidth.study.whole import over_the_workspace
 from zwidth.study.workspace import workspace_map
+from zwidth.study.workspace_summary import over_the_workspace
 
 LENGTHS = axis(LENGTH, range=[0.11, 0.18], count=4, tie=[OTHER, {"key": "links.upper-left.mass_kg", "power": 1}])
 ASSEMBLIES = axis("assembly", "elbows-out", "elbows-in")
@@ -167,7 +167,7 @@ def test_a_mechanism_that_moves_no_mass_is_no_device():
 
 def test_a_user_s_measure_that_raises_or_returns_the_wrong_shape_fails_in_its_cells(tmp_path):
     (tmp_path / "own.py").write_text(
-        "from zwidth.measures.own import measure\n"
+        "from zwidth import measure\n"
         "@measure(unit='m')\n"
         "def spoilt(place):\n"
         "    period = place.controller.sampling_period\n"

@@ -28,8 +28,8 @@ from zwidth.measures.measure import (
 from zwidth.model.posture import PostureError
 from zwidth.study.plane import PlaneError, plane_of
 from zwidth.study.store import Store
-from zwidth.study.whole import over_the_workspace, positions
 from zwidth.study.workspace import MapJob, as_dataset, map_job, workspace_map
+from zwidth.study.workspace_summary import over_the_workspace, positions
 
 EACH = Measure(
     "each", "Asked one by one", "N", "lower", "", lambda place: 10.0 * float(place.effective.rigid_mass), each=True

@@ -11,8 +11,8 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import MEASURES
 from zwidth.measures.measure import NO_VALUE, OK, Measure, MeasureError, NoValueError
 from zwidth.model.posture import solve_posture
+from zwidth.study.direction_share import share_measure, share_of_directions
 from zwidth.study.requirement import Requirement, parse_requirement
-from zwidth.study.share import share_measure, share_of_directions
 from zwidth.study.worst import along_extreme, sphere
 
 KINDS = {"planar": random_five_bar, "arm": spatial_arm, "loop": spatial_loop}

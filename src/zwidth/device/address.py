@@ -12,9 +12,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final
 
 from zwidth.device.faults import DeviceError, Fault, Path, dotted, fail, listed, nearest, quote
-from zwidth.device.plain import copied
 from zwidth.device.read import within_depth
 from zwidth.device.schema import file as schema
+from zwidth.device.toml_access import copied
 
 UNSET: Final = object()
 OPTION: Final = "--set"

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from zwidth.device import address, build, geometry, unsupported
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, Path, dotted
-from zwidth.device.holding import held_by
+from zwidth.device.operator_choice import held_by
 from zwidth.device.plausible import warn_of_implausible
 from zwidth.device.read import bundled, read
 from zwidth.device.relations import relations

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from zwidth.device.faults import Path
-from zwidth.device.plain import number, rows, table, tables
 from zwidth.device.schema.bounds import STRONGEST_DAMPING
 from zwidth.device.schema.loop import LONGEST_DELAY
 from zwidth.device.schema.numbers import LARGEST
+from zwidth.device.toml_access import number, rows, table, tables
 from zwidth.loop.estimators import Kalman
 
 Found = Iterator[tuple[Path, str]]

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from zwidth.device.faults import Path
 from zwidth.device.loop_relations import along_fault, lag_fault
-from zwidth.device.plain import number, rows, table, tables
+from zwidth.device.toml_access import number, rows, table, tables
 
 Found = Iterator[tuple[Path, str]]
 

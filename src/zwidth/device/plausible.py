@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from zwidth.device.faults import Fault, Path, dotted
-from zwidth.device.plain import table, tables
+from zwidth.device.toml_access import table, tables
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device

@@ -14,8 +14,8 @@ from zwidth.device.address import allowed, exists
 from zwidth.device.faults import Path, listed, quote, suggestion
 from zwidth.device.loop_relations import electrical_relations, loop_relations
 from zwidth.device.nonlinear_relations import nonlinear_relations
-from zwidth.device.plain import number, rows, table, tables
 from zwidth.device.schema.file import flat_sources
+from zwidth.device.toml_access import number, rows, table, tables
 
 Found = Iterator[tuple[Path, str]]
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from zwidth.device.faults import Path
-from zwidth.device.plain import copied
+from zwidth.device.toml_access import copied
 
 VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str, frozenset[str] | None]]] = {
     ("loop", "velocity", "method"): (

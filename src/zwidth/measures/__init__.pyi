@@ -40,7 +40,7 @@ from .overall import Overall as Overall
 from .overall import global_conditioning_index as global_conditioning_index
 from .overall import global_isotropy_index as global_isotropy_index
 from .overall import overall as overall
-from .own import load_measures as load_measures
-from .own import measure as measure
 from .structural import deformation_ratio as deformation_ratio
 from .structural import structural_distortion as structural_distortion
+from .user_measures import load_measures as load_measures
+from .user_measures import measure as measure

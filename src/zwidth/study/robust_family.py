@@ -13,8 +13,8 @@ from pydantic import ValidationError
 from zwidth.device import address, build
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, dotted, fail, quote
-from zwidth.device.holding import held_by
 from zwidth.device.load import from_document
+from zwidth.device.operator_choice import held_by
 from zwidth.device.relations import operator_relations
 from zwidth.device.schema import file as schema
 from zwidth.device.schema.operator import OperatorSection

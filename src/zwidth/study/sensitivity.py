@@ -4,7 +4,7 @@
 
 exactly at the optimum: the stiffest wall is not searched anew for each number, its first-order motion follows from
 the edge that holds it (`study.optimum`). What is differenced is the device itself, built anew with the number a
-little larger and smaller (`study.slope`).
+little larger and smaller (`study.derivative`).
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from zwidth.device.schema import file as schema
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.arguments import require
+from zwidth.study.derivative import Slope, central_slope, one_sided_slope
+from zwidth.study.local_maxima import rival_stiffness
 from zwidth.study.optimum import Optimum, OptimumError, optimum
-from zwidth.study.rivals import rival_stiffness
 from zwidth.study.sensitivities import Group, Sensitivities, Sensitivity
-from zwidth.study.slope import Slope, central_slope, one_sided_slope
 
 # Numbers of a device file that say where it is asked about, or how its posture is found, and not what it is.
 NO_PROPERTY: Final = {

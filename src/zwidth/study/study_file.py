@@ -15,18 +15,18 @@ from zwidth.contact.room import check_room
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, fail, quote
-from zwidth.device.holding import NOBODY, operator_table
 from zwidth.device.load import from_document, in_order
-from zwidth.device.plain import number, table, tables
+from zwidth.device.operator_choice import NOBODY, operator_table
 from zwidth.device.plausible import warn_of_implausible
 from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, Shelf, bundled_names, parse, read
 from zwidth.device.text_file import Unreadable, read_text
+from zwidth.device.toml_access import number, table, tables
 from zwidth.device.translate import sentences
 from zwidth.device.version import refuse_newer
 from zwidth.measures.measure import Measure, WantedWall
-from zwidth.measures.own import load_measures
-from zwidth.study.asked import Asked, asked
+from zwidth.measures.user_measures import load_measures
 from zwidth.study.axes import CIRCUMSTANCES, Axis, Sampling
+from zwidth.study.column import Asked, asked
 from zwidth.study.plane import Plane, PlaneError, plane_of
 from zwidth.study.study_axes import Found, axes_of, circumstance_fault
 from zwidth.study.study_schema import StudyFile, description, unknown

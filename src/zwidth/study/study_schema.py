@@ -7,7 +7,6 @@ from typing import Annotated, Any, Final, Literal, get_args
 from pydantic import BeforeValidator, Field
 
 from zwidth.device.faults import Path, quote, suggestion
-from zwidth.device.plain import number
 from zwidth.device.schema.numbers import (
     VERSION,
     Bounds,
@@ -19,6 +18,7 @@ from zwidth.device.schema.numbers import (
     WholeNumber,
     quantity,
 )
+from zwidth.device.toml_access import number
 from zwidth.model.reduction import Model
 
 MOST: Final = 10**9  # designs along one axis, and altogether: numbers beyond are slips of the keyboard

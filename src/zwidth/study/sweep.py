@@ -37,13 +37,13 @@ from zwidth.measures.measure import (
 )
 from zwidth.model.arguments import refusal
 from zwidth.model.posture import OutOfReach, PostureError, Singular
-from zwidth.study.asked import Asked
 from zwidth.study.axes import CIRCUMSTANCES, WANTED, Sampling, settings
+from zwidth.study.column import Asked
 from zwidth.study.executor import Progress, run
 from zwidth.study.job import Cells
 from zwidth.study.journal import fingerprint
 from zwidth.study.study_file import Study, read_study
-from zwidth.study.whole import areas
+from zwidth.study.workspace_summary import areas
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -145,7 +145,7 @@ def workspace_map(
     direction  rendered in every cell; "worst" or "best": in each cell the direction in which the measure is so,
                "lowest" or "highest": in which it is so; left out: the file's
     wall       the wanted wall, for measures that are about one
-    own        measures of a user's own, by name (`measures.own.load_measures`)
+    own        measures of a user's own, by name (`measures.user_measures.load_measures`)
     Returns    a dataset over (y_m, x_m): for each measure NAME its values, nan where there is none, NAME_status,
                and with an extreme direction NAME_direction (y_m, x_m, component). Why cells have no value stands
                in the attribute `notes`, a line for each reason

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.evaluate import NO_MECHANISM, evaluate
 from zwidth.measures.measure import MISSING, OK, Measure, Measured, MeasureError, Note
-from zwidth.study.around import Around, Floats, Ints, arounds
+from zwidth.study.direction_search import Around, Floats, Ints, arounds
 
 Extreme = Literal["worst", "best", "lowest", "highest"]
 EXTREMES: Final = ("worst", "best", "lowest", "highest")

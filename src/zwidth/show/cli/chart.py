@@ -10,10 +10,10 @@ import click
 
 from zwidth.show.cli import measured
 from zwidth.show.cli.answer import Answer, deliver, sheet
-from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.failures import NoAnswer, computing
+from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Numbers, Question, about_a_device, as_json, example, output_option
-from zwidth.show.cli.place import heading
 from zwidth.show.motions import counted
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
 from zwidth.show.units import amount, radius, vector
@@ -150,7 +150,7 @@ def rows(chart: StabilityChart | MultiChart) -> Iterator[tuple[str, str]]:
         yield "stable regions", f"{len(chart.regions)}"
     if chart.unobserved_modes:
         from zwidth.loop.loop import Loop
-        from zwidth.study.hidden import hidden_instability
+        from zwidth.loop.unobserved_instability import hidden_instability
 
         names = ", ".join(counted(chart.unobserved_modes))
         warned = "; WARNING: so that the device runs away, whatever the wall"

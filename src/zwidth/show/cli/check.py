@@ -9,9 +9,9 @@ import click
 
 from zwidth.show.cli import measured
 from zwidth.show.cli.answer import Answer, deliver, table
-from zwidth.show.cli.computing import NoAnswer, computing
+from zwidth.show.cli.failures import NoAnswer, computing
+from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, named, output_option
-from zwidth.show.cli.place import heading
 from zwidth.show.cli.points import Walls, read_walls
 from zwidth.show.output import DATA, destination, write_data
 from zwidth.show.units import NONE, amount, radius

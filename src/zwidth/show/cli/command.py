@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import click
 
 from zwidth.show.cli.answer import Answer, deliver
-from zwidth.show.cli.computing import NoAnswer, computing
+from zwidth.show.cli.failures import NoAnswer, computing
+from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
-from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
 
 if TYPE_CHECKING:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli.answer import Answer, deliver, sheet
-from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.failures import NoAnswer, computing
+from zwidth.show.cli.heading import heading
 from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, output_option
-from zwidth.show.cli.place import heading
 from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
 from zwidth.show.units import amount, percent, typed
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
-from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.contact_options import Bounded
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.failures import NoAnswer, computing
+from zwidth.show.cli.heading import heading
 from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, named, output_option
-from zwidth.show.cli.place import heading
 from zwidth.show.cli.predicted_cycles import (
     NOT_PREDICTED,
     Met,

@@ -11,8 +11,8 @@ import click
 
 from zwidth.measures.catalogue import MEASURES
 from zwidth.show.cli.answer import Answer, deliver
-from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.errors import BadInput, as_option
+from zwidth.show.cli.failures import NoAnswer, computing
 from zwidth.show.cli.options import (
     Command,
     Finite,
@@ -170,9 +170,9 @@ def _measures(
 ) -> tuple[list[Measure], list[Requirement]]:
     """What to map, the first of them shown; and the requirements."""
     from zwidth.measures.catalogue import find_measure
-    from zwidth.measures.own import load_measures
+    from zwidth.measures.user_measures import load_measures
+    from zwidth.study.direction_share import NAME, share_measure
     from zwidth.study.requirement import parse_requirement
-    from zwidth.study.share import NAME, share_measure
 
     try:
         own = {} if file is None else load_measures(file)

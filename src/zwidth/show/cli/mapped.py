@@ -10,7 +10,7 @@ import numpy as np
 
 from zwidth.measures.measure import OK, STATUS
 from zwidth.show.cli.answer import Answer, sheet
-from zwidth.show.cli.place import computer, omission
+from zwidth.show.cli.heading import computer, omission
 from zwidth.show.output import ARRAYS, DATA, replacing, shown, write_data
 from zwidth.show.units import amount, area_text, percent, typed, vector
 
@@ -94,7 +94,7 @@ def answered(
 
 
 def _measure(dataset: xr.Dataset, name: str, device: Device) -> dict[str, Any]:
-    from zwidth.study.whole import over_the_workspace
+    from zwidth.study.workspace_summary import over_the_workspace
 
     about = dataset[name].attrs
     found = {
@@ -219,7 +219,7 @@ def write(
 
 def _table(dataset: xr.Dataset) -> dict[str, Any]:
     """A row for each cell, x fastest: its place in the plane and in the base frame, values and their status."""
-    from zwidth.study.whole import positions
+    from zwidth.study.workspace_summary import positions
 
     x, y = np.meshgrid(dataset["x_m"].values, dataset["y_m"].values)
     table: dict[str, Any] = {"x_m": x.ravel(), "y_m": y.ravel()}

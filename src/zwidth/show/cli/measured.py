@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from zwidth.show.cli.answer import Answer, deliver, sheet
 from zwidth.show.cli.command import NO_MODEL
-from zwidth.show.cli.computing import computing
-from zwidth.show.cli.place import heading
+from zwidth.show.cli.failures import computing
+from zwidth.show.cli.heading import heading
 from zwidth.show.output import DATA, replacing, write_data
 from zwidth.show.units import amount, percent, typed
 

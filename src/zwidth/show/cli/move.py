@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli.answer import Answer, deliver
-from zwidth.show.cli.computing import NoAnswer
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.failures import NoAnswer
 from zwidth.show.cli.moved import columns, facts, moved, numbers
 from zwidth.show.cli.moved_pages import pages
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option

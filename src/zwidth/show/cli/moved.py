@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, cast
 
-from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.failures import NoAnswer, computing
 from zwidth.show.cli.surface_options import along
 
 if TYPE_CHECKING:

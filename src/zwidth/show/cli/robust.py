@@ -11,11 +11,11 @@ import click
 from zwidth.device.read import LARGEST_FILE
 from zwidth.device.text_file import Unreadable, read_text
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
-from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.failures import NoAnswer, computing
+from zwidth.show.cli.heading import heading
 from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, named, output_option
-from zwidth.show.cli.place import heading
 from zwidth.show.cli.progress import progress_told
 from zwidth.show.motions import counted
 from zwidth.show.output import DATA, FIGURES, destination, replacing, shown, write_data

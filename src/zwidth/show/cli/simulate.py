@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli.answer import Answer, deliver
-from zwidth.show.cli.computing import NoAnswer
 from zwidth.show.cli.contact_options import LARGEST_SEED, Bounded, Contact, about_a_contact
+from zwidth.show.cli.failures import NoAnswer
 from zwidth.show.cli.measured import without_model
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.simulated import columns, numbers, simulated

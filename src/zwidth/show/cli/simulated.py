@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from math import exp, isfinite, log
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.show.cli.computing import NoAnswer, computing
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.failures import NoAnswer, computing
 from zwidth.show.cli.run_length import Length, heard_length, run_length
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.show.cli.answer import Row, sheet, table
 from zwidth.show.cli.energies import HEADINGS, energy_rows
-from zwidth.show.cli.place import ROUNDING, heading
+from zwidth.show.cli.heading import ROUNDING, heading
 from zwidth.show.units import amount, given, percent, signed, typed, uncertain
 
 if TYPE_CHECKING:

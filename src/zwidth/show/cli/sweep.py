@@ -10,10 +10,10 @@ import click
 
 from zwidth.show.cli.answer import Answer, deliver, sheet, table
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.kept import Stopped, keeping, kept_options, opened
 from zwidth.show.cli.options import as_json, example, named, output_option
 from zwidth.show.cli.process import INTERNAL, say
 from zwidth.show.cli.progress import progress_told
+from zwidth.show.cli.resumable import Stopped, keeping, kept_options, opened
 from zwidth.show.output import ARRAYS, DATA, FIGURES, OutputError, destination, replacing, shown, write_data
 from zwidth.show.units import number, typed
 

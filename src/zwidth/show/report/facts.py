@@ -11,13 +11,13 @@ from zwidth.conditions import Bound, compare
 from zwidth.device.device import Device
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.unobserved_instability import hidden_instability
 from zwidth.measures.felt_chart import FeltChart, felt_chart
 from zwidth.model.effective import EffectiveParameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
 from zwidth.show.friction import told_of
-from zwidth.study.hidden import hidden_instability
 from zwidth.study.sensitivities import Sensitivities
 from zwidth.study.sensitivity import sensitivities
 from zwidth.study.validity import Validity, validity

@@ -1,6 +1,6 @@
 """Measures of a user's own, from a file.
 
-    from zwidth.measures.own import measure
+    from zwidth import measure
 
     @measure(unit="N", title="Force for an acceleration of 10 m/s^2", better="lower")
     def inertial_force(point):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.evaluate import NO_MECHANISM
 from zwidth.measures.measure import Measure, MeasureError
-from zwidth.study.around import Around, Floats, Ints, arounds
+from zwidth.study.direction_search import Around, Floats, Ints, arounds
 from zwidth.study.requirement import Requirement
 
 Bools = NDArray[np.bool_]

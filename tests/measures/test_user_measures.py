@@ -12,12 +12,12 @@ import pytest
 from zwidth.device.load import load
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure
-from zwidth.measures.own import load_measures, measure
+from zwidth.measures.user_measures import load_measures, measure
 from zwidth.study.plane import plane_of
 from zwidth.study.workspace import map_job, workspace_map
 
 GOOD = '''
-from zwidth.measures.own import measure
+from zwidth import measure
 
 ACCELERATION = 10.0
 
@@ -96,7 +96,7 @@ def test_another_text_is_another_question(write):
 
 
 BROKEN = """
-from zwidth.measures.own import measure
+from zwidth import measure
 import numpy as np
 
 @measure()
@@ -172,23 +172,23 @@ def test_what_fails_fails_in_its_own_cells(write):
         ("import no_such_module\n", r"my\.py:1 does not run: ModuleNotFoundError"),
         ("def height(place):\n    return 1.0\n", r"my\.py has no measure; put @measure"),
         (
-            "from zwidth.measures.own import measure\n@measure()\ndef isotropy(place):\n    return 1.0\n",
+            "from zwidth import measure\n@measure()\ndef isotropy(place):\n    return 1.0\n",
             r"the name isotropy is taken .* rename",
         ),
         (
-            "from zwidth.measures.own import measure\n@measure(better='more')\ndef mine(place):\n    return 1.0\n",
+            "from zwidth import measure\n@measure(better='more')\ndef mine(place):\n    return 1.0\n",
             r"my\.py:2 does not run: ValueError: a measure's better must be",
         ),
         (
-            "from zwidth.measures.own import measure\n@measure\ndef mine(place):\n    return 1.0\n",
+            "from zwidth import measure\n@measure\ndef mine(place):\n    return 1.0\n",
             r"my\.py:2 does not run: ValueError: .* write @measure\(unit=\"kg\"\)",
         ),
         (
-            "from zwidth.measures.own import measure\n@measure(unit=3)\ndef mine(place):\n    return 1.0\n",
+            "from zwidth import measure\n@measure(unit=3)\ndef mine(place):\n    return 1.0\n",
             r"my\.py:2 does not run: ValueError: a measure's unit must be a text of one line, got 3",
         ),
         (
-            "from zwidth.measures.own import measure\n@measure(title='a\\nb')\ndef mine(place):\n    return 1.0\n",
+            "from zwidth import measure\n@measure(title='a\\nb')\ndef mine(place):\n    return 1.0\n",
             r"a measure's title must be a text of one line, got 'a\\nb'",
         ),
     ],

@@ -14,7 +14,7 @@ from zwidth.device.faults import listed, nearest
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure, Measured
 from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
-from zwidth.study.whole import CONDITIONS
+from zwidth.study.workspace_summary import CONDITIONS
 
 if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
