@@ -119,7 +119,7 @@ def test_a_chart_that_cannot_be_drawn_leaves_the_table(monkeypatch, tmp_path):
 
         raise ChartError("the edge cannot be closed")
 
-    monkeypatch.setattr("zwidth.chart.chart.stability_chart", undecided)
+    monkeypatch.setattr("zwidth.conditions.comparison.stability_chart", undecided)
     document = found("bounds", TWO_MASS, "--damping", 3.0)
     assert document["decided"] is False
     assert document["undecided"] == "the edge cannot be closed"

@@ -90,3 +90,10 @@ def test_what_is_named_in_code_is_there():
     modules = {path.stem for path in Path(conditions.__file__).parent.glob("*.py")}
     named = set(re.findall(r"`(one_mode|routh_hurwitz|thesis_\w+)[.`]", PAGE))
     assert {"one_mode", "routh_hurwitz", "thesis_flexible"} <= named <= modules
+
+
+def test_the_page_s_program_runs(capsys):
+    (program,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    exec(compile(program, "conditions.md", "exec"), {})
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.startswith(bound.name) for line, bound in zip(lines, BOUNDS, strict=True)] == [True] * len(BOUNDS)

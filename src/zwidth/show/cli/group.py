@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from zwidth import __version__
-from zwidth.show.cli.bounds import bounds
+from zwidth.show.cli.bounds import Bounds
 from zwidth.show.cli.chart import chart
 from zwidth.show.cli.check import check
 from zwidth.show.cli.command import Command
@@ -62,7 +62,7 @@ COMMANDS = (
     Report(),
     SensitivityCommand(),
     felt,
-    bounds,
+    Bounds(),
     guarantees,
     robust,
     simulate,

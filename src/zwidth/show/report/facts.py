@@ -7,7 +7,8 @@ from functools import cached_property
 
 from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart
-from zwidth.conditions import Bound, compare
+from zwidth.conditions import Bound
+from zwidth.conditions.comparison import bounds_of
 from zwidth.device.device import Device
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
@@ -17,7 +18,6 @@ from zwidth.model.effective import EffectiveParameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
-from zwidth.show.friction import told_of
 from zwidth.study.sensitivities import Sensitivities
 from zwidth.study.sensitivity import sensitivities
 from zwidth.study.validity import Validity, validity
@@ -119,6 +119,6 @@ def gather(device: Device, point: OperatingPoint | None = None) -> Facts:
         point=point,
         variants=tuple(what_if(device, point)),
         natural=natural_frequencies(point.unheld_plant),
-        bounds=tuple(compare(point.loop, **told_of(point))),
+        bounds=tuple(bounds_of(point)),
         runs_away=hidden_instability(point.loop),
     )

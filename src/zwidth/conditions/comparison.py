@@ -1,0 +1,159 @@
+"""Published conditions on a device beside its exact stability limit, at one operating point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import nan
+from typing import Any
+
+from zwidth.chart.arc_joining import ChartError
+from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.conditions.bound import Bound
+from zwidth.conditions.dry import ground_friction, reading_step
+from zwidth.conditions.exact import stiffness_limit
+from zwidth.conditions.registry import compare
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.arguments import check_number, require
+
+# Keys of a bound that are no columns of a table: one is the same for every device, the other a table itself.
+NO_COLUMNS = ("assumptions", "taken")
+
+
+@dataclass(frozen=True)
+class BoundsComparison:
+    """What every published condition admits at one damping, and what is exactly stable there.
+
+    bounds     all conditions, always in the same order
+    damping    B of the walls compared [N s/m]
+    exact      largest stable stiffness at that damping [N/m]: 0 where no wall is stable, nan without a chart
+    chart      the exact chart; None where double precision does not decide it
+    undecided  why there is no chart; "" where there is one
+    """
+
+    bounds: tuple[Bound, ...]
+    damping: float
+    exact: float
+    chart: StabilityChart | None
+    undecided: str = ""
+
+    @property
+    def largest(self) -> float:
+        """Largest stable stiffness at whatever damping [N/m]: 0 if no wall is stable, nan without a chart."""
+        if self.chart is None:
+            return nan
+        return self.chart.stiffness_max if self.chart.stiffness_max > 0.0 else 0.0
+
+    @property
+    def damping_at_largest(self) -> float:
+        """Damping of the stiffest stable wall [N s/m]; nan if no wall is stable, or without a chart."""
+        return nan if self.chart is None else self.chart.damping_at_stiffness_max
+
+    def stiffness_max(self, bound: Bound) -> float:
+        """Largest stiffness that a condition admits at the damping compared [N/m], as `Bound.stiffness_max_at`."""
+        return float(bound.stiffness_max_at(self.damping))
+
+    def ratio(self, bound: Bound) -> float:
+        """What a condition admits at the damping compared, over the exact limit there; nan where that is 0."""
+        return _ratio(self.stiffness_max(bound), self.exact)
+
+    def document(self) -> dict[str, Any]:
+        """The conditions and the exact limit by key and unit."""
+        told = {} if self.chart is not None else {"undecided": self.undecided}
+        return {
+            "bounds": [self._entry(bound) for bound in self.bounds],
+            "damping_Ns_per_m": self.damping,
+            "exact_N_per_m": self.exact,
+            "exact_largest_N_per_m": self.largest,
+            "exact_damping_at_largest_Ns_per_m": self.damping_at_largest,
+            "decided": self.chart is not None,
+            **told,
+        }
+
+    def table(self) -> dict[str, list[Any]]:
+        """The conditions as columns, one condition a row; sentences stand one after another in their cell."""
+        rows = [self._entry(bound) for bound in self.bounds]
+        columns = [key for key in (rows[0] if rows else ()) if key not in NO_COLUMNS]
+        return {
+            key: [" ".join(row[key]) if isinstance(row[key], list) else row[key] for row in rows]
+            for key in columns
+        }
+
+    def _entry(self, bound: Bound) -> dict[str, Any]:
+        return {
+            "name": bound.name,
+            "source": bound.source,
+            "kind": bound.kind,
+            "claim": bound.claim,
+            "statement": bound.statement,
+            "stiffness_max_N_per_m": self.stiffness_max(bound),
+            "ratio_to_exact": self.ratio(bound),
+            "largest_N_per_m": bound.stiffness_max,
+            "damping_at_largest_Ns_per_m": bound.damping_at_stiffness_max,
+            "largest_ratio_to_exact": _ratio(bound.stiffness_max, self.largest),
+            "assumptions": list(bound.assumptions),
+            "violated": list(bound.violated),
+            "taken": dict(bound.taken),
+            "lacking": list(bound.lacking),
+        }
+
+    def __repr__(self) -> str:
+        held = [bound.name for bound in self.bounds if bound.holds]
+        exact = (
+            f"exact {self.exact:.4g} N/m there, {self.largest:.4g} N/m at most"
+            if self.chart is not None
+            else "exact limit undecided"
+        )
+        return (
+            f"<BoundsComparison at {self.damping:.4g} N s/m: {exact}\n"
+            f" {len(self.bounds)} conditions, {len(held)} with all assumptions met>"
+        )
+
+
+def compare_bounds(point: OperatingPoint, damping: float | None = None) -> BoundsComparison:
+    """Every published condition on a device at one operating point, beside the exact stability limit.
+
+    damping  B of the walls compared [N s/m]; left out: that of the stiffest stable wall, 0 if there is none
+    Raises   ValueError  for a damping that is not finite
+             what `OperatingPoint.loop` and `stability_chart` raise, but for ChartError: see `undecided`
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> import numpy as np
+    >>> one = np.ones(1)
+    >>> free_mass = Plant(np.array([[1.0]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
+    >>> found = compare_bounds(OperatingPoint(Controller(1.0), given_plant=free_mass), damping=1.0)
+    >>> round(found.exact, 9), round(found.stiffness_max(found.bounds[0]), 9)
+    (0.666666667, 0.666666667)
+    """
+    require("point", point, OperatingPoint)
+    if damping is not None:
+        check_number("damping", damping, "N s/m")
+    loop = point.loop
+    chart, undecided = None, ""
+    try:
+        chart = stability_chart(loop, decay=False)
+    except ChartError as error:
+        undecided = str(error)
+    if damping is None:
+        damping = chart.damping_at_stiffness_max if chart is not None and chart.stiffness_max > 0.0 else 0.0
+    exact = nan if chart is None else stiffness_limit(chart, damping)
+    return BoundsComparison(tuple(bounds_of(point, damping)), damping, exact, chart, undecided)
+
+
+def bounds_of(point: OperatingPoint, wall_damping: float = nan) -> list[Bound]:
+    """Every condition on a device at one operating point, with its dry friction and its encoder's step.
+
+    wall_damping  B of the walls asked about, for assumptions on it [N s/m]; nan: they count as met
+    Raises        what `OperatingPoint.loop` raises
+    """
+    plant = point.plant
+    return compare(
+        point.loop,
+        wall_damping=wall_damping,
+        coulomb_friction=ground_friction(plant) if point.friction_known else nan,
+        resolution=reading_step(plant) if point.resolution_known else nan,
+    )
+
+
+def _ratio(admitted: float, exact: float) -> float:
+    return admitted / exact if exact > 0.0 else nan
