@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from zwidth.guarantees.grid import angle_grid
 from zwidth.guarantees.port import Floats
-from zwidth.guarantees.region import Region, empty
+from zwidth.guarantees.region import Region, empty, largest, outlines
 from zwidth.guarantees.two_port import (
     Demand,
     coupling_impedance,
@@ -24,6 +25,7 @@ DIRECTIONS, STEPS = 721, 60
 # Stiffnesses closer than this are equal.
 LEVEL = 1e-7
 NOTHING = "no coupling meets the condition at all frequencies: the device dissipates too little at the handle"
+NO_HANDLE = "a coupling is judged at the handle, and the plant has none; give plant.handle"
 
 
 @dataclass(frozen=True)
@@ -38,18 +40,58 @@ class Coupling:
     damping: float
     felt: float
 
+    @property
+    def needed(self) -> bool:
+        """Does the wall need a coupling at all?"""
+        return self.stiffness != float("inf")
+
 
 @dataclass(frozen=True)
 class Couplings:
     """Couplings (k_c, b_c) as regions: after Llewellyn, after Raisbeck, and of the sampled device itself.
 
-    limit  of the wall asked about, on the sampled device; None if none was
+    limit   of the wall asked about, on the sampled device; None if none was
+    reason  why none of this could be judged; None where it could
     """
 
     llewellyn: Region
     raisbeck: Region
     sampled: Region
     limit: Coupling | None
+    reason: str | None = None
+
+    @property
+    def regions(self) -> dict[str, Region]:
+        """The three regions by name."""
+        return {"llewellyn": self.llewellyn, "raisbeck": self.raisbeck, "sampled": self.sampled}
+
+    def document(self) -> dict[str, Any]:
+        """The couplings by key and unit; nothing but the reason where they could not be judged."""
+        if self.reason is not None:
+            return {"reason": self.reason}
+        limit = self.limit
+        return {name: region.document() for name, region in self.regions.items()} | {
+            "limit": limit
+            and {
+                "stiffness_N_per_m": limit.stiffness,
+                "damping_Ns_per_m": limit.damping,
+                "felt_stiffness_N_per_m": limit.felt,
+                "needed": limit.needed,
+            }
+        }
+
+    def table(self) -> dict[str, list[Any]]:
+        """The outlines as columns, region after region."""
+        return outlines(self.regions, "coupling")
+
+    def __repr__(self) -> str:
+        if self.reason is not None:
+            return f"<Couplings: none: {self.reason}>"
+        stiffest = ", ".join(f"{name} {largest(region)}" for name, region in self.regions.items())
+        if self.limit is None:
+            return f"<Couplings, the stiffest: {stiffest}>"
+        needed = f"at most {self.limit.stiffness:.4g} N/m" if self.limit.needed else "no coupling"
+        return f"<Couplings, the stiffest: {stiffest}\n the wall needs {needed}, felt {self.limit.felt:.4g} N/m>"
 
 
 def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None) -> Couplings:
@@ -62,6 +104,12 @@ def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None)
         coupling_region(sampled, loop.period),
         None if wall is None else softest_limit(sampled, *wall, loop.period),
     )
+
+
+def without_handle() -> Couplings:
+    """The couplings of a plant that nobody can hold: none, and why."""
+    none = empty(NO_HANDLE)
+    return Couplings(none, none, none, None, NO_HANDLE)
 
 
 def coupling_angles(loop: Loop, held: Floats) -> Floats:

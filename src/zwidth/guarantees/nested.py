@@ -1,20 +1,23 @@
-"""All guarantees of one loop side by side, the strongest first."""
+"""All guarantees of one loop, or of a device at one operating point, side by side, the strongest first."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.guarantees.coupling import Couplings, couplings, without_handle
 from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import Floats
-from zwidth.guarantees.region import Region, empty, stiffest_corner
+from zwidth.guarantees.region import Region, empty, largest, outlines, stiffest_corner
 from zwidth.guarantees.springs import nyquist_region, spring_stable_region
 from zwidth.loop.loop import Loop
-from zwidth.model.arguments import require
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.arguments import check_number, refusal, require
 
 COLGATE = (
     "Colgate and Schenkel 1997, read in Weir and Colgate's chapter of 2008; here for any device by alias disks"
@@ -37,11 +40,15 @@ class Guarantee:
 
 @dataclass(frozen=True)
 class Guarantees:
-    """The guarantees of a loop, from the strongest to plain stability, and the chart that holds them all."""
+    """The guarantees of a loop, from the strongest to plain stability, and the chart that holds them all.
+
+    couplings  virtual couplings through which walls are stable with every passive operator; None: not asked for
+    """
 
     loop: Loop
     guarantees: tuple[Guarantee, ...]
     chart: StabilityChart
+    couplings: Couplings | None = None
 
     def __getitem__(self, name: str) -> Guarantee:
         """The guarantee of that name. Raises KeyError."""
@@ -49,6 +56,29 @@ class Guarantees:
             if guarantee.name == name:
                 return guarantee
         raise KeyError(name)
+
+    @property
+    def none_left(self) -> bool:
+        """Has no wall with K > 0 and B >= 0 any of the guarantees?"""
+        return all(guarantee.region.reason is not None for guarantee in self.guarantees)
+
+    def document(self) -> dict[str, Any]:
+        """The guarantees by key and unit, and the couplings if they were asked for."""
+        entries = [
+            {"name": one.name, "meaning": one.meaning} | one.region.document() | {"source": one.source}
+            for one in self.guarantees
+        ]
+        coupling = {} if self.couplings is None else {"coupling": self.couplings.document()}
+        return {"guarantees": entries} | coupling
+
+    def table(self) -> dict[str, list[Any]]:
+        """The outlines as columns, region after region."""
+        return outlines({guarantee.name: guarantee.region for guarantee in self.guarantees}, "guarantee")
+
+    def __repr__(self) -> str:
+        stiffest = ", ".join(f"{one.name} {largest(one.region)}" for one in self.guarantees)
+        coupled = "" if self.couplings is None else f"\n {self.couplings!r}"
+        return f"<Guarantees, the stiffest wall of each: {stiffest}{coupled}>"
 
 
 def nested(loop: Loop, robust: Sequence[Floats] | None = None) -> Guarantees:
@@ -116,6 +146,34 @@ def nested(loop: Loop, robust: Sequence[Floats] | None = None) -> Guarantees:
     stable = Region(chart.regions, peak, chart.damping_at_stiffness_max, None if np.isfinite(peak) else NO_STABLE)
     found.append(Guarantee("stable", "stable with the device as described", stable, EXACT))
     return Guarantees(loop, tuple(found), chart)
+
+
+def guarantees_of(
+    point: OperatingPoint, coupling: bool = False, wall: tuple[float, float] | None = None
+) -> Guarantees:
+    """Every guarantee of a device at one operating point, without its operator: he is one of those allowed.
+
+    coupling  also virtual couplings after Llewellyn and Raisbeck, and of the sampled device, as `couplings`
+    wall      K [N/m] > 0 and B [N s/m] of a wall: also the stiffest coupling through which it may be rendered
+    Raises    ValueError  for a wall that is none
+              what `OperatingPoint.loop` raises, and ChartError where the chart of the bare device is undecided
+    """
+    require("point", point, OperatingPoint)
+    if wall is not None:
+        _check_wall(wall)
+    loop = point.without_operator.loop
+    found = nested(loop)
+    if not coupling and wall is None:
+        return found
+    handle = loop.plant.handle
+    return replace(found, couplings=without_handle() if handle is None else couplings(loop, handle, wall))
+
+
+def _check_wall(wall: object) -> None:
+    if not isinstance(wall, tuple | list) or len(wall) != 2:
+        raise refusal("wall", "a pair of stiffness [N/m] and damping [N s/m]", wall)
+    check_number("the wall's stiffness", wall[0], "N/m", above=0.0)
+    check_number("the wall's damping", wall[1], "N s/m")
 
 
 def _decided(found: Callable[[Loop], Region], loop: Loop) -> Region:

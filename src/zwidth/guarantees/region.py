@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,6 +46,42 @@ class Region:
         for ring in self.rings:
             inside |= shapely.contains_xy(shapely.Polygon(ring), K, B)
         return inside
+
+    def document(self) -> dict[str, Any]:
+        """The set by key and unit, with what it lacks."""
+        notes = {"reason": self.reason, "warning": self.warning}
+        return {
+            "regions": list(self.rings),
+            "stiffness_max_N_per_m": self.stiffness_max,
+            "damping_at_stiffness_max_Ns_per_m": self.damping_at_stiffness_max,
+        } | {key: note for key, note in notes.items() if note is not None}
+
+    def __repr__(self) -> str:
+        return f"<Region of {len(self.rings)} rings: {largest(self)}>"
+
+
+def largest(region: Region) -> str:
+    """A region's largest stiffness in words.
+
+    >>> largest(Region((), 2000.0, 0.5)), largest(empty("for want of friction"))
+    ('2000 N/m', 'none')
+    """
+    return "none" if region.reason is not None else f"{region.stiffness_max:.4g} N/m"
+
+
+def outlines(regions: Mapping[str, Region], named: str) -> dict[str, list[Any]]:
+    """The rings of several regions as columns, one corner a row, region after region.
+
+    named  what the column of their names is called; the column `region` counts the rings of each from 0
+    """
+    rows = [
+        (name, n, float(K), float(B))
+        for name, region in regions.items()
+        for n, ring in enumerate(region.rings)
+        for K, B in ring
+    ]
+    columns = (named, "region", "stiffness_N_per_m", "damping_Ns_per_m")
+    return {column: [row[i] for row in rows] for i, column in enumerate(columns)}
 
 
 def empty(reason: str) -> Region:

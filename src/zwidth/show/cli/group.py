@@ -16,7 +16,7 @@ from zwidth.show.cli.command import Command
 from zwidth.show.cli.devices import devices
 from zwidth.show.cli.experiment import experiment
 from zwidth.show.cli.felt import felt
-from zwidth.show.cli.guarantees import guarantees
+from zwidth.show.cli.guarantees import GuaranteesCommand
 from zwidth.show.cli.limit_cycles import limit_cycles
 from zwidth.show.cli.map import map_command
 from zwidth.show.cli.move import move
@@ -63,7 +63,7 @@ COMMANDS = (
     SensitivityCommand(),
     felt,
     Bounds(),
-    guarantees,
+    GuaranteesCommand(),
     robust,
     simulate,
     experiment,
