@@ -119,7 +119,7 @@ def test_the_repr_has_the_main_numbers_in_few_lines(found):
     lines = repr(found).splitlines()
     assert len(lines) <= 5
     assert max(map(len, lines)) < 100
-    assert f"{found.largest:.4g} N/m" in lines[0]
+    assert f"{found.largest:.6g} N/m" in lines[0]
     assert f"{len(found.bounds)} conditions" in lines[1]
 
 

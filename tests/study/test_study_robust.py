@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from contextlib import redirect_stdout
 from io import StringIO
@@ -11,10 +12,9 @@ import numpy as np
 import pytest
 
 from zwidth.chart.verdict import judge
-from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document, load
 from zwidth.study.robust import RobustError, promised_walls, robust_study
-from zwidth.study.robust_family import Family, Point, Range
+from zwidth.study.robust_family import Family, Point, Range, RangeError
 
 PAGE = Path(__file__).parents[2] / "docs" / "robust.md"
 
@@ -182,11 +182,23 @@ def test_a_number_off_the_diagonal_moves_with_its_mirror_image():
     ],
 )
 def test_ranges_that_cannot_be_meant_are_refused_in_one_line(ranges, expected):
-    with pytest.raises(DeviceError) as caught:
+    with pytest.raises(RangeError) as caught:
         robust_study(family(from_document(plain().document, "m"), *ranges), 4, 4)
     lines = [str(fault) for fault in caught.value.faults]
     assert any(expected in line for line in lines), lines
-    assert all("\n" not in line and line.startswith("--range: ") for line in lines)
+    assert all("\n" not in line and line.startswith(f"{ranges[0].path}: ") for line in lines)
+    assert str(caught.value).splitlines() == lines
+    assert pickle.loads(pickle.dumps(caught.value)).faults == caught.value.faults
+
+
+def test_a_range_s_advice_is_in_the_words_of_who_asks():
+    whole, logarithmic = (
+        family(plain(), one).faults()[0]
+        for one in (Range("loop.velocity.samples", 1, 2), Range("plant.mass_kg", -0.1, 0.2, True))
+    )
+    assert str(whole).endswith("is a whole number and has no range; compute it for each value with Device.with_")
+    assert str(logarithmic).endswith("give a positive number, or leave out logarithmic")
+    assert whole.spelled(lambda name, value: "--set").endswith("compute it for each value with --set")
 
 
 def test_members_that_cannot_be_built_are_counted_and_named():

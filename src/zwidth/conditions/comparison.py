@@ -99,7 +99,7 @@ class BoundsComparison:
     def __repr__(self) -> str:
         held = [bound.name for bound in self.bounds if bound.holds]
         exact = (
-            f"exact {self.exact:.4g} N/m there, {self.largest:.4g} N/m at most"
+            f"exact {self.exact:.6g} N/m there, {self.largest:.6g} N/m at most"
             if self.chart is not None
             else "exact limit undecided"
         )

@@ -90,8 +90,8 @@ class Couplings:
         stiffest = ", ".join(f"{name} {largest(region)}" for name, region in self.regions.items())
         if self.limit is None:
             return f"<Couplings, the stiffest: {stiffest}>"
-        needed = f"at most {self.limit.stiffness:.4g} N/m" if self.limit.needed else "no coupling"
-        return f"<Couplings, the stiffest: {stiffest}\n the wall needs {needed}, felt {self.limit.felt:.4g} N/m>"
+        needed = f"at most {self.limit.stiffness:.6g} N/m" if self.limit.needed else "no coupling"
+        return f"<Couplings, the stiffest: {stiffest}\n the wall needs {needed}, felt {self.limit.felt:.6g} N/m>"
 
 
 def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None) -> Couplings:

@@ -66,7 +66,7 @@ def largest(region: Region) -> str:
     >>> largest(Region((), 2000.0, 0.5)), largest(empty("for want of friction"))
     ('2000 N/m', 'none')
     """
-    return "none" if region.reason is not None else f"{region.stiffness_max:.4g} N/m"
+    return "none" if region.reason is not None else f"{region.stiffness_max:.6g} N/m"
 
 
 def outlines(regions: Mapping[str, Region], named: str) -> dict[str, list[Any]]:

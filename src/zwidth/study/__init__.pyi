@@ -2,7 +2,7 @@ from .common_area import common_area as common_area
 from .plane import plane_of as plane_of
 from .requirement import parse_requirement as parse_requirement
 from .robust import RobustError as RobustError
-from .robust import RobustStudy as RobustStudy
+from .robust_study import RobustStudy as RobustStudy
 from .robust import robust_study as robust_study
 from .robust_family import Family as Family
 from .robust_family import Range as Range

@@ -12,7 +12,6 @@ A continuum of members cannot be charted; it is sampled, and the sample is then 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import product
 from typing import Any, Final
 
@@ -26,11 +25,11 @@ from zwidth.chart.robust.instability import softening, unstable
 from zwidth.chart.robust.members import Member, chart_member
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import BAND, spectral_radius
-from zwidth.device.faults import DeviceError
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.loop import Loop
 from zwidth.model.arguments import require
-from zwidth.study.robust_family import Family, Point
+from zwidth.study.robust_family import Family, Point, RangeError
+from zwidth.study.robust_study import RobustStudy, Violation
 
 Floats = NDArray[np.float64]
 # stage, done, of how many
@@ -43,70 +42,6 @@ EXCEEDS: Final = 1e-7  # excess of the spectral radius over 1 that makes a membe
 EDGE_WALLS: Final = 200
 RASTER: Final = 12  # walls inside, per axis
 DEPTH: Final = 1e-6  # how far inside the edge walls are asked, in shares of the set's size
-
-
-@dataclass(frozen=True)
-class Violation:
-    """What random members nobody had seen say of the robust walls.
-
-    unseen                 how many were asked; those that could not be built are not counted
-    violating              how many of them find one of the walls unstable
-    worst_spectral_radius  over all of them and all walls; at most 1 if nobody violates
-    worst_stiffness_share  the largest share of the largest stiffness by which a robust wall (K > 0, B >= 0) must
-                           be softened, at its damping, to be stable for a member; 0 if nobody violates
-    worst                  that member's values: path -> value; {} if nobody violates
-    """
-
-    unseen: int
-    violating: int
-    worst_spectral_radius: float
-    worst_stiffness_share: float
-    worst: dict[str, Any]
-
-    def document(self) -> dict[str, Any]:
-        """The numbers under the keys of --json."""
-        return {
-            "unseen": self.unseen,
-            "violating": self.violating,
-            "worst_spectral_radius": self.worst_spectral_radius,
-            "worst_stiffness_share": self.worst_stiffness_share,
-            "worst_member": self.worst or None,
-        }
-
-
-@dataclass(frozen=True)
-class RobustStudy:
-    """A robust chart with who its members are and how far it can be trusted.
-
-    chart      of all members
-    members    path -> value of each; those in `chart.failed` could not be built or charted
-    sampled    members before the search; the rest it found
-    rounds     of the search
-    moved      share of the area by which the last round moved the edge; 0 if it found nobody
-    settled    whether the search ended because nobody it found moves the edge by more than the tolerance
-    violation  None for a list without ranges, all of whose members are in the chart, and where no wall is stable
-    """
-
-    chart: RobustChart
-    members: tuple[dict[str, Any], ...]
-    sampled: int
-    rounds: int
-    moved: float
-    settled: bool
-    violation: Violation | None
-
-    def document(self) -> dict[str, Any]:
-        """The chart and the search under the keys of `zwidth robust --json`."""
-        return self.chart.document() | {
-            "members": list(self.members),
-            "search": {
-                "sampled": self.sampled,
-                "rounds": self.rounds,
-                "moved_share": self.moved,
-                "settled": self.settled,
-            },
-            "violation": self.violation and self.violation.document(),
-        }
 
 
 class RobustError(ValueError):
@@ -127,7 +62,8 @@ def robust_study(
     unseen     random members asked afterwards (see `Violation`)
     seed       of everything random: equal seeds give equal answers
     tolerance  share of the area; a round of the search that moves the edge by less is the last
-    Raises     DeviceError     for ranges that cannot be meant
+    Raises     RangeError      for ranges that cannot be meant
+               DeviceError     for operators that are none
                RobustError     if not one member can be built or charted
                NonlinearError  for a velocity estimate that is not linear
 
@@ -140,9 +76,8 @@ def robust_study(
     (68629.15, 0)
     """
     require("family", family, Family)
-    faults = family.faults()
-    if faults:
-        raise DeviceError(faults)
+    if faults := family.faults():
+        raise RangeError(faults)
     found = _Members(family, progress or (lambda stage, done, of: None))
     points = list(_sample(family, members, seed))
     found.add(points, "members")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite
@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from zwidth.device import address, build
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Fault, dotted, fail, quote
+from zwidth.device.faults import DeviceError, dotted, one_line, quote
 from zwidth.device.load import from_document
 from zwidth.device.operator_choice import held_by
 from zwidth.device.relations import operator_relations
@@ -20,16 +20,53 @@ from zwidth.device.schema import file as schema
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.measure import Spelling, as_argument
 from zwidth.model.plant import Plant
+from zwidth.study.advice import Advice
 
-OPTION: Final = "--range"
+# What two of the faults advise; arguments as Python has them.
+BY_VALUE: Final = Advice("compute it for each value with {}", "Device.with_")
+LINEARLY: Final = Advice("give a positive number, or leave out {}", "logarithmic")
+
+
+@dataclass(frozen=True)
+class RangeFault:
+    """One thing that is wrong with a range of numbers.
+
+    path    of the number
+    reason  what is wrong, and what is allowed
+    advice  what to do instead; None where the reason says it
+    """
+
+    path: str
+    reason: str
+    advice: Advice | None = None
+
+    def __str__(self) -> str:
+        return self.spelled(as_argument)
+
+    def spelled(self, spelling: Spelling) -> str:
+        """The fault on one line, with arguments spelled as the asker gives them."""
+        advice = "" if self.advice is None else f"; {self.advice.spelled(spelling)}"
+        return f"{one_line(self.path)}: {one_line(self.reason)}{advice}"
+
+
+class RangeError(ValueError):
+    """Ranges that make no family of devices; `faults` says everything that is wrong with them."""
+
+    def __init__(self, faults: Iterable[RangeFault]) -> None:
+        self.faults = tuple(dict.fromkeys(faults))
+        super().__init__("\n".join(map(str, self.faults)))
+
+    def __reduce__(self) -> tuple[type[RangeError], tuple[tuple[RangeFault, ...]]]:
+        return type(self), (self.faults,)
 
 
 @dataclass(frozen=True)
 class Range:
     """A number of the device file between two values.
 
-    path         as in `--set`
+    path         dotted, in the device file: see `device.address`
     low, high    finite, low <= high; a number with low = high is fixed
     logarithmic  spread its samples evenly over its logarithm; both values then are positive
     """
@@ -45,15 +82,16 @@ class Range:
             return float(self.low ** (1.0 - share) * self.high**share)
         return self.low + share * (self.high - self.low)
 
-    def fault(self) -> str:
-        """What is wrong with it; "" if nothing is."""
+    def fault(self) -> RangeFault | None:
+        """What is wrong with it; None if nothing is."""
         if not (isfinite(self.low) and isfinite(self.high)):
-            return f"must lie between two finite numbers, got {self.low:g},{self.high:g}"
+            return RangeFault(self.path, f"must lie between two finite numbers, got {self.low:g},{self.high:g}")
         if self.low > self.high:
-            return f"is upside down, got {self.low:g},{self.high:g}; give the smaller number first"
+            upside_down = f"is upside down, got {self.low:g},{self.high:g}; give the smaller number first"
+            return RangeFault(self.path, upside_down)
         if self.logarithmic and not self.low > 0.0:
-            return f"cannot be logarithmic from {self.low:g}; give a positive number, or leave out log"
-        return ""
+            return RangeFault(self.path, f"cannot be logarithmic from {self.low:g}", LINEARLY)
+        return None
 
 
 @dataclass(frozen=True)
@@ -133,13 +171,13 @@ class Family:
             return None
         return replace(self.operating_point, operator=build.operator(section))
 
-    def faults(self) -> list[Fault]:
+    def faults(self) -> list[RangeFault]:
         """What is wrong with the ranges: each by itself, then at its two ends with the others in their middle."""
-        found = [Fault(OPTION, one.path, text) for one in self.ranges if (text := one.fault())]
+        found = [fault for one in self.ranges if (fault := one.fault()) is not None]
         paths = [one.path for one in self.ranges]
         found += [
-            Fault(OPTION, path, "is given twice; one range for each number")
-            for path in {*paths}
+            RangeFault(path, "is given twice; one range for each number")
+            for path in dict.fromkeys(paths)
             if paths.count(path) > 1
         ]
         for document in self._documents:
@@ -156,23 +194,21 @@ class Family:
                     except DeviceError as error:
                         value = self.ranges[k].at(end)
                         found += [
-                            Fault(OPTION, self.ranges[k].path, f"{value:g} makes no device: {fault}")
+                            RangeFault(self.ranges[k].path, f"{value:g} makes no device: {fault}")
                             for fault in error.faults
                         ]
         return list(dict.fromkeys(found))
 
 
-def _no_number(document: dict[str, Any], one: Range) -> list[Fault]:
+def _no_number(document: dict[str, Any], one: Range) -> list[RangeFault]:
     """The fault of a path that leads to no real number."""
     try:
         steps = address.resolve(document, one.path)
     except DeviceError as error:
-        return [Fault(OPTION, fault.key, fault.message) for fault in error.faults]
+        return [RangeFault(fault.key, fault.message) for fault in error.faults]
     types = {kind for found in schema.at(steps) for kind in _types(found)}
     if "integer" in types and "number" not in types:
-        return fail(
-            OPTION, one.path, "is a whole number and has no range; compute it for each value with --set"
-        ).faults
+        return [RangeFault(one.path, "is a whole number and has no range", BY_VALUE)]
     try:
         value = address.get(document, one.path)
     except DeviceError:
@@ -183,21 +219,10 @@ def _no_number(document: dict[str, Any], one: Range) -> list[Fault]:
         ]
         held = "is no number" if value is None else f"holds {quote(value)}, which is no number"
         hint = f"; did you mean '{inside[0]}'?" if inside else ""
-        return fail(OPTION, one.path, held + hint).faults
+        return [RangeFault(one.path, held + hint)]
     return []
 
 
 def _types(found: dict[str, Any]) -> Sequence[str]:
     kind = found.get("type", "")
     return [kind] if isinstance(kind, str) else list(kind)
-
-
-def in_words(value: Any) -> str:
-    """A member's value, in four digits where it is a number.
-
-    >>> in_words(30004.0), in_words(0.74483), in_words("thesis-arm")
-    ('30000', '0.7448', 'thesis-arm')
-    """
-    if isinstance(value, str):
-        return value
-    return f"{float(f'{value:.3e}'):.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"

@@ -9,7 +9,7 @@ a figure, and chooses the exit code. A command that does not fit overrides the o
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final
@@ -95,6 +95,13 @@ class Command:
 
     def check(self, case: Case) -> None:
         """Refuse options that do not go together, before anything is loaded. Raises BadInput."""
+
+    def parse(self, case: Case) -> Mapping[str, Any]:
+        """Options in the shape that `compute` takes, in place of what was typed: texts taken apart, files read.
+
+        Called before anything is loaded. Raises BadInput.
+        """
+        return {}
 
     def default_output(self, question: Question) -> str | None:
         """The file that is written where none is named; None: none is."""
@@ -189,6 +196,7 @@ class Command:
         named = output or self.default_output(question)
         case = Case(question, options, None if named is None else destination(named, self.outputs))
         self.check(case)
+        case = replace(case, options={**options, **self.parse(case)})
         return deliver(self.answer(case), as_json)
 
     def for_click(self) -> click.Command:

@@ -22,7 +22,7 @@ from zwidth.show.cli.map import map_command
 from zwidth.show.cli.move import move
 from zwidth.show.cli.polar import Polar
 from zwidth.show.cli.report import Report
-from zwidth.show.cli.robust import robust
+from zwidth.show.cli.robust import Robust
 from zwidth.show.cli.schema import schema
 from zwidth.show.cli.sensitivity import SensitivityCommand
 from zwidth.show.cli.show import Show
@@ -64,7 +64,7 @@ COMMANDS = (
     felt,
     Bounds(),
     GuaranteesCommand(),
-    robust,
+    Robust(),
     simulate,
     experiment,
     limit_cycles,

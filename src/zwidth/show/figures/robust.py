@@ -15,7 +15,7 @@ from matplotlib.patches import Polygon
 from zwidth.chart.robust.chart import RobustChart
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import GREY, LINES, STABLE, legend_above
-from zwidth.study.robust_family import in_words
+from zwidth.show.members import value_text
 
 NAMED: Final = len(LINES) - 1  # binding members with a line of their own; the last line is for the rest
 DRAWN: Final = 200  # members' outlines at most
@@ -83,7 +83,9 @@ def _words(members: Sequence[Mapping[str, Any]], index: int) -> str:
     last = [path.rsplit(".", 1)[-1] for path in values]
     names = [name if last.count(name) == 1 else path for name, path in zip(last, values, strict=True)]
     pairs = zip(names, values.values(), strict=True)
-    lines = wrap(", ".join(f"{name} = {in_words(value)}".replace(" ", NO_BREAK) for name, value in pairs), LONGEST)
+    lines = wrap(
+        ", ".join(f"{name} = {value_text(value)}".replace(" ", NO_BREAK) for name, value in pairs), LONGEST
+    )
     if len(lines) > 2:
         lines = [lines[0], f"{lines[1]} … (member {index})"]
     return "\n".join(lines)
