@@ -186,7 +186,7 @@ def test_another_plane_has_the_base_frame_s_coordinates_in_its_table(tmp_path):
         (("--share", "rigid_mass>=0.1", "--share", "rigid_mass>=0.2"), "--share: a map has one"),
         (("--share", "nothing"), "--share: 'nothing' is no requirement"),
         (("--measures-file", "nowhere.py", "--measure", "isotropy"), "--measures-file: no such file"),
-        (("--measure", "isotropy", "--plane", "xz"), "cannot leave the plane z = 0 m"),
+        (("--measure", "isotropy", "--plane", "xz"), "in a line; ask for --plane xy"),
         (("--measure", "isotropy", "--plane", "zz"), "--plane"),
         (("--measure", "isotropy", "--plane", "1,0,0,2,0,0"), "are parallel"),
         (("--measure", "isotropy", "--through", "0,0.2,0.3"), "0.3 m beside it; it reaches"),

@@ -39,6 +39,7 @@ WRONG = [
     ({"assembly": "elbows-up"}, "assembly: names no assembly, got 'elbows-up'; did you mean 'elbows-"),
     ({"model": "stiff"}, "model: must be 'full', 'two-mass', 'motor-mass' or 'rigid', got the text 'stiff'"),
     ({"operator": "no-one"}, "no-one: is neither a file nor a bundled operator"),
+    ({"set": 3}, 'set: must be a list, got 3 (changes of the device file, each "PATH=VALUE")'),
     ({"set": ["loop.delay=1"]}, "set.0: loop.delay: is no key of a device file; did you mean 'loop.delay_s'?"),
     ({"set": ["loop.sampling_period_s=-1"]}, "loop.sampling_period_s: must be"),
     ({"frequency_Hz": 0.0}, "frequency_Hz: must be greater than 0, got 0"),
@@ -49,7 +50,8 @@ WRONG = [
     ),
     (
         {"measures": ["average(isotropy)"], "workspace": {"plane": "xz"}},
-        "workspace: the handle cannot leave the plane z = 0 m",
+        "workspace: the handle cannot leave the plane z = 0 m, and meets the plane asked for in a line; "
+        'ask for plane = "xy"',
     ),
     ({"measures": ["average(stiffness_max)"], "device": TWO_MASS}, "measures: average(stiffness_max) is over a"),
     ({"optimise": {"objectives": {"isotropy": "low"}}}, "optimise.objectives.isotropy: must be 'max' or 'min'"),

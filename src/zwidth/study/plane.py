@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.device import Device
+from zwidth.measures.measure import Spelling, as_argument
 from zwidth.model.arguments import require
 from zwidth.model.arrays import pack
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import reachable_positions
 from zwidth.model.reach import Shell, shells
+from zwidth.study.advice import Advice
 
 Floats = NDArray[np.float64]
 
@@ -30,7 +32,22 @@ DIGITS: Final = 14  # of coordinates, those of the longest counted
 
 
 class PlaneError(ValueError):
-    """A plane on which no map can be drawn; the text says why, and what can be reached."""
+    """A plane on which no map can be drawn.
+
+    reason  why not, and what can be reached
+    advice  what to ask for instead; None where the reason says it
+    """
+
+    def __init__(self, reason: str, advice: Advice | None = None) -> None:
+        super().__init__(reason, advice)
+        self.reason, self.advice = reason, advice
+
+    def __str__(self) -> str:
+        return self.spelled(as_argument)
+
+    def spelled(self, spelling: Spelling) -> str:
+        """The sentence, with arguments spelled as the asker gives them: in Python, as options, as keys."""
+        return self.reason if self.advice is None else f"{self.reason}; {self.advice.spelled(spelling)}"
 
 
 @dataclass(frozen=True)
@@ -206,8 +223,8 @@ def _check_met(normal: Floats, point: Floats, own: Floats | None, reach: Reach) 
     plane = next((n for n, axes in AXES.items() if aligned and k not in axes), "")
     where = f"the plane {'xyz'[k]} = {_short(known[0, k])} m" if aligned else f"the plane across {_vector(own)}"
     if np.linalg.norm(np.cross(normal, own)) > PARALLEL:
-        hint = f"ask for --plane {plane}" if plane else "leave --plane out"
-        raise PlaneError(f"the handle cannot leave {where}, and meets the plane asked for in a line; {hint}")
+        advice = Advice("ask for {}", "axes", plane) if plane else Advice("leave {} out", "axes")
+        raise PlaneError(f"the handle cannot leave {where}, and meets the plane asked for in a line", advice)
     off = float(abs((point - known[0]) @ own))
     if off > FLAT * float(np.ptp(known, axis=0).max()):
         raise PlaneError(
@@ -247,7 +264,8 @@ def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) 
     if cells is None:
         lengths = [high - low for low, high in ranges]
         if not min(lengths) > 0.0:
-            raise PlaneError("what the handle reaches has no extent along an axis; give its range and --cells")
+            flat = "what the handle reaches has no extent along an axis"
+            raise PlaneError(flat, Advice("give its range and {}", "cells"))
         nx, ny = (max(2, round((LONG_SIDE - 1) * length / max(lengths)) + 1) for length in lengths)
         return nx, ny
     nx, ny = (int(count) for count in cells)

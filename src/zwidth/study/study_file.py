@@ -275,12 +275,18 @@ def _plane(
             document.get("assembly"),
         )
     except PlaneError as error:
-        found.append((("workspace",), str(error)))
+        found.append((("workspace",), error.spelled(_workspace_key)))
     except DeviceError as error:
         found.append((("workspace",), error.faults[0].message))
     except ValueError as error:  # an assembly that is singular throughout, or does not close
         found.append((("workspace",), f"cannot be laid out: {error}"))
     return None
+
+
+def _workspace_key(name: str, value: str | None) -> str:
+    """An argument of `plane_of` as [workspace] spells it."""
+    key = {"axes": "plane", "cells": "count"}.get(name, name)
+    return key if value is None else f'{key} = "{value}"'
 
 
 def held(study: Study, name: str, document: dict[str, Any]) -> dict[str, Any]:

@@ -45,7 +45,7 @@ def _plane(value: Any) -> Any:
 class TieSection(Section):
     """A number that goes with an axis's."""
 
-    key: Text = quantity("the number that goes with the axis's, as in --set")
+    key: Text = quantity("the number that goes with the axis's: a dotted path of the device file")
     factor: Number | None = quantity("times the axis's value", default=None)
     power: Number | None = quantity("of the axis's value over that in the file, times its own there", default=None)
 
@@ -56,7 +56,7 @@ Tie = Annotated[TieSection, BeforeValidator(_by_name)]
 class AxisSection(Section):
     """What is varied: a number of the device file, or a circumstance."""
 
-    key: Text = quantity("what is varied: a path as in --set, or a circumstance such as assembly")
+    key: Text = quantity("what is varied: a dotted path of the device file, or a circumstance such as assembly")
     range: Bounds | None = quantity("lowest and highest value", default=None)
     count: WholeNumber | None = quantity("values of the range, its ends among them", ge=1, le=MOST, default=None)
     values: tuple[Any, ...] | None = quantity("the values", min_length=1, default=None)
@@ -103,7 +103,7 @@ class StudyFile(Section):
     assembly: Text | None = quantity("way of assembling the mechanism", default=None)
     model: Model | None = quantity("how much of the device is modelled", default=None)
     operator: Text | None = quantity("a bundled operator, a file beside this one, or none", default=None)
-    set: tuple[Text, ...] = quantity("changes of the device file, PATH=VALUE as in --set", default=())
+    set: tuple[Text, ...] = quantity('changes of the device file, each "PATH=VALUE"', default=())
     stiffness_N_per_m: Number | None = quantity("of the wanted wall", "N/m", ge=0, default=None)
     damping_Ns_per_m: Number | None = quantity("of the wanted wall", "N s/m", ge=0, default=None)
     frequency_Hz: Number | None = quantity("at which the hand moves", "Hz", gt=0, default=None)

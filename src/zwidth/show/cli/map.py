@@ -236,8 +236,15 @@ def _mapped(
             )
     except MeasureError as error:
         raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
-    except (PlaneError, TooLarge) as error:
+    except PlaneError as error:
+        raise BadInput(f"{question.name}: {error.spelled(_plane_option)}") from None
+    except TooLarge as error:
         raise BadInput(f"{question.name}: {error}") from None
+
+
+def _plane_option(name: str, value: str | None) -> str:
+    """An argument of `plane_of` as an option."""
+    return as_option("plane" if name == "axes" else name, value)
 
 
 def _plane(question: Question, device: Device, grid: dict[str, Any]) -> Plane:
