@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
-    from zwidth.chart.at_point import AnyChart
     from zwidth.chart.chart import StabilityChart
-    from zwidth.chart.measured.verdict import MeasuredVerdicts
-    from zwidth.chart.verdict import Verdicts
+    from zwidth.chart.result import Chart
+    from zwidth.chart.verdict import Verdicts, WallVerdicts
     from zwidth.contact.environments.environment import Environment
     from zwidth.device.device import Device
     from zwidth.device.load import Settings
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
     from zwidth.measures.description import Description
     from zwidth.measures.measure import Measure, Measured
+    from zwidth.result import Result
     from zwidth.study.sensitivities import Sensitivities
 
 
@@ -61,15 +62,13 @@ def loop_check(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -
     return judge(loop, wall_stiffness, wall_damping)
 
 
-def chart(point: OperatingPoint, radius: float, decay: bool) -> AnyChart:
+def chart(point: OperatingPoint, radius: float, decay: bool) -> Chart:
     from zwidth.chart.at_point import chart_at
 
     return chart_at(point, radius, decay=decay)
 
 
-def check(
-    point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayLike
-) -> Verdicts | MeasuredVerdicts:
+def check(point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
     from zwidth.chart.at_point import check_at
 
     return check_at(point, wall_stiffness, wall_damping)
@@ -97,3 +96,15 @@ def environment_named(source: str) -> Environment:
     from zwidth.contact.environments.load import load_environment
 
     return load_environment(source)
+
+
+def plot(result: Result, ax: Axes | None) -> Axes:
+    from zwidth.show.figures.plots import plot
+
+    return plot(result, ax)
+
+
+def notebook(result: Result) -> str:
+    from zwidth.show.figures.plots import notebook
+
+    return notebook(result)

@@ -50,7 +50,7 @@ def test_many_walls_keep_their_order_whatever_is_judged_at_once(tmp_path, monkey
     file = tmp_path / "walls.csv"
     file.write_text(HEAD + "".join(f"{K!r},{B!r}\n" for K, B in walls.tolist()))
     whole = found("check", TWO_MASS, "--points", file)["points"]
-    monkeypatch.setattr("zwidth.show.cli.check.AT_ONCE", 7)
+    monkeypatch.setattr("zwidth.chart.verdict.AT_ONCE", 7)
     assert found("check", TWO_MASS, "--points", file)["points"] == whole
     assert_allclose([[p["stiffness_N_per_m"], p["damping_Ns_per_m"]] for p in whole], walls)
     assert {p["verdict"] for p in whole} == {"stable", "unstable"}

@@ -30,8 +30,8 @@ def moved(*words):
 
 def called(wall, **settings):
     device = package.load(MECHANISM)
-    plane = package.Plane((0.0, 0.252), (0.0, -1.0), **settings)
-    return package.simulate_mechanism(
+    plane = package.contact.Plane((0.0, 0.252), (0.0, -1.0), **settings)
+    return package.contact.simulate_mechanism(
         device.mechanism, device.damping, device.controller, wall, plane, at=device.position(),
         encoders=device.encoders, push=(0.0, 1.0, 0.0), duration=0.1,
     )  # fmt: skip
@@ -77,9 +77,9 @@ def test_parameters_come_by_their_option_and_by_those_of_walls():
 def test_a_wall_of_stiffness_and_damping_is_named_too():
     gains = ("--stiffness", 900, "--damping", 2)
     for words, name, motion in (
-        ((), "one-sided wall", called(package.SurfaceWall(900.0, 2.0))),
-        (("--no-pull",), "one-sided wall", called(package.SurfaceWall(900.0, 2.0, no_pull=True))),
-        (("--two-sided",), "wall", called(package.SurfaceWall(900.0, 2.0), two_sided=True)),
+        ((), "one-sided wall", called(package.contact.SurfaceWall(900.0, 2.0))),
+        (("--no-pull",), "one-sided wall", called(package.contact.SurfaceWall(900.0, 2.0, no_pull=True))),
+        (("--two-sided",), "wall", called(package.contact.SurfaceWall(900.0, 2.0), two_sided=True)),
     ):
         document = moved(*gains, *words)
         assert document["environment"] == name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
@@ -10,16 +10,11 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.arguments import require
 
 if TYPE_CHECKING:
-    from zwidth.chart.chart import StabilityChart
-    from zwidth.chart.measured.chart import MeasuredChart
-    from zwidth.chart.measured.verdict import MeasuredVerdicts
-    from zwidth.chart.several_directions.chart import MultiChart
-    from zwidth.chart.verdict import Verdicts
-
-    AnyChart: TypeAlias = StabilityChart | MultiChart | MeasuredChart
+    from zwidth.chart.result import Chart
+    from zwidth.chart.verdict import WallVerdicts
 
 
-def chart_at(point: OperatingPoint, radius: float = 1.0, *, decay: bool = True) -> AnyChart:
+def chart_at(point: OperatingPoint, radius: float = 1.0, *, decay: bool = True) -> Chart:
     """The stable walls at a single operating point.
 
     A measured response, and a loss factor, are charted by their frequency response; several directions rendered
@@ -52,9 +47,7 @@ def chart_at(point: OperatingPoint, radius: float = 1.0, *, decay: bool = True) 
     return stability_chart(point.loop, radius, decay)
 
 
-def check_at(
-    point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayLike
-) -> Verdicts | MeasuredVerdicts:
+def check_at(point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
     """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, at a single operating point.
 
     Returns Verdicts by eigenvalues; MeasuredVerdicts by the count of roots for what has a frequency response only
@@ -62,8 +55,8 @@ def check_at(
     """
     require("point", point, OperatingPoint)
     if point.charted_by_response:
-        chart: MeasuredChart = chart_at(point)  # type: ignore[assignment]
-        return chart.check(wall_stiffness, wall_damping)
-    from zwidth.chart.verdict import judge
+        return chart_at(point).check(wall_stiffness, wall_damping)
+    from zwidth.chart.verdict import verdicts
 
-    return judge(point.loop, wall_stiffness, wall_damping)
+    loop = point.loop if point.direction_count == 1 else point.loop_of_directions
+    return verdicts(loop, wall_stiffness, wall_damping)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,17 +19,21 @@ BAND = 1e-9
 # Rounding of an eigenvalue in units of its own condition number.
 ROUNDING = 1e-15
 UNSTABLE, UNDECIDED, STABLE = -1, 0, 1
+AT_ONCE = 20_000  # walls judged in one batch of transition matrices
 NAMES = {STABLE: "stable", UNDECIDED: "undecided", UNSTABLE: "unstable"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class WallVerdicts:
     """Verdicts on walls (...).
 
-    verdict    STABLE, UNSTABLE or UNDECIDED
-    frequency  of the vibration that each wall is nearest to, or grows in [Hz]
+    stiffness, damping  of the walls [N/m], [N s/m]
+    verdict             STABLE, UNSTABLE or UNDECIDED
+    frequency           of the vibration that each wall is nearest to, or grows in [Hz]
     """
 
+    stiffness: Floats
+    damping: Floats
     verdict: NDArray[np.int8]
     frequency: Floats
 
@@ -37,8 +42,31 @@ class WallVerdicts:
         """The verdicts in words, flattened."""
         return [NAMES[int(v)] for v in self.verdict.ravel()]
 
+    def table(self) -> dict[str, list[Any]]:
+        """The walls as columns, one a row; the spectral radius is not known without a model."""
+        return {
+            "stiffness_N_per_m": self.stiffness.ravel().tolist(),
+            "damping_Ns_per_m": self.damping.ravel().tolist(),
+            "verdict": self.names,
+            "spectral_radius": [None] * self.verdict.size,
+            "frequency_Hz": self.frequency.ravel().tolist(),
+        }
 
-@dataclass(frozen=True)
+    def document(self) -> dict[str, Any]:
+        """The walls under the key `points`, each with its verdict."""
+        columns = self.table()
+        return {"points": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]}
+
+    def __repr__(self) -> str:
+        names = self.names
+        if len(names) == 1:
+            wall = f"{float(self.stiffness.ravel()[0]):.6g} N/m, {float(self.damping.ravel()[0]):.6g} N s/m"
+            return f"{type(self).__name__}: {wall} is {names[0]}"
+        counted = ", ".join(f"{names.count(name)} {name}" for name in NAMES.values() if name in names)
+        return f"{type(self).__name__}: {len(names)} walls, {counted}"
+
+
+@dataclass(frozen=True, repr=False)
 class Verdicts(WallVerdicts):
     """What eigenvalues say of walls (...); the frequency is that of the largest root, |arg z| / (2 pi T).
 
@@ -48,6 +76,9 @@ class Verdicts(WallVerdicts):
 
     spectral_radius: Floats
     uncertainty: Floats
+
+    def table(self) -> dict[str, list[Any]]:
+        return super().table() | {"spectral_radius": self.spectral_radius.ravel().tolist()}
 
 
 def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.complex128]:
@@ -78,6 +109,18 @@ def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Ver
 def verdicts(loop: Loop | MultiLoop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
     """`judge`, for loops of several directions, too."""
     K, B = walls(wall_stiffness, wall_damping)
+    judged = [
+        _judged(loop, K.ravel()[first : first + AT_ONCE], B.ravel()[first : first + AT_ONCE])
+        for first in range(0, max(K.size, 1), AT_ONCE)
+    ]
+    verdict, frequency, radius, width = (
+        np.concatenate(parts).reshape(K.shape) for parts in zip(*judged, strict=True)
+    )
+    return Verdicts(K, B, verdict, frequency, radius, width)
+
+
+def _judged(loop: Loop | MultiLoop, K: Floats, B: Floats) -> tuple[NDArray[np.int8], Floats, Floats, Floats]:
+    """Verdict, frequency, spectral radius and half-width of the undecided band of walls (k,)."""
     finite = np.isfinite(K) & np.isfinite(B)
     with np.errstate(over="ignore", invalid="ignore"):
         L = loop.transition_matrix(np.where(finite, K, 0.0), np.where(finite, B, 0.0))
@@ -94,7 +137,7 @@ def verdicts(loop: Loop | MultiLoop, wall_stiffness: ArrayLike, wall_damping: Ar
         at = tuple(index)
         width[at] = max(BAND, _rounding(L[at]))
     verdict = np.where(radius < 1.0 - width, STABLE, np.where(radius > 1.0 + width, UNSTABLE, UNDECIDED))
-    return Verdicts(verdict.astype(np.int8), frequency, radius, width)
+    return verdict.astype(np.int8), frequency, radius, width
 
 
 def _rounding(L: Floats) -> float:

@@ -21,9 +21,8 @@ from zwidth.model.plant import Plant
 from zwidth.model.response import Response
 
 if TYPE_CHECKING:
-    from zwidth.chart.at_point import AnyChart
-    from zwidth.chart.measured.verdict import MeasuredVerdicts
-    from zwidth.chart.verdict import Verdicts
+    from zwidth.chart.result import Chart
+    from zwidth.chart.verdict import WallVerdicts
     from zwidth.loop.operating_point import OperatingPoint, Position
     from zwidth.measures.description import Description
     from zwidth.measures.measure import Measure, Measured
@@ -181,11 +180,11 @@ class Device:
         """
         return _verbs.device_held_by(self, operator)
 
-    def chart(self, radius: float = 1.0, *, decay: bool = True) -> AnyChart:
+    def chart(self, radius: float = 1.0, *, decay: bool = True) -> Chart:
         """The stable walls at the device's reference; `device.at(...).chart()` elsewhere. See `chart_at`."""
         return self.at().chart(radius, decay=decay)
 
-    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts | MeasuredVerdicts:
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
         """Verdicts on walls at the device's reference; see `OperatingPoint.check`."""
         return self.at().check(wall_stiffness, wall_damping)
 

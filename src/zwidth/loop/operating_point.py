@@ -27,9 +27,8 @@ from zwidth.model.reduction import Encoders, Model, plant_effective_parameters, 
 from zwidth.model.response import Response
 
 if TYPE_CHECKING:
-    from zwidth.chart.at_point import AnyChart
-    from zwidth.chart.measured.verdict import MeasuredVerdicts
-    from zwidth.chart.verdict import Verdicts
+    from zwidth.chart.result import Chart
+    from zwidth.chart.verdict import WallVerdicts
     from zwidth.measures.description import Description
     from zwidth.measures.measure import Measure, Measured
 
@@ -302,7 +301,7 @@ class OperatingPoint:
 
     # --- what is asked there --------------------------------------------------------------------------
 
-    def chart(self, radius: float = 1.0, *, decay: bool = True) -> AnyChart:
+    def chart(self, radius: float = 1.0, *, decay: bool = True) -> Chart:
         """The stable walls at a single point, exactly; see `chart.at_point.chart_at`.
 
         radius  less than 1 for the walls whose slowest motion shrinks at least by that factor per sample
@@ -310,7 +309,7 @@ class OperatingPoint:
         """
         return _verbs.chart(self, radius, decay)
 
-    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts | MeasuredVerdicts:
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
         """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast; see `chart.at_point`."""
         return _verbs.check(self, wall_stiffness, wall_damping)
 

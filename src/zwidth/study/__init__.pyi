@@ -2,10 +2,10 @@ from .common_area import common_area as common_area
 from .plane import plane_of as plane_of
 from .requirement import parse_requirement as parse_requirement
 from .robust import RobustError as RobustError
-from .robust_study import RobustStudy as RobustStudy
 from .robust import robust_study as robust_study
 from .robust_family import Family as Family
 from .robust_family import Range as Range
+from .robust_study import RobustStudy as RobustStudy
 from .sensitivities import Sensitivities as Sensitivities
 from .sensitivity import sensitivities as sensitivities
 from .store import Store as Store

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +16,7 @@ from zwidth.model.arguments import walls as broadcast_walls
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MeasuredVerdicts(WallVerdicts):
     """What the count of roots says of walls (...).
 
@@ -26,6 +27,9 @@ class MeasuredVerdicts(WallVerdicts):
     """
 
     outside: NDArray[np.int64]
+
+    def table(self) -> dict[str, list[Any]]:
+        return super().table() | {"roots_outside": self.outside.ravel().tolist()}
 
 
 @dataclass(frozen=True)
@@ -80,4 +84,4 @@ def judge_measured(
             frequency[part] = nearest.frequency(safe[part])
     frequency[~finite] = np.nan
     verdict = np.where(doubtful, UNDECIDED, np.where(outside == 0, STABLE, UNSTABLE)).astype(np.int8)
-    return MeasuredVerdicts(verdict.reshape(K.shape), frequency.reshape(K.shape), outside.reshape(K.shape))
+    return MeasuredVerdicts(K, B, verdict.reshape(K.shape), frequency.reshape(K.shape), outside.reshape(K.shape))

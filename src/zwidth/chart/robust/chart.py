@@ -72,6 +72,8 @@ class RobustChart(Chart):
             return np.asarray(np.take_along_axis(np.array(values), worst[None], axis=0)[0])
 
         return Verdicts(
+            stiffness=each[0].stiffness,
+            damping=each[0].damping,
             verdict=np.min([one.verdict for one in each], axis=0),
             frequency=of_worst([one.frequency for one in each]),
             spectral_radius=of_worst([one.spectral_radius for one in each]),

@@ -10,8 +10,8 @@ import click
 
 from zwidth import __version__
 from zwidth.show.cli.bounds import Bounds
-from zwidth.show.cli.chart import chart
-from zwidth.show.cli.check import check
+from zwidth.show.cli.chart import ChartCommand
+from zwidth.show.cli.check import Check
 from zwidth.show.cli.command import Command
 from zwidth.show.cli.devices import devices
 from zwidth.show.cli.experiment import experiment
@@ -54,8 +54,8 @@ COMMANDS = (
     devices,
     schema,
     Show(),
-    chart,
-    check,
+    ChartCommand(),
+    Check(),
     Polar(),
     map_command,
     sweep,

@@ -1,26 +1,19 @@
-"""What `zwidth chart` and `zwidth check` say of a device that is known by its measured response."""
+"""What `zwidth chart` says of a chart by a frequency response, beside what it says of every chart."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.show.cli.answer import Answer, deliver, sheet
+from zwidth.show.cli.answer import Answer, deliver
 from zwidth.show.cli.command import NO_MODEL
-from zwidth.show.cli.failures import computing
-from zwidth.show.cli.heading import heading
-from zwidth.show.output import DATA, replacing, write_data
 from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
-    from zwidth.chart.chart import StabilityChart
     from zwidth.chart.measured.chart import MeasuredChart
     from zwidth.chart.measured.usable_frequencies import Stretch
     from zwidth.device.device import Device
-    from zwidth.show.cli.chart import Window
     from zwidth.show.cli.options import Question
-    from zwidth.show.cli.points import Walls
 
 SHOWN: Final = 6  # stretches named on a terminal
 MOST_UNMEASURED: Final = 0.1  # of the frequencies up to half the sampling rate, before the heading says so
@@ -28,65 +21,6 @@ OPEN: Final = (
     "the measured edge does not close round the stable walls: frequencies are missing; measure up to half the "
     "sampling rate"
 )
-
-
-def answer_chart(
-    question: Question, device: Device, path: Path | None, window: Window | None, as_json: bool
-) -> int:
-    """`zwidth chart` for a device with a [response]."""
-    from zwidth.show.cli.chart import NO_WALL, rows
-
-    found = _charted(question, device)
-    common = cast("StabilityChart", found)  # the fields asked for are the same in both
-    document = question.facts(device) | found.document() | {"decided": True, "warning": warning(found)}
-    if path is not None:
-        document["file"] = str(path)
-    written = [] if path is None else [f"written: {path}"]
-    reason = None if found.stiffness_max == found.stiffness_max else OPEN if found.open else NO_WALL
-    if path is not None:
-        _write(path, found, document | ({} if reason is None else {"reason": reason}), window)
-
-    def pages() -> list[Any]:
-        warnings = [f"warning: {text}" for text in [warning(found)] if text]
-        return [heading(question, device), *warnings, sheet([*rows(common), *more_rows(found)]), *written]
-
-    return deliver(Answer(document, pages, reason), as_json)
-
-
-def without_model(question: Question, device: Device, unanswered: Mapping[str, Any], as_json: bool) -> int:
-    """The answer of a command that needs a model, for a device with a [response]: none, and why.
-
-    unanswered  what the command's document holds besides the facts where it has no answer
-    Raises      DeviceError  for a posture, direction, assembly or model, which such a device does not have
-    """
-    question.as_measured(device)
-    return deliver(Answer(question.facts(device) | dict(unanswered), reason=NO_MODEL), as_json)
-
-
-def _charted(question: Question, device: Device) -> MeasuredChart:
-    if device.response is None:
-        from zwidth.chart.hysteretic import hysteretic_chart
-
-        with computing(question):
-            return hysteretic_chart(question.point(device).loop)
-    from zwidth.chart.measured.chart import measured_chart
-
-    question.as_measured(device)
-    with computing(question):
-        return measured_chart(device.response, device.controller)
-
-
-def _write(path: Path, chart: MeasuredChart, document: dict[str, Any], window: Window | None) -> None:
-    if path.suffix.lower() in DATA:
-        write_data(path, document, chart.table())
-        return
-    from zwidth.show.figures.measured import draw_measured_chart
-    from zwidth.show.figures.style import figure, save
-
-    drawing, ax = figure()
-    draw_measured_chart(ax, chart, window=window)
-    with replacing(path) as draft:
-        save(drawing, draft)
 
 
 def warning(chart: MeasuredChart) -> str | None:
@@ -101,7 +35,7 @@ def warning(chart: MeasuredChart) -> str | None:
     )
 
 
-def more_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
+def measured_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
     """Rows for people, below those of every chart."""
     if chart.band is not None:
         low, high = amount(chart.band.stiffness_low, "N/m"), amount(chart.band.stiffness_high, "N/m")
@@ -124,19 +58,7 @@ def told(stretch: Stretch) -> str:
     return f"{amount(stretch.low, 'Hz')} to {amount(stretch.high, 'Hz')}: {stretch.reason}{where}"
 
 
-def judged(question: Question, device: Device, walls: Walls) -> list[dict[str, Any]]:
-    """One entry per wall, as `zwidth check` gives it; the spectral radius is not known without a model."""
-    found = _charted(question, device).check([K for K, _ in walls], [B for _, B in walls])
-    return [
-        {
-            "stiffness_N_per_m": K,
-            "damping_Ns_per_m": B,
-            "verdict": verdict,
-            "spectral_radius": None,
-            "frequency_Hz": frequency,
-            "roots_outside": outside,
-        }
-        for (K, B), verdict, frequency, outside in zip(
-            walls, found.names, found.frequency.tolist(), found.outside.tolist(), strict=True
-        )
-    ]
+def without_model(question: Question, device: Device, unanswered: Mapping[str, Any], as_json: bool) -> int:
+    """The answer of a command that needs a model, for a device with a [response]: none, and why."""
+    question.as_measured(device)
+    return deliver(Answer(question.facts(device) | dict(unanswered), reason=NO_MODEL), as_json)

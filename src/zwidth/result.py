@@ -1,0 +1,39 @@
+"""What every result can do: tell its keys and its columns, show itself in a few lines, and draw itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from zwidth import _verbs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+class Result:
+    """A result: numbers with the way to a document, a table, a figure and a notebook.
+
+    `document()` holds every number under its key, the unit in the name, as `--json` prints it; `table()` holds
+    columns of equal length, as a .csv file has them. `repr` is a few lines; arrays are not spelled out. Nothing of
+    files or figures is loaded until `plot`, or a notebook, asks for it.
+    """
+
+    def document(self) -> dict[str, Any]:
+        """Every number by its key."""
+        raise NotImplementedError
+
+    def table(self) -> Mapping[str, Any]:
+        """Columns of equal length by their names."""
+        raise NotImplementedError
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the result; returns the axes, in which more can be drawn.
+
+        ax  axes to draw into; left out: those of a new figure of pyplot's
+        """
+        return _verbs.plot(self, ax)
+
+    def _repr_html_(self) -> str:
+        """The result as notebooks show it: its few lines, and its figure."""
+        return _verbs.notebook(self)

@@ -1,0 +1,155 @@
+"""How each result draws itself: what `result.plot()` and a notebook call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html import escape
+from typing import Any, Final
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+
+from zwidth.show.figures.style import BLACK, GREY, VERMILION, context, figure, inline_svg, label
+
+Window = tuple[float, float, float, float]
+Draw = Callable[[Axes, Any], None]
+
+
+def plot(result: Any, ax: Axes | None = None) -> Axes:
+    """Draw a result into axes, or into those of a new figure of pyplot's; returns the axes.
+
+    Raises  TypeError  for what has no drawing
+    """
+    draw = drawing_of(result)
+    if ax is not None:
+        draw(ax, result)
+        return ax
+    from matplotlib import pyplot
+
+    with context():
+        _, ax = pyplot.subplots(figsize=(5.6, 3.9), layout="constrained")
+        draw(ax, result)
+    return ax
+
+
+def notebook(result: Any) -> str:
+    """A result as HTML: its few lines, and its figure beneath."""
+    made, ax = figure()
+    with context():
+        drawing_of(result)(ax, result)
+    picture = inline_svg(made, f"zwidth-{id(result):x}", repr(result).splitlines()[0])
+    return f"<pre>{escape(repr(result))}</pre>\n<div style='max-width: 40em'>{picture}</div>"
+
+
+def drawing_of(result: Any) -> Draw:
+    """What draws results of this kind. Raises TypeError where nothing does."""
+    for kind in type(result).__mro__:
+        if kind.__name__ in DRAWINGS:
+            return DRAWINGS[kind.__name__]
+    raise TypeError(f"a {type(result).__name__} has no drawing")
+
+
+def draw_any_chart(ax: Axes, chart: Any, window: Window | None = None) -> None:
+    """The chart of one direction, of several, or by a frequency response."""
+    if type(chart).__name__ == "MeasuredChart":
+        from zwidth.show.figures.measured import draw_measured_chart
+
+        draw_measured_chart(ax, chart, window=window)
+        return
+    from zwidth.show.figures.stability import draw_chart
+
+    draw_chart(ax, chart, window=window)
+
+
+def _robust(ax: Axes, chart: Any) -> None:
+    from zwidth.show.figures.robust import draw_robust
+
+    draw_robust(ax, chart)
+
+
+def _robust_study(ax: Axes, study: Any) -> None:
+    from zwidth.show.figures.robust import draw_robust
+
+    draw_robust(ax, study.chart, study.members)
+
+
+def _polar(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.polar import draw_polar
+
+    draw_polar(ax, found, found.angles, (found.plane[:1] or "x", found.plane[1:] or "y"))
+
+
+def _bounds(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.bounds import draw_bounds
+
+    draw_bounds(ax, found.bounds, found.chart)
+
+
+def _guarantees(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.guarantees import draw_guarantees
+
+    draw_guarantees(ax, found)
+
+
+def _sensitivities(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.sensitivity import draw_sensitivities
+
+    draw_sensitivities(ax, found)
+
+
+def _verdicts(ax: Axes, found: Any) -> None:
+    """The walls as marks: filled where stable, open where not, grey where undecided."""
+    K, B, names = found.stiffness.ravel(), found.damping.ravel(), np.array(found.names)
+    for name, style in (
+        ("stable", {"marker": "o", "color": BLACK}),
+        ("unstable", {"marker": "x", "color": VERMILION}),
+        ("undecided", {"marker": "s", "color": GREY, "facecolors": "none"}),
+    ):
+        here = names == name
+        if here.any():
+            ax.scatter(K[here], B[here], s=16.0, label=name, **style)  # type: ignore[arg-type]
+    label(ax.xaxis, "Virtual stiffness", "N/m")
+    label(ax.yaxis, "Virtual damping", "Ns/m")
+    ax.legend(frameon=False, fontsize=8.0)
+
+
+def _measured(ax: Axes, found: Any) -> None:
+    """A measure's values: a bar for one, marks in order for a row, colours for a plane of points."""
+    values = np.asarray(found.values, dtype=float)
+    if values.ndim == 2:
+        image = ax.imshow(values, origin="lower", aspect="auto", cmap=colormaps["viridis"])
+        assert ax.figure is not None
+        ax.figure.colorbar(image, ax=ax)
+        return
+    row = np.atleast_1d(values).ravel()
+    ax.plot(np.arange(len(row)), row, linestyle="none", marker="o", color=BLACK, markersize=4.0)
+    ax.set_xlabel("operating point")
+    ax.set_ylabel("value")
+
+
+def _description(ax: Axes, found: Any) -> None:
+    """Natural frequencies as lines along a frequency axis, with their damping ratios."""
+    frequencies = np.asarray(found.natural_frequencies, dtype=float)
+    ratios = found.damping_ratios or [None] * len(frequencies)
+    for frequency, ratio in zip(frequencies, ratios, strict=True):
+        ax.axvline(frequency, color=BLACK, linewidth=1.2)
+        told = "rigid motion" if frequency == 0.0 else "" if ratio is None else f"damping ratio {ratio:.3g}"
+        ax.annotate(told, (frequency, 0.5), rotation=90.0, va="center", ha="right", fontsize=8.0)
+    ax.set_ylim(0.0, 1.0)
+    ax.set_yticks([])
+    label(ax.xaxis, "Natural frequency", "Hz")
+
+
+DRAWINGS: Final[dict[str, Draw]] = {
+    "Chart": draw_any_chart,
+    "RobustChart": _robust,
+    "RobustStudy": _robust_study,
+    "ByDirection": _polar,
+    "BoundsComparison": _bounds,
+    "Guarantees": _guarantees,
+    "Sensitivities": _sensitivities,
+    "WallVerdicts": _verdicts,
+    "Measured": _measured,
+    "Description": _description,
+}
