@@ -15,38 +15,39 @@ from benchmarks._own import Case, Cases, run
 from benchmarks._timing import machine, print_table, seconds
 from zwidth.contact.bench import Bench, observe
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
-from zwidth.study.experiment import Plan, measure
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.study.experiment import measure_boundary
+from zwidth.study.experiment_plan import Plan
 
 TARGET = 10.0  # s
 
 
 def own() -> Cases:
     """Some of the points; the search for the stable walls, which takes longest, is the same."""
-    loop, plan = ungripped_loop(), Plan(stiffnesses=4, tips=2)
+    point, plan = published(), Plan(stiffnesses=4, tips=2)
     return {
         "10 boundary points, two-sided": Case(
-            lambda: len(measure(loop, plan=plan).points), warm=lambda: warm_up(loop)
+            lambda: len(measure_boundary(point, plan).points), warm=lambda: warm_up(point)
         )
     }
 
 
-def ungripped_loop() -> Loop:
-    """The published plant without an operator."""
-    return load("published-two-mass").at().without_operator.loop
+def published() -> OperatingPoint:
+    """The published plant, which nobody holds."""
+    return load("published-two-mass").at()
 
 
-def warm_up(loop: Loop) -> None:
+def warm_up(point: OperatingPoint) -> None:
     """Compile or load what an experiment runs."""
-    observe(Bench(loop), [[1000.0, 5.0]])
+    observe(Bench(point.loop), [[1000.0, 5.0]])
 
 
 def experiment() -> list[tuple[str, ...]]:
     """Rows: what, time, the largest distance from the exact edge in shares of the widest range."""
-    loop = ungripped_loop()
-    warm_up(loop)
+    point = published()
+    warm_up(point)
     start = perf_counter()
-    found = measure(loop)
+    found = measure_boundary(point)
     taken = perf_counter() - start
     assert len(found.points) == 40
     edges = [point for point in found.points if point.edge != "tip"]

@@ -16,8 +16,9 @@ from tests.cli.cli_run import TWO_MASS, found, refused, zwidth
 from tests.interruption import stopped_by_ctrl_c
 from tests.systems import published
 from zwidth.contact.experiment import Place
-from zwidth.show.experiment import numbers, point_rows, sentences
-from zwidth.study.experiment import Experiment, MeasuredPoint, Plan
+from zwidth.show.experiment import point_rows, sentences, warning
+from zwidth.study.experiment_plan import Plan
+from zwidth.study.measured_boundary import Experiment, MeasuredPoint
 
 FEW = ("--stiffnesses", 2, "--tips", 1)
 FEWEST = ("--stiffnesses", 1, "--tips", 0)
@@ -135,21 +136,21 @@ EDGES = (point(2e3, 1.0, "lower", 1.1), point(2e3, 11.0, "upper", 11.0))
 
 def test_a_tip_far_off_is_named_before_edges_that_are_near_and_doubts_are_told():
     doubtful = measured_run(*EDGES, point(5e3, 5.0, "tip", 4e3, True))
-    far = dict(sentences(doubtful, None))
+    far = dict(sentences(doubtful))
     assert far["difference"].startswith("farthest from the exact linear edge is the tip at 5.000 Ns/m")
     assert "measured 5.000 kN/m, exact 4.000 kN/m, more is stable" in far["difference"]
     assert far["stiffest"].endswith(", unsure")
     assert far["unsure"].startswith("at 1 tip the verdict changes more than once")
     assert "--trials" in far["unsure"]
-    assert [p["unsure"] for p in numbers(doubtful, [])["points"]] == [False, False, True]
-    near = dict(sentences(measured_run(*EDGES, point(4.001e3, 5.0, "tip", 4e3)), None))
+    assert [p["unsure"] for p in doubtful.document()["points"]] == [False, False, True]
+    near = dict(sentences(measured_run(*EDGES, point(4.001e3, 5.0, "tip", 4e3))))
     assert near["difference"].startswith("farthest from the exact linear edge is the lower one")
     assert "unsure" not in near
 
 
 def test_edges_that_are_unsure_are_marked_as_tips_are():
     doubtful = measured_run(EDGES[0], point(2e3, 11.0, "upper", 11.0, True), point(4e3, 5.0, "tip", 4e3))
-    assert dict(sentences(doubtful, None))["unsure"].startswith("at 1 edge the verdict changes more than once")
+    assert dict(sentences(doubtful))["unsure"].startswith("at 1 edge the verdict changes more than once")
     assert [row[-1] for row in point_rows(doubtful)[1]] == ["", "unsure", ""]
 
 
@@ -167,14 +168,14 @@ def test_edges_that_are_unsure_are_marked_as_tips_are():
 )
 def test_an_edge_beyond_a_tip_is_warned_of(tips, says):
     """At 2 kN/m walls from 1 to 11 N s/m were stable: no tip between them is softer, nor is the stiffest tip."""
-    text = numbers(measured_run(*EDGES, *(point(K, B, "tip", K) for K, B in tips)), [])["warning"]
+    text = warning(measured_run(*EDGES, *(point(K, B, "tip", K) for K, B in tips)))
     assert text.startswith("an edge lies beyond a tip")
     assert says in text
 
 
 @pytest.mark.parametrize("tips", [[(4000.0, 5.0)], [(1500.0, 12.0), (4000.0, 5.0)], []])
 def test_tips_beyond_all_edges_or_beside_them_contradict_nothing(tips):
-    assert numbers(measured_run(*EDGES, *(point(K, B, "tip", K) for K, B in tips)), [])["warning"] is None
+    assert warning(measured_run(*EDGES, *(point(K, B, "tip", K) for K, B in tips))) is None
 
 
 def test_a_run_that_takes_its_time_says_what_it_does(folder, monkeypatch):

@@ -15,11 +15,13 @@ from zwidth.chart.chart import stability_chart
 from zwidth.contact.experiment import Place
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.points import read_measured
-from zwidth.show.experiment import numbers, sentences
+from zwidth.show.experiment import sentences
 from zwidth.show.figures.experiment import Barred, draw_experiment
 from zwidth.show.figures.style import figure
 from zwidth.show.units import amount
-from zwidth.study.experiment import Experiment, Plan
+from zwidth.study.experiment_plan import Plan
+from zwidth.study.measured_boundary import Experiment
+from zwidth.study.own_points import compare_points
 
 HEAD = "stiffness_N_per_m,damping_Ns_per_m,edge,verdict\n"
 EDGES = "4000,2.6,lower,\n4000,20.7,upper,\n"  # 0.18 and 0.95 N s/m off
@@ -44,9 +46,11 @@ def in_words(damping):
 def told(tmp_path, text, drawn=True):
     """The JSON and the sentence on a file of points."""
     (tmp_path / "own.csv").write_text(text)
-    run = Experiment(Plan(), Place(7e3, 10.0, 25.0, True), (), 0, (None,), chart() if drawn else None, (), 0)
-    document = numbers(run, read_measured(str(tmp_path / "own.csv")))
-    rows = list(sentences(run, document["measured"]))
+    exact = chart() if drawn else None
+    own = compare_points(exact, read_measured(str(tmp_path / "own.csv")))
+    run = Experiment(Plan(), Place(7e3, 10.0, 25.0, True), (), 0, (None,), exact, (), 0, own)
+    document = run.document()
+    rows = list(sentences(run))
     first = [label for label, _ in rows].index("your points")
     return document, "; ".join(text for _, text in rows[first:])
 

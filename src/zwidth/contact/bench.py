@@ -46,7 +46,18 @@ AT_ONCE: Final = 1_500_000  # samples kept at a time
 
 
 class BenchError(ValueError):
-    """An experiment that cannot be meant; the text says why and what to do."""
+    """An experiment that cannot be meant.
+
+    reason    why not, and what to do
+    argument  the number or choice that it is about
+    """
+
+    def __init__(self, argument: str, reason: str) -> None:
+        super().__init__(argument, reason)
+        self.argument, self.reason = argument, reason
+
+    def __str__(self) -> str:
+        return f"{self.argument} {self.reason}"
 
 
 @dataclass(frozen=True)
@@ -76,17 +87,19 @@ class Bench:
     def __post_init__(self) -> None:
         for name, value in (("disturbance", self.disturbance), ("visible", self.visible), ("speed", self.speed)):
             if not isfinite(value) or (name != "speed" and value < 0.0):
-                raise BenchError(f"{name} must be finite{' and not negative' * (name != 'speed')}, got {value!r}")
+                raise BenchError(name, f"must be finite{' and not negative' * (name != 'speed')}, got {value!r}")
         if self.one_sided:
             if not self.hand.push > 0.0:
                 raise BenchError(
-                    f"push must be positive [N] for a one-sided wall, got {self.hand.push!r}; without it the "
-                    "device leaves the wall"
+                    "push",
+                    f"must be positive [N] for a one-sided wall, got {self.hand.push!r}; without it the device "
+                    "leaves the wall",
                 )
         elif not self.disturbance > max(self.visible, 0.0):
             raise BenchError(
-                f"disturbance must be larger than what counts as visible, {self.visible!r} m, got "
-                f"{self.disturbance!r} m; give a larger one"
+                "disturbance",
+                f"must be larger than what counts as visible, {self.visible!r} m, got {self.disturbance!r} m; "
+                "give a larger one",
             )
 
     @property

@@ -146,9 +146,10 @@ def _check(box: Box | None) -> None:
         return
     for name, unit, span in zip(("stiffness", "damping"), ("N/m", "N s/m"), box, strict=True):
         if not all(map(isfinite, span)) or not span[0] < span[1]:
-            raise BenchError(f"{name} must be a range LOW < HIGH [{unit}], got {span[0]:g} to {span[1]:g}")
+            raise BenchError(name, f"must be a range LOW < HIGH [{unit}], got {span[0]:g} to {span[1]:g}")
     if not box.stiffness[1] > 0.0:
-        raise BenchError(f"stiffness must reach above 0 [N/m], got {box.stiffness[0]:g} to {box.stiffness[1]:g}")
+        got = f"got {box.stiffness[0]:g} to {box.stiffness[1]:g}"
+        raise BenchError("stiffness", f"must reach above 0 [N/m], {got}")
 
 
 def _within(box: Box | None) -> tuple[float, float]:

@@ -1,17 +1,16 @@
-"""A measured boundary in numbers, rows and sentences."""
+"""A measured boundary in rows and sentences."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from math import isnan, nan
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator
+from math import isnan
+from typing import TYPE_CHECKING, Final
 
 from zwidth.show import own_points
 from zwidth.show.units import amount
 
 if TYPE_CHECKING:
-    from zwidth.show.cli.points import PointFromBench
-    from zwidth.study.experiment import Cause, Experiment, MeasuredPoint
+    from zwidth.study.measured_boundary import Cause, Experiment, MeasuredPoint
 
 MATTERS: Final = 0.01  # of the range of stable dampings: what moves an edge by less is not named
 AGREES: Final = 1e-3
@@ -24,53 +23,6 @@ BEYOND: Final = {
     "undecided": "a vibration that hardly grows",
     "converged": "a motion that stays visible",
 }
-
-
-def numbers(found: Experiment, own: Sequence[PointFromBench]) -> dict[str, Any]:
-    """The experiment under the keys of --json."""
-    tips = [p for p in found.points if p.edge == "tip"]
-    best = max(tips or found.points, key=lambda p: p.stiffness, default=None)
-    chart = found.chart
-    measured = own_points.compared(chart, own)
-    return {
-        "points": [_entry(point) for point in found.points],
-        "lost": found.lost,
-        "warning": warning(found),
-        "stiffness_max_N_per_m": None if best is None else best.stiffness,
-        "damping_at_stiffness_max_Ns_per_m": None if best is None else best.damping,
-        "exact_stiffness_max_N_per_m": None if chart is None else chart.stiffness_max,
-        "visible_m": found.plan.visible,
-        "subjects": [None if subject is None else vars(subject) for subject in found.subjects],
-        "explanation": explanation(found),
-        "measured": measured,
-        "measured_counts": own_points.counts(measured),
-    }
-
-
-def _entry(point: MeasuredPoint) -> dict[str, Any]:
-    tip = point.edge == "tip"
-    return {
-        "stiffness_N_per_m": point.stiffness,
-        "damping_Ns_per_m": point.damping,
-        "edge": point.edge,
-        "stiffness_low_N_per_m": point.low if tip else point.stiffness,
-        "stiffness_high_N_per_m": point.high if tip else point.stiffness,
-        "damping_low_Ns_per_m": point.damping if tip else point.low,
-        "damping_high_Ns_per_m": point.damping if tip else point.high,
-        "trials": point.trials,
-        "exact_stiffness_N_per_m": point.exact if tip else point.stiffness,
-        "exact_damping_Ns_per_m": point.damping if tip else point.exact,
-        "beyond": point.beyond,
-        "amplitude_m": point.amplitude,
-        "frequency_Hz": point.frequency,
-        "unsure": point.unsure,
-    }
-
-
-def point_table(document: dict[str, Any]) -> dict[str, list[Any]]:
-    """The points as columns; they can be read again as measured ones."""
-    points = document["points"]
-    return {key: [point[key] for point in points] for key in (points[0] if points else ())}
 
 
 def point_rows(found: Experiment) -> tuple[list[str], list[list[str]]]:
@@ -113,11 +65,10 @@ def warning(found: Experiment) -> str | None:
     )
 
 
-def sentences(found: Experiment, measured: list[dict[str, Any]] | None) -> Iterator[tuple[str, str]]:
+def sentences(found: Experiment) -> Iterator[tuple[str, str]]:
     """What to say below the points: labels and values."""
-    tips = [p for p in found.points if p.edge == "tip"]
-    if tips:
-        best = max(tips, key=lambda p: p.stiffness)
+    best = found.stiffest
+    if best is not None and best.edge == "tip":
         doubt = ", unsure" if best.unsure else ""
         yield "stiffest", f"{amount(best.stiffness, 'N/m')} at {amount(best.damping, 'Ns/m')}{doubt}"
     if found.plan.visible:
@@ -129,8 +80,8 @@ def sentences(found: Experiment, measured: list[dict[str, Any]] | None) -> Itera
         yield "unsure", _doubt(doubtful, single=len(found.subjects) * found.plan.trials == 1)
     for n, text in enumerate(explanation(found)):
         yield "" if n else "difference", text
-    if measured:
-        for n, text in enumerate(own_points.sentences(measured)):
+    if found.own is not None:
+        for n, text in enumerate(own_points.sentences(found.own)):
             yield "" if n else "your points", text
 
 
@@ -146,27 +97,18 @@ def _doubt(tips: list[bool], *, single: bool) -> str:
 
 def explanation(found: Experiment) -> list[str]:
     """What the measured edges have to do with the exact linear ones, and which part of the device is why."""
-    width = _width(found)
-    told = [_difference(found, width)] if found.chart is not None else []
-    return told + [_cause(cause, width) for cause in found.causes]
+    told = [_difference(found)] if found.chart is not None else []
+    return told + [_cause(cause, found.damping_range) for cause in found.causes]
 
 
-def _width(found: Experiment) -> float:
-    """The widest range of stable dampings that was measured [N s/m]."""
-    upper = {p.stiffness: p.damping for p in found.points if p.edge == "upper"}
-    both = [upper[p.stiffness] - p.damping for p in found.points if p.edge == "lower" and p.stiffness in upper]
-    return max(both, default=nan)
-
-
-def _difference(found: Experiment, width: float) -> str:
+def _difference(found: Experiment) -> str:
     """The largest distance from the exact edge, and what happens beyond: of the range of dampings, or of a tip."""
-    apart = [(abs(p.bisected - p.exact) / (abs(p.exact) if p.edge == "tip" else width), p) for p in found.points]
-    apart = [(share, p) for share, p in apart if not isnan(share)]
-    if not apart:
+    compared = found.compared
+    if not compared:
         return "no measured edge has an exact one beside it"
-    share, worst = max(apart, key=lambda pair: pair[0])
-    if share <= AGREES:
-        return f"measured and exact linear edges agree: {_gaps([p for _, p in apart])} apart"
+    worst = max(compared, key=found.deviation)
+    if found.deviation(worst) <= AGREES:
+        return f"measured and exact linear edges agree: {_gaps(compared)} apart"
     tip = worst.edge == "tip"
     larger = (worst.bisected > worst.exact) == (worst.edge != "lower")
     at = amount(worst.damping, "Ns/m") if tip else amount(worst.stiffness, "N/m")
@@ -190,19 +132,12 @@ def _gaps(points: list[MeasuredPoint]) -> str:
 
 def _cause(cause: Cause, width: float) -> str:
     """What one part does: where the edge goes without it."""
-    pairs = [
-        (point, other)
-        for point, other in zip(cause.points, cause.without, strict=True)
-        if not (isnan(point.damping) or isnan(other))
-    ]
-    both = zip(cause.points, cause.without, strict=True)
-    vanished = [point for point, other in both if isnan(point.damping) != isnan(other)]
-    if not pairs or isnan(width):
+    if not cause.compared or isnan(width):
         return f"without {cause.name} no edge could be compared"
-    point, other = max(pairs, key=lambda pair: abs(pair[0].damping - pair[1]))
+    point, other = max(cause.compared, key=lambda pair: abs(pair[0].damping - pair[1]))
     if abs(point.damping - other) <= MATTERS * width:
-        if vanished:
-            return f"without {cause.name} {len(vanished)} of the edges tried appear or vanish"
+        if cause.vanished:
+            return f"without {cause.name} {cause.vanished} of the edges tried appear or vanish"
         return f"without {cause.name} no edge tried moves by more than {100 * MATTERS:g} % of the range"
     holds = (point.damping > other) == (point.edge == "upper")
     return (

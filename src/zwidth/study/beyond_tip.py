@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from zwidth.study.experiment import Experiment, MeasuredPoint
+from zwidth.study.measured_boundary import Experiment, MeasuredPoint
 
 
 class BeyondTip(NamedTuple):

@@ -7,10 +7,11 @@ preset himself, and a single trial as it was asked for. The seed decides everyth
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 from functools import partial
-from math import inf, isfinite, nan
+from math import inf, nan
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -22,7 +23,6 @@ from zwidth.conditions.dry import reading_noise, reading_step
 from zwidth.contact.bench import Bench, BenchError
 from zwidth.contact.experiment import (
     BESIDE,
-    Box,
     Edge,
     EdgePoint,
     Place,
@@ -35,131 +35,54 @@ from zwidth.contact.hand import Hand, Reflex
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.arguments import require
 from zwidth.model.operator import Operator, attach
 from zwidth.study.exact_edge import exact_edge
+from zwidth.study.experiment_plan import Plan
 from zwidth.study.journal import Journal, fingerprint
+from zwidth.study.measured_boundary import Cause, Experiment, MeasuredPoint
+from zwidth.study.own_points import OwnPoint, compare_points
 
 Floats = NDArray[np.float64]
 # stage, done, of how many
 Progress = Callable[[str, int, int], None]
 
-FARTHEST, FASTEST = 1.0, 100.0  # m, m/s; no device moves by more, or faster
 EXPLAINED: Final = 3  # stiffnesses at which causes are looked for
 STEPS: Final = 3.0  # encoder steps that are just visible
 NOISES: Final = 10.0  # standard deviations of the noise that are
 STIFFENED: Final = 2.0  # a reflex adds so many times what arm and grasp have
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What is to be measured.
-
-    one_sided    touch a one-sided wall with `push` [N] and `speed` [m/s]; else displace by `disturbance` [m]
-    stiffnesses  at which the damping is bisected, twice;   tips  dampings at which the stiffness is
-    visible      see `Bench` [m]; None: three encoder steps and ten standard deviations of the noise
-    reflex       the hand stiffens threefold, 50 ms after half of the push is felt
-    subjects, trials, spread, seed   see above
-    box          where to look; None: everywhere
-    Raises       BenchError  for numbers that cannot be meant
-    """
-
-    one_sided: bool = False
-    stiffnesses: int = 16
-    tips: int = 8
-    disturbance: float = 1e-3
-    visible: float | None = None
-    push: float = 0.0
-    speed: float = 0.0
-    reflex: bool = False
-    subjects: int = 1
-    trials: int = 1
-    spread: float = 0.2
-    seed: int = 1
-    box: Box | None = None
-
-    def __post_init__(self) -> None:
-        for name, least in (("stiffnesses", 1), ("tips", 0), ("subjects", 1), ("trials", 1), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise BenchError(f"{name} must be {least} or more, got {getattr(self, name)}")
-        for name, most, unit in (("disturbance", FARTHEST, "m"), ("speed", FASTEST, "m/s")):
-            if isfinite(getattr(self, name)) and abs(getattr(self, name)) > most:
-                raise BenchError(f"{name} must be {most:g} {unit} or less, got {getattr(self, name):g}")
-        if not (isfinite(self.spread) and 0.0 <= self.spread <= 2.0):
-            raise BenchError(f"spread must be from 0 to 2, got {self.spread!r}; 0.2 is 20 %")
-
-
-@dataclass(frozen=True)
-class MeasuredPoint:
-    """One point of the boundary over all subjects and trials.
-
-    stiffness, damping   the mean of what was bisected, and what was chosen
-    edge                 which of the two was bisected: see `EdgePoint`
-    low, high            of what was bisected, over the trials that found an edge
-    trials               how many did;   runs (trials,)  what they found
-    exact                the same number on the exact linear edge; nan where it has none
-    beyond, amplitude, frequency   of the first trial: see `EdgePoint`
-    unsure               of any trial: see `EdgePoint`
-    """
-
-    stiffness: float
-    damping: float
-    edge: Edge
-    low: float
-    high: float
-    trials: int
-    runs: tuple[float, ...]
-    exact: float
-    beyond: str | None
-    amplitude: float
-    frequency: float
-    unsure: bool = False
-
-    @property
-    def bisected(self) -> float:
-        """What was bisected: a stiffness at the tip, else a damping."""
-        return self.stiffness if self.edge == "tip" else self.damping
-
-
-@dataclass(frozen=True)
-class Cause:
-    """What one part of the device does to the edges: they are measured again without it.
-
-    name       of the part, as `Nonlinear.left_out` has it
-    points     with it;   without  the same points without it [N s/m]; nan: no edge was found
-    """
-
-    name: str
-    points: tuple[EdgePoint, ...]
-    without: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """What was measured.
-
-    plan      with the visible amplitude that was used
-    place     where the stable walls are
-    points    lower edges, upper edges, tips; those found by no trial are left out
-    lost      how many were sought and found by no trial
-    subjects  who pushed; (None,) for nobody
-    chart     the exact linear chart, held by the preset; None where the velocity estimate has none
-    causes    of the difference; () for a linear device, and where they were not asked for
-    kept      how many parts of the run were found in the journal
-    """
-
-    plan: Plan
-    place: Place
-    points: tuple[MeasuredPoint, ...]
-    lost: int
-    subjects: tuple[Operator | None, ...]
-    chart: StabilityChart | None
-    causes: tuple[Cause, ...]
-    kept: int
-
-
 def question(loop: Loop, operator: Operator | None, plan: Plan) -> str:
     """By which a journal knows the experiment."""
     return fingerprint("experiment 3", loop, operator, plan)
+
+
+def measure_boundary(
+    point: OperatingPoint,
+    plan: Plan | None = None,
+    own_points: Sequence[OwnPoint] = (),
+    *,
+    file: str | Path | None = None,
+    progress: Progress | None = None,
+    causes: bool = True,
+) -> Experiment:
+    """A stability boundary as it is measured on a device at one operating point, by the operator who holds it.
+
+    own_points  that somebody measured, to be compared with the same exact chart
+    file        keeps what is done, so that a run that was stopped goes on from there; None: nothing is kept
+    causes      measure again without each part that is not linear
+    Raises      JournalError  for a file that holds something else;  OSError  where it cannot be read or written
+                what `measure` and `OperatingPoint.plant` raise
+    """
+    require("point", point, OperatingPoint)
+    plan = plan or Plan()
+    loop = point.without_operator.loop
+    operator = None if loop.plant.handle is None else point.operator
+    journal = Journal(None if file is None else Path(file), question(loop, operator, plan))
+    found = measure(loop, operator, plan, journal, progress, causes and bool(loop.nonlinear))
+    return replace(found, own=compare_points(found.chart, own_points)) if own_points else found
 
 
 def measure(
@@ -232,8 +155,9 @@ def _with_visible(loop: Loop, plan: Plan) -> Plan:
 def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, ...]:
     if operator is None:
         if plan.subjects > 1 or plan.reflex:
-            what = "subjects differ" if plan.subjects > 1 else "a reflex is"
-            raise BenchError(f"{what} in the arm that holds the device, and nobody does; give an operator")
+            argument, verb = ("subjects", "differ") if plan.subjects > 1 else ("reflex", "is")
+            nobody = f"{verb} in the arm that holds the device, and nobody does; give an operator"
+            raise BenchError(argument, nobody)
         return (None,)
     if plan.subjects == 1:
         return (operator,)
@@ -264,10 +188,7 @@ def _bench(loop: Loop, operator: Operator | None, plan: Plan, seed: int = 0) -> 
             grasp_stiffness=STIFFENED * (operator.grasp_stiffness or 0.0),
             grasp_damping=STIFFENED * (operator.grasp_damping or 0.0),
         )
-    try:
-        hand = Hand(operator, push=plan.push, reflex=reflex)
-    except ValueError as error:
-        raise BenchError(str(error)) from None
+    hand = Hand(operator, push=plan.push, reflex=reflex)
     return Bench(loop, hand, plan.one_sided, plan.disturbance, plan.speed, plan.visible or 0.0, seed)
 
 

@@ -14,7 +14,7 @@ from zwidth.show.cli.chart import ChartCommand
 from zwidth.show.cli.check import Check
 from zwidth.show.cli.command import Command
 from zwidth.show.cli.devices import devices
-from zwidth.show.cli.experiment import experiment
+from zwidth.show.cli.experiment import ExperimentCommand
 from zwidth.show.cli.felt import felt
 from zwidth.show.cli.guarantees import GuaranteesCommand
 from zwidth.show.cli.limit_cycles import limit_cycles
@@ -66,7 +66,7 @@ COMMANDS = (
     GuaranteesCommand(),
     Robust(),
     simulate,
-    experiment,
+    ExperimentCommand(),
     limit_cycles,
     move,
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from math import nan
@@ -13,6 +12,7 @@ from typing import Any, Final
 from zwidth.device.text_file import LARGEST_TABLE, Unreadable, filled, header_fault, read_text
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import wall_number
+from zwidth.study.own_points import EDGES, VERDICTS, OwnPoint
 
 COLUMNS: Final = ("stiffness_N_per_m", "damping_Ns_per_m")
 SPREADS: Final = (
@@ -21,8 +21,6 @@ SPREADS: Final = (
     "stiffness_low_N_per_m",
     "stiffness_high_N_per_m",
 )
-EDGES: Final = ("lower", "upper", "tip", "")
-VERDICTS: Final = ("stable", "unstable", "")
 MOST_FAULTS: Final = 20
 
 Walls = list[tuple[float, float]]
@@ -38,28 +36,7 @@ def read_walls(file: str) -> Walls:
     return [(row[COLUMNS[0]], row[COLUMNS[1]]) for row in _read(file, {})]
 
 
-@dataclass(frozen=True)
-class PointFromBench:
-    """A point that somebody measured, of the boundary or beside it; nan, "" and 1 for what was left out.
-
-    damping_low, damping_high   [N s/m];   stiffness_low, stiffness_high  [N/m]
-    edge     lower, upper, tip or "": the boundary was found here
-    verdict  stable, unstable or "": the wall was tried, and was found so
-    trials   how many it is the mean of
-    """
-
-    stiffness: float
-    damping: float
-    edge: str
-    damping_low: float
-    damping_high: float
-    stiffness_low: float
-    stiffness_high: float
-    trials: int
-    verdict: str = ""
-
-
-def read_measured(file: str) -> list[PointFromBench]:
+def read_measured(file: str) -> list[OwnPoint]:
     """Measured points: a CSV file as for `read_walls`, with columns that may be left out, and cells left empty.
 
     Raises BadInput  as `read_walls`
@@ -71,7 +48,7 @@ def read_measured(file: str) -> list[PointFromBench]:
         "trials": _trials,
     }
     return [
-        PointFromBench(
+        OwnPoint(
             stiffness=row["stiffness_N_per_m"],
             damping=row["damping_Ns_per_m"],
             edge=row.get("edge", ""),

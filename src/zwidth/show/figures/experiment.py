@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,8 @@ from matplotlib.patches import Polygon
 from zwidth.chart.chart import StabilityChart
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import BLACK, BLUE, GREEN, STABLE, VERMILION, legend_above
+from zwidth.study.measured_boundary import MeasuredPoint
+from zwidth.study.own_points import OwnPoint
 
 LOOKS = {"lower": (VERMILION, "o"), "upper": (BLUE, "s"), "tip": (GREEN, "^")}
 TITLES = {
@@ -41,6 +43,21 @@ class Barred(NamedTuple):
     low: float
     high: float
     unsure: bool = False
+
+
+def measured_bars(points: Iterable[MeasuredPoint]) -> list[Barred]:
+    """Points of a virtual experiment, with the lowest and highest of their trials."""
+    return [Barred(p.stiffness, p.damping, p.edge, p.low, p.high, p.unsure) for p in points]
+
+
+def own_bars(points: Iterable[OwnPoint]) -> list[Barred]:
+    """Points of somebody's own; one that names neither edge nor verdict is drawn as an edge."""
+    return [
+        Barred(p.stiffness, p.damping, p.edge, p.stiffness_low, p.stiffness_high)
+        if p.edge == "tip"
+        else Barred(p.stiffness, p.damping, p.edge or p.verdict or "lower", p.damping_low, p.damping_high)
+        for p in points
+    ]
 
 
 def draw_experiment(

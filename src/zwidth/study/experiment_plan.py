@@ -1,0 +1,66 @@
+"""What a virtual experiment is to measure, with whom, and where to look."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, Final
+
+from zwidth.contact.bench import BenchError
+from zwidth.contact.experiment import Box
+
+FARTHEST, FASTEST = 1.0, 100.0  # m, m/s; no device moves by more, or faster
+PUSH: Final = 2.0  # N, with which a one-sided wall is usually touched
+SPEED: Final = 0.02  # m/s
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be measured.
+
+    one_sided    touch a one-sided wall with `push` [N] and `speed` [m/s]; else displace by `disturbance` [m]
+    stiffnesses  at which the damping is bisected, twice;   tips  dampings at which the stiffness is
+    visible      see `Bench` [m]; None: three encoder steps and ten standard deviations of the noise
+    reflex       the hand stiffens threefold, 50 ms after half of the push is felt
+    subjects, trials  how many operators, and how often each of them tries
+    spread, seed      of operators and trials: see `study.experiment`
+    box          where to look; None: everywhere
+    Raises       BenchError  for numbers that cannot be meant
+    """
+
+    one_sided: bool = False
+    stiffnesses: int = 16
+    tips: int = 8
+    disturbance: float = 1e-3
+    visible: float | None = None
+    push: float = 0.0
+    speed: float = 0.0
+    reflex: bool = False
+    subjects: int = 1
+    trials: int = 1
+    spread: float = 0.2
+    seed: int = 1
+    box: Box | None = None
+
+    def __post_init__(self) -> None:
+        for name, least in (("stiffnesses", 1), ("tips", 0), ("subjects", 1), ("trials", 1), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise BenchError(name, f"must be {least} or more, got {getattr(self, name)}")
+        for name, most, unit in (("disturbance", FARTHEST, "m"), ("speed", FASTEST, "m/s")):
+            if isfinite(getattr(self, name)) and abs(getattr(self, name)) > most:
+                raise BenchError(name, f"must be {most:g} {unit} or less, got {getattr(self, name):g}")
+        if not (isfinite(self.spread) and 0.0 <= self.spread <= 2.0):
+            raise BenchError("spread", f"must be from 0 to 2, got {self.spread!r}; 0.2 is 20 %")
+        if not isfinite(self.push):
+            raise BenchError("push", f"must be finite [N], got {self.push!r}")
+
+    @classmethod
+    def touching(cls, *, push: float = PUSH, speed: float = SPEED, **more: Any) -> Plan:
+        """A plan that touches a one-sided wall, with a usual push [N] and speed [m/s] where none is given.
+
+        more  arguments of `Plan`
+
+        >>> Plan.touching(tips=3).push
+        2.0
+        """
+        return cls(one_sided=True, push=push, speed=speed, **more)

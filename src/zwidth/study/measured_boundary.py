@@ -1,0 +1,168 @@
+"""What a virtual experiment comes to: points of the boundary, how far they are from the exact one, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import isnan, nan
+from typing import Any
+
+from zwidth.chart.chart import StabilityChart
+from zwidth.contact.experiment import Edge, EdgePoint, Place
+from zwidth.model.operator import Operator
+from zwidth.study.experiment_plan import Plan
+from zwidth.study.own_points import PointsComparison
+
+
+@dataclass(frozen=True)
+class MeasuredPoint:
+    """One point of the boundary over all subjects and trials.
+
+    stiffness, damping   the mean of what was bisected, and what was chosen
+    edge                 which of the two was bisected: see `EdgePoint`
+    low, high            of what was bisected, over the trials that found an edge
+    trials               how many did;   runs (trials,)  what they found
+    exact                the same number on the exact linear edge; nan where it has none
+    beyond, amplitude, frequency   of the first trial: see `EdgePoint`
+    unsure               of any trial: see `EdgePoint`
+    """
+
+    stiffness: float
+    damping: float
+    edge: Edge
+    low: float
+    high: float
+    trials: int
+    runs: tuple[float, ...]
+    exact: float
+    beyond: str | None
+    amplitude: float
+    frequency: float
+    unsure: bool = False
+
+    @property
+    def bisected(self) -> float:
+        """What was bisected: a stiffness at the tip, else a damping."""
+        return self.stiffness if self.edge == "tip" else self.damping
+
+    def document(self) -> dict[str, Any]:
+        """The point by key and unit; what was not bisected has no spread and is exact."""
+        tip = self.edge == "tip"
+        return {
+            "stiffness_N_per_m": self.stiffness,
+            "damping_Ns_per_m": self.damping,
+            "edge": self.edge,
+            "stiffness_low_N_per_m": self.low if tip else self.stiffness,
+            "stiffness_high_N_per_m": self.high if tip else self.stiffness,
+            "damping_low_Ns_per_m": self.damping if tip else self.low,
+            "damping_high_Ns_per_m": self.damping if tip else self.high,
+            "trials": self.trials,
+            "exact_stiffness_N_per_m": self.exact if tip else self.stiffness,
+            "exact_damping_Ns_per_m": self.damping if tip else self.exact,
+            "beyond": self.beyond,
+            "amplitude_m": self.amplitude,
+            "frequency_Hz": self.frequency,
+            "unsure": self.unsure,
+        }
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What one part of the device does to the edges: they are measured again without it.
+
+    name       of the part, as `Nonlinear.left_out` has it
+    points     with it;   without  the same points without it [N s/m]; nan: no edge was found
+    """
+
+    name: str
+    points: tuple[EdgePoint, ...]
+    without: tuple[float, ...]
+
+    @property
+    def compared(self) -> list[tuple[EdgePoint, float]]:
+        """Points at which there is an edge both with the part and without it, and its damping then [N s/m]."""
+        both = zip(self.points, self.without, strict=True)
+        return [(point, other) for point, other in both if not (isnan(point.damping) or isnan(other))]
+
+    @property
+    def vanished(self) -> int:
+        """At how many points there is an edge with the part or without it, but not both."""
+        both = zip(self.points, self.without, strict=True)
+        return sum(isnan(point.damping) != isnan(other) for point, other in both)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What was measured.
+
+    plan      with the visible amplitude that was used
+    place     where the stable walls are
+    points    lower edges, upper edges, tips; those found by no trial are left out
+    lost      how many were sought and found by no trial
+    subjects  who pushed; (None,) for nobody
+    chart     the exact linear chart, held by the preset; None where the velocity estimate has none
+    causes    of the difference; () for a linear device, and where they were not asked for
+    kept      how many parts of the run were found in the journal
+    own       somebody's own points beside the same chart; None where there are none
+    """
+
+    plan: Plan
+    place: Place
+    points: tuple[MeasuredPoint, ...]
+    lost: int
+    subjects: tuple[Operator | None, ...]
+    chart: StabilityChart | None
+    causes: tuple[Cause, ...]
+    kept: int
+    own: PointsComparison | None = None
+
+    @property
+    def stiffest(self) -> MeasuredPoint | None:
+        """The stiffest tip, or else the stiffest edge; None where nothing was found."""
+        tips = [point for point in self.points if point.edge == "tip"]
+        return max(tips or self.points, key=lambda point: point.stiffness, default=None)
+
+    @cached_property
+    def damping_range(self) -> float:
+        """The widest range of stable dampings that was measured [N s/m]; nan if no stiffness has both edges."""
+        upper = {p.stiffness: p.damping for p in self.points if p.edge == "upper"}
+        both = [upper[p.stiffness] - p.damping for p in self.points if p.edge == "lower" and p.stiffness in upper]
+        return max(both, default=nan)
+
+    def deviation(self, point: MeasuredPoint) -> float:
+        """Distance from the exact edge as a share of `damping_range`, of a tip's stiffness; nan if unknown."""
+        whole = abs(point.exact) if point.edge == "tip" else self.damping_range
+        return abs(point.bisected - point.exact) / whole if whole > 0.0 else nan
+
+    @property
+    def compared(self) -> list[MeasuredPoint]:
+        """Points whose deviation from the exact edge is known."""
+        return [point for point in self.points if not isnan(self.deviation(point))]
+
+    def document(self) -> dict[str, Any]:
+        """The points and what they come to by key and unit; None where there is no such point, or no chart."""
+        best, chart = self.stiffest, self.chart
+        own = {"measured": None, "measured_counts": None} if self.own is None else self.own.document()
+        return {
+            "points": [point.document() for point in self.points],
+            "lost": self.lost,
+            "stiffness_max_N_per_m": None if best is None else best.stiffness,
+            "damping_at_stiffness_max_Ns_per_m": None if best is None else best.damping,
+            "exact_stiffness_max_N_per_m": None if chart is None else chart.stiffness_max,
+            "visible_m": self.plan.visible,
+            "subjects": [None if subject is None else vars(subject) for subject in self.subjects],
+        } | own
+
+    def table(self) -> dict[str, list[Any]]:
+        """The points as columns, which can be read again as somebody's own."""
+        rows = [point.document() for point in self.points]
+        return {key: [row[key] for row in rows] for key in (rows[0] if rows else ())}
+
+    def __repr__(self) -> str:
+        tips, best = sum(point.edge == "tip" for point in self.points), self.stiffest
+        lines = [f"{len(self.points) - tips} edges and {tips} tips measured, {self.lost} not found"]
+        if best is not None:
+            exact = "" if self.chart is None else f"; exact and linear {self.chart.stiffness_max:.6g} N/m"
+            lines.append(f"stiffest {best.stiffness:.6g} N/m at {best.damping:.4g} N s/m{exact}")
+        lines.append(f"{len(self.subjects)} subjects with {self.plan.trials} trials each")
+        return "<Experiment: " + "\n ".join(lines) + ">"
