@@ -1,6 +1,18 @@
 """Virtual environments: small compiled functions that say what force a device is to feel; ours by name."""
 
-from zwidth.contact.environments.catalogue import ENVIRONMENTS
+from zwidth.contact.environments.catalogue import (
+    ENVIRONMENTS,
+    coupled_wall,
+    friction_patch,
+    grating,
+    hunt_crossley,
+    nonlinear_wall,
+    one_sided_wall,
+    slot,
+    texture,
+    virtual_mass,
+    wall,
+)
 from zwidth.contact.environments.environment import (
     MEMORY,
     SIGNATURE,
@@ -17,7 +29,17 @@ __all__ = [
     "SIGNATURE",
     "Environment",
     "Parameter",
+    "coupled_wall",
     "environment",
     "environment_at",
+    "friction_patch",
+    "grating",
+    "hunt_crossley",
     "load_environment",
+    "nonlinear_wall",
+    "one_sided_wall",
+    "slot",
+    "texture",
+    "virtual_mass",
+    "wall",
 ]

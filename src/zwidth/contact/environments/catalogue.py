@@ -31,3 +31,17 @@ ENVIRONMENTS: Final[dict[str, Environment]] = {
         virtual_mass,
     )
 }
+
+__all__ = [
+    "ENVIRONMENTS",
+    "coupled_wall",
+    "friction_patch",
+    "grating",
+    "hunt_crossley",
+    "nonlinear_wall",
+    "one_sided_wall",
+    "slot",
+    "texture",
+    "virtual_mass",
+    "wall",
+]
