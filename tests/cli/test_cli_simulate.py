@@ -13,7 +13,7 @@ import zwidth as package
 from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, strict, zwidth
 from zwidth.contact.limit_cycles import limit_cycles
 from zwidth.contact.response import SOURCES
-from zwidth.show.cli.simulate import KEYS
+from zwidth.show.cli.simulate import Simulate
 
 WALL = ("--stiffness", 4000, "--damping", 10)
 SOFT = ("--stiffness", 500, "--damping", 1)
@@ -45,7 +45,7 @@ def simulated(*words):
 
 def test_the_promised_keys_with_their_units():
     document = simulated(TWO_MASS, *WALL)
-    assert set(KEYS) <= set(document)
+    assert set(Simulate.keys) <= set(document)
     assert "left_out" not in document
     count = len(document["time_s"])
     assert all(len(document[key]) == count for key in SERIES)

@@ -14,8 +14,8 @@ from tests.cli.cli_run import found, zwidth
 from zwidth.contact.limit_cycles import limit_cycles
 from zwidth.contact.response import SOURCES
 from zwidth.contact.verdict import Behaviour
-from zwidth.show.cli.simulate import KEYS
-from zwidth.show.cli.simulated_pages import SAYS
+from zwidth.show.cli.simulate import Simulate
+from zwidth.show.cli.simulation_page import VERDICTS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "simulation.md").read_text(encoding="utf-8")
 
@@ -68,9 +68,9 @@ def test_the_pages_limited_paddle_goes_round_as_it_says(tmp_path):
 
 
 def test_every_word_of_the_verdict_and_every_entry_is_on_the_page():
-    for word in SAYS:
+    for word in VERDICTS:
         assert re.search(rf"^\| `{word}` \|", PAGE, re.MULTILINE)
-    assert set(SAYS) == {*get_args(Behaviour), "forced"}
+    assert set(VERDICTS) == {*get_args(Behaviour), "forced"}
     for name in SOURCES:
         assert name in PAGE.partition("## The energy ledger")[2]
 
@@ -79,4 +79,4 @@ def test_the_commands_page_explains_every_key():
     page = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
     section = page.partition("\n## simulate\n")[2].partition("\n## ")[0].partition("| Key |")[2]
     named = set(re.findall(r"`(\w+)`", section))
-    assert set(KEYS) <= named
+    assert set(Simulate.keys) <= named

@@ -5,28 +5,37 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.failures import NoAnswer
 from zwidth.show.cli.options import Finite, Numbers, ParamType, named
-from zwidth.show.output import shown
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from zwidth.contact.environments import Environment
-    from zwidth.contact.hand import Hand
-    from zwidth.model.operator import Operator
     from zwidth.show.cli.options import Question
 
 Command = Callable[..., int]
 
-DEPTH: Final = 1e-3  # m, at the start: inside what acts everywhere, outside what has a surface
-PUSH: Final = 2.0  # N, against what has a surface
+AS_TYPED: Final = (
+    "stiffness",
+    "damping",
+    "environment",
+    "no_pull",
+    "wall_position",
+    "start_position",
+    "start_velocity",
+    "push",
+    "ramp",
+)
+# Arguments whose options are called otherwise, or want a word for their value where they are missing.
+OPTIONS: Final = {"parameters": "--parameter", "operator": "--operator NAME", "push": "--push F"}
 FARTHEST: Final = 1e3  # m
 LARGEST_FORCE: Final = 1e6  # N
 LARGEST_SEED: Final = 2**63 - 1
@@ -75,79 +84,46 @@ class Setting(ParamType):
         return name.strip(), number
 
 
-@dataclass(frozen=True)
-class Contact:
-    """A contact as typed; None where left out. Positions in metres, on the axis of the reading."""
+def check_contact(options: Mapping[str, Any]) -> None:
+    """Raise click.UsageError for options that cannot stand together, as far as the device does not decide."""
+    wall, environment = options["wall"], options["environment"]
+    if wall is not None and environment is not None:
+        raise usage("--wall and --environment exclude each other; leave one out")
+    if environment is not None:
+        return
+    missing = [f"--{name}" for name in ("stiffness", "damping") if options[name] is None]
+    if missing:
+        raise usage(f"a wall needs --stiffness and --damping; missing: {' and '.join(missing)}")
+    if options["parameters"]:
+        raise usage("--parameter belongs to --environment; a wall has --stiffness and --damping")
+    if options["no_pull"] and wall != "one-sided":
+        raise usage("a two-sided wall pulls by its nature; --no-pull goes with --wall one-sided")
 
-    stiffness: float | None
-    damping: float | None
-    wall: str | None
-    environment: str | None
-    parameters: tuple[tuple[str, float], ...]
-    no_pull: bool
-    wall_position: float
-    start_position: float | None
-    start_velocity: float
-    push: float | None
-    ramp: float
-    tremor: tuple[float, ...] | None
-    reach: tuple[float, ...] | None
-    reflex: tuple[float, ...] | None
 
-    def check(self) -> None:
-        """Raises click.UsageError for options that cannot stand together, as far as the device does not decide."""
-        if self.wall is not None and self.environment is not None:
-            raise usage("--wall and --environment exclude each other; leave one out")
-        if self.environment is None:
-            missing = [f"--{name}" for name in ("stiffness", "damping") if getattr(self, name) is None]
-            if missing:
-                raise usage(f"a wall needs --stiffness and --damping; missing: {' and '.join(missing)}")
-            if self.parameters:
-                raise usage("--parameter belongs to --environment; a wall has --stiffness and --damping")
-        if self.environment is None and self.no_pull and self.wall != "one-sided":
-            raise usage("a two-sided wall pulls by its nature; --no-pull goes with --wall one-sided")
+def contact_arguments(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options of a contact as arguments of `simulate_contact`. Raises BadInput for numbers that cannot be."""
+    from zwidth.contact.hand import Reach, Reflex, Tremor
 
-    def touched(self) -> tuple[Environment, NDArray[Any]]:
-        """The environment, and its parameters as it takes them. Raises BadInput."""
-        wall = "one_sided_wall" if self.wall == "one-sided" else "wall"
-        return named_environment(
-            self.environment or wall,
-            self.parameters,
-            stiffness=self.stiffness,
-            damping=self.damping,
-            no_pull=self.no_pull,
+    parameters = _by_name(options["parameters"])
+    tremor, reach, reflex = options["tremor"], options["reach"], options["reflex"]
+    with _named("tremor"):
+        tremor = tremor and Tremor(*tremor)
+    with _named("reach"):
+        reach = reach and Reach(*reach)
+    with _named("reflex"):
+        reflex = reflex and Reflex(
+            reflex[0],
+            arm_stiffness=reflex[1],
+            arm_damping=reflex[2],
+            **dict(zip(("latency", "rise"), reflex[3:], strict=False)),
         )
-
-    def start(self, environment: Environment) -> float:
-        """Where the reading starts [m]."""
-        if self.start_position is not None:
-            return self.start_position
-        return self.wall_position + (-DEPTH if environment.surface else DEPTH)
-
-    def hand(self, environment: Environment, operator: Operator | None) -> Hand:
-        """Who holds the handle and what he does. Raises BadInput for what cannot be."""
-        from zwidth.contact.hand import Hand, Reach, Reflex, Tremor
-
-        for name in ("reach", "reflex"):
-            if getattr(self, name) is not None and operator is None:
-                raise BadInput(f"--{name}: needs an arm, and nobody holds the device; add --operator NAME")
-        push = self.push
-        if push is None:
-            push = PUSH if environment.surface and self.reach is None else 0.0
-        if self.ramp and not push:
-            raise BadInput("--ramp: is the time in which the push grows, and nobody pushes; add --push F")
-        with _named("tremor"):
-            tremor = self.tremor and Tremor(*self.tremor)
-        with _named("reach"):
-            reach = self.reach and Reach(*self.reach)
-        with _named("reflex"):
-            reflex = self.reflex and Reflex(
-                self.reflex[0],
-                arm_stiffness=self.reflex[1],
-                arm_damping=self.reflex[2],
-                **dict(zip(("latency", "rise"), self.reflex[3:], strict=False)),
-            )
-        return Hand(operator, push, self.ramp, reach or None, tremor or None, reflex or None)
+    return {name: options[name] for name in AS_TYPED} | {
+        "wall": options["wall"] or "two-sided",
+        "parameters": parameters,
+        "tremor": tremor,
+        "reach": reach,
+        "reflex": reflex,
+    }
 
 
 def named_environment(
@@ -163,37 +139,21 @@ def named_environment(
     parameters  of --parameter; the others are those that have an option of their own
     Raises      BadInput  for an unknown environment, a file that does not serve, or parameters that do not
     """
-    from zwidth.contact.environments import load_environment
+    from zwidth.contact.contact_arguments import environment_with_values
 
-    try:
-        found = load_environment(name)
-    except ValueError as error:
-        raise BadInput(*(f"--environment: {line}" for line in str(error).splitlines())) from None
-    options = {"stiffness": stiffness, "damping": damping, "no_pull": 1.0 if no_pull else None}
-    given = _given(found, parameters, options)
-    try:
-        return found, found.values(**given)
-    except ValueError as error:
-        raise BadInput(*(f"--parameter: {line}" for line in str(error).splitlines())) from None
+    with contact_faults():
+        return environment_with_values(
+            name, _by_name(parameters), stiffness=stiffness, damping=damping, no_pull=no_pull
+        )
 
 
-def _given(
-    found: Environment, parameters: Sequence[tuple[str, float]], options: Mapping[str, float | None]
-) -> dict[str, float]:
-    """Values by name, the options among them."""
-    pairs = list(parameters)
-    for name, value in options.items():
-        if value is None:
-            continue
-        if name not in found.names:
-            has = ", ".join(found.names) or "none"
-            raise BadInput(f"--{name.replace('_', '-')}: {found.name} has no such parameter; it has {has}")
-        pairs.append((name, value))
-    names = [name for name, _ in pairs]
+def _by_name(parameters: Sequence[tuple[str, float]]) -> dict[str, float]:
+    """Values of --parameter by name. Raises BadInput for those given twice."""
+    names = [name for name, _ in parameters]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise BadInput(*(f"--parameter: {shown(name)} is given twice" for name in twice))
-    return dict(pairs)
+        raise BadInput(*(f"--parameter: {name} is given twice" for name in twice))
+    return dict(parameters)
 
 
 @contextmanager
@@ -205,10 +165,27 @@ def _named(option: str) -> Iterator[None]:
         raise BadInput(f"--{option}: {error}") from None
 
 
-def about_a_contact(command: Command) -> Command:
-    """Give a command the options that say what is touched, from where and by whom, as one `Contact`."""
-    options = [*_of_what_is_touched(), *_of_the_start(), *_of_the_hand()]
-    return gathered(command, "contact", Contact, options, lambda contact, _: contact.check())
+@contextmanager
+def contact_faults() -> Iterator[None]:
+    """Simulate a contact inside this block.
+
+    Raises  BadInput  for what `simulate_contact` does not take, under the options' names
+            NoAnswer  where the environment gives no force
+    """
+    from zwidth.contact.contact_arguments import ContactArgumentError
+    from zwidth.contact.room import TooLarge
+    from zwidth.contact.simulate_contact import NoForceError
+
+    try:
+        yield
+    except ContactArgumentError as error:
+        option = OPTIONS.get(error.argument, f"--{error.argument.replace('_', '-')}")
+        advice = f"; add {OPTIONS[error.missing]}" if error.missing else ""
+        raise BadInput(*(f"{option}: {reason}{advice}" for reason in error.reasons)) from None
+    except NoForceError as error:
+        raise NoAnswer(str(error)) from None
+    except TooLarge as error:
+        raise BadInput(f"--duration: {error}") from None
 
 
 def gathered(
@@ -230,6 +207,11 @@ def gathered(
     for decorate in reversed(options):
         asked = decorate(asked)
     return asked
+
+
+def contact_options() -> tuple[Callable[..., Any], ...]:
+    """What is touched, from where and by whom, as options."""
+    return (*_of_what_is_touched(), *_of_the_start(), *_of_the_hand())
 
 
 def _of_what_is_touched() -> list[Callable[..., Any]]:

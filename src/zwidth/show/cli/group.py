@@ -26,7 +26,7 @@ from zwidth.show.cli.robust import Robust
 from zwidth.show.cli.schema import schema
 from zwidth.show.cli.sensitivity import SensitivityCommand
 from zwidth.show.cli.show import Show
-from zwidth.show.cli.simulate import simulate
+from zwidth.show.cli.simulate import Simulate
 from zwidth.show.cli.sweep import sweep
 
 EPILOG = """\b
@@ -65,7 +65,7 @@ COMMANDS = (
     Bounds(),
     GuaranteesCommand(),
     Robust(),
-    simulate,
+    Simulate(),
     ExperimentCommand(),
     limit_cycles,
     move,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from zwidth.show.cli.answer import Row, sheet, table
 from zwidth.show.cli.energies import HEADINGS, energy_rows
 from zwidth.show.cli.heading import computer
-from zwidth.show.cli.simulated_pages import environment_words
+from zwidth.show.cli.simulation_page import environment_words
 from zwidth.show.output import shown
 from zwidth.show.units import amount, percent, typed, vector
 
