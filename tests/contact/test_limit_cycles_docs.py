@@ -13,14 +13,21 @@ study = Later("gallery.quantisation_limit")
 PAGE = (Path(__file__).parents[2] / "docs" / "limit-cycles.md").read_text(encoding="utf-8")
 
 
-def test_the_example_runs():
-    (program,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
+def printed(program):
+    """The lines that a program of the page prints."""
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text):
         exec(program, {})
-    lines = printed.getvalue().splitlines()
+    return text.getvalue().splitlines()
+
+
+def test_the_examples_run():
+    balance, prediction = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    lines = printed(balance)
     assert lines[0] == "2.02 mm, 10.06 Hz, stable: False"
     assert lines[1].endswith("stable: True")
+    (line,) = printed(prediction)
+    assert line == "2.99 mm at 40.4 Hz, simulated 2.99 mm"
 
 
 def test_pushed_between_two_counts_the_onset_is_the_limit():

@@ -139,6 +139,10 @@ class Command:
         """The answer as a figure."""
         raise NotImplementedError
 
+    def write_others(self, case: Case, result: Any) -> dict[str, Path]:
+        """Write the files that options of the command's own name. Returns each by its key of the answer."""
+        return {}
+
     # --- what is done for all -------------------------------------------------------------------------
 
     def circumstances(self, case: Case) -> dict[str, Any]:
@@ -181,13 +185,14 @@ class Command:
         if case.path is not None:
             document["file"] = str(case.path)
             reason = self.write(case, result, document, reason)
+        others = {key: str(path) for key, path in self.write_others(case, result).items()}
+        document |= others
 
         def pages() -> Iterator[Any]:
             if first := self.heading(case):
                 yield first
             yield from self.pages(case, result, document)
-            if "file" in document:
-                yield f"written: {document['file']}"
+            yield from (f"written: {document[key]}" for key in ("file", *others) if key in document)
 
         return Answer(document, lambda: list(pages()), reason)
 

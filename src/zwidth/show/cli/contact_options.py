@@ -209,6 +209,16 @@ def gathered(
     return asked
 
 
+def wall_options() -> tuple[Callable[..., Any], ...]:
+    """The wall of a command that is about one two-sided wall, as options."""
+    return (
+        click.option(
+            "--stiffness", metavar="K", type=Finite(), required=True, help="Stiffness of the wall [N/m]."
+        ),
+        click.option("--damping", metavar="B", type=Finite(), required=True, help="Damping of the wall [Ns/m]."),
+    )
+
+
 def contact_options() -> tuple[Callable[..., Any], ...]:
     """What is touched, from where and by whom, as options."""
     return (*_of_what_is_touched(), *_of_the_start(), *_of_the_hand())

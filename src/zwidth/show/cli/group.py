@@ -17,7 +17,7 @@ from zwidth.show.cli.devices import devices
 from zwidth.show.cli.experiment import ExperimentCommand
 from zwidth.show.cli.felt import felt
 from zwidth.show.cli.guarantees import GuaranteesCommand
-from zwidth.show.cli.limit_cycles import limit_cycles
+from zwidth.show.cli.limit_cycles import LimitCycles
 from zwidth.show.cli.map import map_command
 from zwidth.show.cli.move import move
 from zwidth.show.cli.polar import Polar
@@ -67,7 +67,7 @@ COMMANDS = (
     Robust(),
     Simulate(),
     ExperimentCommand(),
-    limit_cycles,
+    LimitCycles(),
     move,
 )
 for command in COMMANDS:

@@ -2,219 +2,200 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import Answer, deliver, sheet, table
-from zwidth.show.cli.contact_options import Bounded
+from zwidth.show.cli.answer import sheet, table
+from zwidth.show.cli.command import Case, Command
+from zwidth.show.cli.contact_options import Bounded, wall_options
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.failures import NoAnswer, computing
-from zwidth.show.cli.heading import heading
-from zwidth.show.cli.measured import without_model
-from zwidth.show.cli.options import Finite, Question, about_a_device, as_json, example, named, output_option
-from zwidth.show.cli.predicted_cycles import (
-    NOT_PREDICTED,
-    Met,
-    Predicted,
-    acting,
-    columns,
-    cycle_speed,
-    numbers,
-    predicted,
-)
+from zwidth.show.cli.failures import NoAnswer
+from zwidth.show.cli.options import named
 from zwidth.show.cli.progress import progress_told
-from zwidth.show.output import DATA, FIGURES, destination, write_data
+from zwidth.show.output import FIGURES, destination
 from zwidth.show.units import amount, given
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction, SimulatedVibration
     from zwidth.contact.limit_cycles import LimitCycle
     from zwidth.contact.plane import DevicePlane
-    from zwidth.device.device import Device
-    from zwidth.loop.loop import Loop
 
-KEYS: Final = (
-    "verdict",
-    "nonlinear",
-    "predicted_by",
-    "limit_cycles",
-    "otherwise",
-    "largest_motion_m",
-    "leaves_range",
-    "resting_limit_N_per_m",
-    "quiet_limit_N_per_m",
-    "growth",
-)
 FRICTION: Final = ("friction.coulomb_N", "mechanism.drives.*.coulomb_Nm")  # of a [plant], of a [mechanism]
 STEPS: Final = ("loop.encoder.resolution_m", "mechanism.drives.*.encoder_counts_per_rev")
 NOTHING: Final = (
     "nothing in this device depends on the amplitude, so that no vibration keeps its size; give it dry "
     "friction ({}), encoder steps ({}) or a largest force (loop.saturation.force_N), in the file or by --set"
 )
-OTHERWISE: Final = 1.5  # ratio of frequencies from which a simulation does not have the vibration predicted
 IN_PLANE: Final = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the wall's stiffness, drawn in the plane
 
 
-@click.command(
-    "limit-cycles",
-    short_help="Find the vibrations that keep themselves up on a wall of DEVICE.",
-    epilog=example(
-        "zwidth limit-cycles my-device.toml --stiffness 4000 --damping 1 --set loop.saturation.force_N=5",
-        "zwidth limit-cycles my-device.toml --stiffness 900 --damping 1 --set loop.saturation.force_N=5 --json",
-    ),
-)
-@about_a_device
-@click.option("--stiffness", metavar="K", type=Finite(), required=True, help="Stiffness of the wall [N/m].")
-@click.option("--damping", metavar="B", type=Finite(), required=True, help="Damping of the wall [Ns/m].")
-@click.option(
-    "--offset",
-    metavar="SHARE",
-    type=Bounded("steps", -0.5, 0.5),
-    default=0.0,
-    help="Where the vibration's middle lies, as a share of an encoder's step: 0.5 between two counts, as far as a "
-    "constant push can do. Default: 0.",
-)
-@click.option("--no-simulation", is_flag=True, help="Predict only; simulate nothing.")
-@click.option(
-    "--plane",
-    metavar="FILE",
-    callback=named,
-    help="Draw the friction-quantisation plane with the device in it (.png .svg .pdf).",
-)
-@output_option("Write a figure (.png .svg .pdf: growth over amplitude) or the data (.csv: the cycles, .json).")
-@as_json
-def limit_cycles(
-    question: Question,
-    stiffness: float,
-    damping: float,
-    offset: float,
-    no_simulation: bool,
-    plane: str | None,
-    output: str | None,
-    as_json: bool,
-) -> int:
+class LimitCycles(Command):
     """Find the vibrations that dry friction, encoder steps and the force limit keep up on a two-sided wall of
     DEVICE, and hold them against a simulation."""
-    path = None if output is None else destination(output, FIGURES + DATA)
-    drawn = None if plane is None else destination(plane, FIGURES)
-    if path is not None and path == drawn:
-        raise BadInput("--plane: names the file of --output; name another")
-    device = question.device()
-    wall = {"wall_stiffness_N_per_m": stiffness, "wall_damping_Ns_per_m": damping, "offset_steps": offset}
-    if device.response is not None:
-        return without_model(question, device, wall | dict.fromkeys(KEYS), as_json)
-    facts = question.circumstances(device) | wall
-    try:
-        with computing(question), progress_told() as progress:
-            loop = _loop(question, device)
-            if not acting(loop):
-                raise NoAnswer(NOTHING.format(_key(FRICTION, device), _key(STEPS, device)))
-            _check(question, device, loop, stiffness, offset, drawn)
-            largest = _largest_motion(question, device)
-            found = predicted(loop, stiffness, damping, offset, largest, progress, simulate=not no_simulation)
-    except NoAnswer as none:
-        return deliver(Answer(facts | dict.fromkeys(KEYS), reason=str(none)), as_json)
-    document = facts | numbers(found)
-    if path is not None:
-        document["file"] = str(path)
-        _write(path, found, document)
-    if drawn is not None:
-        document["plane_file"] = str(drawn)
-        _draw_plane(drawn, _in_plane(loop, stiffness))
-    return deliver(Answer(document, lambda: list(_pages(question, device, found, document))), as_json)
 
+    name = "limit-cycles"
+    summary = "Find the vibrations that keep themselves up on a wall of DEVICE."
+    examples = (
+        "zwidth limit-cycles my-device.toml --stiffness 4000 --damping 1 --set loop.saturation.force_N=5",
+        "zwidth limit-cycles my-device.toml --stiffness 900 --damping 1 --set loop.saturation.force_N=5 --json",
+    )
+    options = (
+        *wall_options(),
+        click.option(
+            "--offset",
+            metavar="SHARE",
+            type=Bounded("steps", -0.5, 0.5),
+            default=0.0,
+            help="Where the vibration's middle lies, as a share of an encoder's step: 0.5 between two counts, as "
+            "far as a constant push can do. Default: 0.",
+        ),
+        click.option("--no-simulation", is_flag=True, help="Predict only; simulate nothing."),
+        click.option(
+            "--plane",
+            metavar="FILE",
+            callback=named,
+            help="Draw the friction-quantisation plane with the device in it (.png .svg .pdf).",
+        ),
+    )
+    output_help = "Write a figure (.png .svg .pdf: growth over amplitude) or the data (.csv: the cycles, .json)."
+    keys = (
+        "verdict",
+        "nonlinear",
+        "predicted_by",
+        "limit_cycles",
+        "otherwise",
+        "largest_motion_m",
+        "leaves_range",
+        "resting_limit_N_per_m",
+        "quiet_limit_N_per_m",
+        "growth",
+    )
+    linear = False
 
-def _loop(question: Question, device: Device) -> Loop:
-    loop = question.point(device).loop
-    _ = loop.sections  # refuses plants that no wall moves, or not in time
-    return loop
+    def check(self, case: Case) -> None:
+        if case["plane"] is not None and destination(case["plane"], FIGURES) == case.path:
+            raise BadInput("--plane: names the file of --output; name another")
 
+    def asked(self, case: Case) -> dict[str, Any]:
+        return {
+            "wall_stiffness_N_per_m": case["stiffness"],
+            "wall_damping_Ns_per_m": case["damping"],
+            "offset_steps": case["offset"],
+        }
 
-def _largest_motion(question: Question, device: Device) -> float:
-    """How far the device can move to either side of its posture [m]: a mechanism's handle along the direction,
-    in its assembly; a [plant] as far as any device does."""
-    from zwidth.contact.simulate import LARGEST_MOTION
-
-    reached = question.point(device).handle_range
-    if reached is None:
-        return LARGEST_MOTION
-    back, forth = reached
-    # at the edge of the workspace it moves to one side only, and about a middle within that
-    return min(-back, forth) or max(-back, forth) / 2.0
-
-
-def _key(keys: tuple[str, str], device: Device) -> str:
-    """Where a device file has it."""
-    return keys[device.mechanism is not None]
-
-
-def _check(
-    question: Question, device: Device, loop: Loop, stiffness: float, offset: float, drawn: Path | None
-) -> None:
-    """Raises BadInput for what goes without encoder steps, or without a wall that pushes."""
-    steps = "encoder steps" in acting(loop)
-    if offset and not steps:
-        raise BadInput(
-            f"--offset: {question.name} has no encoder steps to lie between; give {_key(STEPS, device)}"
+    def compute(self, case: Case) -> LimitCyclePrediction:
+        from zwidth.contact.limit_cycle_prediction import (
+            NoEncoderStepsError,
+            NothingNonlinearError,
+            amplitude_dependent,
+            predict_limit_cycles,
         )
-    if drawn is None:
-        return
-    if not steps:
-        raise BadInput(f"--plane: {question.name} has no encoder steps; give {_key(STEPS, device)}")
-    if not stiffness > 0.0:
-        raise BadInput(f"--plane: is drawn for walls with a positive stiffness, got {stiffness:g} N/m")
-    _in_plane(loop, stiffness)
+
+        name, offset = case.question.name, case["offset"]
+        try:
+            parts = amplitude_dependent(case.point, offset)
+        except NothingNonlinearError:
+            raise NoAnswer(NOTHING.format(_key(FRICTION, case), _key(STEPS, case))) from None
+        except NoEncoderStepsError:
+            lacking = f"{name} has no encoder steps to lie between"
+            raise BadInput(f"--offset: {lacking}; give {_key(STEPS, case)}") from None
+        if case["plane"] is not None:
+            if "encoder steps" not in parts:
+                raise BadInput(f"--plane: {name} has no encoder steps; give {_key(STEPS, case)}")
+            _plane(case)  # whether it can be drawn, before the long computation
+        with progress_told() as progress:
+            return predict_limit_cycles(
+                case.point,
+                case["stiffness"],
+                case["damping"],
+                offset=offset,
+                simulate=not case["no_simulation"],
+                progress=progress,
+            )
+
+    def pages(self, case: Case, result: LimitCyclePrediction, document: Mapping[str, Any]) -> Iterator[Any]:
+        yield sheet(list(_circumstances(case, result)))
+        if result.cycles:
+            headings = ["limit cycle", "frequency", "speed", "force asked for", "what it is", "simulated"]
+            yield table(headings, list(_rows(result)))
+        else:
+            yield "no limit cycle is predicted"
+        yield from _remarks(result)
+
+    def draw(self, case: Case, result: LimitCyclePrediction) -> Figure:
+        from zwidth.show.figures.limit_cycles import draw_balance
+        from zwidth.show.figures.style import context, figure
+
+        drawing, ax = figure()
+        with context():
+            draw_balance(ax, result.balance)
+        return drawing
+
+    def write_others(self, case: Case, result: LimitCyclePrediction) -> dict[str, Path]:
+        if case["plane"] is None:
+            return {}
+        from zwidth.show.figures.limit_cycles import draw_plane
+        from zwidth.show.figures.style import context, figure, save
+
+        path = destination(case["plane"], FIGURES)
+        drawing, ax = figure()
+        with context():
+            draw_plane(ax, _plane(case))
+        save(drawing, path)
+        return {"plane_file": path}
 
 
-def _in_plane(loop: Loop, stiffness: float) -> DevicePlane:
+def _key(keys: tuple[str, str], case: Case) -> str:
+    """Where the device's file has it."""
+    return keys[case.device.mechanism is not None]
+
+
+def _plane(case: Case) -> DevicePlane:
+    """The device in the friction-quantisation plane. Raises BadInput for a wall that does not push, and so on."""
     from zwidth.contact.plane import device_plane
 
+    stiffness = case["stiffness"]
+    if not stiffness > 0.0:
+        raise BadInput(f"--plane: is drawn for walls with a positive stiffness, got {stiffness:g} N/m")
     try:
-        return device_plane(loop, [share * stiffness for share in IN_PLANE])
+        return device_plane(case.point.loop, [share * stiffness for share in IN_PLANE])
     except ValueError as error:
         raise BadInput(f"--plane: {error}") from None
 
 
-def _pages(question: Question, device: Device, found: Predicted, document: dict[str, Any]) -> Iterator[Any]:
-    yield heading(question, device, linear=False)
-    far, whose = found.balance.largest_motion, "the handle moves" if device.mechanism else "taken to move"
-    rows = [
-        ("wall", f"{amount(found.stiffness, 'N/m')}, {amount(found.damping, 'Ns/m')}: {found.verdict} if linear"),
-        ("not linear", ", ".join(found.parts)),
-        ("range", f"{whose} {amount(far, 'm')} to either side at most"),
-    ]
+def _circumstances(case: Case, found: LimitCyclePrediction) -> Iterator[tuple[str, str]]:
+    wall = f"{amount(found.wall_stiffness, 'N/m')}, {amount(found.wall_damping, 'Ns/m')}"
+    yield "wall", f"{wall}: {found.verdict} if linear"
+    yield "not linear", ", ".join(found.nonlinear)
+    whose = "the handle moves" if case.device.mechanism else "taken to move"
+    yield "range", f"{whose} {amount(found.largest_motion, 'm')} to either side at most"
     if found.offset:
-        rows.append(("middle", f"{given(found.offset)} of a step beyond a count"))
-    if found.rest is not None:
-        rows.append(("rests under every push", _up_to(found.rest)))
-        rows.append(("hunts in no way", f"{_up_to(found.quiet)}, at this damping"))
-    yield sheet(rows)
-    if found.cycles:
-        headings = ["limit cycle", "frequency", "speed", "force asked for", "what it is", "simulated"]
-        yield table(headings, list(_rows(found)))
-    else:
-        yield "no limit cycle is predicted"
-    yield from _remarks(found, [part for part in device.left_out if part in NOT_PREDICTED])
-    for key in ("file", "plane_file"):
-        if key in document:
-            yield f"written: {document[key]}"
+        yield "middle", f"{given(found.offset)} of a step beyond a count"
+    if found.resting_limit is not None:
+        yield "rests under every push", _up_to(found.resting_limit)
+        yield "hunts in no way", f"{_up_to(found.quiet_limit)}, at this damping"
 
 
 def _up_to(stiffness: float | None) -> str:
     return f"on walls up to {amount(stiffness, 'N/m')}" if stiffness else "on no wall"
 
 
-def _rows(found: Predicted) -> Iterator[tuple[str, ...]]:
-    for cycle, met in zip(found.cycles, found.met, strict=True):
+def _rows(found: LimitCyclePrediction) -> Iterator[tuple[str, ...]]:
+    from zwidth.contact.limit_cycle_prediction import cycle_speed
+
+    for cycle, simulated in zip(found.cycles, found.simulated, strict=True):
         yield (
             amount(cycle.amplitude, "m"),
             amount(cycle.frequency_Hz, "Hz"),
             amount(cycle_speed(cycle), "m/s"),
             amount(cycle.force_amplitude, "N"),
             _kind(cycle),
-            _said(met) if met else "",
+            _said(simulated) if simulated else "",
         )
 
 
@@ -225,51 +206,21 @@ def _kind(cycle: LimitCycle) -> str:
     return "stable: what is seen" if cycle.stable else "unstable: larger ones grow, smaller ones die"
 
 
-def _elsewhere(cycle: LimitCycle, met: Met | None) -> bool:
-    """Does the simulation go round at another frequency?"""
-    if met is None or met.behaviour == "converged":
-        return False
-    return not 1.0 / OTHERWISE < met.frequency / cycle.frequency_Hz < OTHERWISE
-
-
-def _said(met: Met) -> str:
-    if met.behaviour == "converged":
+def _said(simulated: SimulatedVibration) -> str:
+    if simulated.behaviour == "converged":
         return "comes to rest"
-    return f"{met.behaviour}, {amount(met.amplitude, 'm')} at {amount(met.frequency, 'Hz')}"
+    return f"{simulated.behaviour}, {amount(simulated.amplitude, 'm')} at {amount(simulated.frequency, 'Hz')}"
 
 
-def _remarks(found: Predicted, without: Sequence[str]) -> Iterator[str]:
+def _remarks(found: LimitCyclePrediction) -> Iterator[str]:
     if found.otherwise is not None:
         yield f"simulated from {amount(found.otherwise.start, 'm')}: {_said(found.otherwise)}"
-    if any(_elsewhere(cycle, met) for cycle, met in zip(found.cycles, found.met, strict=True)):
+    if found.simulated_otherwise:
         yield "the simulation vibrates otherwise than predicted; believe it: predictions follow one kind"
-    if found.balance.leaves_range:
+    if found.leaves_range:
         yield "vibrations that grow leave this range: what stops them is not modelled"
-    yield f"predicted by {found.by}"
-    if without:
-        yield f"the prediction leaves out {', '.join(without)}"
-    if "encoder steps" in found.parts and "dry friction" not in found.parts:
+    yield f"predicted by {found.predicted_by}"
+    if found.left_out:
+        yield f"the prediction leaves out {', '.join(found.left_out)}"
+    if "encoder steps" in found.nonlinear and "dry friction" not in found.nonlinear:
         yield "without dry friction a device may rattle between two counts also where nothing is predicted"
-
-
-def _write(path: Path, found: Predicted, document: dict[str, Any]) -> None:
-    if path.suffix.lower() in DATA:
-        write_data(path, document, columns(document))
-        return
-    from zwidth.show.figures.limit_cycles import draw_balance
-    from zwidth.show.figures.style import context, figure, save
-
-    drawing, ax = figure()
-    with context():
-        draw_balance(ax, found.balance)
-    save(drawing, path)
-
-
-def _draw_plane(path: Path, device: DevicePlane) -> None:
-    from zwidth.show.figures.limit_cycles import draw_plane
-    from zwidth.show.figures.style import context, figure, save
-
-    drawing, ax = figure()
-    with context():
-        draw_plane(ax, device)
-    save(drawing, path)

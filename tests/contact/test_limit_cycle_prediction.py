@@ -1,0 +1,155 @@
+"""Limit cycles predicted and simulated from Python: what the command says, how far, its limits and its errors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from systems import mass
+
+import zwidth as package
+from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found
+from tests.paddle import LENGTH, paddle
+from zwidth.contact.limit_cycle_prediction import (
+    NoEncoderStepsError,
+    NothingNonlinearError,
+    largest_motion,
+    predict_limit_cycles,
+)
+from zwidth.contact.plane import quiet_limit, resting_limit
+from zwidth.loop.controller import Controller
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.sections import HysteresisError
+from zwidth.model.nonlinear import Brake, Counter, Friction, Nonlinear
+from zwidth.show.output import plain
+
+ONE = np.ones(1)
+ROUGH = ("loop.encoder.resolution_m=2e-5", "friction.coulomb_N=0.03")
+LIMITED = "loop.saturation.force_N=5"
+
+
+def one_mass(kilograms=0.1, damping=0.1, **parts):
+    plant = replace(mass(kilograms, damping), nonlinear=Nonlinear(**parts))
+    return OperatingPoint(Controller(0.001), given_plant=plant)
+
+
+def rough():
+    return one_mass(friction=(Friction(ONE, 0.03),), counters=(Counter(ONE, 2e-5),), force_limit=5.0)
+
+
+SAME = [
+    (TWO_MASS, (LIMITED,), (8000.0, 10.0), {}),
+    (ONE_MASS, (*ROUGH, LIMITED), (2600.0, 0.0), {"simulate": False}),
+    (ONE_MASS, ROUGH, (4500.0, 0.0), {"offset": 0.5}),
+    (ONE_MASS, ROUGH, (500.0, 1.0), {}),
+]
+
+
+@pytest.mark.parametrize(("name", "settings", "wall", "more"), SAME)
+def test_the_command_says_the_same(name, settings, wall, more):
+    predicted = predict_limit_cycles(package.load(name, settings).at(), *wall, **more)
+    words = [word for setting in settings for word in ("--set", setting)]
+    words += ["--offset", more.get("offset", 0.0)] + ["--no-simulation"] * (not more.get("simulate", True))
+    told = found("limit-cycles", name, "--stiffness", wall[0], "--damping", wall[1], *words)
+    document = plain(predicted.document())
+    assert {key: told[key] for key in document} == document
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_limited_force_holds_random_masses_where_it_is_predicted(seed):
+    rng = np.random.default_rng([42, seed])
+    friction = rng.uniform(0.05, 0.5)
+    point = one_mass(rng.uniform(0.05, 1.0), friction, force_limit=rng.uniform(0.5, 5.0))
+    edge = 2.0 * friction / point.controller.sampling_period  # about where a spring alone fails
+    predicted = predict_limit_cycles(point, rng.uniform(1.2, 2.0) * edge, 0.0)
+    assert (predicted.verdict, predicted.nonlinear) == ("unstable", ("the force limit",))
+    (cycle,), (simulated,) = predicted.cycles, predicted.simulated
+    assert simulated.behaviour == "limit cycle"
+    assert simulated.amplitude == pytest.approx(cycle.amplitude, rel=0.01)
+    assert simulated.frequency == pytest.approx(cycle.frequency_Hz, rel=0.01)
+    assert not predicted.simulated_otherwise
+    assert predicted.otherwise is None
+
+
+def test_the_limits_are_those_of_friction_and_steps():
+    predicted = predict_limit_cycles(rough(), 2600.0, 0.4, simulate=False)
+    assert predicted.resting_limit == pytest.approx(float(resting_limit(0.03, 2e-5)))
+    assert predicted.quiet_limit == pytest.approx(float(quiet_limit(0.03, 2e-5, 0.4, 0.001)))
+    pulling = predict_limit_cycles(rough(), -100.0, 0.0, simulate=False)
+    assert pulling.resting_limit is pulling.quiet_limit is None
+    smooth = predict_limit_cycles(one_mass(force_limit=1.0), 1000.0, 0.0, simulate=False)
+    assert smooth.resting_limit is None
+
+
+def test_a_simulation_at_another_frequency_is_told():
+    predicted = predict_limit_cycles(package.load(TWO_MASS, [LIMITED]).at(), 8000.0, 10.0)
+    (simulated,) = predicted.simulated
+    assert not predicted.simulated_otherwise
+    slower = replace(simulated, frequency=0.5 * simulated.frequency)
+    assert replace(predicted, simulated=(slower,)).simulated_otherwise
+    resting = replace(slower, behaviour="converged")
+    assert not replace(predicted, simulated=(resting,)).simulated_otherwise
+    assert not replace(predicted, simulated=(None,)).simulated_otherwise
+
+
+def test_a_device_moves_as_far_as_its_handle_and_a_given_plant_a_metre(tmp_path):
+    assert largest_motion(rough()) == 1.0
+    device = package.load(paddle(tmp_path))
+    assert largest_motion(device.at()) == pytest.approx(LENGTH, rel=1e-3)
+    arm = package.load(MECHANISM)
+    back, forth = arm.at().handle_range
+    assert largest_motion(arm.at()) == min(-back, forth)
+    predicted = predict_limit_cycles(device.at(), 3000.0, 1.0, simulate=False)
+    assert predicted.largest_motion == largest_motion(device.at())
+    assert predicted.leaves_range
+    assert [cycle.within_range for cycle in predicted.cycles] == [True, False]
+
+
+def test_progress_is_told_and_noise_and_brakes_are_left_out():
+    stages = []
+    brake, counted = Brake(ONE, 2.0), Counter(ONE, 2e-5, noise=1e-6)
+    point = one_mass(counters=(counted,), friction=(Friction(ONE, 0.1),), brakes=(brake,))
+    predicted = predict_limit_cycles(point, 1000.0, 2.0, progress=lambda *stage: stages.append(stage))
+    assert predicted.nonlinear == ("dry friction", "encoder steps")
+    assert predicted.left_out == ("noise", "programmable brakes")
+    assert stages[-2:] == [("simulating", 0, 1), ("simulating", 1, 1)]
+    assert "simulating" not in {name for name, *_ in stages[:-2]}
+
+
+def test_the_table_has_a_row_for_each_cycle():
+    predicted = predict_limit_cycles(rough(), 2600.0, 0.0)
+    table = predicted.table()
+    assert table["stable"] == ["false", "true"]
+    assert table["amplitude_m"] == [cycle.amplitude for cycle in predicted.cycles]
+    assert table["simulated_amplitude_m"] == [None, predicted.simulated[1].amplitude]
+    assert {len(column) for column in table.values()} == {2}
+
+
+def test_it_shows_itself_in_five_lines():
+    predicted = predict_limit_cycles(rough(), 2600.0, 0.0, simulate=False)
+    many = replace(predicted, cycles=5 * predicted.cycles)
+    none = replace(predicted, cycles=())
+    for shown in (predicted, many, none):
+        assert len(repr(shown).splitlines()) <= 5
+        assert max(map(len, repr(shown).splitlines())) <= 115
+    assert "and 7 more limit cycles" in repr(many)
+    assert "no limit cycle is predicted" in repr(none)
+
+
+def test_what_cannot_be_asked_is_an_error_of_its_own():
+    with pytest.raises(NothingNonlinearError, match="dry friction, encoder steps or a largest force"):
+        predict_limit_cycles(one_mass(), 1000.0, 1.0)
+    with pytest.raises(NoEncoderStepsError, match="leave it at 0"):
+        predict_limit_cycles(one_mass(force_limit=1.0), 1000.0, 1.0, offset=0.5)
+    with pytest.raises(ValueError, match=r"offset must be from -0\.5 to 0\.5"):
+        predict_limit_cycles(rough(), 1000.0, 1.0, offset=0.6)
+    with pytest.raises(ValueError, match="stiffness must be a finite number"):
+        predict_limit_cycles(rough(), np.nan, 1.0)
+    with pytest.raises(ValueError, match="damping must be a finite number"):
+        predict_limit_cycles(rough(), 1000.0, np.inf)
+    with pytest.raises(TypeError, match=r"point must be an OperatingPoint, got a Device; write device\.at\(\)"):
+        predict_limit_cycles(package.load(ONE_MASS), 1000.0, 1.0)
+    hysteretic = package.load(TWO_MASS, ["plant.loss_factor=0.1", LIMITED]).at()
+    with pytest.raises(HysteresisError):
+        predict_limit_cycles(hysteretic, 1000.0, 1.0)
