@@ -89,7 +89,7 @@ class LimitCycles(Command):
         }
 
     def compute(self, case: Case) -> LimitCyclePrediction:
-        from zwidth.contact.limit_cycle_prediction import (
+        from zwidth.contact.predict_limit_cycles import (
             NoEncoderStepsError,
             NothingNonlinearError,
             amplitude_dependent,

@@ -11,13 +11,13 @@ from systems import mass
 import zwidth as package
 from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found
 from tests.paddle import LENGTH, paddle
-from zwidth.contact.limit_cycle_prediction import (
+from zwidth.contact.plane import quiet_limit, resting_limit
+from zwidth.contact.predict_limit_cycles import (
     NoEncoderStepsError,
     NothingNonlinearError,
     largest_motion,
     predict_limit_cycles,
 )
-from zwidth.contact.plane import quiet_limit, resting_limit
 from zwidth.loop.controller import Controller
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.sections import HysteresisError
