@@ -15,7 +15,7 @@ from zwidth.show.cli.check import Check
 from zwidth.show.cli.command import Command
 from zwidth.show.cli.devices import devices
 from zwidth.show.cli.experiment import ExperimentCommand
-from zwidth.show.cli.felt import felt
+from zwidth.show.cli.felt import Felt
 from zwidth.show.cli.guarantees import GuaranteesCommand
 from zwidth.show.cli.limit_cycles import LimitCycles
 from zwidth.show.cli.map import map_command
@@ -61,7 +61,7 @@ COMMANDS = (
     sweep,
     Report(),
     SensitivityCommand(),
-    felt,
+    Felt(),
     Bounds(),
     GuaranteesCommand(),
     Robust(),
