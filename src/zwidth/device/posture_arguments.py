@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import nan, pi
 from numbers import Real
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from zwidth.device.faults import fail, quote
 from zwidth.model.mechanism import Floats, Mechanism
+
+UNIT: Final = 4.0 * np.finfo(float).eps  # from 1, that the length of a unit vector may be by rounding
 
 
 def vectors(label: str, name: str, value: Any) -> Floats:
@@ -48,8 +50,11 @@ def unit_vectors(label: str, name: str, value: Any) -> Floats:
     largest = np.abs(given).max(axis=-1, keepdims=True, initial=0.0)
     if not largest.all():
         raise fail(label, name, "has zero length; give any vector along it, such as 0,1")
-    given = given / largest  # so that the squares neither overflow nor vanish
-    return np.asarray(given / np.linalg.norm(given, axis=-1, keepdims=True))
+    scaled = given / largest  # so that the squares neither overflow nor vanish
+    length = largest * np.linalg.norm(scaled, axis=-1, keepdims=True)
+    # what is a unit vector already stays as it is, to the last digit
+    units = scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
+    return np.where(np.abs(length - 1.0) <= UNIT, given, units)
 
 
 def joint_angles(label: str, mechanism: Mechanism, at: Mapping[str, float]) -> dict[str, float]:

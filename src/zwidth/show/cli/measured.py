@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
 
-from zwidth.show.cli.answer import Answer, deliver
-from zwidth.show.cli.command import NO_MODEL
 from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
     from zwidth.chart.measured.chart import MeasuredChart
     from zwidth.chart.measured.usable_frequencies import Stretch
-    from zwidth.device.device import Device
-    from zwidth.show.cli.options import Question
 
 SHOWN: Final = 6  # stretches named on a terminal
 MOST_UNMEASURED: Final = 0.1  # of the frequencies up to half the sampling rate, before the heading says so
@@ -56,9 +52,3 @@ def told(stretch: Stretch) -> str:
     """A stretch in words."""
     where = "; the edge of the stable walls runs through it" if stretch.on_edge else ""
     return f"{amount(stretch.low, 'Hz')} to {amount(stretch.high, 'Hz')}: {stretch.reason}{where}"
-
-
-def without_model(question: Question, device: Device, unanswered: Mapping[str, Any], as_json: bool) -> int:
-    """The answer of a command that needs a model, for a device with a [response]: none, and why."""
-    question.as_measured(device)
-    return deliver(Answer(question.facts(device) | dict(unanswered), reason=NO_MODEL), as_json)
