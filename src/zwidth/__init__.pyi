@@ -1,3 +1,12 @@
+from . import chart as chart
+from . import conditions as conditions
+from . import contact as contact
+from . import device as device
+from . import guarantees as guarantees
+from . import loop as loop
+from . import measures as measures
+from . import model as model
+from . import study as study
 from .chart.arc_joining import ChartError as ChartError
 from .chart.chart import StabilityChart as StabilityChart
 from .chart.chart import largest_stiffness as largest_stiffness

@@ -13,17 +13,26 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from zwidth.chart.chart import StabilityChart
+    from zwidth.chart.polar import ByDirection
     from zwidth.chart.result import Chart
     from zwidth.chart.verdict import Verdicts, WallVerdicts
+    from zwidth.conditions.comparison import BoundsComparison
+    from zwidth.contact.contact_simulation import ContactSimulation
     from zwidth.contact.environments.environment import Environment
+    from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction
     from zwidth.device.device import Device
     from zwidth.device.load import Settings
+    from zwidth.guarantees.nested import Guarantees
     from zwidth.loop.loop import Loop
     from zwidth.loop.operating_point import OperatingPoint
     from zwidth.measures.description import Description
+    from zwidth.measures.felt_wall import FeltWall
     from zwidth.measures.measure import Measure, Measured
     from zwidth.result import Result
+    from zwidth.study.experiment_plan import Plan
+    from zwidth.study.measured_boundary import Experiment
     from zwidth.study.sensitivities import Sensitivities
+    from zwidth.study.validity import Validity
 
 
 def device_with(device: Device, settings: Settings) -> Device:
@@ -72,6 +81,65 @@ def check(point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayL
     from zwidth.chart.at_point import check_at
 
     return check_at(point, wall_stiffness, wall_damping)
+
+
+def by_direction(point: OperatingPoint, plane: str | None, count: int) -> ByDirection:
+    from zwidth.chart.polar import largest_stiffness_around
+
+    return largest_stiffness_around(point, plane, count)
+
+
+def bounds(point: OperatingPoint, damping: float | None) -> BoundsComparison:
+    from zwidth.conditions.comparison import compare_bounds
+
+    return compare_bounds(point, damping)
+
+
+def guarantees(point: OperatingPoint, coupling: bool, wall: tuple[float, float] | None) -> Guarantees:
+    from zwidth.guarantees.nested import guarantees_of
+
+    return guarantees_of(point, coupling, wall)
+
+
+def felt(point: OperatingPoint, stiffness: float, damping: float) -> FeltWall:
+    from zwidth.measures.felt_wall import felt_wall
+
+    return felt_wall(point, stiffness, damping)
+
+
+def simulate(
+    point: OperatingPoint, stiffness: float | None, damping: float | None, **more: Any
+) -> ContactSimulation:
+    from zwidth.contact.simulate_contact import simulate_contact
+
+    return simulate_contact(point, stiffness, damping, **more)
+
+
+def limit_cycles(
+    point: OperatingPoint,
+    stiffness: float,
+    damping: float,
+    offset: float,
+    simulate: bool,
+    progress: Any,
+) -> LimitCyclePrediction:
+    from zwidth.contact.predict_limit_cycles import predict_limit_cycles
+
+    return predict_limit_cycles(point, stiffness, damping, offset=offset, simulate=simulate, progress=progress)
+
+
+def measure_boundary(
+    point: OperatingPoint, plan: Plan | None, own_points: Any, file: Any, progress: Any
+) -> Experiment:
+    from zwidth.study.experiment import measure_boundary
+
+    return measure_boundary(point, plan, own_points, file=file, progress=progress)
+
+
+def validity(point: OperatingPoint, tolerance: float) -> Validity:
+    from zwidth.study.validity import validity
+
+    return validity(point, tolerance)
 
 
 def describe(point: OperatingPoint) -> Description:

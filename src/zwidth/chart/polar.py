@@ -20,6 +20,7 @@ from zwidth.model.arguments import check_choice, require
 from zwidth.model.directions import DEPENDENT
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import DirectionError, ModelError
+from zwidth.result import Result
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ PLANES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 
 @dataclass(frozen=True, repr=False)
-class ByDirection:
+class ByDirection(Result):
     """The stiffest wall along each of k directions.
 
     directions  (k, 3)  unit vectors

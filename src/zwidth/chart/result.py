@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.chart.cells import Box, box_of
 from zwidth.chart.decay import FastestDecay
 from zwidth.chart.verdict import WallVerdicts
+from zwidth.result import Result
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ class BoundaryArc:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Chart(ABC):
+class Chart(Result, ABC):
     """A set of stable walls, both signs of K and B, never clipped.
 
     regions         closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set

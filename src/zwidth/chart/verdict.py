@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi import MultiLoop
 from zwidth.model.arguments import require, walls
+from zwidth.result import Result
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ NAMES = {STABLE: "stable", UNDECIDED: "undecided", UNSTABLE: "unstable"}
 
 
 @dataclass(frozen=True, repr=False)
-class WallVerdicts:
+class WallVerdicts(Result):
     """Verdicts on walls (...).
 
     stiffness, damping  of the walls [N/m], [N s/m]

@@ -14,13 +14,14 @@ from zwidth.conditions.exact import stiffness_limit
 from zwidth.conditions.registry import compare
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.arguments import check_number, require
+from zwidth.result import Result
 
 # Keys of a bound that are no columns of a table: one is the same for every device, the other a table itself.
 NO_COLUMNS = ("assumptions", "taken")
 
 
 @dataclass(frozen=True)
-class BoundsComparison:
+class BoundsComparison(Result):
     """What every published condition admits at one damping, and what is exactly stable there.
 
     bounds     all conditions, always in the same order

@@ -16,6 +16,7 @@ from zwidth.contact.run_length import RunLength
 from zwidth.contact.verdict import Behaviour, Judgement, judge_response
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.result import Result
 
 AT_LIMIT = 1.0 - 1e-12  # share of the largest force from which a force was cut to it
 
@@ -44,7 +45,7 @@ class PassivityComparison(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class ContactSimulation:
+class ContactSimulation(Result):
     """One contact simulated; S samples. Positions are along the rendered direction, 0 at the device's posture.
 
     point               device and operator

@@ -7,6 +7,7 @@ from math import pi
 from typing import Any, Final
 
 from zwidth.contact.limit_cycles import HarmonicBalance, LimitCycle
+from zwidth.result import Result
 
 OTHERWISE: Final = 1.5  # ratio of frequencies from which a simulation does not have the vibration predicted
 CYCLE_KEYS: Final = ("amplitude_m", "frequency_Hz", "stable", "within_range", "force_N", "velocity_m_per_s")
@@ -40,7 +41,7 @@ class SimulatedVibration:
 
 
 @dataclass(frozen=True, repr=False)
-class LimitCyclePrediction:
+class LimitCyclePrediction(Result):
     """Limit cycles of a device on one two-sided wall.
 
     wall_stiffness, wall_damping   [N/m], [N s/m]

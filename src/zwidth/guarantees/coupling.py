@@ -19,6 +19,7 @@ from zwidth.guarantees.two_port import (
     sampled_demand,
 )
 from zwidth.loop.loop import Loop
+from zwidth.result import Result
 
 # Ratios of damping to stiffness tried, and steps of golden section between them.
 DIRECTIONS, STEPS = 721, 60
@@ -47,7 +48,7 @@ class Coupling:
 
 
 @dataclass(frozen=True)
-class Couplings:
+class Couplings(Result):
     """Couplings (k_c, b_c) as regions: after Llewellyn, after Raisbeck, and of the sampled device itself.
 
     limit   of the wall asked about, on the sampled device; None if none was

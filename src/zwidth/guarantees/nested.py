@@ -18,6 +18,7 @@ from zwidth.guarantees.springs import nyquist_region, spring_stable_region
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.arguments import check_number, refusal, require
+from zwidth.result import Result
 
 COLGATE = (
     "Colgate and Schenkel 1997, read in Weir and Colgate's chapter of 2008; here for any device by alias disks"
@@ -39,7 +40,7 @@ class Guarantee:
 
 
 @dataclass(frozen=True)
-class Guarantees:
+class Guarantees(Result):
     """The guarantees of a loop, from the strongest to plain stability, and the chart that holds them all.
 
     couplings  virtual couplings through which walls are stable with every passive operator; None: not asked for

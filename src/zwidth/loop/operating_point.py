@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from zwidth import _verbs
 from zwidth.loop.controller import Controller
 from zwidth.loop.left_out import left_out
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi import MultiLoop
 from zwidth.loop.point_errors import NoMechanismError, OperatingPointError, check_several_directions
+from zwidth.loop.point_verbs import PointVerbs
 from zwidth.model.damping import Damping, GivenDamping
 from zwidth.model.directions import MultiPlant, reduce_directions
 from zwidth.model.effective import EffectiveParameters, effective_parameters
@@ -26,12 +26,6 @@ from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solv
 from zwidth.model.reduction import Encoders, Model, plant_effective_parameters, reduce_mechanism, reduce_plant
 from zwidth.model.response import Response
 
-if TYPE_CHECKING:
-    from zwidth.chart.result import Chart
-    from zwidth.chart.verdict import WallVerdicts
-    from zwidth.measures.description import Description
-    from zwidth.measures.measure import Measure, Measured
-
 # Where the handle is: x, y or x, y, z [m], or the angle of every driven joint by the name of its link [rad].
 Position: TypeAlias = Sequence[float] | Mapping[str, float]
 
@@ -40,7 +34,7 @@ PROJECTED: Final = 0.01
 
 
 @dataclass(frozen=True)
-class OperatingPoint:
+class OperatingPoint(PointVerbs):
     """A device in one posture or in many, rendering one direction or several at once in each, and who holds it.
 
     Just one of mechanism, given_plant and response is there. A mechanism comes with postures and directions, whose
@@ -298,39 +292,6 @@ class OperatingPoint:
                 f"{_counted(self.shape)} have no .{what} in common; take one of them by its index, or ask for "
                 ".measure(name), which answers for all"
             )
-
-    # --- what is asked there --------------------------------------------------------------------------
-
-    def chart(self, radius: float = 1.0, *, decay: bool = True) -> Chart:
-        """The stable walls at a single point, exactly; see `chart.at_point.chart_at`.
-
-        radius  less than 1 for the walls whose slowest motion shrinks at least by that factor per sample
-        decay   False skips the search for the fastest-decaying walls, most of the time
-        """
-        return _verbs.chart(self, radius, decay)
-
-    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
-        """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast; see `chart.at_point`."""
-        return _verbs.check(self, wall_stiffness, wall_damping)
-
-    def describe(self) -> Description:
-        """Masses, stiffness, frequencies and dexterity of the device by itself at a single point."""
-        return _verbs.describe(self)
-
-    def measure(
-        self,
-        measure: str | Measure,
-        *,
-        stiffness: float | None = None,
-        damping: float | None = None,
-        frequency: float | None = None,
-    ) -> Measured:
-        """A measure of the catalogue by its name, or one of your own, at all points; see `measures.evaluate`.
-
-        stiffness, damping  of the wanted wall, for measures about one [N/m], [N s/m]
-        frequency           at which the hand moves [Hz]
-        """
-        return _verbs.measure(self, measure, stiffness, damping, frequency)
 
     # --- what results say of it -----------------------------------------------------------------------
 

@@ -15,10 +15,11 @@ from zwidth.model.effective import EffectiveParameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies, real_modes
 from zwidth.model.plant import Plant
+from zwidth.result import Result
 
 
-@dataclass(frozen=True)
-class Description:
+@dataclass(frozen=True, repr=False)
+class Description(Result):
     """Masses and stiffness felt along the direction, frequencies, and the mechanism's dexterity.
 
     effective            masses [kg] and stiffness [N/m]; nan where inapplicable
@@ -60,6 +61,19 @@ class Description:
     def table(self) -> dict[str, list[Any]]:
         """Every single number with its dotted key, in the columns `key` and `value`."""
         return entries(self.document())
+
+    def __repr__(self) -> str:
+        felt = self.effective
+        masses = f"{felt.link_side_mass:.4g} kg link side, {felt.motor_side_mass:.4g} kg motor side"
+        frequencies = ", ".join(f"{f:.4g}" for f in self.natural_frequencies[:8])
+        more = ", ..." if len(self.natural_frequencies) > 8 else ""
+        lines = [
+            f"Description: {felt.rigid_mass:.4g} kg rigid ({masses}), {felt.stiffness:.5g} N/m between",
+            f"natural frequencies {frequencies}{more} Hz",
+        ]
+        if self.manipulability is not None:
+            lines.append(f"manipulability {self.manipulability:.4g}, isotropy {self.isotropy:.4g}")
+        return "\n  ".join(lines)
 
 
 def describe(point: OperatingPoint) -> Description:

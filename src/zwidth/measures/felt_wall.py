@@ -22,13 +22,14 @@ from zwidth.measures.felt import (
     static_stiffness,
 )
 from zwidth.model.arguments import check_number, require
+from zwidth.result import Result
 
 COUNT: Final = 400  # frequencies, from LOWEST of half the sampling frequency up to HIGHEST of it
 LOWEST, HIGHEST = 1e-3, 0.999
 
 
 @dataclass(frozen=True, repr=False)
-class FeltWall:
+class FeltWall(Result):
     """What the hand feels of one wall, of the device without the operator; k frequencies.
 
     wall_stiffness, wall_damping         [N/m], [N s/m]

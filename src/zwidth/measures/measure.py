@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Literal
 
+from zwidth.result import Result
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -100,8 +102,8 @@ class Note:
     first: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class Measured:
+@dataclass(frozen=True, repr=False)
+class Measured(Result):
     """A measure's values over places, all with the places' leading axes.
 
     values  (...)  nan where the status is not OK
@@ -112,6 +114,34 @@ class Measured:
     values: NDArray[np.float64]
     status: NDArray[np.uint8]
     notes: tuple[Note, ...] = ()
+
+    def __float__(self) -> float:
+        """The value of a single point. Raises TypeError for several."""
+        return float(self.values)
+
+    def document(self) -> dict[str, Any]:
+        """Values, nan where there is none, what became of each point in words, and why some have no value."""
+        words = [STATUS[int(one)] for one in self.status.ravel()]
+        notes = [
+            {"status": STATUS[note.status], "reason": note.reason, "count": note.count, "first": list(note.first)}
+            for note in self.notes
+        ]
+        return {"values": self.values.tolist(), "status": words, "shape": list(self.values.shape), "notes": notes}
+
+    def table(self) -> dict[str, list[Any]]:
+        """The values as columns, one point a row, the last axis fastest."""
+        return {"value": self.values.ravel().tolist(), "status": [STATUS[int(one)] for one in self.status.ravel()]}
+
+    def __repr__(self) -> str:
+        words = [STATUS[int(one)] for one in self.status.ravel()]
+        if len(words) == 1:
+            reason = f": {self.notes[0].reason}" if self.notes else ""
+            value = f"{float(self.values.ravel()[0]):.6g}" if words[0] == STATUS[OK] else words[0] + reason
+            return f"Measured: {value}"
+        counted = ", ".join(f"{words.count(word)} {word}" for word in STATUS.values() if word in words)
+        finite = self.values.ravel()[self.status.ravel() == OK]
+        span = f", {finite.min():.6g} to {finite.max():.6g}" if len(finite) else ""
+        return f"Measured: {len(words)} points, {counted}{span}"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
 from .common_area import common_area as common_area
+from .experiment import measure_boundary as measure_boundary
+from .experiment_plan import Plan as Plan
+from .measured_boundary import Experiment as Experiment
 from .plane import plane_of as plane_of
 from .requirement import parse_requirement as parse_requirement
 from .robust import RobustError as RobustError

@@ -10,6 +10,7 @@ from typing import Any
 from zwidth.chart.chart import StabilityChart
 from zwidth.contact.experiment import Edge, EdgePoint, Place
 from zwidth.model.operator import Operator
+from zwidth.result import Result
 from zwidth.study.experiment_plan import Plan
 from zwidth.study.own_points import PointsComparison
 
@@ -92,7 +93,7 @@ class Cause:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Experiment(Result):
     """What was measured.
 
     plan      with the visible amplitude that was used

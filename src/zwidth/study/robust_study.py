@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from zwidth.chart.robust.chart import RobustChart
+from zwidth.result import Result
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Violation:
 
 
 @dataclass(frozen=True)
-class RobustStudy:
+class RobustStudy(Result):
     """A robust chart with who its members are and how far it can be trusted.
 
     chart      of all members

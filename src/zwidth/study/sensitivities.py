@@ -7,6 +7,7 @@ from math import nan
 from typing import Any, Final
 
 from zwidth.chart.peak import Peak
+from zwidth.result import Result
 from zwidth.study.optimum import Kind
 
 COLUMNS: Final = (
@@ -62,8 +63,8 @@ class Group:
     logarithmic: float
 
 
-@dataclass(frozen=True)
-class Sensitivities:
+@dataclass(frozen=True, repr=False)
+class Sensitivities(Result):
     """All of them, with the wall they speak of.
 
     peak      the stiffest wall; None where no wall is stable, and then nothing else is there
@@ -104,6 +105,13 @@ class Sensitivities:
         """The sensitivities as columns, one number a row."""
         rows = self._entries()
         return {column: [row[column] for row in rows] for column in COLUMNS}
+
+    def __repr__(self) -> str:
+        if self.peak is None:
+            return "Sensitivities: no stable wall has K > 0 and B >= 0"
+        first = ", ".join(f"{path} {value:+.4g}" for path, value in self.wholes[:3])
+        stiffest = f"the largest stiffness, {self.peak.stiffness:.6g} N/m, to {len(self.numbers)} numbers"
+        return f"Sensitivities of {stiffest}\n  per cent for one per cent: {first or 'none'}"
 
     def _entries(self) -> list[dict[str, Any]]:
         stiffness = nan if self.peak is None else self.peak.stiffness

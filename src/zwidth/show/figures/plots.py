@@ -141,6 +141,41 @@ def _description(ax: Axes, found: Any) -> None:
     label(ax.xaxis, "Natural frequency", "Hz")
 
 
+def _felt(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.felt import draw_impedance
+
+    felt = np.full(len(found.frequency), np.nan + 0j) if found.impedance is None else found.impedance
+    draw_impedance(ax, found.frequency, felt, found.commanded, found.free_motion)
+
+
+def _experiment(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.experiment import draw_experiment, measured_bars
+
+    draw_experiment(ax, measured_bars(found.points), found.chart)
+
+
+def _limit_cycles(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.limit_cycles import draw_balance
+
+    draw_balance(ax, found.balance)
+
+
+def _couplings(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.guarantees import draw_couplings
+
+    draw_couplings(ax, found)
+
+
+def _contact(ax: Axes, found: Any) -> None:
+    """What the encoders read over time, and where the wall begins; `zwidth simulate --output` draws all panels."""
+    response = found.response
+    ax.plot(response.time, response.reading, color=BLACK, linewidth=1.0, label="counted by the encoders")
+    ax.axhline(response.wall_position, color=GREY, linewidth=0.8, label="wall")
+    label(ax.xaxis, "Time", "s")
+    label(ax.yaxis, "Position", "m")
+    ax.legend(frameon=False, fontsize=8.0)
+
+
 DRAWINGS: Final[dict[str, Draw]] = {
     "Chart": draw_any_chart,
     "RobustChart": _robust,
@@ -152,4 +187,9 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "WallVerdicts": _verdicts,
     "Measured": _measured,
     "Description": _description,
+    "FeltWall": _felt,
+    "Experiment": _experiment,
+    "LimitCyclePrediction": _limit_cycles,
+    "Couplings": _couplings,
+    "ContactSimulation": _contact,
 }

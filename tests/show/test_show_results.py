@@ -1,0 +1,142 @@
+"""Every result: keys and columns, a few lines, a figure, a page of a notebook."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+
+import zwidth
+from zwidth.result import Result
+from zwidth.show.figures.plots import DRAWINGS
+from zwidth.show.output import plain
+
+LINES = 8
+
+
+def device():
+    return zwidth.load("published-two-mass", {"friction.coulomb_N": [0.3, 0.1]}, operator="thesis-arm")
+
+
+def rubbing():
+    return zwidth.load("hapkit-course", {"loop.saturation.force_N": 5.0})
+
+
+def results():
+    point, arms = device().at(), zwidth.load("five-bar")
+    family = zwidth.study.Family(
+        device(), (zwidth.study.Range("operator.arm_mass_kg", 0.3, 1.0),), (), device().at()
+    )
+    plan = zwidth.study.Plan(stiffnesses=2, tips=1)
+    return {
+        "chart": point.chart(),
+        "chart of several directions": arms.at(directions=np.eye(3)[:2]).chart(),
+        "robust chart": zwidth.robust_chart([point.loop, point.without_operator.loop]),
+        "robust study": zwidth.robust_study(family, members=8, unseen=20),
+        "verdicts": point.check([1000.0, 1e5], [5.0, 5.0]),
+        "by direction": arms.at().by_direction(count=8),
+        "description": arms.describe(),
+        "description of a plant": point.describe(),
+        "measured": arms.at([(0.0, 0.25), (0.05, 0.2), (9.0, 9.0)]).measure("isotropy"),
+        "measured once": arms.measure("isotropy"),
+        "bounds": point.bounds(),
+        "guarantees": point.guarantees(coupling=True, wall=(1000.0, 5.0)),
+        "felt": point.felt(1000.0, 5.0),
+        "contact": point.simulate(1000.0, 5.0, duration=0.2),
+        "limit cycles": rubbing().at().limit_cycles(2600.0, 0.0, simulate=False),
+        "boundary": point.without_operator.measure_boundary(plan),
+        "sensitivities": device().sensitivities(),
+    }
+
+
+@pytest.fixture(scope="module")
+def found():
+    return results()
+
+
+NAMES = [
+    "chart",
+    "chart of several directions",
+    "robust chart",
+    "robust study",
+    "verdicts",
+    "by direction",
+    "description",
+    "description of a plant",
+    "measured",
+    "measured once",
+    "bounds",
+    "guarantees",
+    "felt",
+    "contact",
+    "limit cycles",
+    "boundary",
+    "sensitivities",
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_result_knows_its_keys_and_columns(found, name):
+    result = found[name]
+    assert isinstance(result, Result)
+    document = result.document()
+    assert document
+    assert all(isinstance(key, str) for key in document)
+    json.dumps(plain(document), allow_nan=False)
+    table = result.table()
+    assert table
+    assert len({len(column) for column in table.values()}) == 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_result_shows_itself_in_a_few_lines(found, name):
+    text = repr(found[name])
+    assert 1 <= len(text.splitlines()) <= LINES
+    assert max(map(len, text.splitlines())) <= 240
+    assert "array(" not in text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_result_draws_itself_and_stands_in_a_notebook(found, name):
+    result = found[name]
+    figure, ax = pyplot.subplots()
+    assert result.plot(ax) is ax
+    assert ax.lines or ax.collections or ax.patches or ax.images or ax.texts
+    pyplot.close(figure)
+    own = result.plot()
+    assert isinstance(own, Axes)
+    assert own is not ax
+    pyplot.close(own.figure)
+    page = result._repr_html_()
+    assert page.startswith("<pre>")
+    assert "<svg" in page
+
+
+def test_every_kind_of_result_is_tried(found):
+    tried = {kind.__name__ for result in found.values() for kind in type(result).__mro__}
+    assert DRAWINGS.keys() - tried == {"Couplings"}  # which `guarantees` carries
+    kinds = {kind.__name__ for kind in _kinds(Result)}
+    assert kinds - tried - {"Couplings", "MeasuredChart", "MeasuredVerdicts"} == set()
+
+
+def test_what_has_no_drawing_says_so():
+    class Bare(Result):
+        """Nothing."""
+
+    with pytest.raises(TypeError, match="a Bare has no drawing"):
+        Bare().plot()
+
+
+def test_a_single_measure_is_a_number(found):
+    assert math.isclose(float(found["measured once"]), 1.37612507, rel_tol=1e-6)
+
+
+def _kinds(kind):
+    for one in kind.__subclasses__():
+        if one.__module__.startswith("zwidth"):
+            yield one
+            yield from _kinds(one)
