@@ -134,10 +134,17 @@ KINDS = [
         "device must be a Device, got the text 'my.toml'; write load('my.toml')",
     ),
     (
-        lambda: zwidth.workspace_map(device(), "isotropy"),
-        "measures must be a list of names, got the text 'isotropy'; write ['isotropy']",
+        lambda: zwidth.workspace_map(device(), 3),
+        "measures must be a name, a Measure or a list of them, got 3",
     ),
-    (lambda: zwidth.sweep(device()), "study must be a Study or the path of a study file, got a Device"),
+    (
+        lambda: zwidth.run_study(device()),
+        "study must be a Study or the path of a study file, got a Device; write sweep(device, {path: values}, ",
+    ),
+    (
+        lambda: zwidth.sweep("my.toml", {"loop.delay_samples": [1]}, "isotropy"),
+        "device must be a Device, got the text 'my.toml'; write load('my.toml')",
+    ),
     (lambda: zwidth.robust_study(device()), "family must be a Family, got a Device"),
     (
         lambda: evaluate("isotropy", None),

@@ -42,6 +42,7 @@ from .model.response import ResponseError as ResponseError
 from .model.sweep import sweep_response as sweep_response
 from .study.robust import robust_study as robust_study
 from .study.study_file import read_study as read_study
+from .study.sweep import run_study as run_study
 from .study.sweep import sweep as sweep
 from .study.workspace import workspace_map as workspace_map
 

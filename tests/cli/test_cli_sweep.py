@@ -17,7 +17,7 @@ from tests.cli.cli_run import found, refused, strict, zwidth
 from tests.interruption import stopped_by_ctrl_c
 from zwidth.study.store import Store
 from zwidth.study.study_file import read_study
-from zwidth.study.sweep import sweep_job
+from zwidth.study.sweep_job import sweep_job
 
 PAGE = (Path(__file__).parents[2] / "docs" / "studies.md").read_text(encoding="utf-8")
 ZWIDTH = Path(sys.executable).with_name("zwidth")
@@ -280,8 +280,12 @@ def test_the_page_s_study_prints_what_the_page_says(arms):
 
 
 def test_the_page_s_python_runs(arms):
-    (program,) = blocks("python")
-    exec(compile(program, "studies.md", "exec"), {})
+    names: dict[str, object] = {}
+    for program in blocks("python"):
+        exec(compile(program, "studies.md", "exec"), names)
+    results = names["results"]
+    assert isinstance(results, xr.Dataset)
+    assert dict(results.sizes) == {"loop.sampling_period_s": 2, "assembly": 2}
 
 
 def test_the_page_names_every_key():

@@ -8,7 +8,8 @@ import numpy as np
 
 from zwidth.device.faults import DeviceError
 from zwidth.measures.measure import OK
-from zwidth.study.study_file import Study, study_of
+from zwidth.study.study import Study
+from zwidth.study.study_file import study_of
 
 FIVE_BAR, TWO_MASS = "five-bar", "published-two-mass"
 LENGTH, OTHER = "links.upper-right.length_m", "links.upper-left.length_m"

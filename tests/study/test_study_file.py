@@ -137,7 +137,7 @@ def test_files_lie_beside_the_study(tmp_path, monkeypatch):
     found = read_study("studies/study.toml")
     assert found.device.name == "mine"
     assert found.device.operator is not None
-    assert found.asked[0].unit == "kg"
+    assert found.columns[0].unit == "kg"
     operators = axis("operator", "arm.toml", "none", "thesis-arm")
     inner = {**tomllib.loads("\n".join(lines)), "axis": [operators]}
     del inner["operator"]

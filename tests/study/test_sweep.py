@@ -18,7 +18,8 @@ from zwidth.model.effective import effective_parameters
 from zwidth.study.executor import run
 from zwidth.study.store import Store
 from zwidth.study.study_file import study_of
-from zwidth.study.sweep import Sweep, sweep, sweep_job
+from zwidth.study.sweep import Sweep, run_study
+from zwidth.study.sweep_job import sweep_job
 from zwidth.study.workspace import workspace_map
 from zwidth.study.workspace_summary import over_the_workspace
 
@@ -27,7 +28,7 @@ ASSEMBLIES = axis("assembly", "elbows-out", "elbows-in")
 
 
 def asked(*axes, **more) -> Sweep:
-    return sweep(study(*axes, **more), workers=1)
+    return run_study(study(*axes, **more), workers=1)
 
 
 def stiffest(device: Device, *asked, **circumstances) -> float:
@@ -110,7 +111,7 @@ def test_over_the_workspace_a_design_has_what_its_map_has():
     over = ["average", "worst", "best", "uniformity", "variation", "share", "conditioning_index", "isotropy_index"]
     space = {"x_m": [-0.15, 0.15], "y_m": [0.1, 0.4], "count": [5, 4]}
     made = study(LENGTHS, measures=[f"{name}(isotropy)" for name in over], workspace=space, assembly="elbows-in")
-    found = sweep(made, workers=1)
+    found = run_study(made, workers=1)
     assert made.plane is not None
     for n in (0, 3):
         device = load(FIVE_BAR, list(found.design(n).items()))
@@ -118,8 +119,8 @@ def test_over_the_workspace_a_design_has_what_its_map_has():
         assert 0 < (mapped["isotropy_status"] == OK).sum() < 20
         expected = over_the_workspace(mapped, "isotropy", device)
         assert found.cells.values[n].tolist() == [pytest.approx(expected[name], rel=1e-12) for name in over]
-    assert [one.unit for one in made.asked] == [""] * 8
-    assert {one.name: one.better for one in made.asked}["variation(isotropy)"] == "lower"
+    assert [one.unit for one in made.columns] == [""] * 8
+    assert {one.name: one.better for one in made.columns}["variation(isotropy)"] == "lower"
 
 
 def test_a_workspace_out_of_reach_has_no_value_and_says_so():
@@ -160,7 +161,7 @@ def test_a_mechanism_that_moves_no_mass_is_no_device():
     made = study(
         heavy, set=[*[m for m in massless if "upper-left.mass" not in m], *inertia, "links.upper-left.mass_kg=0.3"]
     )
-    found = sweep(made, workers=1)
+    found = run_study(made, workers=1)
     assert found.cells.status.tolist() == [[FAILED], [OK]]
     assert "have a motion that moves no mass" in found.cells.notes[0][0].reason
 
@@ -176,7 +177,7 @@ def test_a_user_s_measure_that_raises_or_returns_the_wrong_shape_fails_in_its_ce
         "    return [1.0, 2.0] if period > 1.5e-3 else period\n"
     )
     document = tables(axis("loop.sampling_period_s", 1e-3, 2e-3, 3e-3), measures=["spoilt", "rigid_mass"])
-    found = sweep(study_of({**document, "measures_file": "own.py"}, str(tmp_path / "study.toml")), workers=1)
+    found = run_study(study_of({**document, "measures_file": "own.py"}, str(tmp_path / "study.toml")), workers=1)
     assert [STATUS[s] for s in found.cells.status[:, 0]] == ["ok", "failed", "failed"]
     assert (found.cells.status[:, 1] == OK).all()
     assert found.cells.values[0, 0] == 1e-3
@@ -188,7 +189,7 @@ def test_a_user_s_measure_that_raises_or_returns_the_wrong_shape_fails_in_its_ce
 def test_a_measure_that_this_device_cannot_be_asked_is_refused_before_anything_is_computed():
     periods = axis("loop.sampling_period_s", range=[1e-3, 2e-3], count=3)
     with pytest.raises(MeasureError) as caught:
-        sweep(study(periods, device=TWO_MASS, measures=["manipulability", "stiffness_max", "isotropy"]))
+        run_study(study(periods, device=TWO_MASS, measures=["manipulability", "stiffness_max", "isotropy"]))
     lines = str(caught.value).splitlines()
     assert [line.split()[0] for line in lines] == ["manipulability", "isotropy"]
     assert "speaks of a mechanism" in lines[0]
@@ -204,7 +205,7 @@ def test_a_measure_that_this_device_cannot_be_asked_is_refused_before_anything_i
 )
 def test_what_a_measure_wants_is_told_by_the_keys_of_a_study(name, more, said):
     with pytest.raises(MeasureError) as caught:
-        sweep(study(axis("plant.mass_kg.0.0", 0.2), device=TWO_MASS, measures=[name], **more))
+        run_study(study(axis("plant.mass_kg.0.0", 0.2), device=TWO_MASS, measures=[name], **more))
     assert str(caught.value).endswith(f"give {said}")
 
 

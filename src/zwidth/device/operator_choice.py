@@ -35,10 +35,15 @@ def held_by(document: dict[str, Any], operator: Operator | str | os.PathLike[str
     """
     if operator is None:
         return document
-    without = {key: value for key, value in document.items() if key != "operator"}
     if isinstance(operator, Operator):
-        return without | {"operator": table_of(operator)}
-    return without if operator == NOBODY else without | {"operator": operator_table(operator)}
+        return with_operator(document, table_of(operator))
+    return with_operator(document, None if operator == NOBODY else operator_table(operator))
+
+
+def with_operator(document: dict[str, Any], table: dict[str, Any] | None) -> dict[str, Any]:
+    """A device's document with this [operator]; None: with nobody."""
+    without = {key: value for key, value in document.items() if key != "operator"}
+    return without if table is None else without | {"operator": table}
 
 
 def table_of(operator: Operator) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from typing import Any, Final
 DATA: Final = (".csv", ".json")
 FIGURES: Final = (".png", ".svg", ".pdf")
 ARRAYS: Final = (".nc", ".mat")  # what `dataset.write_dataset` writes: maps and sweeps
+FOLDERS: Final = (".zarr",)  # what `dataset.write_zarr` writes; one that is there is never replaced
 
 
 class OutputError(Exception):
@@ -82,6 +83,8 @@ def destination(file: str | os.PathLike[str], kinds: Collection[str]) -> Path:
 
 
 def _check_place(path: Path, name: str) -> None:
+    if path.suffix.lower() in FOLDERS and path.exists():
+        raise OutputError(f"{shown(name)}: is there already; remove it, or name another")
     if path.is_dir():
         raise OutputError(f"{shown(name)}: is a directory; name a file in it")
     if not path.parent.is_dir():

@@ -12,9 +12,10 @@ from .robust_study import RobustStudy as RobustStudy
 from .sensitivities import Sensitivities as Sensitivities
 from .sensitivity import sensitivities as sensitivities
 from .store import Store as Store
-from .study_file import Study as Study
+from .study import Study as Study
 from .study_file import read_study as read_study
 from .sweep import Sweep as Sweep
+from .sweep import run_study as run_study
 from .sweep import sweep as sweep
 from .validity import Validity as Validity
 from .validity import validity as validity

@@ -1,11 +1,11 @@
-"""What a study asks of each design: a measure at its operating point, or over its workspace."""
+"""Columns of a study: a measure of each design at its operating point, or over its workspace."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from zwidth.device.faults import listed, nearest
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure, Measured
 from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
+from zwidth.model.arguments import refusal
 from zwidth.study.workspace_summary import CONDITIONS
 
 if TYPE_CHECKING:
@@ -35,12 +36,12 @@ OF: Final = {"conditioning_index": CONDITIONS, "isotropy_index": ("isotropy",)} 
 
 
 @dataclass(frozen=True)
-class Asked:
-    """One column of a study.
+class Column:
+    """What a study asks of each design.
 
     name     as written: "stiffness_max", "worst(isotropy)"
     measure  the one asked cell by cell
-    over     what is made of its values over the workspace; None: asked at one point
+    over     what is made of its values over the workspace; None: asked at the operating point
     """
 
     name: str
@@ -68,7 +69,7 @@ class Asked:
     def key(self) -> str:
         """The name with its unit, as a table's column carries it.
 
-        >>> asked("worst(stiffness_max)").key
+        >>> column_named("worst(stiffness_max)").key
         'worst_stiffness_max_N_per_m'
         """
         if self.over is None:
@@ -103,19 +104,19 @@ class Asked:
         return value, status, next((note.reason for note in found.notes if note.status == status), "")
 
 
-def asked(name: str, own: Mapping[str, Measure] | None = None) -> Asked:
-    """What is asked by a name, such as "isotropy" or "average(isotropy)".
+def column_named(name: str, own: Mapping[str, Measure] | None = None) -> Column:
+    """The column of a name, such as "isotropy" or "average(isotropy)".
 
     own     measures of a user's own, by name
     Raises  ValueError  naming the nearest, where there is none
 
-    >>> asked("average(isotropy)").measure.name
+    >>> column_named("average(isotropy)").measure.name
     'isotropy'
     """
     parts = re.fullmatch(r"\s*(\w+)\s*\(\s*([^()]*?)\s*\)\s*", name)
     if parts is None:
         measure = find_measure(name.strip(), own)
-        return Asked(measure.name, measure)
+        return Column(measure.name, measure)
     over, inner = parts.groups()
     if over not in OVER:
         near = nearest(over, OVER)
@@ -128,4 +129,19 @@ def asked(name: str, own: Mapping[str, Measure] | None = None) -> Asked:
         )
     if measure.name not in OF.get(over, (measure.name,)):
         raise ValueError(f"{over}({measure.name}): is of {listed(OF[over])} only; ask for average({measure.name})")
-    return Asked(f"{over}({measure.name})", measure, over)
+    return Column(f"{over}({measure.name})", measure, over)
+
+
+def measures_listed(measures: Any) -> list[str | Measure]:
+    """One measure or several, by name or themselves, as a list. Raises TypeError for anything else.
+
+    >>> measures_listed("isotropy")
+    ['isotropy']
+    """
+    listed = [measures] if isinstance(measures, str | Measure) else measures
+    if not isinstance(listed, list | tuple):
+        raise refusal("measures", "a name, a Measure or a list of them", measures)
+    for one in listed:
+        if not isinstance(one, str | Measure):
+            raise refusal("measures", "a name, a Measure or a list of them", one)
+    return list(listed)

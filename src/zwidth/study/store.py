@@ -11,6 +11,7 @@ there wholly or not at all, and the status is written last.
 
 from __future__ import annotations
 
+import os
 import secrets
 import shutil
 from collections.abc import Iterator
@@ -157,3 +158,8 @@ class Store:
                 f"{wanted / 1e9:.3g} GB of disk, of {free / 1e9:.3g} GB that are free; ask for fewer, or name a "
                 "folder on another disk"
             )
+
+
+def store_for(job: Job, store: Store | str | os.PathLike[str] | None) -> Store | None:
+    """A job's store: as it is, or in the folder of that name; None: none. Raises what `Store` does."""
+    return Store(Path(store), job) if isinstance(store, str | os.PathLike) else store

@@ -79,7 +79,7 @@ class WorkspaceSection(Section):
 
 
 class OptimiseSection(Section):
-    """What `zwidth optimise` wants of the same file; a sweep does without."""
+    """What an optimiser wants of the same file; a sweep does without."""
 
     objectives: dict[Text, Literal["max", "min"]] = quantity('measure -> "max" or "min"', default={})
     constraints: dict[Text, Text] = quantity('measure -> such as "<= 0.3"', default={})
@@ -108,7 +108,7 @@ class StudyFile(Section):
     damping_Ns_per_m: Number | None = quantity("of the wanted wall", "N s/m", ge=0, default=None)
     frequency_Hz: Number | None = quantity("at which the hand moves", "Hz", gt=0, default=None)
     workspace: WorkspaceSection | None = quantity("for measures over a workspace", default=None)
-    optimise: OptimiseSection | None = quantity("for `zwidth optimise`", default=None)
+    optimise: OptimiseSection | None = quantity("for an optimiser", default=None)
 
 
 _TABLES: Final[dict[str, Any]] = {

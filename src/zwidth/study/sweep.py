@@ -1,249 +1,43 @@
-"""Measures of many designs of one device.
+"""Measures of many designs of one device: from Python, or as a study file says.
 
-    found = sweep("study.toml")
-    found.dataset()["stiffness_max"]
-
-Each design is the device file with a few numbers changed, checked and built like any other. One that is no device,
-or cannot get where it is asked about, has a status instead of values, and the others keep theirs.
+sweep(device, {"loop.sampling_period_s": [0.0005, 0.001]}, ["stiffness_max", "isotropy"])["stiffness_max"]
+run_study("study.toml").dataset()["stiffness_max"]
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from zwidth.device import address
-from zwidth.device.assembled import moves_mass
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.evaluate import answered, evaluate
-from zwidth.measures.measure import (
-    FAILED,
-    NO_VALUE,
-    OK,
-    OUT_OF_REACH,
-    SINGULAR,
-    Measure,
-    MeasureError,
-    Note,
-    WantedWall,
-)
+from zwidth.measures.measure import OK, STATUS, Measure
 from zwidth.model.arguments import refusal
-from zwidth.model.posture import OutOfReach, PostureError, Singular
-from zwidth.study.axes import CIRCUMSTANCES, WANTED, Sampling, settings
-from zwidth.study.column import Asked
+from zwidth.study.axes import settings
 from zwidth.study.executor import Progress, run
 from zwidth.study.job import Cells
-from zwidth.study.journal import fingerprint
-from zwidth.study.study_file import Study, read_study
-from zwidth.study.workspace_summary import areas
+from zwidth.study.plane import Plane
+from zwidth.study.store import Store, store_for
+from zwidth.study.study import Study
+from zwidth.study.study_arguments import study_over
+from zwidth.study.study_file import read_study
+from zwidth.study.sweep_data import as_dataset, reasons, sweep_document, sweep_table
+from zwidth.study.sweep_job import SweepJob, sweep_job
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike
 
-    from zwidth.study.store import Store
+    from zwidth.loop.operating_point import Position
 
-NAMES: Final = dict(zip(WANTED, ("stiffness", "damping", "frequency"), strict=True))
-
-
-class _NoPoint(Exception):
-    """A design that cannot be asked anything: its status, and why."""
-
-    def __init__(self, status: int, reason: str = "") -> None:
-        self.status, self.reason = status, reason
+NONE: Final = "no design has a value"
+SHOWN: Final = 3  # columns of a repr
 
 
-@dataclass(frozen=True)
-class SweepJob:
-    """The designs of a study as cells; columns are what is asked.
-
-    document   of the device, the study's changes made
-    label      of the device, for messages
-    operators  as in `Study`
-    positions  (..., 3) of the workspace [m]; None where nothing is asked over it
-    weights    (...) what each of them stands for [m^2]
-    fixed      circumstances that no axis sets
-    """
-
-    document: dict[str, Any]
-    label: str
-    operators: dict[str, Any]
-    sampling: Sampling
-    asked: tuple[Asked, ...]
-    positions: NDArray[np.float64] | None
-    weights: NDArray[np.float64] | None
-    fixed: dict[str, Any]
-    _last: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_last": {}}
-
-    @property
-    def count(self) -> int:
-        """Number of designs."""
-        return self.sampling.count
-
-    @property
-    def measures(self) -> tuple[str, ...]:
-        """Columns, as they are written in the study."""
-        return tuple(one.name for one in self.asked)
-
-    @property
-    def question(self) -> str:
-        """What its results are known by. Raises TypeError for a measure whose function has no name elsewhere."""
-        return fingerprint(
-            "sweep", self.document, self.operators, self.sampling, self.asked, self.positions, self.fixed
-        )
-
-    def compute(self, first: int, last: int) -> Cells:
-        """Designs first to last - 1."""
-        shape = last - first, len(self.asked)
-        values, status = np.full(shape, np.nan), np.empty(shape, dtype=np.uint8)
-        seen: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.asked]
-        for row in range(last - first):
-            for column, (value, what, reason) in enumerate(self._row(first + row)):
-                values[row, column], status[row, column] = value, what
-                if reason:
-                    seen[column].setdefault((what, reason), []).append(first + row)
-        notes = [tuple(Note(*key, len(at), (at[0],)) for key, at in kinds.items()) for kinds in seen]
-        return Cells(values, status, tuple(notes))
-
-    def design(self, number: int) -> Design:
-        """One of the designs, with the operating points that it is asked about."""
-        return Design(self, number)
-
-    def _row(self, number: int) -> Iterator[tuple[float, int, str]]:
-        """Value, status and reason of each column."""
-        design = self.design(number)
-        for one in self.asked:
-            try:
-                point = design.point() if one.over is None else design.workspace()
-            except _NoPoint as none:
-                yield np.nan, none.status, none.reason
-                continue
-            yield _answer(one, one.measure.at_wall(design.wall), point, self.weights)
-
-    @cached_property
-    def _in_mechanism(self) -> frozenset[str]:
-        """The axes and tied numbers that stand in [mechanism]."""
-        keys = {key for axis in self.sampling.axes for key in (axis.key, *(tie.key for tie in axis.ties))}
-        own = keys - {*CIRCUMSTANCES}
-        return frozenset(key for key in own if address.resolve(self.document, key)[0] == "mechanism")
-
-    def of_mechanism(self, chosen: dict[str, Any]) -> list[tuple[str, Any]]:
-        """What of a design changes the mechanism."""
-        return [(key, value) for key, value in chosen.items() if key in self._in_mechanism]
-
-    def device(self, chosen: dict[str, Any]) -> Device:
-        """The device with its axes' values; kept until another is asked for. Raises DeviceError."""
-        own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
-        key = (chosen.get("operator"), own)
-        if self._last.get("key") != key:
-            document = self.document
-            if "operator" in chosen:
-                operator = self.operators[chosen["operator"]]
-                document = {k: v for k, v in document.items() if k != "operator"}
-                document |= {} if operator is None else {"operator": operator}
-            document = address.assign_all(document, own)
-            # whether it can be put together shows where its posture is solved, which takes a tenth of the time
-            self._last.update(key=key, device=from_document(document, self.label, put_together=True))
-        return self._last["device"]  # type: ignore[no-any-return]
-
-
-class Design:
-    """One design; its operating points are solved once, when they are first asked for."""
-
-    def __init__(self, job: SweepJob, number: int) -> None:
-        self.job = job
-        self.chosen = dict(settings(job.sampling.axes, job.sampling.values(number)))
-        self.known: dict[str, OperatingPoint | _NoPoint] = {}
-
-    @property
-    def wall(self) -> WantedWall:
-        """The wanted wall."""
-        return WantedWall(**{NAMES[key]: self._circumstance(key) for key in WANTED})
-
-    def point(self) -> OperatingPoint:
-        """The posture asked about. Raises _NoPoint."""
-        return self._solved("point", self._circumstance("at"))
-
-    def workspace(self) -> OperatingPoint:
-        """All postures of the workspace. Raises _NoPoint."""
-        return self._solved("workspace", self.job.positions)
-
-    def _solved(self, name: str, positions: Any) -> OperatingPoint:
-        if name not in self.known:
-            try:
-                self.known[name] = self._solve(name, positions)
-            except _NoPoint as none:
-                self.known[name] = none
-        found = self.known[name]
-        if isinstance(found, _NoPoint):
-            raise found
-        return found
-
-    def _solve(self, name: str, positions: Any) -> OperatingPoint:
-        try:
-            device = self.job.device(self.chosen)
-            assembly = self._circumstance("assembly")
-            # what changes the computer or the operator alone leaves the posture as it is
-            same = name, self._circumstance("at"), assembly, self.job.of_mechanism(self.chosen)
-            known = self.job._last.get(name, (None, None))
-            point = device.at(
-                known[1] if known[0] == same else positions,
-                self._circumstance("direction"),
-                assembly=assembly,
-                model=self._circumstance("model"),
-            )
-            if known[0] != same:
-                if point.posture is not None and not moves_mass(point.posture):
-                    from_document(device.document, device.label)  # says what is wrong
-                self.job._last[name] = same, point.posture
-        except OutOfReach as error:
-            raise _NoPoint(OUT_OF_REACH) from error
-        except Singular as error:
-            raise _NoPoint(SINGULAR) from error
-        except (PostureError, DeviceError) as error:
-            raise _NoPoint(FAILED, _said(error)) from error
-        except ValueError as error:
-            raise _NoPoint(FAILED, str(error)) from error
-        return point
-
-    def _circumstance(self, key: str) -> Any:
-        return self.chosen.get(key, self.job.fixed.get(key))
-
-
-def _said(error: Exception) -> str:
-    if not isinstance(error, DeviceError):
-        return str(error)
-    return "; ".join(": ".join(filter(None, (fault.key, fault.message))) for fault in error.faults)
-
-
-def _answer(
-    one: Asked, measure: Measure, point: OperatingPoint, weights: NDArray[np.float64] | None
-) -> tuple[float, int, str]:
-    """Value, status and reason of one column; its measure is about the design's wanted wall."""
-    try:
-        if one.over is not None:
-            return one.reduced(evaluate(measure, point), point, weights)
-        if measure.each:
-            status = int(point.status)
-            return (np.nan, status, "") if status != OK else answered(lambda: measure.compute(point))
-        found = evaluate(measure, point)
-    except MeasureError as error:
-        return np.nan, NO_VALUE, error.spelled(as_key)
-    return float(found.values), int(found.status), found.notes[0].reason if found.notes else ""
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Sweep:
     """A study and what came of it.
 
@@ -254,80 +48,134 @@ class Sweep:
     job: SweepJob
     cells: Cells
 
+    def __repr__(self) -> str:
+        axes = ", ".join(axis.key for axis in self.job.sampling.axes)
+        lines = [f"Sweep: {self.job.count} designs of {self.study.device.label!r} over {axes}"]
+        lines += [self._extremes(n) for n in range(len(self.job.columns))][:SHOWN]
+        more = len(self.job.columns) - SHOWN
+        return "\n  ".join([*lines, f"and {more} more"] if more > 0 else lines)
+
+    @property
+    def reason(self) -> str | None:
+        """Why no design has a value: the first reason told, or else what became of them; None where one has."""
+        if (self.cells.status == OK).any():
+            return None
+        told = [sentence for _, sentence in reasons(self)]
+        return f"{NONE}: {told[0] if told else ', '.join(STATUS[int(k)] for k in np.unique(self.cells.status))}"
+
     def design(self, number: int) -> dict[str, Any]:
         """Path -> value of all that makes a design."""
         sampling = self.job.sampling
         return dict(settings(sampling.axes, sampling.values(number)))
 
     def dataset(self) -> xr.Dataset:
-        """The values over the axes, with units and what was asked; see `sweep_data`."""
-        from zwidth.study.sweep_data import as_dataset
-
+        """The values over the axes, with units and what was asked; see `sweep_data.as_dataset`."""
         return as_dataset(self)
+
+    def document(self) -> dict[str, Any]:
+        """The designs and what came of each by key, lists of one entry for each design."""
+        return sweep_document(self)
+
+    def table(self) -> dict[str, list[Any]]:
+        """The designs as columns, one design a row."""
+        return sweep_table(self)
+
+    def _extremes(self, column: int) -> str:
+        one, values = self.job.columns[column], self.cells.values[:, column]
+        there = values[self.cells.status[:, column] == OK]
+        span = f"{there.min():.4g} to {there.max():.4g} {one.unit}".rstrip() + ", " if len(there) else ""
+        return f"{one.name}: {span}{len(there)} of {len(values)} have a value"
 
 
 def sweep(
+    device: Device,
+    axes: Mapping[str, Sequence[Any] | ArrayLike],
+    measures: str | Measure | Sequence[str | Measure],
+    *,
+    position: Position | None = None,
+    direction: Sequence[float] | None = None,
+    assembly: str | None = None,
+    model: str | None = None,
+    stiffness: float | None = None,
+    damping: float | None = None,
+    frequency: float | None = None,
+    plane: Plane | None = None,
+    own: Mapping[str, Measure] | None = None,
+    store: Store | str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> xr.Dataset:
+    """Measures of a device with every combination of other numbers.
+
+        sweep(device, {"loop.sampling_period_s": [0.0005, 0.001]}, ["stiffness_max", "isotropy"])
+
+    axes       path -> values, as in `Device.with_`; or a circumstance -> values: at, direction, assembly, model,
+               operator (names, files, "none"), and of the wanted wall stiffness_N_per_m, damping_Ns_per_m and
+               frequency_Hz
+    measures   one or several: names such as "isotropy" or, over the workspace, "average(isotropy)"; or measures
+    position, direction, assembly, model    of all designs, as for `Device.at`
+    stiffness, damping, frequency           of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures
+                                            about them
+    plane      the workspace, for measures over it (`study.plane.plane_of`); left out: 15 by 15 points of the
+               device's own
+    own        measures of a user's own, by name (`measures.user_measures.load_measures`)
+    store      a folder that keeps what is done, so that the same call goes on from there after it was stopped
+    progress   is called with what is done now, how many designs are done, and how many there are
+    workers    processes at most; left out: one for each core
+    Returns    a dataset with a dimension for each axis, called as it is: for each measure its values, nan where a
+               design has none, and NAME_status. Why they have none stands in the attribute `notes`
+    Raises     DeviceError   with all faults of what was given
+               MeasureError  for measures that cannot be asked of this device
+               TooLarge      where the designs would not fit into memory
+               TypeError     for arguments of another kind
+               what `executor.run` and `Store` raise
+    """
+    study = study_over(
+        device,
+        axes,
+        measures,
+        position=position,
+        direction=direction,
+        assembly=assembly,
+        model=model,
+        stiffness=stiffness,
+        damping=damping,
+        frequency=frequency,
+        plane=plane,
+        own=own,
+    )
+    job = sweep_job(study)
+    return compute_designs(study, job, store_for(job, store), progress, workers).dataset()
+
+
+def run_study(
     study: Study | str | os.PathLike[str],
-    store: Store | None = None,
+    store: Store | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
 ) -> Sweep:
     """Compute a study, read by `read_study` or named by its file.
 
+    store, progress, workers  as for `sweep`
     Raises  DeviceError   with all faults of the study's file and the device's
             MeasureError  for measures that cannot be asked of this device
-            what `executor.run` raises
+            TooLarge      where the designs would not fit into memory
+            what `executor.run` and `Store` raise
     """
     if not isinstance(study, Study | str | os.PathLike):
-        raise refusal("study", "a Study or the path of a study file", study)
+        hint = "write sweep(device, {path: values}, measures)" if isinstance(study, Device) else ""
+        raise refusal("study", "a Study or the path of a study file", study, hint)
     study = study if isinstance(study, Study) else read_study(study)
     job = sweep_job(study)
+    return compute_designs(study, job, store_for(job, store), progress, workers)
+
+
+def compute_designs(
+    study: Study,
+    job: SweepJob,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> Sweep:
+    """Compute the designs of a study as its job; see `executor.run` for the rest."""
     return Sweep(study, job, run(job, store, progress, workers, stage="computing designs"))
-
-
-def sweep_job(study: Study) -> SweepJob:
-    """The question that `sweep` asks, so that a store can be made for it.
-
-    Raises  MeasureError  for measures that cannot be asked of this device, all of them
-    """
-    wanted = {key: getattr(study.wall, name) for key, name in NAMES.items()}
-    told = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
-    fixed = {key: value for key, value in told.items() if value is not None}
-    plane = study.plane
-    positions, weights = (None, None) if plane is None else (plane.positions, areas(plane.x, plane.y))
-    # what a device's numbers come from is told of the study; it need not be read again for each design
-    document = {key: value for key, value in study.device.document.items() if key != "sources"}
-    asked, designs = study.asked, study.sampling
-    job = SweepJob(document, study.device.label, study.operators, designs, asked, positions, weights, fixed)
-    _check_measures(job)
-    return job
-
-
-def _check_measures(job: SweepJob) -> None:
-    """Raises MeasureError where a measure can be asked of no design, as far as a few of them tell."""
-    pending, refused = job.asked, dict[str, str]()
-    for number in sorted({0, job.count // 2, job.count - 1}):
-        design = job.design(number)
-        try:
-            point = design.point()
-        except _NoPoint:
-            continue
-        refused = {}
-        for one in pending:
-            try:
-                evaluate(one.measure.at_wall(design.wall), point)
-            except MeasureError as error:
-                refused[one.name] = error.spelled(as_key)
-        pending = tuple(one for one in pending if one.name in refused)
-    if refused:
-        raise MeasureError("\n".join(f"{name} {why}" for name, why in refused.items()))
-
-
-def as_key(name: str, value: str | None) -> str:
-    """An argument as a study's file spells it.
-
-    >>> as_key("stiffness", None), as_key("model", "rigid")
-    ('stiffness_N_per_m', 'model = "rigid"')
-    """
-    key = next((key for key, argument in NAMES.items() if argument == name), name)
-    return key if value is None else f'{key} = "{value}"'

@@ -1,4 +1,4 @@
-"""A study's results as labelled arrays, and as rows."""
+"""A study's results as labelled arrays, as a document, and as a table."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def as_dataset(found: Sweep) -> xr.Dataset:
     grid = sampling.size is None
     dims = tuple(axis.key for axis in sampling.axes) if grid else (DESIGN,)
     data: dict[str, Any] = {}
-    for n, one in enumerate(found.job.asked):
+    for n, one in enumerate(found.job.columns):
         about = {
             "unit": one.unit,
             "units": one.unit,
@@ -44,7 +44,7 @@ def as_dataset(found: Sweep) -> xr.Dataset:
             "source": one.measure.source,
             "better": one.better or "",
             "key": one.key,
-            "notes": "\n".join(sentence(found, note) for note in found.cells.notes[n]),
+            "notes": "\n".join(_sentence(found, note) for note in found.cells.notes[n]),
         }
         data[one.name] = (dims, found.cells.values[:, n].reshape(sampling.shape), about)
         data[f"{one.name}_status"] = (dims, found.cells.status[:, n].reshape(sampling.shape), _flags())
@@ -88,29 +88,50 @@ def label(value: Any) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
-def status_texts(found: Sweep) -> list[dict[str, str]]:
-    """What became of each design: column -> as in `measures.measure.STATUS`."""
-    names = found.job.measures
-    return [{name: STATUS[int(s)] for name, s in zip(names, row, strict=True)} for row in found.cells.status]
+def sweep_document(found: Sweep) -> dict[str, Any]:
+    """The designs, and what came of each measure in them, by key and unit; see `Sweep.document`."""
+    sampling, names = found.job.sampling, found.job.measures
+    status = ([STATUS[int(s)] for s in row] for row in found.cells.status)
+    return {
+        "sampling": "grid" if sampling.size is None else "latin-hypercube",
+        "seed": None if sampling.size is None else sampling.seed,
+        "axes": [
+            {"key": axis.key, "unit": axis.unit or None}
+            | ({"values": axis.values} if sampling.size is None or axis.span is None else {"range": axis.span})
+            | {"tied": [tie.key for tie in axis.ties]}
+            for axis in sampling.axes
+        ],
+        "units": {column.name: column.unit or None for column in found.job.columns},
+        "designs": [found.design(n) for n in range(found.job.count)],
+        "values": [dict(zip(names, map(float, row), strict=True)) for row in found.cells.values],
+        "status": [dict(zip(names, row, strict=True)) for row in status],
+        "notes": [f"{name}: {sentence}" for name, sentence in reasons(found)],
+    }
 
 
-def rows(found: Sweep) -> dict[str, list[Any]]:
+def sweep_table(found: Sweep) -> dict[str, list[Any]]:
     """Column -> one entry for each design: all that makes it, the values under names with units, the status."""
     designs = [found.design(n) for n in range(found.job.count)]
     made = {path: [_cell(design[path]) for design in designs] for path in (designs[0] if designs else {})}
-    columns = {one.key: list(found.cells.values[:, n]) for n, one in enumerate(found.job.asked)}
+    columns = {one.key: list(found.cells.values[:, n]) for n, one in enumerate(found.job.columns)}
     status = {
         f"{one.name}_status": [STATUS[int(s)] for s in found.cells.status[:, n]]
-        for n, one in enumerate(found.job.asked)
+        for n, one in enumerate(found.job.columns)
     }
     return made | columns | status
+
+
+def reasons(found: Sweep) -> Iterator[tuple[str, str]]:
+    """Name of a column, and why designs have no value in it: a sentence for each reason."""
+    for name, notes in zip(found.job.measures, found.cells.notes, strict=True):
+        yield from ((name, _sentence(found, note)) for note in notes)
 
 
 def _cell(value: Any) -> Any:
     return json.dumps(value) if isinstance(value, list | tuple) else value
 
 
-def sentence(found: Sweep, note: Note) -> str:
+def _sentence(found: Sweep, note: Note) -> str:
     """A reason, how many designs it is of, and the first of them."""
     sampling = found.job.sampling
     values = sampling.values(note.first[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,17 +16,17 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.evaluate import evaluate
 from zwidth.measures.measure import OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note, WantedWall
-from zwidth.model.arguments import refusal, require
+from zwidth.model.arguments import require
+from zwidth.study.column import measures_listed
 from zwidth.study.executor import Progress, run
 from zwidth.study.job import Cells
 from zwidth.study.journal import fingerprint
 from zwidth.study.plane import Plane, PlaneError, plane_of, reach_of
+from zwidth.study.store import Store, store_for
 from zwidth.study.worst import EXTREMES, along_extreme, sense
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from zwidth.study.store import Store
 
 Direction = Sequence[float] | str | None
 COMPONENTS: Final = ("x", "y", "z")
@@ -34,7 +35,7 @@ FEWEST: Final = 512
 BATCHES: Final = 16
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MapJob:
     """The cells of a map: rows of the plane's grid one after the other; columns are measures.
 
@@ -50,6 +51,10 @@ class MapJob:
     assembly: str | None = None
     model: str | None = None
     wall: WantedWall = WantedWall()  # noqa: RUF009  frozen
+
+    def __repr__(self) -> str:
+        ny, nx = self.plane.shape
+        return f"MapJob: {', '.join(self.measures)} of {self.device.label!r} in {nx} x {ny} cells"
 
     @property
     def count(self) -> int:
@@ -126,7 +131,7 @@ class MapJob:
 
 def workspace_map(
     device: Device,
-    measures: Sequence[str | Measure],
+    measures: str | Measure | Sequence[str | Measure],
     plane: Plane | None = None,
     direction: Direction = None,
     assembly: str | None = None,
@@ -134,18 +139,21 @@ def workspace_map(
     wall: WantedWall | None = None,
     *,
     own: Mapping[str, Measure] | None = None,
-    store: Store | None = None,
+    store: Store | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
 ) -> xr.Dataset:
     """Measures over a plane of a device's workspace.
 
-    measures   names, or measures themselves
+    measures   one or several: names, or measures themselves
     plane      left out: `plane_of(device)`
     direction  rendered in every cell; "worst" or "best": in each cell the direction in which the measure is so,
                "lowest" or "highest": in which it is so; left out: the file's
     wall       the wanted wall, for measures that are about one
     own        measures of a user's own, by name (`measures.user_measures.load_measures`)
+    store      a folder that keeps what is done, so that the same call goes on from there after it was stopped
+    progress   is called with "mapping", cells done, and cells of all
+    workers    processes at most; left out: one for each core
     Returns    a dataset over (y_m, x_m): for each measure NAME its values, nan where there is none, NAME_status,
                and with an extreme direction NAME_direction (y_m, x_m, component). Why cells have no value stands
                in the attribute `notes`, a line for each reason
@@ -153,15 +161,15 @@ def workspace_map(
                ValueError    for an unknown measure, or two of one name
                MeasureError  for a measure that cannot be asked of this device
                DeviceError   as `Device.at` does
-               what `executor.run` raises
+               what `executor.run` and `Store` raise
     """
     job = map_job(device, measures, plane, direction, assembly, model, wall, own=own)
-    return as_dataset(job, run(job, store, progress, workers, batch=job.batch, stage="mapping"))
+    return as_dataset(job, run(job, store_for(job, store), progress, workers, batch=job.batch, stage="mapping"))
 
 
 def map_job(
     device: Device,
-    measures: Sequence[str | Measure],
+    measures: str | Measure | Sequence[str | Measure],
     plane: Plane | None = None,
     direction: Direction = None,
     assembly: str | None = None,
@@ -172,10 +180,7 @@ def map_job(
 ) -> MapJob:
     """The question that `workspace_map` asks, checked, so that a store can be made for it."""
     require("device", device, Device)
-    if isinstance(measures, str | Measure):
-        hint = f"write [{measures!r}]" if isinstance(measures, str) else "write it in a list"
-        raise refusal("measures", "a list of names", measures, hint)
-    asked = tuple(one if isinstance(one, Measure) else find_measure(one, own) for one in measures)
+    asked = tuple(one if isinstance(one, Measure) else find_measure(one, own) for one in measures_listed(measures))
     names = [one.name for one in asked]
     if not names or len(set(names)) < len(names):
         raise ValueError(f"a map has measures of different names, got {', '.join(names) or 'none'}")
@@ -238,6 +243,11 @@ def as_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
     if any("component" in variable[0] for variable in data.values()):
         coordinates["component"] = list(COMPONENTS)
     return xr.Dataset(data, coordinates, _circumstances(job))
+
+
+def measures_of(dataset: xr.Dataset) -> list[str]:
+    """Names of the measures that a map holds, in its order."""
+    return [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
 
 
 def reachable(dataset: xr.Dataset, name: str) -> NDArray[np.bool_]:

@@ -66,7 +66,7 @@ class Case:
 
 
 class Command:
-    """A command about one device at one operating point.
+    """A command about one device at one operating point, or about what else `about` says.
 
     Its docstring is the command's help.
 
@@ -92,6 +92,10 @@ class Command:
     of_responses: ClassVar[bool] = False
 
     # --- what a command says of itself ----------------------------------------------------------------
+
+    def about(self, command: Callable[..., int]) -> Callable[..., int]:
+        """Decorate it with the arguments and options of what it is about, which make its `Question`."""
+        return about_a_device(command)
 
     def check(self, case: Case) -> None:
         """Refuse options that do not go together, before anything is loaded. Raises BadInput."""
@@ -204,10 +208,14 @@ class Command:
         case = replace(case, options={**options, **self.parse(case)})
         return deliver(self.answer(case), as_json)
 
+    def epilog(self) -> str:
+        """What stands below its help."""
+        return example(*self.examples)
+
     def for_click(self) -> click.Command:
         """The command as click knows it."""
         decorators: list[Callable[[Any], Any]] = [
-            about_a_device,
+            self.about,
             *self.options,
             *([output_option(self.output_help)] if self.outputs else []),
             as_json,
@@ -220,4 +228,4 @@ class Command:
         command: Any = run
         for decorate in reversed(decorators):
             command = decorate(command)
-        return click.command(self.name, short_help=self.summary, epilog=example(*self.examples))(command)
+        return click.command(self.name, short_help=self.summary, epilog=self.epilog())(command)

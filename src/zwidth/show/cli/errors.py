@@ -22,6 +22,10 @@ class BadInput(Exception):
         super().__init__("\n".join(lines))
 
 
+class Stopped(Exception):
+    """A run that could not be finished, through no fault of what was asked; the text says why."""
+
+
 def explain(error: Exception) -> tuple[list[str], int]:
     """The lines for standard error, and the exit code."""
     match error:
@@ -29,6 +33,8 @@ def explain(error: Exception) -> tuple[list[str], int]:
             return [str(fault) for fault in error.faults], BAD_INPUT
         case BadInput():
             return [shown(line) for line in error.lines], BAD_INPUT
+        case Stopped():
+            return [f"zwidth: {error}"], INTERNAL
         case OutputError():
             return [str(error)], BAD_INPUT
         case click.Abort():

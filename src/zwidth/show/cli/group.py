@@ -27,7 +27,7 @@ from zwidth.show.cli.schema import schema
 from zwidth.show.cli.sensitivity import SensitivityCommand
 from zwidth.show.cli.show import Show
 from zwidth.show.cli.simulate import Simulate
-from zwidth.show.cli.sweep import sweep
+from zwidth.show.cli.sweep import SweepCommand
 
 EPILOG = """\b
 Example:
@@ -58,7 +58,7 @@ COMMANDS = (
     Check(),
     Polar(),
     map_command,
-    sweep,
+    SweepCommand(),
     Report(),
     SensitivityCommand(),
     Felt(),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.errors import BadInput, Stopped
 from zwidth.show.cli.options import Command, named
 from zwidth.show.cli.process import say, stopped_in_a_kernel
 from zwidth.show.output import shown
@@ -17,10 +17,6 @@ from zwidth.show.output import shown
 if TYPE_CHECKING:
     from zwidth.study.job import Job
     from zwidth.study.store import Store
-
-
-class Stopped(Exception):
-    """A run that could not be finished, through no fault of what was asked; the text says why."""
 
 
 def kept_options(command: Command) -> Command:

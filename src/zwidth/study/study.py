@@ -1,0 +1,230 @@
+"""A study: many designs of one device, and what is asked of each; checked, whoever describes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import prod
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from zwidth.contact.room import check_room
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError
+from zwidth.device.toml_access import number, table, tables
+from zwidth.device.translate import sentences
+from zwidth.measures.measure import Measure, Spelling, WantedWall
+from zwidth.study.axes import CIRCUMSTANCES, Sampling
+from zwidth.study.column import Column, column_named
+from zwidth.study.plane import Plane, PlaneError, plane_of
+from zwidth.study.study_axes import Found, axes_of, circumstance_fault
+from zwidth.study.study_schema import StudyFile, description, unknown
+
+PER_VALUE: Final = 3  # numbers that a value takes: itself, its status, and once more while they are put together
+PER_AXIS: Final = 12  # those that a design's own take, as they are written
+# Argument in Python -> what it is called as a key of a study file, or of its [workspace].
+KEYS: Final[dict[str, str]] = {
+    "position": "at",
+    "stiffness": "stiffness_N_per_m",
+    "damping": "damping_Ns_per_m",
+    "frequency": "frequency_Hz",
+    "axes": "plane",
+    "cells": "count",
+}
+
+
+def as_key(name: str, value: str | None) -> str:
+    """An argument as a study's file spells it.
+
+    >>> as_key("stiffness", None), as_key("model", "rigid")
+    ('stiffness_N_per_m', 'model = "rigid"')
+    """
+    key = KEYS.get(name, name)
+    return key if value is None else f'{key} = "{value}"'
+
+
+@dataclass(frozen=True, repr=False)
+class Study:
+    """Many designs of one device, and what is asked of each.
+
+    label      the file, as messages call it
+    document   what it says
+    device     the device without any axis, its own document holding the changes of `set`
+    operators  name -> [operator] table of those that an axis names; None: nobody
+    sampling   the designs
+    columns    what is asked
+    at, direction, assembly, model   circumstances that no axis sets; None: the file's
+    wall       the wanted one, which some measures are asked about, as far as no axis sets it
+    plane      the workspace; None where nothing is asked over it
+    spelling   how messages about it spell arguments
+    """
+
+    label: str
+    document: dict[str, Any]
+    device: Device
+    operators: dict[str, Any]
+    sampling: Sampling
+    columns: tuple[Column, ...]
+    at: Sequence[float] | Mapping[str, float] | None = None
+    direction: Sequence[float] | None = None
+    assembly: str | None = None
+    model: str | None = None
+    wall: WantedWall = field(default_factory=WantedWall)
+    plane: Plane | None = None
+    spelling: Spelling = as_key
+
+    def __repr__(self) -> str:
+        axes = ", ".join(axis.key for axis in self.sampling.axes)
+        names = ", ".join(column.name for column in self.columns)
+        return f"Study: {self.sampling.count} designs of {self.device.label!r} over {axes}\n  of each {names}"
+
+
+def check_study(
+    document: dict[str, Any],
+    label: str,
+    device: Device | None,
+    operators: dict[str, Any],
+    own: Mapping[str, Measure] | None,
+    found: Found,
+    *,
+    plane: Plane | None = None,
+    spelling: Spelling = as_key,
+) -> Study | None:
+    """The study that a document describes; None where anything is wrong with it, which is added to `found`.
+
+    device     with the changes of `set`; None: it cannot be had, which is told elsewhere
+    operators  as in `Study`
+    own        a user's measures by name; None: they cannot be had, so that no measure is looked up
+    plane      the workspace, in place of the document's
+    Raises     TooLarge  where the designs would not fit into memory
+    """
+    checked: StudyFile | None = None
+    try:
+        checked = StudyFile.model_validate(document)
+    except ValidationError as error:
+        found += sentences(error, document, description, unknown)
+    if device is not None and device.response is not None:
+        found.append((("device",), "has a measured [response] and no model, whose numbers a study could vary"))
+        device = None
+    columns = () if own is None else _columns(document, own, found)
+    axes = axes_of(document, device, found)
+    _check_sampling(document, found)
+    _check_circumstances(document, device, found)
+    plane = _plane(document, device, columns, plane, found, spelling)
+    if found or checked is None or device is None:
+        return None
+    hypercube = checked.sampling == "latin-hypercube"
+    _check_size(checked, hypercube)
+    return Study(
+        label=label,
+        document=document,
+        device=device,
+        operators=operators,
+        sampling=Sampling(axes, checked.count if hypercube else None, 1 if checked.seed is None else checked.seed),
+        columns=columns,
+        at=checked.at,
+        direction=checked.direction,
+        assembly=checked.assembly,
+        model=checked.model,
+        wall=WantedWall(checked.stiffness_N_per_m, checked.damping_Ns_per_m, checked.frequency_Hz),
+        plane=plane,
+        spelling=spelling,
+    )
+
+
+def _columns(document: dict[str, Any], own: Mapping[str, Measure], found: Found) -> tuple[Column, ...]:
+    """The columns as far as their measures are known."""
+    names = document.get("measures")
+    columns: list[Column] = []
+    for n, name in enumerate(names if isinstance(names, list) else []):
+        if not isinstance(name, str) or not name:
+            continue
+        try:
+            column = column_named(name, own)
+        except ValueError as error:
+            found.append((("measures", n), str(error)))
+            continue
+        if column.name in [other.name for other in columns]:
+            found.append((("measures", n), f"{column.name} is asked for twice; remove one"))
+        columns.append(column)
+    return tuple(columns)
+
+
+def _check_sampling(document: dict[str, Any], found: Found) -> None:
+    if document.get("sampling", "grid") == "latin-hypercube":
+        if "count" not in document:
+            found.append((("sampling",), "'latin-hypercube' needs count, how many designs"))
+        return
+    for key in ("count", "seed"):
+        if key in document:
+            found.append(((key,), "is read with sampling = 'latin-hypercube' only; remove it, or set that"))
+
+
+def _check_circumstances(document: dict[str, Any], device: Device | None, found: Found) -> None:
+    """Whether circumstances fit the device, and are set once."""
+    varied = {axis.get("key") for _, axis in tables(document, "axis")}
+    for key in CIRCUMSTANCES:
+        if key not in document:
+            continue
+        if key in varied:
+            found.append(((key,), "is an axis, too; remove one of them"))
+        right = isinstance(document[key], list if key in ("at", "direction") else str)
+        if key in ("at", "direction", "assembly") and right and document[key]:
+            components = document[key] if key != "assembly" else [0.0]
+            if all(map(number, components)) and (said := circumstance_fault(key, document[key], device)):
+                fault = ((key,), said)
+                # the schema may have said so in its own words
+                found += [fault] if all(path != (key,) for path, _ in found) else []
+
+
+def _plane(
+    document: dict[str, Any],
+    device: Device | None,
+    columns: Sequence[Column],
+    plane: Plane | None,
+    found: Found,
+    spelling: Spelling,
+) -> Plane | None:
+    """The grid over the workspace, the same for all designs; None where nothing is asked over it."""
+    wanted = [column.name for column in columns if column.over]
+    if not wanted:
+        if (plane is not None or "workspace" in document) and columns:
+            said = f"is read by measures over it only, such as average({columns[0].measure.name}); remove it"
+            found.append((("workspace",), said))
+        return None
+    if device is None or any(path[0] in ("workspace", "at", "assembly") for path, _ in found):
+        return None
+    if device.mechanism is None:
+        found.append((("measures",), f"{wanted[0]} is over a workspace, and the device is given by its [plant]"))
+        return None
+    if plane is not None:
+        return plane
+    given = table(document, "workspace")
+    count: Any = given.get("count", 15)
+    try:
+        return plane_of(
+            device,
+            given.get("plane"),
+            given.get("through_m", document.get("at")),
+            given.get("x_m"),
+            given.get("y_m"),
+            (count, count) if isinstance(count, int) else count,
+            document.get("assembly"),
+        )
+    except PlaneError as error:
+        found.append((("workspace",), error.spelled(spelling)))
+    except DeviceError as error:
+        found.append((("workspace",), error.faults[0].message))
+    except ValueError as error:  # an assembly that is singular throughout, or does not close
+        found.append((("workspace",), f"cannot be laid out: {error}"))
+    return None
+
+
+def _check_size(checked: StudyFile, hypercube: bool) -> None:
+    """Raises TooLarge where the designs would not fit into memory, before they are spread out."""
+    each = [len(axis.values) if axis.values is not None else axis.count or 1 for axis in checked.axis]
+    designs = (checked.count or 0) if hypercube else prod(each)
+    ties = sum(len(axis.tie) for axis in checked.axis)
+    numbers = designs * (PER_VALUE * len(checked.measures) + PER_AXIS * (len(checked.axis) + ties))
+    check_room(float(numbers), f"{designs} designs of {len(checked.measures)} measures", "lower a count")

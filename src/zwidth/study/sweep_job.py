@@ -1,0 +1,276 @@
+"""The designs of a study as a job, computed one by one.
+
+Each design is the device file with a few numbers changed, checked and built like any other. One that is no device,
+or cannot get where it is asked about, has a status instead of values, and the others keep theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from zwidth.device import address
+from zwidth.device.assembled import moves_mass
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError
+from zwidth.device.load import from_document
+from zwidth.device.operator_choice import with_operator
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.evaluate import answered, evaluate
+from zwidth.measures.measure import (
+    FAILED,
+    NO_VALUE,
+    OK,
+    OUT_OF_REACH,
+    SINGULAR,
+    Measure,
+    MeasureError,
+    Note,
+    Spelling,
+    WantedWall,
+)
+from zwidth.model.posture import OutOfReach, PostureError, Singular
+from zwidth.study.axes import CIRCUMSTANCES, Sampling, settings
+from zwidth.study.column import Column
+from zwidth.study.job import Cells
+from zwidth.study.journal import fingerprint
+from zwidth.study.study import KEYS, Study, as_key
+from zwidth.study.workspace_summary import areas
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+WALL: Final = ("stiffness", "damping", "frequency")  # of the wanted wall, as arguments
+
+
+class _NoPoint(Exception):
+    """A design that cannot be asked anything: its status, and why."""
+
+    def __init__(self, status: int, reason: str = "") -> None:
+        self.status, self.reason = status, reason
+
+
+@dataclass(frozen=True, repr=False)
+class SweepJob:
+    """The designs of a study as cells.
+
+    document   of the device, the study's changes made
+    label      of the device, for messages
+    operators  as in `Study`
+    columns    what is asked
+    positions  (..., 3) of the workspace [m]; None where nothing is asked over it
+    weights    (...) what each of them stands for [m^2]
+    fixed      circumstances that no axis sets
+    """
+
+    document: dict[str, Any]
+    label: str
+    operators: dict[str, Any]
+    sampling: Sampling
+    columns: tuple[Column, ...]
+    positions: NDArray[np.float64] | None
+    weights: NDArray[np.float64] | None
+    fixed: dict[str, Any]
+    _last: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def __repr__(self) -> str:
+        return f"SweepJob({self.count} designs of {self.label!r}: {', '.join(self.measures)})"
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_last": {}}
+
+    @property
+    def count(self) -> int:
+        """Number of designs."""
+        return self.sampling.count
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Columns, as they are written in the study."""
+        return tuple(one.name for one in self.columns)
+
+    @property
+    def question(self) -> str:
+        """What its results are known by. Raises TypeError for a measure whose function has no name elsewhere."""
+        return fingerprint(
+            "sweep", self.document, self.operators, self.sampling, self.columns, self.positions, self.fixed
+        )
+
+    def compute(self, first: int, last: int) -> Cells:
+        """Designs first to last - 1."""
+        shape = last - first, len(self.columns)
+        values, status = np.full(shape, np.nan), np.empty(shape, dtype=np.uint8)
+        seen: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]
+        for row in range(last - first):
+            for column, (value, what, reason) in enumerate(self._row(first + row)):
+                values[row, column], status[row, column] = value, what
+                if reason:
+                    seen[column].setdefault((what, reason), []).append(first + row)
+        notes = [tuple(Note(*key, len(at), (at[0],)) for key, at in kinds.items()) for kinds in seen]
+        return Cells(values, status, tuple(notes))
+
+    def design(self, number: int) -> Design:
+        """One of the designs, with the operating points that it is asked about."""
+        return Design(self, number)
+
+    def _row(self, number: int) -> Iterator[tuple[float, int, str]]:
+        """Value, status and reason of each column."""
+        design = self.design(number)
+        for one in self.columns:
+            try:
+                point = design.point() if one.over is None else design.workspace()
+            except _NoPoint as none:
+                yield np.nan, none.status, none.reason
+                continue
+            yield _answer(one, one.measure.at_wall(design.wall), point, self.weights)
+
+    @cached_property
+    def _in_mechanism(self) -> frozenset[str]:
+        """The axes and tied numbers that stand in [mechanism]."""
+        keys = {key for axis in self.sampling.axes for key in (axis.key, *(tie.key for tie in axis.ties))}
+        own = keys - {*CIRCUMSTANCES}
+        return frozenset(key for key in own if address.resolve(self.document, key)[0] == "mechanism")
+
+    def of_mechanism(self, chosen: dict[str, Any]) -> list[tuple[str, Any]]:
+        """What of a design changes the mechanism."""
+        return [(key, value) for key, value in chosen.items() if key in self._in_mechanism]
+
+    def device(self, chosen: dict[str, Any]) -> Device:
+        """The device with its axes' values; kept until another is asked for. Raises DeviceError."""
+        own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
+        key = (chosen.get("operator"), own)
+        if self._last.get("key") != key:
+            document = self.document
+            if "operator" in chosen:
+                document = with_operator(document, self.operators[chosen["operator"]])
+            document = address.assign_all(document, own)
+            # whether it can be put together shows where its posture is solved, which takes a tenth of the time
+            self._last.update(key=key, device=from_document(document, self.label, put_together=True))
+        return self._last["device"]  # type: ignore[no-any-return]
+
+
+class Design:
+    """One design; its operating points are solved once, when they are first asked for."""
+
+    def __init__(self, job: SweepJob, number: int) -> None:
+        self.job = job
+        self.chosen = dict(settings(job.sampling.axes, job.sampling.values(number)))
+        self.known: dict[str, OperatingPoint | _NoPoint] = {}
+
+    @property
+    def wall(self) -> WantedWall:
+        """The wanted wall."""
+        return WantedWall(**{name: self._circumstance(KEYS[name]) for name in WALL})
+
+    def point(self) -> OperatingPoint:
+        """The posture asked about. Raises _NoPoint."""
+        return self._solved("point", self._circumstance("at"))
+
+    def workspace(self) -> OperatingPoint:
+        """All postures of the workspace. Raises _NoPoint."""
+        return self._solved("workspace", self.job.positions)
+
+    def _solved(self, name: str, positions: Any) -> OperatingPoint:
+        if name not in self.known:
+            try:
+                self.known[name] = self._solve(name, positions)
+            except _NoPoint as none:
+                self.known[name] = none
+        found = self.known[name]
+        if isinstance(found, _NoPoint):
+            raise found
+        return found
+
+    def _solve(self, name: str, positions: Any) -> OperatingPoint:
+        try:
+            device = self.job.device(self.chosen)
+            assembly = self._circumstance("assembly")
+            # what changes the computer or the operator alone leaves the posture as it is
+            same = name, self._circumstance("at"), assembly, self.job.of_mechanism(self.chosen)
+            known = self.job._last.get(name, (None, None))
+            point = device.at(
+                known[1] if known[0] == same else positions,
+                self._circumstance("direction"),
+                assembly=assembly,
+                model=self._circumstance("model"),
+            )
+            if known[0] != same:
+                if point.posture is not None and not moves_mass(point.posture):
+                    from_document(device.document, device.label)  # says what is wrong
+                self.job._last[name] = same, point.posture
+        except OutOfReach as error:
+            raise _NoPoint(OUT_OF_REACH) from error
+        except Singular as error:
+            raise _NoPoint(SINGULAR) from error
+        except (PostureError, DeviceError) as error:
+            raise _NoPoint(FAILED, _said(error)) from error
+        except ValueError as error:
+            raise _NoPoint(FAILED, str(error)) from error
+        return point
+
+    def _circumstance(self, key: str) -> Any:
+        return self.chosen.get(key, self.job.fixed.get(key))
+
+
+def _said(error: Exception) -> str:
+    if not isinstance(error, DeviceError):
+        return str(error)
+    return "; ".join(": ".join(filter(None, (fault.key, fault.message))) for fault in error.faults)
+
+
+def _answer(
+    one: Column, measure: Measure, point: OperatingPoint, weights: NDArray[np.float64] | None
+) -> tuple[float, int, str]:
+    """Value, status and reason of one column; its measure is about the design's wanted wall."""
+    try:
+        if one.over is not None:
+            return one.reduced(evaluate(measure, point), point, weights)
+        if measure.each:
+            status = int(point.status)
+            return (np.nan, status, "") if status != OK else answered(lambda: measure.compute(point))
+        found = evaluate(measure, point)
+    except MeasureError as error:
+        return np.nan, NO_VALUE, error.spelled(as_key)
+    return float(found.values), int(found.status), found.notes[0].reason if found.notes else ""
+
+
+def sweep_job(study: Study) -> SweepJob:
+    """The question that a study asks, so that a store can be made for it.
+
+    Raises  MeasureError  for measures that cannot be asked of this device, all of them
+    """
+    wanted = {KEYS[name]: getattr(study.wall, name) for name in WALL}
+    told = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
+    fixed = {key: value for key, value in told.items() if value is not None}
+    plane = study.plane
+    positions, weights = (None, None) if plane is None else (plane.positions, areas(plane.x, plane.y))
+    # what a device's numbers come from is told of the study; it need not be read again for each design
+    document = {key: value for key, value in study.device.document.items() if key != "sources"}
+    columns, designs = study.columns, study.sampling
+    job = SweepJob(document, study.device.label, study.operators, designs, columns, positions, weights, fixed)
+    _check_measures(job, study.spelling)
+    return job
+
+
+def _check_measures(job: SweepJob, spelling: Spelling) -> None:
+    """Raises MeasureError where a measure can be asked of no design, as far as a few of them tell."""
+    pending, refused = job.columns, dict[str, str]()
+    for number in sorted({0, job.count // 2, job.count - 1}):
+        design = job.design(number)
+        try:
+            point = design.point()
+        except _NoPoint:
+            continue
+        refused = {}
+        for one in pending:
+            try:
+                evaluate(one.measure.at_wall(design.wall), point)
+            except MeasureError as error:
+                refused[one.name] = error.spelled(spelling)
+        pending = tuple(one for one in pending if one.name in refused)
+    if refused:
+        raise MeasureError("\n".join(f"{name} {why}" for name, why in refused.items()))
