@@ -1,6 +1,8 @@
 from .common_area import common_area as common_area
 from .experiment import measure_boundary as measure_boundary
 from .experiment_plan import Plan as Plan
+from .map_data import map_document as map_document
+from .map_data import map_table as map_table
 from .measured_boundary import Experiment as Experiment
 from .plane import plane_of as plane_of
 from .requirement import parse_requirement as parse_requirement

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.study.requirement import Requirement
-from zwidth.study.workspace import reachable
+from zwidth.study.workspace import measures_of, reachable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 ROUNDING: Final = 1e-9  # share of the largest margin that still counts as 0: a bound that is just met is met
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Region:
     """A part of a plane.
 
@@ -39,8 +39,11 @@ class Region:
     area: float
     share: float
 
+    def __repr__(self) -> str:
+        return f"Region: {self.area:.4g} m^2, {100.0 * self.share:.4g} % of what is reached"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class CommonArea:
     """Requirements laid over each other.
 
@@ -54,6 +57,34 @@ class CommonArea:
     regions: tuple[Region, ...]
     common: Region
 
+    def __repr__(self) -> str:
+        required = ", ".join(one.text for one in self.requirements)
+        common = self.common
+        return (
+            f"CommonArea: {common.area:.4g} m^2, {100.0 * common.share:.4g} % of what is reached, with {required}"
+        )
+
+    def document(self) -> dict[str, Any]:
+        """The areas by key and unit."""
+        return {
+            "requirements": [
+                {"requirement": one.text, "area_m2": region.area, "share": region.share}
+                for one, region in zip(self.requirements, self.regions, strict=True)
+            ],
+            "common_area_m2": self.common.area,
+            "common_share": self.common.share,
+            "reachable_area_m2": self.reach.area,
+        }
+
+    def attributes(self) -> dict[str, Any]:
+        """The areas as attributes of a map's dataset: text, numbers and lists of numbers."""
+        areas = self.document()
+        del areas["requirements"]
+        return areas | {
+            "requirements": "\n".join(one.text for one in self.requirements),
+            "required_area_m2": [region.area for region in self.regions],
+        }
+
 
 def common_area(dataset: xr.Dataset, requirements: Sequence[Requirement]) -> CommonArea:
     """The regions of a map in which requirements are met, and the region that they have in common.
@@ -65,7 +96,7 @@ def common_area(dataset: xr.Dataset, requirements: Sequence[Requirement]) -> Com
         raise ValueError("a common area needs at least one requirement")
     missing = [r.measure.name for r in requirements if r.measure.name not in dataset]
     if missing:
-        raise ValueError(f"the map does not hold {missing[0]}; it holds {', '.join(_measures(dataset))}")
+        raise ValueError(f"the map does not hold {missing[0]}; it holds {', '.join(measures_of(dataset))}")
     x, y = dataset["x_m"].values, dataset["y_m"].values
     reached = filled(x, y, np.where(reachable(dataset, requirements[0].measure.name), 1.0, np.nan))
     shapes = [filled(x, y, r.margin(dataset[r.measure.name].values)) for r in requirements]
@@ -107,7 +138,3 @@ def filled(x: Floats, y: Floats, margin: Floats) -> Any:
         outer, *holes = (points[a:b] for a, b in pairwise(ends))
         parts.append(shapely.make_valid(shapely.Polygon(outer, holes)))
     return shapely.union_all(parts) if parts else shapely.Polygon()
-
-
-def _measures(dataset: xr.Dataset) -> list[str]:
-    return [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]

@@ -18,7 +18,7 @@ from zwidth.show.cli.experiment import ExperimentCommand
 from zwidth.show.cli.felt import Felt
 from zwidth.show.cli.guarantees import GuaranteesCommand
 from zwidth.show.cli.limit_cycles import LimitCycles
-from zwidth.show.cli.map import map_command
+from zwidth.show.cli.map import Map
 from zwidth.show.cli.move import move
 from zwidth.show.cli.polar import Polar
 from zwidth.show.cli.report import Report
@@ -57,7 +57,7 @@ COMMANDS = (
     ChartCommand(),
     Check(),
     Polar(),
-    map_command,
+    Map(),
     SweepCommand(),
     Report(),
     SensitivityCommand(),
