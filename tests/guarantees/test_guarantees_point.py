@@ -102,7 +102,7 @@ def test_a_set_that_is_empty_says_why_under_its_keys():
     document = region.document()
     assert document["reason"] == "for want of friction"
     assert isnan(document["stiffness_max_N_per_m"])
-    assert repr(region) == "<Region of 0 rings: none>"
+    assert repr(region) == "Region(0 rings, largest stiffness none)"
     undamped = guarantees_of(point({"mass_kg": 0.03, "handle": 1.0}))
     assert undamped["passive"].region.reason is not None
     assert not undamped.none_left

@@ -89,7 +89,7 @@ def test_keys_and_columns():
 
 def test_the_repr_has_the_counts_on_one_line():
     assert repr(found()) == (
-        "<PointsComparison: 3 edge points, 2 compared; 3 walls, 2 with their exact verdict; 1 unnamed>"
+        "PointsComparison: 3 edge points, 2 compared; 3 walls, 2 with their exact verdict; 1 unnamed"
     )
 
 

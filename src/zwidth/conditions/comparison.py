@@ -105,8 +105,8 @@ class BoundsComparison(Result):
             else "exact limit undecided"
         )
         return (
-            f"<BoundsComparison at {self.damping:.4g} N s/m: {exact}\n"
-            f" {len(self.bounds)} conditions, {len(held)} with all assumptions met>"
+            f"BoundsComparison: at {self.damping:.6g} N s/m {exact}\n"
+            f"  {len(self.bounds)} conditions, {len(held)} with all assumptions met"
         )
 
 

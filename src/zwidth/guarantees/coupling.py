@@ -87,12 +87,12 @@ class Couplings(Result):
 
     def __repr__(self) -> str:
         if self.reason is not None:
-            return f"<Couplings: none: {self.reason}>"
-        stiffest = ", ".join(f"{name} {largest(region)}" for name, region in self.regions.items())
+            return f"Couplings: none: {self.reason}"
+        told = "Couplings: " + ", ".join(f"{name} {largest(one)}" for name, one in self.regions.items())
         if self.limit is None:
-            return f"<Couplings, the stiffest: {stiffest}>"
+            return told
         needed = f"at most {self.limit.stiffness:.6g} N/m" if self.limit.needed else "no coupling"
-        return f"<Couplings, the stiffest: {stiffest}\n the wall needs {needed}, felt {self.limit.felt:.6g} N/m>"
+        return f"{told}\n  the wall needs {needed}, felt {self.limit.felt:.6g} N/m"
 
 
 def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None) -> Couplings:

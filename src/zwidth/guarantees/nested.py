@@ -78,8 +78,8 @@ class Guarantees(Result):
 
     def __repr__(self) -> str:
         stiffest = ", ".join(f"{one.name} {largest(one.region)}" for one in self.guarantees)
-        coupled = "" if self.couplings is None else f"\n {self.couplings!r}"
-        return f"<Guarantees, the stiffest wall of each: {stiffest}{coupled}>"
+        coupled = [] if self.couplings is None else repr(self.couplings).splitlines()
+        return "\n  ".join([f"Guarantees: {stiffest}", *coupled])
 
 
 def nested(loop: Loop, robust: Sequence[Floats] | None = None) -> Guarantees:

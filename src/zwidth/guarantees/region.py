@@ -57,7 +57,7 @@ class Region:
         } | {key: note for key, note in notes.items() if note is not None}
 
     def __repr__(self) -> str:
-        return f"<Region of {len(self.rings)} rings: {largest(self)}>"
+        return f"Region({len(self.rings)} rings, largest stiffness {largest(self)})"
 
 
 def largest(region: Region) -> str:

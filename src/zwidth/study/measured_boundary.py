@@ -164,6 +164,6 @@ class Experiment(Result):
         lines = [f"{len(self.points) - tips} edges and {tips} tips measured, {self.lost} not found"]
         if best is not None:
             exact = "" if self.chart is None else f"; exact and linear {self.chart.stiffness_max:.6g} N/m"
-            lines.append(f"stiffest {best.stiffness:.6g} N/m at {best.damping:.4g} N s/m{exact}")
+            lines.append(f"stiffest {best.stiffness:.6g} N/m at {best.damping:.6g} N s/m{exact}")
         lines.append(f"{len(self.subjects)} subjects with {self.plan.trials} trials each")
-        return "<Experiment: " + "\n ".join(lines) + ">"
+        return "Experiment: " + "\n  ".join(lines)

@@ -140,8 +140,8 @@ class PointsComparison:
         walls = counts["stable_walls"] + counts["unstable_walls"]
         agreeing = counts["stable_walls_agreeing"] + counts["unstable_walls_agreeing"]
         return (
-            f"<PointsComparison: {counts['edge_points']} edge points, {counts['edge_points_compared']} compared; "
-            f"{walls} walls, {agreeing} with their exact verdict; {counts['unnamed_points']} unnamed>"
+            f"PointsComparison: {counts['edge_points']} edge points, {counts['edge_points_compared']} compared; "
+            f"{walls} walls, {agreeing} with their exact verdict; {counts['unnamed_points']} unnamed"
         )
 
 

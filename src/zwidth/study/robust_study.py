@@ -85,7 +85,9 @@ class RobustStudy(Result):
             "settled": self.settled,
         }
         violation = None if self.violation is None else self.violation.document()
-        return self.chart.document() | {"members": list(self.members), "search": search, "violation": violation}
+        # the wall that decays fastest is not searched for over many members
+        chart = {key: value for key, value in self.chart.document().items() if not key.startswith("fastest_decay")}
+        return chart | {"members": list(self.members), "search": search, "violation": violation}
 
     def table(self) -> dict[str, list[Any]]:
         """The robust set's edge as columns, its arcs one after another and counted from 0."""
@@ -95,7 +97,7 @@ class RobustStudy(Result):
         chart, found = self.chart, self.violation
         lines = [f"{len(self.members)} members, {len(chart.binding)} of which bind"]
         if chart.members_at_stiffness_max:
-            stiffest = f"{chart.stiffness_max:.6g} N/m at {chart.damping_at_stiffness_max:.4g} N s/m"
+            stiffest = f"{chart.stiffness_max:.6g} N/m at {chart.damping_at_stiffness_max:.6g} N s/m"
             lines.append(f"largest stiffness stable for all {stiffest}")
             lines.append(
                 f"{chart.lost_stiffness_share:.2%} less than the best member has, {chart.lost_share:.2%} less area"
@@ -104,4 +106,4 @@ class RobustStudy(Result):
             lines.append("no wall with K > 0 and B >= 0 is stable for all")
         if found is not None:
             lines.append(f"{found.violating} of {found.unseen} unseen members find one of the walls unstable")
-        return "<RobustStudy: " + "\n ".join(lines) + ">"
+        return "RobustStudy: " + "\n  ".join(lines)
