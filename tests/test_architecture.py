@@ -22,9 +22,10 @@ DEVICES = sorted(path.stem for path in (PACKAGE / "device" / "zoo").glob("*.toml
 # Numbers flow from left to right: a package imports itself and what stands before it.
 FLOW = ("model", "loop", "chart", "conditions", "guarantees", "contact", "measures", "study", "show")
 # Device files become models and loops; what computes knows nothing of files.
-MAY_IMPORT = {package: {*FLOW[: place + 1], "compiled", "result"} for place, package in enumerate(FLOW)}
-MAY_IMPORT["compiled"] = MAY_IMPORT["result"] = set()
-MAY_IMPORT["device"] = {"device", "model", "loop", "compiled"}
+EVERYWHERE = {"compiled", "result", "_version"}
+MAY_IMPORT = {package: {*FLOW[: place + 1], *EVERYWHERE} for place, package in enumerate(FLOW)}
+MAY_IMPORT |= {module: set() for module in EVERYWHERE}
+MAY_IMPORT["device"] = {"device", "model", "loop", *EVERYWHERE}
 MAY_IMPORT["study"].add("device")
 MAY_IMPORT["show"].add("device")
 MAY_IMPORT["_old_names"] = {*FLOW, "device"}  # above all, and imported by nothing but the package itself

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
+from matplotlib import pyplot
 
 import zwidth
 from zwidth._old_names import old_names
@@ -108,6 +110,17 @@ def test_old_functions_about_circumstances_answer_as_before():
 # --- the lines that keep working ---------------------------------------------------------------------
 
 
+def test_a_study_given_to_sweep_is_computed_with_a_warning(tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_text(
+        'device = "published-two-mass"\nmeasures = ["rigid_mass"]\n[[axis]]\nkey = "loop.sampling_period_s"\n'
+        "values = [0.001, 0.002]\n"
+    )
+    with pytest.warns(DeprecationWarning, match=r"write zwidth\.run_study\(study\)"):
+        found = zwidth.sweep(file)
+    assert found.dataset()["rigid_mass"].values == pytest.approx([0.287, 0.287], rel=1e-12)
+
+
 def test_the_lines_of_the_contract():
     device = zwidth.load("five-bar")
     late = zwidth.load("five-bar", {"loop.delay_samples": 1})
@@ -119,5 +132,16 @@ def test_the_lines_of_the_contract():
     slower = device.with_({"loop.sampling_period_s": 0.002})
     assert slower.controller.sampling_period == 0.002
     assert device.controller.sampling_period == 0.00125
+    response = point.simulate(stiffness=4000.0, damping=10.0)
+    assert response.stable
+    axes = chart.plot()
+    assert axes.get_xlabel().startswith("Virtual stiffness")
+    pyplot.close(axes.figure)
+    results = zwidth.sweep(device, {"loop.sampling_period_s": [0.0005, 0.001]}, ["stiffness_max", "isotropy"])
+    assert isinstance(results, xr.Dataset)
+    assert results["stiffness_max"].dims == ("loop.sampling_period_s",)
+    assert results["isotropy"].values == pytest.approx(np.full(2, float(device.measure("isotropy"))), rel=1e-12)
+    maps = zwidth.workspace_map(device, "rigid_mass", zwidth.study.plane_of(device, cells=(5, 4)))
+    assert maps["rigid_mass"].shape == (4, 5)
     mass = zwidth.Plant.one_mass(mass=0.03, damping=1.0)
     assert zwidth.Loop(mass, sampling_period=0.001).chart().stiffness_max == pytest.approx(21942.75, abs=0.01)

@@ -16,7 +16,7 @@ from typing import Any
 
 import lazy_loader
 
-__version__ = "0.1.0"
+from zwidth._version import __version__ as __version__
 
 _named, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __all__ += ["__version__"]

@@ -80,6 +80,14 @@ def _warn(old: str, new: str) -> None:
     warnings.warn(told, DeprecationWarning, stacklevel=4)
 
 
+def sweep_of_study(study: Any, *more: Any) -> Any:
+    """What `zwidth.sweep` gave for a study before it took a device and axes. Warns DeprecationWarning."""
+    from zwidth.study.sweep import run_study
+
+    _warn("zwidth.sweep(study)", "zwidth.run_study(study)")
+    return run_study(study, *(one for one in more if one))
+
+
 def _operating_point() -> Any:
     from zwidth.loop.operating_point import OperatingPoint
 

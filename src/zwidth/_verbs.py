@@ -166,6 +166,12 @@ def environment_named(source: str) -> Environment:
     return load_environment(source)
 
 
+def old_sweep(study: Any, *more: Any) -> Any:
+    from zwidth._old_names import sweep_of_study
+
+    return sweep_of_study(study, *more)
+
+
 def plot(result: Result, ax: Axes | None) -> Axes:
     from zwidth.show.figures.plots import plot
 

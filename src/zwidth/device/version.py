@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from zwidth import __version__
+from zwidth._version import __version__
 from zwidth.device.faults import fail
 
 KEY: Final = "file_version"

@@ -21,7 +21,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth import __version__
+from zwidth._version import __version__
 from zwidth.device.version import KEPT, newer
 from zwidth.measures.measure import MISSING, OK, STATUS, Note
 from zwidth.study.job import Cells, Job

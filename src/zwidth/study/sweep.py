@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from zwidth import _verbs
 from zwidth.device.device import Device
 from zwidth.measures.measure import OK, STATUS, Measure
 from zwidth.model.arguments import refusal
@@ -89,8 +90,8 @@ class Sweep:
 
 def sweep(
     device: Device,
-    axes: Mapping[str, Sequence[Any] | ArrayLike],
-    measures: str | Measure | Sequence[str | Measure],
+    axes: Mapping[str, Sequence[Any] | ArrayLike] | None = None,
+    measures: str | Measure | Sequence[str | Measure] = (),
     *,
     position: Position | None = None,
     direction: Sequence[float] | None = None,
@@ -130,9 +131,12 @@ def sweep(
                TypeError     for arguments of another kind
                what `executor.run` and `Store` raise
     """
+    if isinstance(device, Study | str | os.PathLike):  # what was swept before there were axes here
+        old: xr.Dataset = _verbs.old_sweep(device, axes, measures)
+        return old
     study = study_over(
         device,
-        axes,
+        axes or {},
         measures,
         position=position,
         direction=direction,

@@ -147,7 +147,7 @@ def _flags() -> dict[str, Any]:
 
 def _circumstances(found: Sweep) -> dict[str, Any]:
     """What was asked, as attributes that any file can hold."""
-    from zwidth import __version__
+    from zwidth._version import __version__
 
     device = found.study.device
     return {

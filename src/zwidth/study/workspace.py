@@ -281,7 +281,7 @@ def _check_reached(job: MapJob, cells: Cells) -> None:
 
 def _circumstances(job: MapJob) -> dict[str, Any]:
     """What the map was asked with, as attributes that any file can hold."""
-    from zwidth import __version__
+    from zwidth._version import __version__
 
     device, plane, direction = job.device, job.plane, job.direction
     asked = direction if isinstance(direction, str) else device.direction(direction).tolist()

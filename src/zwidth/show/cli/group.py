@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from zwidth import __version__
+from zwidth._version import __version__
 from zwidth.show.cli.bounds import Bounds
 from zwidth.show.cli.chart import ChartCommand
 from zwidth.show.cli.check import Check
