@@ -110,6 +110,18 @@ def test_old_functions_about_circumstances_answer_as_before():
 # --- the lines that keep working ---------------------------------------------------------------------
 
 
+def test_old_methods_of_a_device_warn_and_answer():
+    device = zwidth.load("published-two-mass", operator="thesis-arm")
+    with pytest.warns(DeprecationWarning, match=r"write device\.at\(\.\.\.\)\.plant"):
+        assert np.array_equal(device.plant(model="rigid").mass, device.at(model="rigid").plant.mass)
+    with pytest.warns(DeprecationWarning, match=r"\.unheld_plant"):
+        assert device.plant(held=False) is device.given_plant
+    arms = zwidth.load("five-bar")
+    with pytest.warns(DeprecationWarning, match=r"write device\.at\(\.\.\.\)\.posture") as told:
+        assert np.array_equal(arms.posture((0.02, 0.2)).angles, arms.at((0.02, 0.2)).posture.angles)
+    assert Path(told[0].filename) == Path(__file__)
+
+
 def test_a_study_given_to_sweep_is_computed_with_a_warning(tmp_path):
     file = tmp_path / "study.toml"
     file.write_text(

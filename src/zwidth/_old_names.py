@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from zwidth.device.device import Device
     from zwidth.loop.operating_point import OperatingPoint
+    from zwidth.model.plant import Plant
+    from zwidth.model.posture import Posture
 
 # Package -> names that moved there from the top.
 MOVED: Final = {
@@ -75,17 +77,40 @@ def _package_of(name: str) -> str | None:
     return next((package for package, names in MOVED.items() if name in names.split()), None)
 
 
-def _warn(old: str, new: str) -> None:
-    told = f"{old} goes with the next release; write {new}"
-    warnings.warn(told, DeprecationWarning, stacklevel=4)
+def _warn(old: str, new: str, depth: int = 4) -> None:
+    """Warn at the line of the script: so many calls above, two more than the caller's own."""
+    warnings.warn(f"{old} goes with the next release; write {new}", DeprecationWarning, stacklevel=depth)
 
 
 def sweep_of_study(study: Any, *more: Any) -> Any:
     """What `zwidth.sweep` gave for a study before it took a device and axes. Warns DeprecationWarning."""
     from zwidth.study.sweep import run_study
 
-    _warn("zwidth.sweep(study)", "zwidth.run_study(study)")
+    _warn("zwidth.sweep(study)", "zwidth.run_study(study)", 5)
     return run_study(study, *(one for one in more if one))
+
+
+def plant_of(
+    device: Device,
+    at: Any = None,
+    direction: Any = None,
+    assembly: str | None = None,
+    model: str | None = None,
+    *,
+    held: bool = True,
+) -> Plant:
+    """What `device.plant(...)` gave before there were operating points. Warns DeprecationWarning."""
+    _warn("device.plant(...)", "device.at(...).plant, or .unheld_plant", 5)
+    point = device.at(at, direction, assembly=assembly, model=model)
+    return point.plant if held else point.unheld_plant
+
+
+def posture_of(device: Device, at: Any = None, assembly: str | None = None) -> Posture:
+    """What `device.posture(...)` gave before there were operating points. Warns DeprecationWarning."""
+    _warn("device.posture(...)", "device.at(...).posture", 5)
+    posture = device.at(at, assembly=assembly).posture
+    assert posture is not None
+    return posture
 
 
 def _operating_point() -> Any:

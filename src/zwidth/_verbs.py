@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from zwidth.measures.description import Description
     from zwidth.measures.felt_wall import FeltWall
     from zwidth.measures.measure import Measure, Measured
+    from zwidth.model.plant import Plant
+    from zwidth.model.posture import Posture
     from zwidth.result import Result
     from zwidth.study.experiment_plan import Plan
     from zwidth.study.measured_boundary import Experiment
@@ -164,6 +166,18 @@ def environment_named(source: str) -> Environment:
     from zwidth.contact.environments.load import load_environment
 
     return load_environment(source)
+
+
+def old_plant(device: Device, *asked: Any, **circumstances: Any) -> Plant:
+    from zwidth._old_names import plant_of
+
+    return plant_of(device, *asked, **circumstances)
+
+
+def old_posture(device: Device, *asked: Any, **circumstances: Any) -> Posture:
+    from zwidth._old_names import posture_of
+
+    return posture_of(device, *asked, **circumstances)
 
 
 def old_sweep(study: Any, *more: Any) -> Any:

@@ -16,7 +16,7 @@ def said(setting: str, text: str = ARM) -> str:
     with pytest.raises(DeviceError) as caught:
         address.apply(changed(text), [setting])
     (fault,) = caught.value.faults
-    assert fault.file == "--set"
+    assert fault.file == "settings"
     return str(fault)
 
 

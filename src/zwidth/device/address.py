@@ -17,7 +17,7 @@ from zwidth.device.schema import file as schema
 from zwidth.device.toml_access import copied
 
 UNSET: Final = object()
-OPTION: Final = "--set"
+SETTINGS: Final = "settings"  # what stands for a file in messages about settings
 
 FILTERS: Final = (frozenset({"time_constant_s"}), frozenset({"order", "cutoff_Hz", "discretisation"}))
 EXCLUSIVE: Final[dict[tuple[str, ...], tuple[frozenset[str], ...]]] = {
@@ -39,7 +39,7 @@ def get(document: dict[str, Any], path: str) -> Any:
     steps = resolve(document, path)
     found = _value(document, steps)
     if found is UNSET:
-        raise fail(OPTION, path, "is not given in this file, although it may be; give it a value first")
+        raise fail(SETTINGS, path, "is not given in this file, although it may be; give it a value first")
     return found
 
 
@@ -138,7 +138,7 @@ def parse(setting: str | tuple[str, Any]) -> tuple[str, Any]:
     if isinstance(setting, str):
         path, equals, text = setting.partition("=")
         if not equals or not path.strip():
-            raise fail(OPTION, "", f"must be PATH=VALUE, got {quote(setting)}; such as loop.delay_samples=1")
+            raise fail(SETTINGS, "", f"must be PATH=VALUE, got {quote(setting)}; such as loop.delay_samples=1")
         return path.strip(), _parsed(text.strip(), path.strip())
     path, value = setting
     return path, _parsed(value, path) if isinstance(value, str) else value
@@ -183,7 +183,7 @@ def resolve(document: dict[str, Any], path: str) -> Path:
             place = {}
         elif depth + 1 < len(parts) and not isinstance(place, dict | list):
             raise fail(
-                OPTION, path, f"{dotted(tuple(steps), document)} holds {quote(place)}, nothing is inside it"
+                SETTINGS, path, f"{dotted(tuple(steps), document)} holds {quote(place)}, nothing is inside it"
             )
     return tuple(steps)
 
@@ -201,13 +201,13 @@ def _unknown(
 ) -> DeviceError:
     first, *rest = path.split(".")
     if steps in ([], ["mechanism"]) and parts[depth:] == [first, *rest]:
-        return fail(OPTION, path, f"is no key of a device file; {_from_the_top(document, first, rest)}")
+        return fail(SETTINGS, path, f"is no key of a device file; {_from_the_top(document, first, rest)}")
     here, choices = dotted(tuple(steps), document), _choices(place, tuple(steps))
     near = nearest(parts[depth], choices)
     if near:
         right = ".".join([here, near, *parts[depth + 1 :]])
-        return fail(OPTION, path, f"is no key of a device file; did you mean '{right}'?")
-    return fail(OPTION, path, f"is no key of a device file; {here} has: {listed(choices) or 'nothing inside'}")
+        return fail(SETTINGS, path, f"is no key of a device file; did you mean '{right}'?")
+    return fail(SETTINGS, path, f"is no key of a device file; {here} has: {listed(choices) or 'nothing inside'}")
 
 
 def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
@@ -278,12 +278,12 @@ def _parsed(text: str, path: str) -> Any:
     try:
         document = tomllib.loads(f"value = {text}")
     except RecursionError:
-        raise fail(OPTION, path, "is nested too deeply") from None
+        raise fail(SETTINGS, path, "is nested too deeply") from None
     except ValueError:
         return text
     value = document["value"]
     if len(document) > 1:
         return text
     if not within_depth([value]):
-        raise fail(OPTION, path, "is nested too deeply")
+        raise fail(SETTINGS, path, "is nested too deeply")
     return value

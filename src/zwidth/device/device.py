@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Device:
     """A haptic device: a mechanism or a given plant, and the computer that closes the loop.
 
@@ -73,6 +73,14 @@ class Device:
     operator_name: str | None
     encoders: Encoders
     document: dict[str, Any]
+
+    def __repr__(self) -> str:
+        kind = self._kind if self.mechanism is None else "[mechanism]"
+        computer = (
+            f"sampled every {self.controller.sampling_period:g} s, {self.controller.delay:g} samples of delay"
+        )
+        held = f", held by {self.operator_name}" if self.operator_name else ""
+        return f"Device {self.name!r}, {kind} from {self.label}{held}\n  {computer}"
 
     @property
     def friction_known(self) -> bool:
@@ -161,6 +169,14 @@ class Device:
             name=self.name,
             asked=asked,
         )
+
+    def plant(self, *asked: Any, **circumstances: Any) -> Any:
+        """`at(...).plant`, which this was before; goes with the next release."""
+        return _verbs.old_plant(self, *asked, **circumstances)
+
+    def posture(self, *asked: Any, **circumstances: Any) -> Any:
+        """`at(...).posture`, which this was before; goes with the next release."""
+        return _verbs.old_posture(self, *asked, **circumstances)
 
     def like(self, point: OperatingPoint) -> OperatingPoint:
         """This device where another was asked about, at a single point: the same position asked for (or the same

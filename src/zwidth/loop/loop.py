@@ -33,7 +33,7 @@ _INSTEAD = {
 }
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True, init=False, repr=False)
 class Loop:
     """A plant under a sampled wall law. Everything that a chart needs is derived once and kept.
 
@@ -69,6 +69,11 @@ class Loop:
         plant.check_numbers()
         object.__setattr__(self, "plant", plant)
         object.__setattr__(self, "controller", controller)
+
+    def __repr__(self) -> str:
+        names = ", ".join(self.plant.names) or f"{self.plant.size} coordinates"
+        computer = f"sampled every {self.period:g} s, {self.controller.delay:g} samples of delay"
+        return f"Loop of a plant ({names}), {computer}"
 
     def chart(self, radius: float = 1.0, *, decay: bool = True) -> StabilityChart:
         """The stable walls, exactly; see `stability_chart`."""

@@ -33,7 +33,7 @@ Position: TypeAlias = Sequence[float] | Mapping[str, float]
 PROJECTED: Final = 0.01
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class OperatingPoint(PointVerbs):
     """A device in one posture or in many, rendering one direction or several at once in each, and who holds it.
 
@@ -83,6 +83,23 @@ class OperatingPoint(PointVerbs):
             self.directions is None
         ):
             raise ValueError("postures and directions are those of a mechanism, which has both")
+
+    def __repr__(self) -> str:
+        held = f", held by {self.operator_name or 'an operator'}" if self.operator is not None else ""
+        computer = (
+            f"sampled every {self.controller.sampling_period:g} s, {self.controller.delay:g} samples of delay"
+        )
+        if self.posture is None or self.directions is None:
+            kind = "measured response" if self.response is not None else f"plant, model {self.model or AS_GIVEN}"
+            return f"OperatingPoint of {self.name or 'a device'}: {kind}{held}\n  {computer}"
+        if self.shape:
+            where = f"{int(np.prod(self.shape))} postures of shape {self.shape}"
+        else:
+            place = ", ".join(f"{x:.6g}" for x in np.round(self.posture.position, 12) + 0.0)
+            ways = [", ".join(f"{x:.4g}" for x in np.round(u, 12) + 0.0) for u in self.directions]
+            where = f"handle at ({place}) m, along " + " and ".join(f"({way})" for way in ways)
+        model = f"assembly {self.posture.assembly}, model {self.model or 'full'}{held}"
+        return f"OperatingPoint of {self.name or 'a device'}: {where}\n  {model}\n  {computer}"
 
     # --- which postures and directions ----------------------------------------------------------------
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import traceback
+from dataclasses import replace
 
 import click
 
-from zwidth.device.faults import DeviceError
+from zwidth.device.address import SETTINGS
+from zwidth.device.faults import DeviceError, Fault
 from zwidth.show.cli.process import BAD_INPUT, INTERNAL, INTERRUPTED
 from zwidth.show.output import OutputError, shown
 
@@ -30,7 +32,7 @@ def explain(error: Exception) -> tuple[list[str], int]:
     """The lines for standard error, and the exit code."""
     match error:
         case DeviceError():
-            return [str(fault) for fault in error.faults], BAD_INPUT
+            return [str(_as_typed(fault)) for fault in error.faults], BAD_INPUT
         case BadInput():
             return [shown(line) for line in error.lines], BAD_INPUT
         case Stopped():
@@ -45,6 +47,11 @@ def explain(error: Exception) -> tuple[list[str], int]:
             return [f"zwidth: standard output cannot be written: {error.strerror or error}"], BAD_INPUT
         case _:
             return _internal(error), INTERNAL
+
+
+def _as_typed(fault: Fault) -> Fault:
+    """A fault of the settings is one of the option that gives them."""
+    return replace(fault, file="--set") if fault.file == SETTINGS else fault
 
 
 def _usage(error: click.ClickException) -> str:
