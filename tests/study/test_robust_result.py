@@ -19,6 +19,8 @@ KEYS = {
     "members_at_stiffness_max",
     "damping_max_Ns_per_m",
     "stable_area_N2s_per_m2",
+    "fastest_decay",
+    "fastest_decay_in_first_quadrant",
     "unobserved_modes",
     "members",
     "failed",
@@ -63,6 +65,7 @@ def test_keys(found):
     assert document["search"]["settled"] is found.settled
     assert document["frequency_at_stiffness_max_Hz"] == min(found.chart.frequencies_at_stiffness_max)
     assert document["excluding"] is None
+    assert document["fastest_decay"] is document["fastest_decay_in_first_quadrant"] is None  # not searched for
 
 
 def test_columns_are_the_arcs_of_the_edge(found):

@@ -85,9 +85,7 @@ class RobustStudy(Result):
             "settled": self.settled,
         }
         violation = None if self.violation is None else self.violation.document()
-        # the wall that decays fastest is not searched for over many members
-        chart = {key: value for key, value in self.chart.document().items() if not key.startswith("fastest_decay")}
-        return chart | {"members": list(self.members), "search": search, "violation": violation}
+        return self.chart.document() | {"members": list(self.members), "search": search, "violation": violation}
 
     def table(self) -> dict[str, list[Any]]:
         """The robust set's edge as columns, its arcs one after another and counted from 0."""
