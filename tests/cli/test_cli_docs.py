@@ -113,7 +113,7 @@ def test_the_keys_that_come_out_are_those_explained(folder):
 
 
 def test_every_exit_code_is_explained():
-    from zwidth.show.cli import main
+    from zwidth.show.cli import process
 
-    codes = {main.DONE, main.NO_ANSWER, main.BAD_INPUT, main.INTERNAL, main.INTERRUPTED}
+    codes = {process.DONE, process.NO_ANSWER, process.BAD_INPUT, process.INTERNAL, process.INTERRUPTED}
     assert {int(code) for code in re.findall(r"^\| (\d+) \|", PAGE, re.MULTILINE)} == codes
