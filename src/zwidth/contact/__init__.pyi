@@ -1,3 +1,6 @@
+from .contact_arguments import ContactArgumentError as ContactArgumentError
+from .contact_arguments import OutOfWorkspaceError as OutOfWorkspaceError
+from .contact_simulation import ContactSimulation as ContactSimulation
 from .environments import ENVIRONMENTS as ENVIRONMENTS
 from .environments import load_environment as load_environment
 from .environments.environment import Environment as Environment
@@ -7,6 +10,7 @@ from .hand import Hand as Hand
 from .hand import Reach as Reach
 from .hand import Reflex as Reflex
 from .hand import Tremor as Tremor
+from .limit_cycle_prediction import LimitCyclePrediction as LimitCyclePrediction
 from .limit_cycles import limit_cycles as limit_cycles
 from .mechanism.reach import SurfaceOutOfReach as SurfaceOutOfReach
 from .mechanism.simulate import MechanismMotion as MechanismMotion
@@ -17,8 +21,13 @@ from .mechanism.surfaces import Sphere as Sphere
 from .mechanism.walls import SurfaceEnvironment as SurfaceEnvironment
 from .mechanism.walls import SurfaceWall as SurfaceWall
 from .passivity import PassivityController as PassivityController
+from .predict_limit_cycles import NoEncoderStepsError as NoEncoderStepsError
+from .predict_limit_cycles import NothingNonlinearError as NothingNonlinearError
+from .predict_limit_cycles import predict_limit_cycles as predict_limit_cycles
 from .response import TimeResponse as TimeResponse
 from .simulate import Run as Run
 from .simulate import simulate as simulate
 from .simulate import simulate_batch as simulate_batch
+from .simulate_contact import NoForceError as NoForceError
+from .simulate_contact import simulate_contact as simulate_contact
 from .verdict import judge_response as judge_response

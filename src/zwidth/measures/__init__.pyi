@@ -17,6 +17,8 @@ from .evaluate import measure_at as measure_at
 from .felt import felt_impedance as felt_impedance
 from .felt import static_stiffness as static_stiffness
 from .felt_chart import felt_chart as felt_chart
+from .felt_wall import FeltWall as FeltWall
+from .felt_wall import felt_wall as felt_wall
 from .fidelity import OptimalMass as OptimalMass
 from .fidelity import decay_time as decay_time
 from .fidelity import fastest_mass as fastest_mass
