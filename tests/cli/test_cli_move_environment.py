@@ -48,7 +48,7 @@ def own(tmp_path):
 def test_every_environment_is_that_of_python_and_named_as_simulate_names_it(name):
     document = moved("--environment", name)
     environment = ENVIRONMENTS[name]
-    motion = called(package.SurfaceEnvironment(environment, environment.values()))
+    motion = called(package.contact.SurfaceEnvironment(environment, environment.values()))
     assert document["force_N"] == motion.force.tolist()
     assert document["position_m"] == motion.position.tolist()
     assert np.any(motion.force)
@@ -67,7 +67,7 @@ def test_parameters_come_by_their_option_and_by_those_of_walls():
     assert (document["wall_stiffness_N_per_m"], document["wall_damping_Ns_per_m"]) == (700.0, 3.0)
     assert document["no_pull"] is True
     values = ENVIRONMENTS["slot"].values(width=0.004, stiffness=700.0, damping=3.0, no_pull=1)
-    motion = called(package.SurfaceEnvironment(ENVIRONMENTS["slot"], values))
+    motion = called(package.contact.SurfaceEnvironment(ENVIRONMENTS["slot"], values))
     assert document["force_N"] == motion.force.tolist()
     out = zwidth("move", MECHANISM, *PLANE, *PUSH, *words, "--no-pull").out
     said = "slot: width 4.000 mm, stiffness 1.000 kN/m, damping 3.000 Ns/m, no pull"

@@ -186,7 +186,7 @@ def test_bundled_devices_are_not_warned_of(name):
 
 def test_a_warning_changes_neither_the_answer_s_exit_code_nor_its_json(paddle):
     with pytest.warns(ImplausibleNumber, match="more than a full turn"):
-        ran = zwidth("show", paddle, "settings", "mechanism.links.paddle.orientation_rad=[0, 0, 7]", "--json")
+        ran = zwidth("show", paddle, "--set", "mechanism.links.paddle.orientation_rad=[0, 0, 7]", "--json")
     assert ran.code == 0
     assert ran.document["link_side_mass_kg"] > 0.0
 

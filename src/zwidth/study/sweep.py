@@ -131,7 +131,7 @@ def sweep(
                TypeError     for arguments of another kind
                what `executor.run` and `Store` raise
     """
-    if isinstance(device, Study | str | os.PathLike):  # what was swept before there were axes here
+    if isinstance(device, Study | str | os.PathLike) and not axes:  # what was swept before there were axes
         old: xr.Dataset = _verbs.old_sweep(device, axes, measures)
         return old
     study = study_over(
