@@ -12,7 +12,7 @@ import pytest
 
 from tests.cli.cli_run import TWO_MASS, strict
 from tests.interruption import HANGS, interruptible, stopped_by_ctrl_c
-from zwidth.show.cli.check import AT_ONCE
+from zwidth.chart.verdict import AT_ONCE
 
 ZWIDTH = Path(sys.executable).with_name("zwidth")
 HEAVY = {"numpy", "numba", "scipy", "matplotlib", "pydantic", "jinja2", "shapely"}
