@@ -83,7 +83,7 @@ def test_ctrl_c_while_computing(tmp_path):
     verdicts.write_text("from before")
     walls.write_text("stiffness_N_per_m,damping_Ns_per_m\n" + "4000,10\n" * (AT_ONCE + 1))
     words = ["check", TWO_MASS, "--points", str(walls), "--output", str(verdicts)]
-    code, out, err = stopped_by_ctrl_c(words, "zwidth.chart.verdict:judge")
+    code, out, err = stopped_by_ctrl_c(words, "zwidth.chart.verdict:verdicts")
     assert (code, out, len(err.splitlines())) == (130, "", 1)
     assert "interrupted" in err
     assert verdicts.read_text() == "from before"

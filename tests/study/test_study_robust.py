@@ -198,7 +198,7 @@ def test_a_range_s_advice_is_in_the_words_of_who_asks():
     )
     assert str(whole).endswith("is a whole number and has no range; compute it for each value with Device.with_")
     assert str(logarithmic).endswith("give a positive number, or leave out logarithmic")
-    assert whole.spelled(lambda name, value: "settings").endswith("compute it for each value with --set")
+    assert whole.spelled(lambda name, value: "--set").endswith("compute it for each value with --set")
 
 
 def test_members_that_cannot_be_built_are_counted_and_named():

@@ -11,13 +11,12 @@ import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final
 
-from zwidth.device.faults import DeviceError, Fault, Path, dotted, fail, listed, nearest, quote
+from zwidth.device.faults import SETTINGS, DeviceError, Fault, Path, dotted, fail, listed, nearest, quote
 from zwidth.device.read import within_depth
 from zwidth.device.schema import file as schema
 from zwidth.device.toml_access import copied
 
 UNSET: Final = object()
-SETTINGS: Final = "settings"  # what stands for a file in messages about settings
 
 FILTERS: Final = (frozenset({"time_constant_s"}), frozenset({"order", "cutoff_Hz", "discretisation"}))
 EXCLUSIVE: Final[dict[tuple[str, ...], tuple[frozenset[str], ...]]] = {

@@ -13,6 +13,9 @@ Path = tuple[str | int, ...]
 LONGEST_QUOTE: Final = 60
 
 
+SETTINGS: Final = "settings"  # what stands for a file in messages about settings
+
+
 @dataclass(frozen=True)
 class Fault:
     """One thing that is wrong.

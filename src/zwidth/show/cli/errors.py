@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import click
 
-from zwidth.device.address import SETTINGS
-from zwidth.device.faults import DeviceError, Fault
+from zwidth.device.faults import SETTINGS, DeviceError, Fault
 from zwidth.show.cli.process import BAD_INPUT, INTERNAL, INTERRUPTED
 from zwidth.show.output import OutputError, shown
 
