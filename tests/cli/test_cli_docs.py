@@ -68,7 +68,8 @@ def test_an_example_runs(folder, line):
     assert (ran.code, ran.err) == (0, "")
     assert ran.out
     written = {path.name for path in set(folder.iterdir()) - before}
-    expected = re.findall(r"--output (\S+)", line) or (["my-device-report.html"] if words[1] == "report" else [])
+    unnamed = {"report": "my-device-report.html", "new": f"{words[2]}.toml"} if len(words) > 2 else {}
+    expected = re.findall(r"--output (\S+)", line) or [file for name, file in unnamed.items() if name == words[1]]
     assert written == set(expected)
 
 
@@ -94,6 +95,8 @@ def test_the_keys_that_come_out_are_those_explained(folder):
         assert set(found("chart", device)) - asked == keys("chart")
     told = found("bounds", TWO_MASS)
     assert set(told) - asked | set(told["bounds"][0]) == keys("bounds") - {"undecided"}
+    document = found("new", "my-paddle", "--kind", "paddle")
+    assert set(document) - asked == keys("new")
     document = found("check", TWO_MASS, "--points", "walls.csv")
     assert set(document) - asked == {"points"}
     assert set(document["points"][0]) | {"points"} >= keys("check")

@@ -21,6 +21,7 @@ def test_the_commands_are_those_promised():
     assert set(COMMANDS) == {
         "devices",
         "schema",
+        "new",
         "show",
         "chart",
         "check",

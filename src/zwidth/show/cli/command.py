@@ -175,7 +175,7 @@ class Command:
 
     def answer(self, case: Case) -> Answer:
         """Compute, and write the file that is asked for. Raises BadInput."""
-        if case.device.response is not None and not self.of_responses:
+        if not self.of_responses and case.device.response is not None:
             case.question.as_measured(case.device)
             return self.unanswered(case, NoAnswer(NO_MODEL))
         try:

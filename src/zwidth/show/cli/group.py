@@ -20,6 +20,7 @@ from zwidth.show.cli.guarantees import GuaranteesCommand
 from zwidth.show.cli.limit_cycles import LimitCycles
 from zwidth.show.cli.map import Map
 from zwidth.show.cli.move import move
+from zwidth.show.cli.new import New
 from zwidth.show.cli.polar import Polar
 from zwidth.show.cli.report import Report
 from zwidth.show.cli.robust import Robust
@@ -53,6 +54,7 @@ def zwidth(context: click.Context) -> None:
 COMMANDS = (
     devices,
     schema,
+    New(),
     Show(),
     ChartCommand(),
     Check(),

@@ -1,0 +1,91 @@
+"""`zwidth new`: a device file to start from."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Mapping
+from functools import wraps
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from zwidth.device.new import KINDS
+from zwidth.show.cli.command import Case, Command
+from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.options import Command as Callback
+from zwidth.show.cli.options import Question, named
+from zwidth.show.output import shown, write_text
+
+ENDING: Final = ".toml"
+
+
+class New(Command):
+    """Write a device file NAME.toml to start from: exchange its numbers for yours.
+
+    It is complete and answers at once. Every number has a comment that says what it is and where one gets it; what
+    may be left out is there as a comment. A file that is there already is never replaced.
+    """
+
+    name = "new"
+    summary = "Write a device file to start from."
+    examples = ("zwidth new my-paddle --kind paddle", 'zwidth new "My arm" --kind serial-2r --output arm.toml')
+    options = (
+        click.option(
+            "--kind",
+            type=click.Choice(tuple(KINDS)),
+            required=True,
+            help="One link on a drive; a planar arm of two links; a planar linkage of two arms; or masses along "
+            "the rendered direction, where you know its dynamics.",
+        ),
+    )
+    outputs = (ENDING,)
+    output_help = "Where to write it (.toml). Default: NAME.toml in this folder."
+    of_responses = True  # there is no device yet
+
+    def about(self, command: Callback) -> Callback:
+        @wraps(command)
+        def told(device: str, **more: Any) -> int:
+            return command(Question(device), **more)
+
+        return click.argument("device", metavar="NAME", callback=named)(told)
+
+    def default_output(self, question: Question) -> str:
+        return question.name if question.name.lower().endswith(ENDING) else question.name + ENDING
+
+    def check(self, case: Case) -> None:
+        assert case.path is not None
+        if case.path.exists():
+            raise BadInput(f"{case.path}: is there already; remove it, or name another with --output")
+
+    def circumstances(self, case: Case) -> dict[str, Any]:
+        return {"name": _name(case.question), "kind": case["kind"]}
+
+    def compute(self, case: Case) -> str:
+        from zwidth.device.new import new_device
+
+        try:
+            return new_device(_name(case.question), case["kind"])
+        except ValueError as error:
+            raise BadInput(str(error)) from None
+
+    def document(self, case: Case, result: str) -> dict[str, Any]:
+        return {}
+
+    def heading(self, case: Case) -> str:
+        return ""
+
+    def pages(self, case: Case, result: str, document: Mapping[str, Any]) -> Iterator[Any]:
+        file = shown(shlex.quote(document["file"]))
+        yield f"{document['kind']}: exchange its numbers for yours; it answers already:\n  zwidth chart {file}"
+
+    def write(self, case: Case, result: str, document: dict[str, Any], reason: str | None) -> str | None:
+        assert case.path is not None
+        write_text(case.path, result)
+        return reason
+
+
+def _name(question: Question) -> str:
+    """What the device is called: NAME without a folder and without the file's ending."""
+    name = Path(question.name).name
+    return name[: -len(ENDING)] if name.lower().endswith(ENDING) else name

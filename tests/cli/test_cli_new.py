@@ -1,0 +1,88 @@
+"""`zwidth new`: the file that it writes, by whatever name, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import tomllib
+
+import pytest
+
+from tests.cli.cli_run import found, refused, zwidth
+from zwidth.device.new import KINDS, new_device
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_new_device_answers_at_once_without_a_word(folder, kind):
+    document = found("new", "mine", "--kind", kind)
+    assert document == {"name": "mine", "kind": kind, "file": str(folder / "mine.toml")}
+    assert (folder / "mine.toml").read_text() == new_device("mine", kind)
+    assert found("chart", "mine.toml")["stiffness_max_N_per_m"] > 500.0
+    assert found("show", "mine.toml")["rigid_mass_kg"] > 0.01
+    assert found("report", "mine.toml", "--output", "mine.html")["file"] == str(folder / "mine.html")
+    for words in (("chart", "mine.toml"), ("show", "mine.toml")):
+        ran = zwidth(*words)
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.out.startswith("mine: ")
+
+
+def test_people_are_told_what_to_type_next(folder):
+    ran = zwidth("new", "my device", "--kind", "plant")
+    assert (ran.code, ran.err) == (0, "")
+    (line,) = [line for line in ran.out.splitlines() if "zwidth chart" in line]
+    assert zwidth(*shlex.split(line)[1:]).code == 0
+    assert f"written: {folder / 'my device.toml'}" in ran.out
+
+
+@pytest.mark.parametrize(
+    ("typed", "file", "name"),
+    [
+        ("my device", "my device.toml", "my device"),
+        ('5" arm', '5" arm.toml', '5" arm'),
+        ("it's", "it's.toml", "it's"),
+        ("arm.toml", "arm.toml", "arm"),
+        ("v1.2", "v1.2.toml", "v1.2"),
+        ("designs/arm", "designs/arm.toml", "arm"),
+        ("-x", "-x.toml", "-x"),
+    ],
+)
+def test_a_name_makes_the_file_s_name_and_the_device_s(folder, typed, file, name):
+    (folder / "designs").mkdir()
+    ran = zwidth("new", "--kind", "plant", "--json", "--", typed)
+    assert ran.code == 0, ran.err
+    assert json.loads(ran.out)["name"] == name
+    assert tomllib.loads((folder / file).read_text())["name"] == name
+
+
+def test_another_file_may_be_named(folder):
+    found("new", "My arm", "--kind", "serial-2r", "--output", "arm.toml")
+    assert [path.name for path in folder.iterdir()] == ["arm.toml"]
+    assert tomllib.loads((folder / "arm.toml").read_text())["name"] == "My arm"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["there", "--kind", "plant"], "there.toml: is there already; remove it, or name another with --output"),
+        (["x", "--kind", "plant", "--output", "there.toml"], "there.toml: is there already"),
+        (["no/where", "--kind", "plant"], "there is no folder"),
+        (["x", "--kind", "plant", "--output", "x.json"], "x.json: must end in .toml"),
+        (["x"], "missing option '--kind'"),
+        (["x", "--kind", "delta"], "'delta' is not one of 'paddle', 'serial-2r', 'five-bar', 'plant'"),
+        (["", "--kind", "plant"], "is empty; give a name"),
+        (["two\nlines", "--kind", "plant"], r"name must be a line of text, got 'two\nlines'"),
+        (["--kind", "plant"], "missing argument 'NAME'"),
+    ],
+)
+def test_what_is_refused_leaves_everything_as_it_was(folder, words, said):
+    (folder / "there.toml").write_text("somebody's work")
+    (line,) = refused("new", *words)
+    assert said in line
+    assert [path.name for path in folder.iterdir()] == ["there.toml"]
+    assert (folder / "there.toml").read_text() == "somebody's work"
