@@ -18,7 +18,7 @@ from zwidth.device import address
 from zwidth.device.load import from_document, load
 from zwidth.loop.loop import Loop
 from zwidth.model.plant import Plant
-from zwidth.study.derivative import central_slope, one_sided_slope
+from zwidth.study.derivative import central_derivative, one_sided_derivative
 from zwidth.study.local_maxima import rival_stiffness
 from zwidth.study.optimum import optimum
 from zwidth.study.sensitivity import sensitivities
@@ -168,7 +168,7 @@ def test_random_loops_move_as_their_whole_search_says(seed):
         held = optimum(loop, peak)
         assert held.moves(loop) == pytest.approx(peak.stiffness, rel=1e-9)
         for what in ("mass", "damping", "stiffness"):
-            slope = central_slope(moved_by(loop, held, what), 1.0, 1.0)
+            slope = central_derivative(moved_by(loop, held, what), 1.0, 1.0)
             h = 1e-4
             peaks = [largest_stiffness(scaled_plant(loop, what, 1.0 + sign * h)).stiffness for sign in (1, -1)]
             assert slope.value == pytest.approx((peaks[0] - peaks[1]) / (2 * h), abs=2e-5 * peak.stiffness)
@@ -212,7 +212,7 @@ def test_corners_on_lines_of_real_roots_move_as_charts_say():
             continue
         for corner, plus, minus in zip(here, *moved, strict=True):
             held = optimum(loop, corner)
-            slope = central_slope(moved_by(loop, held, "mass"), 1.0, 1.0).value
+            slope = central_derivative(moved_by(loop, held, "mass"), 1.0, 1.0).value
             scale = abs(corner.stiffness) + abs(slope)
             assert slope == pytest.approx((plus.stiffness - minus.stiffness) / 2e-5, abs=1e-3 * scale)
             seen[corner.angles[0] if corner.angles[0] == 0.0 else corner.angles[1]] += 1
@@ -302,12 +302,16 @@ def test_a_second_summit_is_named_and_a_tie_is_called_so():
 
 def test_slopes_know_what_they_are_worth():
     for of, at, exact in ((np.exp, 1.0, np.e), (np.sin, 0.3, np.cos(0.3)), (lambda x: x**5, 1.0, 5.0)):
-        for slope in (central_slope(of, at, at), one_sided_slope(of, at, at, 1), one_sided_slope(of, at, at, -1)):
+        for slope in (
+            central_derivative(of, at, at),
+            one_sided_derivative(of, at, at, 1),
+            one_sided_derivative(of, at, at, -1),
+        ):
             assert abs(slope.value - exact) < 1e-8
             assert abs(slope.value - exact) <= 10.0 * slope.error + 1e-13
 
     rng = np.random.default_rng(3)
-    slopes = [central_slope(lambda x: np.exp(x) + 1e-10 * rng.normal(), 1.0, 1.0) for _ in range(50)]
+    slopes = [central_derivative(lambda x: np.exp(x) + 1e-10 * rng.normal(), 1.0, 1.0) for _ in range(50)]
     errors = np.array([abs(slope.value - np.e) for slope in slopes])
     estimates = np.array([slope.error for slope in slopes])
     assert np.median(errors) < 1e-7

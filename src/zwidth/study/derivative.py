@@ -16,14 +16,14 @@ POOR: Final = 1e-8  # and above which other first steps are tried
 
 
 @dataclass(frozen=True)
-class Slope:
+class Derivative:
     """A derivative and the estimate of its error, both in units of the function over those of its argument."""
 
     value: float
     error: float
 
 
-def central_slope(of: Callable[[float], float], at: float, scale: float) -> Slope:
+def central_derivative(of: Callable[[float], float], at: float, scale: float) -> Derivative:
     """Derivative of a smooth function of order one by central differences, extrapolated to step 0.
 
         D(h) = (f(x + h) - f(x - h)) / 2 h = f' + c2 h^2 + c4 h^4 + ...
@@ -36,26 +36,26 @@ def central_slope(of: Callable[[float], float], at: float, scale: float) -> Slop
     Raises  what the function raises at the first step
 
     >>> from math import exp
-    >>> abs(central_slope(exp, 0.0, 1.0).value - 1.0) < 1e-11
+    >>> abs(central_derivative(exp, 0.0, 1.0).value - 1.0) < 1e-11
     True
     """
     return _extrapolated(lambda h: (of(at + h) - of(at - h)) / (2.0 * h), scale, 4.0)
 
 
-def one_sided_slope(of: Callable[[float], float], at: float, scale: float, side: int) -> Slope:
+def one_sided_derivative(of: Callable[[float], float], at: float, scale: float, side: int) -> Derivative:
     """The same from one side, +1 above or -1 below; for arguments at the end of their range, or at a bend.
 
         D(h) = (f(x + h) - f(x)) / h = f' + c1 h + c2 h^2 + ...
 
     >>> from math import sqrt
-    >>> round(one_sided_slope(sqrt, 1.0, 1.0, -1).value, 8)
+    >>> round(one_sided_derivative(sqrt, 1.0, 1.0, -1).value, 8)
     0.5
     """
     start = of(at)
     return _extrapolated(lambda h: side * (of(at + side * h) - start) / h, scale, 2.0)
 
 
-def _extrapolated(quotient: Callable[[float], float], scale: float, factor: float) -> Slope:
+def _extrapolated(quotient: Callable[[float], float], scale: float, factor: float) -> Derivative:
     """The best of the tables that begin with each first step, as far as they are needed."""
     best = _table(quotient, FIRST[0] * scale, scale, factor)
     for first in FIRST[1:]:
@@ -66,29 +66,29 @@ def _extrapolated(quotient: Callable[[float], float], scale: float, factor: floa
     return best
 
 
-def _table(quotient: Callable[[float], float], first: float, scale: float, factor: float) -> Slope:
+def _table(quotient: Callable[[float], float], first: float, scale: float, factor: float) -> Derivative:
     """Richardson's table of D(h), D(h/2), ..., whose error falls by `factor` at the first halving; its best.
 
     Where it ends in rounding, of which the last quotient is a sample, no entry is better than this rounding over
     its own step: that two entries agree may be luck.
     """
     row: list[float] = []
-    best, found = Slope(float("nan"), float("inf")), 0
+    best, found = Derivative(float("nan"), float("inf")), 0
     for level in range(MOST):
         above, row = row, [quotient(first / 2.0**level)]
         for k, coarse in enumerate(above):
             row.append(row[k] + (row[k] - coarse) / (factor ** (k + 1) - 1.0))
             error = max(abs(row[k + 1] - row[k]), abs(row[k + 1] - coarse))
             if k > 0 and error < best.error:
-                best, found = Slope(row[k + 1], error), level
+                best, found = Derivative(row[k + 1], error), level
         if level + 1 >= LEVELS:
             if best.error <= ENOUGH * max(abs(best.value), 1.0 / scale):
                 return best
             if _rounding(row, best):
                 break
-    return Slope(best.value, max(best.error, abs(row[0] - best.value) * 2.0 ** (found - level)))
+    return Derivative(best.value, max(best.error, abs(row[0] - best.value) * 2.0 ** (found - level)))
 
 
-def _rounding(row: list[float], best: Slope) -> bool:
+def _rounding(row: list[float], best: Derivative) -> bool:
     """Whether rounding has taken over: the newest entries are further apart than the best were."""
     return len(row) > LEVELS and abs(row[-1] - row[-2]) > 4.0 * best.error

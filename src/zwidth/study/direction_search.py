@@ -23,7 +23,7 @@ ROWS: Final = 100_000  # questions asked at once
 
 
 @dataclass(frozen=True)
-class Around:
+class DirectionSearch:
     """A measure to be asked along many directions of points that are OK, all of one freedom to move.
 
     point     flat, of shape (n,), all OK
@@ -57,7 +57,7 @@ class Around:
         return np.asarray(u / np.linalg.norm(u, axis=-1, keepdims=True))
 
 
-def arounds(measure: Measure, point: OperatingPoint) -> Iterator[tuple[Ints, Around]]:
+def direction_searches(measure: Measure, point: OperatingPoint) -> Iterator[tuple[Ints, DirectionSearch]]:
     """Those points of a flat one that are OK, by their freedom to move: which they are, and how to ask there."""
     ok = np.flatnonzero(point.status == OK)
     if not len(ok):
@@ -68,7 +68,7 @@ def arounds(measure: Measure, point: OperatingPoint) -> Iterator[tuple[Ints, Aro
         mine = np.flatnonzero(freedom == r)
         some = point[ok[mine]]
         basis = left[mine][:, :, :r]
-        yield ok[mine], Around(measure, some, basis, _one_sided(measure, some, basis))
+        yield ok[mine], DirectionSearch(measure, some, basis, _one_sided(measure, some, basis))
 
 
 def _one_sided(measure: Measure, point: OperatingPoint, basis: Floats) -> bool:
@@ -76,9 +76,9 @@ def _one_sided(measure: Measure, point: OperatingPoint, basis: Floats) -> bool:
     n, r = len(basis), basis.shape[2]
     which = np.unique(np.linspace(0, n - 1, min(n, TRIED)).astype(np.int64))
     like_no_other = np.broadcast_to(np.array([0.5403, 0.8415, 0.3907])[:r], (len(which), r))
-    around = Around(measure, point, basis, one_sided=False)
-    there = around.asked(which, like_no_other).values
-    back = around.asked(which, -like_no_other).values
+    search = DirectionSearch(measure, point, basis, one_sided=False)
+    there = search.asked(which, like_no_other).values
+    back = search.asked(which, -like_no_other).values
     with np.errstate(invalid="ignore"):
         apart = np.abs(there - back) > SAME * np.maximum(np.abs(there), np.abs(back))
     return bool((apart | (np.isnan(there) != np.isnan(back))).any())

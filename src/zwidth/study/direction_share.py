@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.evaluate import NO_MECHANISM
 from zwidth.measures.measure import Measure, MeasureError
-from zwidth.study.direction_search import Around, Floats, Ints, arounds
+from zwidth.study.direction_search import DirectionSearch, Floats, Ints, direction_searches
 from zwidth.study.requirement import Requirement
 
 Bools = NDArray[np.bool_]
@@ -68,41 +68,43 @@ def share_of_directions(requirement: Requirement, point: OperatingPoint) -> Floa
         raise MeasureError(NO_MECHANISM)
     row = point.flat
     share: Floats = np.full(row.shape, np.nan)
-    for which, around in arounds(requirement.measure, row):
-        r = around.basis.shape[2]
+    for which, search in direction_searches(requirement.measure, row):
+        r = search.basis.shape[2]
         for first in range(0, len(which), CHUNK):
             mine = np.arange(first, min(first + CHUNK, len(which)))
-            share[which[mine]] = _SHARES[r](requirement, around, mine)
+            share[which[mine]] = _SHARES[r](requirement, search, mine)
     return np.asarray(share.reshape(point.shape))
 
 
-def _of_line(requirement: Requirement, around: Around, mine: Ints) -> Floats:
+def _of_line(requirement: Requirement, search: DirectionSearch, mine: Ints) -> Floats:
     ways = (np.ones((len(mine), 1)), -np.ones((len(mine), 1)))
-    return np.asarray(np.mean([requirement.met(around.asked(mine, way).values) for way in ways], axis=0))
+    return np.asarray(np.mean([requirement.met(search.asked(mine, way).values) for way in ways], axis=0))
 
 
-def _of_circle(requirement: Requirement, around: Around, mine: Ints) -> Floats:
-    return _of_latitude(requirement, around, mine, 0.0, whole=around.one_sided)
+def _of_circle(requirement: Requirement, search: DirectionSearch, mine: Ints) -> Floats:
+    return _of_latitude(requirement, search, mine, 0.0, whole=search.one_sided)
 
 
-def _of_sphere(requirement: Requirement, around: Around, mine: Ints) -> Floats:
-    height, weight = np.polynomial.legendre.leggauss(LATITUDES * (2 if around.one_sided else 1))
-    if not around.one_sided:  # the other half is the same
+def _of_sphere(requirement: Requirement, search: DirectionSearch, mine: Ints) -> Floats:
+    height, weight = np.polynomial.legendre.leggauss(LATITUDES * (2 if search.one_sided else 1))
+    if not search.one_sided:  # the other half is the same
         height = 0.5 * (height + 1.0)
-    parts = [_of_latitude(requirement, around, mine, z, whole=True) for z in height.tolist()]
+    parts = [_of_latitude(requirement, search, mine, z, whole=True) for z in height.tolist()]
     return np.asarray(0.5 * weight @ np.array(parts))
 
 
-def _of_latitude(requirement: Requirement, around: Around, mine: Ints, height: float, *, whole: bool) -> Floats:
+def _of_latitude(
+    requirement: Requirement, search: DirectionSearch, mine: Ints, height: float, *, whole: bool
+) -> Floats:
     """The share of a circle (or of its half, which the other half repeats) that meets the requirement."""
     turn, radius = (2.0 * np.pi if whole else np.pi), np.sqrt(1.0 - height * height)
     count = 2 * SAMPLES if whole else SAMPLES
     step = turn / count
-    third = (height,) if around.basis.shape[2] == 3 else ()
+    third = (height,) if search.basis.shape[2] == 3 else ()
 
     def margin(which: Ints, angle: Floats) -> Floats:
         parts = [radius * np.cos(angle), radius * np.sin(angle), *(np.full(len(angle), z) for z in third)]
-        values = around.asked(mine[which], np.stack(parts, axis=-1)).values
+        values = search.asked(mine[which], np.stack(parts, axis=-1)).values
         return np.where(np.isnan(values), -np.inf, requirement.margin(values))
 
     n = np.arange(len(mine))

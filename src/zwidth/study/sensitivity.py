@@ -27,7 +27,7 @@ from zwidth.device.schema import file as schema
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.arguments import require
-from zwidth.study.derivative import Slope, central_slope, one_sided_slope
+from zwidth.study.derivative import Derivative, central_derivative, one_sided_derivative
 from zwidth.study.local_maxima import rival_stiffness
 from zwidth.study.optimum import Optimum, OptimumError, optimum
 from zwidth.study.sensitivities import Group, Sensitivities, Sensitivity
@@ -116,7 +116,7 @@ class _Answer:
         unit = _unit(steps)
         scale = abs(value) or _scale(document, steps)
         reason = _obstacle(steps, value)
-        slope, side = Slope(nan, nan), ""
+        slope, side = Derivative(nan, nan), ""
         if not reason:
             slope, side, reason = self._slope(lambda changed: _with(document, steps, changed), value, scale)
         if self.held is None or reason:
@@ -150,14 +150,16 @@ class _Answer:
 
         return scaled
 
-    def _slope(self, change: Callable[[float], dict[str, Any]], at: float, scale: float) -> tuple[Slope, str, str]:
+    def _slope(
+        self, change: Callable[[float], dict[str, Any]], at: float, scale: float
+    ) -> tuple[Derivative, str, str]:
         """Derivative of ln K_max, its side, and the reason why there is none: from both sides where these are
         alike, else from above, else from below.
 
         A delay that crosses whole samples changes the form of the loop, and the largest stiffness bends there.
         """
         if self.held is None:
-            return Slope(nan, nan), "", self.obstacle
+            return Derivative(nan, nan), "", self.obstacle
         held, seen = self.held, dict[int, tuple[int, bool]]()
 
         def stiffness(changed: float) -> float:
@@ -169,7 +171,9 @@ class _Answer:
         for side, sign in (("both", 0), ("above", 1), ("below", -1)):
             try:
                 slope = (
-                    one_sided_slope(stiffness, at, scale, sign) if sign else central_slope(stiffness, at, scale)
+                    one_sided_derivative(stiffness, at, scale, sign)
+                    if sign
+                    else central_derivative(stiffness, at, scale)
                 )
             except DeviceError as error:
                 reason = reason or error.faults[0].message
@@ -182,7 +186,7 @@ class _Answer:
             if slope.error * scale <= WORTHLESS * max(1.0, abs(slope.value) * scale):
                 return slope, side, ""
             reason = reason or "it changes too abruptly here to have a derivative"
-        return Slope(nan, nan), "", reason
+        return Derivative(nan, nan), "", reason
 
 
 def _obstacle(steps: Path, value: float) -> str:

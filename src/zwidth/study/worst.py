@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.evaluate import NO_MECHANISM, evaluate
 from zwidth.measures.measure import MISSING, OK, Measure, Measured, MeasureError, Note
-from zwidth.study.direction_search import Around, Floats, Ints, arounds
+from zwidth.study.direction_search import DirectionSearch, Floats, Ints, direction_searches
 
 Extreme = Literal["worst", "best", "lowest", "highest"]
 EXTREMES: Final = ("worst", "best", "lowest", "highest")
@@ -66,10 +66,10 @@ def along_extreme(measure: Measure, point: OperatingPoint, extreme: Extreme) -> 
     goal = _Goal(sense(measure, extreme), extreme == "worst")
     values, direction = np.full(row.shape, np.nan), np.full((*row.shape, 3), np.nan)
     status = row.status.copy()
-    for which, around in arounds(measure, row):
+    for which, search in direction_searches(measure, row):
         for first in range(0, len(which), CHUNK):
             mine = np.arange(first, min(first + CHUNK, len(which)))
-            found = _SEARCH[around.basis.shape[2]](around, mine, goal, which)
+            found = _SEARCH[search.basis.shape[2]](search, mine, goal, which)
             values[which[mine]], direction[which[mine]], status[which[mine]] = found
     shape = point.shape
     told = goal.told(shape)
@@ -132,18 +132,18 @@ class _Goal:
 Found = tuple[Floats, Floats, NDArray[np.uint8]]
 
 
-def _in_line(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
-    components = np.array([[1.0], [-1.0]]) if around.one_sided else np.array([[1.0]])
-    f, status = _sampled(around, mine, components, goal, which)
+def _in_line(search: DirectionSearch, mine: Ints, goal: _Goal, which: Ints) -> Found:
+    components = np.array([[1.0], [-1.0]]) if search.one_sided else np.array([[1.0]])
+    f, status = _sampled(search, mine, components, goal, which)
     best = f.argmin(axis=0)
-    return _found(around, mine, goal.sign * f.min(axis=0), components[best], status)
+    return _found(search, mine, goal.sign * f.min(axis=0), components[best], status)
 
 
-def _in_plane(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
-    count = 2 * IN_PLANE if around.one_sided else IN_PLANE
+def _in_plane(search: DirectionSearch, mine: Ints, goal: _Goal, which: Ints) -> Found:
+    count = 2 * IN_PLANE if search.one_sided else IN_PLANE
     step = float(np.pi / IN_PLANE)
     angles: Floats = np.asarray(step * np.arange(count), dtype=np.float64)
-    f, status = _sampled(around, mine, _turned(angles), goal, which)
+    f, status = _sampled(search, mine, _turned(angles), goal, which)
     expected, n = _expected(f), np.arange(len(mine))
     k = expected.argmin(axis=0)
     lowest = f[k, n]
@@ -158,7 +158,7 @@ def _in_plane(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
     start, place = start[keep], place[keep]
 
     def ask(angle: Floats) -> Floats:
-        return goal.lowered(around.asked(mine[place], _turned(angle)).values)
+        return goal.lowered(search.asked(mine[place], _turned(angle)).values)
 
     angle, value = _golden(ask, start - step, start + step)
     best_angle: Floats = angles[k]
@@ -167,7 +167,7 @@ def _in_plane(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
         better = value[rows] < best[place[rows]]
         best[place[rows][better]] = value[rows][better]
         best_angle[place[rows][better]] = angle[rows][better]
-    return _found(around, mine, goal.sign * best, _turned(best_angle), status)
+    return _found(search, mine, goal.sign * best, _turned(best_angle), status)
 
 
 def _expected(f: Floats) -> Floats:
@@ -195,15 +195,15 @@ def _golden(ask, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: i
     return np.where(left, c, d), np.where(left, at_c, at_d)
 
 
-def _on_sphere(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
+def _on_sphere(search: DirectionSearch, mine: Ints, goal: _Goal, which: Ints) -> Found:
     points = sphere(2 * ON_SPHERE)
-    points = points if around.one_sided else points[:ON_SPHERE]
+    points = points if search.one_sided else points[:ON_SPHERE]
     reach = float(np.sqrt(2.0 * np.pi / ON_SPHERE))
-    f, status = _sampled(around, mine, points, goal, which)
+    f, status = _sampled(search, mine, points, goal, which)
     k, n = f.argmin(axis=0), np.arange(len(mine))
     lowest = f[k, n]
     cosine = points @ points[k].T
-    near = cosine > np.cos(2.0 * reach) if around.one_sided else np.abs(cosine) > np.cos(2.0 * reach)
+    near = cosine > np.cos(2.0 * reach) if search.one_sided else np.abs(cosine) > np.cos(2.0 * reach)
     second = np.where(near, np.inf, f)
     also = np.flatnonzero(second.min(axis=0) <= lowest + NEAR * _spread(f))
     start = np.concatenate([points[k], points[second.argmin(axis=0)[also]]])
@@ -211,18 +211,18 @@ def _on_sphere(around: Around, mine: Ints, goal: _Goal, which: Ints) -> Found:
     value = np.concatenate([lowest, second.min(axis=0)[also]])
     keep = np.isfinite(value)
     start, place, value = start[keep], place[keep], value[keep]
-    end, value = _compass(around, mine[place], start, value, goal, 0.6 * reach)
+    end, value = _compass(search, mine[place], start, value, goal, 0.6 * reach)
     best, best_point = lowest.copy(), points[k].copy()
     split = int(keep[: len(n)].sum())
     for rows in (slice(0, split), slice(split, len(place))):
         better = value[rows] < best[place[rows]]
         best[place[rows][better]] = value[rows][better]
         best_point[place[rows][better]] = end[rows][better]
-    return _found(around, mine, goal.sign * best, best_point, status)
+    return _found(search, mine, goal.sign * best, best_point, status)
 
 
 def _compass(
-    around: Around, place: Ints, u: Floats, value: Floats, goal: _Goal, reach: float
+    search: DirectionSearch, place: Ints, u: Floats, value: Floats, goal: _Goal, reach: float
 ) -> tuple[Floats, Floats]:
     """The lowest of eight directions round each, again and again; nearer ones where none of them is lower."""
     u, value, step = u.copy(), value.copy(), np.full(len(u), reach)
@@ -234,7 +234,7 @@ def _compass(
         angle = 0.25 * np.pi * np.arange(8) + turn  # no axis is preferred
         out = np.cos(angle)[:, None, None] * p + np.sin(angle)[:, None, None] * q
         trial = np.cos(step[busy])[:, None] * u[busy] + np.sin(step[busy])[:, None] * out
-        asked = around.asked(np.tile(place[busy], 8), trial.reshape(-1, 3)).values.reshape(8, -1)
+        asked = search.asked(np.tile(place[busy], 8), trial.reshape(-1, 3)).values.reshape(8, -1)
         f = goal.lowered(asked)
         k, n = f.argmin(axis=0), np.arange(len(busy))
         better = f[k, n] < value[busy]
@@ -270,11 +270,11 @@ def _turned(angle: Floats) -> Floats:
 
 
 def _sampled(
-    around: Around, mine: Ints, components: Floats, goal: _Goal, which: Ints
+    search: DirectionSearch, mine: Ints, components: Floats, goal: _Goal, which: Ints
 ) -> tuple[Floats, NDArray[np.uint8]]:
     """What to make small, (s, n), inf where there is no value; and what became of each place, (n,)."""
     s, n = len(components), len(mine)
-    found = around.asked(np.tile(mine, s), np.repeat(components, n, axis=0))
+    found = search.asked(np.tile(mine, s), np.repeat(components, n, axis=0))
     status = goal.status(found, found.status.reshape(s, n), which[mine])
     return goal.lowered(found.values.reshape(s, n)), status
 
@@ -285,9 +285,11 @@ def _spread(f: Floats) -> Floats:
     return np.where(finite.any(axis=0), high - low, 0.0)
 
 
-def _found(around: Around, mine: Ints, values: Floats, components: Floats, status: NDArray[np.uint8]) -> Found:
-    u = around.directions(mine, components)
-    if not around.one_sided:  # of a direction and its opposite, the one that points along the first axis it can
+def _found(
+    search: DirectionSearch, mine: Ints, values: Floats, components: Floats, status: NDArray[np.uint8]
+) -> Found:
+    u = search.directions(mine, components)
+    if not search.one_sided:  # of a direction and its opposite, the one that points along the first axis it can
         lead = np.take_along_axis(u, (np.abs(u) > 1e-9).argmax(axis=1)[:, None], axis=1)
         u = u * np.where(lead < 0.0, -1.0, 1.0)
     none = status != OK

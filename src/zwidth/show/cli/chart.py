@@ -132,12 +132,12 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
         yield "stable regions", f"{len(chart.regions)}"
     if chart.unobserved_modes:
         from zwidth.chart.chart import StabilityChart
-        from zwidth.loop.unobserved_instability import hidden_instability
+        from zwidth.loop.unobserved_instability import unobserved_instability
 
         names = ", ".join(counted(chart.unobserved_modes))
         warned = "; WARNING: so that the device runs away, whatever the wall"
         # several directions are those of a mechanism, whose springs and dampers feed no motion
-        runs_away = isinstance(chart, StabilityChart) and hidden_instability(chart.loop)
+        runs_away = isinstance(chart, StabilityChart) and unobserved_instability(chart.loop)
         yield "moved by no wall", names + (warned if runs_away else "")
 
 

@@ -12,7 +12,7 @@ from zwidth.conditions.comparison import bounds_of
 from zwidth.device.device import Device
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.unobserved_instability import hidden_instability
+from zwidth.loop.unobserved_instability import unobserved_instability
 from zwidth.measures.felt_chart import FeltChart, felt_chart
 from zwidth.model.effective import EffectiveParameters
 from zwidth.model.mechanism import Floats
@@ -120,5 +120,5 @@ def gather(device: Device, point: OperatingPoint | None = None) -> Facts:
         variants=tuple(what_if(device, point)),
         natural=natural_frequencies(point.unheld_plant),
         bounds=tuple(bounds_of(point)),
-        runs_away=hidden_instability(point.loop),
+        runs_away=unobserved_instability(point.loop),
     )
