@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
 
 import numpy as np
 import shapely
@@ -34,15 +35,12 @@ def outline(arcs: list[Walk]) -> Floats:
 
     An arc's last point is left out where the next one begins, unless they are farther apart than WIDE_CORNER.
     """
-    walks = [np.column_stack([K, B]) for _, K, B in arcs]
-    apart = WIDE_CORNER * np.ptp(np.vstack(walks), axis=0)
-    following = [*walks[1:], walks[0]]
-    points = np.vstack(
-        [
-            walk if np.any(np.abs(walk[-1] - after[0]) > apart) else walk[:-1]
-            for walk, after in zip(walks, following, strict=True)
-        ]
-    )
+    K, B = np.concatenate([K for _, K, _ in arcs]), np.concatenate([B for _, _, B in arcs])
+    walls = np.column_stack([K, B])
+    after = np.array([*accumulate(len(K) for _, K, _ in arcs)])
+    gaps = np.abs(walls[after - 1] - walls[after % len(walls)])
+    joined = np.all(gaps <= WIDE_CORNER * np.array([np.ptp(K), np.ptp(B)]), axis=1)
+    points = np.delete(walls, after[joined] - 1, axis=0)
     return np.vstack([points, points[:1]])
 
 

@@ -96,8 +96,8 @@ def largest_damping(arcs: Arcs, curves: Curves, width: float, stable: Callable[[
     width   largest |K| on the edge
     stable  whether a wall (K, B) is
     """
-    walls = np.vstack([arcs.first, arcs.last])
-    stops: set[float] = {0.0, *walls[np.abs(walls[:, 0]) <= 1e-8 * width, 1].tolist()}
+    corners: list[list[float]] = [*arcs.first.tolist(), *arcs.last.tolist()]
+    stops = {0.0, *(B for K, B in corners if abs(K) <= 1e-8 * width)}
     stops.update(arcs.crossings(STIFFNESS)[1][:, 1].tolist())
     for k in arcs.curved:
         arc = arcs[k]
