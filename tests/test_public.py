@@ -122,6 +122,18 @@ def test_old_methods_of_a_device_warn_and_answer():
     assert Path(told[0].filename) == Path(__file__)
 
 
+def test_files_of_measures_of_one_s_own_written_before_still_run(tmp_path):
+    file = tmp_path / "my.py"
+    file.write_text(
+        "from zwidth.measures.own import measure\n@measure(unit='kg')\ndef mass(place):\n"
+        "    return place.effective.rigid_mass\n"
+    )
+    with pytest.warns(DeprecationWarning, match="write from zwidth import measure"):
+        own = zwidth.load_measures(str(file))
+    device = zwidth.load("published-two-mass")
+    assert float(device.measure(own["mass"])) == pytest.approx(0.287, rel=1e-12)
+
+
 def test_a_study_given_to_sweep_is_computed_with_a_warning(tmp_path):
     file = tmp_path / "study.toml"
     file.write_text(

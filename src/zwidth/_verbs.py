@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from zwidth.result import Result
     from zwidth.study.experiment_plan import Plan
     from zwidth.study.measured_boundary import Experiment
-    from zwidth.study.sensitivities import Sensitivities
+    from zwidth.study.sensitivity_result import Sensitivities
     from zwidth.study.validity import Validity
 
 

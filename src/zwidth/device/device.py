@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from zwidth.model.operator import Operator
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model
-    from zwidth.study.sensitivities import Sensitivities
+    from zwidth.study.sensitivity_result import Sensitivities
 
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
 

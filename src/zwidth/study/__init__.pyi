@@ -11,8 +11,8 @@ from .robust import robust_study as robust_study
 from .robust_family import Family as Family
 from .robust_family import Range as Range
 from .robust_study import RobustStudy as RobustStudy
-from .sensitivities import Sensitivities as Sensitivities
 from .sensitivity import sensitivities as sensitivities
+from .sensitivity_result import Sensitivities as Sensitivities
 from .store import Store as Store
 from .study import Study as Study
 from .study_file import read_study as read_study

@@ -30,7 +30,7 @@ from zwidth.model.arguments import require
 from zwidth.study.derivative import Derivative, central_derivative, one_sided_derivative
 from zwidth.study.local_maxima import rival_stiffness
 from zwidth.study.optimum import Optimum, OptimumError, optimum
-from zwidth.study.sensitivities import Group, Sensitivities, Sensitivity
+from zwidth.study.sensitivity_result import Group, Sensitivities, Sensitivity
 
 # Numbers of a device file that say where it is asked about, or how its posture is found, and not what it is.
 NO_PROPERTY: Final = {

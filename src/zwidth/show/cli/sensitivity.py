@@ -14,7 +14,7 @@ from zwidth.show.units import amount, given, signed, typed
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from zwidth.study.sensitivities import Sensitivities, Sensitivity
+    from zwidth.study.sensitivity_result import Sensitivities, Sensitivity
 
 NO_WALL: Final = "no stable wall has K > 0 and B >= 0, so that there is no largest stiffness to change"
 

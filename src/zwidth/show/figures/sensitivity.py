@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION
 from zwidth.show.units import MINUS, NONE, signed
-from zwidth.study.sensitivities import Sensitivities
+from zwidth.study.sensitivity_result import Sensitivities
 
 
 def draw_sensitivities(ax: Axes, found: Sensitivities, top: int = 12, *, wholes: bool = False) -> None:

@@ -18,8 +18,8 @@ from zwidth.model.effective import EffectiveParameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
-from zwidth.study.sensitivities import Sensitivities
 from zwidth.study.sensitivity import sensitivities
+from zwidth.study.sensitivity_result import Sensitivities
 from zwidth.study.validity import Validity, validity
 from zwidth.study.what_if import BASE, Variant, find, what_if
 
