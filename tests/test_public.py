@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import warnings
@@ -143,6 +144,19 @@ def test_a_study_given_to_sweep_is_computed_with_a_warning(tmp_path):
     with pytest.warns(DeprecationWarning, match=r"write zwidth\.run_study\(study\)"):
         found = zwidth.sweep(file)
     assert found.dataset()["rigid_mass"].values == pytest.approx([0.287, 0.287], rel=1e-12)
+
+
+def test_the_readme_s_lines_of_python_print_what_they_say(capsys):
+    page = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    exec(block, {})
+    pyplot.close("all")
+    first, second, *rest = capsys.readouterr().out.splitlines()
+    stiffness, frequency = first.split(" ", 1)
+    assert f"{float(stiffness):.0f} N/m" in block
+    assert f"{float(frequency.strip('(),')):.1f} Hz" in block
+    assert float(second) < float(stiffness)
+    assert "stable" in "".join(rest)
 
 
 def test_the_lines_of_the_contract():
