@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from gallery.fig_3_7_bilateral_wall import chart
 from gallery.models import published, write_figure
-from zwidth.chart.chart import BoundaryArc, stability_chart
+from zwidth.chart.chart import stability_chart
+from zwidth.chart.result import BoundaryArc
 
 NYQUIST = 0.5 / chart.loop.period
 
