@@ -22,5 +22,6 @@ from .sweep import sweep as sweep
 from .validity import Validity as Validity
 from .validity import validity as validity
 from .what_if import Variant as Variant
+from .what_if import limiting_change as limiting_change
 from .what_if import what_if as what_if
 from .workspace import workspace_map as workspace_map
