@@ -13,6 +13,7 @@ from zwidth.chart.chart import traced
 from zwidth.chart.peak import largest_damping, stiffest, topmost
 from zwidth.chart.several_directions.branch import Branch
 from zwidth.chart.several_directions.eigenloci import trace_loci
+from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
 from zwidth.loop.multi import MultiLoop
 from zwidth.model.directions import MultiPlant
@@ -131,6 +132,32 @@ def test_the_largest_damping_is_where_the_polygon_ends_beside_the_axis():
     assert seen > 50
 
 
+def test_stops_that_rounding_parted_are_one():
+    ring = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0 + 1e-12], [0.0, 1.0], [-1.0, 0.5], [0.0, 0.0]])
+    assert largest_damping(Arcs.chords([ring]), (), 1.0, lambda K, B: True) == 1.0
+
+
+def test_what_is_stiff_by_rounding_alone_has_no_area():
+    ring = np.array([[-1.0, 0.0], [1e-12, 0.0], [1e-12, 1.0], [-1.0, 1.0], [-1.0, 0.0]])
+    edge = TracedEdge.of(Arcs.chords([ring]), ())
+    assert (edge.width, edge.peak, edge.area) == (1.0, None, 0.0)
+    assert quadrant_area(edge.arcs, ()) == pytest.approx(1e-12)
+
+
+def test_an_outline_has_each_corner_once_unless_it_is_blurred():
+    """The third side begins 1e-7 of the size beside the second's end, the fourth 1e-2 beside the third's."""
+    ends = (
+        [(0.0, 0.0), (2.0, 0.0)],
+        [(2.0, 0.0), (2.0, 1.0)],
+        [(2.0 - 2e-7, 1.0), (0.0, 1.0)],
+        [(0.0, 0.98), (0.0, 0.0)],
+    )
+    arcs = Arcs.of([[Arc(CHORD, first, last, 0.0, 0.0, np.empty(0)) for first, last in ends]])
+    (outline,) = TracedEdge.of(arcs, ()).outlines
+    corners = [(0.0, 0.0), (2.0, 0.0), (2.0 - 2e-7, 1.0), (0.0, 1.0), (0.0, 0.98), (0.0, 0.0)]
+    assert list(map(tuple, outline.tolist())) == corners
+
+
 def test_of_walls_as_stiff_as_each_other_the_most_damped_prevails():
     rng = np.random.default_rng(6)
     K = np.array([1.0, 1.0 - 3e-14, 1.0 + 3e-14, 1.0 - 1e-12, 2.0, 1e-12])
@@ -164,23 +191,35 @@ def test_zeros_and_integrals_along_a_curve_are_those_of_its_points(seed):
             assert tracer.integral(arc) == pytest.approx(trapezoids, abs=1e-5 * np.ptp(B) * np.ptp(K))
 
 
+def branch_of_one_direction(loop, size):
+    p = loop.plant
+    plant = MultiPlant(p.mass, p.damping, p.stiffness, p.actuator[None], p.sensor[None])
+    return Branch(trace_loci(MultiLoop(plant, loop.controller)), 0, size)
+
+
 @pytest.mark.parametrize("seed", [0, 3, 9, 12])
 def test_a_branch_of_one_direction_is_the_curve_of_the_single_loop(seed):
     loop = published() if seed == 0 else random_loop(np.random.default_rng(seed))
-    tracer, p = Tracer.of(loop), loop.plant
-    plant = MultiPlant(p.mass, p.damping, p.stiffness, p.actuator[None], p.sensor[None])
+    tracer = Tracer.of(loop)
     edge, _ = traced(tracer)
     size = np.ptp(np.vstack(edge.outlines), axis=0)
-    branch = Branch(trace_loci(MultiLoop(plant, loop.controller)), 0, size)
-    seen = 0
-    for arc in edge.arcs:
-        if not arc.curved or min(arc.start, arc.end) < 1e-6 or max(arc.start, arc.end) > np.pi - 1e-6:
-            continue
-        seen += 1
+    branch = branch_of_one_direction(loop, size)
+    curved = [edge.arcs[k] for k in edge.arcs.curved]
+    assert curved
+    for arc in curved:
         assert np.column_stack(branch.walls(arc.thetas)) == pytest.approx(
             np.column_stack(tracer.walls(arc.thetas)), rel=1e-6, abs=1e-7 * size.max()
         )
         for component in (STIFFNESS, DAMPING, SLOPE):
             assert np.sort(branch.zeros(arc, component)) == pytest.approx(tracer.zeros(arc, component), rel=1e-7)
         assert branch.integral(arc) == pytest.approx(tracer.integral(arc), rel=1e-6, abs=1e-9 * size.prod())
-    assert seen or seed
+
+
+def test_a_branch_is_straight_beside_its_end():
+    """There its evaluation is all rounding; the first step, 1e-12 of the area, is added all the same."""
+    tracer = Tracer.of(published())
+    edge, _ = traced(tracer)
+    size = np.ptp(np.vstack(edge.outlines), axis=0)
+    (arc,) = (edge.arcs[k] for k in edge.arcs.curved if edge.arcs[k].start == 0.0)
+    branch = branch_of_one_direction(published(), size)
+    assert branch.integral(arc) == pytest.approx(tracer.integral(arc), rel=0.0, abs=1e-14 * size.prod())

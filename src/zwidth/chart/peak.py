@@ -62,8 +62,8 @@ def stiffest(arcs: Arcs, curves: Curves, width: float) -> Peak | None:
     crossed, crossings = arcs.crossings(DAMPING)
     crossings[:, DAMPING] = 0.0
     walls = [arcs.last, arcs.first[arcs.following], crossings]
-    before = [np.arange(len(arcs)), np.arange(len(arcs)), crossed]
-    angles = [arcs.end, arcs.end, arcs.start[crossed]]
+    # number of the arc and angle of each wall that is no corner
+    along = list(zip(crossed.tolist(), arcs.start[crossed].tolist(), strict=True))
     for k in arcs.curved:
         arc = arcs[k]
         curve = curves[arc.member]
@@ -72,19 +72,20 @@ def stiffest(arcs: Arcs, curves: Curves, width: float) -> Peak | None:
             if len(thetas):
                 K, B = curve.walls(thetas)
                 walls.append(np.column_stack([K, np.zeros_like(K) if component == DAMPING else B]))
-                before.append(np.full(len(thetas), k))
-                angles.append(thetas)
+                along += [(k, theta) for theta in thetas.tolist()]
     K, B = np.vstack(walls).T
-    best = topmost(K, B, 1e-10 * width)
+    best, corners = topmost(K, B, 1e-10 * width), 2 * len(arcs)
     if best < 0:
         return None
-    last = int(np.concatenate(before)[best])
-    roots = {(float(np.concatenate(angles)[best]), int(arcs.member[last]))}
-    if best < 2 * len(arcs):
+    if best < corners:
+        last = best % len(arcs)
         after = arcs.following[last]
-        roots.add((float(arcs.start[after]), int(arcs.member[after])))
-    ordered = sorted(roots)
-    return Peak(float(K[best]), float(B[best]), tuple(a for a, _ in ordered), tuple(m for _, m in ordered))
+        roots = {(float(arcs.end[last]), last), (float(arcs.start[after]), after)}
+    else:
+        last, angle = along[best - corners]
+        roots = {(angle, last)}
+    angles, members = zip(*sorted({(angle, int(arcs.member[k])) for angle, k in roots}), strict=True)
+    return Peak(float(K[best]), float(B[best]), angles, members)
 
 
 def largest_damping(arcs: Arcs, curves: Curves, width: float, stable: Callable[[float, float], bool]) -> float:
