@@ -1,4 +1,4 @@
-"""Names that stood at the top before 0.2 and still work for one release, with a warning that tells the new one.
+"""Names of the release 0.1.0 that still work for one release, with a warning that tells what to write instead.
 
 This is the one place where two ways to say a thing stand side by side; it goes with the release after the next.
 """
@@ -78,7 +78,7 @@ def _package_of(name: str) -> str | None:
 
 
 def _warn(old: str, new: str, depth: int = 4) -> None:
-    """Warn at the line of the script: so many calls above, two more than the caller's own."""
+    """Warn at the line of the script that uses the old name, which is `depth` calls above `warnings.warn`."""
     warnings.warn(f"{old} goes with the next release; write {new}", DeprecationWarning, stacklevel=depth)
 
 

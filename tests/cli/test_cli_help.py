@@ -10,7 +10,7 @@ import pytest
 
 from tests.cli.cli_run import zwidth
 from zwidth import __version__
-from zwidth.device.device import MODELS as DEVICE_MODELS
+from zwidth.model.reduction import MODELS as MODEL_NAMES
 from zwidth.show.cli.group import zwidth as group
 from zwidth.show.cli.options import MODELS
 
@@ -78,4 +78,4 @@ def test_the_version():
 
 
 def test_the_models_offered_are_the_models_there_are():
-    assert MODELS == DEVICE_MODELS
+    assert MODELS == MODEL_NAMES

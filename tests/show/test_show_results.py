@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -114,6 +115,14 @@ def test_a_result_draws_itself_and_stands_in_a_notebook(found, name):
     page = result._repr_html_()
     assert page.startswith("<pre>")
     assert "<svg" in page
+
+
+def test_two_figures_of_one_notebook_share_no_id(found):
+    pages = [found[NAMES[0]]._repr_html_() for _ in range(2)]
+    first, second = (set(re.findall(r' id="([^"]+)"', page)) for page in pages)
+    assert first
+    assert second
+    assert not first & second
 
 
 def test_every_kind_of_result_is_tried(found):

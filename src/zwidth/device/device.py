@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model
     from zwidth.study.sensitivity_result import Sensitivities
-
-MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
 
 
 @dataclass(frozen=True, repr=False)
@@ -133,6 +131,7 @@ class Device:
                 PostureError  (model.posture) where a single position has no posture: out of reach, or singular
         """
         from zwidth.loop.operating_point import OperatingPoint
+        from zwidth.model.reduction import MODELS
 
         if operator is not None:
             held = self.held_by(operator)

@@ -90,7 +90,7 @@ class OperatingPoint(PointVerbs):
             f"sampled every {self.controller.sampling_period:g} s, {self.controller.delay:g} samples of delay"
         )
         if self.posture is None or self.directions is None:
-            kind = "measured response" if self.response is not None else f"plant, model {self.model or AS_GIVEN}"
+            kind = "measured response" if self.response is not None else f"plant, model {self.model or 'as given'}"
             return f"OperatingPoint of {self.name or 'a device'}: {kind}{held}\n  {computer}"
         if self.shape:
             where = f"{int(np.prod(self.shape))} postures of shape {self.shape}"
@@ -323,25 +323,7 @@ class OperatingPoint(PointVerbs):
         hysteretic = self.given_plant is not None and self.given_plant.hysteresis is not None
         return self.response is not None or hysteretic
 
-    def document(self) -> dict[str, Any]:
-        """Name, posture, direction, model, operator and sampling as results state them; None: inapplicable."""
-        posture, single = self.posture, self.direction_count == 1
-        return {
-            "name": self.name,
-            "position_m": None if posture is None else posture.position,
-            "projected_m": None if posture is None else posture.projected,
-            "direction": None if posture is None or not single else self.direction,
-            **({} if single else {"directions": self.directions}),
-            "assembly": None if posture is None else posture.assembly,
-            "model": self.model or (AS_GIVEN if posture is None else "full"),
-            "operator": None if self.model == "motor-mass" else self.operator_name,
-            "sampling_period_s": self.controller.sampling_period,
-            "delay_samples": self.controller.delay,
-            "left_out": list(self.left_out),
-        }
 
-
-AS_GIVEN: Final = "as given"  # the model of a plant that is not reduced
 _NO_MODEL: Final = "the device has a measured response and no model; ask for .chart(), or .check(...)"
 
 

@@ -7,10 +7,11 @@ from math import isfinite, isnan
 from typing import Any, Final
 
 from zwidth.device import address
-from zwidth.device.device import MODELS, Device
+from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Path, dotted, fail, nearest, quote, suggestion
 from zwidth.device.schema import file as schema
 from zwidth.device.toml_access import number, tables
+from zwidth.model.reduction import MODELS
 from zwidth.study.axes import CIRCUMSTANCES, WANTED, Axis, Tie, spread
 
 UNITS: Final = {"stiffness_N_per_m": "N/m", "damping_Ns_per_m": "N s/m", "frequency_Hz": "Hz"}

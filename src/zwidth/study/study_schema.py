@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal, get_args
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -117,7 +117,6 @@ _TABLES: Final[dict[str, Any]] = {
     "workspace": WorkspaceSection,
     "optimise": OptimiseSection,
 }
-MODELS: Final = get_args(Model)
 
 
 def _table(path: Path) -> Any:

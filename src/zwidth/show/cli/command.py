@@ -20,7 +20,7 @@ from zwidth.show.cli.answer import Answer, deliver
 from zwidth.show.cli.failures import NoAnswer, computing
 from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
-from zwidth.show.output import DATA, FIGURES, destination, replacing, write_data
+from zwidth.show.output import DATA, FIGURES, destination, write_data
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -164,8 +164,7 @@ class Command:
             return reason
         from zwidth.show.figures.style import save
 
-        with replacing(case.path) as draft:
-            save(self.draw(case, result), draft)
+        save(self.draw(case, result), case.path)
         return reason
 
     def unanswered(self, case: Case, none: NoAnswer) -> Answer:
@@ -176,7 +175,7 @@ class Command:
     def answer(self, case: Case) -> Answer:
         """Compute, and write the file that is asked for. Raises BadInput."""
         if not self.of_responses and case.device.response is not None:
-            case.question.as_measured(case.device)
+            case.question.point(case.device)  # refuses what is asked of a [response] that needs a model
             return self.unanswered(case, NoAnswer(NO_MODEL))
         try:
             with computing(case.question):

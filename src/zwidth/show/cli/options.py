@@ -52,14 +52,6 @@ class Question:
         """Where the device is asked about. Raises what `Device.at` raises."""
         return device.at(self.at, self.direction, assembly=self.assembly, model=self.model)
 
-    def charted_by_response(self, device: Device) -> bool:
-        """Is the device charted by its frequency response? Raises DeviceError as `Device.at` does."""
-        return device.mechanism is None and self.point(device).charted_by_response
-
-    def as_measured(self, device: Device) -> None:
-        """Raises DeviceError for whatever is asked of a [response] that needs a model."""
-        self.point(device)
-
     def of_several_directions(self, device: Device) -> None:
         """Raises BadInput for what directions computed together leave out."""
         from zwidth.loop.point_errors import SeveralDirectionsError, check_several_directions

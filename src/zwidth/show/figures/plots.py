@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from html import escape
+from itertools import count
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +15,8 @@ from zwidth.show.figures.style import BLACK, GREY, VERMILION, context, figure, i
 
 Window = tuple[float, float, float, float]
 Draw = Callable[[Axes, Any], None]
+
+SHOWN: Final = count(1)  # numbers the figures that notebooks hold: ids in one page must differ
 
 
 def plot(result: Any, ax: Axes | None = None) -> Axes:
@@ -38,7 +41,7 @@ def notebook(result: Any) -> str:
     made, ax = figure()
     with context():
         drawing_of(result)(ax, result)
-    picture = inline_svg(made, f"zwidth-{id(result):x}", repr(result).splitlines()[0])
+    picture = inline_svg(made, f"zwidth-{next(SHOWN)}", repr(result).splitlines()[0])
     return f"<pre>{escape(repr(result))}</pre>\n<div style='max-width: 40em'>{picture}</div>"
 
 
@@ -99,7 +102,7 @@ def _sensitivities(ax: Axes, found: Any) -> None:
 
 
 def _verdicts(ax: Axes, found: Any) -> None:
-    """The walls as marks: filled where stable, open where not, grey where undecided."""
+    """The walls as marks: discs where stable, crosses where not, grey squares where undecided."""
     K, B, names = found.stiffness.ravel(), found.damping.ravel(), np.array(found.names)
     for name, style in (
         ("stable", {"marker": "o", "color": BLACK}),
@@ -115,7 +118,7 @@ def _verdicts(ax: Axes, found: Any) -> None:
 
 
 def _measured(ax: Axes, found: Any) -> None:
-    """A measure's values: a bar for one, marks in order for a row, colours for a plane of points."""
+    """A measure's values: marks in order for one or a row, colours for a plane of points."""
     values = np.asarray(found.values, dtype=float)
     if values.ndim == 2:
         image = ax.imshow(values, origin="lower", aspect="auto", cmap=colormaps["viridis"])
