@@ -22,11 +22,16 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from contact.mechanism_cases import sampled, uncoupled_five_bar, with_drives, with_friction
+from contact.mechanism_cases import (
+    motion_of,
+    sampled,
+    uncoupled_five_bar,
+    with_drives,
+    with_friction,
+)
 from contact.mechanism_judge import judged
 
 from benchmarks._own import Case, Cases, run
-from zwidth.contact.mechanism.simulate import simulate_mechanism
 from zwidth.contact.mechanism.surfaces import Plane
 from zwidth.contact.mechanism.walls import SurfaceWall
 from zwidth.model.damping import ModalDamping
@@ -42,7 +47,7 @@ def motion(mechanism, substeps, seconds=PERIOD * SAMPLES, **others):
     """The five-bar pushed into the wall."""
     scene = (mechanism, DAMPED, CONTROLLER, WALL, Plane(POINT, NORMAL))
     settings = {"at": START, "duration": seconds, "push": PUSH, "gravity": GRAVITY, "substeps": substeps}
-    return simulate_mechanism(*scene, **settings | others)
+    return motion_of(*scene, **settings | others)
 
 
 def real_time_factor(mechanism, substeps):

@@ -27,7 +27,7 @@ MOVED: Final = {
     "conditions": "Bound compare",
     "contact": (
         "Box Environment ENVIRONMENTS Hand judge_response limit_cycles load_environment MechanismMotion "
-        "PassivityController Plane Reach Reflex Run simulate simulate_batch simulate_mechanism Sphere "
+        "PassivityController Plane Reach Reflex Run simulate simulate_batch Sphere "
         "SurfaceOutOfReach SurfaceWall TimeResponse Tremor"
     ),
     "guarantees": "nested passive_region spring_stable_region",
@@ -173,6 +173,30 @@ def _largest_stiffness_by_direction(
     return largest_stiffness_by_direction(point, directions)
 
 
+def _simulate_mechanism(
+    mechanism: Any,
+    damping: Any,
+    controller: Any,
+    wall: Any = None,
+    surface: Any = None,
+    *,
+    at: ArrayLike | None = None,
+    assembly: str | None = None,
+    encoders: Any = "motor",
+    **more: Any,
+) -> Any:
+    """As `contact.simulate_mechanism` of an operating point."""
+    import numpy as np
+
+    from zwidth.contact.mechanism.simulate import simulate_mechanism
+    from zwidth.loop.operating_point import OperatingPoint
+    from zwidth.model.posture import solve_posture
+
+    posture = solve_posture(mechanism, mechanism.reference_position if at is None else at, assembly)
+    point = OperatingPoint(controller, mechanism, posture, np.eye(3)[:1], damping=damping, encoders=encoders)
+    return simulate_mechanism(point, wall, surface, **more)
+
+
 # Old name -> what to write instead, and what it gives meanwhile.
 REPLACED: Final[dict[str, tuple[str, Callable[[], Any]]]] = {
     "Place": ("zwidth.OperatingPoint", _operating_point),
@@ -180,6 +204,7 @@ REPLACED: Final[dict[str, tuple[str, Callable[[], Any]]]] = {
     "place_of": ("device.at(position, direction)", lambda: _place_of),
     "sensitivities": ("device.sensitivities(device.at(...))", lambda: _sensitivities),
     "validity": ("zwidth.study.validity(device.at(...))", lambda: _validity),
+    "simulate_mechanism": ("device.at(position).move(wall, surface)", lambda: _simulate_mechanism),
     "largest_stiffness_by_direction": (
         "zwidth.chart.largest_stiffness_by_direction(device.at(...), directions)",
         lambda: _largest_stiffness_by_direction,

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from zwidth.contact.contact_simulation import ContactSimulation
     from zwidth.contact.environments.environment import Environment
     from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction
+    from zwidth.contact.mechanism.motion import MechanismMotion
+    from zwidth.contact.mechanism.surfaces import Surface
+    from zwidth.contact.mechanism.walls import Wall
     from zwidth.device.device import Device
     from zwidth.device.load import Settings
     from zwidth.guarantees.nested import Guarantees
@@ -115,6 +118,12 @@ def simulate(
     from zwidth.contact.simulate_contact import simulate_contact
 
     return simulate_contact(point, stiffness, damping, **more)
+
+
+def move(point: OperatingPoint, wall: Wall | None, surface: Surface | None, **more: Any) -> MechanismMotion:
+    from zwidth.contact.mechanism.simulate import simulate_mechanism
+
+    return simulate_mechanism(point, wall, surface, **more)
 
 
 def limit_cycles(

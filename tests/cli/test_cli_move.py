@@ -9,8 +9,8 @@ import pytest
 
 import zwidth as package
 from tests.cli.cli_run import MECHANISM, TWO_MASS, found, refused, strict, zwidth
-from zwidth.contact import Box, Plane, Sphere, SurfaceWall, simulate_mechanism
-from zwidth.show.cli.move import KEYS
+from zwidth.contact import Box, Plane, Sphere, SurfaceWall
+from zwidth.show.cli.move import Move
 
 WALL = ("--stiffness", 1500, "--damping", 3)
 BALL = ("--sphere", "0,0.31,0.05", *WALL, "--push", "0.02,1", "--duration", 0.3)
@@ -39,17 +39,12 @@ def ball():
 
 
 def called(surface, **settings):
-    device = package.load(MECHANISM)
-    wall = SurfaceWall(1500.0, 3.0)
-    return simulate_mechanism(
-        device.mechanism, device.damping, device.controller, wall, surface, at=device.position(),
-        encoders=device.encoders, **settings
-    )  # fmt: skip
+    return package.load(MECHANISM).at().move(SurfaceWall(1500.0, 3.0), surface, **settings)
 
 
 def test_the_numbers_are_those_of_the_python_call(ball):
     motion = called(Sphere((0.0, 0.31), 0.05), push=(0.02, 1.0, 0.0), duration=0.3)
-    assert set(KEYS) <= set(ball)
+    assert set(Move.keys) <= set(ball)
     for key, values in (
         ("time_s", motion.time),
         ("position_m", motion.position),

@@ -29,12 +29,8 @@ def moved(*words):
 
 
 def called(wall, **settings):
-    device = package.load(MECHANISM)
     plane = package.contact.Plane((0.0, 0.252), (0.0, -1.0), **settings)
-    return package.contact.simulate_mechanism(
-        device.mechanism, device.damping, device.controller, wall, plane, at=device.position(),
-        encoders=device.encoders, push=(0.0, 1.0, 0.0), duration=0.1,
-    )  # fmt: skip
+    return package.load(MECHANISM).at().move(wall, plane, push=(0.0, 1.0, 0.0), duration=0.1)
 
 
 @pytest.fixture

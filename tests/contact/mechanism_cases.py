@@ -15,10 +15,30 @@ from model.model_cases import (
 )
 
 from zwidth.loop.controller import Controller
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.damping import GivenDamping
 from zwidth.model.mechanism import DriveNonlinearity, Mechanism
+from zwidth.model.posture import solve_posture
 
 UNDAMPED = GivenDamping()
+
+
+def motion_of(
+    mechanism,
+    damping,
+    controller,
+    wall=None,
+    surface=None,
+    *,
+    at=None,
+    assembly=None,
+    encoders="motor",
+    **settings,
+):
+    """The motion of a mechanism from a position of its handle; left out: its reference."""
+    posture = solve_posture(mechanism, mechanism.reference_position if at is None else at, assembly)
+    point = OperatingPoint(controller, mechanism, posture, np.eye(3)[:1], damping=damping, encoders=encoders)
+    return point.move(wall, surface, **settings)
 
 
 def sampled(period=1e-3, **others):

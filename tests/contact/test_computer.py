@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contact.engine_cases import bench
-from contact.mechanism_cases import paddle, planar_chain, sampled, with_drives, with_friction
+from contact.mechanism_cases import (
+    motion_of,
+    paddle,
+    planar_chain,
+    sampled,
+    with_drives,
+    with_friction,
+)
 from scipy.signal import lfilter
 
 from zwidth.contact.computer import (
@@ -20,7 +27,6 @@ from zwidth.contact.computer import (
     signals_of,
 )
 from zwidth.contact.environments import wall
-from zwidth.contact.mechanism.simulate import simulate_mechanism
 from zwidth.contact.noise import normal
 from zwidth.contact.simulate import simulate
 from zwidth.loop.controller import Butterworth, FirstOrder
@@ -146,7 +152,7 @@ def test_noise_of_one_seed_is_the_same_in_both():
     """Two arms at rest: what each encoder is off by is its own draw, and the reading has the weighted sum."""
     arms = with_friction(with_drives(planar_chain(2), encoder_counts=np.nan), encoder_noise=1e-6)
     seed, sigma, u = 2**40 + 7, 1e-6 / 18.6, np.array([0.6, 0.8, 0.0])
-    motion = simulate_mechanism(arms, GivenDamping(), sampled(PERIOD), duration=0.05, seed=seed)
+    motion = motion_of(arms, GivenDamping(), sampled(PERIOD), duration=0.05, seed=seed)
     draws = np.array([[normal(np.uint64(seed), j, i) for i in range(2)] for j in range(51)])
     posture = solve_posture(arms, arms.reference_position)
     off = motion.counted_position - motion.position
@@ -155,7 +161,7 @@ def test_noise_of_one_seed_is_the_same_in_both():
     response = simulate(loop, wall, FREE, duration=0.05, seed=seed)
     assert response.reading == pytest.approx(off @ u, abs=1e-12)
     assert np.std(response.reading) > 1e-9
-    others = simulate_mechanism(arms, GivenDamping(), sampled(PERIOD), duration=0.05, seed=seed + 1)
+    others = motion_of(arms, GivenDamping(), sampled(PERIOD), duration=0.05, seed=seed + 1)
     assert not np.any(others.counted_position[:, :2] == motion.counted_position[:, :2])
 
 
@@ -185,7 +191,7 @@ def test_a_tie_of_the_encoder_rounds_alike_in_both():
         step = 2.0 * np.pi / (counted.drives.encoder_counts[0] * 10.0)
         assert step == 0.25
         at = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
-        motion = simulate_mechanism(counted, GivenDamping(), sampled(PERIOD), at=at, duration=0.01)
+        motion = motion_of(counted, GivenDamping(), sampled(PERIOD), at=at, duration=0.01)
         assert set(motion.motors[:, 0]) == {angle}
         seen = 0.5 * np.array([np.cos(count * step), np.sin(count * step), 0.0])
         assert motion.counted_position == pytest.approx(np.tile(seen, (11, 1)), abs=1e-15)

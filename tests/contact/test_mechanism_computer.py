@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from contact.mechanism_cases import (
+    motion_of,
     paddle,
     planar_chain,
     sampled,
@@ -13,7 +14,6 @@ from contact.mechanism_cases import (
 from model.model_cases import rotation_about
 
 from zwidth.contact.mechanism.reach import SurfaceOutOfReach
-from zwidth.contact.mechanism.simulate import simulate_mechanism
 from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, depth_and_normal
 from zwidth.contact.mechanism.walls import SurfaceWall
 from zwidth.contact.room import TooLarge
@@ -29,7 +29,7 @@ INTO = Plane((0.0, 0.26), (0.0, -1.0))
 
 def moved(mechanism=FIVE_BAR, controller=None, wall=None, surface=None, **settings):
     settings = {"duration": 0.2, "push": (0.1, 1.0, 0.0)} | settings
-    return simulate_mechanism(mechanism, DAMPED, controller or sampled(), wall, surface, **settings)
+    return motion_of(mechanism, DAMPED, controller or sampled(), wall, surface, **settings)
 
 
 # --- counts ---------------------------------------------------------------------------------------------
@@ -160,9 +160,7 @@ def test_the_force_is_the_walls_at_the_place_that_is_seen(surface):
 def test_a_push_comes_to_rest_where_the_wall_holds_it(surface):
     """1 N into 500 N/m: 2 mm deep as the motors see it."""
     settings = {"duration": 3.0, "push": (0.0, 1.0, 0.0)}
-    motion = simulate_mechanism(
-        FIVE_BAR, ModalDamping(0.5), sampled(), SurfaceWall(500.0, 12.0), surface, **settings
-    )
+    motion = motion_of(FIVE_BAR, ModalDamping(0.5), sampled(), SurfaceWall(500.0, 12.0), surface, **settings)
     assert motion.status == "done"
     assert motion.counted_position[-1, 1] == pytest.approx(0.262, abs=2e-5)
     assert motion.force[-1] == pytest.approx([0.0, -1.0, 0.0], abs=1e-2)

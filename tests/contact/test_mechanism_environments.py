@@ -4,13 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact.mechanism_cases import UNDAMPED, paddle, sampled, uncoupled_five_bar, with_drives, with_friction
+from contact.mechanism_cases import (
+    UNDAMPED,
+    motion_of,
+    paddle,
+    sampled,
+    uncoupled_five_bar,
+    with_drives,
+    with_friction,
+)
 from systems import random_controller, random_method
 
 from zwidth.contact.environments import ENVIRONMENTS, Parameter, environment
 from zwidth.contact.hand import Hand
 from zwidth.contact.mechanism.checks import MotionError
-from zwidth.contact.mechanism.simulate import simulate_mechanism
 from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, depth_and_normal
 from zwidth.contact.mechanism.walls import SurfaceEnvironment, SurfaceWall
 from zwidth.contact.simulate import simulate
@@ -124,7 +131,7 @@ def test_one_arm_at_a_plane_is_the_device_of_the_other_simulator(name, seed):
     arm, damping = straight_arm(rng)
     if rng.random() < 0.3:
         arm = with_drives(arm, torque_limit=1.5e-4 * K * LENGTH)
-    motion = simulate_mechanism(
+    motion = motion_of(
         arm, damping, controller, SurfaceEnvironment(LAWS[name], values),
         Plane((LENGTH, WALL, 0.0), (0.0, -1.0, 0.0)),
         duration=250 * T, start_velocity=speed * ALONG, push=push * ALONG, seed=seed,
@@ -166,7 +173,7 @@ PUSHED = {"at": (0.0, 0.25), "duration": 0.25, "push": (0.2, 1.0, 0.0)}
 def pushed(law, surface, mechanism=FIVE_BAR, damping=UNDAMPED, controller=None, **settings):
     values = LAWS[law].values(**{"friction": 0.4} if law == "friction_patch" else {})
     wall = SurfaceEnvironment(LAWS[law], values)
-    motion = simulate_mechanism(mechanism, damping, controller or sampled(), wall, surface, **PUSHED | settings)
+    motion = motion_of(mechanism, damping, controller or sampled(), wall, surface, **PUSHED | settings)
     assert motion.status == "done"
     assert np.max(np.abs(motion.force)) > 0.05
     return motion, values
@@ -212,8 +219,8 @@ def test_the_wall_of_a_stiffness_and_a_damping_is_an_environment(wall, two_sided
     given = {"stiffness": wall.stiffness, "damping": wall.damping}
     values = ENVIRONMENTS[name].values(**given, **({"no_pull": 1} if wall.no_pull else {}))
     plane = Plane((0.0, 0.255), (0.2, -1.0))
-    one = simulate_mechanism(FIVE_BAR, UNDAMPED, sampled(), wall, replace(plane, two_sided=two_sided), **PUSHED)
-    other = simulate_mechanism(
+    one = motion_of(FIVE_BAR, UNDAMPED, sampled(), wall, replace(plane, two_sided=two_sided), **PUSHED)
+    other = motion_of(
         FIVE_BAR, UNDAMPED, sampled(), SurfaceEnvironment(ENVIRONMENTS[name], values), plane, **PUSHED
     )
     assert np.any(one.depth > 1e-3)
@@ -223,14 +230,14 @@ def test_the_wall_of_a_stiffness_and_a_damping_is_an_environment(wall, two_sided
 
 
 def test_no_environment_acts_without_a_surface_and_none_at_a_balls_centre():
-    free = simulate_mechanism(FIVE_BAR, UNDAMPED, sampled(), **PUSHED)
+    free = motion_of(FIVE_BAR, UNDAMPED, sampled(), **PUSHED)
     assert not free.two_sided
     assert not np.any(free.force)
     at = solve_posture(FIVE_BAR, (0.0, 0.25)).position
     values = ENVIRONMENTS["one_sided_wall"].values()
     inside = SurfaceEnvironment(ENVIRONMENTS["one_sided_wall"], values)
     settings = {"at": at, "duration": 0.01, "counted": False}
-    motion = simulate_mechanism(FIVE_BAR, UNDAMPED, sampled(), inside, Sphere(at, 0.05), **settings)
+    motion = motion_of(FIVE_BAR, UNDAMPED, sampled(), inside, Sphere(at, 0.05), **settings)
     assert motion.status == "done"
     assert np.all(np.isfinite(motion.force))
 
@@ -240,7 +247,7 @@ def test_no_environment_acts_without_a_surface_and_none_at_a_balls_centre():
 
 def test_an_environment_that_gives_no_number_ends_the_motion_there():
     wall = SurfaceEnvironment(silent, [])
-    motion = simulate_mechanism(FIVE_BAR, UNDAMPED, sampled(), wall, SURFACES[0], **PUSHED)
+    motion = motion_of(FIVE_BAR, UNDAMPED, sampled(), wall, SURFACES[0], **PUSHED)
     assert motion.status == "no force"
     depth = depth_and_normal(SURFACES[0], motion.counted_position)[0]
     assert depth[-1] >= 1e-3 > np.max(depth[:-1])
@@ -270,4 +277,4 @@ def test_an_environment_that_gives_no_number_ends_the_motion_there():
 )
 def test_walls_that_cannot_be_meant(wall, surface, said):
     with pytest.raises(MotionError, match=said):
-        simulate_mechanism(FIVE_BAR, UNDAMPED, sampled(), wall, surface, **PUSHED)
+        motion_of(FIVE_BAR, UNDAMPED, sampled(), wall, surface, **PUSHED)

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from contact.mechanism_cases import sampled, uncoupled_five_bar, with_drives
+from contact.mechanism_cases import motion_of, sampled, uncoupled_five_bar, with_drives
 from model.model_cases import KINDS
 from scipy.linalg import expm
 
-from zwidth.contact.mechanism.simulate import simulate_mechanism
 from zwidth.contact.mechanism.surfaces import Plane
 from zwidth.contact.mechanism.walls import SurfaceWall
 from zwidth.loop.controller import Butterworth, FirstOrder
@@ -55,7 +54,7 @@ def both(mechanism, damping, controller, wall, speed, samples=400, share=0.0, at
     posture = solve_posture(mechanism, mechanism.reference_position if at is None else at)
     u = posture.jacobian @ np.array([1.0, 0.4, -0.3])[: posture.jacobian.shape[1]]
     u = u / np.linalg.norm(u) if direction is None else np.asarray(direction)
-    motion = simulate_mechanism(
+    motion = motion_of(
         mechanism,
         damping,
         controller,
@@ -140,7 +139,7 @@ def test_growth_follows_the_spectral_radius_through_filters(order):
     rho = np.max(np.abs(values))
     assert rho > 1.005
     samples = int(np.log(1e6) / np.log(rho))
-    motion = simulate_mechanism(
+    motion = motion_of(
         mechanism,
         ModalDamping(0.05),
         controller,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from contact.mechanism_cases import (
     UNDAMPED,
+    motion_of,
     paddle,
     planar_chain,
     sampled,
@@ -18,7 +19,6 @@ from contact.mechanism_judge import FiveBarByMultipliers, judged
 from model.model_cases import KINDS, five_bar, random_five_bar, some_postures, spatial_arm
 from model.model_engines import mjcf
 
-from zwidth.contact.mechanism.simulate import simulate_mechanism
 from zwidth.contact.mechanism.surfaces import Plane, Sphere
 from zwidth.contact.mechanism.walls import SurfaceWall
 from zwidth.model.arrays import pack
@@ -44,7 +44,7 @@ def test_a_hand_pushes_a_five_bar_about_and_into_a_wall(seed):
     controller = sampled(1.25e-3, delay=1.0 if seed is None else 0.4)
     wall, push, gravity = SurfaceWall(1500.0, 3.0), np.array([0.1, 1.5]), np.array([0.1, -0.5])
     samples = 400 if seed is None else 60
-    ours = simulate_mechanism(
+    ours = motion_of(
         mechanism,
         ModalDamping(0.05),
         controller,
@@ -74,9 +74,9 @@ def test_it_converges_with_the_fourth_power_of_the_substep():
     mechanism, errors = uncoupled_five_bar(), []
     settings = {"duration": 0.4, "push": (0.2, 0.6, 0.0)}
     scene = (ModalDamping(0.05), sampled(4e-3), SurfaceWall(500.0, 3.0), Sphere((0.03, 0.29), 0.02))
-    fine = simulate_mechanism(mechanism, *scene, substeps=128, **settings)
+    fine = motion_of(mechanism, *scene, substeps=128, **settings)
     for substeps in (4, 8, 16):
-        found = simulate_mechanism(mechanism, *scene, substeps=substeps, **settings)
+        found = motion_of(mechanism, *scene, substeps=substeps, **settings)
         errors.append(np.max(np.abs(found.position - fine.position)))
     ratios = np.array(errors[:-1]) / errors[1:]
     assert np.all((ratios > 12.0) & (ratios < 24.0))
@@ -89,7 +89,7 @@ def test_stiff_drives_set_no_limit_to_the_step(stiffer, error):
     mechanism = with_drives(plain, stiffness=stiffer * plain.drives.stiffness)
     scene = (mechanism, ModalDamping(0.05), sampled(), SurfaceWall(500.0, 2.0), Plane((0.0, 0.265), (0.1, -1.0)))
     fine, coarse = (
-        simulate_mechanism(*scene, duration=0.4, push=(0.1, 1.5, 0.0), substeps=substeps) for substeps in (128, 2)
+        motion_of(*scene, duration=0.4, push=(0.1, 1.5, 0.0), substeps=substeps) for substeps in (128, 2)
     )
     assert np.max(fine.depth) > 1e-3
     assert np.max(np.abs(coarse.position - fine.position)) < error
@@ -107,7 +107,7 @@ def test_free_motion_keeps_its_energy(kind):
     velocity = here.jacobian @ np.array([2.0, -1.5, 1.0])[: here.jacobian.shape[1]]
     lost = []
     for substeps in (1, 2, 4):
-        motion = simulate_mechanism(
+        motion = motion_of(
             mechanism, UNDAMPED, sampled(2e-3), duration=0.05, start_velocity=velocity, gravity=GRAVITY,
             substeps=substeps,
         )  # fmt: skip
@@ -122,7 +122,7 @@ def test_free_motion_keeps_its_energy(kind):
 def test_every_joule_is_accounted_for():
     """Hand, motors, gravity, bent springs; without dampers nothing is missing."""
     mechanism = with_friction(uncoupled_five_bar(), hardening=20.0, backward_stiffness=0.9)
-    motion = simulate_mechanism(
+    motion = motion_of(
         mechanism, UNDAMPED, sampled(1e-3, delay=0.3), SurfaceWall(800.0, 2.0), Plane((0.0, 0.26), (0.0, -1.0)),
         duration=0.4, push=(0.5, 3.0, 0.0), gravity=(0.0, -1.0, 0.0), substeps=20,
     )  # fmt: skip
@@ -132,7 +132,7 @@ def test_every_joule_is_accounted_for():
 
 
 def test_dampers_only_take():
-    motion = simulate_mechanism(
+    motion = motion_of(
         uncoupled_five_bar(), ModalDamping(0.05), sampled(1e-3), SurfaceWall(800.0, 2.0),
         Plane((0.0, 0.26), (0.0, -1.0)), duration=0.4, push=(0.5, 3.0, 0.0), substeps=4,
     )  # fmt: skip
@@ -197,7 +197,7 @@ def test_a_chain_swings_as_in_mujoco(make, seed):
     mechanism = with_drives(make(np.random.default_rng(seed)), stiffness=np.inf, encoder_counts=np.nan)
     model, data = engine(mechanism, GRAVITY)
     model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 5e-5
-    motion = simulate_mechanism(mechanism, UNDAMPED, sampled(1e-3), duration=0.4, gravity=GRAVITY, substeps=4)
+    motion = motion_of(mechanism, UNDAMPED, sampled(1e-3), duration=0.4, gravity=GRAVITY, substeps=4)
     data.qpos[:] = motion.joints[0]
     for _ in range(round(0.4 / 5e-5)):
         mujoco.mj_step(model, data)
@@ -211,7 +211,7 @@ def test_a_chain_swings_as_in_mujoco(make, seed):
 
 def test_a_motion_into_a_singularity_ends_there():
     """Pulled outwards the arms of a five-bar stretch and its elbows meet."""
-    motion = simulate_mechanism(
+    motion = motion_of(
         uncoupled_five_bar(), ModalDamping(0.05), sampled(1e-3), duration=2.0, push=(0.0, 5.0, 0.0), substeps=4
     )
     assert motion.status in ("singular", "loop lost")
@@ -222,14 +222,14 @@ def test_a_motion_into_a_singularity_ends_there():
 
 def test_a_start_next_to_a_singularity_is_told_at_once():
     """A twentieth of a micrometre from where both arms of the five-bar are stretched."""
-    motion = simulate_mechanism(uncoupled_five_bar(), UNDAMPED, sampled(), at=(0.0, 0.346 - 5e-8), duration=0.1)
+    motion = motion_of(uncoupled_five_bar(), UNDAMPED, sampled(), at=(0.0, 0.346 - 5e-8), duration=0.1)
     assert motion.status == "singular"
     assert motion.time.size == 0
     assert motion.reason.startswith("after 0 s ")
 
 
 def test_a_wall_that_is_far_too_stiff_stops_the_motion_too():
-    motion = simulate_mechanism(
+    motion = motion_of(
         uncoupled_five_bar(), UNDAMPED, sampled(5e-3), SurfaceWall(1e6),
         Plane((0.0, 0.25), (0.0, -1.0), two_sided=True), duration=2.0, start_velocity=(0.0, 0.01),
     )  # fmt: skip
@@ -239,9 +239,7 @@ def test_a_wall_that_is_far_too_stiff_stops_the_motion_too():
 
 def test_loops_stay_closed():
     mechanism = with_drives(five_bar(), encoder_counts=np.nan)
-    motion = simulate_mechanism(
-        mechanism, UNDAMPED, sampled(1e-3), duration=1.0, start_velocity=(0.2, 0.05), substeps=2
-    )
+    motion = motion_of(mechanism, UNDAMPED, sampled(1e-3), duration=1.0, start_velocity=(0.2, 0.05), substeps=2)
     arms = replace(mechanism, drives=mechanism.drives)
     model = FiveBarByMultipliers(arms, np.zeros((4, 4)))
     passive = solve_posture(mechanism, mechanism.reference_position).angles[[1, 3]]
@@ -251,7 +249,5 @@ def test_loops_stay_closed():
 
 
 def test_a_paddle_turns_round_and_round():
-    motion = simulate_mechanism(
-        paddle(), UNDAMPED, sampled(1e-3), duration=3.0, start_velocity=(0.0, 1.0), substeps=1
-    )
+    motion = motion_of(paddle(), UNDAMPED, sampled(1e-3), duration=3.0, start_velocity=(0.0, 1.0), substeps=1)
     assert motion.joints[-1, 0] == pytest.approx(30.0, rel=1e-9)

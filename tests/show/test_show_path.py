@@ -7,7 +7,7 @@ import pytest
 
 import zwidth
 from tests.show.show_cases import check_legends_lie_beside
-from zwidth.contact import Box, Plane, Sphere, SurfaceWall, simulate_mechanism
+from zwidth.contact import Box, Plane, Sphere, SurfaceWall
 from zwidth.show.figures.motion import DRAWN
 from zwidth.show.figures.path import draw_path, path_figure
 from zwidth.show.figures.style import save
@@ -16,12 +16,11 @@ BALL = Sphere((0.0, 0.31), 0.05)
 
 
 def drawn(surface=BALL, **settings):
-    device = zwidth.load("five-bar")
     wall = None if surface is None else SurfaceWall(1500.0, 3.0)
-    scene = (device.mechanism, device.damping, device.controller, wall, surface)
-    motion = simulate_mechanism(*scene, **({"push": (0.02, 1.0, 0.0), "duration": 0.25} | settings))
+    settings = {"push": (0.02, 1.0, 0.0), "duration": 0.25} | settings
+    motion = zwidth.load("five-bar").at().move(wall, surface, **settings)
     made, axes = path_figure()
-    draw_path(axes, device.mechanism, device.at().posture, motion, surface)
+    draw_path(axes, motion)
     made.canvas.draw()
     return motion, made, axes
 

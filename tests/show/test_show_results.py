@@ -48,6 +48,9 @@ def results():
         "guarantees": point.guarantees(coupling=True, wall=(1000.0, 5.0)),
         "felt": point.felt(1000.0, 5.0),
         "contact": point.simulate(1000.0, 5.0, duration=0.2),
+        "motion": arms.at().move(
+            zwidth.contact.SurfaceWall(1500.0, 3.0), zwidth.contact.Sphere((0.0, 0.31), 0.05), push=(0.02, 1.0)
+        ),
         "limit cycles": rubbing().at().limit_cycles(2600.0, 0.0, simulate=False),
         "boundary": point.without_operator.measure_boundary(plan),
         "sensitivities": device().sensitivities(),
@@ -74,6 +77,7 @@ NAMES = [
     "guarantees",
     "felt",
     "contact",
+    "motion",
     "limit cycles",
     "boundary",
     "sensitivities",

@@ -12,8 +12,8 @@ from .hand import Reflex as Reflex
 from .hand import Tremor as Tremor
 from .limit_cycle_prediction import LimitCyclePrediction as LimitCyclePrediction
 from .limit_cycles import limit_cycles as limit_cycles
+from .mechanism.motion import MechanismMotion as MechanismMotion
 from .mechanism.reach import SurfaceOutOfReach as SurfaceOutOfReach
-from .mechanism.simulate import MechanismMotion as MechanismMotion
 from .mechanism.simulate import simulate_mechanism as simulate_mechanism
 from .mechanism.surfaces import Box as Box
 from .mechanism.surfaces import Plane as Plane

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.multi import MultiLoop
 from zwidth.loop.point_errors import NoMechanismError, OperatingPointError, check_several_directions
 from zwidth.loop.point_verbs import PointVerbs
+from zwidth.model.arguments import check_choice
 from zwidth.model.damping import Damping, GivenDamping
 from zwidth.model.directions import MultiPlant, reduce_directions
 from zwidth.model.effective import EffectiveParameters, effective_parameters
@@ -74,6 +75,7 @@ class OperatingPoint(PointVerbs):
 
     def __post_init__(self) -> None:
         """Raise ValueError for what does not go together."""
+        check_choice("encoders", self.encoders, get_args(Encoders))
         kinds = (self.mechanism, self.given_plant, self.response)
         if sum(kind is not None for kind in kinds) != 1:
             raise ValueError(
@@ -220,7 +222,7 @@ class OperatingPoint(PointVerbs):
         """
         if self.mechanism is None:
             return None
-        self._check_single("handle_range")
+        self.check_single("handle_range")
         return handle_range(self.mechanism, self._posture, self.direction)
 
     def distance_from_path(self, displacement: float) -> float | None:
@@ -234,7 +236,7 @@ class OperatingPoint(PointVerbs):
         """
         if self.mechanism is None:
             return None
-        self._check_single("distance_from_path")
+        self.check_single("distance_from_path")
         if displacement == 0.0:
             return 0.0
         # without forces across, a handle with few drives moves by the part of the direction that it can move along
@@ -262,7 +264,7 @@ class OperatingPoint(PointVerbs):
             raise OperatingPointError(_NO_MODEL)
         if self.given_plant is not None:
             return self.given_plant if self.model is None else reduce_plant(self.given_plant, self.model)
-        self._check_single("plant")
+        self.check_single("plant")
         assert self.mechanism is not None
         return reduce_mechanism(
             self.mechanism, self._posture, self.direction, self.model or "full", self.damping, self.encoders
@@ -287,7 +289,7 @@ class OperatingPoint(PointVerbs):
                 ModelError, DirectionError  (model.reduction) as `plant`
         """
         posture = self._posture
-        self._check_single("plant")
+        self.check_single("plant")
         check_several_directions(self.mechanism, self.operator, self.encoders)
         assert self.mechanism is not None
         assert self.directions is not None
@@ -303,7 +305,8 @@ class OperatingPoint(PointVerbs):
         """All directions under one sampled wall law. Raises what `plant_of_directions` raises."""
         return MultiLoop(self.plant_of_directions, self.controller)
 
-    def _check_single(self, what: str) -> None:
+    def check_single(self, what: str) -> None:
+        """Raise OperatingPointError for several points; what: each of them has, and all have not in common."""
         if self.shape:
             raise OperatingPointError(
                 f"{_counted(self.shape)} have no .{what} in common; take one of them by its index, or ask for "

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from zwidth.contact.environments.environment import Environment
     from zwidth.contact.hand import Reach, Reflex, Tremor
     from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction
+    from zwidth.contact.mechanism.motion import MechanismMotion
+    from zwidth.contact.mechanism.surfaces import Surface
+    from zwidth.contact.mechanism.walls import Wall
     from zwidth.guarantees.nested import Guarantees
     from zwidth.loop.operating_point import OperatingPoint
     from zwidth.measures.description import Description
@@ -138,6 +141,36 @@ class PointVerbs:
             passivity_damping=passivity_damping,
             duration=duration,
             substeps=substeps,
+            seed=seed,
+        )
+
+    def move(
+        self,
+        wall: Wall | None = None,
+        surface: Surface | None = None,
+        *,
+        duration: float = 1.0,
+        start_velocity: ArrayLike | None = None,
+        push: ArrayLike | None = None,
+        gravity: ArrayLike | None = None,
+        substeps: int = 4,
+        counted: bool = True,
+        torque_limits: Literal["each", "together"] = "each",
+        seed: int = 0,
+    ) -> MechanismMotion:
+        """The large motion of the whole mechanism from here, at a surface or free; see
+        `contact.simulate_mechanism`, which says what each argument means."""
+        return _verbs.move(
+            self._point,
+            wall,
+            surface,
+            duration=duration,
+            start_velocity=start_velocity,
+            push=push,
+            gravity=gravity,
+            substeps=substeps,
+            counted=counted,
+            torque_limits=torque_limits,
             seed=seed,
         )
 

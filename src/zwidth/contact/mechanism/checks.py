@@ -55,17 +55,14 @@ def motion_inputs(
     return Inputs(samples, _push(push, samples), _gravity(gravity))
 
 
-def check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    """Is it one of them? Raises MotionError."""
-    if value not in choices:
-        raise MotionError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
+def start_rates(posture: Posture, velocity: ArrayLike | None) -> tuple[Floats, Floats]:
+    """The handle's velocity (3,) [m/s], and the drives' rates (d,) that give it [rad/s].
 
-
-def start_rates(posture: Posture, velocity: ArrayLike | None) -> Floats:
-    """Rates (d,) of the drives at a velocity of the handle [rad/s]. Raises MotionError where it cannot have it."""
+    Raises MotionError  for a velocity that the handle cannot have
+    """
     J = posture.jacobian
     if velocity is None:
-        return np.zeros(J.shape[1])
+        return np.zeros(3), np.zeros(J.shape[1])
     given = _vector("start_velocity", velocity, "m/s")
     rates = np.linalg.lstsq(J, given, rcond=None)[0]
     left = float(np.linalg.norm(J @ rates - given))
@@ -74,7 +71,7 @@ def start_rates(posture: Posture, velocity: ArrayLike | None) -> Floats:
             f"the handle cannot move with start_velocity {given.tolist()} m/s: {left:.3g} m/s of it is across "
             "what the drives can do; give a velocity within the mechanism's plane of motion"
         )
-    return np.asarray(rates)
+    return given, np.asarray(rates)
 
 
 def _check_friction(mechanism: Mechanism) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,20 +11,22 @@ from numpy.typing import ArrayLike
 from zwidth.contact.computer import computers
 from zwidth.contact.environments import Environment
 from zwidth.contact.mechanism import run as kernel
-from zwidth.contact.mechanism.checks import MotionError, check_choice, motion_inputs, start_rates
+from zwidth.contact.mechanism.checks import MotionError, motion_inputs, start_rates
 from zwidth.contact.mechanism.law import law_of
+from zwidth.contact.mechanism.motion import MechanismMotion
 from zwidth.contact.mechanism.reach import check_reach
 from zwidth.contact.mechanism.surfaces import Surface, depth_and_normal, packed
 from zwidth.contact.mechanism.system import System, system_of
 from zwidth.contact.mechanism.walls import Wall, rendered_environment
-from zwidth.loop.controller import Controller
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_errors import NoMechanismError
+from zwidth.model.arguments import check_choice, require
 from zwidth.model.arrays import pack
-from zwidth.model.damping import Damping
 from zwidth.model.mechanism import Floats, Mechanism
-from zwidth.model.posture import Posture, solve_posture
+from zwidth.model.posture import OK, Posture
 from zwidth.model.reduction import reduce_mechanism
 
-REASONS = {
+REASONS: Final = {
     kernel.DONE: ("done", ""),
     kernel.SINGULAR: ("singular", "the drives no longer hold the other joints: it is a singularity"),
     kernel.LOOP_LOST: (
@@ -36,80 +38,31 @@ REASONS = {
 }
 
 
-@dataclass(frozen=True)
-class MechanismMotion:
-    """A motion sampled by the computer, k samples from the start on.
-
-    time             (k,) [s]
-    position         (k, 3)  where the handle is [m]
-    counted_position (k, 3)  where the computer sees it, the kinematics of the counted angles [m]
-    velocity         (k, 3)  of the handle as the computer estimates it [m/s]
-    depth            (k,)    how deep it truly is in the wall, negative outside; -inf without a surface [m]
-    joints, motors   (k, d)  driven joints' angles, and the motors' at the joint [rad]
-    joint_rates, motor_rates (k, d)  [rad/s]
-    force            (k, 3)  on the handle, as commanded [N]
-    torque           (k, d)  as commanded, at the joint [N m]
-    kinetic, elastic, gravitational (k,)  energies [J]; the last against the base frame's origin
-    hand_work, motor_work, friction_loss (k,)  since the start [J]; motor_work is nan with a lagging actuator
-    status           "done", or why the motion stops: "singular", "loop lost", "diverged", "no force"; reason in
-                     words
-    started_inside   was the handle inside the wall at the start?
-    two_sided        does the wall act on both sides of the surface alike?
-    """
-
-    time: Floats
-    position: Floats
-    counted_position: Floats
-    velocity: Floats
-    depth: Floats
-    joints: Floats
-    motors: Floats
-    joint_rates: Floats
-    motor_rates: Floats
-    force: Floats
-    torque: Floats
-    kinetic: Floats
-    elastic: Floats
-    gravitational: Floats
-    hand_work: Floats
-    motor_work: Floats
-    friction_loss: Floats
-    status: str
-    reason: str
-    started_inside: bool
-    two_sided: bool
-
-
 def simulate_mechanism(
-    mechanism: Mechanism,
-    damping: Damping,
-    controller: Controller,
+    point: OperatingPoint,
     wall: Wall | None = None,
     surface: Surface | None = None,
     *,
-    at: ArrayLike | None = None,
-    assembly: str | None = None,
-    duration: float,
+    duration: float = 1.0,
     start_velocity: ArrayLike | None = None,
     push: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     substeps: int = 4,
     counted: bool = True,
-    encoders: Literal["motor", "link"] = "motor",
     torque_limits: Literal["each", "together"] = "each",
     seed: int = 0,
 ) -> MechanismMotion:
-    """How a mechanism moves on its flexible drives, with all that large motions bring, at a surface of any shape.
+    """Simulate how a mechanism moves on its flexible drives at a surface of any shape, or free.
 
     In each period the computer reads the encoders, places the handle by the kinematics of the counted angles,
     estimates its velocity, and sends to the motors the torques J^T f of the wall's force. Between samples the
     links' inertia, velocity forces and gravity act in full; the loops are closed exactly at every evaluation.
 
-    damping         the mechanism's; its matrix is that of the linear full model at the start, kept in the
-                    coordinates of joints and motors
+    point           the device in the posture from which the motion starts, with no drive bent. The damping matrix
+                    is that of its full linear model there, kept in the coordinates of joints and motors; its
+                    direction, model and operator take no part
     wall, surface   what is rendered, a `SurfaceWall` or a `SurfaceEnvironment`, and where; both or neither:
                     without them the motors stay without current
-    at              (2,) or (3,)  handle at the start [m]; None: the reference position. No drive is bent there
     duration        [s]
     start_velocity  (2,) or (3,)  of the handle [m/s]; joints and motors move with it
     push            (3,) force at the handle [N], or (samples, 3), each held for one period
@@ -122,7 +75,8 @@ def simulate_mechanism(
     Returns  MechanismMotion; a motion that meets a singularity ends there, and says so
     Raises   SurfaceOutOfReach  (a ValueError) for a surface that the handle never touches in this assembly
              MotionError  (a ValueError) for inputs that cannot be meant
-             PostureError (a ValueError) where the handle cannot be at the start
+             NoMechanismError    (loop.point_errors) for a device without a mechanism
+             OperatingPointError (loop.point_errors) for several postures
              TooLarge     (a ValueError) for more samples than the machine has memory for
 
     >>> import zwidth
@@ -131,45 +85,64 @@ def simulate_mechanism(
     >>> devices = (zwidth.load(name) for name, *_ in zwidth.bundled())
     >>> device = next(device for device in devices if device.mechanism)
     >>> hollow = Sphere(device.reference_position, radius=0.01, hollow=True)
-    >>> scene = (device.mechanism, device.damping, device.controller, SurfaceWall(500.0, 2.0), hollow)
-    >>> simulate_mechanism(*scene, duration=0.1, start_velocity=device.direction()).status
+    >>> wall = SurfaceWall(500.0, 2.0)
+    >>> simulate_mechanism(device.at(), wall, hollow, duration=0.1, start_velocity=device.direction()).status
     'done'
     """
+    require("point", point, OperatingPoint)
+    mechanism, posture = point.mechanism, point.posture
+    if mechanism is None or posture is None:
+        raise NoMechanismError
+    point.check_single("motion")
+    if posture.status != OK:
+        raise MotionError("the posture is out of reach or singular and no motion can start there; ask for another")
     if mechanism.design_shape:
         raise MotionError(f"one design is simulated at a time, got a set of shape {mechanism.design_shape}")
-    check_choice("encoders", encoders, ("motor", "link"))
     check_choice("torque_limits", torque_limits, ("each", "together"))
     if (wall is None) != (surface is None):
         raise MotionError("a wall needs a surface and a surface a wall; give both, or neither for a free device")
     environment, values = None, np.zeros(0)
     if wall is not None and surface is not None:
         environment, values = rendered_environment(wall, surface)
-    position = mechanism.reference_position if at is None else at
-    posture = solve_posture(mechanism, position, assembly)
+    controller = point.controller
     inputs = motion_inputs(mechanism, controller, duration, push, gravity, substeps, len(posture.jacobian[0]))
-    rates = start_rates(posture, start_velocity)
+    velocity, rates = start_rates(posture, start_velocity)
     shape, mech = packed(surface), pack(mechanism)
     if surface is not None:
         check_reach(mechanism, mech, posture, surface)
     # any direction that the handle can move along will do: matrices and drives are the same for all
     along = np.linalg.svd(posture.jacobian)[0][:, 0]
-    plant = reduce_mechanism(mechanism, posture, along, "full", damping, encoders)
+    plant = reduce_mechanism(mechanism, posture, along, "full", point.damping, point.encoders)
     system = system_of(mech, mechanism.drives, plant, inputs.gravity, controller.actuator_time_constant)
     start = _start(mechanism, posture, system, rates)
     trace = _room(inputs.samples + 1, len(start), len(system.motor))
-    read = system.motor if encoders == "motor" else np.arange(len(system.motor))
+    read = system.motor if point.encoders == "motor" else np.arange(len(system.motor))
     address = 0 if environment is None else environment.address
     law = law_of(mechanism.drives, shape, address, values, read, counted, seed, torque_limits == "together")
     status, reached = kernel.run(
         system, law, computers([controller], [controller.saturation]), start, posture.angles.copy(), inputs.push,
         controller.fractional_delay, substeps, trace,
     )  # fmt: skip
-    motion = _motion(system, trace, status, reached, controller.sampling_period)
-    if environment is None or surface is None:
-        return motion
-    if status == kernel.UNANSWERED:
-        motion = replace(motion, reason=_unanswered(motion, environment, surface))
-    return replace(motion, two_sided=environment.linear)
+    motion = MechanismMotion(
+        point=point,
+        surface=surface,
+        environment=environment,
+        values=values,
+        start_velocity=velocity,
+        push=inputs.push,
+        gravity=inputs.gravity,
+        duration=duration,
+        substeps=substeps,
+        seed=seed,
+        counted=counted,
+        torque_limits=torque_limits,
+        status=REASONS[status][0],
+        reason=_reason(status, mechanism, max(reached - 1, 0) * controller.sampling_period),
+        **_course(system, trace, reached, controller.sampling_period),
+    )
+    if status == kernel.UNANSWERED and environment is not None and surface is not None:
+        return replace(motion, reason=_unanswered(motion, environment, surface))
+    return motion
 
 
 def _start(mechanism: Mechanism, posture: Posture, system: System, rates: Floats) -> Floats:
@@ -196,36 +169,38 @@ def _room(samples: int, states: int, drives: int) -> kernel.Trace:
     )
 
 
-def _motion(system: System, trace: kernel.Trace, status: int, reached: int, period: float) -> MechanismMotion:
+def _course(system: System, trace: kernel.Trace, reached: int, period: float) -> dict[str, Floats]:
+    """What is known of each sample, by its name in `MechanismMotion`."""
     d, n, motor = len(system.motor), len(system.damping), system.motor
     state, energy, work = trace.state[:reached], trace.energy[:reached], trace.work[:reached]
-    name, reason = REASONS[status]
-    if reason:
-        reason = f"after {max(reached - 1, 0) * period:.6g} s {reason}"
     lagging = np.any(system.lag_command >= 0)
-    return MechanismMotion(
-        time=np.arange(reached, dtype=np.float64) * period,
-        position=trace.position[:reached],
-        counted_position=trace.seen[:reached],
-        velocity=trace.velocity[:reached],
-        depth=trace.depth[:reached],
-        joints=state[:, :d].copy(),
-        motors=state[:, motor].copy(),
-        joint_rates=state[:, n : n + d].copy(),
-        motor_rates=state[:, n + motor].copy(),
-        force=trace.force[:reached],
-        torque=trace.torque[:reached],
-        kinetic=energy[:, 0],
-        elastic=energy[:, 1],
-        gravitational=energy[:, 2],
-        hand_work=work[:, 0],
-        motor_work=np.full(reached, np.nan) if lagging else work[:, 1],
-        friction_loss=work[:, 2],
-        status=name,
-        reason=reason,
-        started_inside=bool(reached and trace.depth[0] > 0.0),
-        two_sided=False,
-    )
+    return {
+        "time": np.arange(reached, dtype=np.float64) * period,
+        "position": trace.position[:reached],
+        "counted_position": trace.seen[:reached],
+        "velocity": trace.velocity[:reached],
+        "depth": trace.depth[:reached],
+        "joints": state[:, :d].copy(),
+        "motors": state[:, motor].copy(),
+        "joint_rates": state[:, n : n + d].copy(),
+        "motor_rates": state[:, n + motor].copy(),
+        "force": trace.force[:reached],
+        "torque": trace.torque[:reached],
+        "kinetic": energy[:, 0],
+        "elastic": energy[:, 1],
+        "gravitational": energy[:, 2],
+        "hand_work": work[:, 0],
+        "motor_work": np.full(reached, np.nan) if lagging else work[:, 1],
+        "friction_loss": work[:, 2],
+    }
+
+
+def _reason(status: int, mechanism: Mechanism, seconds: float) -> str:
+    """Why a motion ends before its time; "" where it does not."""
+    reason = REASONS[status][1]
+    if status == kernel.LOOP_LOST and not len(mechanism.closures.names):  # an open chain has no loops to close
+        reason = "it moves farther between two steps than can be followed; push less hard, or take more substeps"
+    return reason and f"after {seconds:.6g} s {reason}"
 
 
 def _unanswered(motion: MechanismMotion, environment: Environment, surface: Surface) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +69,18 @@ class Box:
 
 
 Surface = Plane | Sphere | Box
+
+
+def surface_document(surface: Surface, two_sided: bool) -> dict[str, Any]:
+    """A surface by keys and units; two_sided: does what is rendered at a plane act on both of its sides?"""
+    match surface:
+        case Plane():
+            return {"kind": "plane", "point_m": surface.point, "normal": surface.normal, "two_sided": two_sided}
+        case Sphere():
+            kind: dict[str, Any] = {"kind": "sphere", "center_m": surface.center, "radius_m": surface.radius}
+        case Box():
+            kind = {"kind": "box", "center_m": surface.center, "half_sizes_m": surface.half_sizes}
+    return kind | {"hollow": surface.hollow}
 
 
 def packed(surface: Surface | None) -> Floats:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import fields
-from functools import wraps
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -19,7 +17,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from zwidth.contact.environments import Environment
-    from zwidth.show.cli.options import Question
 
 Command = Callable[..., int]
 
@@ -186,27 +183,6 @@ def contact_faults() -> Iterator[None]:
         raise NoAnswer(str(error)) from None
     except TooLarge as error:
         raise BadInput(f"--duration: {error}") from None
-
-
-def gathered(
-    command: Command,
-    name: str,
-    kind: type[Any],
-    options: Sequence[Callable[..., Any]],
-    check: Callable[[Any, Question], None],
-) -> Command:
-    """Give a command these options as one argument: a dataclass of this kind, checked with the question."""
-    own = [field.name for field in fields(kind)]
-
-    @wraps(command)
-    def asked(question: Any, **given: Any) -> int:
-        found = kind(**{key: given.pop(key) for key in own})
-        check(found, question)
-        return command(question, **{name: found}, **given)
-
-    for decorate in reversed(options):
-        asked = decorate(asked)
-    return asked
 
 
 def wall_options() -> tuple[Callable[..., Any], ...]:

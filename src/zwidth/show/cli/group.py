@@ -19,7 +19,7 @@ from zwidth.show.cli.felt import Felt
 from zwidth.show.cli.guarantees import GuaranteesCommand
 from zwidth.show.cli.limit_cycles import LimitCycles
 from zwidth.show.cli.map import Map
-from zwidth.show.cli.move import move
+from zwidth.show.cli.move import Move
 from zwidth.show.cli.new import New
 from zwidth.show.cli.polar import Polar
 from zwidth.show.cli.report import Report
@@ -70,7 +70,7 @@ COMMANDS = (
     Simulate(),
     ExperimentCommand(),
     LimitCycles(),
-    move,
+    Move(),
 )
 for command in COMMANDS:
     zwidth.add_command(command.for_click() if isinstance(command, Command) else command)

@@ -2,105 +2,153 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
-from zwidth.show.cli.answer import Answer, deliver
+from zwidth.show.cli.command import Case, Command
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.failures import NoAnswer
-from zwidth.show.cli.moved import columns, facts, moved, numbers
-from zwidth.show.cli.moved_pages import pages
-from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
-from zwidth.show.cli.surface_options import Motion, about_a_motion
-from zwidth.show.output import DATA, FIGURES, destination, write_data
-
-if TYPE_CHECKING:
-    from zwidth.show.cli.moved import Moved
-
-KEYS: Final = (
-    "surface",
-    "environment",
-    "parameters",
-    "wall_stiffness_N_per_m",
-    "wall_damping_Ns_per_m",
-    "no_pull",
-    "push_N",
-    "start_velocity_m_per_s",
-    "gravity_m_per_s2",
-    "torque_limits",
-    "encoders_counted",
-    "substeps",
-    "seed",
-    "duration_asked_s",
-    "duration_s",
-    "status",
-    "ended_because",
-    "started_inside",
-    "largest_penetration_m",
-    "largest_force_N",
-    "contact_share",
-    "torque_limit_share",
-    "force_limit_share",
-    "energy_book_J",
-    "time_s",
-    "position_m",
-    "counted_position_m",
-    "depth_m",
-    "force_N",
-    "torque_Nm",
-    "joint_rad",
-    "motor_rad",
-    "kinetic_J",
-    "elastic_J",
-    "gravitational_J",
-    "hand_work_J",
-    "motor_work_J",
-    "friction_loss_J",
+from zwidth.show.cli.surface_options import (
+    check_motion,
+    components,
+    motion_options,
+    surface_of,
+    surface_option,
+    wall_of,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-@click.command(
-    short_help="Move the whole mechanism of DEVICE, against a surface or free.",
-    epilog=example(
+    from zwidth.contact.mechanism.motion import MechanismMotion
+
+OPERATOR: Final = "the operator"
+AS_TEXT: Final = 6  # numbers' worth of memory that one takes as text
+SHOWN: Final = (17, 3)  # numbers shown of each sample, and as many more for each drive
+
+
+class Move(Command):
+    """Move the whole mechanism of DEVICE, free or against a surface: large motions, with all that bends, rubs and
+    swings. The posture is where it starts; the hand is a push."""
+
+    name = "move"
+    summary = "Move the whole mechanism of DEVICE, against a surface or free."
+    examples = (
         "zwidth move my-arms.toml --plane 0,0.28,0,-1 --stiffness 2000 --damping 5 --push 0,2",
         "zwidth move my-arms.toml --sphere 0,0.3,0.05 --stiffness 900 --damping 3 --push 2 --output path.svg",
         "zwidth move my-arms.toml --plane 0,0.28,0,-1 --environment hunt_crossley --parameter dissipation=1",
-    ),
-)
-@about_a_device
-@about_a_motion
-@output_option("Write a figure (.png .svg .pdf) or the data (.csv .json).")
-@as_json
-def move(question: Question, motion: Motion, output: str | None, as_json: bool) -> int:
-    """Move the whole mechanism of DEVICE, free or against a surface: large motions, with all that bends, rubs and
-    swings. The posture is where it starts; the hand is a push."""
-    path = None if output is None else destination(output, FIGURES + DATA)
-    device = question.device()
-    if device.mechanism is None:
-        kind = "[plant]" if device.given_plant is not None else "[response]"
-        raise BadInput(
-            f"{question.name}: has a {kind} and no [mechanism] to move; `zwidth simulate` takes a [plant]"
-        )
-    try:
-        found = moved(question, device, motion)
-    except NoAnswer as none:
-        return deliver(Answer(facts(question, device) | dict.fromkeys(KEYS), reason=str(none)), as_json)
-    document = facts(question, device) | numbers(found)
-    if path is not None:
-        document["file"] = str(path)
-        _write(path, found, document)
-    return deliver(Answer(document, lambda: list(pages(found, document))), as_json)
+    )
+    options = motion_options()
+    keys = (
+        "surface",
+        "environment",
+        "parameters",
+        "wall_stiffness_N_per_m",
+        "wall_damping_Ns_per_m",
+        "no_pull",
+        "push_N",
+        "start_velocity_m_per_s",
+        "gravity_m_per_s2",
+        "torque_limits",
+        "encoders_counted",
+        "substeps",
+        "seed",
+        "duration_asked_s",
+        "duration_s",
+        "status",
+        "ended_because",
+        "started_inside",
+        "largest_penetration_m",
+        "largest_force_N",
+        "contact_share",
+        "torque_limit_share",
+        "force_limit_share",
+        "energy_book_J",
+        "time_s",
+        "position_m",
+        "counted_position_m",
+        "depth_m",
+        "force_N",
+        "torque_Nm",
+        "joint_rad",
+        "motor_rad",
+        "kinetic_J",
+        "elastic_J",
+        "gravitational_J",
+        "hand_work_J",
+        "motor_work_J",
+        "friction_loss_J",
+    )
+    linear = False
+    of_responses = True  # which it refuses like every device without a mechanism
+
+    def check(self, case: Case) -> None:
+        check_motion(case.options, case.question)
+
+    def circumstances(self, case: Case) -> dict[str, Any]:
+        # nobody holds the handle but by the push
+        left_out = [OPERATOR] if case.device.operator is not None else []
+        return super().circumstances(case) | {"operator": None, "left_out": left_out}
+
+    def compute(self, case: Case) -> MechanismMotion:
+        from zwidth.contact.mechanism.checks import MotionError
+        from zwidth.contact.mechanism.reach import SurfaceOutOfReach
+        from zwidth.contact.room import TooLarge
+
+        device, name = case.device, case.question.name
+        if device.mechanism is None:
+            kind = "[plant]" if device.given_plant is not None else "[response]"
+            raise BadInput(f"{name}: has a {kind} and no [mechanism] to move; `zwidth simulate` takes a [plant]")
+        direction = device.direction(case.question.direction)
+        surface, wall = surface_of(case.options, device), wall_of(case.options)
+        point = case.point
+        try:
+            _check_room(case)
+            motion = point.move(
+                wall,
+                surface,
+                duration=case["duration"],
+                start_velocity=components(case["start_velocity"], direction),
+                push=components(case["push"], direction),
+                gravity=components(case["gravity"], direction),
+                substeps=case["substeps"],
+                counted=not case["exact"],
+                torque_limits=case["torque_limits"],
+                seed=case["seed"],
+            )
+        except TooLarge as error:
+            raise BadInput(f"--duration: {error}") from None
+        except SurfaceOutOfReach as error:
+            raise BadInput(f"{surface_option(case.options)}: {error}") from None
+        except MotionError as error:
+            option = "--start-velocity: " if "start_velocity" in str(error) else ""
+            raise BadInput(f"{name}: {option}{error}") from None
+        if not len(motion.time):
+            raise NoAnswer(motion.reason)
+        if motion.status == "no force":
+            raise NoAnswer(f"{motion.reason}; have it return a number there")
+        return motion
+
+    def heading(self, case: Case) -> str:
+        return ""  # the pages begin with where it starts
+
+    def pages(self, case: Case, result: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Any]:
+        from zwidth.show.cli.move_page import pages
+
+        return pages(case, result, document)
+
+    def draw(self, case: Case, result: MechanismMotion) -> Figure:
+        from zwidth.show.figures.path import draw_path, path_figure
+
+        drawing, axes = path_figure()
+        draw_path(axes, result)
+        return drawing
 
 
-def _write(path: Path, found: Moved, document: dict[str, Any]) -> None:
-    if path.suffix.lower() in DATA:
-        write_data(path, document, columns(document))
-        return
-    from zwidth.show.figures.path import draw_path, path_figure
-    from zwidth.show.figures.style import save
+def _check_room(case: Case) -> None:
+    """Raise TooLarge for more samples than there is memory for, all that is shown as text included."""
+    from zwidth.contact.room import check_room
 
-    drawing, axes = path_figure()
-    draw_path(axes, found.mechanism, found.posture, found.motion, found.surface)
-    save(drawing, path)
+    samples = case["duration"] / case.device.controller.sampling_period
+    numbers = SHOWN[0] + SHOWN[1] * len(case.point.drives.names)
+    check_room((1 + AS_TEXT) * samples * numbers, f"{samples:.4g} samples", "move for a shorter time")

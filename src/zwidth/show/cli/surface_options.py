@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -12,7 +11,6 @@ from zwidth.show.cli.contact_options import (
     LARGEST_FORCE,
     LARGEST_SEED,
     Bounded,
-    gathered,
     named_environment,
     of_environments,
     usage,
@@ -23,14 +21,12 @@ from zwidth.show.cli.options import LARGEST_WALL, Finite, Numbers
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, Surface
+    from zwidth.contact.mechanism.surfaces import Surface
     from zwidth.contact.mechanism.walls import Wall
     from zwidth.device.device import Device
     from zwidth.show.cli.options import Question
 
     Floats = NDArray[Any]
-
-Command = Callable[..., int]
 
 SURFACES: Final = ("plane", "sphere", "box")
 OF_A_WALL: Final = ("stiffness", "damping", "no_pull", "two_sided", "hollow", "environment", "parameters")
@@ -38,146 +34,110 @@ LONGEST: Final = 1e9  # s
 FASTEST: Final = 1e3  # m/s
 
 
-@dataclass(frozen=True)
-class Motion:
-    """A motion as typed; None where left out. Metres, newtons, seconds."""
-
-    plane: tuple[float, ...] | None
-    sphere: tuple[float, ...] | None
-    box: tuple[float, ...] | None
-    two_sided: bool
-    hollow: bool
-    stiffness: float | None
-    damping: float | None
-    environment: str | None
-    parameters: tuple[tuple[str, float], ...]
-    no_pull: bool
-    push: tuple[float, ...] | None
-    start_velocity: tuple[float, ...] | None
-    gravity: tuple[float, ...] | None
-    duration: float
-    substeps: int
-    seed: int
-    exact: bool
-    torque_limits: str
-
-    def check(self, question: Question) -> None:
-        """Raises click.UsageError for options that cannot stand together."""
-        given = [f"--{name}" for name in SURFACES if getattr(self, name) is not None]
-        if len(given) > 1:
-            raise usage(f"{' and '.join(given)} exclude each other: a motion meets one surface")
-        self._check_wall(given)
-        self._check_sizes()
-        self._check_question(question)
-
-    def _check_wall(self, given: Sequence[str]) -> None:
-        if not given:
-            alone = [name for name in OF_A_WALL if getattr(self, name) not in (None, False, ())]
-            if alone:
-                raise usage(f"{_option(alone[0])} says what a surface does; add --plane, --sphere or --box")
-            return
-        missing = [f"--{name}" for name in ("stiffness", "damping") if getattr(self, name) is None]
-        if self.environment is None and missing:
-            raise usage(f"{given[0]} needs --stiffness and --damping; missing: {' and '.join(missing)}")
-        if self.environment is None and self.parameters:
-            raise usage("--parameter belongs to --environment; a wall has --stiffness and --damping")
-        if self.environment is not None and self.two_sided:
-            raise usage(
-                "--two-sided and --environment exclude each other: an environment says itself on which sides it "
-                "acts, as `--environment wall` does on both"
-            )
-        if self.two_sided and self.plane is None:
-            raise usage("--two-sided goes with --plane; a sphere and a box have one side, or --hollow the other")
-        if self.hollow and self.plane is not None:
-            raise usage("--hollow goes with --sphere or --box; turn a plane round by its normal")
-        if self.two_sided and self.no_pull:
-            raise usage("a two-sided plane pulls by its nature; leave --no-pull or --two-sided out")
-
-    def _check_sizes(self) -> None:
-        for name, most, unit in (("push", LARGEST_FORCE, "N"), ("start_velocity", FASTEST, "m/s")):
-            value = getattr(self, name) or ()
-            if any(abs(part) > most for part in value):
-                told = ",".join(f"{part:g}" for part in value)
-                raise usage(f"{_option(name)}: must lie from -{most:g} to {most:g} {unit}, got {told}")
-
-    def _check_question(self, question: Question) -> None:
-        if question.model not in (None, "full"):
-            raise usage(
-                f"the whole mechanism moves, so that --model {question.model} does not apply; leave it out"
-            )
-        if question.operator not in (None, "none"):
-            raise usage("no arm holds a mechanism that moves; leave --operator out and give a --push")
-        along = [self.push, self.start_velocity]
-        if question.direction is not None and not any(value is not None and len(value) == 1 for value in along):
-            one = "a --push or --start-velocity given as one number"
-            raise usage(f"--direction is that of {one}; give one, or leave it out")
-
-    @property
-    def option(self) -> str:
-        """The option that gave the surface."""
-        return next((f"--{name}" for name in SURFACES if getattr(self, name) is not None), "")
-
-    def surface(self, device: Device) -> Surface | None:
-        """What the handle meets. Numbers in a plane lie at the height of the device's reference.
-
-        Raises  BadInput  for numbers that describe none
-        """
-        from zwidth.contact.mechanism.surfaces import packed
-
-        height = 0.0 if device.reference_position is None else float(device.reference_position[2])
-        surface = self._surface(height)
-        try:
-            packed(surface)
-        except ValueError as error:
-            raise BadInput(f"{self.option}: {error}") from None
-        return surface
-
-    def _surface(self, height: float) -> Plane | Sphere | Box | None:
-        from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere
-
-        if self.plane is not None:
-            half = len(self.plane) // 2
-            return Plane(_raised(self.plane[:half], height), self.plane[half:], two_sided=self.two_sided)
-        if self.sphere is not None:
-            return Sphere(_raised(self.sphere[:-1], height), self.sphere[-1], hollow=self.hollow)
-        if self.box is not None:
-            half = len(self.box) // 2
-            return Box(_raised(self.box[:half], height), self.box[half:], hollow=self.hollow)
-        return None
-
-    def wall(self) -> Wall | None:
-        """What the computer renders at the surface. Raises BadInput for an environment that cannot be."""
-        from zwidth.contact.mechanism.walls import SurfaceEnvironment, SurfaceWall
-
-        if self.environment is not None:
-            found, values = named_environment(
-                self.environment,
-                self.parameters,
-                stiffness=self.stiffness,
-                damping=self.damping,
-                no_pull=self.no_pull,
-            )
-            return SurfaceEnvironment(found, values)
-        if self.stiffness is None or self.damping is None:
-            return None
-        return SurfaceWall(self.stiffness, self.damping, self.no_pull)
+def check_motion(options: Mapping[str, Any], question: Question) -> None:
+    """Raise click.UsageError for options that cannot stand together."""
+    given = [f"--{name}" for name in SURFACES if options[name] is not None]
+    if len(given) > 1:
+        raise usage(f"{' and '.join(given)} exclude each other: a motion meets one surface")
+    _check_wall(options, given)
+    _check_sizes(options)
+    _check_question(options, question)
 
 
-def along(value: tuple[float, ...] | None, direction: Floats) -> Floats:
-    """(3,) of one number along the direction, or of two or three components; 0 where left out."""
-    import numpy as np
+def _check_wall(options: Mapping[str, Any], given: Sequence[str]) -> None:
+    environment, plane, two_sided = options["environment"], options["plane"], options["two_sided"]
+    if not given:
+        alone = [name for name in OF_A_WALL if options[name] not in (None, False, ())]
+        if alone:
+            raise usage(f"{_option(alone[0])} says what a surface does; add --plane, --sphere or --box")
+        return
+    missing = [f"--{name}" for name in ("stiffness", "damping") if options[name] is None]
+    if environment is None and missing:
+        raise usage(f"{given[0]} needs --stiffness and --damping; missing: {' and '.join(missing)}")
+    if environment is None and options["parameters"]:
+        raise usage("--parameter belongs to --environment; a wall has --stiffness and --damping")
+    if environment is not None and two_sided:
+        raise usage(
+            "--two-sided and --environment exclude each other: an environment says itself on which sides it "
+            "acts, as `--environment wall` does on both"
+        )
+    if two_sided and plane is None:
+        raise usage("--two-sided goes with --plane; a sphere and a box have one side, or --hollow the other")
+    if options["hollow"] and plane is not None:
+        raise usage("--hollow goes with --sphere or --box; turn a plane round by its normal")
+    if two_sided and options["no_pull"]:
+        raise usage("a two-sided plane pulls by its nature; leave --no-pull or --two-sided out")
 
-    if value is None:
-        return np.zeros(3)
-    if len(value) == 1:
-        return np.asarray(value[0] * direction)
-    return np.append(value, np.zeros(3 - len(value)))
+
+def _check_sizes(options: Mapping[str, Any]) -> None:
+    for name, most, unit in (("push", LARGEST_FORCE, "N"), ("start_velocity", FASTEST, "m/s")):
+        value = options[name] or ()
+        if any(abs(part) > most for part in value):
+            told = ",".join(f"{part:g}" for part in value)
+            raise usage(f"{_option(name)}: must lie from -{most:g} to {most:g} {unit}, got {told}")
 
 
-def about_a_motion(command: Command) -> Command:
-    """Give a command the options that say what a mechanism meets and what drives it, as one `Motion`."""
-    options = [*_of_surfaces(), *_of_drives(), *_of_the_run()]
-    return gathered(command, "motion", Motion, options, Motion.check)
+def _check_question(options: Mapping[str, Any], question: Question) -> None:
+    if question.model not in (None, "full"):
+        raise usage(f"the whole mechanism moves, so that --model {question.model} does not apply; leave it out")
+    if question.operator not in (None, "none"):
+        raise usage("no arm holds a mechanism that moves; leave --operator out and give a --push")
+    along = [options["push"], options["start_velocity"]]
+    if question.direction is not None and not any(value is not None and len(value) == 1 for value in along):
+        one = "a --push or --start-velocity given as one number"
+        raise usage(f"--direction is that of {one}; give one, or leave it out")
+
+
+def surface_option(options: Mapping[str, Any]) -> str:
+    """The option that gave the surface; "" where none did."""
+    return next((f"--{name}" for name in SURFACES if options[name] is not None), "")
+
+
+def surface_of(options: Mapping[str, Any], device: Device) -> Surface | None:
+    """What the handle meets. Numbers in a plane lie at the height of the device's reference.
+
+    Raises  BadInput  for numbers that describe none
+    """
+    from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, packed
+
+    height = 0.0 if device.reference_position is None else float(device.reference_position[2])
+    plane, sphere, box = (options[name] for name in SURFACES)
+    surface: Surface | None = None
+    if plane is not None:
+        half = len(plane) // 2
+        surface = Plane(_raised(plane[:half], height), plane[half:], two_sided=options["two_sided"])
+    elif sphere is not None:
+        surface = Sphere(_raised(sphere[:-1], height), sphere[-1], hollow=options["hollow"])
+    elif box is not None:
+        half = len(box) // 2
+        surface = Box(_raised(box[:half], height), box[half:], hollow=options["hollow"])
+    try:
+        packed(surface)
+    except ValueError as error:
+        raise BadInput(f"{surface_option(options)}: {error}") from None
+    return surface
+
+
+def wall_of(options: Mapping[str, Any]) -> Wall | None:
+    """What the computer renders at the surface. Raises BadInput for an environment that cannot be."""
+    from zwidth.contact.mechanism.walls import SurfaceEnvironment, SurfaceWall
+
+    gains = {name: options[name] for name in ("stiffness", "damping", "no_pull")}
+    if options["environment"] is not None:
+        return SurfaceEnvironment(*named_environment(options["environment"], options["parameters"], **gains))
+    if surface_option(options):
+        return SurfaceWall(**gains)
+    return None
+
+
+def components(value: tuple[float, ...] | None, direction: Floats) -> Sequence[float] | Floats | None:
+    """A vector of two or three components as typed, or of one number along the direction; None where left out."""
+    return value[0] * direction if value is not None and len(value) == 1 else value
+
+
+def motion_options() -> tuple[Callable[..., Any], ...]:
+    """What a mechanism meets and what drives it, as options."""
+    return (*_of_surfaces(), *_of_drives(), *_of_the_run())
 
 
 def _of_surfaces() -> list[Callable[..., Any]]:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from zwidth.contact.mechanism.simulate import MechanismMotion
+from zwidth.contact.mechanism.motion import MechanismMotion
 from zwidth.contact.mechanism.surfaces import Box, Sphere, Surface, depth_and_normal
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import Posture, PostureError, link_points, solve_posture
@@ -43,25 +43,18 @@ def path_figure() -> tuple[Figure, list[Axes]]:
     return made, [first, close, depth, *rest]
 
 
-def draw_path(
-    axes: Sequence[Axes],
-    mechanism: Mechanism,
-    posture: Posture,
-    motion: MechanismMotion,
-    surface: Surface | None,
-) -> None:
+def draw_path(axes: Sequence[Axes], motion: MechanismMotion) -> None:
     """The mechanism at the start and, lighter, at the end; the path close up; depth, force and energies in time.
 
-    axes     as `path_figure` gives them
-    posture  at the start
+    axes  as `path_figure` gives them
     """
     overall, close, depth, force, energy = axes
-    _draw_overall(overall, mechanism, posture, motion, surface)
-    _draw_close(close, mechanism, posture, motion, surface)
+    _draw_overall(overall, motion)
+    draw_close(close, motion)
     draw = sweep if len(motion.time) > DRAWN else line
-    _draw_contact(depth, force, motion, surface, draw)
+    _draw_contact(depth, force, motion, draw)
     _draw_energies(energy, motion, draw)
-    for ax in (depth, force, energy) if surface is not None else (energy,):
+    for ax in (depth, force, energy) if motion.surface is not None else (energy,):
         legend_above(ax, columns=4)
         ax.margins(x=0.0, y=0.08)
         ax.tick_params(labelbottom=ax is energy)
@@ -69,10 +62,9 @@ def draw_path(
     depth.figure.align_ylabels([depth, force, energy])
 
 
-def _draw_overall(
-    ax: Axes, mechanism: Mechanism, posture: Posture, motion: MechanismMotion, surface: Surface | None
-) -> None:
-    last = _last(mechanism, posture, motion)
+def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
+    mechanism, posture = motion.mechanism, motion.start
+    last = _last(motion)
     poses = [posture] if last is None else [posture, last]
     strokes = [_strokes(mechanism, pose) for pose in poses]
     flat = flattest(np.vstack([np.zeros((1, 3)), *strokes[0], motion.position]))
@@ -82,18 +74,16 @@ def _draw_overall(
     points = np.vstack([np.zeros((1, 3)), *(stroke for lines in strokes for stroke in lines), motion.position])
     seen = points[:, flat]
     size = max(float(np.max(np.ptp(seen, axis=0))), 1e-9)
-    own = _bounds(surface, size)
+    own = _bounds(motion.surface, size)
     view = _view(seen if own is None else np.vstack([seen, own[:, flat]]), size * LEAST)
-    _draw_surface(ax, surface, view, flat, motion)
+    _draw_surface(ax, view, flat, motion)
     _frame(ax, view, flat)
     legend_above(ax, columns=4)
 
 
-def _draw_close(
-    ax: Axes, mechanism: Mechanism, posture: Posture, motion: MechanismMotion, surface: Surface | None
-) -> None:
+def draw_close(ax: Axes, motion: MechanismMotion) -> None:
     """The path alone, with where the computer sees the handle."""
-    strokes = _strokes(mechanism, posture)
+    strokes = _strokes(motion.mechanism, motion.start)
     flat = flattest(np.vstack([np.zeros((1, 3)), *strokes, motion.position]))
     size = float(np.max(np.ptp(np.vstack(strokes), axis=0)))
     true, seen = motion.position[:, flat], motion.counted_position[:, flat]
@@ -104,15 +94,16 @@ def _draw_close(
     ax.plot(*true[0][:, None], marker="o", markerfacecolor="white", label="start", **mark)
     ax.plot(*true[-1][:, None], marker="s", markerfacecolor=BLACK, label="end", **mark)
     view = _view(true, size * LEAST)
-    _draw_surface(ax, surface, view, flat, motion)
+    _draw_surface(ax, view, flat, motion)
     _frame(ax, view, flat)
     legend_above(ax, columns=5)
 
 
-def _last(mechanism: Mechanism, posture: Posture, motion: MechanismMotion) -> Posture | None:
+def _last(motion: MechanismMotion) -> Posture | None:
     """The posture at the end; None where it is not found again, as next to a singularity."""
+    mechanism = motion.mechanism
     try:
-        found = solve_posture(mechanism, motion.position[-1], posture.assembly)
+        found = solve_posture(mechanism, motion.position[-1], motion.start.assembly)
     except PostureError:
         return None
     turned = found.angles[mechanism.drives.joint] - motion.joints[-1]
@@ -187,18 +178,16 @@ def _frame(ax: Axes, view: Floats, flat: list[int]) -> None:
         label(axis, AXES[k], "m", plain=True)
 
 
-def _draw_surface(
-    ax: Axes, surface: Surface | None, view: Floats, flat: list[int], motion: MechanismMotion
-) -> None:
+def _draw_surface(ax: Axes, view: Floats, flat: list[int], motion: MechanismMotion) -> None:
     """Where the wall is, cut at one height: shaded, with its edge."""
-    if surface is None:
+    if motion.surface is None:
         return
     cut = _cut(motion, flat)
     more = FILLED * np.max(view[1] - view[0])
     x, y = np.linspace(view[0] - more, view[1] + more, GRID).T
     points = np.empty((GRID, GRID, 3))
     points[..., flat[0]], points[..., flat[1]], points[..., cut[0]] = x[None, :], y[:, None], cut[1]
-    depth = depth_and_normal(surface, points)[0]
+    depth = depth_and_normal(motion.surface, points)[0]
     if motion.two_sided:
         name = "two-sided wall"
     else:
@@ -209,17 +198,16 @@ def _draw_surface(
     ax.plot([], [], color=GREY, linewidth=1.2, label=name + _where(motion, cut))
 
 
-def _draw_contact(depth: Axes, force: Axes, motion: MechanismMotion, surface: Surface | None, draw: Any) -> None:
+def _draw_contact(depth: Axes, force: Axes, motion: MechanismMotion, draw: Any) -> None:
     label(depth.yaxis, "Depth", "m")
     label(force.yaxis, "Force", "N")
-    if surface is None:
+    if motion.surface is None:
         for ax in (depth, force):
             ax.set_visible(False)
         return
     draw(depth, motion.time, motion.depth, BLUE, "depth")
     depth.axhline(0.0, color=GREY, linewidth=0.7, linestyle=":", zorder=1.5, label="surface")
-    size = np.linalg.norm(motion.force, axis=1)
-    draw(force, motion.time, size, BLUE, "force on the handle, as commanded", held=True)
+    draw(force, motion.time, motion.force_size, BLUE, "force on the handle, as commanded", held=True)
 
 
 def _draw_energies(ax: Axes, motion: MechanismMotion, draw: Any) -> None:

@@ -179,6 +179,13 @@ def _contact(ax: Axes, found: Any) -> None:
     ax.legend(frameon=False, fontsize=8.0)
 
 
+def _path(ax: Axes, motion: Any) -> None:
+    """The handle's path at the surface; `zwidth move --output` draws all panels."""
+    from zwidth.show.figures.path import draw_close
+
+    draw_close(ax, motion)
+
+
 DRAWINGS: Final[dict[str, Draw]] = {
     "Chart": draw_any_chart,
     "RobustChart": _robust,
@@ -195,4 +202,5 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "LimitCyclePrediction": _limit_cycles,
     "Couplings": _couplings,
     "ContactSimulation": _contact,
+    "MechanismMotion": _path,
 }
