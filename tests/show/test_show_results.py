@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
 import re
@@ -15,8 +16,11 @@ import zwidth
 from zwidth.result import Result
 from zwidth.show.figures.plots import DRAWINGS
 from zwidth.show.output import plain
+from zwidth.study.plane import plane_of
+from zwidth.study.study_arguments import study_over
 
 LINES = 8
+PACKAGES = ["chart", "conditions", "contact", "guarantees", "loop", "measures", "model", "study"]
 
 
 def device():
@@ -54,6 +58,28 @@ def results():
         "limit cycles": rubbing().at().limit_cycles(2600.0, 0.0, simulate=False),
         "boundary": point.without_operator.measure_boundary(plan),
         "sensitivities": device().sensitivities(),
+        **of_functions(point, arms),
+    }
+
+
+def of_functions(point, arms):
+    """Results of functions that are no verbs of an operating point."""
+    loop, wall = point.without_operator.loop, zwidth.contact.ENVIRONMENTS["wall"]
+    maps = zwidth.workspace_map(arms, "rigid_mass", plane_of(arms, cells=(15, 9)))
+    designs = {"loop.sampling_period_s": [0.001, 0.0015], "loop.delay_samples": [0.0, 0.5, 1.0]}
+    return {
+        "felt chart": zwidth.measures.felt_chart(loop.chart()),
+        "guarantee": zwidth.guarantees.spring_stable_region(loop),
+        "validity": point.validity(),
+        "response": zwidth.contact.simulate(
+            loop, wall, wall.values(stiffness=1e3, damping=5.0), duration=0.2, start_position=1e-3
+        ),
+        "eigenvalue paths": zwidth.measures.wall_paths(loop, np.linspace(1e3, 1e5, 9), 5.0),
+        "common area": zwidth.study.common_area(maps, [zwidth.study.parse_requirement("rigid_mass>=0.25")]),
+        "designs": zwidth.run_study(study_over(device(), designs, "stiffness_max")),
+        "designs of one number": zwidth.run_study(
+            study_over(device(), {"plant.mass_kg.0.0": [0.2, 0.3]}, "stiffness_max")
+        ),
     }
 
 
@@ -61,6 +87,18 @@ def results():
 def found():
     return results()
 
+
+# What is on the way to results: devices, plants, loops, and what they are made of or asked with.
+STAGES = """
+    Device OperatingPoint Posture Plant MultiPlant Response Loop Controller Estimator AlphaBeta Nonlinear
+    Measure Requirement Environment Plane Study RangeFault Cells MeasureError ForceLaw Function
+"""
+# Plain values, arrays, and a few numbers by name, such as the rows of a result; datasets show themselves.
+NUMBERS = """
+    Any None bool int float str complex dict list tuple Iterator Callable NDArray np bool_ complex128 float64
+    Floats Complex Complexes ArrayLike Mapping Sequence xr Dataset Axes
+    Peak FastestDecay EffectiveParameters ImpedanceRange OptimalMass Overall Judgement Bound LimitCycle Variant
+"""
 
 NAMES = [
     "chart",
@@ -81,6 +119,14 @@ NAMES = [
     "limit cycles",
     "boundary",
     "sensitivities",
+    "felt chart",
+    "guarantee",
+    "validity",
+    "response",
+    "eigenvalue paths",
+    "common area",
+    "designs",
+    "designs of one number",
 ]
 
 
@@ -136,6 +182,18 @@ def test_every_kind_of_result_is_tried(found):
     assert kinds - tried - {"Couplings", "MeasuredChart", "MeasuredVerdicts"} == set()
 
 
+def test_whatever_a_public_function_returns_is_a_result_or_known_not_to_be():
+    """Read off the annotations: a new type has to become a `Result`, or be named below."""
+    known = {*STAGES.split(), *NUMBERS.split()} | {kind.__name__ for kind in _kinds(Result)}
+    unknown = {
+        f"{word} of {where}"
+        for where, returned in _returned()
+        for word in re.findall(r"\w+", re.sub(r"Literal\[.*?\]", "", returned))
+        if word not in known
+    }
+    assert not unknown
+
+
 def test_what_has_no_drawing_says_so():
     class Bare(Result):
         """Nothing."""
@@ -153,3 +211,17 @@ def _kinds(kind):
         if one.__module__.startswith("zwidth"):
             yield one
             yield from _kinds(one)
+
+
+def _returned():
+    """(name, annotation) of every public function, and of every public method of a public class."""
+    packages = [zwidth, *(getattr(zwidth, name) for name in PACKAGES)]
+    for package in packages:
+        for name in package.__all__:
+            thing = getattr(package, name)
+            if inspect.isfunction(thing):
+                yield name, str(thing.__annotations__.get("return", "missing"))
+            elif inspect.isclass(thing):
+                for method, function in inspect.getmembers(thing, inspect.isfunction):
+                    if not method.startswith("_") and function.__module__.startswith("zwidth"):
+                        yield f"{name}.{method}", str(function.__annotations__.get("return", "missing"))

@@ -120,7 +120,7 @@ def test_what_they_show_of_themselves_is_short(device, area):
         f"CommonArea: {common.area:.4g} m^2, {100 * common.share:.4g} % of what is reached"
     )
     assert repr(area).endswith("with isotropy<=2")
-    assert repr(common) == f"Region: {common.area:.4g} m^2, {100 * common.share:.4g} % of what is reached"
+    assert repr(common) == f"PlaneArea: {common.area:.4g} m^2, {100 * common.share:.4g} % of what is reached"
     job = map_job(device, ["stiffness", "isotropy"], plane_of(device, cells=COUNTS))
     assert repr(job) == "MapJob: stiffness, isotropy of 'five-bar' in 7 x 5 cells"
 

@@ -11,7 +11,7 @@ import numpy as np
 from zwidth.contact.environments.environment import Environment, Floats
 from zwidth.contact.hand import Hand
 from zwidth.contact.passivity import rendered_stiffness
-from zwidth.contact.response import SOURCES, TimeResponse
+from zwidth.contact.response import SOURCES, TimeResponse, as_key
 from zwidth.contact.run_length import RunLength
 from zwidth.contact.verdict import Behaviour, Judgement, judge_response
 from zwidth.loop.loop import Loop
@@ -238,27 +238,15 @@ class ContactSimulation(Result):
             "given_up": self.given_up,
             "range_m": left and (left.backward, left.forward),
             "left_range_at_s": left and left.time,
-            "ledger_J": {_as_key(name): energy for name, energy in self.ledger.items()},
+            "ledger_J": {as_key(name): energy for name, energy in self.ledger.items()},
             "ledger_imbalance": self.response.imbalance,
             "passivity": self._passivity_document(),
-            **self._series(),
+            **self.response.series,
         }
 
     def table(self) -> dict[str, Floats]:
         """The motion in time as columns, each entry of the energy ledger with its own."""
-        entries = {f"{_as_key(name)}_J": self.response.energies[:, i] for i, name in enumerate(SOURCES)}
-        return self._series() | entries
-
-    def _series(self) -> dict[str, Floats]:
-        return {
-            "time_s": self.time,
-            "position_m": self.position,
-            "penetration_m": self.penetration,
-            "velocity_m_per_s": self.velocity,
-            "force_N": self.force,
-            "handle_m": self.handle,
-            "energy_J": self.energy,
-        }
+        return self.response.table()
 
     def _passivity_document(self) -> dict[str, Any] | None:
         if self.passivity is None:
@@ -292,10 +280,6 @@ class ContactSimulation(Result):
 
 def _felt_stiffness(response: TimeResponse) -> float:
     return rendered_stiffness(response.reading, response.force, response.wall_position)
-
-
-def _as_key(source: str) -> str:
-    return source.replace(" ", "_")
 
 
 def _hand_document(hand: Hand) -> dict[str, Any]:

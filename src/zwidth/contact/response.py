@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.contact.machine import FORCE, HANDLE, READING, TRUTH, VELOCITY, Records
+from zwidth.result import Result
 
 Floats = NDArray[np.float64]
 
@@ -46,8 +47,8 @@ class Plan(NamedTuple):
     held: bool
 
 
-@dataclass(frozen=True)
-class TimeResponse:
+@dataclass(frozen=True, repr=False)
+class TimeResponse(Result):
     """What a loop does in time; S samples.
 
     period           T [s]
@@ -128,3 +129,36 @@ class TimeResponse:
             return float("nan")
         gap = np.abs(self.energies.sum(axis=1) - self.stored)
         return float(gap.max() / max(np.abs(self.energies).max(), np.abs(self.stored).max(), 1e-300))
+
+    def document(self) -> dict[str, Any]:
+        """The motion by key and unit, and whether it was given up."""
+        return {"wall_position_m": self.wall_position, "given_up": self.given_up, **self.series}
+
+    def table(self) -> dict[str, Floats]:
+        """The motion in time as columns; where it is kept, each entry of the energy ledger with its own."""
+        kept = enumerate(SOURCES if self.energies.size else ())
+        return self.series | {f"{as_key(name)}_J": self.energies[:, i] for i, name in kept}
+
+    @property
+    def series(self) -> dict[str, Floats]:
+        """What is known of each sample, by key and unit."""
+        return {
+            "time_s": self.time,
+            "position_m": self.reading,
+            "penetration_m": self.penetration,
+            "velocity_m_per_s": self.velocity,
+            "force_N": self.force,
+            "handle_m": self.handle,
+            "energy_J": self.stored,
+        }
+
+    def __repr__(self) -> str:
+        largest = float(np.max(np.abs(self.force), initial=0.0))
+        given_up = ", given up" if self.given_up else ""
+        last = float(self.time[-1]) if len(self.time) else 0.0
+        return f"TimeResponse: {len(self.time)} samples, {last:.4g} s{given_up}, largest force {largest:.4g} N"
+
+
+def as_key(source: str) -> str:
+    """The name of one of SOURCES as part of a key."""
+    return source.replace(" ", "_")

@@ -13,12 +13,13 @@ from shapely.geometry.polygon import orient
 
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.peak import stiffest
+from zwidth.result import Result
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Region:
+@dataclass(frozen=True, repr=False)
+class Region(Result):
     """Walls that have one guarantee.
 
     rings          closed rings (k, 2) of [K, B], counter-clockwise; their union is the set, () if it is empty
@@ -55,6 +56,12 @@ class Region:
             "stiffness_max_N_per_m": self.stiffness_max,
             "damping_at_stiffness_max_Ns_per_m": self.damping_at_stiffness_max,
         } | {key: note for key, note in notes.items() if note is not None}
+
+    def table(self) -> dict[str, list[Any]]:
+        """The corners of its rings as columns, ring after ring and counted from 0."""
+        columns = outlines({"": self}, "name")
+        del columns["name"]
+        return columns
 
     def __repr__(self) -> str:
         return f"Region({len(self.rings)} rings, largest stiffness {largest(self)})"

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.chart.verdict import BAND
 from zwidth.loop.loop import Loop
 from zwidth.model.arguments import require
+from zwidth.result import Result
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -32,6 +33,7 @@ LONG: Final = 0.1
 SHORT: Final = 1e-3
 # Halvings of one step at most, where eigenvalues jump.
 HALVINGS: Final = 40
+SHOWN: Final = 4  # crossings that a repr names
 
 
 class PathError(ValueError):
@@ -53,9 +55,14 @@ class Crossing:
     path: int
     outwards: bool
 
+    def document(self) -> dict[str, Any]:
+        """The crossing by key."""
+        z = {"real": self.eigenvalue.real, "imag": self.eigenvalue.imag}
+        return {"value": self.value, **z, "path": self.path, "outwards": self.outwards}
 
-@dataclass(frozen=True)
-class EigenvaluePaths:
+
+@dataclass(frozen=True, repr=False)
+class EigenvaluePaths(Result):
     """Eigenvalues along a path of one number.
 
     values       (k,)    the values asked for, in their order, and those that were needed between
@@ -73,6 +80,32 @@ class EigenvaluePaths:
     def spectral_radius(self) -> Floats:
         """Largest |z| (k,)."""
         return np.asarray(np.abs(self.eigenvalues).max(axis=1))
+
+    def document(self) -> dict[str, Any]:
+        """Values, eigenvalues by real and imaginary part (k, N), spectral radius and crossings, by key."""
+        return {
+            "values": self.values,
+            "asked": self.asked,
+            "real": self.eigenvalues.real,
+            "imag": self.eigenvalues.imag,
+            "spectral_radius": self.spectral_radius,
+            "crossings": [crossing.document() for crossing in self.crossings],
+        }
+
+    def table(self) -> dict[str, Any]:
+        """A row for each value; the real and imaginary part of each path, counted from 0."""
+        parts = [(f"real_{i}", z.real) for i, z in enumerate(self.eigenvalues.T)]
+        parts += [(f"imag_{i}", z.imag) for i, z in enumerate(self.eigenvalues.T)]
+        return {"value": self.values, "asked": self.asked, "spectral_radius": self.spectral_radius, **dict(parts)}
+
+    def __repr__(self) -> str:
+        paths = self.eigenvalues.shape[1]
+        lines = [f"EigenvaluePaths: {paths} paths over values from {self.values[0]:g} to {self.values[-1]:g}"]
+        ways = {True: "out of", False: "into"}
+        crossed = ", ".join(f"{ways[c.outwards]} it at {c.value:.6g}" for c in self.crossings[:SHOWN])
+        more = f" and {len(self.crossings) - SHOWN} more" if len(self.crossings) > SHOWN else ""
+        lines.append(f"unit circle: {crossed}{more}" if crossed else "no path crosses the unit circle")
+        return "\n  ".join(lines)
 
 
 def eigenvalue_paths(matrix_at: Callable[[float], ArrayLike], values: ArrayLike) -> EigenvaluePaths:

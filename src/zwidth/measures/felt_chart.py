@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
@@ -13,6 +14,7 @@ from zwidth.chart.result import BoundaryArc
 from zwidth.measures.felt import hardest_static_stiffness, static_stiffness
 from zwidth.model.arguments import require
 from zwidth.model.plant import Plant
+from zwidth.result import Result
 
 Floats = NDArray[np.float64]
 
@@ -20,8 +22,8 @@ Floats = NDArray[np.float64]
 PIECE = 1e-3
 
 
-@dataclass(frozen=True)
-class FeltChart:
+@dataclass(frozen=True, repr=False)
+class FeltChart(Result):
     """The stable walls with K >= 0, each at the stiffness that the hand feels at rest.
 
     regions   closed rings (k, 2) of [felt stiffness, wall damping], counter-clockwise
@@ -34,6 +36,37 @@ class FeltChart:
     boundary: tuple[BoundaryArc, ...]
     stiffest: float
     limit: float
+
+    def document(self) -> dict[str, Any]:
+        """The chart by key and unit."""
+        return {
+            "regions": [ring.tolist() for ring in self.regions],
+            "boundary": [
+                {
+                    "felt_stiffness_N_per_m": arc.stiffness,
+                    "damping_Ns_per_m": arc.damping,
+                    "frequency_Hz": arc.frequency,
+                }
+                for arc in self.boundary
+            ],
+            "felt_stiffness_max_N_per_m": self.stiffest,
+            "felt_stiffness_limit_N_per_m": self.limit,
+        }
+
+    def table(self) -> dict[str, Floats]:
+        """The edge's walls as columns, its arcs one after another and counted from 0."""
+        empty = np.zeros(0)
+        return {
+            "arc": np.repeat(np.arange(len(self.boundary)), [len(arc.stiffness) for arc in self.boundary]),
+            "felt_stiffness_N_per_m": np.concatenate([empty, *(arc.stiffness for arc in self.boundary)]),
+            "damping_Ns_per_m": np.concatenate([empty, *(arc.damping for arc in self.boundary)]),
+            "frequency_Hz": np.concatenate([empty, *(arc.frequency for arc in self.boundary)]),
+        }
+
+    def __repr__(self) -> str:
+        return (
+            f"FeltChart: hardest felt contact {self.stiffest:.6g} N/m, no wall is felt above {self.limit:.6g} N/m"
+        )
 
 
 def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.result import Result
 from zwidth.study.requirement import Requirement
 from zwidth.study.workspace import measures_of, reachable
 
@@ -27,7 +28,7 @@ ROUNDING: Final = 1e-9  # share of the largest margin that still counts as 0: a 
 
 
 @dataclass(frozen=True, repr=False)
-class Region:
+class PlaneArea:
     """A part of a plane.
 
     shape  a shapely polygon or several, in the plane's coordinates [m]
@@ -40,22 +41,26 @@ class Region:
     share: float
 
     def __repr__(self) -> str:
-        return f"Region: {self.area:.4g} m^2, {100.0 * self.share:.4g} % of what is reached"
+        return f"PlaneArea: {self.area:.4g} m^2, {100.0 * self.share:.4g} % of what is reached"
 
 
 @dataclass(frozen=True, repr=False)
-class CommonArea:
+class CommonArea(Result):
     """Requirements laid over each other.
 
+    units    of the requirements' values, in their order
+    axes     what the plane's axes are called
     reach    what can be reached
     regions  where each requirement is met, in their order
     common   where all are
     """
 
     requirements: tuple[Requirement, ...]
-    reach: Region
-    regions: tuple[Region, ...]
-    common: Region
+    units: tuple[str, ...]
+    axes: tuple[str, str]
+    reach: PlaneArea
+    regions: tuple[PlaneArea, ...]
+    common: PlaneArea
 
     def __repr__(self) -> str:
         required = ", ".join(one.text for one in self.requirements)
@@ -74,6 +79,15 @@ class CommonArea:
             "common_area_m2": self.common.area,
             "common_share": self.common.share,
             "reachable_area_m2": self.reach.area,
+        }
+
+    def table(self) -> dict[str, list[Any]]:
+        """A row for each requirement, and one for all of them together."""
+        areas = [*self.regions, self.common]
+        return {
+            "requirement": [*(one.text for one in self.requirements), "all"],
+            "area_m2": [region.area for region in areas],
+            "share": [region.share for region in areas],
         }
 
     def attributes(self) -> dict[str, Any]:
@@ -105,11 +119,18 @@ def common_area(dataset: xr.Dataset, requirements: Sequence[Requirement]) -> Com
         common = common.intersection(shape)
     whole = float(reached.area)
 
-    def region(shape: Any) -> Region:
+    def region(shape: Any) -> PlaneArea:
         area = float(shape.area)
-        return Region(shape, area, area / whole if whole > 0.0 else np.nan)
+        return PlaneArea(shape, area, area / whole if whole > 0.0 else np.nan)
 
-    return CommonArea(tuple(requirements), region(reached), tuple(map(region, shapes)), region(common))
+    return CommonArea(
+        requirements=tuple(requirements),
+        units=tuple(str(dataset[r.measure.name].attrs["unit"]) for r in requirements),
+        axes=(str(dataset["x_m"].attrs["long_name"]), str(dataset["y_m"].attrs["long_name"])),
+        reach=region(reached),
+        regions=tuple(map(region, shapes)),
+        common=region(common),
+    )
 
 
 def filled(x: Floats, y: Floats, margin: Floats) -> Any:

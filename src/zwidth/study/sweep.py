@@ -17,6 +17,7 @@ from zwidth import _verbs
 from zwidth.device.device import Device
 from zwidth.measures.measure import OK, STATUS, Measure
 from zwidth.model.arguments import refusal
+from zwidth.result import Result
 from zwidth.study.axes import settings
 from zwidth.study.executor import Progress, run
 from zwidth.study.job import Cells
@@ -39,7 +40,7 @@ SHOWN: Final = 3  # columns of a repr
 
 
 @dataclass(frozen=True, repr=False)
-class Sweep:
+class Sweep(Result):
     """A study and what came of it.
 
     cells  (designs, columns), in the designs' order

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import nan, pi
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from zwidth.model.arguments import require
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import Model, ModelError
+from zwidth.result import Result
 
 Floats = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -73,8 +74,8 @@ class Fit:
         return len(self.error) > 0 and self.within == ((float(self.frequency[0]), float(self.frequency[-1])),)
 
 
-@dataclass(frozen=True)
-class Validity:
+@dataclass(frozen=True, repr=False)
+class Validity(Result):
     """The models of a device beside its full model.
 
     tolerance      that `Fit.within` means
@@ -91,6 +92,38 @@ class Validity:
     walls: Floats
     arc: NDArray[np.int64]
     fits: tuple[Fit, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The tolerance, and where along the edge each model stays within it, by key and unit."""
+        return {
+            "tolerance": self.tolerance,
+            "first_natural_frequency_Hz": self.first_natural,
+            "within": [
+                {
+                    "key": fit.key,
+                    "label": fit.label,
+                    "frequency_ranges_Hz": [list(interval) for interval in fit.within],
+                    **({"reason": fit.reason} if fit.reason else {}),
+                }
+                for fit in self.fits
+            ],
+        }
+
+    def table(self) -> dict[str, list[Any]]:
+        """A row for each model and each wall of the edge."""
+        rows = [
+            (fit.key, float(frequency), float(error))
+            for fit in self.fits
+            for frequency, error in zip(fit.frequency, fit.error, strict=True)
+        ]
+        return {name: [row[i] for row in rows] for i, name in enumerate(("model", "frequency_Hz", "error"))}
+
+    def __repr__(self) -> str:
+        lines = [f"Validity: models beside the full one, within {100.0 * self.tolerance:g} %"]
+        for fit in self.fits:
+            ranges = " and ".join(f"{low:.4g} to {high:.4g} Hz" for low, high in fit.within)
+            lines.append(f"{fit.label}: {fit.reason or ranges or 'nowhere'}")
+        return "\n  ".join(lines)
 
 
 def validity(point: OperatingPoint, tolerance: float = TOLERANCE) -> Validity:

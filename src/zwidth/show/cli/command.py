@@ -176,7 +176,8 @@ class Command:
         """Compute, and write the file that is asked for. Raises BadInput."""
         if not self.of_responses and case.device.response is not None:
             case.question.point(case.device)  # refuses what is asked of a [response] that needs a model
-            return self.unanswered(case, NoAnswer(NO_MODEL))
+            none = self.unanswered(case, NoAnswer(NO_MODEL))
+            return replace(none, document=case.question.facts(case.device) | none.document)
         try:
             with computing(case.question):
                 result = self.compute(case)

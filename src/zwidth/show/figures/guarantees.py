@@ -24,6 +24,7 @@ AREAS: Final = {
     "spring-stable": ("#BFD1E0", BLUE, 3.4, 2.1),
     "passive": ("#A0BAD0", VERMILION, 1.5, 2.2),
 }
+ROOM: Final = 0.05  # of the box of what is shown, beside it
 # Sets that lie across the others are outlines only.
 LINES: Final = {"nyquist-spring": (PURPLE, (0, (5, 1.5))), "passive-at-actuator": (BLACK, (0, (1.2, 1.2)))}
 WORDS: Final = {
@@ -53,6 +54,17 @@ def draw_guarantees(ax: Axes, found: Guarantees, window: Window | None = None) -
                 ax.plot(*ring.T, color=colour, linestyle=dashes, zorder=3.0, label=text)
     frame(ax, window or _box(found), empty=not found.chart.regions)
     legend_above(ax, columns=2)
+
+
+def draw_region(ax: Axes, region: Region) -> None:
+    """The walls of one guarantee."""
+    fill, edge, width, _ = AREAS["passive"]
+    for ring in region.rings:
+        ax.add_patch(Polygon(ring, facecolor=fill, edgecolor=edge, linewidth=width))
+    corners = np.vstack(region.rings) if region.rings else np.array([[0.0, 0.0], [1.0, 1.0]])
+    (K0, B0), (K1, B1) = corners.min(axis=0), corners.max(axis=0)
+    K, B = ROOM * (K1 - K0), ROOM * (B1 - B0)
+    frame(ax, (float(K0 - K), float(K1 + K), float(B0 - B), float(B1 + B)), empty=not region.rings)
 
 
 def draw_couplings(ax: Axes, found: Couplings) -> None:

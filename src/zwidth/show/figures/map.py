@@ -79,7 +79,7 @@ def draw_map(
     handles += _marks(ax, x, y, dataset[f"{name}_status"].values)
     handles += _strokes(ax, dataset, f"{name}_direction")
     if area is not None:
-        handles += _areas(ax, dataset, area)
+        handles += draw_areas(ax, area)
     mechanism = _mechanism(dataset, device)
     if mechanism is not None:
         _draw_mechanism(ax, mechanism)
@@ -165,14 +165,19 @@ def _every(x: Floats, apart: float) -> NDArray[np.int64]:
     return np.arange(min(step // 2, len(x) - 1), len(x), step)
 
 
-def _areas(ax: Axes, dataset: xr.Dataset, area: CommonArea) -> list[Any]:
+def draw_areas(ax: Axes, area: CommonArea) -> list[Any]:
+    """Where each requirement is met, hatched, and where all are, within a bold dotted outline.
+
+    Returns  what a legend names
+    """
     handles: list[Any] = []
-    for n, (requirement, region) in enumerate(zip(area.requirements, area.regions, strict=True)):
+    required = zip(area.requirements, area.units, area.regions, strict=True)
+    for n, (requirement, unit, region) in enumerate(required):
         colour, dashes = LINES[1 + n % (len(LINES) - 1)]
         hatch = HATCHES[n % len(HATCHES)]
         measure = requirement.measure
         sign = "\u2265" if requirement.at_least else "\u2264"
-        bound = given(requirement.value, printed(str(dataset[measure.name].attrs["unit"])))
+        bound = given(requirement.value, printed(unit))
         text = f"{measure.title} {sign} {bound}: {area_text(region.area)}"
         style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.3, "linestyle": dashes, "facecolor": "none"}
         for path in _paths(region.shape):

@@ -170,13 +170,58 @@ def _couplings(ax: Axes, found: Any) -> None:
 
 
 def _contact(ax: Axes, found: Any) -> None:
+    _response(ax, found.response)
+
+
+def _response(ax: Axes, response: Any) -> None:
     """What the encoders read over time, and where the wall begins; `zwidth simulate --output` draws all panels."""
-    response = found.response
     ax.plot(response.time, response.reading, color=BLACK, linewidth=1.0, label="counted by the encoders")
     ax.axhline(response.wall_position, color=GREY, linewidth=0.8, label="wall")
     label(ax.xaxis, "Time", "s")
     label(ax.yaxis, "Position", "m")
     ax.legend(frameon=False, fontsize=8.0)
+
+
+def _felt_chart(ax: Axes, chart: Any) -> None:
+    from zwidth.show.figures.felt import draw_felt_chart
+
+    draw_felt_chart(ax, chart)
+
+
+def _region(ax: Axes, region: Any) -> None:
+    from zwidth.show.figures.guarantees import draw_region
+
+    draw_region(ax, region)
+
+
+def _eigenvalue_paths(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.eigenvalues import draw_eigenvalue_paths
+
+    draw_eigenvalue_paths(ax, found)
+
+
+def _validity(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.validity import draw_validity
+
+    draw_validity(ax, found)
+
+
+def _sweep(ax: Axes, found: Any) -> None:
+    """The first column; `zwidth sweep --output` draws all."""
+    from zwidth.show.figures.study import draw_first_column
+
+    draw_first_column(ax, found.dataset())
+
+
+def _common_area(ax: Axes, found: Any) -> None:
+    from zwidth.show.figures.map import draw_areas
+
+    handles = draw_areas(ax, found)
+    ax.autoscale_view()
+    ax.set_aspect("equal")
+    for axis, name in ((ax.xaxis, found.axes[0]), (ax.yaxis, found.axes[1])):
+        label(axis, name, "m", plain=True)
+    ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.02), fontsize=8.0, frameon=False)
 
 
 def _path(ax: Axes, motion: Any) -> None:
@@ -202,5 +247,12 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "LimitCyclePrediction": _limit_cycles,
     "Couplings": _couplings,
     "ContactSimulation": _contact,
+    "TimeResponse": _response,
     "MechanismMotion": _path,
+    "FeltChart": _felt_chart,
+    "Region": _region,
+    "EigenvaluePaths": _eigenvalue_paths,
+    "Validity": _validity,
+    "Sweep": _sweep,
+    "CommonArea": _common_area,
 }

@@ -59,6 +59,24 @@ def study_figure(dataset: xr.Dataset) -> Figure:
     return _parallel(dataset, names)
 
 
+def draw_first_column(ax: Axes, dataset: xr.Dataset) -> None:
+    """The first column of a study, in one panel: over the first axis of numbers, or over two as a heat map."""
+    names = [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
+    numeric, texts = _kinds(dataset, names)
+    if dataset[names[0]].dims == ("design",):
+        draw_parallel(ax, dataset, _keys_of(dataset), names)
+    elif len(numeric) == 2 and not texts and min(dataset.sizes[key] for key in numeric) > 1:
+        draw_heat_map(ax, dataset.sortby(numeric), names[0], numeric[0], numeric[1])
+    elif len(numeric) + len(texts) <= 2:
+        along = (numeric or texts)[0]
+        dataset = dataset.sortby(along) if numeric else dataset
+        lost = draw_curves(ax, dataset, names[0], along)
+        others = [key for key in (*numeric, *texts) if key != along]
+        _legend_above(ax, list(_line_handles(dataset, others, lines=bool(numeric))), [_symbol(k) for k in lost])
+    else:
+        draw_parallel(ax, dataset, [*numeric, *texts], names)
+
+
 def _kinds(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], list[str]]:
     """The axes of numbers, and those of texts."""
     axes = [str(dim) for dim in dataset[names[0]].dims]

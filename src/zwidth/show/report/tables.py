@@ -9,7 +9,6 @@ from zwidth.conditions import Bound
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
 from zwidth.show.units import UNKNOWN, number, quantity
-from zwidth.study.validity import Validity
 from zwidth.study.what_if import Variant
 
 Row = tuple[str, ...]
@@ -128,7 +127,7 @@ def document(facts: Facts) -> dict[str, Any]:
             }
             for number in facts.answers.numbers
         ],
-        "models": facts.fits and _models(facts.fits),
+        "models": facts.fits and facts.fits.document(),
         "what_if": [{"key": v.key, "label": v.label, **_walls(v)} for v in facts.variants],
         "bounds": [
             {
@@ -145,22 +144,6 @@ def document(facts: Facts) -> dict[str, Any]:
     }
     reason = {} if facts.renders else {"reason": sentences.NO_WALL}
     return {key: _known(value) for key, value in {**found, **reason}.items()}
-
-
-def _models(fits: Validity) -> dict[str, Any]:
-    return {
-        "tolerance": fits.tolerance,
-        "first_natural_frequency_Hz": fits.first_natural,
-        "within": [
-            {
-                "key": fit.key,
-                "label": fit.label,
-                "frequency_ranges_Hz": [list(interval) for interval in fit.within],
-                **({"reason": fit.reason} if fit.reason else {}),
-            }
-            for fit in fits.fits
-        ],
-    }
 
 
 def _walls(variant: Variant) -> dict[str, Any]:
