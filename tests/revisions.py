@@ -50,16 +50,16 @@ def export(trees: Mapping[str, str], folder: Path) -> None:
     complete.touch()
 
 
-def texts_below(tree: str, path: str, suffix: str) -> dict[str, str]:
+def texts_below(tree: str, path: str, *suffixes: str) -> dict[str, str]:
     """Texts of a tree's files below a path, by their paths from there. Raises SystemExit where there are none."""
     texts = {}
     with tarfile.open(fileobj=io.BytesIO(_archive(tree, path))) as archive:
         for member in archive.getmembers():
             content = archive.extractfile(member)
-            if content is not None and member.name.endswith(suffix):
+            if content is not None and member.name.endswith(suffixes):
                 texts[member.name.removeprefix(f"{path}/")] = content.read().decode()
     if not texts:
-        raise SystemExit(f"{path} holds no *{suffix}")
+        raise SystemExit(f"{path} holds no *{' or *'.join(suffixes)}")
     return texts
 
 

@@ -13,8 +13,6 @@ from scipy.optimize import brentq
 from tests.systems import published
 from zwidth.chart.chart import stability_chart
 from zwidth.contact.experiment import Place
-from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.points import read_measured
 from zwidth.show.experiment import sentences
 from zwidth.show.figures.experiment import Barred, draw_experiment
 from zwidth.show.figures.style import figure
@@ -22,6 +20,7 @@ from zwidth.show.units import amount
 from zwidth.study.experiment_plan import Plan
 from zwidth.study.measured_boundary import Experiment
 from zwidth.study.own_points import compare_points
+from zwidth.study.points_file import PointsError, read_points
 
 HEAD = "stiffness_N_per_m,damping_Ns_per_m,edge,verdict\n"
 EDGES = "4000,2.6,lower,\n4000,20.7,upper,\n"  # 0.18 and 0.95 N s/m off
@@ -47,7 +46,7 @@ def told(tmp_path, text, drawn=True):
     """The JSON and the sentence on a file of points."""
     (tmp_path / "own.csv").write_text(text)
     exact = chart() if drawn else None
-    own = compare_points(exact, read_measured(str(tmp_path / "own.csv")))
+    own = compare_points(exact, read_points(str(tmp_path / "own.csv")))
     run = Experiment(Plan(), Place(7e3, 10.0, 25.0, True), (), 0, (None,), exact, (), 0, own)
     document = run.document()
     rows = list(sentences(run))
@@ -119,8 +118,8 @@ def test_without_an_exact_chart_nothing_is_counted_as_agreeing(tmp_path):
 )
 def test_a_verdict_is_checked(tmp_path, line, says):
     (tmp_path / "own.csv").write_text(HEAD + line + "\n")
-    with pytest.raises(BadInput, match=re.escape(says)):
-        read_measured(str(tmp_path / "own.csv"))
+    with pytest.raises(PointsError, match=re.escape(says)):
+        read_points(str(tmp_path / "own.csv"))
 
 
 def test_walls_that_were_tried_have_signs_of_their_own(tmp_path):

@@ -14,7 +14,8 @@ counted:
                         functions count, those below `if TYPE_CHECKING` do not; a module named by --except is
                         left out of this and of the next. `from a import b` imports the module a.b, or else a
     single importer     modules that one other module imports, and no more
-    public names        `__all__` of the package's own file, worked out from literals without importing
+    public names        those of the package's own stub; without one its `__all__`, worked out from literals
+                        without importing
     two meanings        a class defined in several modules; a constant in capitals (two letters or more) to which
                         several modules give values, and of those where the values as written differ; a public
                         function that stands in several modules with different signatures as written, annotations
@@ -53,8 +54,9 @@ def options(words: list[str] | None = None) -> argparse.Namespace:
 
 def structure_of(label: str, folder: str, left_out: list[str]) -> Structure:
     """The numbers of one commit."""
-    texts = texts_below(tree_of(label), folder, ".py")
-    return structure(modules_of(folder.rpartition("/")[2], texts), left_out)
+    texts = texts_below(tree_of(label), folder, ".py", ".pyi")
+    sources = {path: text for path, text in texts.items() if path.endswith(".py")}
+    return structure(modules_of(folder.rpartition("/")[2], sources), left_out, texts.get("__init__.pyi"))
 
 
 def number_rows(before: Structure, after: Structure) -> Iterator[tuple[str, str, str]]:

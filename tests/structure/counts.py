@@ -15,6 +15,7 @@ from tests.structure.names import (
     differing,
     functions_of_several_signatures,
     public_names,
+    stub_names,
 )
 from tests.structure.sizes import argument_counts, file_lines, function_lengths, lines_of, percentile
 
@@ -41,13 +42,13 @@ class Structure:
         self.lists[what] = dict(names)
 
 
-def structure(modules: list[Module], left_out: Collection[str]) -> Structure:
+def structure(modules: list[Module], left_out: Collection[str], stub: str | None = None) -> Structure:
     """All numbers of a package's modules; those left out are left out of the imports only."""
     found = Structure()
     _sizes(found, modules)
     _functions(found, modules)
     _imports(found, modules, left_out)
-    _names(found, modules)
+    _names(found, modules, stub)
     return found
 
 
@@ -96,9 +97,9 @@ def _imports(found: Structure, modules: list[Module], left_out: Collection[str])
     )
 
 
-def _names(found: Structure, modules: list[Module]) -> None:
+def _names(found: Structure, modules: list[Module], stub: str | None) -> None:
     tops = [public_names(module) for module in modules if module.path == "__init__.py"]
-    public = tops[0] if tops else []
+    public = stub_names(stub) if stub is not None else tops[0] if tops else []
     found.numbers["public names at the top"] = None if public is None else len(public)
     found.lists["public names at the top"] = dict.fromkeys(public or [], "public")
     constants = constants_of_several_modules(modules)

@@ -63,6 +63,19 @@ def differing(meanings: Meanings) -> Meanings:
     return {name: said for name, said in meanings.items() if len(set(said.values())) > 1}
 
 
+def stub_names(stub: str) -> list[str]:
+    """Names that a stub gives away, sorted: what it imports under its own name, and what it defines."""
+    found: set[str] = set()
+    for node in ast.parse(stub).body:
+        if isinstance(node, ast.ImportFrom):
+            found.update(alias.asname for alias in node.names if alias.asname is not None)
+        elif isinstance(node, Function | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            found.add(node.target.id)
+    return sorted(name for name in found if not name.startswith("_") or name.startswith("__"))
+
+
 def public_names(top: Module) -> list[str] | None:
     """The package's `__all__`, sorted; without one its names at the top level that begin with no underscore.
 

@@ -18,6 +18,7 @@ from tests.structure.names import (
     differing,
     functions_of_several_signatures,
     public_names,
+    stub_names,
 )
 from tests.structure.sizes import argument_counts, file_lines, function_lengths, lines_of, percentile
 
@@ -260,6 +261,19 @@ def test_a_function_of_two_signatures_has_two_meanings():
 )
 def test_public_names_are_read_without_importing(text, names):
     assert public_names(module(text, "__init__.py")) == names
+
+
+def test_a_stub_names_what_it_gives_away():
+    stub = """from .a import b as b
+from .a import c
+import d
+__version__: str
+def f(x: int) -> int: ...
+class G: ...
+_hidden: int
+"""
+    assert stub_names(stub) == ["G", "__version__", "b", "f"]
+    assert structure(modules(__init__="__all__ = made()"), [], stub).numbers["public names at the top"] == 4
 
 
 def test_nothing_runs_while_names_are_read(tmp_path):

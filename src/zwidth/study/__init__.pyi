@@ -5,6 +5,9 @@ from .map_data import map_document as map_document
 from .map_data import map_table as map_table
 from .measured_boundary import Experiment as Experiment
 from .plane import plane_of as plane_of
+from .points_file import PointsError as PointsError
+from .points_file import read_points as read_points
+from .points_file import read_walls as read_walls
 from .requirement import parse_requirement as parse_requirement
 from .robust import RobustError as RobustError
 from .robust import robust_study as robust_study

@@ -10,9 +10,9 @@ import click
 from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Case, Command
 from zwidth.show.cli.options import Finite, named
-from zwidth.show.cli.points import Walls, read_walls
 from zwidth.show.output import DATA
 from zwidth.show.units import NONE, amount, radius
+from zwidth.study.points_file import Walls, read_walls
 
 if TYPE_CHECKING:
     from zwidth.chart.verdict import WallVerdicts

@@ -11,6 +11,7 @@ import click
 from zwidth.device.faults import SETTINGS, DeviceError, Fault
 from zwidth.show.cli.process import BAD_INPUT, INTERNAL, INTERRUPTED
 from zwidth.show.output import OutputError, shown
+from zwidth.study.points_file import PointsError
 
 DEBUG = "ZWIDTH_DEBUG"
 
@@ -32,7 +33,7 @@ def explain(error: Exception) -> tuple[list[str], int]:
     match error:
         case DeviceError():
             return [str(_as_typed(fault)) for fault in error.faults], BAD_INPUT
-        case BadInput():
+        case BadInput() | PointsError():
             return [shown(line) for line in error.lines], BAD_INPUT
         case Stopped():
             return [f"zwidth: {error}"], INTERNAL

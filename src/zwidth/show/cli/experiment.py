@@ -14,10 +14,10 @@ from zwidth.show.cli.command import Case, Command
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.failures import NoAnswer
 from zwidth.show.cli.options import Numbers, named
-from zwidth.show.cli.points import read_measured
 from zwidth.show.cli.process import say
 from zwidth.show.cli.progress import progress_told
 from zwidth.show.experiment import explanation, point_rows, sentences, warning
+from zwidth.study.points_file import read_points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -162,7 +162,7 @@ class ExperimentCommand(Command):
 
     def parse(self, case: Case) -> dict[str, Any]:
         measured = case["measured"]
-        return {"measured": () if measured is None else read_measured(measured), "plan": _plan(case)}
+        return {"measured": () if measured is None else read_points(measured), "plan": _plan(case)}
 
     def circumstances(self, case: Case) -> dict[str, Any]:
         return super().circumstances(case) | {"left_out": []}

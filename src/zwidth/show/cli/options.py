@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.study.points_file import wall_number
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -25,7 +27,6 @@ else:
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
 EXTREMES: Final = ("worst", "best", "lowest", "highest")  # as in study.worst
 AS_GIVEN: Final = "as given"
-LARGEST_WALL: Final = 1e15  # N/m, N s/m; beyond, rounding would give the verdicts
 
 Command = Callable[..., int]
 
@@ -163,19 +164,6 @@ class Numbers(ParamType):
             count = " or ".join(map(str, self.lengths))
             self.fail(f"must be {count} finite numbers such as {self.example}, got {value!r}", param, ctx)
         return numbers
-
-
-def wall_number(text: str) -> tuple[float, str]:
-    """A wall's stiffness or damping, and what is wrong with it ("" if nothing)."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        return number, "must be a finite number, " + (f"got {text[:60]!r}" if text else "but it is missing")
-    if abs(number) > LARGEST_WALL:
-        return number, f"must be from {-LARGEST_WALL:g} to {LARGEST_WALL:g}, got {text[:60]!r}; is the unit right?"
-    return number, ""
 
 
 class Finite(ParamType):

@@ -16,7 +16,8 @@ from zwidth.show.cli.contact_options import (
     usage,
 )
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import LARGEST_WALL, Finite, Numbers
+from zwidth.show.cli.options import Finite, Numbers
+from zwidth.study.points_file import LARGEST_WALL
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

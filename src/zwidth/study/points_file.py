@@ -1,8 +1,10 @@
-"""Walls, and points of a boundary, from a CSV file; every fault with its line."""
+"""Walls, and measured points of a stability boundary, from a CSV file; every fault with its line."""
 
 from __future__ import annotations
 
 import csv
+import math
+import os
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 from itertools import islice
@@ -10,8 +12,6 @@ from math import nan
 from typing import Any, Final
 
 from zwidth.device.text_file import LARGEST_TABLE, Unreadable, filled, header_fault, read_text
-from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import wall_number
 from zwidth.study.own_points import EDGES, VERDICTS, OwnPoint
 
 COLUMNS: Final = ("stiffness_N_per_m", "damping_Ns_per_m")
@@ -22,24 +22,47 @@ SPREADS: Final = (
     "stiffness_high_N_per_m",
 )
 MOST_FAULTS: Final = 20
+LARGEST_WALL: Final = 1e15  # N/m, N s/m; beyond, rounding would give the verdicts
 
+Path = str | os.PathLike[str]
 Walls = list[tuple[float, float]]
 # from a cell to its value, and what is wrong with it ("" if nothing)
 Reader = Callable[[str], tuple[Any, str]]
 
 
-def read_walls(file: str) -> Walls:
+class PointsError(ValueError):
+    """A file of walls or points that cannot be meant; `lines` has one fault each, with the file and its line."""
+
+    def __init__(self, *lines: str) -> None:
+        self.lines = lines
+        super().__init__("\n".join(lines))
+
+
+def wall_number(text: str) -> tuple[float, str]:
+    """A wall's stiffness or damping, and what is wrong with it ("" if nothing)."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        return number, "must be a finite number, " + (f"got {text[:60]!r}" if text else "but it is missing")
+    if abs(number) > LARGEST_WALL:
+        return number, f"must be from {-LARGEST_WALL:g} to {LARGEST_WALL:g}, got {text[:60]!r}; is the unit right?"
+    return number, ""
+
+
+def read_walls(file: Path) -> Walls:
     """The walls (stiffness [N/m], damping [N s/m]) of a CSV file with these two columns; others are left alone.
 
-    Raises BadInput  if it cannot be read, lacks a column or holds no wall, or with every line that is wrong
+    Raises PointsError  if it cannot be read, lacks a column or holds no wall, or with every line that is wrong
     """
     return [(row[COLUMNS[0]], row[COLUMNS[1]]) for row in _read(file, {})]
 
 
-def read_measured(file: str) -> list[OwnPoint]:
+def read_points(file: Path) -> list[OwnPoint]:
     """Measured points: a CSV file as for `read_walls`, with columns that may be left out, and cells left empty.
 
-    Raises BadInput  as `read_walls`
+    Raises PointsError  as `read_walls`
     """
     optional: dict[str, Reader] = {
         "edge": partial(_word, EDGES),
@@ -77,7 +100,7 @@ def _trials(text: str) -> tuple[int, str]:
     return 1, f"must be a whole number from 1 on, got {text[:60]!r}"
 
 
-def _read(file: str, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
+def _read(file: Path, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
     """The rows by column; of the optional ones those that are there."""
     rows = csv.reader(_text(file).splitlines(), strict=True)
     faults: list[str] = []
@@ -101,12 +124,12 @@ def _read(file: str, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
             faults += [f"{file}: line {rows.line_num}: {fault}" for fault in _at_odds(cells)]
             found.append(cells)
     except csv.Error as error:
-        raise BadInput(f"{file}: line {rows.line_num}: is not CSV: {error}") from None
+        raise PointsError(f"{file}: line {rows.line_num}: is not CSV: {error}") from None
     if faults:
         more = [f"{file}: and {len(faults) - MOST_FAULTS} more faults"] if len(faults) > MOST_FAULTS else []
-        raise BadInput(*islice(faults, MOST_FAULTS), *more)
+        raise PointsError(*islice(faults, MOST_FAULTS), *more)
     if not found:
-        raise BadInput(f"{file}: holds no walls; give a line with {' and '.join(COLUMNS)} for each")
+        raise PointsError(f"{file}: holds no walls; give a line with {' and '.join(COLUMNS)} for each")
     return found
 
 
@@ -122,17 +145,17 @@ def _at_odds(cells: dict[str, Any]) -> Iterator[str]:
             yield f"{low}: must be at most {high} = {cells[high]:g}, got {cells[low]:g}"
 
 
-def _places(file: str, header: list[str], optional: Collection[str]) -> dict[str, int]:
+def _places(file: Path, header: list[str], optional: Collection[str]) -> dict[str, int]:
     """Index of each column wanted, and of the optional ones that are there."""
     if not header:
-        raise BadInput(f"{file}: is empty; its first line must name the columns {', '.join(COLUMNS)}")
+        raise PointsError(f"{file}: is empty; its first line must name the columns {', '.join(COLUMNS)}")
     if fault := header_fault(header, COLUMNS, optional):
-        raise BadInput(f"{file}: line 1: {fault}")
+        raise PointsError(f"{file}: line 1: {fault}")
     return {name: header.index(name) for name in (*COLUMNS, *optional) if name in header}
 
 
-def _text(file: str) -> str:
+def _text(file: Path) -> str:
     try:
         return read_text(file, LARGEST_TABLE, pipes=True)
     except Unreadable as error:
-        raise BadInput(f"{file}: {error}; give a CSV file") from None
+        raise PointsError(f"{file}: {error}; give a CSV file") from None
