@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import subprocess
 import sys
@@ -109,6 +110,18 @@ def test_old_functions_about_circumstances_answer_as_before():
 
 
 # --- the lines that keep working ---------------------------------------------------------------------
+
+
+def test_the_old_way_to_simulate_a_mechanism_gives_the_same_motion():
+    device = zwidth.load("five-bar")
+    settings = {"push": (0.02, 1.0, 0.0), "duration": 0.1}
+    with pytest.warns(DeprecationWarning, match=r"write device\.at\(position\)\.move\(wall, surface\)"):
+        old = zwidth.simulate_mechanism(
+            device.mechanism, device.damping, device.controller, at=(0.02, 0.24), encoders="link", **settings
+        )
+    point = dataclasses.replace(device.at((0.02, 0.24)), encoders="link")
+    assert np.array_equal(old.position, point.move(**settings).position)
+    assert not np.array_equal(old.position, device.at((0.0, 0.25)).move(**settings).position)
 
 
 def test_old_methods_of_a_device_warn_and_answer():

@@ -7,9 +7,11 @@ import json
 import os
 import stat
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 
+from tests.cli.cli_run import MECHANISM, zwidth
 from zwidth.show.output import OutputError, csv_text, destination, json_text, plain, replacing, write_text
 
 
@@ -95,3 +97,14 @@ def test_a_file_that_may_not_be_written_is_not_replaced(tmp_path, monkeypatch):
 def test_the_ending_counts_in_capitals_too(tmp_path):
     assert destination(tmp_path / "A.CSV", (".csv",)).name == "A.CSV"
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "words", ["chart {}", "simulate {} --stiffness 2000 --damping 5 --duration 0.1", "move {} --push 0,1"]
+)
+def test_a_figure_does_not_hang_on_the_settings_of_matplotlib(words, tmp_path):
+    plain, own = tmp_path / "plain.svg", tmp_path / "own.svg"
+    assert zwidth(*words.format(MECHANISM).split(), "--output", str(plain)).code == 0
+    with mpl.rc_context({"lines.linewidth": 7.0, "axes.facecolor": "red", "font.size": 20.0}):
+        assert zwidth(*words.format(MECHANISM).split(), "--output", str(own)).code == 0
+    assert own.read_bytes() == plain.read_bytes()

@@ -13,8 +13,6 @@ from zwidth.show.cli.options import Finite
 from zwidth.show.units import amount, number, typed
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from zwidth.conditions import Bound
     from zwidth.conditions.comparison import BoundsComparison
 
@@ -59,12 +57,11 @@ class Bounds(Command):
         "exact_largest_N_per_m",
         "exact_damping_at_largest_Ns_per_m",
     )
+    size = (5.6, 4.6)
     decides = True
 
     def compute(self, case: Case) -> BoundsComparison:
-        from zwidth.conditions.comparison import compare_bounds
-
-        return compare_bounds(case.point, case["damping"])
+        return case.point.bounds(case["damping"])
 
     def pages(self, case: Case, result: BoundsComparison, document: Mapping[str, Any]) -> Iterator[Any]:
         yield sheet(list(_exact(result)))
@@ -87,14 +84,6 @@ class Bounds(Command):
         if silent:
             yield "not asked, for the device lacks what they take:"
             yield sheet(silent)
-
-    def draw(self, case: Case, result: BoundsComparison) -> Figure:
-        from zwidth.show.figures.bounds import draw_bounds
-        from zwidth.show.figures.style import figure
-
-        drawing, ax = figure(height=4.6)
-        draw_bounds(ax, result.bounds, result.chart)
-        return drawing
 
 
 def _exact(found: BoundsComparison) -> Iterator[tuple[str, str]]:

@@ -74,6 +74,7 @@ class Command:
     examples       command lines
     options        click's decorators of its own options
     outputs        endings that --output takes;   output_help  what they are
+    size           of the figure [inches]
     keys           of its answer, beside the circumstances: null where there is no answer
     linear         does the answer leave out what is not linear?
     decides        may double precision leave it undecided? Then the answer has the key `decided`
@@ -86,6 +87,7 @@ class Command:
     options: ClassVar[tuple[Callable[[Any], Any], ...]] = ()
     outputs: ClassVar[tuple[str, ...]] = FIGURES + DATA
     output_help: ClassVar[str] = "Write a figure (.png .svg .pdf) or the data (.csv .json)."
+    size: ClassVar[tuple[float, float]] = (5.6, 3.9)
     keys: ClassVar[tuple[str, ...]] = ()
     linear: ClassVar[bool] = True
     decides: ClassVar[bool] = False
@@ -140,8 +142,13 @@ class Command:
         raise NotImplementedError
 
     def draw(self, case: Case, result: Any) -> Figure:
-        """The answer as a figure."""
-        raise NotImplementedError
+        """The answer as a figure: as the result draws itself."""
+        from zwidth.show.figures.plots import drawing_of
+        from zwidth.show.figures.style import figure
+
+        made, ax = figure(*self.size)
+        drawing_of(result)(ax, result)
+        return made
 
     def write_others(self, case: Case, result: Any) -> dict[str, Path]:
         """Write the files that options of the command's own name. Returns each by its key of the answer."""
@@ -162,9 +169,10 @@ class Command:
             stated = document | ({} if reason is None else {"reason": reason})
             write_data(case.path, stated, self.table(case, result, document) if case.writes([".csv"]) else {})
             return reason
-        from zwidth.show.figures.style import save
+        from zwidth.show.figures.style import context, save
 
-        save(self.draw(case, result), case.path)
+        with context():  # whatever settings of matplotlib the user has
+            save(self.draw(case, result), case.path)
         return reason
 
     def unanswered(self, case: Case, none: NoAnswer) -> Answer:

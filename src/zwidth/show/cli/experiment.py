@@ -20,8 +20,6 @@ from zwidth.show.experiment import explanation, point_rows, sentences, warning
 from zwidth.study.points_file import read_points
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from zwidth.study.experiment_plan import Plan
     from zwidth.study.measured_boundary import Experiment
 
@@ -202,14 +200,6 @@ class ExperimentCommand(Command):
         headings, rows = point_rows(result)
         yield table(headings, rows)
         yield sheet(list(sentences(result)))
-
-    def draw(self, case: Case, result: Experiment) -> Figure:
-        from zwidth.show.figures.experiment import draw_experiment, measured_bars, own_bars
-        from zwidth.show.figures.style import figure
-
-        drawing, ax = figure()
-        draw_experiment(ax, measured_bars(result.points), result.chart, own_bars(case["measured"]))
-        return drawing
 
 
 def _plan(case: Case) -> Plan:

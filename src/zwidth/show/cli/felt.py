@@ -12,8 +12,6 @@ from zwidth.show.cli.errors import BadInput
 from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from zwidth.measures.felt_wall import FeltWall
 
 
@@ -48,10 +46,9 @@ class Felt(Command):
 
     def compute(self, case: Case) -> FeltWall:
         from zwidth.measures.felt import HandleError
-        from zwidth.measures.felt_wall import felt_wall
 
         try:
-            return felt_wall(case.point, case["stiffness"], case["damping"])
+            return case.point.felt(case["stiffness"], case["damping"])
         except HandleError:
             model = f"model {case.question.model}: " if case.question.model else ""
             raise BadInput(
@@ -66,15 +63,6 @@ class Felt(Command):
 
     def pages(self, case: Case, result: FeltWall, document: Mapping[str, Any]) -> Iterator[Any]:
         yield sheet(list(_rows(result)))
-
-    def draw(self, case: Case, result: FeltWall) -> Figure:
-        from zwidth.show.figures.felt import draw_impedance
-        from zwidth.show.figures.style import figure
-
-        assert result.impedance is not None
-        drawing, ax = figure()
-        draw_impedance(ax, result.frequency, result.impedance, result.commanded, result.free_motion)
-        return drawing
 
     def write(self, case: Case, result: FeltWall, document: dict[str, Any], reason: str | None) -> str | None:
         if reason is None:

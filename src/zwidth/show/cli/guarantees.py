@@ -58,10 +58,8 @@ class GuaranteesCommand(Command):
         return super().circumstances(case) | {"operator": None}
 
     def compute(self, case: Case) -> Guarantees:
-        from zwidth.guarantees.nested import guarantees_of
-
         wall = None if case["stiffness"] is None else (case["stiffness"], case["damping"] or 0.0)
-        return guarantees_of(case.point, case["coupling"], wall)
+        return case.point.guarantees(coupling=case["coupling"], wall=wall)
 
     def reason(self, case: Case, result: Guarantees) -> str | None:
         return NOTHING if result.none_left else None
@@ -81,14 +79,13 @@ class GuaranteesCommand(Command):
 
     def draw(self, case: Case, result: Guarantees) -> Figure:
         from zwidth.show.figures.guarantees import draw_couplings, draw_guarantees
-        from zwidth.show.figures.style import context, figure
+        from zwidth.show.figures.style import figure
 
         drawing, ax = figure()
         if result.couplings is not None and result.couplings.reason is None:
             drawing.set_size_inches(5.6, 8.0)
             ax.set_subplotspec(drawing.add_gridspec(2, 1)[0])
-            with context():
-                draw_couplings(drawing.add_subplot(2, 1, 2), result.couplings)
+            draw_couplings(drawing.add_subplot(2, 1, 2), result.couplings)
         draw_guarantees(ax, result)
         return drawing
 

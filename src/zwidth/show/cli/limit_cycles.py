@@ -19,8 +19,6 @@ from zwidth.show.output import FIGURES, destination
 from zwidth.show.units import amount, given
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction, SimulatedVibration
     from zwidth.contact.limit_cycles import LimitCycle
     from zwidth.contact.plane import DevicePlane
@@ -126,15 +124,6 @@ class LimitCycles(Command):
         else:
             yield "no limit cycle is predicted"
         yield from _remarks(result)
-
-    def draw(self, case: Case, result: LimitCyclePrediction) -> Figure:
-        from zwidth.show.figures.limit_cycles import draw_balance
-        from zwidth.show.figures.style import context, figure
-
-        drawing, ax = figure()
-        with context():
-            draw_balance(ax, result.balance)
-        return drawing
 
     def write_others(self, case: Case, result: LimitCyclePrediction) -> dict[str, Path]:
         if case["plane"] is None:

@@ -14,8 +14,6 @@ from zwidth.show.output import shown
 from zwidth.show.units import amount, given, typed, vector
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from zwidth.chart.polar import ByDirection
 
 PLANES: Final = ("xy", "xz", "yz")  # as in chart.polar
@@ -54,6 +52,7 @@ class Polar(Command):
         "frequency_at_stiffness_max_Hz",
         "status",
     )
+    size = (4.6, 5.2)
     of_responses = True  # which it refuses like every device without a mechanism
 
     def check(self, case: Case) -> None:
@@ -70,13 +69,11 @@ class Polar(Command):
         return {key: value for key, value in super().circumstances(case).items() if key != "direction"}
 
     def compute(self, case: Case) -> ByDirection:
-        from zwidth.chart.polar import largest_stiffness_around
-
         question = case.question
         if case.device.mechanism is None:
             raise BadInput(f"{question.name}: has no [mechanism], and so one direction only; ask for its chart")
         question.of_several_directions(case.device)
-        return largest_stiffness_around(case.point, case["plane"], case["count"])
+        return case.point.by_direction(case["plane"], case["count"])
 
     def reason(self, case: Case, result: ByDirection) -> str | None:
         return result.reason
@@ -89,14 +86,6 @@ class Polar(Command):
 
     def pages(self, case: Case, result: ByDirection, document: Mapping[str, Any]) -> Iterator[Any]:
         yield sheet(list(_rows(result)))
-
-    def draw(self, case: Case, result: ByDirection) -> Figure:
-        from zwidth.show.figures.polar import draw_polar
-        from zwidth.show.figures.style import figure
-
-        drawing, ax = figure(4.6, 5.2)
-        draw_polar(ax, result, result.angles, (result.plane[0], result.plane[1]))
-        return drawing
 
 
 def _rows(found: ByDirection) -> Iterator[tuple[str, str]]:

@@ -21,8 +21,6 @@ from zwidth.show.output import shown
 from zwidth.show.units import amount, percent, radius, typed, uncertain
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from zwidth.study.robust_family import Range
     from zwidth.study.robust_study import RobustStudy, Violation
 
@@ -96,6 +94,7 @@ class Robust(Command):
         "violation",
         "excluding",
     )
+    size = (5.6, 4.6)
     decides = True
 
     def parse(self, case: Case) -> dict[str, Any]:
@@ -142,14 +141,6 @@ class Robust(Command):
         yield table(["binds", *paths, "of the edge"], rows)
         if len(shares) > TOLD:
             yield f"... and {len(shares) - TOLD} more; --json lists all"
-
-    def draw(self, case: Case, result: RobustStudy) -> Figure:
-        from zwidth.show.figures.robust import draw_robust
-        from zwidth.show.figures.style import figure
-
-        drawing, ax = figure(5.6, 4.6)
-        draw_robust(ax, result.chart, result.members)
-        return drawing
 
 
 def _ranges(texts: tuple[str, ...]) -> tuple[Range, ...]:

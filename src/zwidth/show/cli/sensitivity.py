@@ -46,9 +46,7 @@ class SensitivityCommand(Command):
     decides = True
 
     def compute(self, case: Case) -> Sensitivities:
-        from zwidth.study.sensitivity import sensitivities
-
-        return sensitivities(case.device, case.point)
+        return case.device.sensitivities(case.point)
 
     def reason(self, case: Case, result: Sensitivities) -> str | None:
         return None if result.peak is not None else NO_WALL

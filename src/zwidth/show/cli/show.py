@@ -40,9 +40,7 @@ class Show(Command):
     )
 
     def compute(self, case: Case) -> Description:
-        from zwidth.measures.description import describe
-
-        return describe(case.point)
+        return case.point.describe()
 
     def document(self, case: Case, result: Description) -> dict[str, Any]:
         return result.document() | {"sources": case.device.sources}

@@ -152,9 +152,10 @@ def _felt(ax: Axes, found: Any) -> None:
 
 
 def _experiment(ax: Axes, found: Any) -> None:
-    from zwidth.show.figures.experiment import draw_experiment, measured_bars
+    from zwidth.show.figures.experiment import draw_experiment, measured_bars, own_bars
 
-    draw_experiment(ax, measured_bars(found.points), found.chart)
+    own = () if found.own is None else own_bars(compared.point for compared in found.own.points)
+    draw_experiment(ax, measured_bars(found.points), found.chart, own)
 
 
 def _limit_cycles(ax: Axes, found: Any) -> None:
