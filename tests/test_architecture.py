@@ -132,6 +132,17 @@ def test_only_show_draws_and_talks(path):
     assert not {name.split(".")[0] for name in imports_of(path)} & FOR_PEOPLE
 
 
+@pytest.mark.parametrize("path", [path for path in MODULES if part(path) != "show"], ids=short)
+def test_only_the_command_line_speaks_of_options(path):
+    tree = ast.parse(path.read_text())
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    with_text = [node for node in ast.walk(tree) if isinstance(node, documented) and ast.get_docstring(node)]
+    prose = {id(node.body[0].value) for node in with_text}
+    texts = [node for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    messages = [node.value for node in texts if id(node) not in prose]
+    assert not [text for text in messages if re.search(r"(?<![-\w])--[a-z]|\bzwidth (chart|simulate|check)", text)]
+
+
 @pytest.mark.parametrize("module", ["zwidth", "zwidth.show.cli.main"])
 def test_importing_stays_light(module):
     program = f"import sys, {module}; print(*sys.modules)"

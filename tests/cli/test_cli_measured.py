@@ -167,7 +167,7 @@ def test_a_loss_factor_is_charted_and_checked_on_the_full_model_only(lossy):
         for command in (("chart", lossy), ("check", lossy, *wall)):
             (line,) = refused(*command, "--model", model)
             assert line.endswith(
-                f"model {model}: a loss factor is charted on the full model only; leave --model out"
+                f"model {model}: a loss factor is charted on the full model only; leave model out"
             )
     assert found("check", lossy, *wall, "--model", "full")["points"][0]["verdict"] == "stable"
 

@@ -286,7 +286,7 @@ def test_it_has_no_chart_and_says_what_to_do(method, name):
         lambda: method.estimator(T),
         lambda: stability_chart(Loop(mass(0.3, 2.0), Controller(T, velocity=method))),
     ):
-        with pytest.raises(NonlinearError, match=f"^{name}.* is not linear: it has no chart; ask zwidth simulate"):
+        with pytest.raises(NonlinearError, match=f"^{name}.* is not linear: it has no chart; simulate it"):
             ask()
     with pytest.raises(ValueError, match="the sampling period must be positive"):
         method.estimator(-T)

@@ -28,12 +28,14 @@ class Estimator:
 
 
 class NonlinearError(ValueError):
-    """An estimate that is not linear was asked for w(z), which it does not have."""
+    """An estimate that is not linear was asked for w(z), which it does not have.
 
+    estimate  what it is called
+    """
 
-def no_chart(what: str) -> NonlinearError:
-    """The error of an estimate, called `what`, that is not linear."""
-    return NonlinearError(
-        f"{what} is not linear: it has no chart; ask zwidth simulate or zwidth experiment, or chart another "
-        "estimate with --set loop.velocity.method=backward-difference"
-    )
+    def __init__(self, estimate: str) -> None:
+        self.estimate = estimate
+        super().__init__(
+            f"{estimate} is not linear: it has no chart; simulate it, measure its boundary, or for the chart of "
+            "another estimate set loop.velocity.method to backward-difference"
+        )

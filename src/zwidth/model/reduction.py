@@ -119,7 +119,7 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
     require("plant", plant, Plant)
     _check_model(model)
     if model != "full" and plant.hysteresis is not None:
-        raise ModelError("a loss factor is charted on the full model only; leave --model out")
+        raise ModelError("a loss factor is charted on the full model only; leave model out")
     if model == "full" or (model == "two-mass" and _is_two_mass(plant)):
         return plant
     if model == "rigid":

@@ -19,7 +19,14 @@ MOST_SUBSTEPS: Final = 100_000
 
 
 class MotionError(ValueError):
-    """The motion asked for cannot be meant, or cannot be simulated here."""
+    """The motion asked for cannot be meant, or cannot be simulated here.
+
+    argument  of `simulate_mechanism` that cannot be meant; "" where it is the device, or several together
+    """
+
+    def __init__(self, text: str, argument: str = "") -> None:
+        self.argument = argument
+        super().__init__(text)
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,8 @@ def start_rates(posture: Posture, velocity: ArrayLike | None) -> tuple[Floats, F
     if left > ALONG * float(np.linalg.norm(given)):
         raise MotionError(
             f"the handle cannot move with start_velocity {given.tolist()} m/s: {left:.3g} m/s of it is across "
-            "what the drives can do; give a velocity within the mechanism's plane of motion"
+            "what the drives can do; give a velocity within the mechanism's plane of motion",
+            argument="start_velocity",
         )
     return given, np.asarray(rates)
 

@@ -78,7 +78,7 @@ class PlantSection(Section):
         default=None,
     )
     loss_factor: LossFactor | None = quantity(
-        "hysteretic damping, stiffness K (1 + i eta) in steady vibration; for zwidth chart and check only; "
+        "hysteretic damping, stiffness K (1 + i eta) in steady vibration; for charts and single walls only; "
         "omitted: none",
         "1",
         default=None,

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.loop.estimator import Estimator, no_chart
+from zwidth.loop.estimator import Estimator, NonlinearError
 from zwidth.loop.estimators.bounds import check_period, check_positive, check_whole
 
 Floats = NDArray[np.float64]
@@ -77,7 +77,7 @@ class Foaw:
         Raises  NonlinearError  always
         """
         check_period(period)
-        raise no_chart("adaptive windowing")
+        raise NonlinearError("adaptive windowing")
 
     @property
     def parameters(self) -> Floats:

@@ -8,7 +8,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.loop.estimator import Estimator, no_chart
+from zwidth.loop.estimator import Estimator, NonlinearError
 from zwidth.loop.estimators.bounds import check_period, check_positive
 
 Floats = NDArray[np.float64]
@@ -65,7 +65,7 @@ class Levant:
         Raises  NonlinearError  always
         """
         check_period(period)
-        raise no_chart("Levant's differentiator")
+        raise NonlinearError("Levant's differentiator")
 
     @property
     def parameters(self) -> Floats:

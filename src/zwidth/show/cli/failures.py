@@ -50,5 +50,10 @@ def computing(question: Question) -> Iterator[None]:
         raise BadInput(f"{question.name}: {model}{error}") from None
     except ResponseError as error:
         raise BadInput(f"{question.name}: response: {error}") from None
-    except (UnmovedError, HysteresisError, NonlinearError) as error:
+    except NonlinearError as error:
+        raise BadInput(
+            f"{question.name}: {error.estimate} is not linear: it has no chart; ask zwidth simulate or zwidth "
+            "experiment, or chart another estimate with --set loop.velocity.method=backward-difference"
+        ) from None
+    except (UnmovedError, HysteresisError) as error:
         raise BadInput(f"{question.name}: {error}") from None

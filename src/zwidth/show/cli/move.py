@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.show.cli.command import Case, Command
-from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.failures import NoAnswer
 from zwidth.show.cli.surface_options import (
     check_motion,
@@ -121,7 +121,7 @@ class Move(Command):
         except SurfaceOutOfReach as error:
             raise BadInput(f"{surface_option(case.options)}: {error}") from None
         except MotionError as error:
-            option = "--start-velocity: " if "start_velocity" in str(error) else ""
+            option = f"{as_option(error.argument.replace('_', '-'), None)}: " if error.argument else ""
             raise BadInput(f"{name}: {option}{error}") from None
         if not len(motion.time):
             raise NoAnswer(motion.reason)
