@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.signal import lfilter
 
 from tests import systems
 from tests.measured_cases import dense, measured, sampled_response
@@ -18,7 +19,9 @@ from zwidth.chart.verdict import eigenvalues
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.estimators import CentralDifference, LeastSquaresSlope, SavitzkyGolay
 from zwidth.loop.loop import Loop
+from zwidth.model.plant import Plant
 from zwidth.model.response import Response, ResponseError, integrators_of
+from zwidth.model.sweep import sweep_response
 
 DAMPED = (0.01, 0.05, 0.3, 1.0, 1.5)
 
@@ -288,6 +291,26 @@ def test_the_band_of_the_coherence_holds_the_true_chart():
     assert np.mean(held) >= 0.9
     assert np.mean(decided) > 0.97
     assert len(decided) > 300
+
+
+@pytest.mark.parametrize(("seed", "step"), [(3, 2e-6), (25, 2e-6), (40, 2e-6), (23, 1e-6), (4, 2e-6)])
+def test_noise_near_half_the_sampling_rate_makes_no_root_there(seed, step):
+    """A free mass, 20 s of noise counted in steps: beyond the last coherent frequency there is no pole, although
+    the last points alone, by their noise, would say so in the first four cases."""
+    T, mass, friction = 0.001, 0.1, 1.0
+    force = np.random.default_rng(seed).normal(0.0, 2.0, 20_000)
+    left = np.exp(-friction * T / mass)
+    velocity = lfilter([0.0, (1.0 - left) / friction], [1.0, -left], force)
+    moved = (force * T - mass * np.diff(velocity, append=0.0)) / friction
+    reading = step * np.round(lfilter([0.0, 1.0], [1.0, -1.0], moved) / step)
+    chart = measured_chart(sweep_response(force, reading, T, integrators=2, segment=512), Controller(T))
+    exact = stability_chart(Loop(Plant.one_mass(mass, friction), Controller(T)), decay=False)
+    assert chart.stiffness_max == pytest.approx(exact.stiffness_max, rel=0.03)
+    assert chart.band.stiffness_low < 1.02 * exact.stiffness_max
+    assert chart.band.stiffness_high > 0.98 * exact.stiffness_max
+    verdicts = chart.check(50e3, [80.0, 100.0])
+    assert verdicts.names == ["stable", "stable"]
+    assert not verdicts.outside.any()
 
 
 def test_repeated_sweeps_span_the_band():

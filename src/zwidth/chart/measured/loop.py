@@ -85,7 +85,8 @@ class MeasuredLoop:
     def interpolation(self) -> ResponseInterpolation:
         """The response between these angles."""
         P = self.response.value[self.good]
-        return interpolate_response(self.angles, P, self.integrators, closed=reaches_the_end(self.angles)[0])
+        closed, to_end = reaches_the_end(self.angles)
+        return interpolate_response(self.angles, P, self.integrators, closed=closed, to_end=to_end)
 
     @cached_property
     def unusable(self) -> tuple[Stretch, ...]:

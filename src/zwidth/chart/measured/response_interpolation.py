@@ -78,10 +78,14 @@ def smooth_part(theta: Floats, P: Complexes, integrators: int) -> tuple[Complexe
     return G * np.exp(1j * delay * theta), delay
 
 
-def interpolate_response(theta: Floats, P: Complexes, integrators: int, *, closed: bool) -> ResponseInterpolation:
+def interpolate_response(
+    theta: Floats, P: Complexes, integrators: int, *, closed: bool, to_end: bool = True
+) -> ResponseInterpolation:
     """The interpolation through a response P (n,) at ascending angles (n,) in (0, pi].
 
     closed  whether the last angle is near enough to pi for its mirror image to be the next point
+    to_end  False: nothing was measured in the last stretch up to pi, so that no pole is read into it: noise of the
+            last points alone would say that there is one
     """
     if len(theta) < FEWEST:
         raise ResponseError(
@@ -104,6 +108,8 @@ def interpolate_response(theta: Floats, P: Complexes, integrators: int, *, close
     size = np.maximum(np.abs(y), 0.2 * np.mean(np.abs(y[_windows(len(y))[0]]), axis=1))
     missed = np.array([_missed(x, kinds[0], size), _missed(x, kinds[1], kinds[1]), _missed(x, kinds[2], 1.0)])
     missed = np.maximum(missed[:, :-1], missed[:, 1:])
+    if closed and not to_end:
+        missed[1, MIRRORED + len(theta) - 1] = np.inf
     kind = np.argmin(missed, axis=0)
     slopes, error = np.array([_slopes(x, v) for v in kinds]), np.min(missed, axis=0) / 64.0
     return ResponseInterpolation(x, kinds, slopes, kind, error, integrators, delay, closed)
