@@ -65,6 +65,13 @@ def test_a_file_that_holds_something_else_is_left_alone(point, tmp_path):
     assert notes.read_text() == "my notes\n"
 
 
+def test_trials_of_the_largest_disturbance_that_a_plan_may_have_are_run(point):
+    """Half of them are larger than it."""
+    found = measure_boundary(point, replace(FEWEST, disturbance=1.0, trials=6, spread=0.5))
+    assert [one.edge for one in found.points] == ["lower", "upper"]
+    assert all(found.deviation(one) < 0.01 for one in found.compared)
+
+
 def test_parts_that_are_not_linear_are_left_out_one_by_one_unless_not_wanted():
     dry = from_document(
         {

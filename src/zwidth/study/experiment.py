@@ -178,28 +178,34 @@ def _varied(operator: Operator, random: np.random.Generator, spread: float) -> O
     return replace(operator, **changed)
 
 
-def _bench(loop: Loop, operator: Operator | None, plan: Plan, seed: int = 0) -> Bench:
+def _bench(
+    loop: Loop,
+    operator: Operator | None,
+    plan: Plan,
+    factors: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    seed: int = 0,
+) -> Bench:
+    """The bench of a plan, its disturbance, speed and push times these factors, even beyond what plans allow."""
+    disturbance, speed, push = factors[0] * plan.disturbance, factors[1] * plan.speed, factors[2] * plan.push
     reflex = None
     if plan.reflex and operator is not None:
         reflex = Reflex(
-            threshold=0.5 * abs(plan.push),
+            threshold=0.5 * abs(push),
             arm_stiffness=STIFFENED * operator.arm_stiffness,
             arm_damping=STIFFENED * operator.arm_damping,
             grasp_stiffness=STIFFENED * (operator.grasp_stiffness or 0.0),
             grasp_damping=STIFFENED * (operator.grasp_damping or 0.0),
         )
-    hand = Hand(operator, push=plan.push, reflex=reflex)
-    return Bench(loop, hand, plan.one_sided, plan.disturbance, plan.speed, plan.visible or 0.0, seed)
+    hand = Hand(operator, push=push, reflex=reflex)
+    return Bench(loop, hand, plan.one_sided, disturbance, speed, plan.visible or 0.0, seed)
 
 
 def _trial(loop: Loop, operator: Operator | None, plan: Plan, subject: int, trial: int) -> Bench:
+    factors = (1.0, 1.0, 1.0)
     if plan.trials > 1:
         random = np.random.default_rng([plan.seed, subject, trial])
-        disturbance, speed, push = np.exp(plan.spread * random.standard_normal(3)).tolist()
-        plan = replace(
-            plan, disturbance=plan.disturbance * disturbance, speed=plan.speed * speed, push=plan.push * push
-        )
-    return _bench(loop, operator, plan, seed=(plan.seed * 1000 + subject) * 1000 + trial)
+        factors = tuple(np.exp(plan.spread * random.standard_normal(3)).tolist())
+    return _bench(loop, operator, plan, factors, seed=(plan.seed * 1000 + subject) * 1000 + trial)
 
 
 def _numbers(found: Any) -> list[Any]:
