@@ -18,6 +18,7 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib import pyplot
+from matplotlib.figure import Figure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -105,6 +106,13 @@ def section(example: Example) -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def picture(example: Example) -> Figure:
+    """The figure of an example that draws one, as a script by itself draws it: into no axes of another's."""
+    pyplot.close("all")
+    figure: Figure = example.names["figure"]().figure
+    return figure
+
+
 def _anchor(example: Example) -> str:
     return f"{example.number}-{example.title.lower().replace(' ', '-')}"
 
@@ -114,7 +122,7 @@ def main() -> None:
     print(PAGE)
     for example in map(run, FILES):
         if example.image is not None:
-            print(save(example.names["figure"]().figure, IMAGES / example.image))
+            print(save(picture(example), IMAGES / example.image))
     pyplot.close("all")
 
 

@@ -66,6 +66,18 @@ def test_an_example_draws_what_can_be_read(file):
     pyplot.close(ax.figure)
 
 
+def test_no_example_is_drawn_into_another_s_picture():
+    """xarray draws into the axes that are current; those of the example before are none of this one's."""
+    before = make_examples.picture(make_examples.run(FILES[4]))
+    assert before.axes[0].patches
+    (ax,) = make_examples.picture(make_examples.run(FILES[6])).axes
+    assert ax.figure is not before
+    assert len(ax.lines) == 3
+    assert not ax.patches
+    assert ax.get_xlabel().startswith("loop.sampling_period_s")
+    pyplot.close("all")
+
+
 # --- their numbers, by other routes ---------------------------------------------------------------------
 
 
