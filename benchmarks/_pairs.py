@@ -102,6 +102,8 @@ def worker(side: Side, script: str) -> Iterator[Worker]:
     """A fresh process, which ends with the block."""
     command = [sys.executable, str(side.folder / "benchmarks" / f"{script}.py"), "--ours", "--on-request"]
     environment = os.environ | {"PYTHONPATH": str(side.sources)}
+    # a side whose bytecode is kept would start sooner than one that may keep none
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen(command, cwd=side.folder, env=environment, text=True, **pipes) as process:
         try:
