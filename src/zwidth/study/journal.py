@@ -72,7 +72,7 @@ class Journal:
             self.kept = 0
             return
         if path.exists() and not path.is_file():
-            raise JournalError(f"{path}: is no plain file; name another")
+            raise JournalError(f"{path.name or path}: is no plain file; name another")
         data = path.read_bytes() if path.exists() else b""
         whole = _read(path, data.split(b"\n")[:-1], data != b"", question)
         self.known = {entry["name"]: entry["value"] for entry in map(json.loads, whole[1:])}
@@ -101,9 +101,9 @@ def _read(path: Path, lines: list[bytes], there: bool, question: str) -> list[by
     first = json.dumps({"version": KEPT, "question": question}).encode()
     known = _entry(lines[0]) if lines else {}
     if said := newer(known.get("version"), KEPT):
-        raise JournalError(f"{path}: its version {said}, or name another file")
+        raise JournalError(f"{path.name}: its version {said}, or name another file")
     if there and not isinstance(known.get("question"), str):
-        raise JournalError(f"{path}: is not the journal of a run; name another file, or remove it")
+        raise JournalError(f"{path.name}: is not the journal of a run; name another file, or remove it")
     if known.get("question") != question:
         return [first]
     count = 1
