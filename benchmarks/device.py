@@ -18,6 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import zwidth
+from benchmarks._own import Case, Cases, run
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.loop.loop import Loop
 from zwidth.model.posture import solve_posture
@@ -57,6 +58,18 @@ def row(what: str, ours: Callable[[int], Any], other: Callable[[int], Any]) -> t
     return what, seconds(here), seconds(there), f"{there / here:.1f}", seconds(TARGET), verdict
 
 
+def own() -> Cases:
+    """The same, each call with a number or a position of its own."""
+    numbers = count(1)
+
+    def change(key: str, value: Callable[[int], float]) -> Case:
+        return Case(lambda n: DEVICE.with_({key: value(n)}).controller.delay, numbers.__next__)
+
+    changes = {f"with_ {key}": change(key, value) for key, value in NUMBERS.items()}
+    there = Case(lambda n: len(DEVICE.at(place(n), (0.0, 1.0)).loop.plant.mass), numbers.__next__)
+    return changes | {"an operating point and its loop": there}
+
+
 def main() -> None:
     """Compare, time and print."""
     print(f"{NAME}: {machine('numpy', 'numba', 'pydantic')}")
@@ -88,4 +101,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run(main, own))

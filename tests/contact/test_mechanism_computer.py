@@ -13,6 +13,8 @@ from contact.mechanism_cases import (
 )
 from model.model_cases import rotation_about
 
+import zwidth
+from zwidth.contact.mechanism.checks import MotionError
 from zwidth.contact.mechanism.reach import SurfaceOutOfReach
 from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, depth_and_normal
 from zwidth.contact.mechanism.walls import SurfaceWall
@@ -288,3 +290,23 @@ def test_a_paddle_reaches_only_its_circle():
         moved(paddle(), wall=SurfaceWall(1.0), surface=Plane((0.0, 0.12), (0.0, -1.0)), **slow)
     with pytest.raises(SurfaceOutOfReach):
         moved(paddle(), wall=SurfaceWall(1.0), surface=Sphere((0.0, 0.0), 0.08), **slow)
+
+
+def test_several_postures_and_a_negative_seed_are_refused():
+    point = zwidth.load("five-bar").at([(0.0, 0.25), (0.02, 0.25)])
+    with pytest.raises(MotionError, match=r"one posture is moved at a time, got \(2,\); take one of them by its"):
+        point.move()
+    with pytest.raises(MotionError, match="seed must be zero or positive, got -1"):
+        point[0].move(seed=-1)
+    with pytest.raises(MotionError, match="duration must be positive and finite, in seconds, got '1'"):
+        point[0].move(duration="1")
+
+
+def test_a_turned_box_has_its_axes_among_the_keys():
+    turned = np.array([[np.cos(0.5), -np.sin(0.5), 0.0], [np.sin(0.5), np.cos(0.5), 0.0], [0.0, 0.0, 1.0]])
+    boxes = [Box((0.0, 0.25), (0.05, 0.03), axes, hollow=True) for axes in (None, turned)]
+    point, wall = zwidth.load("five-bar").at(), SurfaceWall(500.0, 1.0)
+    motions = [point.move(wall, box, duration=0.01) for box in boxes]
+    plain, rotated = (motion.document()["surface"] for motion in motions)
+    assert "axes" not in plain
+    assert np.array_equal(rotated["axes"], turned)

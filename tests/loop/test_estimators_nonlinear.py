@@ -1,5 +1,6 @@
 """Adaptive windows and Levant's differentiator against formulas written out, and against what they promise."""
 
+import pickle
 import re
 from math import sqrt
 from pathlib import Path
@@ -339,3 +340,10 @@ def test_the_pages_errors_are_ours():
         for error, (x, speed) in zip(errors, motions, strict=True):
             found = velocity_of(methods[name], step * np.rint(x / step), T)[500:] - speed[500:]
             assert float(error) == pytest.approx(1e3 * sqrt(np.mean(found**2)), rel=6e-3)
+
+
+def test_the_error_of_an_estimate_that_is_not_linear_survives_a_process():
+    error = NonlinearError("adaptive windowing")
+    again = pickle.loads(pickle.dumps(error))
+    assert str(again) == str(error)
+    assert again.estimate == "adaptive windowing"

@@ -91,7 +91,7 @@ def found():
 # What is on the way to results: devices, plants, loops, and what they are made of or asked with.
 STAGES = """
     Device OperatingPoint Posture Plant MultiPlant Response Loop Controller Estimator AlphaBeta Nonlinear
-    Measure Requirement Environment Plane Study RangeFault Cells MeasureError ForceLaw Function
+    Measure Requirement Environment Plane Study RangeFault Cells MeasureError ForceLaw Function OwnPoint Walls
 """
 # Plain values, arrays, and a few numbers by name, such as the rows of a result; datasets show themselves.
 NUMBERS = """
@@ -192,6 +192,52 @@ def test_whatever_a_public_function_returns_is_a_result_or_known_not_to_be():
         if word not in known
     }
     assert not unknown
+
+
+def test_a_motion_that_ends_before_its_first_sample_has_nulls():
+    motion = zwidth.load("five-bar").at((0.0, 0.346 - 5e-8)).move(duration=0.1)
+    assert len(motion.time) == 0
+    document = plain(motion.document())
+    assert document["duration_s"] is document["energy_book_J"]["hand"] is document["force_limit_share"] is None
+    assert "singularity" in repr(motion)
+    assert "singularity" in motion.plot().get_title(loc="left")
+    pyplot.close("all")
+
+
+def test_a_response_without_an_energy_ledger_has_columns_of_one_length():
+    wall = zwidth.contact.ENVIRONMENTS["wall"]
+    run = zwidth.contact.Run(device().at().loop, wall.values(stiffness=1e3, damping=5.0), start_position=1e-3)
+    (response,) = zwidth.contact.simulate_batch([run], wall, duration=0.05)
+    assert {len(column) for column in response.table().values()} == {len(response.time)}
+    assert "energy_J" not in response.table()
+
+
+@pytest.mark.parametrize("count", [3, 8])
+def test_a_sweep_over_texts_is_drawn_however_many_there_are(count):
+    periods = [0.001 + 1e-4 * n for n in range(count)]
+    designs = study_over(
+        device(), {"model": ["full", "rigid"], "operator.arm_mass_kg": [0.5], "loop.sampling_period_s": periods},
+        "stiffness_max",
+    )  # fmt: skip
+    texts = study_over(
+        zwidth.load("five-bar"),
+        {"model": ["full", "two-mass"], "direction": [[np.cos(a), np.sin(a)] for a in periods]},
+        "stiffness_max",
+    )
+    for study in (designs, texts):
+        ax = zwidth.run_study(study).plot()
+        ax.figure.draw_without_rendering()
+        assert ax.lines or ax.collections
+    pyplot.close("all")
+
+
+def test_an_empty_guarantee_is_drawn_with_its_reason():
+    loop = zwidth.Loop(zwidth.Plant.one_mass(0.1, 0.0), sampling_period=1e-3)
+    region = zwidth.guarantees.passive_region(loop)
+    said = " ".join(text.get_text() for text in region.plot().texts).replace("\n", " ")
+    assert region.reason
+    assert region.reason.split(";")[0] in said
+    pyplot.close("all")
 
 
 def test_what_has_no_drawing_says_so():

@@ -141,7 +141,8 @@ class TimeResponse(Result):
 
     @property
     def series(self) -> dict[str, Floats]:
-        """What is known of each sample, by key and unit."""
+        """What is known of each sample, by key and unit; the energy where it was kept."""
+        energy = {"energy_J": self.stored} if self.stored.size else {}
         return {
             "time_s": self.time,
             "position_m": self.reading,
@@ -149,7 +150,7 @@ class TimeResponse(Result):
             "velocity_m_per_s": self.velocity,
             "force_N": self.force,
             "handle_m": self.handle,
-            "energy_J": self.stored,
+            **energy,
         }
 
     def __repr__(self) -> str:

@@ -39,3 +39,7 @@ class NonlinearError(ValueError):
             f"{estimate} is not linear: it has no chart; simulate it, measure its boundary, or for the chart of "
             "another estimate set loop.velocity.method to backward-difference"
         )
+
+    def __reduce__(self) -> tuple[type[NonlinearError], tuple[str]]:
+        """Made again from the estimate's name: an error that a worker raises is sent as what it was made of."""
+        return type(self), (self.estimate,)

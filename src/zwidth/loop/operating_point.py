@@ -222,7 +222,7 @@ class OperatingPoint(PointVerbs):
         """
         if self.mechanism is None:
             return None
-        self.check_single("handle_range")
+        self._check_single("handle_range")
         return handle_range(self.mechanism, self._posture, self.direction)
 
     def distance_from_path(self, displacement: float) -> float | None:
@@ -236,7 +236,7 @@ class OperatingPoint(PointVerbs):
         """
         if self.mechanism is None:
             return None
-        self.check_single("distance_from_path")
+        self._check_single("distance_from_path")
         if displacement == 0.0:
             return 0.0
         # without forces across, a handle with few drives moves by the part of the direction that it can move along
@@ -264,7 +264,7 @@ class OperatingPoint(PointVerbs):
             raise OperatingPointError(_NO_MODEL)
         if self.given_plant is not None:
             return self.given_plant if self.model is None else reduce_plant(self.given_plant, self.model)
-        self.check_single("plant")
+        self._check_single("plant")
         assert self.mechanism is not None
         return reduce_mechanism(
             self.mechanism, self._posture, self.direction, self.model or "full", self.damping, self.encoders
@@ -289,7 +289,7 @@ class OperatingPoint(PointVerbs):
                 ModelError, DirectionError  (model.reduction) as `plant`
         """
         posture = self._posture
-        self.check_single("plant")
+        self._check_single("plant")
         check_several_directions(self.mechanism, self.operator, self.encoders)
         assert self.mechanism is not None
         assert self.directions is not None
@@ -305,7 +305,7 @@ class OperatingPoint(PointVerbs):
         """All directions under one sampled wall law. Raises what `plant_of_directions` raises."""
         return MultiLoop(self.plant_of_directions, self.controller)
 
-    def check_single(self, what: str) -> None:
+    def _check_single(self, what: str) -> None:
         """Raise OperatingPointError for several points; what: each of them has, and all have not in common."""
         if self.shape:
             raise OperatingPointError(

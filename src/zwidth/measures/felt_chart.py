@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -64,9 +65,9 @@ class FeltChart(Result):
         }
 
     def __repr__(self) -> str:
-        return (
-            f"FeltChart: hardest felt contact {self.stiffest:.6g} N/m, no wall is felt above {self.limit:.6g} N/m"
-        )
+        hardest = f"hardest felt contact {self.stiffest:.6g} N/m" if isfinite(self.stiffest) else "no stable wall"
+        limit = f", no wall is felt above {self.limit:.6g} N/m" if isfinite(self.limit) else ""
+        return f"FeltChart: {hardest}{limit}"
 
 
 def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:

@@ -65,6 +65,8 @@ class CommonArea(Result):
     def __repr__(self) -> str:
         required = ", ".join(one.text for one in self.requirements)
         common = self.common
+        if not self.reach.area > 0.0:
+            return f"CommonArea: the map reaches nothing, with {required}"
         return (
             f"CommonArea: {common.area:.4g} m^2, {100.0 * common.share:.4g} % of what is reached, with {required}"
         )

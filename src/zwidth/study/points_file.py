@@ -22,6 +22,7 @@ SPREADS: Final = (
     "stiffness_high_N_per_m",
 )
 MOST_FAULTS: Final = 20
+MOST_DIGITS: Final = 12  # of a number of trials
 LARGEST_WALL: Final = 1e15  # N/m, N s/m; beyond, rounding would give the verdicts
 
 Path = str | os.PathLike[str]
@@ -95,7 +96,7 @@ def _spread(text: str) -> tuple[float, str]:
 
 
 def _trials(text: str) -> tuple[int, str]:
-    if not text or (text.isdecimal() and int(text) > 0):
+    if not text or (text.isdecimal() and len(text) < MOST_DIGITS and int(text) > 0):
         return int(text or 1), ""
     return 1, f"must be a whole number from 1 on, got {text[:60]!r}"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
+from numbers import Real
 from typing import Final
 
 import numpy as np
@@ -48,8 +49,8 @@ def motion_inputs(
     drives: int,
 ) -> Inputs:
     """The numbers of a motion. Raises MotionError."""
-    if not (isfinite(duration) and duration > 0.0):
-        raise MotionError(f"duration must be positive and finite, in seconds, got {duration}")
+    if not (isinstance(duration, Real) and isfinite(duration) and duration > 0.0):
+        raise MotionError(f"duration must be positive and finite, in seconds, got {duration!r}")
     if not (isinstance(substeps, int | np.integer) and 1 <= substeps <= MOST_SUBSTEPS):
         raise MotionError(f"substeps must be a whole number from 1 to {MOST_SUBSTEPS}, got {substeps}")
     samples = int(np.ceil(duration / controller.sampling_period - 1e-9))

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.contact.environments.environment import Environment
 from zwidth.contact.mechanism.surfaces import Surface, surface_document
@@ -21,7 +22,7 @@ AT_LIMIT: Final = 1.0 - 1e-12  # share of a limit from which a force or torque w
 
 @dataclass(frozen=True, repr=False)
 class MechanismMotion(Result):
-    """A motion of a whole mechanism sampled by its computer; k samples from the start on.
+    """A motion of a whole mechanism sampled by its computer; k samples from the start on, or none.
 
     What was simulated:
 
@@ -29,7 +30,7 @@ class MechanismMotion(Result):
     surface          what the handle meets; None: nothing
     environment      what is rendered at the surface;   values (P,) of its parameters. None without a surface
     start_velocity   (3,) of the handle [m/s]
-    push             (1, 3) force at the handle, or (k, 3), each held for one period [N]
+    push             (1, 3) force at the handle, or one for each period asked for, held throughout it [N]
     gravity          (3,) [m/s^2]
     duration         asked for [s];   substeps between samples;   seed of the encoders' noise
     counted          are the encoders read in counts, with noise?
@@ -125,26 +126,28 @@ class MechanismMotion(Result):
     @property
     def contact_share(self) -> float:
         """Share of the samples within the wall; 1 for a two-sided one, which acts everywhere."""
-        return 1.0 if self.two_sided else float(np.mean(self.depth > 0.0))
+        return 1.0 if self.two_sided else _share(self.depth > 0.0)
 
     @property
     def torque_limit_share(self) -> dict[str, float]:
         """Share of the samples at which each drive is at its torque limit, by the drive's name."""
         drives = self.mechanism.drives
         reached = np.abs(self.torque) >= AT_LIMIT * drives.transmission * drives.torque_limit
-        return dict(zip(drives.names, np.mean(reached, axis=0).tolist(), strict=True))
+        return dict(zip(drives.names, map(_share, reached.T), strict=True))
 
     @property
     def force_limit_share(self) -> float:
         """Share of the samples at which the force was cut to its limit."""
-        return float(np.mean(self.force_size >= AT_LIMIT * self.point.controller.saturation))
+        return _share(self.force_size >= AT_LIMIT * self.point.controller.saturation)
 
     @property
     def energy_book(self) -> dict[str, float]:
         """What each has put in by the end, and how much more is stored than at the start [J].
 
-        Dampers have what the others leave; nan where the motors' work is not known.
+        Dampers have what the others leave; nan where the motors' work is not known, and without samples.
         """
+        if not len(self.time):
+            return dict.fromkeys(("hand", "motors", "gravity", "friction", "dampers", "stored"), np.nan)
         stored = self.kinetic + self.elastic
         put = {
             "hand": float(self.hand_work[-1]),
@@ -167,7 +170,7 @@ class MechanismMotion(Result):
             "wall_stiffness_N_per_m": parameters.get("stiffness"),
             "wall_damping_Ns_per_m": parameters.get("damping"),
             "no_pull": bool(parameters.get("no_pull")) if touches else None,
-            "push_N": self.push[0] if len(self.push) == 1 else self.push,
+            "push_N": self.push[0] if len(self.push) == 1 else self.push[: len(self.time)],
             "start_velocity_m_per_s": self.start_velocity,
             "gravity_m_per_s2": self.gravity,
             "torque_limits": self.torque_limits,
@@ -175,12 +178,12 @@ class MechanismMotion(Result):
             "substeps": self.substeps,
             "seed": self.seed,
             "duration_asked_s": self.duration,
-            "duration_s": float(self.time[-1]),
+            "duration_s": float(self.time[-1]) if len(self.time) else None,
             "status": self.status,
             "ended_because": self.reason or None,
             "started_inside": self.started_inside if touches else None,
-            "largest_penetration_m": float(self.penetration.max()) if touches else None,
-            "largest_force_N": float(self.force_size.max()) if touches else None,
+            "largest_penetration_m": _largest(self.penetration) if touches else None,
+            "largest_force_N": _largest(self.force_size) if touches else None,
             "contact_share": self.contact_share if touches else None,
             "torque_limit_share": self.torque_limit_share,
             "force_limit_share": self.force_limit_share,
@@ -250,6 +253,17 @@ class MechanismMotion(Result):
             f"  handle from ({start}) to ({end}) m",
         ]
         if self.surface is not None:
-            deepest, largest = self.penetration.max(), self.force_size.max()
+            deepest, largest = _largest(self.penetration), _largest(self.force_size)
             lines.append(f"  deepest {deepest:.4g} m, largest force {largest:.4g} N")
         return "\n".join([*lines, *([f"  {self.reason}"] if self.reason else [])])
+
+
+def _share(flags: NDArray[np.bool_]) -> float:
+    """Share of the samples at which something holds; nan without samples."""
+    return float(np.mean(flags)) if len(flags) else np.nan
+
+
+def _largest(values: Floats) -> float:
+    """The largest of what is known; nan where nothing is, as of a force that the environment did not give."""
+    known = values[~np.isnan(values)]
+    return float(known.max()) if len(known) else np.nan

@@ -76,7 +76,7 @@ def simulate_mechanism(
     Raises   SurfaceOutOfReach  (a ValueError) for a surface that the handle never touches in this assembly
              MotionError  (a ValueError) for inputs that cannot be meant
              NoMechanismError    (loop.point_errors) for a device without a mechanism
-             OperatingPointError (loop.point_errors) for several postures
+             ValueError          for another word for torque_limits
              TooLarge     (a ValueError) for more samples than the machine has memory for
 
     >>> import zwidth
@@ -93,12 +93,15 @@ def simulate_mechanism(
     mechanism, posture = point.mechanism, point.posture
     if mechanism is None or posture is None:
         raise NoMechanismError
-    point.check_single("motion")
+    if point.shape:
+        raise MotionError(f"one posture is moved at a time, got {point.shape}; take one of them by its index")
     if posture.status != OK:
         raise MotionError("the posture is out of reach or singular and no motion can start there; ask for another")
     if mechanism.design_shape:
         raise MotionError(f"one design is simulated at a time, got a set of shape {mechanism.design_shape}")
     check_choice("torque_limits", torque_limits, ("each", "together"))
+    if seed < 0:
+        raise MotionError(f"seed must be zero or positive, got {seed}", "seed")
     if (wall is None) != (surface is None):
         raise MotionError("a wall needs a surface and a surface a wall; give both, or neither for a free device")
     environment, values = None, np.zeros(0)

@@ -80,6 +80,7 @@ def surface_document(surface: Surface, two_sided: bool) -> dict[str, Any]:
             kind: dict[str, Any] = {"kind": "sphere", "center_m": surface.center, "radius_m": surface.radius}
         case Box():
             kind = {"kind": "box", "center_m": surface.center, "half_sizes_m": surface.half_sizes}
+            kind |= {} if surface.axes is None else {"axes": surface.axes}
     return kind | {"hollow": surface.hollow}
 
 

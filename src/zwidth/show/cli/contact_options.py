@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from zwidth.contact.environments import Environment
 
-Command = Callable[..., int]
-
 AS_TYPED: Final = (
     "stiffness",
     "damping",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import wrap
 from typing import Final
 
 import numpy as np
@@ -13,7 +14,7 @@ from zwidth.guarantees.coupling import Couplings
 from zwidth.guarantees.nested import Guarantee, Guarantees
 from zwidth.guarantees.region import Region
 from zwidth.show.figures.stability import Window, frame
-from zwidth.show.figures.style import BLACK, BLUE, GREEN, PURPLE, VERMILION, label, legend_above
+from zwidth.show.figures.style import BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, label, legend_above
 from zwidth.show.units import quantity
 
 # Fill, edge, and the edge's width and place above the fills; the sets get darker inwards. The narrower edge lies
@@ -24,6 +25,7 @@ AREAS: Final = {
     "spring-stable": ("#BFD1E0", BLUE, 3.4, 2.1),
     "passive": ("#A0BAD0", VERMILION, 1.5, 2.2),
 }
+REASON: Final = 40  # letters of a line
 ROOM: Final = 0.05  # of the box of what is shown, beside it
 # Sets that lie across the others are outlines only.
 LINES: Final = {"nyquist-spring": (PURPLE, (0, (5, 1.5))), "passive-at-actuator": (BLACK, (0, (1.2, 1.2)))}
@@ -57,14 +59,19 @@ def draw_guarantees(ax: Axes, found: Guarantees, window: Window | None = None) -
 
 
 def draw_region(ax: Axes, region: Region) -> None:
-    """The walls of one guarantee."""
+    """The walls of one guarantee; why there are none, where there are none."""
     fill, edge, width, _ = AREAS["passive"]
     for ring in region.rings:
         ax.add_patch(Polygon(ring, facecolor=fill, edgecolor=edge, linewidth=width))
     corners = np.vstack(region.rings) if region.rings else np.array([[0.0, 0.0], [1.0, 1.0]])
     (K0, B0), (K1, B1) = corners.min(axis=0), corners.max(axis=0)
     K, B = ROOM * (K1 - K0), ROOM * (B1 - B0)
-    frame(ax, (float(K0 - K), float(K1 + K), float(B0 - B), float(B1 + B)), empty=not region.rings)
+    frame(ax, (float(K0 - K), float(K1 + K), float(B0 - B), float(B1 + B)), empty=False)
+    if not region.rings:
+        ax.set_xticks([])
+        ax.set_yticks([])
+        reason = "\n".join(wrap(region.reason or "no wall has this guarantee", REASON))
+        ax.text(0.5, 0.5, reason, transform=ax.transAxes, ha="center", va="center", color=GREY)
 
 
 def draw_couplings(ax: Axes, found: Couplings) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import Any, Final
 
 import numpy as np
@@ -28,6 +29,7 @@ NEAR: Final = 1e-6  # rad, by which a posture found again may differ; share of a
 LEAST: Final = 1e-3  # share of the mechanism's size that a close-up shows at least
 WORTH: Final = 1e-3  # share of the largest energy below which an entry is no line
 ROOM: Final = 0.12
+TITLE: Final = 60  # letters of a line
 OF_LINKS: Final = tuple(colour for colour, _ in LINES if colour != VERMILION)  # which is the path's
 
 
@@ -82,7 +84,14 @@ def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
 
 
 def draw_close(ax: Axes, motion: MechanismMotion) -> None:
-    """The path alone, with where the computer sees the handle."""
+    """The path alone, with where the computer sees the handle; or why there is none."""
+    if not len(motion.time):
+        flat = flattest(np.vstack([np.zeros((1, 3)), motion.start.position[None]]))
+        ax.plot(*motion.start.position[flat][:, None], "o", color=BLACK, markerfacecolor="white", label="start")
+        ax.set_title("\n".join(wrap(motion.reason, TITLE)), fontsize=8.0, loc="left")
+        for axis, k in zip((ax.xaxis, ax.yaxis), flat, strict=True):
+            label(axis, AXES[k], "m", plain=True)
+        return
     strokes = _strokes(motion.mechanism, motion.start)
     flat = flattest(np.vstack([np.zeros((1, 3)), *strokes, motion.position]))
     size = float(np.max(np.ptp(np.vstack(strokes), axis=0)))

@@ -208,7 +208,7 @@ def _validity(ax: Axes, found: Any) -> None:
 
 
 def _sweep(ax: Axes, found: Any) -> None:
-    """The first column; `zwidth sweep --output` draws all."""
+    """The first column; `zwidth sweep --output` draws all columns."""
     from zwidth.show.figures.study import draw_first_column
 
     draw_first_column(ax, found.dataset())

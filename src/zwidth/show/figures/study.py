@@ -50,31 +50,41 @@ def study_figure(dataset: xr.Dataset) -> Figure:
     for key in numeric:  # values may be listed in any order
         dataset = dataset.sortby(key)
     lines = int(np.prod([dataset.sizes[key] for key in texts]))
+    if _few_lines(dataset, names[0], numeric, texts):
+        return _curves(dataset, names, numeric[0] if numeric else texts[0])
     if dataset[names[0]].dims == ("design",):
         return _parallel(dataset, names)
-    if len(numeric) <= 1 and (lines if numeric else lines / dataset.sizes[texts[0]]) <= len(LINES):
-        return _curves(dataset, names, numeric[0] if numeric else texts[0])
     if len(numeric) == 2 and lines * len(names) <= MOST_PANELS and min(dataset.sizes[k] for k in numeric) > 1:
         return _heat_maps(dataset, names, numeric, texts)
     return _parallel(dataset, names)
 
 
 def draw_first_column(ax: Axes, dataset: xr.Dataset) -> None:
-    """The first column of a study, in one panel: over the first axis of numbers, or over two as a heat map."""
-    names = [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
-    numeric, texts = _kinds(dataset, names)
-    if dataset[names[0]].dims == ("design",):
-        draw_parallel(ax, dataset, _keys_of(dataset), names)
-    elif len(numeric) == 2 and not texts and min(dataset.sizes[key] for key in numeric) > 1:
-        draw_heat_map(ax, dataset.sortby(numeric), names[0], numeric[0], numeric[1])
-    elif len(numeric) + len(texts) <= 2:
+    """The first column of a study in one panel: curves, a heat map or parallel coordinates, as `study_figure`."""
+    name = next(str(name) for name in dataset.data_vars if f"{name}_status" in dataset)
+    numeric, texts = _kinds(dataset, [name])
+    for key in numeric:
+        dataset = dataset.sortby(key)
+    if _few_lines(dataset, name, numeric, texts):
         along = (numeric or texts)[0]
-        dataset = dataset.sortby(along) if numeric else dataset
-        lost = draw_curves(ax, dataset, names[0], along)
         others = [key for key in (*numeric, *texts) if key != along]
-        _legend_above(ax, list(_line_handles(dataset, others, lines=bool(numeric))), [_symbol(k) for k in lost])
+        lost = draw_curves(ax, dataset, name, along)
+        handles = list(_line_handles(dataset, others, lines=bool(numeric)))
+        _legend_above(ax, handles, [_symbol(status) for status in lost])
+    elif len(numeric) == 2 and not texts and min(dataset.sizes[key] for key in numeric) > 1:
+        hatched = draw_heat_map(ax, dataset, name, numeric[0], numeric[1])
+        _legend_above(ax, [], [_patch(status) for status in hatched])
     else:
-        draw_parallel(ax, dataset, [*numeric, *texts], names)
+        dims = [str(dim) for dim in dataset[name].dims]
+        draw_parallel(ax, dataset, dims if dims != ["design"] else _keys_of(dataset), [name])
+
+
+def _few_lines(dataset: xr.Dataset, name: str, numeric: Sequence[str], texts: Sequence[str]) -> bool:
+    """Has a study one axis to draw along, and few enough values of the others for a line each?"""
+    if dataset[name].dims == ("design",) or len(numeric) > 1:
+        return False
+    lines = int(np.prod([dataset.sizes[key] for key in texts]))
+    return (lines if numeric else lines / dataset.sizes[texts[0]]) <= len(LINES)
 
 
 def _kinds(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], list[str]]:
