@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import csv
-import math
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 from itertools import islice
-from math import nan
+from math import isfinite, nan
 from typing import Any, Final
 
 from zwidth.device.text_file import LARGEST_TABLE, Unreadable, filled, header_fault, read_text
@@ -25,7 +24,7 @@ MOST_FAULTS: Final = 20
 MOST_DIGITS: Final = 12  # of a number of trials
 LARGEST_WALL: Final = 1e15  # N/m, N s/m; beyond, rounding would give the verdicts
 
-Path = str | os.PathLike[str]
+File = str | os.PathLike[str]
 Walls = list[tuple[float, float]]
 # from a cell to its value, and what is wrong with it ("" if nothing)
 Reader = Callable[[str], tuple[Any, str]]
@@ -44,15 +43,15 @@ def wall_number(text: str) -> tuple[float, str]:
     try:
         number = float(text)
     except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
+        number = nan
+    if not isfinite(number):
         return number, "must be a finite number, " + (f"got {text[:60]!r}" if text else "but it is missing")
     if abs(number) > LARGEST_WALL:
         return number, f"must be from {-LARGEST_WALL:g} to {LARGEST_WALL:g}, got {text[:60]!r}; is the unit right?"
     return number, ""
 
 
-def read_walls(file: Path) -> Walls:
+def read_walls(file: File) -> Walls:
     """The walls (stiffness [N/m], damping [N s/m]) of a CSV file with these two columns; others are left alone.
 
     Raises PointsError  if it cannot be read, lacks a column or holds no wall, or with every line that is wrong
@@ -60,7 +59,7 @@ def read_walls(file: Path) -> Walls:
     return [(row[COLUMNS[0]], row[COLUMNS[1]]) for row in _read(file, {})]
 
 
-def read_points(file: Path) -> list[OwnPoint]:
+def read_points(file: File) -> list[OwnPoint]:
     """Measured points: a CSV file as for `read_walls`, with columns that may be left out, and cells left empty.
 
     Raises PointsError  as `read_walls`
@@ -101,7 +100,7 @@ def _trials(text: str) -> tuple[int, str]:
     return 1, f"must be a whole number from 1 on, got {text[:60]!r}"
 
 
-def _read(file: Path, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
+def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
     """The rows by column; of the optional ones those that are there."""
     rows = csv.reader(_text(file).splitlines(), strict=True)
     faults: list[str] = []
@@ -146,7 +145,7 @@ def _at_odds(cells: dict[str, Any]) -> Iterator[str]:
             yield f"{low}: must be at most {high} = {cells[high]:g}, got {cells[low]:g}"
 
 
-def _places(file: Path, header: list[str], optional: Collection[str]) -> dict[str, int]:
+def _places(file: File, header: list[str], optional: Collection[str]) -> dict[str, int]:
     """Index of each column wanted, and of the optional ones that are there."""
     if not header:
         raise PointsError(f"{file}: is empty; its first line must name the columns {', '.join(COLUMNS)}")
@@ -155,7 +154,7 @@ def _places(file: Path, header: list[str], optional: Collection[str]) -> dict[st
     return {name: header.index(name) for name in (*COLUMNS, *optional) if name in header}
 
 
-def _text(file: Path) -> str:
+def _text(file: File) -> str:
     try:
         return read_text(file, LARGEST_TABLE, pipes=True)
     except Unreadable as error:

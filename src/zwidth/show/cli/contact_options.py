@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.failures import NoAnswer
 from zwidth.show.cli.options import Finite, Numbers, ParamType, named
 
@@ -174,7 +174,7 @@ def contact_faults() -> Iterator[None]:
     try:
         yield
     except ContactArgumentError as error:
-        option = OPTIONS.get(error.argument, f"--{error.argument.replace('_', '-')}")
+        option = OPTIONS.get(error.argument, as_option(error.argument))
         advice = f"; add {OPTIONS[error.missing]}" if error.missing else ""
         raise BadInput(*(f"{option}: {reason}{advice}" for reason in error.reasons)) from None
     except NoForceError as error:

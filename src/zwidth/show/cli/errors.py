@@ -72,10 +72,11 @@ def _internal(error: Exception) -> list[str]:
     ]
 
 
-def as_option(name: str, value: str | None) -> str:
+def as_option(name: str, value: str | None = None) -> str:
     """An argument as the command line spells it.
 
-    >>> as_option("stiffness", None), as_option("model", "rigid")
-    ('--stiffness', '--model rigid')
+    >>> as_option("start_velocity"), as_option("model", "rigid")
+    ('--start-velocity', '--model rigid')
     """
-    return f"--{name}" if value is None else f"--{name} {value}"
+    option = f"--{name.replace('_', '-')}"
+    return option if value is None else f"{option} {value}"

@@ -121,7 +121,7 @@ class Move(Command):
         except SurfaceOutOfReach as error:
             raise BadInput(f"{surface_option(case.options)}: {error}") from None
         except MotionError as error:
-            option = f"{as_option(error.argument.replace('_', '-'), None)}: " if error.argument else ""
+            option = f"{as_option(error.argument)}: " if error.argument else ""
             raise BadInput(f"{name}: {option}{error}") from None
         if not len(motion.time):
             raise NoAnswer(motion.reason)

@@ -81,8 +81,7 @@ def _results(motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[R
     import numpy as np
 
     if motion.surface is not None:
-        depth = np.abs(motion.depth) if motion.two_sided else motion.depth
-        yield "largest penetration", _when(document["largest_penetration_m"], "m", depth, motion.time)
+        yield "largest penetration", _when(document["largest_penetration_m"], "m", motion.penetration, motion.time)
         yield "largest force", _when(document["largest_force_N"], "N", motion.force_size, motion.time)
         yield "in contact", f"{typed(percent(document['contact_share']))} of the samples"
         yield "torque limits", _limits(motion)

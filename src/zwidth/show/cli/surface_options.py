@@ -15,7 +15,7 @@ from zwidth.show.cli.contact_options import (
     of_environments,
     usage,
 )
-from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Finite, Numbers
 from zwidth.study.points_file import LARGEST_WALL
 
@@ -220,4 +220,4 @@ def _raised(numbers: Sequence[float], height: float) -> tuple[float, ...]:
 
 
 def _option(name: str) -> str:
-    return "--parameter" if name == "parameters" else f"--{name.replace('_', '-')}"
+    return "--parameter" if name == "parameters" else as_option(name)

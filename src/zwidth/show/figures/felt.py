@@ -10,7 +10,7 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from zwidth.measures.felt_chart import FeltChart
-from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above
+from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above, tell_empty
 from zwidth.show.units import MINUS, quantity
 
 
@@ -65,7 +65,5 @@ def draw_felt_chart(ax: Axes, chart: FeltChart) -> None:
     label(ax.xaxis, "Stiffness felt at rest", "N/m")
     label(ax.yaxis, "Virtual damping B", "Ns/m")
     if not chart.regions:
-        ax.set_xticks([])
-        ax.set_yticks([])
-        ax.text(0.5, 0.5, "no wall is stable", transform=ax.transAxes, ha="center", va="center", color=GREY)
+        tell_empty(ax)
     legend_above(ax)

@@ -14,7 +14,7 @@ from zwidth.guarantees.coupling import Couplings
 from zwidth.guarantees.nested import Guarantee, Guarantees
 from zwidth.guarantees.region import Region
 from zwidth.show.figures.stability import Window, frame
-from zwidth.show.figures.style import BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, label, legend_above
+from zwidth.show.figures.style import BLACK, BLUE, GREEN, PURPLE, VERMILION, label, legend_above, tell_empty
 from zwidth.show.units import quantity
 
 # Fill, edge, and the edge's width and place above the fills; the sets get darker inwards. The narrower edge lies
@@ -68,10 +68,7 @@ def draw_region(ax: Axes, region: Region) -> None:
     K, B = ROOM * (K1 - K0), ROOM * (B1 - B0)
     frame(ax, (float(K0 - K), float(K1 + K), float(B0 - B), float(B1 + B)), empty=False)
     if not region.rings:
-        ax.set_xticks([])
-        ax.set_yticks([])
-        reason = "\n".join(wrap(region.reason or "no wall has this guarantee", REASON))
-        ax.text(0.5, 0.5, reason, transform=ax.transAxes, ha="center", va="center", color=GREY)
+        tell_empty(ax, "\n".join(wrap(region.reason or "no wall has this guarantee", REASON)))
 
 
 def draw_couplings(ax: Axes, found: Couplings) -> None:

@@ -85,21 +85,20 @@ def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
 
 def draw_close(ax: Axes, motion: MechanismMotion) -> None:
     """The path alone, with where the computer sees the handle; or why there is none."""
-    if not len(motion.time):
-        flat = flattest(np.vstack([np.zeros((1, 3)), motion.start.position[None]]))
-        ax.plot(*motion.start.position[flat][:, None], "o", color=BLACK, markerfacecolor="white", label="start")
-        ax.set_title("\n".join(wrap(motion.reason, TITLE)), fontsize=8.0, loc="left")
-        for axis, k in zip((ax.xaxis, ax.yaxis), flat, strict=True):
-            label(axis, AXES[k], "m", plain=True)
-        return
     strokes = _strokes(motion.mechanism, motion.start)
     flat = flattest(np.vstack([np.zeros((1, 3)), *strokes, motion.position]))
     size = float(np.max(np.ptp(np.vstack(strokes), axis=0)))
+    mark: dict[str, Any] = {"linestyle": "none", "markersize": 7.0, "markeredgecolor": BLACK, "zorder": 5.0}
+    if not len(motion.time):
+        place = motion.start.position[None, flat]
+        ax.plot(*place.T, marker="o", markerfacecolor="white", label="start", **mark)
+        ax.set_title("\n".join(wrap(motion.reason, TITLE)), fontsize=8.0, loc="left")
+        _frame(ax, _view(place, size), flat)
+        return
     true, seen = motion.position[:, flat], motion.counted_position[:, flat]
     if np.max(np.abs(true - seen)) > 2e-3 * max(float(np.max(np.ptp(true, axis=0))), 1e-12):
         ax.plot(*seen.T, color=BLUE, linewidth=0.8, alpha=0.8, label="as read", zorder=3.0)
     ax.plot(*true.T, color=VERMILION, linewidth=1.3, label="path", zorder=4.0)
-    mark: dict[str, Any] = {"linestyle": "none", "markersize": 7.0, "markeredgecolor": BLACK, "zorder": 5.0}
     ax.plot(*true[0][:, None], marker="o", markerfacecolor="white", label="start", **mark)
     ax.plot(*true[-1][:, None], marker="s", markerfacecolor=BLACK, label="end", **mark)
     view = _view(true, size * LEAST)

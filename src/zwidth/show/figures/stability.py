@@ -11,7 +11,7 @@ from matplotlib.patches import Polygon
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.measured.chart import MeasuredChart
-from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above
+from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above, tell_empty
 from zwidth.show.units import quantity
 
 # KMIN, KMAX [N/m], BMIN, BMAX [N s/m]
@@ -82,6 +82,4 @@ def frame(ax: Axes, window: Window, *, empty: bool) -> None:
     label(ax.xaxis, "Virtual stiffness K", "N/m")
     label(ax.yaxis, "Virtual damping B", "Ns/m")
     if empty:
-        ax.set_xticks([])
-        ax.set_yticks([])
-        ax.text(0.5, 0.5, "no wall is stable", transform=ax.transAxes, ha="center", va="center", color=GREY)
+        tell_empty(ax)

@@ -78,6 +78,13 @@ def figure(width: float = 5.6, height: float = 3.9) -> tuple[Figure, Axes]:
         return made, made.add_subplot()
 
 
+def tell_empty(ax: Axes, text: str = "no wall is stable") -> None:
+    """Say in the middle of axes why there is nothing to be drawn; numbers along them would mean nothing."""
+    ax.set_xticks([])
+    ax.set_yticks([])
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)
+
+
 def save(made: Figure, path: str | os.PathLike[str]) -> Path:
     """Write a figure as .png, .svg or .pdf, whole or not at all, without dates.
 
