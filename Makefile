@@ -1,7 +1,8 @@
 # On a fresh machine with Python 3.11 or newer and make:
 #     make report     sets up .venv, then writes the report on the bundled five-bar to out/
 #     make test       sets up .venv with what the tests want, then runs them
-# The set-up happens once, and again only when pyproject.toml or the constraints change.
+# The set-up happens once, and again only when pyproject.toml or the constraints change; kernels are compiled once, and
+# again where their sources change.
 
 DEVICE  ?= five-bar
 PYTHON  ?= python3 python3.13 python3.12 python3.11 python
@@ -21,8 +22,6 @@ CONSTRAINTS := constraints.txt
 BIN     := $(VENV)/bin
 NUMERICAL := $(addprefix tests/,chart conditions contact guarantees loop measures model reproduction study)
 OUTPUT   = out/$(basename $(notdir $(DEVICE))).html
-# Those of this environment's Python; another's stay.
-DROP_KERNELS = find src -name "*.$$($(BIN)/python -c 'import sys; print("py%d%d" % sys.version_info[:2])')*.nb?" -delete
 
 # Relative on purpose: pip splits this variable at blanks, and a folder's name may hold one.
 # Newer releases of pip read the second for the build backend, older ones the first.
@@ -30,7 +29,7 @@ export PIP_CONSTRAINT := $(CONSTRAINTS)
 export PIP_BUILD_CONSTRAINT := $(CONSTRAINTS)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help report test older-processor record structure slow lint bench bench-pairs docs clean
+.PHONY: help report test older-processor record structure slow lint compile-check bench bench-pairs wheel docs clean
 
 help:
 	@echo 'make report   the report on a device (DEVICE=$(DEVICE)), into $(OUTPUT)'
@@ -40,23 +39,22 @@ help:
 	@echo 'make structure  files, lines, import circles and names of two commits beside each other: BASE, NEW'
 	@echo 'make slow     the longer studies, or those in TESTS=...: thousands of random loops'
 	@echo 'make lint     style and types'
+	@echo 'make compile-check  how many kernels are compiled at first use, against what is allowed'
 	@echo 'make bench    how fast, beside what a competent user would write otherwise'
 	@echo 'make bench-pairs  our own part of it at two commits in turn: BASE, and NEW or what is here'
+	@echo 'make wheel    a wheel in dist/ that carries compiled kernels, for this Python and platform'
 	@echo 'make docs     write the generated pages and pictures of docs/ again'
 	@echo 'make clean    remove what was made, all but $(VENV)'
 
-report: $(VENV)/.installed
+report: $(VENV)/.kernels
 	@mkdir -p $(dir $(OUTPUT))
 	$(BIN)/zwidth report $(DEVICE) --output $(OUTPUT)
 
 # Each worker takes its tests as they stand, so that what a file's tests share is computed once.
-test: $(VENV)/.kernels
+test: $(VENV)/.installed-test $(VENV)/.kernels
 	$(BIN)/python -m pytest -n auto --dist worksteal $(TESTS)
 
-# Kernels for the older processor only: those for this one are compiled again by whoever wants them next.
 older-processor: $(VENV)/.installed-test
-	@$(DROP_KERNELS)
-	@rm -f $(VENV)/.kernels
 	$(BIN)/python tests/older_processor.py AVX2 -n auto --dist worksteal $(or $(TESTS),$(NUMERICAL))
 
 record: $(VENV)/.installed-test
@@ -65,7 +63,7 @@ record: $(VENV)/.installed-test
 structure: $(VENV)/bin/python
 	$(BIN)/python -m tests.structure $(BASE) $(NEW)
 
-slow: $(VENV)/.kernels
+slow: $(VENV)/.installed-test $(VENV)/.kernels
 	$(BIN)/python -m pytest -n auto --dist worksteal -m slow $(TESTS)
 
 lint: $(VENV)/.installed-test
@@ -75,12 +73,20 @@ lint: $(VENV)/.installed-test
 	$(BIN)/stubtest zwidth --mypy-config-file pyproject.toml --concise \
 	    --allowlist tests/stubtest_allowed.txt --ignore-unused-allowlist
 
-bench: $(VENV)/.kernels
+# No more may be compiled at first use than a number in the script allows.
+compile-check: $(VENV)/.installed-test
+	PYTHONPATH=. $(BIN)/python benchmarks/_compiling.py --check
+
+bench: $(VENV)/.installed-test $(VENV)/.kernels
 	@set -e; for script in benchmarks/[!_]*.py; do echo "== $$script"; $(BIN)/python "$$script"; done
 
 bench-pairs: $(VENV)/.installed-test
 	$(BIN)/python -m benchmarks._pairs $(if $(filter file,$(origin BASE)),,--base $(BASE)) \
 	  $(if $(NEW),--new $(NEW)) $(PAIRS)
+
+# For this Python and this platform, with the machine code of all kernels: nothing is compiled at first use.
+wheel: $(VENV)/.installed
+	$(BIN)/python tools/build_wheel.py dist
 
 docs: $(VENV)/.installed-test
 	@set -e; for script in docs/[!_]*.py; do echo "== $$script"; $(BIN)/python "$$script"; done
@@ -99,11 +105,9 @@ $(VENV)/.installed-test: $(VENV)/bin/python pyproject.toml $(CONSTRAINTS)
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	@touch $(VENV)/.installed $@
 
-# A cached kernel does not notice an edit in a function that it calls from another file: after any edit all are
-# dropped and, once for all workers, compiled anew.
-$(VENV)/.kernels: $(VENV)/.installed-test tests/compile_kernels.py $(shell find src -name '*.py' 2>/dev/null)
-	@$(DROP_KERNELS)
-	@$(BIN)/python tests/compile_kernels.py
+# All kernels at once, for this processor; machine code whose sources are unchanged is kept.
+$(VENV)/.kernels: $(VENV)/.installed $(shell find src -name '*.py' 2>/dev/null)
+	@$(BIN)/zwidth compile
 	@touch $@
 
 # The first interpreter of PYTHON that is new enough; venv, else virtualenv, else one sentence.

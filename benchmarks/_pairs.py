@@ -6,7 +6,7 @@
 
 Each commit runs its own scripts on its own sources, so that a case may be written otherwise where the interface
 has changed. Its name must stay, and its answer is compared, so that both do the same work. A commit from before
-`benchmarks/_own.py` runs the scripts of the first commit that has it. Sources lie where the frozen record keeps
+`benchmarks/_cases.py` runs the scripts of the first commit that has it. Sources lie where the frozen record keeps
 them, with the kernels compiled from them; scripts in `out/pairs/`.
 
 Every case runs once on each side, for its kernels to be compiled. Then, for each pair and script, a fresh process
@@ -35,17 +35,17 @@ from typing import Any
 
 from benchmarks._timing import machine, print_table, seconds
 from tests import revisions
-from tests.frozen.commits import side as sources_of
+from tests.frozen.commits import commit_sources as sources_of
 
 LIMIT = 1.10
 PAIRS = 15
 SAME_ANSWER = 1e-6  # relative
 ENDED = {"error": "the process has ended"}
-STATES_CASES = "benchmarks/_own.py"
+STATES_CASES = ("benchmarks/_cases.py", "benchmarks/_own.py")  # the second is its name in older commits
 
 
 @dataclass(frozen=True)
-class Side:
+class CommitBenchmarks:
     """One of the two commits: where its sources and its benchmarks are."""
 
     label: str
@@ -56,7 +56,8 @@ class Side:
     def scripts(self) -> list[str]:
         """Names of the scripts that state cases of their own."""
         files = sorted((self.folder / "benchmarks").glob("[!_]*.py"))
-        return [path.stem for path in files if "benchmarks._own" in path.read_text(encoding="utf-8")]
+        modules = [file.removesuffix(".py").replace("/", ".") for file in STATES_CASES]
+        return [path.stem for path in files if any(name in path.read_text(encoding="utf-8") for name in modules)]
 
 
 @dataclass
@@ -78,7 +79,7 @@ class Timing:
 Timings = dict[str, Timing]
 
 
-class Worker:
+class TimingWorker:
     """A process of one side that times the cases of one script on request; no cases where it could not start."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
@@ -98,7 +99,7 @@ class Worker:
 
 
 @contextmanager
-def worker(side: Side, script: str) -> Iterator[Worker]:
+def worker(side: CommitBenchmarks, script: str) -> Iterator[TimingWorker]:
     """A fresh process, which ends with the block."""
     command = [sys.executable, str(side.folder / "benchmarks" / f"{script}.py"), "--ours", "--on-request"]
     environment = os.environ | {"PYTHONPATH": str(side.sources)}
@@ -107,14 +108,14 @@ def worker(side: Side, script: str) -> Iterator[Worker]:
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen(command, cwd=side.folder, env=environment, text=True, **pipes) as process:
         try:
-            yield Worker(process)
+            yield TimingWorker(process)
         finally:
             process.kill()
             with suppress(BrokenPipeError):  # a request that it did not live to read
                 process.communicate()
 
 
-def side_of(label: str, new: str) -> Side:
+def commit_benchmarks(label: str, new: str) -> CommitBenchmarks:
     """One side, exported where it is not yet; new: the label of the new side, where scripts are looked for."""
     tree = revisions.tree_of(label)
     benchmarks = tree if _states_cases(tree) else revisions.tree_of(_first_with_cases(new))
@@ -122,31 +123,31 @@ def side_of(label: str, new: str) -> Side:
     name = "-".join(revisions.git("rev-parse", f"{of}:{path}")[:12] for path, of in parts.items())
     folder = revisions.ROOT / "out" / "pairs" / name
     revisions.export(parts, folder)
-    return Side(label, sources_of(label, ()).folder / "src", folder)
+    return CommitBenchmarks(label, sources_of(label, ()).folder / "src", folder)
 
 
 def _states_cases(tree: str) -> bool:
-    return bool(revisions.git("ls-tree", "--name-only", tree, STATES_CASES))
+    return bool(revisions.git("ls-tree", "--name-only", tree, *STATES_CASES))
 
 
 def _first_with_cases(new: str) -> str:
     """The first commit whose scripts state cases; the new side itself where none is committed."""
     start = "HEAD" if new == revisions.WORKING_TREE else new
-    added = revisions.git("log", "--reverse", "--diff-filter=A", "--format=%H", start, "--", STATES_CASES)
+    added = revisions.git("log", "--reverse", "--diff-filter=A", "--format=%H", start, "--", *STATES_CASES)
     return added.split("\n")[0] or new
 
 
-def warm_up(both: tuple[Side, Side], patterns: list[str]) -> Timings:
+def warm_up(both: tuple[CommitBenchmarks, CommitBenchmarks], patterns: list[str]) -> Timings:
     """Run every case once on each side; returns the cases, with the faults of those that have any."""
 
-    def answers(side: Side) -> dict[str, dict[str, Any]]:
+    def answers(side: CommitBenchmarks) -> dict[str, dict[str, Any]]:
         found = {}
         for script in side.scripts:
             with worker(side, script) as process:
                 for case in process.cases:
                     name = f"{script}: {case}"
-                    if wanted(name, patterns):
-                        say(f"warm-up of {side.label}: {name}")
+                    if is_selected(name, patterns):
+                        print_progress(f"warm-up of {side.label}: {name}")
                         found[name] = process.time(case)
         return found
 
@@ -168,7 +169,7 @@ def fault(base: dict[str, Any] | None, new: dict[str, Any] | None) -> str:
     return ""
 
 
-def time_pairs(both: tuple[Side, Side], timings: Timings, pairs: int) -> None:
+def time_pairs(both: tuple[CommitBenchmarks, CommitBenchmarks], timings: Timings, pairs: int) -> None:
     """Time all cases without a fault on both sides, pair by pair."""
     scripts: dict[str, list[str]] = {}
     for name, timing in timings.items():
@@ -177,7 +178,7 @@ def time_pairs(both: tuple[Side, Side], timings: Timings, pairs: int) -> None:
             scripts.setdefault(script, []).append(case)
     for pair in range(pairs):
         for script, cases in scripts.items():
-            say(f"pair {pair + 1} of {pairs}: {script}")
+            print_progress(f"pair {pair + 1} of {pairs}: {script}")
             with ExitStack() as stack, ThreadPoolExecutor(2) as pool:
                 # started together: loading takes longer than most cases
                 start = partial(_started, stack, script)
@@ -186,11 +187,11 @@ def time_pairs(both: tuple[Side, Side], timings: Timings, pairs: int) -> None:
                     _time_pair(timings[f"{script}: {case}"], base, new, case, new_first=pair % 2 == 1)
 
 
-def _started(stack: ExitStack, script: str, side: Side) -> Worker:
+def _started(stack: ExitStack, script: str, side: CommitBenchmarks) -> TimingWorker:
     return stack.enter_context(worker(side, script))
 
 
-def _time_pair(timing: Timing, base: Worker, new: Worker, case: str, new_first: bool) -> None:
+def _time_pair(timing: Timing, base: TimingWorker, new: TimingWorker, case: str, new_first: bool) -> None:
     """One pair of one case; a case that fails on the way has a fault and no times."""
     if timing.fault:
         return
@@ -225,12 +226,12 @@ def document(timings: Timings) -> dict[str, object]:
     }
 
 
-def wanted(name: str, patterns: list[str]) -> bool:
+def is_selected(name: str, patterns: list[str]) -> bool:
     """Is a case among those that were asked for?"""
     return not patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
-def say(line: str) -> None:
+def print_progress(line: str) -> None:
     """A line of progress."""
     print(line, file=sys.stderr, flush=True)
 
@@ -258,7 +259,7 @@ def main(words: list[str] | None = None) -> int:
     asked = options(words)
     head = "HEAD" if asked.new == revisions.WORKING_TREE else asked.new
     base = asked.base or revisions.git("merge-base", "main", head)
-    both = side_of(base, asked.new), side_of(asked.new, asked.new)
+    both = commit_benchmarks(base, asked.new), commit_benchmarks(asked.new, asked.new)
     timings = warm_up(both, asked.only)
     time_pairs(both, timings, asked.pairs)
     rows = [row(name, timing, asked.limit) for name, timing in timings.items()]

@@ -11,7 +11,7 @@ from numba import njit, prange
 from zwidth.model.plant import Plant
 
 
-def held(plant: Plant, period: float):
+def held_force_step(plant: Plant, period: float):
     """Transition matrix (2n, 2n) and input (2n,) of [x, v] over one period of a held force."""
     from scipy.linalg import expm
 
@@ -31,7 +31,7 @@ def by_eigenvalues(plant: Plant, period: float, K, B, chunk: int = 50_000):
     Z = [x, v, y_{j-1}]; the plant is discretised once, the walls enter the matrices by broadcasting.
     """
     n = plant.size
-    free, push = held(plant, period)
+    free, push = held_force_step(plant, period)
     L0 = np.zeros((2 * n + 1, 2 * n + 1))
     L0[:-1, :-1] = free
     L0[-1, :n] = plant.sensor

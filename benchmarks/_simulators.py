@@ -13,7 +13,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Bench:
+class TwoMassDevice:
     """link, motor [kg]; drive stiffness [N/m] and damping [N s/m]; friction, limit [N]; step [m]; period [s]."""
 
     link: float
@@ -30,12 +30,12 @@ class Bench:
         asked = -(K * reading + B * (reading - before) / self.period)
         return min(max(asked, -self.limit), self.limit)
 
-    def counted(self, place: float) -> float:
+    def quantised(self, place: float) -> float:
         """The encoder."""
         return self.step * floor(place / self.step + 0.5)
 
 
-def by_mujoco(bench: Bench, K: float, B: float, start: float, samples: int, substeps: int = 20):
+def by_mujoco(bench: TwoMassDevice, K: float, B: float, start: float, samples: int, substeps: int = 20):
     """Readings of the motor (samples,), and the seconds it took to step.
 
     The link rides on the motor, on a slide joint that has the drive's spring and damper; friction is the joint's
@@ -72,18 +72,18 @@ def by_mujoco(bench: Bench, K: float, B: float, start: float, samples: int, subs
     data.qpos[0] = start
     readings = np.empty(samples)
     place, control = data.qpos, data.ctrl
-    before = bench.counted(start)
+    before = bench.quantised(start)
     begun = perf_counter()
     for j in range(samples):
         readings[j] = place[0]
-        reading = bench.counted(place[0])
+        reading = bench.quantised(place[0])
         control[0] = bench.force(reading, before, K, B)
         before = reading
         mujoco.mj_step(model, data, nstep=substeps)
     return readings, perf_counter() - begun
 
 
-def by_events(bench: Bench, K: float, B: float, start: float, samples: int):
+def by_events(bench: TwoMassDevice, K: float, B: float, start: float, samples: int):
     """The same by scipy's solve_ivp, from one change between sticking and sliding to the next."""
     from time import perf_counter
 
@@ -109,12 +109,12 @@ def by_events(bench: Bench, K: float, B: float, start: float, samples: int):
 
     stops.terminal, stops.direction = True, -1.0
     starts.terminal, starts.direction = True, -1.0
-    s, before = np.array([start, start, 0.0, 0.0]), bench.counted(start)
+    s, before = np.array([start, start, 0.0, 0.0]), bench.quantised(start)
     readings = np.empty(samples)
     begun = perf_counter()
     for j in range(samples):
         readings[j] = s[1]
-        reading = bench.counted(s[1])
+        reading = bench.quantised(s[1])
         force = bench.force(reading, before, K, B)
         before, t, forced = reading, 0.0, 0.0
         while t < bench.period:

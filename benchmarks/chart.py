@@ -18,7 +18,7 @@ import shapely
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks._own import Case, Cases, run
+from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._peers import by_eigenvalues, by_jury, by_python_control
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.chart.chart import StabilityChart, boundary_points, stability_chart
@@ -72,7 +72,7 @@ def boundary_error(loop: Loop, count: int) -> float:
     return float(np.abs(z - on_circle[:, None]).min(axis=1).max())
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """The chart with all its numbers; points of the boundary, of a loop already discretised and of a new one."""
     known = fresh_loop()
     plant, controller = known.plant, known.controller
@@ -81,9 +81,9 @@ def own() -> Cases:
         return np.ptp(boundary_points(loop, 1000)[2])
 
     return {
-        "exact chart, all its numbers": Case(lambda: stability_chart(Loop(plant, controller)).stiffness_max),
-        "1000 boundary points": Case(lambda: points(known)),
-        "1000 boundary points, discretising the plant first": Case(lambda: points(Loop(plant, controller))),
+        "exact chart, all its numbers": TimedCase(lambda: stability_chart(Loop(plant, controller)).stiffness_max),
+        "1000 boundary points": TimedCase(lambda: points(known)),
+        "1000 boundary points, discretising the plant first": TimedCase(lambda: points(Loop(plant, controller))),
     }
 
 
@@ -161,4 +161,4 @@ def verdict(value: float, limit: float) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

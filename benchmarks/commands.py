@@ -11,7 +11,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks._own import Case, Cases, run
+from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, median_time, print_table, seconds
 
 ZWIDTH = Path(sys.executable).with_name("zwidth")
@@ -29,10 +29,10 @@ def run_command(line: tuple[str, ...]) -> subprocess.CompletedProcess[bytes]:
     return subprocess.run([ZWIDTH, *line], stdout=subprocess.DEVNULL, check=True)
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """The same commands; each call starts a process, which nothing in this one can warm."""
     return {
-        f"zwidth {' '.join(line)}": Case(lambda line=line: run_command(line).returncode, warm=lambda: None)
+        f"zwidth {' '.join(line)}": TimedCase(lambda line=line: run_command(line).returncode, warm=lambda: None)
         for line in TARGETS
     }
 
@@ -50,4 +50,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import zwidth
-from benchmarks._own import Case, Cases, run
+from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.loop.loop import Loop
 from zwidth.model.posture import solve_posture
@@ -34,7 +34,7 @@ NUMBERS: dict[str, Callable[[int], float]] = {
 }
 
 
-def place(n: int) -> tuple[float, float]:
+def handle_position(n: int) -> tuple[float, float]:
     """A handle position of the n-th call [m]."""
     return 0.02 + 1e-9 * n, 0.24
 
@@ -58,15 +58,15 @@ def row(what: str, ours: Callable[[int], Any], other: Callable[[int], Any]) -> t
     return what, seconds(here), seconds(there), f"{there / here:.1f}", seconds(TARGET), verdict
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """The same, each call with a number or a position of its own."""
     numbers = count(1)
 
-    def change(key: str, value: Callable[[int], float]) -> Case:
-        return Case(lambda n: DEVICE.with_({key: value(n)}).controller.delay, numbers.__next__)
+    def change(key: str, value: Callable[[int], float]) -> TimedCase:
+        return TimedCase(lambda n: DEVICE.with_({key: value(n)}).controller.delay, numbers.__next__)
 
     changes = {f"with_ {key}": change(key, value) for key, value in NUMBERS.items()}
-    there = Case(lambda n: len(DEVICE.at(place(n), (0.0, 1.0)).loop.plant.mass), numbers.__next__)
+    there = TimedCase(lambda n: len(DEVICE.at(handle_position(n), (0.0, 1.0)).loop.plant.mass), numbers.__next__)
     return changes | {"an operating point and its loop": there}
 
 
@@ -85,20 +85,24 @@ def main() -> None:
         charts = [device.chart().stiffness_max for device in (changed(0), loaded(0))]
         assert charts[0] == charts[1]
         rows.append(row(f"with_ {key}", changed, loaded))
-    point = DEVICE.at(place(0), (0.0, 1.0))
-    assert point.chart().stiffness_max == loop_by_hand(place(0)).chart().stiffness_max
+    point = DEVICE.at(handle_position(0), (0.0, 1.0))
+    assert point.chart().stiffness_max == loop_by_hand(handle_position(0)).chart().stiffness_max
     rows.append(
-        row("at(position, direction)", lambda n: DEVICE.at(place(n), (0.0, 1.0)), lambda n: loop_by_hand(place(n)))
+        row(
+            "at(position, direction)",
+            lambda n: DEVICE.at(handle_position(n), (0.0, 1.0)),
+            lambda n: loop_by_hand(handle_position(n)),
+        )
     )
     rows.append(
         row(
             "at(position, direction).loop",
-            lambda n: DEVICE.at(place(n), (0.0, 1.0)).loop,
-            lambda n: loop_by_hand(place(n)),
+            lambda n: DEVICE.at(handle_position(n), (0.0, 1.0)).loop,
+            lambda n: loop_by_hand(handle_position(n)),
         )
     )
     print_table(("what", "ours", "by hand", "ratio", "target", "verdict"), rows)
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

@@ -20,14 +20,14 @@ from scipy.optimize import minimize_scalar
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks._own import Case, Cases, run
+from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.polar import circle, largest_stiffness_by_direction
 from zwidth.chart.several_directions.chart import multi_chart
 from zwidth.device.load import load
 from zwidth.loop.loop import Loop
-from zwidth.loop.multi import MultiLoop
+from zwidth.loop.multi_loop import MultiLoop
 from zwidth.model.plant import Plant
 
 COUNT = 72
@@ -67,7 +67,7 @@ def by_bisection(plant: Plant, period: float) -> float:
     return float(-found.fun)
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """All directions at once, different ones and pairs; one by one; the chart of one law over the plane."""
     device = load("five-bar")
     point, controller = device.at(), device.controller
@@ -81,10 +81,12 @@ def own() -> Cases:
     half, full = circle(2 * COUNT)[:COUNT], circle(COUNT)
     plane = device.at(directions=np.eye(3)[:2]).plant_of_directions
     return {
-        "72 different directions": Case(lambda: together(half)),
-        "72 directions over a full turn": Case(lambda: together(full)),
-        "72 different directions, one by one": Case(lambda: one_by_one(half)),
-        "chart of one law over the plane": Case(lambda: multi_chart(MultiLoop(plane, controller)).stiffness_max),
+        "72 different directions": TimedCase(lambda: together(half)),
+        "72 directions over a full turn": TimedCase(lambda: together(full)),
+        "72 different directions, one by one": TimedCase(lambda: one_by_one(half)),
+        "chart of one law over the plane": TimedCase(
+            lambda: multi_chart(MultiLoop(plane, controller)).stiffness_max
+        ),
     }
 
 
@@ -132,4 +134,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks._own import Case, Cases, run
+from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.device.load import load
@@ -57,10 +57,11 @@ def loops() -> dict[str, tuple[Plant, Controller]]:
     }
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """The chart of each loop."""
     return {
-        name: Case(lambda loop=loop: stability_chart(Loop(*loop)).stiffness_max) for name, loop in loops().items()
+        name: TimedCase(lambda loop=loop: stability_chart(Loop(*loop)).stiffness_max)
+        for name, loop in loops().items()
     }
 
 
@@ -108,4 +109,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

@@ -22,14 +22,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks._own import Case, Cases, run
-from benchmarks._peers import held
+from benchmarks._cases import Cases, TimedCase, run
+from benchmarks._peers import held_force_step
 from benchmarks._timing import machine, median_time, print_table, seconds
 from zwidth.device.device import Device
 from zwidth.device.load import load
 from zwidth.measures.catalogue import find_measure
+from zwidth.measures.definition import OK, MeasureValues
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.measure import OK, Measured
 from zwidth.model.plant import Plant
 
 SIZES = (50, 100, 200, 400)
@@ -46,12 +46,12 @@ def positions(count: int) -> np.ndarray:
     return np.stack([x, y, np.zeros_like(x)], axis=-1)
 
 
-def stiffness_map(device: Device, at: np.ndarray) -> Measured:
+def stiffness_map(device: Device, at: np.ndarray) -> MeasureValues:
     """Ours: postures, modes, stiffest walls."""
     return evaluate(find_measure("stiffness_max"), device.at(at))
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """Maps up to the size that is wanted; the largest takes too long to be repeated often."""
     device = load("five-bar")
 
@@ -60,13 +60,13 @@ def own() -> Cases:
         return found.values[found.status == OK].mean()
 
     grids = {size: positions(size) for size in SIZES if size <= WANTED}
-    return {f"map of {size} x {size}": Case(lambda at=at: mean(at)) for size, at in grids.items()}
+    return {f"map of {size} x {size}": TimedCase(lambda at=at: mean(at)) for size, at in grids.items()}
 
 
 def by_bisection(plant: Plant, period: float) -> float:
     """The peer: the largest K over dampings B, each K by bisection on eigenvalues."""
     n = plant.size
-    free, push = held(plant, period)
+    free, push = held_force_step(plant, period)
     # motions along the wall are free whatever the wall: a double root z = 1 each, which rounding splits by 1e-8
     along = n - 2
 
@@ -95,7 +95,7 @@ def by_bisection(plant: Plant, period: float) -> float:
     return float(K.max())
 
 
-def peer(device: Device, at: np.ndarray, ours: Measured) -> tuple[float, float]:
+def peer(device: Device, at: np.ndarray, ours: MeasureValues) -> tuple[float, float]:
     """Seconds per cell of the peer, and the largest difference from ours, in shares, over some cells."""
     cells = np.argwhere(ours.status == OK)
     chosen = cells[np.linspace(0, len(cells) - 1, SAMPLE).astype(int)]
@@ -137,4 +137,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

@@ -25,8 +25,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "model"))
 
 from model_cases import five_bar, two_bar_angles
 
-from benchmarks._own import Case, Cases, run
-from zwidth.model.effective import effective_parameters
+from benchmarks._cases import Cases, TimedCase, run
+from zwidth.model.effective_parameters import effective_parameters
 from zwidth.model.posture import OK, solve_posture
 
 POSTURES, ENGINE_POSTURES, ROUNDS, TARGET_US = 100_000, 2_000, 7, 2.0
@@ -50,10 +50,10 @@ def this_engine(at):
     return np.stack([found.link_side_mass, found.motor_side_mass, found.stiffness], axis=-1)
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """All postures in one call."""
     at = positions(POSTURES)
-    return {f"{POSTURES} postures": Case(lambda: this_engine(at).mean())}
+    return {f"{POSTURES} postures": TimedCase(lambda: this_engine(at).mean())}
 
 
 def angles_of(at):
@@ -188,4 +188,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

@@ -19,7 +19,7 @@ import shapely
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks._own import Case, Cases, run
+from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.robust.chart import robust_chart
@@ -41,13 +41,13 @@ def loops(count: int = MEMBERS) -> list[Loop]:
     return [Loop(attach(device.at().plant, operator), device.controller) for operator in operators[:count]]
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """The robust chart, each time of new loops."""
 
     def chart(members: list[Loop]) -> float:
         return robust_chart(members).stiffness_max
 
-    return {f"robust chart of {MEMBERS} members": Case(chart, fresh=loops, warm=lambda: chart(loops(10)))}
+    return {f"robust chart of {MEMBERS} members": TimedCase(chart, fresh=loops, warm=lambda: chart(loops(10)))}
 
 
 def by_grid(members: list[Loop], K, B) -> np.ndarray:
@@ -58,7 +58,7 @@ def by_grid(members: list[Loop], K, B) -> np.ndarray:
     return stable
 
 
-def timed(call) -> tuple[float, object]:
+def time_call(call) -> tuple[float, object]:
     start = perf_counter()
     result = call()
     return perf_counter() - start, result
@@ -68,14 +68,14 @@ def main() -> None:
     print(machine("numpy", "numba", "shapely"))
     robust_chart(loops()[:10])
     stability_chart(loops()[0])
-    tries = [timed(partial(robust_chart, loops())) for _ in range(3)]
+    tries = [time_call(partial(robust_chart, loops())) for _ in range(3)]
     ours, chart = min(tries, key=lambda one: one[0])
     members = loops()
-    charts, _ = timed(lambda: [stability_chart(loop) for loop in members[:200]])
+    charts, _ = time_call(lambda: [stability_chart(loop) for loop in members[:200]])
     charts *= MEMBERS / 200
     K, B = np.linspace(0.0, 1.1 * chart.stiffness_max, GRID), np.linspace(0.0, 1.1 * chart.damping_max, GRID)
     some = loops()[:GRIDDED]
-    grid, stable = timed(lambda: by_grid(some, K, B[:, None]))
+    grid, stable = time_call(lambda: by_grid(some, K, B[:, None]))
     grid *= MEMBERS / GRIDDED
     apart = disagreement(robust_chart(some), K, B, stable)
     print_table(
@@ -105,4 +105,4 @@ def disagreement(chart, K, B, stable) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

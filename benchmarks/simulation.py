@@ -21,8 +21,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks._own import Case, Cases, run
-from benchmarks._simulators import Bench, by_events, by_mujoco
+from benchmarks._cases import Cases, TimedCase, run
+from benchmarks._simulators import TwoMassDevice, by_events, by_mujoco
 from benchmarks._timing import machine, print_table, seconds
 from zwidth.contact.environments import wall
 from zwidth.contact.simulate import Run, simulate_batch
@@ -34,7 +34,7 @@ STIFFNESS, DAMPING, START, SUBSTEPS = 6000.0, 12.0, 0.003, 20
 FRICTION, STEP, LIMIT = 0.1, 1e-5, 20.0
 
 
-def prepared() -> tuple[Loop, Bench]:
+def loop_and_device() -> tuple[Loop, TwoMassDevice]:
     """The device for us and for the others."""
     device = load("published-two-mass")
     plant, controller = device.at().plant, device.controller
@@ -43,7 +43,7 @@ def prepared() -> tuple[Loop, Bench]:
     motor = int(np.argmax(plant.actuator))
     damping = -plant.damping[0, 1]
     numbers = (masses[1 - motor], masses[motor], stiffness, damping, FRICTION, STEP, LIMIT)
-    return Loop(replace(plant, nonlinear=rough), controller), Bench(
+    return Loop(replace(plant, nonlinear=rough), controller), TwoMassDevice(
         *map(float, numbers), controller.sampling_period
     )
 
@@ -55,7 +55,7 @@ def simulated(loop: Loop, duration: float, walls: int = 1):
     return simulate_batch(runs, wall, duration=duration, substeps=SUBSTEPS)
 
 
-def ours(loop: Loop, duration: float, walls: int = 1, repeats: int = 7):
+def time_zwidth(loop: Loop, duration: float, walls: int = 1, repeats: int = 7):
     """Readings of the first run, and the median seconds."""
     times = []
     for _ in range(repeats + 1):
@@ -65,9 +65,9 @@ def ours(loop: Loop, duration: float, walls: int = 1, repeats: int = 7):
     return found[0].truth, median(times[1:])
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """A minute on one core, and a thousand walls on all."""
-    loop, _ = prepared()
+    loop, _ = loop_and_device()
 
     def on_one_core() -> float:
         numba.set_num_threads(1)
@@ -77,32 +77,34 @@ def own() -> Cases:
             numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
 
     return {
-        "a minute on one core": Case(on_one_core),
-        "1000 walls for 2 s": Case(lambda: sum(response.truth.size for response in simulated(loop, 2.0, 1000))),
+        "a minute on one core": TimedCase(on_one_core),
+        "1000 walls for 2 s": TimedCase(
+            lambda: sum(response.truth.size for response in simulated(loop, 2.0, 1000))
+        ),
     }
 
 
-def swing(readings: np.ndarray, period: float) -> str:
+def rms_text(readings: np.ndarray, period: float) -> str:
     """Root mean square from 0.05 s to 0.25 s, in micrometres."""
     part = readings[round(0.05 / period) : round(0.25 / period)]
     return f"{1e6 * np.sqrt(np.mean(part**2)):.4g} µm"
 
 
-def simulators() -> tuple[list[tuple[str, ...]], list[str]]:
+def simulator_rows() -> tuple[list[tuple[str, ...]], list[str]]:
     """Rows of the table, and what follows from it."""
-    loop, bench = prepared()
+    loop, bench = loop_and_device()
     T = bench.period
     numba.set_num_threads(1)
-    fine, mine = ours(loop, 60.0)
+    fine, mine = time_zwidth(loop, 60.0)
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     readings, muj = by_mujoco(bench, STIFFNESS, DAMPING, START, round(4.0 / T), SUBSTEPS)
     located, ode = by_events(bench, STIFFNESS, DAMPING, START, round(0.5 / T))
-    _, batch = ours(loop, 2.0, 1000, 3)
+    _, batch = time_zwidth(loop, 2.0, 1000, 3)
     cores = numba.get_num_threads()
     found = [
-        ("zwidth, one core", 60.0, mine, swing(fine, T)),
-        ("MuJoCo, the same step", 4.0, muj, swing(readings, T)),
-        ("solve_ivp with events", 0.5, ode, swing(located, T)),
+        ("zwidth, one core", 60.0, mine, rms_text(fine, T)),
+        ("MuJoCo, the same step", 4.0, muj, rms_text(readings, T)),
+        ("solve_ivp with events", 0.5, ode, rms_text(located, T)),
         (f"zwidth, 1000 walls, {cores} core{'s' * (cores > 1)}", 2000.0, batch, ""),
     ]
     rows = [
@@ -126,7 +128,7 @@ def simulators() -> tuple[list[tuple[str, ...]], list[str]]:
 
 def main() -> None:
     print(machine("numpy", "numba", "scipy", "mujoco"))
-    rows, says = simulators()
+    rows, says = simulator_rows()
     head = ("simulator", "simulated", "took", "times real time", "time to ours", "rms motion, 0.05 to 0.25 s")
     print_table(head, rows)
     print("\n".join(says))
@@ -136,4 +138,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

@@ -11,9 +11,9 @@ from time import perf_counter
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks._own import Case, Cases, run
+from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds
-from zwidth.contact.bench import Bench, observe
+from zwidth.contact.stability_trial import StabilityTrial, observe
 from zwidth.device.load import load
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.study.experiment import measure_boundary
@@ -22,11 +22,11 @@ from zwidth.study.experiment_plan import Plan
 TARGET = 10.0  # s
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """Some of the points; the search for the stable walls, which takes longest, is the same."""
     point, plan = published(), Plan(stiffnesses=4, tips=2)
     return {
-        "10 boundary points, two-sided": Case(
+        "10 boundary points, two-sided": TimedCase(
             lambda: len(measure_boundary(point, plan).points), warm=lambda: warm_up(point)
         )
     }
@@ -39,7 +39,7 @@ def published() -> OperatingPoint:
 
 def warm_up(point: OperatingPoint) -> None:
     """Compile or load what an experiment runs."""
-    observe(Bench(point.loop), [[1000.0, 5.0]])
+    observe(StabilityTrial(point.loop), [[1000.0, 5.0]])
 
 
 def experiment() -> list[tuple[str, ...]]:
@@ -65,4 +65,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

@@ -22,23 +22,23 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+from contact.five_bar_reference import reference_motion as reference_of
 from contact.mechanism_cases import (
     motion_of,
-    sampled,
+    sampled_controller,
     uncoupled_five_bar,
     with_drives,
     with_friction,
 )
-from contact.mechanism_judge import judged
 
-from benchmarks._own import Case, Cases, run
+from benchmarks._cases import Cases, TimedCase, run
 from zwidth.contact.mechanism.surfaces import Plane
 from zwidth.contact.mechanism.walls import SurfaceWall
 from zwidth.model.damping import ModalDamping
 
 PERIOD, SAMPLES, ALLOWED, TARGET, ROUNDS = 1.25e-3, 400, 1e-6, 20.0, 15
 STEPS = (8, 4, 2, 1)
-FIVE_BAR, DAMPED, CONTROLLER = uncoupled_five_bar(), ModalDamping(0.05), sampled(PERIOD, delay=1.0)
+FIVE_BAR, DAMPED, CONTROLLER = uncoupled_five_bar(), ModalDamping(0.05), sampled_controller(PERIOD, delay=1.0)
 WALL, NORMAL, POINT = SurfaceWall(1500.0, 3.0), np.array([0.1, -1.0]) / np.hypot(0.1, 1.0), np.array([0.0, 0.265])
 PUSH, GRAVITY, START = np.array([0.1, 1.5]), np.array([0.1, -0.5]), (0.0, 0.25)
 
@@ -61,38 +61,38 @@ def real_time_factor(mechanism, substeps):
     return float(found.time[-1]) / min(times)
 
 
-def own() -> Cases:
+def cases() -> Cases:
     """The motion at each step, and with friction and counts."""
 
     def depth(mechanism, substeps) -> float:
         return motion(mechanism, substeps).depth.max()
 
-    everything = rough_five_bar()
+    everything = five_bar_with_friction()
     return {
-        **{f"{n} steps a sample": Case(lambda n=n: depth(FIVE_BAR, n)) for n in STEPS},
-        "with friction and counts, 4 steps a sample": Case(lambda: len(motion(everything, 4).time)),
+        **{f"{n} steps a sample": TimedCase(lambda n=n: depth(FIVE_BAR, n)) for n in STEPS},
+        "with friction and counts, 4 steps a sample": TimedCase(lambda: len(motion(everything, 4).time)),
     }
 
 
-def rough_five_bar():
+def five_bar_with_friction():
     """The five-bar with friction and encoder counts."""
     return with_friction(with_drives(FIVE_BAR, encoder_counts=4000.0), 1e-3)
 
 
-def truth():
+def five_bar_motion():
     """The judge's handle at all samples, (k, 2), and the seconds it took."""
 
     def surface(x):
         return -(x - POINT) @ NORMAL, NORMAL
 
     start = time.process_time()
-    handle = judged(FIVE_BAR, DAMPED, CONTROLLER, WALL, surface, PUSH, SAMPLES, GRAVITY, START)
+    handle = reference_of(FIVE_BAR, DAMPED, CONTROLLER, WALL, surface, PUSH, SAMPLES, GRAVITY, START)
     return handle, time.process_time() - start
 
 
 def rows():
     """(step, peak error [m], real-time factor) for each step; the judge's own real-time factor."""
-    handle, elapsed = truth()
+    handle, elapsed = five_bar_motion()
     found = []
     for substeps in STEPS:
         ours = motion(FIVE_BAR, substeps)
@@ -117,7 +117,7 @@ def main() -> int:
     for step, error, factor in found:
         print(f"step {step * 1e6:7.1f} us   peak error {error * 1e6:9.2e} um   {factor:6.1f} x real time")
     print(f"the judge                                   {judge:6.3f} x real time")
-    factor = real_time_factor(rough_five_bar(), 4)
+    factor = real_time_factor(five_bar_with_friction(), 4)
     print(f"with friction and counts, 4 steps a sample  {factor:6.1f} x real time")
     best = best_step(found)
     met = best is not None and best[2] >= TARGET
@@ -130,4 +130,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(run(main, own))
+    sys.exit(run(main, cases))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from docs._row import SCAN_DAMAGED, Claim, Reason, Row
+from docs._comparison_row import SCAN_DAMAGED, Claim, Reason, Row
 from gallery import chapter_4_algebra as algebra
 from gallery import damped_mass_algebra as damped
 from gallery import mass_spring_algebra as spring
@@ -10,7 +10,7 @@ from gallery import mass_spring_algebra as spring
 SAME = "the same, from the transition matrix by computer algebra"
 
 
-def derived(place: str, quantity: str, printed: str, same: bool) -> Claim:
+def derived_claim(place: str, quantity: str, printed: str, same: bool) -> Claim:
     """A formula that computer algebra derives from the transition matrix."""
     return Claim(place, quantity, printed, SAME if same else "another one", same)
 
@@ -58,13 +58,15 @@ def polynomials() -> list[Row]:
         ),
         ("(4.32)", "l = 1: edge", "4 p < −12 − d² + (2 + d) √(36 − 20 d + d²)", algebra.as_4_32),
     )
-    return [derived(*row) for row in found]
+    return [derived_claim(*row) for row in found]
 
 
 def with_friction() -> list[Row]:
     """(4.1)-(4.14)."""
     return [
-        derived("(4.1)–(4.5)", "transformed polynomial", "four coefficients μ_i in ε, β, p and d", damped.as_4_5),
+        derived_claim(
+            "(4.1)–(4.5)", "transformed polynomial", "four coefficients μ_i in ε, β, p and d", damped.as_4_5
+        ),
         Claim(
             "(4.6)–(4.8)",
             "the edge as a hyperbola",
@@ -113,7 +115,7 @@ def on_a_spring() -> list[Row]:
         ),
         ("(4.46)", "where the boundaries meet", "p = −Ω_n², d = Ω_n²/(1 − cos Ω_n)", spring.as_4_46),
     )
-    return [derived(*row) for row in found]
+    return [derived_claim(*row) for row in found]
 
 
 def on_a_smaller_circle() -> list[Row]:

@@ -5,28 +5,30 @@ from __future__ import annotations
 import numpy as np
 
 from docs import _rows_device as device
-from docs._row import MISPRINT, ROUNDED, Claim, Evidence, Number, Reason, Row
+from docs._comparison_row import MISPRINT, ROUNDED, Claim, Evidence, Number, Reason, Row
 from gallery import fig_3_7_bilateral_wall as wall
 from gallery import fig_3_8_frequencies as vibration
 from gallery import fig_3_9_no_damping as undamped
 from gallery import fig_3_11_filter as low_pass
 from gallery import fig_3_12_operator as hand
 from gallery import transition_matrices as matrices
-from gallery.brute_force import Judge, butterworth
+from gallery.brute_force import BruteForceLoop, butterworth
 from zwidth.chart.chart import StabilityChart
 
 T = wall.loop.period
 
 
-def judge_of(chart: StabilityChart, delay: int = 0, filter_of=None) -> Judge:
+def judge_of(chart: StabilityChart, delay: int = 0, filter_of=None) -> BruteForceLoop:
     """The brute-force judge of a chart's plant."""
     plant = chart.loop.plant
     low = {} if filter_of is None else {"low_pass": filter_of}
-    return Judge(plant.mass, plant.damping, plant.stiffness, plant.actuator, chart.loop.period, delay, **low)
+    return BruteForceLoop(
+        plant.mass, plant.damping, plant.stiffness, plant.actuator, chart.loop.period, delay, **low
+    )
 
 
 def chart_rows(
-    place: str, case: str, chart: StabilityChart, judge: Judge, corners=(), within_area=1e-8
+    place: str, case: str, chart: StabilityChart, judge: BruteForceLoop, corners=(), within_area=1e-8
 ) -> list[Row]:
     """Largest stiffness, its damping and frequency, largest damping and area, each beside the brute force's.
 
@@ -38,15 +40,30 @@ def chart_rows(
     d_max = judge.largest_damping(1.2 * chart.damping_max)
     smooth = len(chart.frequencies_at_stiffness_max) == 1
     hertz = chart.frequencies_at_stiffness_max[0]
-    frequency = [Number(place, f"{case}: frequency there", hertz, "Hz", judge=f, within=1e-5)] if smooth else []
+    frequency = (
+        [Number(place, f"{case}: frequency there", hertz, "Hz", second_value=f, tolerance=1e-5)] if smooth else []
+    )
     return [
-        Number(place, f"{case}: largest stiffness", chart.stiffness_max, "N/m", judge=K, digits=9),
+        Number(place, f"{case}: largest stiffness", chart.stiffness_max, "N/m", second_value=K, digits=9),
         # damping and frequency at a maximum are known to the root of the rounding only
-        Number(place, f"{case}: damping there", chart.damping_at_stiffness_max, "N s/m", judge=B, within=1e-5),
-        *frequency,
-        Number(place, f"{case}: largest damping, K → 0", chart.damping_max, "N s/m", judge=d_max, digits=8),
         Number(
-            place, f"{case}: stable area", chart.stable_area, "N² s/m²", judge=area, within=within_area, digits=9
+            place,
+            f"{case}: damping there",
+            chart.damping_at_stiffness_max,
+            "N s/m",
+            second_value=B,
+            tolerance=1e-5,
+        ),
+        *frequency,
+        Number(place, f"{case}: largest damping, K → 0", chart.damping_max, "N s/m", second_value=d_max, digits=8),
+        Number(
+            place,
+            f"{case}: stable area",
+            chart.stable_area,
+            "N² s/m²",
+            second_value=area,
+            tolerance=within_area,
+            digits=9,
         ),
     ]
 
@@ -76,18 +93,32 @@ def figure_3_7() -> list[Row]:
             ),
         ),
         *chart_rows("Fig. 3.7, (2.36)", "r_k = 0.00012 s", wall.chart, judge, (vibration.corner_stiffness,)),
-        Number("Fig. 3.7", "lower edge at 4000 N/m", wall.crossings_at_4000[0], "N s/m", judge=low, within=1e-5),
-        Number("Fig. 3.7", "upper edge at 4000 N/m", wall.crossings_at_4000[1], "N s/m", judge=high, within=1e-5),
+        Number(
+            "Fig. 3.7",
+            "lower edge at 4000 N/m",
+            wall.crossings_at_4000[0],
+            "N s/m",
+            second_value=low,
+            tolerance=1e-5,
+        ),
+        Number(
+            "Fig. 3.7",
+            "upper edge at 4000 N/m",
+            wall.crossings_at_4000[1],
+            "N s/m",
+            second_value=high,
+            tolerance=1e-5,
+        ),
         Number(
             "Fig. 3.10",
             "point E: smallest spectral radius",
             best.spectral_radius,
-            judge=rho,
-            within=1e-6,
+            second_value=rho,
+            tolerance=1e-6,
         ),
         # the radius is flat there: the wall is known less well than the radius
-        Number("Fig. 3.10", "point E: stiffness", best.stiffness, "N/m", judge=K, within=1e-4, digits=4),
-        Number("Fig. 3.10", "point E: damping", best.damping, "N s/m", judge=B, within=1e-4, digits=4),
+        Number("Fig. 3.10", "point E: stiffness", best.stiffness, "N/m", second_value=K, tolerance=1e-4, digits=4),
+        Number("Fig. 3.10", "point E: damping", best.damping, "N s/m", second_value=B, tolerance=1e-4, digits=4),
     ]
 
 
@@ -104,8 +135,10 @@ def figure_3_8() -> list[Row]:
     highest = vibration.highest_Hz
     corner = f"corner at {vibration.corner_stiffness:.1f} N/m, {vibration.corner_damping:.4f} N s/m"
     return [
-        Number("Fig. 3.8", f"{corner}: lower frequency", vibration.corner_low_Hz, "Hz", judge=hertz.min()),
-        Number("Fig. 3.8", f"{corner}: higher frequency", vibration.corner_high_Hz, "Hz", judge=hertz.max()),
+        Number("Fig. 3.8", f"{corner}: lower frequency", vibration.corner_low_Hz, "Hz", second_value=hertz.min()),
+        Number(
+            "Fig. 3.8", f"{corner}: higher frequency", vibration.corner_high_Hz, "Hz", second_value=hertz.max()
+        ),
         Number(
             "3.1.3, Fig. 3.8",
             "highest vibration frequency",
@@ -120,9 +153,19 @@ def figure_3_8() -> list[Row]:
             ),
         ),
         *chart_rows("Fig. 3.7", "one sample of delay", vibration.delayed, late),
-        Number("Fig. 3.8", "one sample of delay, at the tip: lower frequency", low, "Hz", judge=late_hertz.min()),
         Number(
-            "Fig. 3.8", "one sample of delay, at the tip: higher frequency", high, "Hz", judge=late_hertz.max()
+            "Fig. 3.8",
+            "one sample of delay, at the tip: lower frequency",
+            low,
+            "Hz",
+            second_value=late_hertz.min(),
+        ),
+        Number(
+            "Fig. 3.8",
+            "one sample of delay, at the tip: higher frequency",
+            high,
+            "Hz",
+            second_value=late_hertz.max(),
         ),
     ]
 
@@ -202,19 +245,30 @@ def figure_3_12() -> list[Row]:
     """The operator."""
     judge = hand.judge_of(hand.ASSUMED)
     K, B, f = judge.largest_stiffness(20000.0, 60.0)
-    held, alone = hand.chart, hand.alone
-    free, on_spring = ({name: hand.sprung[name, k][0] for name in hand.MASSES} for k in (0.0, hand.ARM[1]))
+    held, alone = hand.chart, hand.chart_without_operator
+    free, on_spring = (
+        {name: hand.tips_on_operator_spring[name, k][0] for name in hand.MASSES} for k in (0.0, hand.ARM[1])
+    )
     return [
         Number(
             "Fig. 3.12, (3.23), (3.24)",
             "in the operator's hand: largest stiffness",
             held.stiffness_max,
             "N/m",
-            judge=K,
+            second_value=K,
             digits=9,
         ),
-        Number("Fig. 3.12", "damping there", held.damping_at_stiffness_max, "N s/m", judge=B, within=1e-5),
-        Number("Fig. 3.12", "frequency there", held.frequencies_at_stiffness_max[0], "Hz", judge=f, within=1e-5),
+        Number(
+            "Fig. 3.12", "damping there", held.damping_at_stiffness_max, "N s/m", second_value=B, tolerance=1e-5
+        ),
+        Number(
+            "Fig. 3.12",
+            "frequency there",
+            held.frequencies_at_stiffness_max[0],
+            "Hz",
+            second_value=f,
+            tolerance=1e-5,
+        ),
         Claim(
             "3.1.3",
             "natural frequencies with a firm grasp",
@@ -255,7 +309,7 @@ def figure_3_12() -> list[Row]:
             "(motor's mass), by (4.44) and by brute force. In the three masses of (3.24) the positive area stays, "
             f"to 1e-7; the static edge moves to K = {hand.static_edge:.1f} N/m",
             all(0.95 * free[name] < on_spring[name] < free[name] for name in hand.MASSES)
-            and all(abs(closed / judged - 1.0) < 1e-9 for closed, judged in hand.sprung.values())
+            and all(abs(closed / judged - 1.0) < 1e-9 for closed, judged in hand.tips_on_operator_spring.values())
             and abs(hand.area_by_arm_stiffness) < 1e-7
             and abs(hand.static_edge / hand.static_edge_by_hand - 1.0) < 1e-9,
         ),

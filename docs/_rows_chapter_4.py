@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from docs._row import ANOTHER_QUESTION, MISPRINT, SCAN_DAMAGED, Claim, Evidence, Number, Reason, Row
-from gallery import chapter_4_completed as completed
+from docs._comparison_row import ANOTHER_QUESTION, MISPRINT, SCAN_DAMAGED, Claim, Evidence, Number, Reason, Row
+from gallery import chapter_4_extended_forms as completed
 from gallery import fig_4_1_rigid as rigid
 from gallery import fig_4_2_delay as delay
 from gallery import fig_4_3_mass_spring as spring
 from gallery import fig_4_4_models as models
 from gallery import which_model_where as where
-from gallery.brute_force import Judge
+from gallery.brute_force import BruteForceLoop
 
 
 def figure_4_1() -> list[Row]:
     """One mass, with and without friction; (4.7)-(4.17), (5.4), (5.5)."""
-    judge = Judge(1.0, rigid.BETA, 0.0, 1.0, 1.0)
+    judge = BruteForceLoop(1.0, rigid.BETA, 0.0, 1.0, 1.0)
     p, d, _ = judge.largest_stiffness(2.0, 3.0)
     stable_tip = rigid.radius_inside_the_tip_below < 1.0 < rigid.radius_inside_the_tip_above
     p_wall, d_wall = rigid.OPTIMISTIC
@@ -44,8 +44,14 @@ def figure_4_1() -> list[Row]:
                 abs(rigid.area_of_5_5 - rigid.free.stable_area) < 1e-9,
             ),
         ),
-        Number("Fig. 4.1", "β = 0.2: largest p, point B", rigid.damped.stiffness_max, judge=p, digits=8),
-        Number("Fig. 4.1", "β = 0.2: its d", rigid.damped.damping_at_stiffness_max, judge=d, within=1e-6),
+        Number("Fig. 4.1", "β = 0.2: largest p, point B", rigid.damped.stiffness_max, second_value=p, digits=8),
+        Number(
+            "Fig. 4.1",
+            "β = 0.2: its d",
+            rigid.damped.damping_at_stiffness_max,
+            second_value=d,
+            tolerance=1e-6,
+        ),
         Claim(
             "(4.11)",
             "d of the tip in closed form, β = 0.2",
@@ -137,9 +143,9 @@ def figure_4_2() -> list[Row]:
         ),
     ]
     for l, (largest_p, its_d) in completed.delayed.items():
-        p, d = completed.judged_late(l)
-        rows.append(Number("(4.26)", f"l = {l}: largest p", largest_p, judge=p))
-        rows.append(Number("(4.26)", f"l = {l}: its d", its_d, judge=d, within=1e-6))
+        p, d = completed.delayed_tip_by_brute_force(l)
+        rows.append(Number("(4.26)", f"l = {l}: largest p", largest_p, second_value=p))
+        rows.append(Number("(4.26)", f"l = {l}: its d", its_d, second_value=d, tolerance=1e-6))
     rows.append(
         Claim(
             "(4.26)",
@@ -176,8 +182,9 @@ def completed_4_9() -> list[Row]:
         ),
     ]
     for beta in completed.FRICTIONS[-2:]:
-        p, d = completed.judged_tips[beta]
-        rows.append(Number("(4.9)", f"completed, β = {beta:g}: largest p", completed.completed[beta][0], judge=p))
+        p, d = completed.tips_by_brute_force[beta]
+        largest = completed.completed[beta][0]
+        rows.append(Number("(4.9)", f"completed, β = {beta:g}: largest p", largest, second_value=p))
         (its_p, its_d), tip = completed.completed[beta], completed.printed[beta]
         rows.append(
             Claim(
@@ -288,7 +295,7 @@ def figure_4_4() -> list[Row]:
     high, high_motor = models.high_edge, models.high_edge_motor_mass
     bare = models.motor_mass_undamped
     plant = models.motor_mass.loop.plant
-    judge = Judge(plant.mass, plant.damping, plant.stiffness, 1.0, models.motor_mass.loop.period)
+    judge = BruteForceLoop(plant.mass, plant.damping, plant.stiffness, 1.0, models.motor_mass.loop.period)
     K, B, _ = judge.largest_stiffness(9000.0, 40.0)
     return [
         Number(
@@ -296,22 +303,22 @@ def figure_4_4() -> list[Row]:
             "motor's mass, damped: largest stiffness",
             models.motor_mass.stiffness_max,
             "N/m",
-            judge=K,
+            second_value=K,
         ),
         Number(
             "Fig. 4.4",
             "motor's mass, damped: damping there",
             models.motor_mass.damping_at_stiffness_max,
             "N s/m",
-            judge=B,
-            within=1e-5,
+            second_value=B,
+            tolerance=1e-5,
         ),
         Number(
             "Fig. 4.4",
             "motor's mass, undamped: largest stiffness, by (4.44)",
             bare.stiffness_max,
             "N/m",
-            judge=models.closed_form,
+            second_value=models.closed_form,
             route="exact chart",
         ),
         Claim(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from docs._row import Claim, Number, Row
+from docs._comparison_row import Claim, Number, Row
 from docs._rows_designs import designs
 from docs._rows_eigenvalues import eigenvalues
 from gallery import fig_5_1_workspace as maps
@@ -27,10 +27,10 @@ def dexterity() -> list[Row]:
             Number(
                 f"Fig. 5.1, {place}",
                 f"{title} {AT}",
-                maps.here[name][0],
+                maps.at_reference[name][0],
                 unit,
-                judge=maps.here[name][1],
-                within=BY_HAND,
+                second_value=maps.at_reference[name][1],
+                tolerance=BY_HAND,
                 route=ARMS,
             )
             for name, (place, title, unit) in titles.items()
@@ -63,13 +63,20 @@ def impedance_range() -> list[Row]:
         "motor-mass": ("Fig. 5.3", "flexible, (5.7): largest stiffness"),
         "full": ("Figs. 5.2, 5.3", "full model, 5 % damping, exact: largest stiffness"),
     }
-    contrast, alike = maps.contrast, maps.alike
+    contrast, alike = maps.contrast, maps.rank_correlations
     r, kappa = maps.at_largest("rigid")
     tenth = {model: maps.where_stiffest(model) for model in ("rigid", "flexible")}
     symmetric = max(maps.asymmetries[name] for name in ("rigid", "rigid area"))
     return [
         *(
-            Number(place, f"{text} {AT}", maps.stiffest[model], "N/m", judge=maps.judged(model), within=1e-9)
+            Number(
+                place,
+                f"{text} {AT}",
+                maps.stiffest[model],
+                "N/m",
+                second_value=maps.stiffness_by_brute_force(model),
+                tolerance=1e-9,
+            )
             for model, (place, text) in texts.items()
         ),
         Claim(
@@ -114,8 +121,8 @@ def common_area() -> list[Row]:
                 f"common area, {name} ≥ 0.2 kg ({100 * common.areas[mass].common.share:.0f} % of what is reached)",
                 1e4 * common.areas[mass].common.area,
                 "cm²",
-                judge=1e4 * common.by_integration[mass],
-                within=1e-3,
+                second_value=1e4 * common.by_integration[mass],
+                tolerance=1e-3,
                 digits=3,
                 route="integration",
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from docs._row import Claim, Number, Row
+from docs._comparison_row import Claim, Number, Row
 from gallery import rendered_directions as plane
 from gallery import spring_stability as spring
 
@@ -26,13 +26,13 @@ def spring_stability() -> list[Row]:
             "1.1.3",
             f"Nyquist spring, β = {beta}: largest p at d = 0",
             spring.largest_p_on_the_spring,
-            judge=spring.judged_on_the_spring,
+            second_value=spring.judged_on_the_spring,
         ),
         Number(
             "1.1.3",
             f"spring-stable, β = {beta}: largest p, at d = {spring.its_d:.6f}",
             spring.largest_p,
-            judge=spring.judged_at_its_d,
+            second_value=spring.judged_at_its_d,
         ),
         Claim(
             "4.2",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from docs._row import (
+from docs._comparison_row import (
     ANOTHER_QUESTION,
     MISPRINT,
     ROUNDED,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from docs._row import MISPRINT, SCAN_DAMAGED, UNEXPLAINED, Claim, Evidence, Number, Reason, Row
+from docs._comparison_row import MISPRINT, SCAN_DAMAGED, UNEXPLAINED, Claim, Evidence, Number, Reason, Row
 from gallery import fig_5_10_eigenvalues as across
-from gallery import fig_5_11_radii as radii
+from gallery import fig_5_11_spectral_radii as radii
 from gallery import fig_5_12_eigenvalue_paths as over_mass
 from gallery import optimal_mass as optimum
 from gallery.fig_3_7_bilateral_wall import edges_at_4000
@@ -23,7 +23,7 @@ def figure_5_10() -> list[Row]:
             f"slow pair enters {at}, lower edge",
             slow.value,
             "N s/m",
-            judge=edges_at_4000[0],
+            second_value=edges_at_4000[0],
             route="bisection",
         ),
         Number(
@@ -31,7 +31,7 @@ def figure_5_10() -> list[Row]:
             f"fast pair leaves {at}, upper edge",
             fast.value,
             "N s/m",
-            judge=edges_at_4000[1],
+            second_value=edges_at_4000[1],
             route="bisection",
         ),
         Claim(
@@ -105,8 +105,8 @@ def figure_5_11() -> list[Row]:
             "Fig. 5.14",
             "the chart with the optimal mass of D",
             "much larger, D well inside",
-            f"{radii.grown:.1f} times the area, {radii.stiffer:.2f} times the stiffness",
-            radii.grown > 2.0 and radii.stiffer > 2.0,
+            f"{radii.area_ratio:.1f} times the area, {radii.stiffness_ratio:.2f} times the stiffness",
+            radii.area_ratio > 2.0 and radii.stiffness_ratio > 2.0,
         ),
     ]
 
@@ -120,16 +120,16 @@ def figures_5_12_to_5_14() -> list[Row]:
                 Number(
                     f"Fig. {figure}",
                     f"wall {name}, {model}: stable from a motor-side mass of",
-                    over_mass.ways[name][model].stable_from,
+                    over_mass.model_paths[name][model].stable_from,
                     "kg",
-                    judge=over_mass.judged_stable_from(model, name),
+                    second_value=over_mass.judged_stable_from(model, name),
                 )
             )
     two, one = over_mass.MODELS
     apart = max(abs(each[two] - each[one]) for each in over_mass.at_optimum.values())
     missed = max(over_mass.at_optimum[name][two] - rho for name, (_, rho) in over_mass.fastest_pair.items())
     pairs = ", ".join(f"{name} {1e3 * mass:.1f} g" for name, (mass, _) in over_mass.fastest_pair.items())
-    best = {name: each[two].fastest for name, each in over_mass.ways.items()}
+    best = {name: each[two].fastest for name, each in over_mass.model_paths.items()}
     whole = ", ".join(f"{name} {rho:.4f} at {1e3 * mass:.1f} g" for name, (mass, rho) in best.items())
     return [
         *found,
@@ -150,8 +150,11 @@ def figures_5_12_to_5_14() -> list[Row]:
             all(
                 rho > optimum.optimum[name][1] + 0.05
                 and mass < 0.5 * optimum.optimum[name][0]
-                and abs(over_mass.judged_radius(two, name, mass) - rho) < 1e-6
-                and all(over_mass.judged_radius(two, name, share * mass) > rho for share in (0.9, 0.99, 1.01, 1.1))
+                and abs(over_mass.radius_by_brute_force(two, name, mass) - rho) < 1e-6
+                and all(
+                    over_mass.radius_by_brute_force(two, name, share * mass) > rho
+                    for share in (0.9, 0.99, 1.01, 1.1)
+                )
                 for name, (mass, rho) in best.items()
             ),
             route="brute force there and 1 and 10 % beside, to 1e-06",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
-from docs._row import ANOTHER_QUESTION, Claim, Reason, Row
+from docs._comparison_row import ANOTHER_QUESTION, Claim, Reason, Row
 from gallery import quantisation_limit as encoder
 from gallery.fig_3_7_bilateral_wall import chart as bilateral
 
@@ -16,7 +16,7 @@ def section_3_2_5() -> list[Row]:
     quiet = not any(found[below].any() for found in encoder.moves.values())
     pushed = [edges for name, edges in encoder.onsets.items() if name.startswith("pushed between")]
     sharp = all(low < limit < high for low, high in pushed)
-    free = {name: edges for name, edges in encoder.onsets.items() if not _disturbed(name)}
+    free = {name: edges for name, edges in encoder.onsets.items() if not _has_disturbance(name)}
     lowest, highest = (pick(high for _, high in free.values()) for pick in (min, max))
     steep = [encoder.onsets[f"0.1 ms, {b} N s/m"][1] / limit for b in (3, 10, 30)]
     fast = [encoder.onsets[f"{T} ms, 10 N s/m"][1] / limit for T in ("0.2", "0.1", "0.05")]
@@ -90,7 +90,7 @@ def section_3_2_5() -> list[Row]:
     ]
 
 
-def _disturbed(name: str) -> bool:
+def _has_disturbance(name: str) -> bool:
     """Is a case of the encoder's limit about the disturbance?"""
     return name.startswith(("from", "pushed", "hit"))
 

@@ -16,10 +16,10 @@ from docs import _rows_chapter_3 as chapter_3
 from docs import _rows_chapter_4 as chapter_4
 from docs import _rows_chapter_5 as chapter_5
 from docs import _rows_chapters_1_2 as chapters_1_2
-from docs import _rows_contact as contact
 from docs import _rows_device as device
-from docs._numbered import KINDS, NOT_COVERED, NOT_COVERED_ELSEWHERE, NUMBERED, covered
-from docs._row import MEANING, OURS_ONLY, Row, count_verdicts
+from docs import _rows_simulations as contact
+from docs._comparison_row import MEANING, OURS_ONLY, Row, count_verdicts
+from docs._thesis_items import ITEMS, KINDS, NOT_COVERED, NOT_COVERED_ELSEWHERE, items_covered
 
 Sections = list[tuple[str, list[Row]]]
 
@@ -103,9 +103,9 @@ def verdicts(rows: list[Row]) -> str:
 
 def coverage(rows: list[Row]) -> str:
     """One sentence: how many of the thesis's numbered items are in rows."""
-    found = covered(row.place for row in rows)
+    found = items_covered(row.place for row in rows)
     parts = [
-        f"{sum(item[0] == kind for item in found)} of {sum(item[0] == kind for item in NUMBERED)} numbered {kind}s"
+        f"{sum(item[0] == kind for item in found)} of {sum(item[0] == kind for item in ITEMS)} numbered {kind}s"
         for kind in KINDS
     ]
     printed = sum(row.printed is not None for row in rows)
@@ -115,7 +115,7 @@ def coverage(rows: list[Row]) -> str:
     )
 
 
-def part(content: Sections, printed: bool) -> list[str]:
+def section_tables(content: Sections, printed: bool) -> list[str]:
     """The tables of what is printed, or of what is ours only, by chapter; with pictures among the printed."""
     header = ("Where", "What", "Verdict", *(("Printed", "Ours, and why") if printed else ("Ours", "Second route")))
     found = []
@@ -138,9 +138,9 @@ def page(content: Sections) -> str:
         verdicts(rows),
         coverage(rows),
         PRINTED,
-        *part(content, printed=True),
+        *section_tables(content, printed=True),
         OURS,
-        *part(content, printed=False),
+        *section_tables(content, printed=False),
         NOT_COVERED_TEXT,
         missing,
         "Nor about these parts of the rest:\n",

@@ -120,7 +120,7 @@ class AppendixB:
         return B.T @ ((gyration or self.gyration)(rates) + self.mass() @ turning)
 
 
-def off(found, expected) -> float:
+def relative_difference(found, expected) -> float:
     """Largest distance, relative to the largest entry."""
     return float(np.max(np.abs(np.subtract(found, expected))) / np.max(np.abs(expected)))
 
@@ -132,15 +132,17 @@ RATES = np.array([1.3, -0.7])  # rad/s
 device = load("five-bar", [*rods, *on_the_axes])
 postures = [device.at(position).posture for position in POSITIONS]
 printed = [AppendixB(mechanism, posture.angles) for posture in postures]
-both = list(zip(printed, postures, strict=True))
+printed_and_engine = list(zip(printed, postures, strict=True))
 
-error_of_position = max(off(one.handle(i), at.position[:2]) for one, at in both for i in (0, 2))
+error_of_position = max(
+    relative_difference(one.handle(i), at.position[:2]) for one, at in printed_and_engine for i in (0, 2)
+)
 error_of_jacobian = max(
-    off(one.chain_jacobian(i) @ one.transformation()[i : i + 2], at.jacobian[:2])
-    for one, at in both
+    relative_difference(one.chain_jacobian(i) @ one.transformation()[i : i + 2], at.jacobian[:2])
+    for one, at in printed_and_engine
     for i in (0, 2)
 )
-error_of_B_7 = max(off(one.jacobian(), at.jacobian[:2]) for one, at in both)
+error_of_B_7 = max(relative_difference(one.jacobian(), at.jacobian[:2]) for one, at in printed_and_engine)
 # (B.6): the constraints' Jacobian leaves the columns of (B.18) alone
 _constraint = [np.hstack([one.chain_jacobian(0), -one.chain_jacobian(2)]) for one in printed]
 error_of_B_6 = max(
@@ -148,12 +150,16 @@ error_of_B_6 = max(
     for A, one in zip(_constraint, printed, strict=True)
 )
 error_of_mass = max(
-    off(one.transformation().T @ one.mass() @ one.transformation(), at.mass_matrix) for one, at in both
+    relative_difference(one.transformation().T @ one.mass() @ one.transformation(), at.mass_matrix)
+    for one, at in printed_and_engine
 )
 _engine = [inertia_terms(mechanism, at, RATES) for at in postures]
-error_of_terms = max(off(one.nonlinear(RATES), at) for one, at in zip(printed, _engine, strict=True))
+error_of_terms = max(
+    relative_difference(one.nonlinear(RATES), at) for one, at in zip(printed, _engine, strict=True)
+)
 error_of_B_17 = max(
-    off(one.nonlinear(RATES, one.printed_gyration), at) for one, at in zip(printed, _engine, strict=True)
+    relative_difference(one.nonlinear(RATES, one.printed_gyration), at)
+    for one, at in zip(printed, _engine, strict=True)
 )
 
 
@@ -175,7 +181,7 @@ def half_angle(one: AppendixB, x: float, y: float) -> float:
 error_of_B_8 = max(
     float(np.abs(np.exp(1j * np.array(passive_angles(one))) - np.exp(1j * one.q[[1, 3]])).max()) for one in printed
 )
-error_of_inverse = max(half_angle(one, *at.position[:2]) for one, at in both)
+error_of_inverse = max(half_angle(one, *at.position[:2]) for one, at in printed_and_engine)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from scipy.optimize import root
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
-class Judge:
+class BruteForceLoop:
     """Walls on one plant: M x'' + B x' + K x = actuator f, read by the same coordinate.
 
     mass, damping, stiffness  (n, n)

@@ -31,7 +31,7 @@ def transition_matrix(delay: int) -> sp.Matrix:
     return L
 
 
-def mapped(delay: int) -> list[sp.Expr]:
+def transformed_polynomial(delay: int) -> list[sp.Expr]:
     """Coefficients of the transformed characteristic polynomial, highest power first."""
     L = transition_matrix(delay)
     n = L.shape[0]
@@ -58,13 +58,13 @@ inverse_slope = eps * beta * (1 + beta) / (eps * (beta + 1) - 1)
 limit_of_slope = sp.limit(1 / inverse_slope, beta, 0)
 
 # (4.27), (4.28): no delay.
-no_delay = mapped(0)
+no_delay = transformed_polynomial(0)
 determinant_4_28 = sp.expand(hurwitz(no_delay)[:2, :2].det())
 as_4_27 = all(map(same, no_delay, (p, 2 * d, 4 - p - 2 * d, 4)))
 as_4_28 = same(determinant_4_28, -2 * (d + 2) * p + 4 * d * (2 - d))
 
 # (4.30), (4.31): one sample.
-one_sample = mapped(1)
+one_sample = transformed_polynomial(1)
 determinant_4_31 = sp.expand(hurwitz(one_sample)[:3, :3].det())
 as_4_30 = all(map(same, one_sample, (p, 2 * d - p, -(4 * d + p - 4), 2 * d + p + 8, 4)))
 as_4_31 = same(determinant_4_31, -16 * p**2 - 8 * (d**2 + 12) * p - 16 * (d**3 + 4 * d**2 - 4 * d))

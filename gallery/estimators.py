@@ -21,7 +21,7 @@ Run `python -m gallery.estimators` to draw gain, phase delay and charts.
 
 from __future__ import annotations
 
-from gallery.models import published, write_figure
+from gallery.shared_loops import published, write_figure
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.loop.estimators import (
     AlphaBeta,
@@ -32,7 +32,7 @@ from zwidth.loop.estimators import (
     SavitzkyGolay,
     WindowedDifference,
 )
-from zwidth.loop.estimators.bounds import quantisation_noise
+from zwidth.loop.estimators.parameter_checks import quantisation_noise
 
 PERIOD = 0.00125  # s
 RESOLUTION = 10e-6  # m

@@ -13,7 +13,7 @@ Run `python -m gallery.fig_3_11_filter` to draw it.
 
 from __future__ import annotations
 
-from gallery.models import published, write_figure
+from gallery.shared_loops import published, write_figure
 from zwidth.chart.chart import stability_chart
 from zwidth.loop.controller import Butterworth
 

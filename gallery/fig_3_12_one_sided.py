@@ -21,10 +21,10 @@ from __future__ import annotations
 import numpy as np
 
 from gallery.fig_3_12_operator import ARM, ASSUMED, GRASP, chart, damper, edge
-from gallery.models import PUBLISHED, write_figure
-from zwidth.contact.bench import Bench
-from zwidth.contact.experiment import Place, measure_edges
+from gallery.shared_loops import PUBLISHED, write_figure
+from zwidth.contact.boundary_experiment import StableExtent, measure_edges
 from zwidth.contact.hand import Hand, Reflex
+from zwidth.contact.stability_trial import StabilityTrial
 from zwidth.device.load import load
 from zwidth.loop.loop import Loop
 from zwidth.model.operator import Operator
@@ -44,8 +44,8 @@ def loop_without_hand() -> Loop:
 
 def lower_edge(hand: Hand) -> np.ndarray:
     """Damping at the lower edge for each stiffness, found by touching the one-sided wall."""
-    bench = Bench(loop_without_hand(), hand, one_sided=True, speed=0.05)
-    inside = Place(chart.stiffness_max, chart.damping_at_stiffness_max, chart.damping_max, True)
+    bench = StabilityTrial(loop_without_hand(), hand, one_sided=True, speed=0.05)
+    inside = StableExtent(chart.stiffness_max, chart.damping_at_stiffness_max, chart.damping_max, True)
     points = [point for point in measure_edges(bench, STIFFNESS, inside) if point.edge == "lower"]
     return np.array([point.damping for point in points])
 

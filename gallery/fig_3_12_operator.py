@@ -28,8 +28,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gallery.brute_force import Judge
-from gallery.models import PUBLISHED, write_figure
+from gallery.brute_force import BruteForceLoop
+from gallery.shared_loops import PUBLISHED, write_figure
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.conditions import thesis_flexible
 from zwidth.device.load import load
@@ -48,7 +48,7 @@ def damper(ratio: float) -> float:
     return 2.0 * ratio * float(np.sqrt(SPRING * LINK * MOTOR / (LINK + MOTOR)))
 
 
-def held(ratio: float, operator: str = OPERATOR, **changes: float) -> Loop:
+def loop_with_operator(ratio: float, operator: str = OPERATOR, **changes: float) -> Loop:
     """The published two masses with a damping ratio, in an operator's hands; changes: of his numbers."""
     b = damper(ratio)
     settings = [("plant.damping_Ns_per_m", [[b, -b], [-b, b]])]
@@ -57,10 +57,10 @@ def held(ratio: float, operator: str = OPERATOR, **changes: float) -> Loop:
     return device.at().loop
 
 
-def judge_of(ratio: float) -> Judge:
+def judge_of(ratio: float) -> BruteForceLoop:
     """(3.24) typed in, for an independent computation."""
     b, (m_h, k_h, b_h), (k_c, b_c) = damper(ratio), ARM, GRASP
-    return Judge(
+    return BruteForceLoop(
         np.diag([LINK, MOTOR, m_h]),
         [[b + b_c, -b, -b_c], [-b, b, 0.0], [-b_c, 0.0, b_c + b_h]],
         [[SPRING + k_c, -SPRING, -k_c], [-SPRING, SPRING, 0.0], [-k_c, 0.0, k_c + k_h]],
@@ -73,7 +73,7 @@ def on_the_operators_spring(mass: float, stiffness: float) -> tuple[float, float
     """Largest stiffness of a mass on a spring of the operator, by (4.44) and by brute force [N/m]."""
     period = chart.loop.period
     closed = float(thesis_flexible.largest_stiffness(mass, stiffness, period))
-    judge = Judge(mass, 0.0, stiffness, 1.0, period)
+    judge = BruteForceLoop(mass, 0.0, stiffness, 1.0, period)
     return closed, judge.largest_stiffness(1.3 * closed, 2.0 * mass / period)[0]
 
 
@@ -93,22 +93,26 @@ def crossings_at(stability: StabilityChart, B: float) -> list[float]:
     return found
 
 
-chart = stability_chart(held(ASSUMED), decay=False)
-alone = stability_chart(held(ASSUMED, "none"), decay=False)
-chart_at_5_percent = stability_chart(held(USUAL), decay=False)
-alone_at_5_percent = stability_chart(held(USUAL, "none"), decay=False)
-without_arm_stiffness = stability_chart(held(ASSUMED, arm_stiffness_N_per_m=0.0), decay=False)
+chart = stability_chart(loop_with_operator(ASSUMED), decay=False)
+chart_without_operator = stability_chart(loop_with_operator(ASSUMED, "none"), decay=False)
+chart_at_5_percent = stability_chart(loop_with_operator(USUAL), decay=False)
+alone_at_5_percent = stability_chart(loop_with_operator(USUAL, "none"), decay=False)
+without_arm_stiffness = stability_chart(loop_with_operator(ASSUMED, arm_stiffness_N_per_m=0.0), decay=False)
 
 # 4.2's models: the device's mass, or the motor's alone, free and on the arm's spring.
 MASSES = {"rigid": 0.287, "motor": MOTOR}  # kg
-sprung = {(name, k): on_the_operators_spring(mass, k) for name, mass in MASSES.items() for k in (0.0, ARM[1])}
+tips_on_operator_spring = {
+    (name, k): on_the_operators_spring(mass, k) for name, mass in MASSES.items() for k in (0.0, ARM[1])
+}
 
 # Highest natural frequency, free and in his hand [Hz].
-frequency_alone, frequency_held = (float(natural_frequencies(each.loop.plant)[-1]) for each in (alone, chart))
+frequency_alone, frequency_held = (
+    float(natural_frequencies(each.loop.plant)[-1]) for each in (chart_without_operator, chart)
+)
 
-gain_by_operator = chart.stiffness_max / alone.stiffness_max - 1.0
+gain_by_operator = chart.stiffness_max / chart_without_operator.stiffness_max - 1.0
 gain_by_damping = chart.stiffness_max / chart_at_5_percent.stiffness_max - 1.0
-area_by_operator = chart.stable_area / alone.stable_area - 1.0
+area_by_operator = chart.stable_area / chart_without_operator.stable_area - 1.0
 area_by_damping = chart.stable_area / chart_at_5_percent.stable_area - 1.0
 area_by_arm_stiffness = chart.stable_area / without_arm_stiffness.stable_area - 1.0
 
@@ -124,7 +128,7 @@ def draw(ax) -> None:
 
     charts = {
         "in the operator's hand, 7.5 % damping": chart,
-        "alone, 7.5 % damping": alone,
+        "alone, 7.5 % damping": chart_without_operator,
         "alone, 5 % damping": alone_at_5_percent,
     }
     K0, K1, B0, B1 = chart.box

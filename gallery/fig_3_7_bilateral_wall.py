@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gallery.models import published, write_figure
+from gallery.shared_loops import published, write_figure
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.verdict import judge
 from zwidth.model.modes import natural_frequencies

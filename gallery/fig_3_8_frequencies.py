@@ -11,9 +11,9 @@ Run `python -m gallery.fig_3_8_frequencies` to draw it.
 from __future__ import annotations
 
 from gallery.fig_3_7_bilateral_wall import chart
-from gallery.models import published, write_figure
+from gallery.shared_loops import published, write_figure
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.result import BoundaryArc
+from zwidth.chart.chart_base import BoundaryArc
 
 NYQUIST = 0.5 / chart.loop.period
 

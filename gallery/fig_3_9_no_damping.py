@@ -8,7 +8,7 @@ Run `python -m gallery.fig_3_9_no_damping` to draw it.
 
 from __future__ import annotations
 
-from gallery.models import published, write_figure
+from gallery.shared_loops import published, write_figure
 from zwidth.chart.chart import stability_chart
 
 flexible = stability_chart(published(stiffness_damping=0.0), decay=False)

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from gallery.models import label_dimensionless, unit_mass, write_figure
+from gallery.shared_loops import label_dimensionless, unit_mass, write_figure
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.verdict import judge
 from zwidth.conditions import thesis_rigid
@@ -72,7 +72,7 @@ stable_p_without_damping = max(
 )
 
 
-def _room(beta: float) -> float:
+def _clearance(beta: float) -> float:
     """How far the real root's line stays clear of (4.9), at the nearest, over p > 0."""
     e = eps(beta)
     top = beta / (e + e * beta - 1.0)
@@ -81,7 +81,7 @@ def _room(beta: float) -> float:
 
 
 # (4.9) is incomplete above the first, its tip (4.10) unstable above the second.
-beta_where_incomplete = float(brentq(_room, 1.0, 3.5))
+beta_where_incomplete = float(brentq(_clearance, 1.0, 3.5))
 beta_where_tip_unstable = float(brentq(lambda b: real_root_line(b) - tip(b)[0] - 2.0 * tip(b)[1], 2.5, 6.0))
 above = 1.02 * beta_where_tip_unstable
 radius_inside_the_tip_above = float(judge(unit_mass(above), 0.999 * tip(above)[0], tip(above)[1]).spectral_radius)

@@ -10,9 +10,9 @@ Run `python -m gallery.fig_4_2_delay` to draw it.
 
 from __future__ import annotations
 
-from gallery.models import label_dimensionless, unit_mass, write_figure
+from gallery.shared_loops import label_dimensionless, unit_mass, write_figure
 from zwidth.chart.chart import stability_chart
-from zwidth.conditions import thesis_delay
+from zwidth.conditions import thesis_unit_delay
 
 DELAYS = (0, 1, 2, 3, 5)
 
@@ -22,9 +22,9 @@ d_at_largest_p = {l: chart.damping_at_stiffness_max for l, chart in charts.items
 largest_d = {l: chart.damping_max for l, chart in charts.items()}
 
 # (4.32), for l = 1
-closed_largest_p = float(thesis_delay.largest_stiffness(1.0, 1.0))
-closed_d_at_largest_p = float(thesis_delay.damping_at_largest_stiffness(1.0, 1.0))
-closed_largest_d = float(thesis_delay.largest_damping(1.0, 1.0))
+closed_largest_p = float(thesis_unit_delay.largest_stiffness(1.0, 1.0))
+closed_d_at_largest_p = float(thesis_unit_delay.damping_at_largest_stiffness(1.0, 1.0))
+closed_largest_d = float(thesis_unit_delay.largest_damping(1.0, 1.0))
 
 
 def draw(ax) -> None:

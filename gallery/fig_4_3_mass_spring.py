@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gallery.models import label_dimensionless, unit_mass, write_figure
+from gallery.shared_loops import label_dimensionless, unit_mass, write_figure
 from zwidth.chart.chart import stability_chart
 from zwidth.conditions import thesis_flexible as closed
 
@@ -24,15 +24,15 @@ RATES = (0.2, 0.5, 0.8, 1.1, 1.4, np.pi / 2 - 0.01)
 charts = {W: stability_chart(unit_mass(stiffness=W**2), decay=False) for W in RATES}
 
 
-def _worst(name: str, formula) -> float:
+def _largest_error(name: str, formula) -> float:
     """Largest relative distance of the charts from a closed form over W."""
     return max(abs(getattr(charts[W], name) / float(formula(1.0, W**2, 1.0)) - 1.0) for W in RATES)
 
 
-error_of_4_44 = _worst("stiffness_max", closed.largest_stiffness)
-error_of_4_45 = _worst("damping_at_stiffness_max", closed.damping_at_largest_stiffness)
-error_of_5_7 = _worst("damping_max", closed.largest_damping)
-error_of_area = _worst("stable_area", closed.stable_area)
+error_of_4_44 = _largest_error("stiffness_max", closed.largest_stiffness)
+error_of_4_45 = _largest_error("damping_at_stiffness_max", closed.damping_at_largest_stiffness)
+error_of_5_7 = _largest_error("damping_max", closed.largest_damping)
+error_of_area = _largest_error("stable_area", closed.stable_area)
 
 # One W in numbers.
 W = 0.8

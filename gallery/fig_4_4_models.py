@@ -11,7 +11,7 @@ Run `python -m gallery.fig_4_4_models` to draw it.
 from __future__ import annotations
 
 from gallery.fig_3_7_bilateral_wall import crossings_at
-from gallery.models import published, write_figure
+from gallery.shared_loops import published, write_figure
 from zwidth.chart.chart import stability_chart
 from zwidth.conditions import thesis_flexible
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from gallery.fig_3_7_bilateral_wall import chart, loop
-from gallery.models import published, write_page
+from gallery.shared_loops import published, write_page
 from zwidth.chart.verdict import eigenvalues, spectral_radius
 from zwidth.measures.eigenvalue_paths import Crossing, wall_paths
 
@@ -39,7 +39,7 @@ fast_in, slow_in, fast_out = crossings
 beyond_the_axis = float(np.degrees(np.angle(fast_out.eigenvalue))) - 90.0
 
 
-def moved(path: int) -> float:
+def path_extent(path: int) -> float:
     """How far an eigenvalue gets from where it enters, over the stable part of the way."""
     inside = (paths.values >= slow_in.value) & (paths.values <= fast_out.value)
     z = paths.eigenvalues[inside, path]
@@ -47,7 +47,11 @@ def moved(path: int) -> float:
 
 
 _real = int(np.argmin(np.abs(paths.eigenvalues.imag).max(axis=0)))
-moves = {"fast pair": moved(fast_out.path), "slow pair": moved(slow_in.path), "real": moved(_real)}
+moves = {
+    "fast pair": path_extent(fast_out.path),
+    "slow pair": path_extent(slow_in.path),
+    "real": path_extent(_real),
+}
 # The slow pair's largest modulus within the caption's range: it starts outside.
 slow_at_first = float(abs(paths.eigenvalues[0, slow_in.path]))
 
@@ -69,10 +73,10 @@ def draw(figure) -> None:
     draw_decay_contours(left, loop, RADII, (-2000.0, 8000.0, LOWEST - 1.0, HIGHEST), chart)
     left.annotate("A", point_A, xytext=(-22, -3), textcoords="offset points", fontsize=9.0)
     left.plot([K, K], [LOWEST, HIGHEST], color=BLACK, linewidth=0.8, linestyle=(0, (1.0, 1.5)))
-    draw_way(right)
+    draw_paths(right)
 
 
-def draw_way(ax) -> None:
+def draw_paths(ax) -> None:
     """Eigenvalues in the complex plane, along the way and at A."""
     from zwidth.show.figures.style import BLUE, GREEN, VERMILION, legend_above
 

@@ -23,12 +23,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gallery import optimal_mass
-from gallery.models import published, write_page
+from gallery.shared_loops import published, write_page
 from zwidth.chart.verdict import eigenvalues, judge
 from zwidth.contact.environments import wall
-from zwidth.contact.response import TimeResponse
+from zwidth.contact.motion_verdict import Judgement, judge_response
 from zwidth.contact.simulate import simulate
-from zwidth.contact.verdict import Judgement, judge_response
+from zwidth.contact.time_response import TimeResponse
 from zwidth.loop.loop import Loop
 
 WALLS = {name: optimal_mass.WALLS[name] for name in "BCD"}
@@ -41,16 +41,16 @@ STRUCTURAL = 50.0  # Hz, above it
 class Vibration:
     """x1 - x2 with one motor-side mass.
 
-    radius      spectral radius of the loop;   structural  the same of its roots above 50 Hz
-    to_a_tenth  time in which the structural vibration falls to a tenth [s]; negative: it grows tenfold
-    stretch     the run, whose handle is x1 - x2
+    radius               spectral radius of the loop;   structural  the same of its roots above 50 Hz
+    decay_time_to_tenth  time in which the structural vibration falls to a tenth [s]; negative: it grows tenfold
+    stretch              the run, whose handle is x1 - x2
     """
 
     mass: float
     verdict: str
     radius: float
     structural: float
-    to_a_tenth: float
+    decay_time_to_tenth: float
     stretch: TimeResponse
     judged: Judgement
 

@@ -20,14 +20,14 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from gallery import optimal_mass
-from gallery.brute_force import Judge
+from gallery.brute_force import BruteForceLoop
 from gallery.fig_5_10_eigenvalues import draw_circle
-from gallery.fig_5_11_radii import LOOPS, WALLS
-from gallery.models import write_page
+from gallery.fig_5_11_spectral_radii import LOOPS, WALLS
+from gallery.shared_loops import write_page
 from zwidth.chart.verdict import eigenvalues
 from zwidth.loop.loop import Loop
 from zwidth.measures.eigenvalue_paths import EigenvaluePaths, loop_paths
-from zwidth.measures.fidelity import fastest_mass, with_motor_side_mass
+from zwidth.measures.vibration_decay import fastest_mass, with_motor_side_mass
 
 LIGHTEST, HEAVIEST = 0.01, 0.2  # kg
 MODELS = ("two masses", "motor's mass")
@@ -40,7 +40,7 @@ def with_mass(model: str, mass: float) -> Loop:
 
 
 @dataclass(frozen=True)
-class Way:
+class ModelPaths:
     """Eigenvalues of one model at one wall over the mass.
 
     stable_from  mass at which the last pair enters the unit circle [kg]
@@ -52,14 +52,14 @@ class Way:
     fastest: tuple[float, float]
 
 
-def way(model: str, wall: tuple[float, float]) -> Way:
+def paths_over_mass(model: str, wall: tuple[float, float]) -> ModelPaths:
     """Followed over the masses."""
     paths = loop_paths(lambda mass: with_mass(model, mass), np.geomspace(LIGHTEST, HEAVIEST, 40), *wall)
     entering = [found.value for found in paths.crossings if not found.outwards]
-    return Way(paths, max(entering), fastest_mass(LOOPS[model], *wall, LIGHTEST, HEAVIEST))
+    return ModelPaths(paths, max(entering), fastest_mass(LOOPS[model], *wall, LIGHTEST, HEAVIEST))
 
 
-ways = {name: {model: way(model, wall) for model in MODELS} for name, wall in WALLS.items()}
+model_paths = {name: {model: paths_over_mass(model, wall) for model in MODELS} for name, wall in WALLS.items()}
 
 
 def fast_radius(model: str, name: str, mass: float) -> float:
@@ -87,14 +87,16 @@ def _fastest_pair(name: str) -> tuple[float, float]:
 fastest_pair = {name: _fastest_pair(name) for name in WALLS}
 
 
-def judged_radius(model: str, name: str, motor_side_mass: float) -> float:
+def radius_by_brute_force(model: str, name: str, motor_side_mass: float) -> float:
     """Spectral radius at a wall with another motor-side mass [kg], by brute force."""
     plant = LOOPS[model].plant
     place = int(np.argmax(plant.actuator))
     mass = plant.mass.copy()
     mass[place, place] = motor_side_mass
     return float(
-        Judge(mass, plant.damping, plant.stiffness, plant.actuator, LOOPS[model].period).radius(*WALLS[name])
+        BruteForceLoop(mass, plant.damping, plant.stiffness, plant.actuator, LOOPS[model].period).radius(
+            *WALLS[name]
+        )
     )
 
 
@@ -103,7 +105,7 @@ def judged_stable_from(model: str, name: str) -> float:
     low, high = LIGHTEST, optimal_mass.optimum[name][0]
     for _ in range(50):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if judged_radius(model, name, middle) < 1.0 else (middle, high)
+        low, high = (low, middle) if radius_by_brute_force(model, name, middle) < 1.0 else (middle, high)
     return high
 
 
@@ -111,14 +113,14 @@ def draw(figure) -> None:
     """One panel for each wall."""
     axes = figure.subplots(1, 3)
     for ax, name in zip(axes, WALLS, strict=True):
-        draw_ways(ax, name)
+        draw_model_paths(ax, name)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="outside upper left", ncols=2, frameon=False, fontsize=8.0, handlelength=2.6
     )
 
 
-def draw_ways(ax, name: str) -> None:
+def draw_model_paths(ax, name: str) -> None:
     """The upper half plane; below it all is mirrored."""
     from zwidth.show.figures.style import BLACK, BLUE, VERMILION
 
@@ -127,7 +129,7 @@ def draw_ways(ax, name: str) -> None:
     styles = {"two masses": (BLACK, "-"), "motor's mass": (BLUE, (0, (4, 1.5)))}
     texts = {"two masses": "two masses, damped", "motor's mass": "motor's mass on its spring, undamped"}
     for model, (colour, dashes) in styles.items():
-        z = ways[name][model].paths.eigenvalues
+        z = model_paths[name][model].paths.eigenvalues
         shown = np.where(z.imag >= -1e-9, z, np.nan)
         for path in range(z.shape[1]):
             line = shown[:, path]
@@ -151,7 +153,7 @@ def draw_ways(ax, name: str) -> None:
 
 
 if __name__ == "__main__":
-    for name, each in ways.items():
+    for name, each in model_paths.items():
         for model, found in each.items():
             mass, rho = found.fastest
             print(

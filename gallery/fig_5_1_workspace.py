@@ -19,12 +19,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gallery.designs import REFERENCE, device, measured
-from gallery.five_bar import bundled, judge
-from gallery.models import write_page
+from gallery.five_bar import brute_force_loop, bundled
+from gallery.five_bar_designs import REFERENCE, device, measure_values
+from gallery.shared_loops import write_page
 from zwidth.measures.impedance_range import rigid_range, sprung_range
-from zwidth.study.plane import plane_of
-from zwidth.study.workspace import workspace_map
+from zwidth.study.map import workspace_map
+from zwidth.study.plane_grid import plane_of
 
 ASSEMBLY = device.reference_assembly
 plane = plane_of(device, cells=(121, 61))
@@ -80,7 +80,7 @@ contrast = {
     for model in ("rigid", "flexible", "exact")
     for measure in ("w", "w_d", "kappa")
 }
-alike = {
+rank_correlations = {
     "stiffness": rank_correlation("rigid", "flexible"),
     "area": rank_correlation("rigid area", "flexible area"),
     "exact": rank_correlation("rigid", "exact"),
@@ -120,8 +120,8 @@ _place = device.at()
 _felt = bundled().at(REFERENCE, ASSEMBLY)
 PERIOD = device.controller.sampling_period
 _whole = _felt.mass_matrix + np.diag(bundled().rotor)
-here = {
-    name: (float(measured(name, _place).values), float(by_hand))
+at_reference = {
+    name: (float(measure_values(name, _place).values), float(by_hand))
     for name, by_hand in (
         ("manipulability", _felt.manipulability),
         ("dynamic_manipulability", _felt.manipulability / np.linalg.det(_whole)),
@@ -135,15 +135,15 @@ stiffest = {
         ("rigid", rigid_range(_effective.rigid_mass, PERIOD).stiffness_max),
         ("links", rigid_range(_effective.link_side_mass, PERIOD).stiffness_max),
         ("motor-mass", sprung_range(_effective.motor_side_mass, _effective.stiffness, PERIOD).stiffness_max),
-        ("full", measured("stiffness_max", _place).values),
+        ("full", measure_values("stiffness_max", _place).values),
     )
 }
 DAMPING_RATIO = float(device.document["mechanism"]["damping"]["mode_ratio"])
 
 
-def judged(model: str) -> float:
+def stiffness_by_brute_force(model: str) -> float:
     """The largest stiffness of a model at the reference position, by brute force."""
-    return judge(_felt, model, DAMPING_RATIO, PERIOD).largest_stiffness(2.0 * stiffest[model], 400.0)[0]
+    return brute_force_loop(_felt, model, DAMPING_RATIO, PERIOD).largest_stiffness(2.0 * stiffest[model], 400.0)[0]
 
 
 # The outermost centimetre: dexterity next to the boundary against the best of all.
@@ -183,12 +183,15 @@ def draw(figure) -> None:
 
 if __name__ == "__main__":
     print(
-        "at the reference, and by hand:", here, "by brute force:", {m: (v, judged(m)) for m, v in stiffest.items()}
+        "at the reference, and by hand:",
+        at_reference,
+        "by brute force:",
+        {m: (v, stiffness_by_brute_force(m)) for m, v in stiffest.items()},
     )
     print("kappa where w and w_d are 0.9 of their largest:", kappa_where_dexterous)
     print("stiffest cells, radius and kappa:", {name: at_largest(name) for name in ("rigid", "flexible", "exact")})
     print("rank correlation with dexterity:", {" ".join(k): f"{v:+.2f}" for k, v in contrast.items()})
-    print("rigid against flexible:", {k: f"{v:.2f}" for k, v in alike.items()})
+    print("rigid against flexible:", {k: f"{v:.2f}" for k, v in rank_correlations.items()})
     print("asymmetry:", {k: f"{v:.2g}" for k, v in asymmetries.items()})
     print("condition number at most:", {k: f"{100 * v:.0f} %" for k, v in isotropic.items()}, "rim:", rim)
     print(f"largest w {w_there:.6f} at r = {largest_w:.4f} m, where kappa = {kappa_there:.3f}")

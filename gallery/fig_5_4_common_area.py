@@ -22,9 +22,9 @@ from __future__ import annotations
 import numpy as np
 
 from gallery import fig_5_1_workspace as maps
-from gallery.designs import REFERENCE, device
 from gallery.five_bar import bundled
-from gallery.models import write_page
+from gallery.five_bar_designs import REFERENCE, device
+from gallery.shared_loops import write_page
 from zwidth.study.common_area import common_area
 from zwidth.study.requirement import parse_requirement
 

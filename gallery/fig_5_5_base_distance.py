@@ -22,18 +22,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from gallery import designs
+from gallery import five_bar_designs
 from gallery.five_bar import bundled
-from gallery.models import write_page
+from gallery.shared_loops import write_page
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.measures.impedance_range import rigid_range, sprung_range
 from zwidth.model.posture import PostureError
 
-Y = designs.REFERENCE[1]
-REACH = float(designs.device.mechanism.links.tip[[designs.RIGHT, designs.DISTAL_RIGHT], 0].sum())
-PERIOD = designs.device.controller.sampling_period
+Y = five_bar_designs.REFERENCE[1]
+REACH = float(
+    five_bar_designs.device.mechanism.links.tip[[five_bar_designs.RIGHT, five_bar_designs.DISTAL_RIGHT], 0].sum()
+)
+PERIOD = five_bar_designs.device.controller.sampling_period
 farthest_by_geometry = 2.0 * float(np.sqrt(REACH**2 - Y**2))
 
 DISTANCES = (-0.2, -0.1, 0.0, 0.1, 0.2)  # m
@@ -41,7 +43,7 @@ WITHIN = 0.13  # m; what all of them reach
 x = np.linspace(-0.25, 0.25, 501)
 
 
-def apart(distance: float) -> Device:
+def five_bar_at(distance: float) -> Device:
     """The five-bar with its base joints a distance d apart, as a user would ask for it."""
     places = {"upper-right": distance / 2.0, "upper-left": -distance / 2.0}
     return load("five-bar", [(f"mechanism.links.{name}.origin_m", [x, 0.0, 0.0]) for name, x in places.items()])
@@ -50,7 +52,7 @@ def apart(distance: float) -> Device:
 def reaches(distance: float) -> bool:
     """Whether the handle gets to (0, 0.25) m; farther apart the arms do not even meet (DeviceError)."""
     try:
-        apart(distance).at((0.0, Y))
+        five_bar_at(distance).at((0.0, Y))
     except (PostureError, DeviceError):
         return False
     return True
@@ -61,7 +63,14 @@ def farthest(sign: float) -> float:
     near, far = 0.4, 0.6
     while far - near > 1e-4:
         tried = np.linspace(near, far, 21)
-        out = int(np.argmax(designs.felt(designs.set_apart(sign * tried), "elbows-out").status != 0))
+        out = int(
+            np.argmax(
+                five_bar_designs.operating_points(
+                    five_bar_designs.with_base_distance(sign * tried), "elbows-out"
+                ).status
+                != 0
+            )
+        )
         near, far = float(tried[out - 1]), float(tried[out])
     return sign * near
 
@@ -79,7 +88,7 @@ def curves(of: Device) -> dict[str, np.ndarray]:
         "rigid": rigid_range(felt.rigid_mass, PERIOD).stiffness_max,
         "links": rigid_range(felt.link_side_mass, PERIOD).stiffness_max,
         "flexible": sprung_range(felt.motor_side_mass, felt.stiffness, PERIOD).stiffness_max,
-        "exact": designs.measured("stiffness_max", full).values,
+        "exact": five_bar_designs.measure_values("stiffness_max", full).values,
     }
 
 
@@ -111,18 +120,20 @@ def with_equal_drives(of: Device) -> Device:
 
 farthest_apart, farthest_crossed = farthest(1.0), farthest(-1.0)
 
-found = curves(designs.set_apart(np.array(DISTANCES)))
-found_with_equal_drives = curves(with_equal_drives(designs.set_apart(np.array([-0.2, 0.0]))))
+curves_by_distance = curves(five_bar_designs.with_base_distance(np.array(DISTANCES)))
+found_with_equal_drives = curves(with_equal_drives(five_bar_designs.with_base_distance(np.array([-0.2, 0.0]))))
 
-by_distance = {name: dict(zip(DISTANCES, values, strict=True)) for name, values in found.items()}
+by_distance = {name: dict(zip(DISTANCES, values, strict=True)) for name, values in curves_by_distance.items()}
 ratio_of_stiffness = factor(by_distance["rigid"][-0.2], WITHIN)
 factors = {name: {d: factor(v, WITHIN) for d, v in each.items()} for name, each in by_distance.items()}
 factors_of_all = {name: {d: factor(v) for d, v in each.items()} for name, each in by_distance.items()}
 three_within = {name: reach_of_factor(each[-0.2], 3.0) for name, each in by_distance.items()}
 # Of the crossed arms, the sine of the angle between the distal links at the last point that is reached.
 _last = float(x[np.isfinite(by_distance["rigid"][-0.2])][-1])
-between_at_the_edge = abs(float(replace(bundled(), base=(-0.1, 0.1)).at((_last, Y), "elbows-out").between))
-asymmetries = {name: max(asymmetry(v) for v in values) for name, values in found.items()}
+between_at_the_edge = abs(
+    float(replace(bundled(), base=(-0.1, 0.1)).at((_last, Y), "elbows-out").distal_angle_sine)
+)
+asymmetries = {name: max(asymmetry(v) for v in values) for name, values in curves_by_distance.items()}
 asymmetries_with_equal_drives = {
     name: max(asymmetry(v) for v in values) for name, values in found_with_equal_drives.items()
 }
@@ -153,7 +164,7 @@ def draw(figure) -> None:
 
 if __name__ == "__main__":
     print(f"reached for d from {farthest_crossed:.4f} to {farthest_apart:.4f} m")
-    for name in found:
+    for name in curves_by_distance:
         text = ", ".join(f"{d:g} m: {factors[name][d]:.2f} ({factors_of_all[name][d]:.2f})" for d in DISTANCES)
         print(f"{name}: largest over least stiffness within {WITHIN} m (of all): {text}")
         print(f"    three times within {three_within[name]:.4f} m; asymmetry {asymmetries[name]:.2g}")

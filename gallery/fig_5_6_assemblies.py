@@ -24,17 +24,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gallery import designs
+from gallery import five_bar_designs
 from gallery.five_bar import SIDES, bundled, closed_form
-from gallery.models import write_page
+from gallery.shared_loops import write_page
 from zwidth.measures.impedance_range import rigid_range, sprung_range
 
-PERIOD = designs.device.controller.sampling_period
+PERIOD = five_bar_designs.device.controller.sampling_period
 distance = np.linspace(-0.475, 0.475, 191)
 
 
 @dataclass(frozen=True)
-class Assembly:
+class AssemblyCurves:
     """Over the distances, nan where there is no posture; stiffness [N/m], area [N^2 s/m^2].
 
     rigid, links  (5.4) with the mass of links and rotors, and of the links alone; with their areas (5.5)
@@ -52,28 +52,28 @@ class Assembly:
     isotropy: np.ndarray
 
 
-def assembled(designs_apart, name: str) -> Assembly:
+def curves_of(designs_apart, name: str) -> AssemblyCurves:
     """All of it for one assembly."""
-    full = designs.felt(designs_apart, name)
+    full = five_bar_designs.operating_points(designs_apart, name)
     rigid = rigid_range(full.effective.rigid_mass, PERIOD)
     links = rigid_range(full.effective.link_side_mass, PERIOD)
     sprung = sprung_range(full.effective.motor_side_mass, full.effective.stiffness, PERIOD)
-    return Assembly(
+    return AssemblyCurves(
         rigid.stiffness_max,
         rigid.stable_area,
         links.stiffness_max,
         links.stable_area,
         sprung.stiffness_max,
         sprung.stable_area,
-        designs.measured("stiffness_max", full).values,
-        designs.measured("isotropy", full).values,
+        five_bar_designs.measure_values("stiffness_max", full).values,
+        five_bar_designs.measure_values("isotropy", full).values,
     )
 
 
-_apart = designs.set_apart(distance)
-found = {name: assembled(_apart, name) for name in SIDES}
+_apart = five_bar_designs.with_base_distance(distance)
+curves = {name: curves_of(_apart, name) for name in SIDES}
 
-_out, _in = found["elbows-out"], found["elbows-in"]
+_out, _in = curves["elbows-out"], curves["elbows-in"]
 mirrored = {
     name: float(np.nanmax(np.abs(getattr(_in, name)[::-1] / getattr(_out, name) - 1.0)))
     for name in ("flexible", "flexible_area", "exact", "rigid")
@@ -92,13 +92,13 @@ least = {
         for model in ("rigid", "flexible", "exact")
         for values in [getattr(each, model)]
     }
-    for name, each in found.items()
+    for name, each in curves.items()
 }
 
 
 def by_hand(name: str, at: float) -> float:
     """(5.7) of the arms written out by hand, base joints a distance apart [N/m]."""
-    felt = replace(bundled(), base=(at / 2.0, -at / 2.0)).at(designs.REFERENCE, name)
+    felt = replace(bundled(), base=(at / 2.0, -at / 2.0)).at(five_bar_designs.REFERENCE, name)
     return float(closed_form(felt.motor_side_mass, felt.stiffness, PERIOD))
 
 
@@ -122,7 +122,7 @@ def draw(figure) -> None:
     }
     axes = figure.subplots(3, 2, sharex=True).ravel()
     for ax, (name, (title, unit, scale, view)) in zip(axes, panels.items(), strict=True):
-        for (assembly, each), (colour, dashes) in zip(found.items(), LINES, strict=False):
+        for (assembly, each), (colour, dashes) in zip(curves.items(), LINES, strict=False):
             ax.plot(distance, getattr(each, name) / scale, color=colour, linestyle=dashes, label=assembly)
         ax.set_yscale("log")
         ax.set_ylim(*view)

@@ -28,23 +28,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from gallery import designs
+from gallery import five_bar_designs
 from gallery.five_bar import SIDES, bundled
-from gallery.models import write_page
+from gallery.shared_loops import write_page
 from zwidth.measures.impedance_range import rigid_range, sprung_range
 
-PERIOD = designs.device.controller.sampling_period
-LENGTH, Y = designs.LENGTH, designs.REFERENCE[1]
+PERIOD = five_bar_designs.device.controller.sampling_period
+LENGTH, Y = five_bar_designs.LENGTH, five_bar_designs.REFERENCE[1]
 PRINTED = 0.146  # m
 TIES = ("L1 alone", "L1 = L3")
 MODELS = ("rigid", "flexible", "exact")
 NEAR = 2  # steps of the grid
 length = np.linspace(0.1, 0.35, 251)
-both_in_line = float(np.hypot(Y, designs.device.mechanism.links.tip[designs.DISTAL_RIGHT, 0]))
+both_in_line = float(np.hypot(Y, five_bar_designs.device.mechanism.links.tip[five_bar_designs.DISTAL_RIGHT, 0]))
 
 
 @dataclass(frozen=True)
-class Curve:
+class LengthCurves:
     """Over the lengths, nan where the drives do not hold the handle [N/m].
 
     rigid, flexible, exact   (5.4) with links and rotors, (5.7), and the full model's
@@ -56,7 +56,7 @@ class Curve:
     flexible: np.ndarray
     exact: np.ndarray
     singular: tuple[float, ...]
-    throughout: bool
+    always_singular: bool
 
     def low_points(self, model: str) -> list[float]:
         """Lengths of local minima between the ends, to the steps of the grid."""
@@ -69,18 +69,18 @@ class Curve:
         return any(abs(at - where) <= (NEAR + 0.01) * (length[1] - length[0]) for where in self.singular)
 
 
-def curve(tie: str, law: str, assembly: str) -> Curve:
+def curve(tie: str, law: str, assembly: str) -> LengthCurves:
     """One curve of each model."""
     other = length if tie == "L1 = L3" else np.full_like(length, LENGTH)
-    changed = designs.with_lengths(length, other, law)
-    full = designs.felt(changed, assembly)
-    judge = replace(bundled(), driven=(length, other)).at(designs.REFERENCE, assembly)
-    throughout = bool(np.all(np.abs(judge.between) < 1e-9))
-    return Curve(
+    changed = five_bar_designs.with_lengths(length, other, law)
+    full = five_bar_designs.operating_points(changed, assembly)
+    judge = replace(bundled(), driven_length=(length, other)).at(five_bar_designs.REFERENCE, assembly)
+    throughout = bool(np.all(np.abs(judge.distal_angle_sine) < 1e-9))
+    return LengthCurves(
         rigid_range(full.effective.rigid_mass, PERIOD).stiffness_max,
         sprung_range(full.effective.motor_side_mass, full.effective.stiffness, PERIOD).stiffness_max,
-        designs.measured("stiffness_max", full).values,
-        () if throughout else singularities(tie, assembly, judge.between),
+        five_bar_designs.measure_values("stiffness_max", full).values,
+        () if throughout else singularities(tie, assembly, judge.distal_angle_sine),
         throughout,
     )
 
@@ -90,9 +90,9 @@ def singularities(tie: str, assembly: str, between: np.ndarray) -> tuple[float, 
 
     def sine(L: float) -> float:
         return float(
-            replace(bundled(), driven=(L, L if tie == "L1 = L3" else LENGTH))
-            .at(designs.REFERENCE, assembly)
-            .between
+            replace(bundled(), driven_length=(L, L if tie == "L1 = L3" else LENGTH))
+            .at(five_bar_designs.REFERENCE, assembly)
+            .distal_angle_sine
         )
 
     signs = np.flatnonzero(between[:-2] * between[2:] < 0.0)
@@ -100,13 +100,16 @@ def singularities(tie: str, assembly: str, between: np.ndarray) -> tuple[float, 
 
 
 curves = {
-    (tie, law, assembly): curve(tie, law, assembly) for tie in TIES for law in designs.LAWS for assembly in SIDES
+    (tie, law, assembly): curve(tie, law, assembly)
+    for tie in TIES
+    for law in five_bar_designs.LAWS
+    for assembly in SIDES
 }
 
 low_points = {
     key: {model: found.low_points(model) for model in MODELS}
     for key, found in curves.items()
-    if not found.throughout
+    if not found.always_singular
 }
 # The lengths of low points that are no singularities.
 minima = {

@@ -23,15 +23,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from gallery import designs
-from gallery.brute_force import Judge
+from gallery import five_bar_designs
+from gallery.brute_force import BruteForceLoop
 from gallery.five_bar import bundled, closed_form
-from gallery.models import write_page
+from gallery.shared_loops import write_page
 from zwidth.measures.impedance_range import sprung_range
 
-device = designs.device
+device = five_bar_designs.device
 PERIOD = device.controller.sampling_period
-POSITION = np.array([*designs.REFERENCE, 0.0])
+POSITION = np.array([*five_bar_designs.REFERENCE, 0.0])
 
 # (a) in units of m and T; the grid stays off both ends.
 W = np.linspace(0.01, np.pi / 2.0 - 0.01, 157)
@@ -41,15 +41,17 @@ limit_rigid = float(sprung_range(1.0, 1e-8, 1.0).stiffness_max)
 beyond = sprung_range(1.0, np.array([1.58, 2.0, 3.0, 4.0, 4.7]) ** 2, 1.0).stiffness_max
 
 
-def judged(frequency: float) -> float:
+def p_max_by_brute_force(frequency: float) -> float:
     """p_max at a W by eigenvalues and bisection."""
-    return Judge([[1.0]], [[0.0]], [[frequency**2]], [1.0], 1.0).largest_stiffness(1.0, 2.0)[0]
+    return BruteForceLoop([[1.0]], [[0.0]], [[frequency**2]], [1.0], 1.0).largest_stiffness(1.0, 2.0)[0]
 
 
-felt = device.at().effective
-W_of_the_device = float(np.sqrt(felt.stiffness / felt.motor_side_mass) * PERIOD)
+effective = device.at().effective
+W_of_the_device = float(np.sqrt(effective.stiffness / effective.motor_side_mass) * PERIOD)
 p_of_the_device = float(
-    sprung_range(felt.motor_side_mass, felt.stiffness, PERIOD).stiffness_max * PERIOD**2 / felt.motor_side_mass
+    sprung_range(effective.motor_side_mass, effective.stiffness, PERIOD).stiffness_max
+    * PERIOD**2
+    / effective.motor_side_mass
 )
 
 # (b)
@@ -70,7 +72,7 @@ def over_inertia(assembly: str) -> tuple[np.ndarray, np.ndarray]:
     for value in inertia:
         place = with_first_motor(float(value)).at(POSITION, assembly=assembly)
         closed = sprung_range(place.effective.motor_side_mass, place.effective.stiffness, PERIOD).stiffness_max
-        rows.append((float(closed), float(designs.measured("stiffness_max", place).values)))
+        rows.append((float(closed), float(five_bar_designs.measure_values("stiffness_max", place).values)))
     closed, exact = np.array(rows).T
     return closed, exact
 
@@ -80,14 +82,14 @@ flexible_outward, exact_outward = over_inertia("elbows-out")
 _bar = bundled()
 _at_the_joint = float(device.mechanism.drives.transmission[0]) ** 2 * inertia
 _felt = replace(_bar, rotor=(_at_the_joint, _bar.rotor[1])).at(
-    np.broadcast_to(designs.REFERENCE, (len(inertia), 2)), "elbows-in"
+    np.broadcast_to(five_bar_designs.REFERENCE, (len(inertia), 2)), "elbows-in"
 )
 error_by_hand = float(np.abs(flexible / closed_form(_felt.motor_side_mass, _felt.stiffness, PERIOD) - 1.0).max())
 at_present = len(inertia) // 2
 # One rotor alone: the first one endlessly heavy.
 levels_off = float(
     sprung_range(
-        with_first_motor(1e6 * BUNDLED).at(POSITION).effective.motor_side_mass, felt.stiffness, PERIOD
+        with_first_motor(1e6 * BUNDLED).at(POSITION).effective.motor_side_mass, effective.stiffness, PERIOD
     ).stiffness_max
 )
 doubled = tuple(

@@ -9,7 +9,7 @@ import zwidth
 
 device = zwidth.load("five-bar")
 sensitivities = device.sensitivities()
-for path, share in sensitivities.wholes[:3]:
+for path, share in sensitivities.ranking[:3]:
     print(f"{path}: {share:+.3f} % for 1 % more")
 
 before = device.chart().stiffness_max

@@ -21,7 +21,7 @@ from functools import cache
 import numpy as np
 from scipy.linalg import eigh
 
-from gallery.brute_force import Judge
+from gallery.brute_force import BruteForceLoop
 from zwidth.device.load import load
 
 # On which side of the line from its base to the handle each arm's elbow is, +1 to the right: right arm, left arm.
@@ -34,13 +34,14 @@ SIDES = {
 
 
 @dataclass(frozen=True)
-class Felt:
+class HandleProperties:
     """What is felt along y, and how the handle is driven; nan out of reach.
 
     jacobian, mass_matrix  (..., 2, 2)  J [m/rad] and M of the links [kg m^2], in the driven angles
     link_side_mass, motor_side_mass, rigid_mass  (...)  [kg];   stiffness  (...) [N/m]
-    between    (...)  sine of the angle between the distal links: 0 where the drives do not hold the handle
-    driven     (..., 2)  angles of the driven arms [rad];  elbow  (..., 2) of the distal against the driven ones
+    distal_angle_sine  (...)  sine of the angle between the distal links: 0 where the drives do not hold the handle
+    driven_angles      (..., 2)  angles of the driven arms [rad];  elbow  (..., 2) of the distal against the driven
+                       ones
     """
 
     jacobian: np.ndarray
@@ -49,8 +50,8 @@ class Felt:
     motor_side_mass: np.ndarray
     rigid_mass: np.ndarray
     stiffness: np.ndarray
-    between: np.ndarray
-    driven: np.ndarray
+    distal_angle_sine: np.ndarray
+    driven_angles: np.ndarray
     elbow: np.ndarray
 
     @property
@@ -78,27 +79,29 @@ class Felt:
 class FiveBar:
     """The device; each field for the right and the left arm, numbers or arrays that broadcast.
 
-    base           x of the base joints, y is 0 [m]
-    driven, distal lengths [m]
-    swing          moment of inertia of the driven arm about its base joint [kg m^2]
+    base            x of the base joints, y is 0 [m]
+    driven_length, distal_length  [m]
+    driven_inertia  moment of inertia of the driven arm about its base joint [kg m^2]
     mass, center, inertia  of the distal link: [kg], (along, across) [m], about its centre of mass [kg m^2]
-    rotor, spring  of the drive, at the joint [kg m^2], [N m/rad]
+    rotor, spring   of the drive, at the joint [kg m^2], [N m/rad]
     """
 
     base: tuple
-    driven: tuple
-    distal: tuple
-    swing: tuple
+    driven_length: tuple
+    distal_length: tuple
+    driven_inertia: tuple
     mass: tuple
     center: tuple
     inertia: tuple
     rotor: tuple
     spring: tuple
 
-    def at(self, position, assembly: str) -> Felt:
+    def at(self, position, assembly: str) -> HandleProperties:
         """Everything at handle positions (..., 2) [m]."""
         p = np.asarray(position, float)[..., :2]
-        shape = np.broadcast_shapes(p.shape[:-1], *(np.shape(v) for v in (*self.base, *self.driven, *self.distal)))
+        shape = np.broadcast_shapes(
+            p.shape[:-1], *(np.shape(v) for v in (*self.base, *self.driven_length, *self.distal_length))
+        )
         p = np.broadcast_to(p, (*shape, 2))
         arms = [self._arm(p, i, SIDES[assembly][i]) for i in range(2)]
         A = np.stack([arm["along"] for arm in arms], axis=-2)
@@ -106,21 +109,21 @@ class FiveBar:
         for i, arm in enumerate(arms):
             b[..., i, i] = (arm["along"] * arm["elbow moves"]).sum(axis=-1)
         between = _determinant(A)
-        J = _solved(A, b)
+        J = _solve(A, b)
         M = self._mass_matrix(arms, J)
         rotor, spring = (self._diagonal(values, shape) for values in (self.rotor, self.spring))
         h = J[..., 1, :]
-        return Felt(
+        return HandleProperties(
             J,
             M,
-            *(_felt(S, h) for S in (M, rotor, M + rotor, spring)),
+            *(_effective_value(S, h) for S in (M, rotor, M + rotor, spring)),
             between,
             np.stack([arm["angle"] for arm in arms], axis=-1),
             np.stack([arm["bend"] for arm in arms], axis=-1),
         )
 
     def _arm(self, p, i, side):
-        L, l = np.asarray(self.driven[i], float), np.asarray(self.distal[i], float)
+        L, l = np.asarray(self.driven_length[i], float), np.asarray(self.distal_length[i], float)
         x, y = p[..., 0] - self.base[i], p[..., 1]
         D = np.hypot(x, y)
         with np.errstate(invalid="ignore"):
@@ -134,11 +137,11 @@ class FiveBar:
 
     @np.errstate(invalid="ignore", over="ignore")
     def _mass_matrix(self, arms, J):
-        M = self._diagonal(self.swing, J.shape[:-2])
+        M = self._diagonal(self.driven_inertia, J.shape[:-2])
         for i, arm in enumerate(arms):
             elbow = arm["elbow moves"][..., :, None] * np.eye(2)[i]
             turning = np.einsum("...k,...kj->...j", arm["across"], J - elbow)
-            turning = turning / np.asarray(self.distal[i], float)[..., None]
+            turning = turning / np.asarray(self.distal_length[i], float)[..., None]
             x, y = self.center[i]
             lever = x * arm["across"] - y * arm["along"]
             center = elbow + lever[..., :, None] * turning[..., None, :]
@@ -170,9 +173,9 @@ def bundled() -> FiveBar:
     drives = mechanism["drives"]
     return FiveBar(
         base=(0.0, 0.0),
-        driven=tuple(link["length_m"] for link in upper),
-        distal=tuple(link["length_m"] for link in distal),
-        swing=tuple(
+        driven_length=tuple(link["length_m"] for link in upper),
+        distal_length=tuple(link["length_m"] for link in distal),
+        driven_inertia=tuple(
             link["inertia_kg_m2"] + link["mass_kg"] * float(np.sum(np.square(link["center_of_mass_m"])))
             for link in upper
         ),
@@ -184,7 +187,7 @@ def bundled() -> FiveBar:
     )
 
 
-def judge(felt: Felt, model: str, damping_ratio: float, period: float) -> Judge:
+def brute_force_loop(felt: HandleProperties, model: str, damping_ratio: float, period: float) -> BruteForceLoop:
     """The loop of one posture with a wall along y, for brute force's eigenvalues.
 
     model  "rigid": links and rotors as one mass; "links": those alone; "motor-mass": the rotors on their spring,
@@ -192,9 +195,9 @@ def judge(felt: Felt, model: str, damping_ratio: float, period: float) -> Judge:
     """
     if model in ("rigid", "links"):
         mass = felt.rigid_mass if model == "rigid" else felt.link_side_mass
-        return Judge([[mass]], [[0.0]], [[0.0]], [1.0], period)
+        return BruteForceLoop([[mass]], [[0.0]], [[0.0]], [1.0], period)
     if model == "motor-mass":
-        return Judge([[felt.motor_side_mass]], [[0.0]], [[felt.stiffness]], [1.0], period)
+        return BruteForceLoop([[felt.motor_side_mass]], [[0.0]], [[felt.stiffness]], [1.0], period)
     rotor, spring = (np.diag(values) for values in (bundled().rotor, bundled().spring))
     none = np.zeros((2, 2))
     M = np.block([[felt.mass_matrix, none], [none, rotor]])
@@ -203,7 +206,7 @@ def judge(felt: Felt, model: str, damping_ratio: float, period: float) -> Judge:
     squared, side = squared[2:], np.concatenate([np.zeros(2), felt.jacobian[1]]) @ shapes[:, 2:]
     modes = np.concatenate([[0.0], squared])
     side = np.concatenate([[1.0 / np.sqrt(felt.rigid_mass)], side])
-    return Judge(np.eye(3), np.diag(2.0 * damping_ratio * np.sqrt(modes)), np.diag(modes), side, period)
+    return BruteForceLoop(np.eye(3), np.diag(2.0 * damping_ratio * np.sqrt(modes)), np.diag(modes), side, period)
 
 
 def closed_form(mass, stiffness, period):
@@ -213,13 +216,13 @@ def closed_form(mass, stiffness, period):
         return np.where(c > 0.0, 2.0 * stiffness * (np.sqrt(1.0 + c) - 1.0) ** 2 / (1.0 - c), 0.0)
 
 
-def _felt(S, h):
+def _effective_value(S, h):
     """1/(h^T S^-1 h)."""
     with np.errstate(invalid="ignore", over="ignore"):
-        return 1.0 / (h * _solved(S, h[..., None])[..., 0]).sum(axis=-1)
+        return 1.0 / (h * _solve(S, h[..., None])[..., 0]).sum(axis=-1)
 
 
-def _solved(A, B):
+def _solve(A, B):
     """A^-1 B by Cramer's rule: infinite where singular instead of raising."""
     turned = np.stack(
         [np.stack([A[..., 1, 1], -A[..., 0, 1]], axis=-1), np.stack([-A[..., 1, 0], A[..., 0, 0]], axis=-1)],

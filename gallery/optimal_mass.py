@@ -11,8 +11,8 @@ Printed it is
     rho = 2 sqrt 2 sqrt(k_e k_d T + k_d k_p T)/sqrt(4 k_d^2 + 8 k_e k_d T + 4 k_d k_p T + k_p^2 T^2)
 
 whose last term, (k_p T)^2, the scan damages to "KZAL". The formula holds where B > K T/2 and the remaining real
-root is at most rho; `measures.fidelity` has it, and why no mass does better. Beside it the minimum is found by
-eigenvalues alone.
+root is at most rho; `measures.vibration_decay` has it, and why no mass does better. Beside it the minimum is found
+by eigenvalues alone.
 
 Run `python -m gallery.optimal_mass` to see the numbers.
 """
@@ -21,10 +21,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gallery.models import published
+from gallery.shared_loops import published
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
-from zwidth.measures.fidelity import fastest_mass, optimal_mass
+from zwidth.measures.vibration_decay import fastest_mass, optimal_mass
 from zwidth.model.plant import Plant
 
 T = published().period

@@ -28,12 +28,12 @@ from math import ceil, inf
 
 import numpy as np
 
-from gallery.models import published, write_figure
+from gallery.shared_loops import published, write_figure
 from zwidth.chart.verdict import STABLE, judge
 from zwidth.contact.environments import one_sided_wall, wall
+from zwidth.contact.friction_quantisation_plane import resting_limit
 from zwidth.contact.hand import Hand
-from zwidth.contact.limit_cycles import limit_cycles
-from zwidth.contact.plane import resting_limit
+from zwidth.contact.harmonic_balance import limit_cycles
 from zwidth.contact.simulate import Run, simulate_batch
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
@@ -53,7 +53,7 @@ stiffness = PRINTED * 2.0 ** (0.5 * np.arange(-2, 11) + 0.25)  # the limit lies 
 
 
 @dataclass(frozen=True)
-class Case:
+class Disturbance:
     """What disturbs the device, and what stops it.
 
     period   [s];   damping  of the wall [N s/m]
@@ -78,7 +78,7 @@ def device(period: float) -> Loop:
     return Loop(replace(plant, nonlinear=parts), Controller(period))
 
 
-def moving(case: Case, walls: Sequence[float] | np.ndarray = stiffness) -> np.ndarray:
+def is_moving(case: Disturbance, walls: Sequence[float] | np.ndarray = stiffness) -> np.ndarray:
     """Does the reading still change at the end, on each wall? Without end counts as moving."""
     loop, sides = device(case.period), wall if case.speed is None else one_sided_wall
     start = case.start * STEP if case.speed is None else 0.0
@@ -106,7 +106,7 @@ def onset(moves: np.ndarray) -> tuple[float, float]:
     return float(stiffness[first - 1]) if first else 0.0, float(stiffness[first])
 
 
-def linear_edge(case: Case) -> tuple[float, float]:
+def linear_edge(case: Disturbance) -> tuple[float, float]:
     """The same of the linear loop, which has neither friction nor counts."""
     return onset(judge(device(case.period), stiffness, np.full_like(stiffness, case.damping)).verdict != STABLE)
 
@@ -117,27 +117,27 @@ def first_without_rest(push: float) -> float:
 
 
 CASES = {
-    "0.1 ms, 3 N s/m": Case(damping=3.0),
-    "0.1 ms, 10 N s/m": Case(),
-    "0.1 ms, 30 N s/m": Case(damping=30.0),
-    "0.05 ms, 10 N s/m": Case(period=5e-5),
-    "0.2 ms, 10 N s/m": Case(period=2e-4),
-    "from 0.3 counts": Case(start=0.3),
-    "from 1 count": Case(start=1.0),
-    "from 50 counts, 1 mm": Case(start=50.0),
-    "pushed between counts, 3 N s/m": Case(damping=3.0, counts=BETWEEN, start=0.0),
-    "pushed between counts": Case(counts=BETWEEN, start=0.0),
-    "pushed between counts, 30 N s/m": Case(damping=30.0, counts=BETWEEN, start=0.0),
-    "pushed by 0.9 C": Case(push=0.9, start=0.0),
-    "pushed by 2.75 C": Case(push=AS_PRINTED, start=0.0),
-    "pushed by 2.75 C, from 1 mm": Case(push=AS_PRINTED, start=50.0),
-    "hit at 0.05 m/s, 2.75 C": Case(push=AS_PRINTED, speed=0.05),
-    "hit at 0.2 m/s, 2.75 C": Case(push=AS_PRINTED, speed=0.2),
+    "0.1 ms, 3 N s/m": Disturbance(damping=3.0),
+    "0.1 ms, 10 N s/m": Disturbance(),
+    "0.1 ms, 30 N s/m": Disturbance(damping=30.0),
+    "0.05 ms, 10 N s/m": Disturbance(period=5e-5),
+    "0.2 ms, 10 N s/m": Disturbance(period=2e-4),
+    "from 0.3 counts": Disturbance(start=0.3),
+    "from 1 count": Disturbance(start=1.0),
+    "from 50 counts, 1 mm": Disturbance(start=50.0),
+    "pushed between counts, 3 N s/m": Disturbance(damping=3.0, counts=BETWEEN, start=0.0),
+    "pushed between counts": Disturbance(counts=BETWEEN, start=0.0),
+    "pushed between counts, 30 N s/m": Disturbance(damping=30.0, counts=BETWEEN, start=0.0),
+    "pushed by 0.9 C": Disturbance(push=0.9, start=0.0),
+    "pushed by 2.75 C": Disturbance(push=AS_PRINTED, start=0.0),
+    "pushed by 2.75 C, from 1 mm": Disturbance(push=AS_PRINTED, start=50.0),
+    "hit at 0.05 m/s, 2.75 C": Disturbance(push=AS_PRINTED, speed=0.05),
+    "hit at 0.2 m/s, 2.75 C": Disturbance(push=AS_PRINTED, speed=0.2),
 }
-moves = {name: moving(case) for name, case in CASES.items()}
+moves = {name: is_moving(case) for name, case in CASES.items()}
 onsets = {name: onset(found) for name, found in moves.items()}
 around = {
-    push: moving(Case(push=push, start=0.0), first_without_rest(push) * np.array([0.95, 1.05])).tolist()
+    push: is_moving(Disturbance(push=push, start=0.0), first_without_rest(push) * np.array([0.95, 1.05])).tolist()
     for push in (1.5, AS_PRINTED, 4.0, 6.0)
 }
 

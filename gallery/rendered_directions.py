@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import block_diag, eigh
 
 from zwidth.device.load import load
-from zwidth.model.directions import decompose, reduce_directions
+from zwidth.model.multi_plant import decompose, reduce_directions
 
 SIZES = ((1, 3), (1, 5), (2, 3), (2, 5), (3, 4), (3, 6))  # m of n
 
@@ -47,25 +47,25 @@ J, drives = posture.jacobian[:2], device.mechanism.drives
 _squared = drives.transmission**2
 
 
-def _seen(matrix: np.ndarray, through: np.ndarray) -> np.ndarray:
+def _effective_matrix(matrix: np.ndarray, through: np.ndarray) -> np.ndarray:
     return np.linalg.inv(through @ np.linalg.inv(matrix) @ through.T)
 
 
 A_1, A_2 = np.hstack([J, 0.0 * J]), np.hstack([0.0 * J, J])  # (2.25), (2.27)
 M = block_diag(posture.mass_matrix, np.diag(_squared * drives.motor_inertia))
-W1, W2 = _seen(M, A_1), _seen(M, A_2)  # (2.28)
+W1, W2 = _effective_matrix(M, A_1), _effective_matrix(M, A_2)  # (2.28)
 K_phi = np.diag(_squared * drives.stiffness)
-K = _seen(K_phi, J)  # (2.34)
+K = _effective_matrix(K_phi, J)  # (2.34)
 # (2.29)-(2.33): motors locked, a unit force at the handle along each direction moves it by K^-1
 deflection = J @ np.linalg.solve(K_phi, J.T)
 
 
-def _off(found: np.ndarray, expected: np.ndarray) -> float:
+def _relative_difference(found: np.ndarray, expected: np.ndarray) -> float:
     return float(np.max(np.abs(found - expected)) / np.max(np.abs(expected)))
 
 
-error_of_2_28 = _off(masses.mass, block_diag(W1, W2))
-error_of_2_34 = _off(masses.stiffness, np.block([[K, -K], [-K, K]]))
+error_of_2_28 = _relative_difference(masses.mass, block_diag(W1, W2))
+error_of_2_34 = _relative_difference(masses.stiffness, np.block([[K, -K], [-K, K]]))
 
 
 def frequencies(plant) -> np.ndarray:

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.device.load import load
-from zwidth.model.effective import EffectiveParameters
+from zwidth.model.effective_parameters import EffectiveParameters
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.reduction import effective_parameters, plant_effective_parameters
 

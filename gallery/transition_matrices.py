@@ -19,8 +19,8 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.signal import bilinear
 
-from gallery.brute_force import Judge, butterworth
-from gallery.models import published
+from gallery.brute_force import BruteForceLoop, butterworth
+from gallery.shared_loops import published
 
 T = published().period
 M = np.diag([0.2616, 0.0254])  # Table 3.4
@@ -118,21 +118,21 @@ def filtered_matrix(p: float, d: float, cutoff: float) -> np.ndarray:
     )
 
 
-def apart(one: np.ndarray, other: np.ndarray) -> float:
+def coefficient_distance(one: np.ndarray, other: np.ndarray) -> float:
     """Largest distance of two matrices' characteristic coefficients; the longer one's last ones against 0."""
     a, b = np.poly(one), np.poly(other)
     return float(np.abs(a - np.pad(b, (0, len(a) - len(b)))).max())
 
 
-_two_masses = Judge(M, R_M * M + R_K * K, K, [0.0, 1.0], T)
-error_of_modal = max(apart(modal_matrix(*wall), _two_masses.matrix(*wall)) for wall in WALLS)
+_two_masses = BruteForceLoop(M, R_M * M + R_K * K, K, [0.0, 1.0], T)
+error_of_modal = max(coefficient_distance(modal_matrix(*wall), _two_masses.matrix(*wall)) for wall in WALLS)
 # the one that is zero and the least of the five others
 zero, non_zero = (
     function(np.sort(np.abs(np.linalg.eigvals(modal_matrix(*wall))))[index] for wall in WALLS)
     for function, index in ((max, 0), (min, 1))
 )
 error_of_damped = max(
-    apart(damped_matrix(*wall, beta), Judge(1.0, beta, 0.0, 1.0, 1.0).matrix(*wall))
+    coefficient_distance(damped_matrix(*wall, beta), BruteForceLoop(1.0, beta, 0.0, 1.0, 1.0).matrix(*wall))
     for wall in DIMENSIONLESS
     for beta in (0.01, 0.2, 3.0)
 )
@@ -142,8 +142,10 @@ _scipy = bilinear([_analogue**2], [1.0, np.sqrt(2.0) * _analogue, _analogue**2],
 error_of_filter = max(
     float(np.abs(ours - theirs).max()) for ours, theirs in zip(filter_coefficients(CUTOFF, T), _scipy, strict=True)
 )
-_late = Judge(1.0, 0.0, 0.0, 1.0, 1.0, low_pass=butterworth(CUTOFF * T, 1.0))
-error_of_filtered = max(apart(filtered_matrix(*wall, CUTOFF * T), _late.matrix(*wall)) for wall in DIMENSIONLESS)
+_late = BruteForceLoop(1.0, 0.0, 0.0, 1.0, 1.0, low_pass=butterworth(CUTOFF * T, 1.0))
+error_of_filtered = max(
+    coefficient_distance(filtered_matrix(*wall, CUTOFF * T), _late.matrix(*wall)) for wall in DIMENSIONLESS
+)
 
 
 if __name__ == "__main__":

@@ -7,15 +7,15 @@ pass there (`zwidth.study.validity`); here is asked where that stays within 10 %
 
 from __future__ import annotations
 
-from gallery.models import PUBLISHED
+from gallery.shared_loops import PUBLISHED
 from zwidth.device.load import load
 from zwidth.study.validity import validity
 
-found = validity(load(PUBLISHED).at())
-fits = {fit.key: fit for fit in found.fits}
-natural = found.first_natural
-lowest, highest = float(found.frequency[0]), float(found.frequency[-1])
+model_validity = validity(load(PUBLISHED).at())
+fits = {fit.key: fit for fit in model_validity.fits}
+natural = model_validity.first_natural
+lowest, highest = float(model_validity.frequency[0]), float(model_validity.frequency[-1])
 
-rigid, motor, motor_undamped = (fits[key].within for key in ("rigid", "motor-mass", "motor-mass-undamped"))
+rigid, motor, motor_undamped = (fits[key].valid_ranges for key in ("rigid", "motor-mass", "motor-mass-undamped"))
 rigid_below = rigid[-1][1]
 motor_above = motor[0][0]

@@ -32,7 +32,7 @@ def one_thread() -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def patience() -> Iterator[None]:
+def no_progress_messages() -> Iterator[None]:
     """A command line on a slow machine says no more than on a fast one, also where tests share what it said."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("zwidth.show.cli.progress.PATIENCE", 1e6)

@@ -8,11 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-HANGS = 900.0  # seconds after which a process that should have ended counts as one that never will
+HANG_TIMEOUT_S = 900.0  # seconds after which a process that should have ended counts as one that never will
 
 # The method `{name}` of `{owner}` of `{module}` (a function of the module where there is no owner) works as ever.
 # After call number `{calls}` it tells the test and waits for the signal; one that comes earlier counts too.
-STOPPING = """
+INTERRUPTED_PROGRAM = """
 import importlib, os, signal, sys
 
 sys.path[:0] = {path!r}
@@ -55,7 +55,7 @@ def stopped_by_ctrl_c(
     module, _, attribute = where.partition(":")
     owner, _, name = attribute.rpartition(".")
     ready, tell = os.pipe()
-    program = STOPPING.format(
+    program = INTERRUPTED_PROGRAM.format(
         path=sys.path, module=module, owner=owner, name=name, calls=calls, ready=tell, words=words
     )
     running = subprocess.Popen(
@@ -73,6 +73,6 @@ def stopped_by_ctrl_c(
         reached = pipe.read(1) == b"."  # empty where the process ended without getting there
     if reached:
         os.killpg(running.pid, signal.SIGINT)
-    out, err = running.communicate(timeout=HANGS)
+    out, err = running.communicate(timeout=HANG_TIMEOUT_S)
     assert reached, f"ended before it got to {where}: {err}"
     return running.returncode, out, err

@@ -28,7 +28,7 @@ def sampled_response(loop, frequency):
     return states[:, :n] @ loop.plant.sensor
 
 
-def dense(loop, count=1200, lowest=3e-5):
+def frequency_grid(loop, count=1200, lowest=3e-5):
     """Frequencies up to half the sampling rate, `count` logarithmic and a third as many linear ones."""
     half = 0.5 / loop.period
     return np.unique(
@@ -36,9 +36,9 @@ def dense(loop, count=1200, lowest=3e-5):
     )
 
 
-def measured(loop, frequency=None, **more):
+def measured_response(loop, frequency=None, **more):
     """A loop's plant as a response, and the controller without what the response holds already."""
-    f = dense(loop) if frequency is None else frequency
+    f = frequency_grid(loop) if frequency is None else frequency
     own = loop.controller
     computer = Controller(own.sampling_period, velocity_filter=own.velocity_filter)
     return Response(f, sampled_response(loop, f), **more), computer
@@ -52,7 +52,7 @@ def chirp(count, period, low, high, amplitude=1.0):
     return amplitude * np.concatenate([up, up[::-1]])
 
 
-def moved(loop, force, resolution=0.0, noise=0.0, seed=0):
+def encoder_readings(loop, force, resolution=0.0, noise=0.0, seed=0):
     """The encoder's readings (n,) of a loop's plant under held forces (n,), quantised and noisy."""
     T, n = loop.period, loop.plant.size
     whole = int(loop.controller.delay)

@@ -49,9 +49,9 @@ def environment(without: str) -> dict[str, str]:
 def main() -> int:
     without, *arguments = sys.argv[1:] or [""]
     env = environment(without)
-    here = Path(__file__).parent
-    subprocess.run([sys.executable, here / "compile_kernels.py"], env=env, check=True)
-    return subprocess.run([sys.executable, "-m", "pytest", *arguments], env=env, cwd=here.parent).returncode
+    subprocess.run([sys.executable, "-m", "zwidth.show.cli.main", "compile"], env=env, check=True)
+    root = Path(__file__).parent.parent
+    return subprocess.run([sys.executable, "-m", "pytest", *arguments], env=env, cwd=root).returncode
 
 
 if __name__ == "__main__":

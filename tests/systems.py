@@ -220,7 +220,7 @@ def velocity_weights(method, T):
     return None
 
 
-class States:
+class StateSpaceBuilder:
     """A linear system under construction: rows of its transition matrix, signals as functions of its states."""
 
     def __init__(self, size):
@@ -251,7 +251,7 @@ class States:
         return signals
 
 
-def second_matrix(loop, wall_stiffness, wall_damping):
+def reference_transition_matrix(loop, wall_stiffness, wall_damping):
     """The transition matrix of one wall, built from physical states, a queue of forces and direct-form filters.
 
     Nothing is shared with the package but the plant and the controller.
@@ -266,7 +266,7 @@ def second_matrix(loop, wall_stiffness, wall_damping):
     low_pass, on_force = velocity_filter(controller), low_pass_sections(controller.force_filter, T)
     weights = velocity_weights(controller.velocity, T)
     memory = 2 if weights is None else len(weights) - 1
-    system = States(len(F) + whole + 1 + memory + 2 * len(low_pass) + 2 * len(on_force))
+    system = StateSpaceBuilder(len(F) + whole + 1 + memory + 2 * len(low_pass) + 2 * len(on_force))
     plant_states = system.add(len(F))
     y = sum(c * system.signal(at) for c, at in zip(plant.sensor, plant_states, strict=False))
     if weights is None:

@@ -10,11 +10,11 @@ import pytest
 
 import zwidth
 from tests import systems
-from tests.measured_cases import measured
+from tests.measured_cases import measured_response
 from zwidth.chart import eigenvalues, hysteretic_chart, measured_chart, multi_chart, spectral_radius
 from zwidth.conditions import compare
 from zwidth.contact import judge_response, limit_cycles, simulate
-from zwidth.guarantees import nested, passive_region, spring_stable_region
+from zwidth.guarantees import find_guarantees, passive_region, spring_stable_region
 from zwidth.loop import MultiLoop, velocity_of
 from zwidth.measures import decay_time, evaluate, felt_chart, felt_impedance, static_stiffness, wall_paths
 from zwidth.model import MultiPlant, attach, natural_frequencies, reduce_plant, solve_posture
@@ -93,7 +93,7 @@ KINDS = [
     (lambda: compare(device()), "loop must be a Loop, got a Device"),
     (lambda: passive_region(device()), "loop must be a Loop, got a Device"),
     (lambda: spring_stable_region(device()), "loop must be a Loop, got a Device"),
-    (lambda: nested(device()), "loop must be a Loop, got a Device"),
+    (lambda: find_guarantees(device()), "loop must be a Loop, got a Device"),
     (lambda: limit_cycles(device(), 1.0, 1.0), "loop must be a Loop, got a Device"),
     (lambda: felt_impedance(device(), 1.0, 1.0, [1.0]), "loop must be a Loop, got a Device"),
     (lambda: felt_chart(device()), "chart must be a StabilityChart, got a Device"),
@@ -217,7 +217,10 @@ VALUES = [
         lambda: zwidth.Controller(0.001, actuator_time_constant=-1.0),
         "actuator_time_constant must be a finite number, at least 0 [s], got -1",
     ),
-    (lambda: zwidth.Controller(0.001, saturation=nan), "saturation must be a number greater than 0 [N], got nan"),
+    (
+        lambda: zwidth.Controller(0.001, force_limit=nan),
+        "force_limit must be a number greater than 0 [N], got nan",
+    ),
     (
         lambda: zwidth.Controller(0.001, force_filter=zwidth.Butterworth(2, 500.0, "tustin-prewarped")),
         "force_filter: cutoff_Hz must be below half the sampling frequency, 500 Hz, got 500",
@@ -285,13 +288,13 @@ def test_among_many_walls_one_that_is_no_number_is_undecided():
     assert found.names == ["undecided", "stable"]
     assert np.isnan(found.spectral_radius[0])
     assert chart().check([nan], [1.0]).names == ["undecided"]
-    response, _ = measured(systems.published(), np.linspace(4.0, 400.0, 100))
+    response, _ = measured_response(systems.published(), np.linspace(4.0, 400.0, 100))
     other = measured_chart(response, zwidth.Controller(0.00125))
     assert other.check([nan], [1.0]).names == ["undecided"]
 
 
 def test_a_wall_of_a_measured_device_is_finite():
-    response, _ = measured(systems.published(), np.linspace(4.0, 400.0, 100))
+    response, _ = measured_response(systems.published(), np.linspace(4.0, 400.0, 100))
     other = measured_chart(response, zwidth.Controller(0.00125))
     with pytest.raises(ValueError, match=r"wall_stiffness must be a finite number \[N/m\], got nan"):
         other.check(nan, 1.0)

@@ -128,7 +128,7 @@ def test_old_methods_of_a_device_warn_and_answer():
     device = zwidth.load("published-two-mass", operator="thesis-arm")
     with pytest.warns(DeprecationWarning, match=r"write device\.at\(\.\.\.\)\.plant"):
         assert np.array_equal(device.plant(model="rigid").mass, device.at(model="rigid").plant.mass)
-    with pytest.warns(DeprecationWarning, match=r"\.unheld_plant"):
+    with pytest.warns(DeprecationWarning, match=r"\.ungripped_plant"):
         assert device.plant(held=False) is device.given_plant
     arms = zwidth.load("five-bar")
     with pytest.warns(DeprecationWarning, match=r"write device\.at\(\.\.\.\)\.posture") as told:

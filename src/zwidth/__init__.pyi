@@ -28,8 +28,8 @@ from .loop.loop import Loop as Loop
 from .loop.operating_point import OperatingPoint as OperatingPoint
 from .loop.point_errors import OperatingPointError as OperatingPointError
 from .measures.catalogue import find_measure as find_measure
-from .measures.measure import Measure as Measure
-from .measures.measure import MeasureError as MeasureError
+from .measures.definition import Measure as Measure
+from .measures.definition import MeasureError as MeasureError
 from .measures.user_measures import load_measures as load_measures
 from .measures.user_measures import measure as measure
 from .model.operator import Operator as Operator
@@ -39,11 +39,11 @@ from .model.posture import PostureError as PostureError
 from .model.reduction import ModelError as ModelError
 from .model.response import Response as Response
 from .model.response import ResponseError as ResponseError
-from .model.sweep import sweep_response as sweep_response
+from .model.sweep_response import sweep_response as sweep_response
+from .study.map import workspace_map as workspace_map
 from .study.robust import robust_study as robust_study
 from .study.study_file import read_study as read_study
 from .study.sweep import run_study as run_study
 from .study.sweep import sweep as sweep
-from .study.workspace import workspace_map as workspace_map
 
 __version__: str

@@ -30,7 +30,7 @@ MOVED: Final = {
         "PassivityController Plane Reach Reflex Run simulate simulate_batch Sphere "
         "SurfaceOutOfReach SurfaceWall TimeResponse Tremor"
     ),
-    "guarantees": "nested passive_region spring_stable_region",
+    "guarantees": "passive_region spring_stable_region",
     "loop": (
         "AlphaBeta BackwardDifference CentralDifference Foaw Kalman LeastSquaresSlope Levant MultiLoop "
         "SavitzkyGolay velocity_of WindowedDifference"
@@ -40,7 +40,7 @@ MOVED: Final = {
         "dynamic_manipulability eigenvalue_paths EigenvaluePaths evaluate fastest_mass felt_chart felt_impedance "
         "force_along force_component friction_along global_conditioning_index global_isotropy_index "
         "handle_mass_isotropy homogeneous_jacobian ImpedanceRange isotropy isotropy_frobenius loop_paths "
-        "manipulability Measured optimal_mass OptimalMass Overall overall resolution_along rigid_range "
+        "manipulability optimal_mass OptimalMass Overall overall resolution_along rigid_range "
         "scaled_jacobian sprung_range static_stiffness structural_distortion wall_paths"
     ),
     "model": (
@@ -100,9 +100,9 @@ def plant_of(
     held: bool = True,
 ) -> Plant:
     """What `device.plant(...)` gave before there were operating points. Warns DeprecationWarning."""
-    _warn("device.plant(...)", "device.at(...).plant, or .unheld_plant", 5)
+    _warn("device.plant(...)", "device.at(...).plant, or .ungripped_plant", 5)
     point = device.at(at, direction, assembly=assembly, model=model)
-    return point.plant if held else point.unheld_plant
+    return point.plant if held else point.ungripped_plant
 
 
 def posture_of(device: Device, at: Any = None, assembly: str | None = None) -> Posture:
@@ -120,9 +120,21 @@ def _operating_point() -> Any:
 
 
 def _wanted_wall() -> Any:
-    from zwidth.measures.measure import WantedWall
+    from zwidth.measures.definition import WantedWall
 
     return WantedWall
+
+
+def _measure_values() -> Any:
+    from zwidth.measures.definition import MeasureValues
+
+    return MeasureValues
+
+
+def _find_guarantees() -> Any:
+    from zwidth.guarantees.loop_guarantees import find_guarantees
+
+    return find_guarantees
 
 
 def _place_of(
@@ -188,7 +200,7 @@ def _simulate_mechanism(
     """As `contact.simulate_mechanism` of an operating point."""
     import numpy as np
 
-    from zwidth.contact.mechanism.simulate import simulate_mechanism
+    from zwidth.contact.mechanism.simulate_mechanism import simulate_mechanism
     from zwidth.loop.operating_point import OperatingPoint
     from zwidth.model.posture import solve_posture
 
@@ -201,6 +213,8 @@ def _simulate_mechanism(
 REPLACED: Final[dict[str, tuple[str, Callable[[], Any]]]] = {
     "Place": ("zwidth.OperatingPoint", _operating_point),
     "Wanted": ("zwidth.measures.WantedWall", _wanted_wall),
+    "Measured": ("zwidth.measures.MeasureValues", _measure_values),
+    "nested": ("zwidth.guarantees.find_guarantees", _find_guarantees),
     "place_of": ("device.at(position, direction)", lambda: _place_of),
     "sensitivities": ("device.sensitivities(device.at(...))", lambda: _sensitivities),
     "validity": ("zwidth.study.validity(device.at(...))", lambda: _validity),

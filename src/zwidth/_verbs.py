@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from zwidth.chart.chart import StabilityChart
+    from zwidth.chart.chart_base import Chart
     from zwidth.chart.polar import ByDirection
-    from zwidth.chart.result import Chart
     from zwidth.chart.verdict import Verdicts, WallVerdicts
     from zwidth.conditions.comparison import BoundsComparison
     from zwidth.contact.contact_simulation import ContactSimulation
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction
     from zwidth.contact.mechanism.motion import MechanismMotion
     from zwidth.contact.mechanism.surfaces import Surface
-    from zwidth.contact.mechanism.walls import Wall
+    from zwidth.contact.mechanism.walls import SurfaceRendering
     from zwidth.device.device import Device
     from zwidth.device.load import Settings
-    from zwidth.guarantees.nested import Guarantees
+    from zwidth.guarantees.loop_guarantees import Guarantees
     from zwidth.loop.loop import Loop
     from zwidth.loop.operating_point import OperatingPoint
+    from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
     from zwidth.measures.felt_wall import FeltWall
-    from zwidth.measures.measure import Measure, Measured
     from zwidth.model.plant import Plant
     from zwidth.model.posture import Posture
     from zwidth.result import Result
@@ -41,15 +41,15 @@ if TYPE_CHECKING:
 
 
 def device_with(device: Device, settings: Settings) -> Device:
-    from zwidth.device.load import changed
+    from zwidth.device.load import device_with_settings
 
-    return changed(device, settings)
+    return device_with_settings(device, settings)
 
 
 def device_held_by(device: Device, operator: Any) -> Device:
-    from zwidth.device.load import held
+    from zwidth.device.load import device_held_by
 
-    return held(device, operator)
+    return device_held_by(device, operator)
 
 
 def device_sensitivities(device: Device, point: OperatingPoint) -> Sensitivities:
@@ -77,13 +77,13 @@ def loop_check(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -
 
 
 def chart(point: OperatingPoint, radius: float, decay: bool) -> Chart:
-    from zwidth.chart.at_point import chart_at
+    from zwidth.chart.point_chart import chart_at
 
     return chart_at(point, radius, decay=decay)
 
 
 def check(point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
-    from zwidth.chart.at_point import check_at
+    from zwidth.chart.point_chart import check_at
 
     return check_at(point, wall_stiffness, wall_damping)
 
@@ -101,7 +101,7 @@ def bounds(point: OperatingPoint, damping: float | None) -> BoundsComparison:
 
 
 def guarantees(point: OperatingPoint, coupling: bool, wall: tuple[float, float] | None) -> Guarantees:
-    from zwidth.guarantees.nested import guarantees_of
+    from zwidth.guarantees.loop_guarantees import guarantees_of
 
     return guarantees_of(point, coupling, wall)
 
@@ -120,8 +120,10 @@ def simulate(
     return simulate_contact(point, stiffness, damping, **more)
 
 
-def move(point: OperatingPoint, wall: Wall | None, surface: Surface | None, **more: Any) -> MechanismMotion:
-    from zwidth.contact.mechanism.simulate import simulate_mechanism
+def move(
+    point: OperatingPoint, wall: SurfaceRendering | None, surface: Surface | None, **more: Any
+) -> MechanismMotion:
+    from zwidth.contact.mechanism.simulate_mechanism import simulate_mechanism
 
     return simulate_mechanism(point, wall, surface, **more)
 
@@ -140,11 +142,11 @@ def limit_cycles(
 
 
 def measure_boundary(
-    point: OperatingPoint, plan: Plan | None, own_points: Any, file: Any, progress: Any
+    point: OperatingPoint, plan: Plan | None, user_points: Any, file: Any, progress: Any
 ) -> Experiment:
     from zwidth.study.experiment import measure_boundary
 
-    return measure_boundary(point, plan, own_points, file=file, progress=progress)
+    return measure_boundary(point, plan, user_points, file=file, progress=progress)
 
 
 def validity(point: OperatingPoint, tolerance: float) -> Validity:
@@ -165,7 +167,7 @@ def measure(
     stiffness: float | None,
     damping: float | None,
     frequency: float | None,
-) -> Measured:
+) -> MeasureValues:
     from zwidth.measures.evaluate import measure_at
 
     return measure_at(point, measure, stiffness, damping, frequency)
@@ -177,16 +179,16 @@ def environment_named(source: str) -> Environment:
     return load_environment(source)
 
 
-def old_plant(device: Device, *asked: Any, **circumstances: Any) -> Plant:
+def old_plant(device: Device, *arguments: Any, **options: Any) -> Plant:
     from zwidth._old_names import plant_of
 
-    return plant_of(device, *asked, **circumstances)
+    return plant_of(device, *arguments, **options)
 
 
-def old_posture(device: Device, *asked: Any, **circumstances: Any) -> Posture:
+def old_posture(device: Device, *arguments: Any, **options: Any) -> Posture:
     from zwidth._old_names import posture_of
 
-    return posture_of(device, *asked, **circumstances)
+    return posture_of(device, *arguments, **options)
 
 
 def old_sweep(study: Any, *more: Any) -> Any:

@@ -1,7 +1,14 @@
-"""The one door to numba: a typed decorator for kernels that are compiled once and cached on disk.
+"""The one door to numba: typed decorators for kernels that are compiled once and kept on disk.
 
 Kernels work on plain arrays and scalars, never on Python objects, so that the same source can also be
 compiled for other targets.
+
+A kernel is compiled in one of two ways, by who calls it. Called by another kernel it is only translated:
+optimising and emitting machine code are left to the kernel that Python calls, which does both once for all that it
+holds. Numba by itself does both at every level of calls, which takes twice the time (the kernels of
+`zwidth move`: 84 s against 38 s of processor time). Called by Python it becomes machine code, which `machine_code`
+keeps on disk; the interpreter's lock is released while it runs, so that `threads.in_chunks` can spread a loop over
+the cores.
 """
 
 from __future__ import annotations
@@ -10,18 +17,26 @@ from collections.abc import Callable
 from typing import Any, Final, TypeVar, cast
 
 import numba
+from numba import types
+from numba.core import compiler, registry
+from numba.core.codegen import JITCodeLibrary
+
+from zwidth.compile_events import compiling
+from zwidth.machine_code import MachineCode
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-UNCOUNTED: Final[dict[str, Any]] = {"_nrt": False}  # numba takes this flag, its type stubs do not name it
-INLINED: Final[dict[str, Any]] = {**UNCOUNTED, "forceinline": True}
+# Division follows IEEE (1/0 is inf), so that a singular point is data and not an exception.
+OPTIONS: Final[dict[str, Any]] = {"nopython": True, "error_model": "numpy"}
+NO_REFERENCE_COUNTS: Final[dict[str, Any]] = {"_nrt": False}  # numba takes this flag, its stubs do not name it
+INLINED: Final[dict[str, Any]] = {**NO_REFERENCE_COUNTS, "forceinline": True}
+# Numba's releases whose compiler is known to work as it is taken apart below; with others kernels are compiled by
+# `numba.njit` as it is: the same answers, a longer wait at first use.
+TAKEN_APART: Final = ((0, 61), (0, 68))
 
 
 def compiled(function: Function) -> Function:
-    """Compile a scalar kernel to machine code on first use; later processes read it from the cache.
-
-    Division follows IEEE (1/0 is inf), so that a singular point is data and not an exception.
-    """
-    return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
+    """Compile a scalar kernel to machine code on first use; later processes read it from disk."""
+    return _kernel(function, {})
 
 
 def compiled_lean(function: Function) -> Function:
@@ -31,7 +46,7 @@ def compiled_lean(function: Function) -> Function:
     instructions; around the algebra of a few bodies that is three quarters of the time. Without the counting
     such a kernel cannot allocate: numba refuses to compile it, it never computes something else.
     """
-    return cast(Function, numba.njit(cache=True, error_model="numpy", **UNCOUNTED)(function))
+    return _kernel(function, NO_REFERENCE_COUNTS)
 
 
 def compiled_inline(function: Function) -> Function:
@@ -40,9 +55,143 @@ def compiled_inline(function: Function) -> Function:
     Left to itself the compiler stops building them in once the loop around them has grown, and the calls then
     cost as much as the algebra.
     """
-    return cast(Function, numba.njit(cache=True, error_model="numpy", **INLINED)(function))
+    return _kernel(function, INLINED)
 
 
-def compiled_parallel(function: Function) -> Function:
-    """Like `compiled`, with `numba.prange` loops spread over the cores."""
-    return cast(Function, numba.njit(cache=True, parallel=True, error_model="numpy")(function))
+def compiled_for(signature: Any, function: Callable[..., Any]) -> Any:
+    """Compile `function` for one signature now, for callers that know its address only.
+
+    signature  a numba signature, such as float64(float64, float64)
+    Returns    numba's dispatcher; keep it as long as its address is in use
+    Raises     numba.core.errors.NumbaError where numba cannot compile it
+    """
+    if not can_be_taken_apart():
+        return numba.njit(signature, error_model="numpy")(function)
+    entry = _Entry(function, OPTIONS)
+    entry.compile(signature)
+    return entry
+
+
+def can_be_taken_apart() -> bool:
+    """Is the installed numba one of those whose compiler is known from within?"""
+    oldest, newest = TAKEN_APART
+    return oldest <= tuple(numba.version_info.short) <= newest
+
+
+def _kernel(function: Function, options: dict[str, Any]) -> Function:
+    options = {**OPTIONS, **options}
+    if not can_be_taken_apart():
+        return cast(Function, numba.jit(cache=True, nogil=True, **options)(function))
+    return cast(Function, _Kernel(function, options))
+
+
+class _PartLibrary(JITCodeLibrary):
+    """Translated code of a kernel that other kernels call: neither optimised nor loaded by itself."""
+
+    class _Unloaded:
+        def set_env(self, name: str, environment: Any) -> None:
+            """Constants that Python would fetch: kernels have none, and nothing is loaded that could hold them."""
+
+    @property
+    def codegen(self) -> Any:
+        """What numba asks to register the loaded code; nothing was."""
+        return self._Unloaded()
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        """Left to the kernel that Python calls."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """No address: the code is not loaded."""
+        self._ensure_finalized()
+        return 0
+
+
+class _EntryLibrary(JITCodeLibrary):
+    """Machine code of a kernel that Python calls, with all that it calls in turn, optimised once."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+
+class _PartCompiler(compiler.CompilerBase):
+    library: type[JITCodeLibrary] = _PartLibrary
+
+    def define_pipelines(self) -> list[Any]:
+        self.state.library = self.library(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        self.state.library.enable_object_caching()
+        return [compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)]
+
+
+class _EntryCompiler(_PartCompiler):
+    library = _EntryLibrary
+
+
+class _Entry(registry.CPUDispatcher):
+    """A kernel as Python calls it."""
+
+    def __init__(
+        self, function: Callable[..., Any], options: dict[str, Any], kernel: _Kernel | None = None
+    ) -> None:
+        alone = {name: value for name, value in options.items() if name != "forceinline"}
+        alone |= {"no_cfunc_wrapper": True, "nogil": True}
+        super().__init__(function, targetoptions=alone, pipeline_class=_EntryCompiler)
+        self._cache = MachineCode(function, alone)
+        self._compiler: Any = _AnnouncedCompiler(self._compiler, f"{function.__module__}.{function.__qualname__}")
+        self._kernel = kernel
+
+    def add_overload(self, result: Any) -> None:
+        super().add_overload(result)
+        if self._kernel is not None:
+            self._kernel._insert([kind._code for kind in result.signature.args], result.entry_point, False)
+
+
+class _AnnouncedCompiler:
+    """Numba's compiler, which also says what it compiles."""
+
+    def __init__(self, inner: Any, name: str) -> None:
+        self._inner, self._name = inner, name
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._inner, name)
+
+    def compile(self, *arguments: Any) -> Any:
+        with compiling(self._name):
+            return self._inner.compile(*arguments)
+
+
+class _Kernel(registry.CPUDispatcher):
+    """A kernel as other kernels call it; a call from Python goes to its entry."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        inside = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        super().__init__(function, targetoptions=inside, pipeline_class=_PartCompiler)
+        self.kernel_options = options
+        self._entry: _Entry | None = None
+
+    @property
+    def signatures(self) -> list[Any]:
+        """Types of arguments that Python has called it with."""
+        return [] if self._entry is None else list(self._entry.overloads)
+
+    def add_overload(self, result: Any) -> None:
+        # not given to numba's own table of what Python may call: there is nothing to call
+        self.overloads[tuple(result.signature.args)] = result
+
+    def get_call_template(self, arguments: Any, keywords: Any) -> Any:
+        """Types as the callee sees them: a number written in the call is a number, not a type of its own."""
+        plain = {name: types.unliteral(kind) for name, kind in keywords.items()}
+        return super().get_call_template(tuple(map(types.unliteral, arguments)), plain)
+
+    def _compile_for_args(self, *arguments: Any, **keywords: Any) -> Any:
+        """Called by numba for a call from Python with types of arguments that it has not seen."""
+        if self._entry is None:
+            self._entry = _Entry(self.py_func, self.kernel_options, self)
+        return self._entry._compile_for_args(*arguments, **keywords)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from zwidth import _verbs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from zwidth.loop.operating_point import OperatingPoint
 
 
 class Result:
@@ -17,7 +19,16 @@ class Result:
     `document()` holds every number under its key, the unit in the name, as `--json` prints it; `table()` holds
     columns of equal length, as a .csv file has them. `repr` is a few lines; arrays are not spelled out. Nothing of
     files or figures is loaded until `plot`, or a notebook, asks for it.
+
+    operating_point  what it is about, which its figure states; None: a result of numbers that know no device
     """
+
+    operating_point: OperatingPoint | None = None
+
+    def about(self, point: OperatingPoint) -> Self:
+        """Remember the operating point that this result, just computed, is about; returns the result itself."""
+        object.__setattr__(self, "operating_point", point)
+        return self
 
     def document(self) -> dict[str, Any]:
         """Every number by its key."""
@@ -30,7 +41,8 @@ class Result:
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the result; returns the axes, in which more can be drawn.
 
-        ax  axes to draw into; left out: those of a new figure of pyplot's
+        ax  axes to draw into; left out: those of a new figure of pyplot's, with a caption below that says which
+            device it shows, where, and how it is sampled
         """
         return _verbs.plot(self, ax)
 

@@ -19,7 +19,7 @@ def mixed_loop(seed, ratios=RATIOS):
     return random_loop(rng, ratios, KINDS[seed % 4], features)
 
 
-def off_circle(loop, K, B, frequency):
+def eigenvalue_distances(loop, K, B, frequency):
     """Distance of the nearest eigenvalue from exp(i theta), and of the next one from it."""
     z = np.linalg.eigvals(loop.transition_matrix(K, B))
     distance = np.sort(np.abs(z - np.exp(2j * np.pi * frequency * loop.period)))
@@ -36,7 +36,7 @@ def farthest_end(loop):
     """The largest distance of an arc's end from its root, as a share of what double precision allows."""
     shares = [0.0]
     for K, B, frequency in ends(stability_chart(loop, decay=False)):
-        nearest, next_one = off_circle(loop, K, B, frequency)
+        nearest, next_one = eigenvalue_distances(loop, K, B, frequency)
         shares.append(nearest / (DOUBLE if next_one < 1e-3 else 1e-9))
     return max(shares)
 
@@ -68,7 +68,7 @@ def test_a_double_root_at_minus_one_has_the_wall_that_the_characteristic_equatio
     loop = mixed_loop(seed, DAMPED)
     found, z = 0, np.array(-1.0 + 1e-30j)
     for K, B, frequency in ends(stability_chart(loop, decay=False)):
-        if frequency * loop.period > 0.5 * (1.0 - 1e-12) and off_circle(loop, K, B, frequency)[1] < 1e-3:
+        if frequency * loop.period > 0.5 * (1.0 - 1e-12) and eigenvalue_distances(loop, K, B, frequency)[1] < 1e-3:
             terms = np.array([1.0 / loop.plant_response(z), K, B * loop.velocity_response(z)])
             assert abs(np.sum(terms.real)) <= 1e-12 * np.sum(np.abs(terms.real))
             assert abs(np.sum(terms.imag)) <= 1e-12 * np.sum(np.abs(terms.imag))

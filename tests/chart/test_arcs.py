@@ -9,14 +9,14 @@ import shapely
 from tests.systems import published, random_loop
 from zwidth.chart.arcs import CHORD, DAMPING, MINUS, PAIR, PLUS, SLOPE, STIFFNESS, Arc, Arcs
 from zwidth.chart.area import quadrant_area
-from zwidth.chart.chart import traced
-from zwidth.chart.peak import largest_damping, stiffest, topmost
+from zwidth.chart.chart import trace_edge
+from zwidth.chart.peak import find_peak, largest_damping, stiffest_index
 from zwidth.chart.several_directions.branch import Branch
 from zwidth.chart.several_directions.eigenloci import trace_loci
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
-from zwidth.loop.multi import MultiLoop
-from zwidth.model.directions import MultiPlant
+from zwidth.loop.multi_loop import MultiLoop
+from zwidth.model.multi_plant import MultiPlant
 
 
 def star(rng, corners=12):
@@ -50,7 +50,7 @@ def test_arcs_come_out_as_they_went_in():
     for arc, own in zip(arcs, given, strict=True):
         np.testing.assert_array_equal(arc.thetas, own.thetas)
         assert arc._replace(thetas=0) == own._replace(thetas=0)
-    assert arcs.following.tolist() == [1, 2, 0, 3]
+    assert arcs.next_arc.tolist() == [1, 2, 0, 3]
     assert [list(ring) for ring in arcs.rings] == [[0, 1, 2], [3]]
     assert arcs.curved == [1]
 
@@ -58,7 +58,7 @@ def test_arcs_come_out_as_they_went_in():
 def test_no_arcs_are_no_rings():
     for arcs in (Arcs.of(()), Arcs.chords(())):
         assert (len(arcs), arcs.rings, arcs.curved) == (0, (), [])
-        assert stiffest(arcs, (), 1.0) is None
+        assert find_peak(arcs, (), 1.0) is None
         assert (largest_damping(arcs, (), 1.0, lambda K, B: True), quadrant_area(arcs, ())) == (0.0, 0.0)
 
 
@@ -66,7 +66,7 @@ def test_chords_are_the_arcs_of_a_polygon():
     ring = star(np.random.default_rng(1), 5)
     arcs = Arcs.chords([ring, ring[::-1]])
     np.testing.assert_array_equal(np.vstack([arcs.first[:5], arcs.last[4]]), ring)
-    np.testing.assert_array_equal(arcs.first[arcs.following], arcs.last)
+    np.testing.assert_array_equal(arcs.first[arcs.next_arc], arcs.last)
     assert [list(part) for part in arcs.rings] == [[0, 1, 2, 3, 4], [5, 6, 7, 8, 9]]
 
 
@@ -107,7 +107,7 @@ def test_the_stiffest_wall_is_the_polygons_rightmost_point_in_the_quadrant():
     none = 0
     for _ in range(200):
         ring = star(rng, int(rng.integers(5, 12)))
-        found = stiffest(Arcs.chords([ring]), (), 1.0)
+        found = find_peak(Arcs.chords([ring]), (), 1.0)
         corners = shapely.get_coordinates(in_quadrant(shapely.Polygon(ring)))
         if not len(corners):
             none += 1
@@ -140,7 +140,7 @@ def test_stops_that_rounding_parted_are_one():
 def test_what_is_stiff_by_rounding_alone_has_no_area():
     ring = np.array([[-1.0, 0.0], [1e-12, 0.0], [1e-12, 1.0], [-1.0, 1.0], [-1.0, 0.0]])
     edge = TracedEdge.of(Arcs.chords([ring]), ())
-    assert (edge.width, edge.peak, edge.area) == (1.0, None, 0.0)
+    assert (edge.stiffness_scale, edge.peak, edge.area) == (1.0, None, 0.0)
     assert quadrant_area(edge.arcs, ()) == pytest.approx(1e-12)
 
 
@@ -164,8 +164,8 @@ def test_of_walls_as_stiff_as_each_other_the_most_damped_prevails():
     B = np.array([0.1, 0.5, 0.2, 0.9, -0.1, 1.0])
     for _ in range(20):
         order = rng.permutation(6)
-        assert order[topmost(K[order], B[order], 1e-10)] == 1
-    assert topmost(K, B, 3.0) == -1
+        assert order[stiffest_index(K[order], B[order], 1e-10)] == 1
+    assert stiffest_index(K, B, 3.0) == -1
 
 
 # --- curves ----------------------------------------------------------------------------------------------
@@ -174,8 +174,8 @@ def test_of_walls_as_stiff_as_each_other_the_most_damped_prevails():
 @pytest.mark.parametrize("seed", range(6))
 def test_zeros_and_integrals_along_a_curve_are_those_of_its_points(seed):
     tracer = Tracer.of(published() if seed == 0 else random_loop(np.random.default_rng(seed)))
-    edge, _ = traced(tracer)
-    for arc, (thetas, K, B) in zip(edge.arcs, edge.walks, strict=True):
+    edge, _ = trace_edge(tracer)
+    for arc, (thetas, K, B) in zip(edge.arcs, edge.arc_points, strict=True):
         if not arc.curved:
             continue
         for component, values in ((STIFFNESS, K), (DAMPING, B)):
@@ -201,7 +201,7 @@ def branch_of_one_direction(loop, size):
 def test_a_branch_of_one_direction_is_the_curve_of_the_single_loop(seed):
     loop = published() if seed == 0 else random_loop(np.random.default_rng(seed))
     tracer = Tracer.of(loop)
-    edge, _ = traced(tracer)
+    edge, _ = trace_edge(tracer)
     size = np.ptp(np.vstack(edge.outlines), axis=0)
     branch = branch_of_one_direction(loop, size)
     curved = [edge.arcs[k] for k in edge.arcs.curved]
@@ -218,7 +218,7 @@ def test_a_branch_of_one_direction_is_the_curve_of_the_single_loop(seed):
 def test_a_branch_is_straight_beside_its_end():
     """There its evaluation is all rounding; the first step, 1e-12 of the area, is added all the same."""
     tracer = Tracer.of(published())
-    edge, _ = traced(tracer)
+    edge, _ = trace_edge(tracer)
     size = np.ptp(np.vstack(edge.outlines), axis=0)
     (arc,) = (edge.arcs[k] for k in edge.arcs.curved if edge.arcs[k].start == 0.0)
     branch = branch_of_one_direction(published(), size)

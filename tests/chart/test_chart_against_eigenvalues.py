@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import shapely
 
-from tests.systems import mass, random_loop, second_matrix, two_mass
+from tests.systems import mass, random_loop, reference_transition_matrix, two_mass
 from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import boundary_points, stability_chart
-from zwidth.chart.hurwitz import QUOTIENT, hurwitz, working_room
+from zwidth.chart.hurwitz import QUOTIENT, hurwitz, work_array
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import CentralDifference
 from zwidth.loop.loop import Loop
@@ -19,9 +19,12 @@ from zwidth.loop.loop import Loop
 DAMPED = (0.01, 0.02, 0.05, 0.1, 0.3, 1.0, 1.5)
 
 
-def radii(loop, K, B):
+def spectral_radii(loop, K, B):
     return np.array(
-        [np.max(np.abs(np.linalg.eigvals(second_matrix(loop, k, b)))) for k, b in zip(K, B, strict=True)]
+        [
+            np.max(np.abs(np.linalg.eigvals(reference_transition_matrix(loop, k, b))))
+            for k, b in zip(K, B, strict=True)
+        ]
     )
 
 
@@ -53,7 +56,7 @@ def disagreements(rng, loop, count=30):
     suspect = ((radius < 1.0) != inside) | (rng.random(len(K)) < 0.02)
     if not suspect.any():
         return 0
-    second = radii(loop, K[suspect], B[suspect])
+    second = spectral_radii(loop, K[suspect], B[suspect])
     clear = np.abs(second - 1.0) > 3e-6
     return int(np.sum(((second < 1.0) != inside[suspect]) & clear))
 
@@ -99,7 +102,7 @@ def test_undamped_loops_agree_or_say_that_rounding_hides_the_edge():
     assert given_up <= 1
 
 
-def on_edge(loop):
+def edge_distances(loop):
     """Distances of boundary points to the nearest eigenvalue, for simple and for nearly double roots."""
     K, B, frequency, edge = boundary_points(loop, 40)
     z = np.exp(2j * np.pi * frequency * loop.period)
@@ -118,7 +121,7 @@ def test_boundary_points_lie_on_the_unit_circle(kind):
     rng = np.random.default_rng(13)
     simple, double = [], []
     for _ in range(60):
-        some, others = on_edge(random_loop(rng, kind=kind))
+        some, others = edge_distances(random_loop(rng, kind=kind))
         simple += some
         double += others
     assert len(simple) > 200
@@ -167,12 +170,14 @@ def test_walls_at_infinity_edge_nothing(friction, time_constant):
     loop = Loop(mass(0.03, friction), Controller(0.001, 0.0, low_pass, CentralDifference()))
     chart = stability_chart(loop, decay=False)
     K, B = chart.stiffness_max, chart.damping_at_stiffness_max
-    inside, outside = (np.abs(np.linalg.eigvals(second_matrix(loop, s * K, B))).max() for s in (0.999, 1.001))
+    inside, outside = (
+        np.abs(np.linalg.eigvals(reference_transition_matrix(loop, s * K, B))).max() for s in (0.999, 1.001)
+    )
     assert inside < 1.0 < outside
 
 
 def test_a_polynomial_with_a_negative_coefficient_is_not_hurwitz_whatever_rounding_hides_of_another():
-    room = working_room(3)
+    room = work_array(3)
     room[QUOTIENT, :4] = [3.4e13, 6.7, -3.4e13, 6.7]
     room[QUOTIENT + 1, :4] = [3.4e13, 8.1e13, 3.4e13, 6.7]
     assert hurwitz(room, QUOTIENT, 3) == -1

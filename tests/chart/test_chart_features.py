@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.chart.test_chart_against_eigenvalues import DAMPED, disagreements
-from tests.systems import FEATURES, random_loop, second_matrix
+from tests.systems import FEATURES, random_loop, reference_transition_matrix
 
 KINDS = ("chain", "dense", "coupled", "apart")
 SETS = [*((feature,) for feature in FEATURES), FEATURES]
@@ -38,7 +38,10 @@ def test_response_and_transition_matrix_agree_with_states_built_apart(features):
             K, B = rng.uniform(0.05, 0.4) * inertia / loop.period**2, rng.uniform(0.1, 0.5) * inertia / loop.period
             z = 1.2 * np.exp(1j * rng.uniform(0.1, 3.0))
             ratio = 1.0 + loop.plant_response(z) * (K + B * loop.velocity_response(z))
-            for matrix in (loop.transition_matrix, lambda k, b, loop=loop: second_matrix(loop, k, b)):
+            for matrix in (
+                loop.transition_matrix,
+                lambda k, b, loop=loop: reference_transition_matrix(loop, k, b),
+            ):
                 eye = np.eye(len(matrix(0.0, 0.0)))
                 (sign, log), (sign0, log0) = (
                     np.linalg.slogdet(z * eye - matrix(k, b)) for k, b in ((K, B), (0.0, 0.0))

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from tests.systems import FEATURES, mass, published, random_loop
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.decay import coalesced
+from zwidth.chart.decay import double_root_wall
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import spectral_radius
 from zwidth.loop.controller import Controller
@@ -40,7 +40,7 @@ def a_loop(seed):
 )
 def test_where_a_real_root_is_double_another_is_as_large(seed, positive, low, high):
     loop = a_loop(seed)
-    K, B, radius = coalesced(Tracer.of(loop).factors, positive, low, high)
+    K, B, radius = double_root_wall(Tracer.of(loop).factors, positive, low, high)
     assert low < radius < high
     roots = np.linalg.eigvals(loop.transition_matrix(K, B))
     roots = roots[np.argsort(np.abs(roots - (radius if positive else -radius)))]

@@ -8,9 +8,9 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from tests.systems import mass, published, random_plant, two_mass
-from zwidth.chart.aliases import SampledResponse
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.hysteretic import hysteretic_chart
+from zwidth.chart.hysteretic_response import SampledResponse
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import HysteresisError
@@ -23,7 +23,7 @@ def with_loss(plant, factor):
 
 
 @cache
-def lossy(factor):
+def lossy_loop_and_chart(factor):
     """The published masses with this loss factor, and their chart, made once for all tests."""
     loop = Loop(with_loss(two_mass(0.2616, 0.0254, 15620.0), factor), Controller(0.00125))
     return loop, hysteretic_chart(loop)
@@ -59,7 +59,7 @@ def test_the_sampled_response_is_the_sum_over_all_aliases():
 
 @pytest.mark.parametrize("factor", [0.02, 0.1, 0.5])
 def test_the_tip_is_the_largest_stiffness_along_the_exact_curve(factor):
-    loop, chart = lossy(factor)
+    loop, chart = lossy_loop_and_chart(factor)
     sampled = SampledResponse.of(loop)
     (tip,) = chart.frequencies_at_stiffness_max
 
@@ -77,7 +77,7 @@ def test_the_tip_is_the_largest_stiffness_along_the_exact_curve(factor):
 def test_little_loss_is_like_dampers_that_lose_as_much_at_the_tip():
     plant = two_mass(0.2616, 0.0254, 15620.0)
     for factor, close in ((0.1, 4e-3), (0.01, 1e-3)):
-        _, chart = lossy(factor)
+        _, chart = lossy_loop_and_chart(factor)
         rate = 2.0 * np.pi * chart.frequencies_at_stiffness_max[0]
         damped = replace(plant, damping=factor / rate * plant.stiffness)
         alike = stability_chart(Loop(damped, Controller(0.00125)), decay=False)
@@ -103,7 +103,7 @@ def test_as_the_loss_tends_to_zero_the_chart_tends_to_the_undamped_one_in_propor
 
 def test_filters_and_operators_go_with_a_loss_factor():
     bare = with_loss(two_mass(0.2616, 0.0254, 15620.0), 0.1)
-    plain = lossy(0.1)[1].stiffness_max
+    plain = lossy_loop_and_chart(0.1)[1].stiffness_max
     filtered = hysteretic_chart(Loop(bare, Controller(0.00125, force_filter=Butterworth(2, 200.0)))).stiffness_max
     held = attach(bare, Operator(0.8, 580.0, 5.5, 10000.0, 5.0))
     assert filtered < 0.5 * plain

@@ -23,7 +23,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.sections import HysteresisError
 
 SMALLEST = 1e-5
-CLEAR = 1e-9  # least |1 + L| over 1 + |L| that is counted
+MARGIN = 1e-9  # least |1 + L| over 1 + |L| that is counted
 
 
 def undamped_loop(seed):
@@ -49,7 +49,7 @@ def lossy_chart(loop, factor):
     return hysteretic_chart(replace(loop, plant=replace(loop.plant, hysteresis=factor * loop.plant.stiffness)))
 
 
-def passed(sections, z):
+def section_response(sections, z):
     """Response of second-order sections at z (n,)."""
     out = np.ones_like(z)
     for b0, b1, b2, _, a1, a2 in sections:
@@ -79,7 +79,9 @@ class AliasSum:
             G = np.einsum("i,ijk->jk", self.shares, 1.0 / (lossy - w * w))
             hold = -np.expm1(-1j * theta)[:, None] / (1j * w) * np.exp(-1j * w * c.delay * self.period)
             parts.append(np.sum(G * hold / (1j * w * c.actuator_time_constant + 1.0), axis=1) / self.period)
-        return np.concatenate(parts) * passed(low_pass_sections(c.force_filter, self.period), np.exp(1j * thetas))
+        return np.concatenate(parts) * section_response(
+            low_pass_sections(c.force_filter, self.period), np.exp(1j * thetas)
+        )
 
     def velocity(self, thetas):
         """w (n,)."""
@@ -93,7 +95,7 @@ class AliasSum:
             speed = states[:, 1, 0] * z
         else:
             speed = np.polyval(weights[::-1], 1.0 / z)
-        return speed * passed(velocity_filter(self.controller), z)
+        return speed * section_response(velocity_filter(self.controller), z)
 
     def angles(self):
         """Angles that close in on both ends, and on each mode's alias as sharply as its loss asks for."""
@@ -143,7 +145,7 @@ class AliasSum:
             first = np.angle(F[:, 0] * np.sign(F[:, 0].real))
         turns = np.sum(np.angle(F[:, 1:] / F[:, :-1]), axis=1) + np.angle(np.sign(F[:, -1].real) / F[:, -1])
         clear = np.min(np.abs(F) / (1.0 + np.abs(F - 1.0)), axis=1)
-        return np.where(clear < CLEAR, np.nan, -(first + turns) / np.pi)
+        return np.where(clear < MARGIN, np.nan, -(first + turns) / np.pi)
 
 
 def counts_at_the_tip(loop, chart, factor):

@@ -8,7 +8,7 @@ from tests.systems import published, random_plant
 from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.nyquist import phase_flags, terms_along
-from zwidth.chart.tracer import LONG, Tracer
+from zwidth.chart.tracer import HIGH_DEGREE, Tracer
 from zwidth.loop.controller import Controller
 from zwidth.loop.estimators import LeastSquaresSlope, SavitzkyGolay, WindowedDifference
 from zwidth.loop.loop import Loop
@@ -51,7 +51,7 @@ def test_the_phase_along_the_circle_counts_what_polynomials_count():
         tracer = Tracer.of(
             Loop(random_plant(rng, rate, DAMPED), Controller(1.0 / rate, float(rng.integers(0, 4))))
         )
-        assert not tracer.long
+        assert not tracer.is_high_degree
         thetas, terms = tracer._circle
         K, B, edge = tracer.trace(thetas)
         walls = np.column_stack([K, B])
@@ -73,7 +73,7 @@ def test_terms_along_the_circle_are_those_of_the_loop():
 
 def test_a_chart_of_a_hundred_samples_of_delay_is_that_of_its_roots():
     loop = published(delay=100.0)
-    assert Tracer.of(loop).degree > LONG
+    assert Tracer.of(loop).degree > HIGH_DEGREE
     chart = stability_chart(loop, decay=False)
     K, B = chart.stiffness_max, chart.damping_at_stiffness_max
     inside, outside = (np.abs(np.linalg.eigvals(loop.transition_matrix(s * K, B))).max() for s in (0.9999, 1.0001))

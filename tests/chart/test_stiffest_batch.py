@@ -12,14 +12,14 @@ from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.stiffest_batch import DOUBTFUL, FOUND, NO_WALL, stiffest_walls
 from zwidth.loop.controller import Controller
-from zwidth.loop.evaluate import factor_arrays
+from zwidth.loop.factor_kernels import factor_arrays
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import UnmovedError
 
 KINDS = ("chain", "dense", "coupled", "apart")
 
 
-def asked(*loops):
+def stiffest_of(*loops):
     """Loops of one computer, together."""
     every = [factor_arrays(loop) for loop in loops]
     most = max(len(factors.rows) for factors in every)
@@ -29,7 +29,7 @@ def asked(*loops):
     return stiffest_walls(every[0], rows, np.array([len(factors.rows) for factors in every]))
 
 
-def compared(seed, count, features=()):
+def compare_with_charts(seed, count, features=()):
     """How many loops were found, without wall and in doubt; the worst relative difference of those found.
 
     What is in doubt is asked of the chart by whoever asks, and so is a loop without wall: neither can be wrong.
@@ -40,7 +40,7 @@ def compared(seed, count, features=()):
         chosen = [name for name in features if rng.random() < 0.4]
         loop = random_loop(rng, kind=str(rng.choice(KINDS)), features=chosen)
         try:
-            found = asked(loop)
+            found = stiffest_of(loop)
             status = int(found.status[0])
             counts[status] += 1
             if status == FOUND:
@@ -55,7 +55,7 @@ def compared(seed, count, features=()):
 
 @pytest.mark.parametrize(("features", "share"), [((), 0.7), (FEATURES, 0.5)])
 def test_what_is_found_is_what_the_chart_says(features, share):
-    counts, worst = compared(5, 60, features)
+    counts, worst = compare_with_charts(5, 60, features)
     # a corner where one branch moves by 1e-8 for the last digit of its angle is known to no more
     assert worst < 2e-8
     assert counts[FOUND] > share * sum(counts.values())
@@ -65,23 +65,23 @@ def test_what_is_found_is_what_the_chart_says(features, share):
 @pytest.mark.parametrize("features", [(), FEATURES])
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_found_is_what_the_chart_says_over_thousands_of_loops(features, seed):
-    counts, worst = compared(100 + seed, 2000, features)
+    counts, worst = compare_with_charts(100 + seed, 2000, features)
     assert worst < 1e-7
     assert counts[FOUND] > 0.7 * sum(counts.values())
 
 
 def test_loops_together_are_the_loops_alone():
     loops = [published(structural=r) for r in (0.0, 0.00003, 0.00012)]
-    many = asked(*loops)
+    many = stiffest_of(*loops)
     for i, loop in enumerate(loops):
-        alone, peak = asked(loop), largest_stiffness(loop)
+        alone, peak = stiffest_of(loop), largest_stiffness(loop)
         assert many.stiffness[i] == alone.stiffness[0] == pytest.approx(peak.stiffness, rel=1e-12)
         assert many.angles[i] == pytest.approx([peak.angles[0], peak.angles[-1]], rel=1e-9)
 
 
 def test_a_corner_has_the_angles_of_both_its_roots():
     loop = published(delay=1.0)
-    found = asked(loop)
+    found = stiffest_of(loop)
     assert found.angles[0] / (2.0 * np.pi * loop.period) == pytest.approx([9.628, 135.28], rel=1e-4)
     assert found.stiffness[0] == pytest.approx(1101.30206608, rel=1e-9)
 
@@ -90,7 +90,7 @@ def test_an_edge_that_goes_on_to_softer_dampings_is_cut_at_no_damping():
     """Between its last sample, where B < 0, and its corner, where B > 0, the curve crosses B = 0."""
     plant = mass(0.9347989059773463, 1448.8225717821992, 10332245.294673104)
     loop = Loop(plant, Controller(0.0005254763058013773, delay=3.0))
-    found, peak = asked(loop), largest_stiffness(loop)
+    found, peak = stiffest_of(loop), largest_stiffness(loop)
     assert found.stiffness[0] == pytest.approx(peak.stiffness, rel=1e-12)
     assert found.damping[0] == peak.damping == 0.0
 
@@ -98,14 +98,14 @@ def test_an_edge_that_goes_on_to_softer_dampings_is_cut_at_no_damping():
 def test_a_braked_mass_is_limited_on_the_line_of_the_real_root():
     """Beyond b T/m = 3.659 the root z = -1 binds (thesis 4.10 overlooks it)."""
     loop = Loop(mass(1.0, damping=5.0), Controller(1.0))
-    found, peak = asked(loop), largest_stiffness(loop)
+    found, peak = stiffest_of(loop), largest_stiffness(loop)
     assert found.status[0] == DOUBTFUL or found.stiffness[0] == pytest.approx(peak.stiffness, rel=1e-9)
 
 
 def test_a_loop_without_stable_wall_has_none_or_is_in_doubt():
     loop = published(structural=0.0, delay=1.0)
     assert largest_stiffness(loop) is None
-    assert asked(loop).status[0] != FOUND
+    assert stiffest_of(loop).status[0] != FOUND
 
 
 def test_a_plant_that_no_wall_moves_is_in_doubt():
@@ -118,8 +118,8 @@ def test_a_plant_that_no_wall_moves_is_in_doubt():
 def test_a_stiffer_wall_that_was_passed_over_is_noticed():
     """Rows of another plant behind the flags: what is found must not depend on luck with the samples."""
     loop = published()
-    stiff = asked(loop).stiffness[0]
+    stiff = stiffest_of(loop).stiffness[0]
     for scale in (0.5, 0.999, 1.001, 2.0):
         other = replace(loop, plant=replace(loop.plant, mass=scale * loop.plant.mass))
-        assert asked(other).stiffness[0] == pytest.approx(largest_stiffness(other).stiffness, rel=1e-9)
-        assert asked(other).stiffness[0] != stiff
+        assert stiffest_of(other).stiffness[0] == pytest.approx(largest_stiffness(other).stiffness, rel=1e-9)
+        assert stiffest_of(other).stiffness[0] != stiff

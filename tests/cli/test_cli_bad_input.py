@@ -7,7 +7,7 @@ from importlib import import_module
 
 import pytest
 
-from tests.cli.cli_run import MECHANISM, TWO_MASS, refused, zwidth
+from tests.cli.command_runner import MECHANISM, TWO_MASS, refusal_lines, run_command
 
 PLANT = """
 name = "two masses"
@@ -20,7 +20,7 @@ sensor = [0.0, 1.0]
 sampling_period_s = 0.001
 """
 FILTER = '[loop.velocity.filter]\ntype = "butterworth"\n'
-BOTH = "[mechanism]\n[[mechanism.links]]\nname = 'a'\n"
+PLANT_AND_MECHANISM = "[mechanism]\n[[mechanism.links]]\nname = 'a'\n"
 
 # what is replaced in PLANT (None: the whole of it), by what, and for each line its key and words of it
 FILES = {
@@ -57,7 +57,7 @@ FILES = {
         f"0.001\n{FILTER}order = 0\ncutoff_Hz = 20.0",
         [("loop.velocity.filter.order", "got 0")],
     ),
-    "plant and mechanism": ("[loop]", f"{BOTH}[loop]", [("", "mechanism")]),
+    "plant and mechanism": ("[loop]", f"{PLANT_AND_MECHANISM}[loop]", [("", "mechanism")]),
     "empty": (None, "", [("", "is empty")]),
     "not TOML": (None, "name = ", [("", "is not TOML")]),
     "binary": (None, b"\x7fELF\x02\x01\x00\xff\xfe", [("", "UTF-8")]),
@@ -74,7 +74,7 @@ def test_a_wrong_file_is_refused_with_file_key_and_reason(tmp_path, fault, comma
     file = tmp_path / "wrong.toml"
     text = new if old is None else PLANT.replace(old, new)
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    lines = refused(command[0], file, *command[1:])
+    lines = refusal_lines(command[0], file, *command[1:])
     for key, words in expected:
         assert any(line.startswith(f"{file}: {key}") and words in line for line in lines), lines
     if fault != "plant and mechanism":
@@ -85,7 +85,7 @@ def test_a_wrong_file_is_refused_with_file_key_and_reason(tmp_path, fault, comma
 def test_all_faults_of_a_file_are_reported_together(tmp_path):
     file = tmp_path / "wrong.toml"
     file.write_text(PLANT.replace("0.001", '"fast"').replace("0.02]]", "inf]]").replace("[loop]", "x = 1\n[loop]"))
-    assert len(refused("chart", file)) == 3
+    assert len(refusal_lines("chart", file)) == 3
 
 
 @pytest.mark.parametrize(
@@ -98,19 +98,19 @@ def test_all_faults_of_a_file_are_reported_together(tmp_path):
 )
 def test_a_device_that_is_none(tmp_path, monkeypatch, name, words):
     monkeypatch.chdir(tmp_path)
-    (line,) = refused("chart", name, "--json")
+    (line,) = refusal_lines("chart", name, "--json")
     assert line.startswith(f"{name}: ")
     assert words in line
 
 
 def test_a_loop_that_cannot_close():
-    (line,) = refused("chart", MECHANISM, "--set", "links.upper-left.origin_m=[9.0, 0.0, 0.0]")
+    (line,) = refusal_lines("chart", MECHANISM, "--set", "links.upper-left.origin_m=[9.0, 0.0, 0.0]")
     assert line.startswith(f"{MECHANISM}: mechanism.")
     assert "close" in line
 
 
 # two masses with nothing between them, one driven, the other read
-APART = [
+SENSOR_APART = [
     f"--set=plant.{key}" for key in ("stiffness_N_per_m=unset", "damping_Ns_per_m=unset", "sensor=[1.0, 0.0]")
 ]
 
@@ -153,7 +153,7 @@ LINES = [
     (("chart", TWO_MASS, "--jason"), ["--jason"]),
     (("chrat", TWO_MASS), ["no such command 'chrat'"]),
     (("devices", "five-bar"), ["unexpected extra argument"]),
-    (("chart", TWO_MASS, *APART), [f"{TWO_MASS}: the wall force moves nothing that the sensor reads"]),
+    (("chart", TWO_MASS, *SENSOR_APART), [f"{TWO_MASS}: the wall force moves nothing that the sensor reads"]),
     (("check", TWO_MASS), ["--points FILE.csv, or both"]),
     (("--jason",), ["--jason"]),
 ]
@@ -161,7 +161,7 @@ LINES = [
 
 @pytest.mark.parametrize(("words", "says"), LINES, ids=lambda value: " ".join(value))
 def test_a_wrong_command_line_is_refused_on_one_line_each(words, says):
-    lines = refused(*words)
+    lines = refusal_lines(*words)
     assert len(lines) == len(says)
     for line, text in zip(lines, says, strict=True):
         assert text.lower() in line.lower()
@@ -191,7 +191,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_anything_is_computed
     os.mkfifo(tmp_path / "pipe.svg")
     before = sorted(tmp_path.iterdir())
     monkeypatch.setattr("zwidth.device.load.load", lambda *_: pytest.fail("the device was loaded"))
-    (line,) = refused("chart", TWO_MASS, "--output", f"{tmp_path}/{name}" if name else name)
+    (line,) = refusal_lines("chart", TWO_MASS, "--output", f"{tmp_path}/{name}" if name else name)
     assert any(choice in line for choice in words.split("|"))
     assert sorted(tmp_path.iterdir()) == before
     assert (tmp_path / "file.csv").read_text() == "kept"
@@ -202,7 +202,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_anything_is_computed
     [(("report",), "x.pdf"), (("show",), "x.svg"), (("check", "--stiffness=1", "--damping=1"), "x.svg")],
 )
 def test_a_result_is_not_written_as_what_it_is_not(tmp_path, command, name):
-    (line,) = refused(command[0], TWO_MASS, *command[1:], "--output", tmp_path / name)
+    (line,) = refusal_lines(command[0], TWO_MASS, *command[1:], "--output", tmp_path / name)
     assert "must end in" in line
     assert not list(tmp_path.iterdir())
 
@@ -212,12 +212,12 @@ def test_an_error_of_our_own_is_one_line_and_code_70(monkeypatch):
         raise ZeroDivisionError("first line\nsecond")
 
     monkeypatch.setattr("zwidth.chart.chart.stability_chart", broken)
-    ran = zwidth("chart", TWO_MASS)
+    ran = run_command("chart", TWO_MASS)
     assert (ran.code, ran.out, len(ran.lines)) == (70, "", 1)
     assert "ZeroDivisionError: first line second" in ran.err
     assert "please report it" in ran.err
     monkeypatch.setenv("ZWIDTH_DEBUG", "1")
-    assert "Traceback" in zwidth("chart", TWO_MASS).err
+    assert "Traceback" in run_command("chart", TWO_MASS).err
 
 
 @pytest.mark.parametrize("command", ["chart", "report"])
@@ -231,7 +231,7 @@ def test_a_chart_that_cannot_be_closed_is_undecided(tmp_path, monkeypatch, comma
     import_module("zwidth.show.report.report")  # whatever imports the chart has done so before it is replaced
     monkeypatch.setattr(import_module("zwidth.study.what_if"), "stability_chart", open_edge)
     monkeypatch.setattr("zwidth.chart.chart.stability_chart", open_edge)
-    ran = zwidth(command, TWO_MASS, "--json")
+    ran = run_command(command, TWO_MASS, "--json")
     assert ran.code == 1
     assert ran.document["decided"] is False
     assert ran.document.get("regions") is None
@@ -248,7 +248,7 @@ def test_an_interruption_is_one_line_and_leaves_nothing_half_written(tmp_path, m
         raise KeyboardInterrupt
 
     monkeypatch.setattr("zwidth.show.output.os.replace", stopped)
-    ran = zwidth("chart", TWO_MASS, "--output", file)
+    ran = run_command("chart", TWO_MASS, "--output", file)
     assert (ran.code, ran.out, len(ran.lines)) == (130, "", 1)
     assert file.read_text() == "from before"
     assert list(tmp_path.iterdir()) == [file]

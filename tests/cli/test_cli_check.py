@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests import systems
-from tests.cli.cli_run import MECHANISM, TWO_MASS, found, refused, zwidth
+from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, refusal_lines, run_command
 from zwidth.chart.verdict import judge
 
 HEAD = "stiffness_N_per_m,damping_Ns_per_m\n"
@@ -19,7 +19,7 @@ def test_the_verdicts_at_the_edges_printed_in_the_thesis(tmp_path):
     """At K = 4000 N/m the published plant's walls are stable from 2.42 to 21.66 Ns/m."""
     file = tmp_path / "walls.csv"
     file.write_text(HEAD + "4000,2.41\n4000,2.43\n4000,21.65\n4000,21.67\n467.90,21.9465\n0,0\n")
-    points = found("check", TWO_MASS, "--points", file)["points"]
+    points = document_of("check", TWO_MASS, "--points", file)["points"]
     verdicts = [point["verdict"] for point in points]
     assert verdicts == ["unstable", "stable", "stable", "unstable", "stable", "undecided"]
     assert points[0].keys() >= {"stiffness_N_per_m", "damping_Ns_per_m", "spectral_radius", "frequency_Hz"}
@@ -27,17 +27,17 @@ def test_the_verdicts_at_the_edges_printed_in_the_thesis(tmp_path):
 
 
 def test_one_wall_may_be_given_on_the_command_line_and_be_negative():
-    (point,) = found("check", MECHANISM, "--stiffness", "-300", "--damping", "-0.5")["points"]
+    (point,) = document_of("check", MECHANISM, "--stiffness", "-300", "--damping", "-0.5")["points"]
     assert (point["stiffness_N_per_m"], point["damping_Ns_per_m"]) == (-300.0, -0.5)
     assert point["verdict"] == "unstable"
-    assert "unstable" in zwidth("check", MECHANISM, "--stiffness", "-300", "--damping", "-0.5").out
+    assert "unstable" in run_command("check", MECHANISM, "--stiffness", "-300", "--damping", "-0.5").out
 
 
 def test_people_read_the_radius_in_four_digits_of_its_distance_from_1():
-    shown = zwidth("check", TWO_MASS, "--stiffness", "4000", "--damping", "10").out
+    shown = run_command("check", TWO_MASS, "--stiffness", "4000", "--damping", "10").out
     assert all(word in shown.split() for word in ("4.000", "stable", "0.98884"))
-    at_the_edge = zwidth("check", TWO_MASS, "--stiffness", "7133.868", "--damping", "9.975").out
-    (point,) = found("check", TWO_MASS, "--stiffness", "7133.868", "--damping", "9.975")["points"]
+    at_the_edge = run_command("check", TWO_MASS, "--stiffness", "7133.868", "--damping", "9.975").out
+    (point,) = document_of("check", TWO_MASS, "--stiffness", "7133.868", "--damping", "9.975")["points"]
     decimals = len(next(word for word in at_the_edge.split() if word.startswith(("1.0", "0.99"))).split(".")[1])
     assert float(f"{abs(point['spectral_radius'] - 1.0):.3e}") == pytest.approx(
         abs(round(point["spectral_radius"], decimals) - 1.0), rel=1e-3
@@ -49,9 +49,9 @@ def test_many_walls_keep_their_order_whatever_is_judged_at_once(tmp_path, monkey
     walls = np.column_stack([rng.uniform(-500, 9000, 50), rng.uniform(-5, 35, 50)])
     file = tmp_path / "walls.csv"
     file.write_text(HEAD + "".join(f"{K!r},{B!r}\n" for K, B in walls.tolist()))
-    whole = found("check", TWO_MASS, "--points", file)["points"]
-    monkeypatch.setattr("zwidth.chart.verdict.AT_ONCE", 7)
-    assert found("check", TWO_MASS, "--points", file)["points"] == whole
+    whole = document_of("check", TWO_MASS, "--points", file)["points"]
+    monkeypatch.setattr("zwidth.chart.verdict.BATCH_SIZE", 7)
+    assert document_of("check", TWO_MASS, "--points", file)["points"] == whole
     assert_allclose([[p["stiffness_N_per_m"], p["damping_Ns_per_m"]] for p in whole], walls)
     assert {p["verdict"] for p in whole} == {"stable", "unstable"}
 
@@ -61,7 +61,7 @@ def test_files_as_spreadsheets_and_people_write_them(tmp_path):
     file.write_bytes(
         b'\xef\xbb\xbfnote,damping_Ns_per_m , stiffness_N_per_m\r\n"a, b",10.0,4e3\r\n\r\n,"30",4000\r\n'
     )
-    points = found("check", TWO_MASS, "--points", file)["points"]
+    points = document_of("check", TWO_MASS, "--points", file)["points"]
     assert [(p["stiffness_N_per_m"], p["damping_Ns_per_m"]) for p in points] == [(4000.0, 10.0), (4000.0, 30.0)]
     assert [p["verdict"] for p in points] == ["stable", "unstable"]
 
@@ -69,7 +69,7 @@ def test_files_as_spreadsheets_and_people_write_them(tmp_path):
 def test_verdicts_are_written_as_data(tmp_path):
     file, out = tmp_path / "walls.csv", tmp_path / "verdicts.csv"
     file.write_text(HEAD + "4000,10\n9000,10\n")
-    points = found("check", TWO_MASS, "--points", file, "--output", out)["points"]
+    points = document_of("check", TWO_MASS, "--points", file, "--output", out)["points"]
     rows = list(csv.DictReader(out.read_text().splitlines()))
     assert [row["verdict"] for row in rows] == ["stable", "unstable"]
     assert [float(row["spectral_radius"]) for row in rows] == [p["spectral_radius"] for p in points]
@@ -105,7 +105,7 @@ def test_verdicts_are_written_as_data(tmp_path):
 def test_every_fault_of_a_file_of_walls_has_its_line(tmp_path, text, says):
     file = tmp_path / "walls.csv"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    lines = refused("check", TWO_MASS, "--points", file, "--json")
+    lines = refusal_lines("check", TWO_MASS, "--points", file, "--json")
     assert len(lines) == len(says)
     for line, words in zip(lines, says, strict=True):
         assert line.startswith(f"{file}: ")
@@ -115,7 +115,7 @@ def test_every_fault_of_a_file_of_walls_has_its_line(tmp_path, text, says):
 def test_of_very_many_faults_the_first_are_listed(tmp_path):
     file = tmp_path / "walls.csv"
     file.write_text(HEAD + "a,1\n" * 1000)
-    lines = refused("check", TWO_MASS, "--points", file)
+    lines = refusal_lines("check", TWO_MASS, "--points", file)
     assert len(lines) == 21
     assert "line 2:" in lines[0]
     assert "and 980 more" in lines[-1]
@@ -126,7 +126,7 @@ def test_of_very_many_faults_the_first_are_listed(tmp_path):
 )
 def test_a_file_of_walls_that_cannot_be_read(tmp_path, monkeypatch, name, says):
     monkeypatch.chdir(tmp_path)
-    (line,) = refused("check", TWO_MASS, "--points", name)
+    (line,) = refusal_lines("check", TWO_MASS, "--points", name)
     assert says in line
 
 
@@ -142,12 +142,12 @@ def test_a_file_of_walls_that_cannot_be_read(tmp_path, monkeypatch, name, says):
     ],
 )
 def test_half_a_wall_is_refused(words):
-    (line,) = refused("check", TWO_MASS, *words)
+    (line,) = refusal_lines("check", TWO_MASS, *words)
     assert line.startswith("zwidth check: ")
 
 
 def test_a_posture_out_of_reach_has_no_verdicts():
-    ran = zwidth("check", MECHANISM, "--stiffness", "1", "--damping", "1", "--at", "9,9", "--json")
+    ran = run_command("check", MECHANISM, "--stiffness", "1", "--damping", "1", "--at", "9,9", "--json")
     assert ran.code == 1
     assert ran.document["points"] is None
     assert "cannot reach" in ran.document["reason"]
@@ -156,13 +156,13 @@ def test_a_posture_out_of_reach_has_no_verdicts():
 def test_walls_that_no_device_renders_are_refused(tmp_path):
     file = tmp_path / "walls.csv"
     file.write_text(HEAD + "1e308,1e308\n1e15,-1e15\n")
-    lines = refused("check", TWO_MASS, "--points", file)
+    lines = refusal_lines("check", TWO_MASS, "--points", file)
     assert len(lines) == 2
     assert "line 2: stiffness_N_per_m: must be from -1e+15 to 1e+15, got '1e308'" in lines[0]
     for command in ("check", "felt"):
-        (line,) = refused(command, TWO_MASS, "--stiffness", "1e308", "--damping", "5")
+        (line,) = refusal_lines(command, TWO_MASS, "--stiffness", "1e308", "--damping", "5")
         assert "'--stiffness': must be from -1e+15 to 1e+15, got '1e308'" in line
-    (point,) = found("check", TWO_MASS, "--stiffness", "1e15", "--damping", "1e15")["points"]
+    (point,) = document_of("check", TWO_MASS, "--stiffness", "1e15", "--damping", "1e15")["points"]
     assert point["verdict"] == "unstable"
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.cli_run import MECHANISM, TWO_MASS, found, zwidth
+from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, run_command
 from zwidth.show.cli.group import zwidth as group
 
 PAGE = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
@@ -64,7 +64,7 @@ def test_an_example_runs(folder, line):
     before = set(folder.iterdir())
     words = shlex.split(line)
     assert words[0] == "zwidth"
-    ran = zwidth(*words[1:])
+    ran = run_command(*words[1:])
     assert (ran.code, ran.err) == (0, "")
     assert ran.out
     written = {path.name for path in set(folder.iterdir()) - before}
@@ -91,27 +91,27 @@ def test_every_command_has_its_section_and_every_option_its_word():
 def test_the_keys_that_come_out_are_those_explained(folder):
     asked = keys("What comes out")
     for device in (MECHANISM, TWO_MASS):
-        assert set(found("show", device)) - asked == keys("show")
-        assert set(found("chart", device)) - asked == keys("chart")
-    told = found("bounds", TWO_MASS)
+        assert set(document_of("show", device)) - asked == keys("show")
+        assert set(document_of("chart", device)) - asked == keys("chart")
+    told = document_of("bounds", TWO_MASS)
     assert set(told) - asked | set(told["bounds"][0]) == keys("bounds") - {"undecided"}
-    document = found("new", "my-paddle", "--kind", "paddle")
+    document = document_of("new", "my-paddle", "--kind", "paddle")
     assert set(document) - asked == keys("new")
-    document = found("check", TWO_MASS, "--points", "walls.csv")
+    document = document_of("check", TWO_MASS, "--points", "walls.csv")
     assert set(document) - asked == {"points"}
     assert set(document["points"][0]) | {"points"} >= keys("check")
-    assert set(found("devices")) == keys("devices")
-    document = found("move", MECHANISM, "--duration", 0.01)
+    assert set(document_of("devices")) == keys("devices")
+    document = document_of("move", MECHANISM, "--duration", 0.01)
     assert set(document) - asked == keys("move") - asked
     everything = ("--measure", "rigid_mass", "--direction", "lowest", "--require", "isotropy<=2", "--cells", "5,4")
-    document = found("map", MECHANISM, *everything)
+    document = document_of("map", MECHANISM, *everything)
     assert set(document) - asked == keys("map") - asked
     assert set(document["requirements"][0]) == {"requirement", "area_m2", "share"}
-    document = found("experiment", TWO_MASS, "--stiffnesses", 1, "--tips", 0)
+    document = document_of("experiment", TWO_MASS, "--stiffnesses", 1, "--tips", 0)
     assert set(document) - asked == keys("experiment")
-    document = found("sweep", "my-study.toml")
+    document = document_of("sweep", "my-study.toml")
     assert set(document) - asked == keys("sweep")
-    report = found("report", TWO_MASS, "--output", "report.html")
+    report = document_of("report", TWO_MASS, "--output", "report.html")
     assert set(report) >= {"file", "summary", "stiffness_max_N_per_m", *(asked - {"reason"})}
 
 

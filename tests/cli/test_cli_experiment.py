@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tests.cli.cli_run import TWO_MASS, found, refused, zwidth
+from tests.cli.command_runner import TWO_MASS, document_of, refusal_lines, run_command
 from tests.interruption import stopped_by_ctrl_c
 from tests.systems import published
-from zwidth.contact.experiment import Place
-from zwidth.show.experiment import point_rows, sentences, warning
+from zwidth.contact.boundary_experiment import StableExtent
+from zwidth.show.cli.experiment_page import point_rows, sentences, warning
 from zwidth.study.experiment_plan import Plan
 from zwidth.study.measured_boundary import Experiment, MeasuredPoint
 
@@ -33,7 +33,7 @@ sampling_period_s = 0.001
 [loop.encoder]
 resolution_m = {step}
 """
-OWN = """stiffness_N_per_m,damping_Ns_per_m,edge,trials
+USER_POINTS = """stiffness_N_per_m,damping_Ns_per_m,edge,trials
 4000,2.6,lower,4
 4000,20.7,upper,
 7000,9.9748,tip,5
@@ -48,10 +48,10 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def kept(tmp_path_factory):
+def journal_bytes(tmp_path_factory):
     """The journal of the smallest experiment, for tests of what is made of its points."""
     journal = tmp_path_factory.mktemp("experiment") / "run.progress"
-    found("experiment", TWO_MASS, *FEWEST, "--resume", journal)
+    document_of("experiment", TWO_MASS, *FEWEST, "--resume", journal)
     return journal.read_bytes()
 
 
@@ -60,8 +60,8 @@ def dry(folder, friction=0.02, step=0.0):
     return "dry.toml"
 
 
-def test_points_lie_on_the_exact_boundary_and_can_be_read_again(folder, kept):
-    document = found("experiment", TWO_MASS, *FEW, "--output", "points.csv")
+def test_points_lie_on_the_exact_boundary_and_can_be_read_again(folder, journal_bytes):
+    document = document_of("experiment", TWO_MASS, *FEW, "--output", "points.csv")
     points = document["points"]
     assert [point["edge"] for point in points] == ["lower", "lower", "upper", "upper", "tip"]
     for point in points:
@@ -74,9 +74,9 @@ def test_points_lie_on_the_exact_boundary_and_can_be_read_again(folder, kept):
     with open("points.csv", newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [float(row["damping_Ns_per_m"]) for row in rows] == [point["damping_Ns_per_m"] for point in points]
-    Path("run.progress").write_bytes(kept)
+    Path("run.progress").write_bytes(journal_bytes)
     resumed = ("--resume", "run.progress", "--measured", "points.csv")
-    again = found("experiment", TWO_MASS, *FEWEST, *resumed)["measured"]
+    again = document_of("experiment", TWO_MASS, *FEWEST, *resumed)["measured"]
     assert max(abs(p["deviation_Ns_per_m"]) for p in again) < 3e-3
 
 
@@ -86,11 +86,11 @@ def eigenvalue_edge(low, high):
     return brentq(lambda B: np.abs(np.linalg.eigvals(matrix(4000.0, B))).max() - 1.0, low, high, xtol=1e-12)
 
 
-def test_own_points_are_held_against_the_exact_edge(folder, kept):
-    Path("own.csv").write_text(OWN)
-    Path("run.progress").write_bytes(kept)
+def test_own_points_are_held_against_the_exact_edge(folder, journal_bytes):
+    Path("own.csv").write_text(USER_POINTS)
+    Path("run.progress").write_bytes(journal_bytes)
     resumed = ("--resume", "run.progress", "--measured", "own.csv", "--output", "own.svg")
-    document = found("experiment", TWO_MASS, *FEWEST, *resumed)
+    document = document_of("experiment", TWO_MASS, *FEWEST, *resumed)
     lower, upper, tip, free = document["measured"]
     assert lower["deviation_Ns_per_m"] == pytest.approx(2.6 - eigenvalue_edge(2.0, 3.0), abs=1e-6)
     assert upper["deviation_Ns_per_m"] == pytest.approx(20.7 - eigenvalue_edge(21.0, 22.0), abs=1e-6)
@@ -111,11 +111,11 @@ def test_own_points_are_held_against_the_exact_edge(folder, kept):
 )
 def test_the_difference_is_explained_by_what_makes_it(folder, friction, step, says, says_not):
     asked = ("experiment", dry(folder, friction, step), *FEW, "--resume", "run.progress")
-    document = found(*asked)
+    document = document_of(*asked)
     text = " ".join(document["explanation"])
     assert says in text
     assert says_not not in text
-    people = zwidth(*asked)
+    people = run_command(*asked)
     assert says in " ".join(people.out.split())
 
 
@@ -125,17 +125,17 @@ def point(K, B, edge, exact, unsure=False):
     return MeasuredPoint(K, B, edge, value, value, 1, (value,), exact, *seen)
 
 
-def measured_run(*points):
+def experiment_of(*points):
     """An experiment that measured these points, with the chart of a device of 4 kN/m."""
     chart = SimpleNamespace(stiffness_max=4e3)
-    return Experiment(Plan(), Place(4e3, 5.0, 11.0, True), points, 0, (None,), chart, (), 0)
+    return Experiment(Plan(), StableExtent(4e3, 5.0, 11.0, True), points, 0, (None,), chart, (), 0)
 
 
 EDGES = (point(2e3, 1.0, "lower", 1.1), point(2e3, 11.0, "upper", 11.0))
 
 
 def test_a_tip_far_off_is_named_before_edges_that_are_near_and_doubts_are_told():
-    doubtful = measured_run(*EDGES, point(5e3, 5.0, "tip", 4e3, True))
+    doubtful = experiment_of(*EDGES, point(5e3, 5.0, "tip", 4e3, True))
     far = dict(sentences(doubtful))
     assert far["difference"].startswith("farthest from the exact linear edge is the tip at 5.000 Ns/m")
     assert "measured 5.000 kN/m, exact 4.000 kN/m, more is stable" in far["difference"]
@@ -143,13 +143,13 @@ def test_a_tip_far_off_is_named_before_edges_that_are_near_and_doubts_are_told()
     assert far["unsure"].startswith("at 1 tip the verdict changes more than once")
     assert "--trials" in far["unsure"]
     assert [p["unsure"] for p in doubtful.document()["points"]] == [False, False, True]
-    near = dict(sentences(measured_run(*EDGES, point(4.001e3, 5.0, "tip", 4e3))))
+    near = dict(sentences(experiment_of(*EDGES, point(4.001e3, 5.0, "tip", 4e3))))
     assert near["difference"].startswith("farthest from the exact linear edge is the lower one")
     assert "unsure" not in near
 
 
 def test_edges_that_are_unsure_are_marked_as_tips_are():
-    doubtful = measured_run(EDGES[0], point(2e3, 11.0, "upper", 11.0, True), point(4e3, 5.0, "tip", 4e3))
+    doubtful = experiment_of(EDGES[0], point(2e3, 11.0, "upper", 11.0, True), point(4e3, 5.0, "tip", 4e3))
     assert dict(sentences(doubtful))["unsure"].startswith("at 1 edge the verdict changes more than once")
     assert [row[-1] for row in point_rows(doubtful)[1]] == ["", "unsure", ""]
 
@@ -168,19 +168,19 @@ def test_edges_that_are_unsure_are_marked_as_tips_are():
 )
 def test_an_edge_beyond_a_tip_is_warned_of(tips, says):
     """At 2 kN/m walls from 1 to 11 N s/m were stable: no tip between them is softer, nor is the stiffest tip."""
-    text = warning(measured_run(*EDGES, *(point(K, B, "tip", K) for K, B in tips)))
+    text = warning(experiment_of(*EDGES, *(point(K, B, "tip", K) for K, B in tips)))
     assert text.startswith("an edge lies beyond a tip")
     assert says in text
 
 
 @pytest.mark.parametrize("tips", [[(4000.0, 5.0)], [(1500.0, 12.0), (4000.0, 5.0)], []])
 def test_tips_beyond_all_edges_or_beside_them_contradict_nothing(tips):
-    assert warning(measured_run(*EDGES, *(point(K, B, "tip", K) for K, B in tips))) is None
+    assert warning(experiment_of(*EDGES, *(point(K, B, "tip", K) for K, B in tips))) is None
 
 
 def test_a_run_that_takes_its_time_says_what_it_does(folder, monkeypatch):
     monkeypatch.setattr("zwidth.show.cli.progress.PATIENCE", 0.0)
-    ran = zwidth("experiment", TWO_MASS, *FEWEST)
+    ran = run_command("experiment", TWO_MASS, *FEWEST)
     assert "looking for stable walls" in ran.err
     assert "looking" not in ran.out
 
@@ -188,12 +188,12 @@ def test_a_run_that_takes_its_time_says_what_it_does(folder, monkeypatch):
 def test_subjects_and_trials_give_bars(folder):
     asked = ("experiment", TWO_MASS, "--operator", "thesis-arm", "--wall", "one-sided", "--stiffnesses", 1)
     many = (*asked, "--tips", 0, "--subjects", 2, "--trials", 2, "--spread", 0.5)
-    document = found(*many)
+    document = document_of(*many)
     lower, upper = document["points"]
     assert lower["trials"] == 4
     assert lower["damping_low_Ns_per_m"] < lower["damping_Ns_per_m"] < lower["damping_high_Ns_per_m"]
     assert len({tuple(subject.values()) for subject in document["subjects"]}) == 2
-    assert found(*many, "--seed", 2)["points"] != document["points"]  # of one seed: see the interrupted run
+    assert document_of(*many, "--seed", 2)["points"] != document["points"]  # of one seed: see the interrupted run
     assert upper["damping_Ns_per_m"] > 10.0
 
 
@@ -202,37 +202,37 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     words = ["experiment", TWO_MASS, "--operator", "thesis-arm", "--stiffnesses", "1", "--tips", "0"]
     words += ["--subjects", "3", "--trials", "3", "--output", "points.csv"]
     journal = folder / "points.csv.progress"
-    code, _, err = stopped_by_ctrl_c(words, "zwidth.study.journal:Journal.ask", 4, folder)
+    code, _, err = stopped_by_ctrl_c(words, "zwidth.study.journal:Journal.get_or_compute", 4, folder)
     assert code == 130
     assert "points.csv.progress keeps what is done" in err
     assert not (folder / "points.csv").exists()
     assert journal.read_bytes().count(b"\n") == 5, "the question, and four results"
-    assert zwidth(*words).code == 0
+    assert run_command(*words).code == 0
     assert not journal.exists()
     resumed = (folder / "points.csv").read_bytes()
-    assert zwidth(*words).code == 0
+    assert run_command(*words).code == 0
     assert (folder / "points.csv").read_bytes() == resumed
 
 
-def measured_again(*_):
+def fail_if_measured(*_):
     raise AssertionError("measured again")
 
 
 def test_a_journal_of_ones_own_is_kept_and_a_changed_question_begins_anew(folder, monkeypatch):
     asked = ("experiment", TWO_MASS, *FEWEST, "--resume", "run.progress")
-    first = found(*asked)["points"]
+    first = document_of(*asked)["points"]
     kept = Path("run.progress").read_bytes()
     with monkeypatch.context() as patched:
-        for name in ("find_place", "measure_edges", "measure_tips"):
-            patched.setattr(f"zwidth.study.experiment.{name}", measured_again)
-        assert found(*asked)["points"] == first
+        for name in ("find_stable_walls", "measure_edges", "measure_tips"):
+            patched.setattr(f"zwidth.study.experiment.{name}", fail_if_measured)
+        assert document_of(*asked)["points"] == first
     assert Path("run.progress").read_bytes() == kept
-    assert found(*asked, "--disturbance", 0.002)["points"]
+    assert document_of(*asked, "--disturbance", 0.002)["points"]
     assert Path("run.progress").read_bytes() != kept
 
 
 def test_no_stable_wall_is_an_answer(folder):
-    ran = zwidth("experiment", TWO_MASS, *FEW, "--stiffness", "8000,9000", "--damping", "0,30", "--json")
+    ran = run_command("experiment", TWO_MASS, *FEW, "--stiffness", "8000,9000", "--damping", "0,30", "--json")
     assert ran.code == 1
     assert ran.document["points"] is None
     assert "no stable wall was found" in ran.document["reason"]
@@ -245,7 +245,7 @@ def test_a_measured_response_has_nothing_to_disturb(folder):
     Path("swept.toml").write_text(
         'name = "swept"\n[response]\nfile = "sweep.csv"\n[loop]\nsampling_period_s = 0.00125\n'
     )
-    ran = zwidth("experiment", "swept.toml", "--json")
+    ran = run_command("experiment", "swept.toml", "--json")
     assert ran.code == 1
     assert ran.document["points"] is None
 
@@ -276,7 +276,7 @@ def test_a_measured_response_has_nothing_to_disturb(folder):
 )
 def test_what_cannot_be_meant_is_one_line(folder, words, line):
     Path("notes.txt").write_text("my notes\n")
-    (said,) = refused("experiment", TWO_MASS, *words)
+    (said,) = refusal_lines("experiment", TWO_MASS, *words)
     assert line in said
     assert Path("notes.txt").read_text() == "my notes\n"
 
@@ -303,7 +303,7 @@ def test_what_cannot_be_meant_is_one_line(folder, words, line):
 )
 def test_somebody_s_points_are_checked(folder, text, line):
     Path("own.csv").write_text(text)
-    said = refused("experiment", TWO_MASS, "--measured", "own.csv")
+    said = refusal_lines("experiment", TWO_MASS, "--measured", "own.csv")
     assert line in said[0]
 
 

@@ -7,13 +7,21 @@ import csv
 import numpy as np
 import pytest
 
-from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, refused, strict, zwidth
+from tests.cli.command_runner import (
+    MECHANISM,
+    ONE_MASS,
+    TWO_MASS,
+    document_of,
+    parse_strict_json,
+    refusal_lines,
+    run_command,
+)
 
 WALL = ("--stiffness", "4000", "--damping", "10")
 
 
 def test_the_promised_keys_with_two_springs_in_series():
-    document = found("felt", TWO_MASS, *WALL)
+    document = document_of("felt", TWO_MASS, *WALL)
     k, K = 15620.0, 4000.0
     assert document["static_stiffness_N_per_m"] == pytest.approx(K * k / (K + k), rel=1e-9)
     assert document["static_stiffness_limit_N_per_m"] == pytest.approx(k)
@@ -30,7 +38,7 @@ def test_the_promised_keys_with_two_springs_in_series():
 
 
 def test_people_read_the_same():
-    out = zwidth("felt", TWO_MASS, *WALL).out
+    out = run_command("felt", TWO_MASS, *WALL).out
     for row in (
         "wall                  4.000 kN/m, 10.00 Ns/m: stable",
         "felt at rest          3.185 kN/m (79.61 % of it)",
@@ -38,14 +46,14 @@ def test_people_read_the_same():
         "no wall is felt above  15.62 kN/m",
     ):
         assert " ".join(row.split()) in " ".join(out.split())
-    assert "no wall is felt above" not in zwidth("felt", ONE_MASS, *WALL).out
+    assert "no wall is felt above" not in run_command("felt", ONE_MASS, *WALL).out
 
 
 def test_an_unstable_wall_is_no_answer_and_leaves_no_file(tmp_path):
     file = tmp_path / "felt.csv"
-    ran = zwidth("felt", TWO_MASS, "--stiffness", "9000", "--damping", "10", "--json", "--output", file)
+    ran = run_command("felt", TWO_MASS, "--stiffness", "9000", "--damping", "10", "--json", "--output", file)
     assert ran.code == 1
-    document = strict(ran.out)
+    document = parse_strict_json(ran.out)
     assert document["static_stiffness_N_per_m"] is None
     assert document["impedance_real_Ns_per_m"] is None
     assert document["free_motion_mass_kg"] == pytest.approx(0.287)
@@ -55,19 +63,19 @@ def test_an_unstable_wall_is_no_answer_and_leaves_no_file(tmp_path):
 
 
 def test_a_posture_out_of_reach_is_no_answer():
-    ran = zwidth("felt", MECHANISM, *WALL, "--at", "5,5", "--json")
+    ran = run_command("felt", MECHANISM, *WALL, "--at", "5,5", "--json")
     assert ran.code == 1
-    assert strict(ran.out)["impedance_real_Ns_per_m"] is None
+    assert parse_strict_json(ran.out)["impedance_real_Ns_per_m"] is None
 
 
 def test_without_a_handle_it_is_refused():
-    (line,) = refused("felt", MECHANISM, *WALL, "--model", "motor-mass")
+    (line,) = refusal_lines("felt", MECHANISM, *WALL, "--model", "motor-mass")
     assert "no handle" in line
-    (line,) = refused("felt", TWO_MASS, *WALL, "--set", "plant.handle=unset")
+    (line,) = refusal_lines("felt", TWO_MASS, *WALL, "--set", "plant.handle=unset")
     assert "give plant.handle" in line
 
 
-HELD = """
+WITH_OPERATOR = """
 name = "held"
 [plant]
 mass_kg = [[0.2616, 0.0], [0.0, 0.0254]]
@@ -89,23 +97,23 @@ grasp_damping_Ns_per_m = 5.0
 
 def test_the_operator_decides_what_is_stable_and_feels_the_device_without_himself(tmp_path):
     file = tmp_path / "held.toml"
-    file.write_text(HELD)
-    held, alone = found("felt", file, *WALL), found("felt", TWO_MASS, *WALL)
+    file.write_text(WITH_OPERATOR)
+    held, alone = document_of("felt", file, *WALL), document_of("felt", TWO_MASS, *WALL)
     for key in ("static_stiffness_N_per_m", "free_motion_mass_kg", "impedance_real_Ns_per_m"):
         assert held[key] == pytest.approx(alone[key], rel=1e-12)
     assert held["stiffness_max_N_per_m"] != pytest.approx(alone["stiffness_max_N_per_m"], rel=1e-3)
 
 
 def test_both_numbers_of_the_wall_are_needed():
-    assert "--damping" in refused("felt", TWO_MASS, "--stiffness", "100")[0]
-    assert refused("felt", TWO_MASS, "--stiffness", "nan", "--damping", "1")
+    assert "--damping" in refusal_lines("felt", TWO_MASS, "--stiffness", "100")[0]
+    assert refusal_lines("felt", TWO_MASS, "--stiffness", "nan", "--damping", "1")
 
 
 def test_files(tmp_path):
     table, figure = tmp_path / "felt.csv", tmp_path / "felt.svg"
-    document = found("felt", TWO_MASS, *WALL, "--output", table)
+    document = document_of("felt", TWO_MASS, *WALL, "--output", table)
     with table.open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [float(row["impedance_real_Ns_per_m"]) for row in rows] == document["impedance_real_Ns_per_m"]
-    found("felt", TWO_MASS, *WALL, "--output", figure)
+    document_of("felt", TWO_MASS, *WALL, "--output", figure)
     assert "<svg" in figure.read_text()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.cli.cli_run import ONE_MASS, found, refused, zwidth
+from tests.cli.command_runner import ONE_MASS, document_of, refusal_lines, run_command
 
 KEYS = {
     "name",
@@ -18,7 +18,7 @@ KEYS = {
 
 def test_a_paddle_has_its_guarantees_and_couplings(tmp_path):
     path = tmp_path / "guarantees.png"
-    document = found("guarantees", ONE_MASS, "--coupling", "--stiffness", "5000", "--output", path)
+    document = document_of("guarantees", ONE_MASS, "--coupling", "--stiffness", "5000", "--output", path)
     entries = {entry["name"]: entry for entry in document["guarantees"]}
     assert list(entries) == ["passive", "spring-stable", "nyquist-spring", "stable"]
     assert all(set(entry) == KEYS for entry in entries.values())
@@ -32,7 +32,7 @@ def test_a_paddle_has_its_guarantees_and_couplings(tmp_path):
 
 
 def test_a_device_that_dissipates_nothing_has_only_its_chart():
-    ran = zwidth("guarantees", ONE_MASS, "--set", "plant.damping_Ns_per_m=0", "--json")
+    ran = run_command("guarantees", ONE_MASS, "--set", "plant.damping_Ns_per_m=0", "--json")
     assert ran.code == 0  # some wall is stable with a free hand
     passive = ran.document["guarantees"][0]
     assert passive["stiffness_max_N_per_m"] is None
@@ -40,5 +40,5 @@ def test_a_device_that_dissipates_nothing_has_only_its_chart():
 
 
 def test_a_wall_needs_the_coupling_it_is_for():
-    assert "--coupling" in refused("guarantees", ONE_MASS, "--stiffness", "100")[0]
-    assert "--stiffness" in refused("guarantees", ONE_MASS, "--coupling", "--damping", "1")[0]
+    assert "--coupling" in refusal_lines("guarantees", ONE_MASS, "--stiffness", "100")[0]
+    assert "--stiffness" in refusal_lines("guarantees", ONE_MASS, "--coupling", "--damping", "1")[0]

@@ -8,7 +8,7 @@ import shlex
 import click
 import pytest
 
-from tests.cli.cli_run import zwidth
+from tests.cli.command_runner import run_command
 from zwidth import __version__
 from zwidth.model.reduction import MODELS as MODEL_NAMES
 from zwidth.show.cli.group import zwidth as group
@@ -21,6 +21,7 @@ def test_the_commands_are_those_promised():
     assert set(COMMANDS) == {
         "devices",
         "schema",
+        "compile",
         "new",
         "show",
         "chart",
@@ -43,7 +44,7 @@ def test_the_commands_are_those_promised():
 
 @pytest.mark.parametrize("words", [(), ("--help",), ("-h",)])
 def test_the_first_help_lists_the_commands(words):
-    ran = zwidth(*words)
+    ran = run_command(*words)
     assert (ran.code, ran.err) == (0, "")
     assert all(f"\n  {name} " in ran.out for name in COMMANDS)
     assert "..." not in ran.out.partition("\n")[2], "a summary is cut"
@@ -52,7 +53,7 @@ def test_the_first_help_lists_the_commands(words):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_is_explained(name):
-    ran = zwidth(name, "--help")
+    ran = run_command(name, "--help")
     assert (ran.code, ran.err) == (0, "")
     options = [parameter for parameter in group.commands[name].params if isinstance(parameter, click.Option)]
     for option in options:
@@ -62,7 +63,7 @@ def test_every_option_is_explained(name):
 
 @pytest.mark.parametrize("name", ["", *COMMANDS])
 def test_the_examples_of_the_help_are_typed_right(name):
-    text = zwidth(*filter(None, [name]), "--help").out
+    text = run_command(*filter(None, [name]), "--help").out
     examples = re.findall(r"^ +(zwidth .+)$", text.partition("Example:")[2], re.MULTILINE)
     assert examples
     for line in examples:
@@ -73,7 +74,7 @@ def test_the_examples_of_the_help_are_typed_right(name):
 
 
 def test_the_version():
-    ran = zwidth("--version")
+    ran = run_command("--version")
     assert (ran.code, ran.out) == (0, f"zwidth {__version__}\n")
 
 

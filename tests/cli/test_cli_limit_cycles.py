@@ -6,30 +6,40 @@ import csv
 
 import pytest
 
-from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, refused, strict, zwidth
+from tests.cli.command_runner import (
+    MECHANISM,
+    ONE_MASS,
+    TWO_MASS,
+    document_of,
+    parse_strict_json,
+    refusal_lines,
+    run_command,
+)
 from tests.cli.test_cli_docs import PAGE, keys
 from tests.paddle import LENGTH, paddle
-from zwidth.contact.limit_cycles import limit_cycles
+from zwidth.contact.harmonic_balance import limit_cycles
 from zwidth.device.load import load
 
 LIMITED = ("--set", "loop.saturation.force_N=5")
 WALL = ("--stiffness", "8000", "--damping", "10")
 ROUGH = ("--set", "loop.encoder.resolution_m=2e-5", "--set", "friction.coulomb_N=0.03")
 SLIPPERY = ("--set", "friction.coulomb_N=0.01")
-BOTH = (*ROUGH, *LIMITED, "--stiffness", "2600", "--damping", "0")
+ROUGH_AND_LIMITED = (*ROUGH, *LIMITED, "--stiffness", "2600", "--damping", "0")
 
 
 @pytest.fixture(scope="module")
-def both(tmp_path_factory):
+def cycle_prediction(tmp_path_factory):
     """What is predicted of everything at once, and the two files of it."""
     folder = tmp_path_factory.mktemp("cycles")
     table, plane = folder / "cycles.csv", folder / "plane.svg"
-    document = found("limit-cycles", ONE_MASS, *BOTH, "--no-simulation", "--output", table, "--plane", plane)
+    document = document_of(
+        "limit-cycles", ONE_MASS, *ROUGH_AND_LIMITED, "--no-simulation", "--output", table, "--plane", plane
+    )
     return document, table, plane
 
 
 def test_a_limited_force_holds_a_growing_vibration_as_predicted():
-    document = found("limit-cycles", TWO_MASS, *WALL, *LIMITED)
+    document = document_of("limit-cycles", TWO_MASS, *WALL, *LIMITED)
     assert (document["verdict"], document["nonlinear"]) == ("unstable", ["the force limit"])
     (cycle,) = document["limit_cycles"]
     assert cycle["stable"] is True
@@ -43,8 +53,8 @@ def test_a_limited_force_holds_a_growing_vibration_as_predicted():
     assert document["resting_limit_N_per_m"] is None
 
 
-def test_the_numbers_are_those_of_the_package(both):
-    document, *_ = both
+def test_the_numbers_are_those_of_the_package(cycle_prediction):
+    document, *_ = cycle_prediction
     settings = [word for word in (*ROUGH, *LIMITED) if word != "--set"]
     device = load(ONE_MASS, settings)
     expected = limit_cycles(device.at().loop, 2600.0, 0.0)
@@ -58,7 +68,7 @@ def test_the_numbers_are_those_of_the_package(both):
 
 
 def test_people_read_the_same():
-    out = " ".join(zwidth("limit-cycles", ONE_MASS, *BOTH).out.split())
+    out = " ".join(run_command("limit-cycles", ONE_MASS, *ROUGH_AND_LIMITED).out.split())
     assert "2.600 kN/m, 0 Ns/m: unstable if linear" in out
     assert "not linear dry friction, encoder steps, the force limit" in out
     assert "rests under every push on walls up to 3.000 kN/m" in out
@@ -68,7 +78,7 @@ def test_people_read_the_same():
 
 
 def test_between_two_counts_beyond_the_resting_limit_it_hunts():
-    document = found(
+    document = document_of(
         "limit-cycles", ONE_MASS, *ROUGH, "--stiffness", 4500, "--damping", 0, "--offset", 0.5, *SLIPPERY
     )
     assert document["offset_steps"] == 0.5
@@ -78,27 +88,27 @@ def test_between_two_counts_beyond_the_resting_limit_it_hunts():
 
 
 def test_where_nothing_is_predicted_a_start_some_counts_off_is_simulated():
-    document = found("limit-cycles", ONE_MASS, *ROUGH, "--stiffness", 500, "--damping", 1)
+    document = document_of("limit-cycles", ONE_MASS, *ROUGH, "--stiffness", 500, "--damping", 1)
     assert document["limit_cycles"] == []
     assert document["otherwise"]["behaviour"] == "converged"
     assert document["otherwise"]["start_m"] == pytest.approx(1e-4)
     assert (
         "no limit cycle is predicted"
-        in zwidth("limit-cycles", ONE_MASS, *ROUGH, "--stiffness", 500, "--damping", 1, "--no-simulation").out
+        in run_command("limit-cycles", ONE_MASS, *ROUGH, "--stiffness", 500, "--damping", 1, "--no-simulation").out
     )
 
 
 def test_a_linear_device_has_no_answer_and_hears_what_to_add(tmp_path):
     file = tmp_path / "cycles.csv"
-    ran = zwidth("limit-cycles", TWO_MASS, *WALL, "--json", "--output", file)
+    ran = run_command("limit-cycles", TWO_MASS, *WALL, "--json", "--output", file)
     assert ran.code == 1
-    document = strict(ran.out)
+    document = parse_strict_json(ran.out)
     assert document["limit_cycles"] is None
     for key in ("friction.coulomb_N", "loop.encoder.resolution_m", "loop.saturation.force_N"):
         assert key in document["reason"]
     assert not file.exists()
-    assert "mechanism.drives.*.coulomb_Nm" in zwidth("limit-cycles", MECHANISM, *WALL).err
-    assert zwidth("limit-cycles", MECHANISM, *WALL, *LIMITED, "--at", "5,5").code == 1
+    assert "mechanism.drives.*.coulomb_Nm" in run_command("limit-cycles", MECHANISM, *WALL).err
+    assert run_command("limit-cycles", MECHANISM, *WALL, *LIMITED, "--at", "5,5").code == 1
 
 
 @pytest.mark.parametrize(
@@ -114,22 +124,22 @@ def test_a_linear_device_has_no_answer_and_hears_what_to_add(tmp_path):
 )
 def test_what_cannot_be_asked_is_refused_in_one_line(words, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (line,) = refused("limit-cycles", TWO_MASS, *WALL, *LIMITED, *words)
+    (line,) = refusal_lines("limit-cycles", TWO_MASS, *WALL, *LIMITED, *words)
     assert said in line
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_simulation_that_vibrates_otherwise_is_said_to():
     """Far beyond the edge the slow vibration wins, which a sinus that grows fastest does not show."""
-    ran = zwidth(
+    ran = run_command(
         "limit-cycles", TWO_MASS, *LIMITED, "--set", "loop.delay_samples=0.5", "--stiffness", 7000, "--damping", 10
     )
     assert "vibrates otherwise than predicted" in ran.out
-    assert "otherwise" not in zwidth("limit-cycles", TWO_MASS, *WALL, *LIMITED).out
+    assert "otherwise" not in run_command("limit-cycles", TWO_MASS, *WALL, *LIMITED).out
 
 
-def test_files(both, tmp_path):
-    (document, table, plane), figure = both, tmp_path / "growth.svg"
+def test_files(cycle_prediction, tmp_path):
+    (document, table, plane), figure = cycle_prediction, tmp_path / "growth.svg"
     assert document["plane_file"] == str(plane)
     with table.open(newline="") as stream:
         rows = list(csv.DictReader(stream))
@@ -137,13 +147,13 @@ def test_files(both, tmp_path):
         cycle["amplitude_m"] for cycle in document["limit_cycles"]
     ]
     assert [row["stable"] for row in rows] == ["false", "true"]
-    found("limit-cycles", TWO_MASS, *WALL, *LIMITED, "--no-simulation", "--output", figure)
+    document_of("limit-cycles", TWO_MASS, *WALL, *LIMITED, "--no-simulation", "--output", figure)
     assert "<svg" in figure.read_text()
     assert "<svg" in plane.read_text()
 
 
 def test_the_keys_that_come_out_are_those_explained():
-    document = found("limit-cycles", ONE_MASS, *BOTH)
+    document = document_of("limit-cycles", ONE_MASS, *ROUGH_AND_LIMITED)
     last = document["limit_cycles"][-1]
     assert {*document, *last, "plane_file"} - keys("What comes out") == keys("limit-cycles")
     assert all(f"`{key}`" in PAGE for key in (*last["simulated"], *document["growth"]))
@@ -151,14 +161,14 @@ def test_the_keys_that_come_out_are_those_explained():
 
 def test_a_vibration_larger_than_the_handle_can_move_is_not_what_is_seen(tmp_path):
     words = (paddle(tmp_path), "--stiffness", 3000, "--damping", 1)
-    document = found("limit-cycles", *words)
+    document = document_of("limit-cycles", *words)
     edge, far = document["limit_cycles"]
     assert document["largest_motion_m"] == pytest.approx(LENGTH, rel=1e-3)
     assert (edge["within_range"], far["within_range"]) == (True, False)
     assert far["amplitude_m"] > LENGTH
     assert far["simulated"] is None
     assert document["otherwise"]["behaviour"] == "converged"
-    out = " ".join(zwidth("limit-cycles", *words, "--no-simulation").out.split())
+    out = " ".join(run_command("limit-cycles", *words, "--no-simulation").out.split())
     assert "what is seen" not in out
     assert "the handle moves 90.00 mm to either side at most" in out
     assert "vibrations that grow leave this range" in out
@@ -166,6 +176,6 @@ def test_a_vibration_larger_than_the_handle_can_move_is_not_what_is_seen(tmp_pat
 
 def test_a_given_plant_moves_a_metre_at_most():
     limited = ("--set", "loop.saturation.force_N=5000", "--stiffness", 2600, "--damping", 0, "--no-simulation")
-    document = found("limit-cycles", ONE_MASS, *limited)
+    document = document_of("limit-cycles", ONE_MASS, *limited)
     assert document["largest_motion_m"] == 1.0
     assert [cycle["within_range"] for cycle in document["limit_cycles"]] == [False]

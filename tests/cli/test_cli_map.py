@@ -11,19 +11,19 @@ import pytest
 import xarray as xr
 from scipy.io import loadmat
 
-from tests.cli.cli_run import MECHANISM, TWO_MASS, found, refused, zwidth
+from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, refusal_lines, run_command
 from zwidth.device.load import load
 from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.measure import STATUS
+from zwidth.measures.definition import STATUS
 from zwidth.show.cli.options import EXTREMES
-from zwidth.study import worst
+from zwidth.study import extreme_direction
 
 FEW = ("--cells", "7,5")
 DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_values_stand_at_their_places():
-    document = found("map", MECHANISM, "--measure", "rigid_mass", "--direction", "1,1", *FEW)
+    document = document_of("map", MECHANISM, "--measure", "rigid_mass", "--direction", "1,1", *FEW)
     assert (document["measure"], document["unit"]) == ("rigid_mass", "kg")
     assert (len(document["x_m"]), len(document["y_m"])) == (7, 5)
     values, status = np.array(document["values"], dtype=float), np.array(document["status"])
@@ -40,7 +40,7 @@ def test_values_stand_at_their_places():
 
 
 def test_several_measures_are_under_their_names():
-    document = found(
+    document = document_of(
         "map", MECHANISM, "--measure", "rigid_mass", "--measure", "isotropy", "--direction", "lowest", *FEW
     )
     assert list(document["measures"]) == ["rigid_mass", "isotropy"]
@@ -50,7 +50,7 @@ def test_several_measures_are_under_their_names():
     assert "directions" not in document["measures"]["isotropy"]
     u = np.array(document["directions"], dtype=float)
     assert u.shape == (5, 7, 3)
-    given = found("map", MECHANISM, "--measure", "rigid_mass", *FEW)
+    given = document_of("map", MECHANISM, "--measure", "rigid_mass", *FEW)
     low, one = (np.array(d["values"], dtype=float) for d in (document, given))
     assert (low[np.isfinite(low)] <= one[np.isfinite(one)] + 1e-12).all()
     assert 0.0 < document["measures"]["isotropy"]["overall"]["conditioning_index"] < 1.0
@@ -59,7 +59,7 @@ def test_several_measures_are_under_their_names():
 
 def test_requirements_and_their_common_area():
     """The numbers of thesis Fig. 5.4; Fig. 5.4's own common area is not printed."""
-    document = found(
+    document = document_of(
         "map", MECHANISM, "--require", "rigid_mass_kg>=0.2", "--require", "isotropy<=1.3", "--cells", "41,21"
     )
     assert [r["requirement"] for r in document["requirements"]] == ["rigid_mass>=0.2", "isotropy<=1.3"]
@@ -70,7 +70,7 @@ def test_requirements_and_their_common_area():
 
 
 def test_a_share_of_directions_is_mapped_and_required():
-    document = found(
+    document = document_of(
         "map",
         MECHANISM,
         "--share",
@@ -103,13 +103,13 @@ def never(place):
 def test_a_measure_of_one_s_own(tmp_path):
     (tmp_path / "my.py").write_text(OWN)
     own = ("--measures-file", tmp_path / "my.py", "--measure")
-    document = found("map", MECHANISM, *own, "inertial_force", "--measure", "rigid_mass", *FEW)
+    document = document_of("map", MECHANISM, *own, "inertial_force", "--measure", "rigid_mass", *FEW)
     force, mass = (np.array(document["measures"][n]["values"], dtype=float) for n in document["measures"])
     np.testing.assert_allclose(force[:, :4], 10.0 * mass[:, :4])
     assert np.isnan(force[:, 4:]).all()
     assert {"failed", "ok", "out of reach"} == {s for row in document["status"] for s in row}
     assert any("raised RuntimeError: not on the right" in note for note in document["notes"])
-    ran = zwidth("map", MECHANISM, *own, "never", *FEW, "--json")
+    ran = run_command("map", MECHANISM, *own, "never", *FEW, "--json")
     assert ran.code == 1
     assert ran.document["reason"].startswith("no cell has a value: 2")
     assert "returned None instead of a number" in ran.document["reason"]
@@ -118,14 +118,14 @@ def test_a_measure_of_one_s_own(tmp_path):
 
 def test_no_stable_wall_anywhere_is_no_answer():
     unstable = ("--set", "loop.delay_samples=1", "--set", "mechanism.damping.mode_ratio=0")
-    ran = zwidth("map", MECHANISM, "--measure", "stiffness_max", "--cells", "3,2", *unstable, "--json")
+    ran = run_command("map", MECHANISM, "--measure", "stiffness_max", "--cells", "3,2", *unstable, "--json")
     assert ran.code == 1
     assert "no wall with K > 0 and B >= 0 is stable" in ran.document["reason"]
     assert {s for row in ran.document["status"] for s in row} <= {"no value", "out of reach"}
 
 
 def test_an_assembly_that_is_singular_throughout_is_no_answer():
-    ran = zwidth("map", MECHANISM, "--measure", "isotropy", "--assembly", "elbows-right", "--json")
+    ran = run_command("map", MECHANISM, "--measure", "isotropy", "--assembly", "elbows-right", "--json")
     assert ran.code == 1
     assert "singular wherever" in ran.document["reason"]
     assert ran.document["values"] is None
@@ -134,8 +134,8 @@ def test_an_assembly_that_is_singular_throughout_is_no_answer():
 def test_files(tmp_path):
     asked = ("map", MECHANISM, "--measure", "stiffness", "--direction", "worst", "--require", "isotropy<=2", *FEW)
     for ending in (".csv", ".json", ".nc", ".mat", ".svg"):
-        assert zwidth(*asked, "--output", tmp_path / f"m{ending}").code == 0
-    document = found(*asked)
+        assert run_command(*asked, "--output", tmp_path / f"m{ending}").code == 0
+    document = document_of(*asked)
     values = np.array(document["values"], dtype=float)
     rows = list(csv.DictReader((tmp_path / "m.csv").read_text().splitlines()))
     assert len(rows) == 35
@@ -167,7 +167,9 @@ def test_files(tmp_path):
 
 def test_another_plane_has_the_base_frame_s_coordinates_in_its_table(tmp_path):
     turned = ("--plane", "1,1,0,-1,1,0", "--x", "0.1,0.2", "--y", "0.1,0.2", "--cells", "2,2")
-    assert zwidth("map", MECHANISM, "--measure", "isotropy", *turned, "--output", tmp_path / "m.csv").code == 0
+    assert (
+        run_command("map", MECHANISM, "--measure", "isotropy", *turned, "--output", tmp_path / "m.csv").code == 0
+    )
     rows = list(csv.DictReader((tmp_path / "m.csv").read_text().splitlines()))
     assert float(rows[1]["position_x_m"]) == pytest.approx((0.2 - 0.1) / np.sqrt(2))
     assert float(rows[1]["position_y_m"]) == pytest.approx((0.2 + 0.1) / np.sqrt(2))
@@ -205,12 +207,12 @@ def test_another_plane_has_the_base_frame_s_coordinates_in_its_table(tmp_path):
     ],
 )
 def test_bad_input_is_one_line(words, said):
-    (line,) = refused("map", MECHANISM, *words)
+    (line,) = refusal_lines("map", MECHANISM, *words)
     assert said in line
 
 
 def test_a_plant_has_no_workspace():
-    (line,) = refused("map", TWO_MASS, "--measure", "stiffness_max")
+    (line,) = refusal_lines("map", TWO_MASS, "--measure", "stiffness_max")
     assert "no [mechanism]" in line
 
 
@@ -220,8 +222,8 @@ def test_the_heading_says_what_matters_to_the_measures():
 
     def heading(*names):
         measures = [word for name in names for word in ("--measure", name)]
-        document = found("map", MECHANISM, *measures, *rubs, "--direction", "1,0", "--cells", "3,3")
-        ran = zwidth("map", MECHANISM, *measures, *rubs, "--direction", "1,0", "--cells", "3,3")
+        document = document_of("map", MECHANISM, *measures, *rubs, "--direction", "1,0", "--cells", "3,3")
+        ran = run_command("map", MECHANISM, *measures, *rubs, "--direction", "1,0", "--cells", "3,3")
         said = ran.out.split("\n\n")[0]
         assert ("leaves out dry friction" in said) == (document["left_out"] == ["dry friction"])
         return "along (1, 0)" in said, "leaves out" in said
@@ -234,12 +236,12 @@ def test_the_heading_says_what_matters_to_the_measures():
 
 def test_a_measure_of_one_s_own_cannot_be_called_a_share(tmp_path):
     (tmp_path / "my.py").write_text(OWN.replace("def never", "def share_of_directions"))
-    (line,) = refused("map", MECHANISM, "--measures-file", tmp_path / "my.py", "--measure", "inertial_force")
+    (line,) = refusal_lines("map", MECHANISM, "--measures-file", tmp_path / "my.py", "--measure", "inertial_force")
     assert "the name share_of_directions is taken by --share" in line
 
 
 def test_people_read_numbers_and_where_they_are():
-    out = zwidth("map", MECHANISM, "--measure", "isotropy", "--require", "isotropy<=1.5", *FEW).out
+    out = run_command("map", MECHANISM, "--measure", "isotropy", "--require", "isotropy<=1.5", *FEW).out
     assert "Condition number of the Jacobian (isotropy)" in out
     assert re.search(r"best +1\.0\d+ at \(.*\) m", out)
     assert re.search(r"cells +\d+ ok, \d+ out of reach", out)
@@ -247,7 +249,7 @@ def test_people_read_numbers_and_where_they_are():
 
 
 def test_the_help_lists_every_measure_with_its_unit():
-    out = zwidth("map", "--help").out
+    out = run_command("map", "--help").out
     for measure in MEASURES.values():
         line = next(line for line in out.splitlines() if line.split()[:1] == [measure.name])
         assert measure.title in line
@@ -255,7 +257,7 @@ def test_the_help_lists_every_measure_with_its_unit():
 
 
 def test_the_extremes_offered_are_those_there_are():
-    assert EXTREMES == worst.EXTREMES
+    assert EXTREMES == extreme_direction.EXTREMES
 
 
 def test_the_page_s_python_says_what_it_comes_to(tmp_path, monkeypatch):
@@ -276,12 +278,12 @@ def test_the_page_s_python_says_what_it_comes_to(tmp_path, monkeypatch):
     for words in re.findall(r"^    zwidth (map .*)$", page, re.MULTILINE):
         split = [word.strip("'") for word in words.split()]
         if "stiffness_max" not in split:
-            ran = zwidth(*split)
+            ran = run_command(*split)
             assert (ran.code, ran.err) == (0, "")
     assert "379 cm²" in page
     assert (
-        "common area            378.9 cm^2, 26.19 %"
-        in zwidth(
+        "common area            378.9 cm^2, 25.73 %"
+        in run_command(
             "map",
             "five-bar",
             *(part for text in re.findall(r"--require '(.*?)'", page) for part in ("--require", text)),

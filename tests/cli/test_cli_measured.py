@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests import systems
-from tests.cli.cli_run import found, refused, zwidth
-from tests.measured_cases import measured
+from tests.cli.command_runner import document_of, refusal_lines, run_command
+from tests.measured_cases import measured_response
 from zwidth.chart.chart import stability_chart
 from zwidth.loop.controller import Butterworth
 
@@ -48,7 +48,7 @@ def spectrum(path, f, value, **more):
 @pytest.fixture
 def device(tmp_path):
     """A device with an exact response of 1 to 400 Hz beside it."""
-    response, _ = measured(LOOP, np.linspace(1.0, 400.0, 400))
+    response, _ = measured_response(LOOP, np.linspace(1.0, 400.0, 400))
     spectrum(tmp_path / "sweep.csv", response.frequency, response.value)
     (tmp_path / "device.toml").write_text(DEVICE.format('file = "sweep.csv"'))
     return tmp_path / "device.toml"
@@ -57,7 +57,7 @@ def device(tmp_path):
 @pytest.fixture
 def noisy(tmp_path):
     """The same with a coherence of 0.99 in 16 averages, and the error that goes with it."""
-    response, _ = measured(LOOP, np.linspace(1.0, 400.0, 400))
+    response, _ = measured_response(LOOP, np.linspace(1.0, 400.0, 400))
     rng = np.random.default_rng(1)
     error = np.sqrt(0.01 / (2 * 16 * 0.99)) * (rng.normal(size=400) + 1j * rng.normal(size=400))
     spectrum(
@@ -68,7 +68,7 @@ def noisy(tmp_path):
 
 
 def test_a_measured_chart_has_the_keys_of_every_chart_and_its_own(device):
-    chart, exact = found("chart", device), stability_chart(LOOP, decay=False)
+    chart, exact = document_of("chart", device), stability_chart(LOOP, decay=False)
     assert chart["stiffness_max_N_per_m"] == pytest.approx(exact.stiffness_max, rel=1e-5)
     assert chart["damping_max_Ns_per_m"] == pytest.approx(exact.damping_max, rel=1e-4)
     assert chart["frequencies_at_stiffness_max_Hz"] == pytest.approx(exact.frequencies_at_stiffness_max, rel=1e-3)
@@ -83,10 +83,10 @@ def test_a_measured_chart_has_the_keys_of_every_chart_and_its_own(device):
 
 
 def test_people_read_the_band_and_what_is_not_to_be_relied_on(noisy, tmp_path):
-    document = found("chart", noisy)
+    document = document_of("chart", noisy)
     band = document["band"]
     assert band["stiffness_low_N_per_m"] < document["stiffness_max_N_per_m"] < band["stiffness_high_N_per_m"]
-    out = zwidth("chart", noisy, "--output", tmp_path / "chart.png").out
+    out = run_command("chart", noisy, "--output", tmp_path / "chart.png").out
     assert "[response]" in out
     assert "within 95 % of the error that the coherence tells" in out
     assert "400 of 400 frequencies used, 2 integrators" in out
@@ -94,7 +94,7 @@ def test_people_read_the_band_and_what_is_not_to_be_relied_on(noisy, tmp_path):
 
 
 def test_the_boundary_is_written_as_a_table(noisy, tmp_path):
-    found("chart", noisy, "--output", tmp_path / "edge.csv")
+    document_of("chart", noisy, "--output", tmp_path / "edge.csv")
     rows = list(csv.DictReader((tmp_path / "edge.csv").read_text().splitlines()))
     inner = [row for row in rows if 0.0 < float(row["frequency_Hz"]) < 400.0]
     for row in inner:
@@ -105,21 +105,21 @@ def test_the_boundary_is_written_as_a_table(noisy, tmp_path):
 def test_walls_are_judged_by_count_and_undecided_within_the_error(device, noisy, tmp_path):
     walls = tmp_path / "walls.csv"
     walls.write_text("stiffness_N_per_m,damping_Ns_per_m\n800,2.5\n800,9\n-50,2\n1560,2.02\n")
-    exact = found("check", device, "--points", walls)["points"]
+    exact = document_of("check", device, "--points", walls)["points"]
     assert [point["verdict"] for point in exact] == ["stable", "unstable", "unstable", "stable"]
     assert [point["roots_outside"] for point in exact] == [0, 2, 1, 0]
     assert all(point["spectral_radius"] is None for point in exact)
     assert exact[1]["frequency_Hz"] == pytest.approx(140.0, abs=15.0)
     assert exact[2]["frequency_Hz"] == 0.0
-    doubted = found("check", noisy, "--points", walls)["points"]
+    doubted = document_of("check", noisy, "--points", walls)["points"]
     assert [point["verdict"] for point in doubted] == ["stable", "unstable", "unstable", "undecided"]
-    assert "undecided" in zwidth("check", noisy, "--stiffness", "1560", "--damping", "2.02").out
+    assert "undecided" in run_command("check", noisy, "--stiffness", "1560", "--damping", "2.02").out
 
 
 def test_an_edge_that_does_not_close_has_no_answer(device, tmp_path):
-    response, _ = measured(LOOP, np.linspace(1.0, 100.0, 100))
+    response, _ = measured_response(LOOP, np.linspace(1.0, 100.0, 100))
     spectrum(tmp_path / "sweep.csv", response.frequency, response.value)
-    ran = zwidth("chart", device, "--json")
+    ran = run_command("chart", device, "--json")
     assert ran.code == 1
     assert ran.document["stiffness_max_N_per_m"] is None
     assert ran.document["closed"] is False
@@ -130,27 +130,27 @@ def test_an_edge_that_does_not_close_has_no_answer(device, tmp_path):
 
 @pytest.mark.parametrize("command", ["show", "report"])
 def test_what_needs_a_model_has_no_answer(device, command):
-    ran = zwidth(command, device, "--json")
+    ran = run_command(command, device, "--json")
     assert ran.code == 1
     assert "a measured response has no masses" in ran.document["reason"]
     assert ran.document["sampling_period_s"] == 0.00125
 
 
 def test_options_that_need_a_model_and_faults_of_the_file_are_refused(device, tmp_path):
-    assert refused("chart", device, "--model", "rigid") == [
+    assert refusal_lines("chart", device, "--model", "rigid") == [
         f"{device}: model: does not apply to a device given by its [response]; leave it out"
     ]
-    (line,) = refused("check", device, "--at", "0,1", "--stiffness", "1", "--damping", "1")
+    (line,) = refusal_lines("check", device, "--at", "0,1", "--stiffness", "1", "--damping", "1")
     assert "at: does not apply" in line
     text = (tmp_path / "sweep.csv").read_text().splitlines()
     (tmp_path / "sweep.csv").write_text("\n".join([text[0], text[2], text[1], *text[3:]]))
-    (line,) = refused("chart", device)
+    (line,) = refusal_lines("chart", device)
     assert (
         line == f"{tmp_path / 'sweep.csv'}: line 3: frequency_Hz: 1 follows 2; sort the lines by rising frequency"
     )
-    response, _ = measured(LOOP, np.linspace(1.0, 400.0, 400))
+    response, _ = measured_response(LOOP, np.linspace(1.0, 400.0, 400))
     spectrum(tmp_path / "sweep.csv", response.frequency, 1j * np.conj(response.value))
-    (line,) = refused("chart", device)
+    (line,) = refusal_lines("chart", device)
     assert "are columns swapped" in line
 
 
@@ -165,47 +165,47 @@ def test_a_loss_factor_is_charted_and_checked_on_the_full_model_only(lossy):
     wall = ("--stiffness", "100", "--damping", "1")
     for model in ("two-mass", "motor-mass", "rigid"):
         for command in (("chart", lossy), ("check", lossy, *wall)):
-            (line,) = refused(*command, "--model", model)
+            (line,) = refusal_lines(*command, "--model", model)
             assert line.endswith(
                 f"model {model}: a loss factor is charted on the full model only; leave model out"
             )
-    assert found("check", lossy, *wall, "--model", "full")["points"][0]["verdict"] == "stable"
+    assert document_of("check", lossy, *wall, "--model", "full")["points"][0]["verdict"] == "stable"
 
 
 def test_half_a_loss_factor_is_shown_as_damping(lossy):
-    rigid, flexible = found("show", lossy)["damping_ratios"]
+    rigid, flexible = document_of("show", lossy)["damping_ratios"]
     assert rigid is None
     assert flexible == pytest.approx(0.075, rel=1e-12)
-    viscous = found("show", lossy, "--set", "plant.loss_factor=unset", "--set", DAMPER)["damping_ratios"][1]
-    both = found("show", lossy, "--set", DAMPER)["damping_ratios"][1]
+    viscous = document_of("show", lossy, "--set", "plant.loss_factor=unset", "--set", DAMPER)["damping_ratios"][1]
+    both = document_of("show", lossy, "--set", DAMPER)["damping_ratios"][1]
     assert both == pytest.approx(viscous + 0.075, rel=1e-12)
 
 
 def test_a_loss_factor_needs_a_stiffness(lossy):
     for change in ("unset", "[[0.0, 0.0], [0.0, 0.0]]"):
-        (line,) = refused("chart", lossy, "--set", f"plant.stiffness_N_per_m={change}")
+        (line,) = refusal_lines("chart", lossy, "--set", f"plant.stiffness_N_per_m={change}")
         assert "plant.loss_factor: is a share of the stiffness, and there is none" in line
 
 
 def test_people_are_told_what_frequency_stands_beside_a_verdict(lossy, device):
     wall = ("--stiffness", "100", "--damping", "1")
     for file, column in ((lossy, "nearest edge at"), (device, "nearest edge at"), ("five-bar", "its frequency")):
-        assert column in zwidth("check", file, *wall).out
+        assert column in run_command("check", file, *wall).out
 
 
 # --- what is not seen, and what cannot be asked ----------------------------------------------------------
 
 
-def cut_short(tmp_path, highest):
-    response, _ = measured(LOOP, np.linspace(1.0, highest, 400))
+def short_response(tmp_path, highest):
+    response, _ = measured_response(LOOP, np.linspace(1.0, highest, 400))
     spectrum(tmp_path / "short.csv", response.frequency, response.value)
     (tmp_path / "short.toml").write_text(DEVICE.format('file = "short.csv"'))
     return tmp_path / "short.toml"
 
 
 def test_a_response_cut_short_warns_above_the_numbers(tmp_path):
-    short = cut_short(tmp_path, 300.0)
-    chart, text = found("chart", short), zwidth("chart", short).out
+    short = short_response(tmp_path, 300.0)
+    chart, text = document_of("chart", short), run_command("chart", short).out
     assert chart["measured_up_to_share"] == pytest.approx(0.75)
     assert chart["warning"].startswith("measured up to 300.0 Hz, 75.00 % of half the sampling rate (400.0 Hz)")
     assert "walls that fail above are not seen" in chart["warning"]
@@ -214,16 +214,16 @@ def test_a_response_cut_short_warns_above_the_numbers(tmp_path):
 
 @pytest.mark.parametrize(("highest", "share"), [(380.0, 0.95), (400.0, 1.0)])
 def test_a_response_that_nearly_reaches_half_the_sampling_rate_does_not_warn(tmp_path, highest, share):
-    chart = found("chart", cut_short(tmp_path, highest))
+    chart = document_of("chart", short_response(tmp_path, highest))
     assert (chart["measured_up_to_share"], chart["warning"]) == (pytest.approx(share), None)
 
 
 def test_the_band_of_two_equal_sweeps_holds_the_largest_stiffness(tmp_path):
-    response, _ = measured(LOOP, np.linspace(1.0, 400.0, 400))
+    response, _ = measured_response(LOOP, np.linspace(1.0, 400.0, 400))
     for name in ("one.csv", "two.csv"):
         spectrum(tmp_path / name, response.frequency, response.value)
     (tmp_path / "device.toml").write_text(DEVICE.format('files = ["one.csv", "two.csv"]'))
-    chart = found("chart", tmp_path / "device.toml")
+    chart = document_of("chart", tmp_path / "device.toml")
     band = chart["band"]
     assert band["stiffness_low_N_per_m"] <= chart["stiffness_max_N_per_m"] <= band["stiffness_high_N_per_m"]
 
@@ -241,7 +241,7 @@ def test_the_band_of_two_equal_sweeps_holds_the_largest_stiffness(tmp_path):
     ],
 )
 def test_what_needs_a_model_has_no_answer_for_a_response(device, command, key):
-    ran = zwidth(command[0], device, *command[1:], "--json")
+    ran = run_command(command[0], device, *command[1:], "--json")
     assert ran.code == 1
     assert ran.document[key] is None
     assert "no masses, stiffnesses, modes or postures" in ran.document["reason"]
@@ -251,4 +251,4 @@ def test_a_sweep_whose_time_falls_is_told_so(tmp_path):
     lines = [f"{0.00125 * (50 - n)},{n % 3},0.0" for n in range(50)]
     (tmp_path / "back.csv").write_text("\n".join(["time_s,force_command_N,position_m", *lines]) + "\n")
     (tmp_path / "device.toml").write_text(DEVICE.format('file = "back.csv"'))
-    assert "the time falls" in refused("chart", tmp_path / "device.toml")[0]
+    assert "the time falls" in refusal_lines("chart", tmp_path / "device.toml")[0]

@@ -8,13 +8,20 @@ import numpy as np
 import pytest
 
 import zwidth as package
-from tests.cli.cli_run import MECHANISM, TWO_MASS, found, refused, strict, zwidth
+from tests.cli.command_runner import (
+    MECHANISM,
+    TWO_MASS,
+    document_of,
+    parse_strict_json,
+    refusal_lines,
+    run_command,
+)
 from zwidth.contact import Box, Plane, Sphere, SurfaceWall
-from zwidth.show.cli.move import Move
+from zwidth.show.cli.move import MoveCommand
 
 WALL = ("--stiffness", 1500, "--damping", 3)
 BALL = ("--sphere", "0,0.31,0.05", *WALL, "--push", "0.02,1", "--duration", 0.3)
-COURSES = ("kinetic_J", "elastic_J", "gravitational_J", "hand_work_J", "motor_work_J", "friction_loss_J")
+ENERGY_KEYS = ("kinetic_J", "elastic_J", "gravitational_J", "hand_work_J", "motor_work_J", "friction_loss_J")
 DRIVES = ("motor-right", "motor-left")
 DRIVE = "mechanism.drives."
 WEAK = [
@@ -24,27 +31,27 @@ WEAK = [
 ]
 
 
-def moved(*words):
-    return found("move", MECHANISM, *words)
+def move_document(*words):
+    return document_of("move", MECHANISM, *words)
 
 
-def each(key, value):
+def for_both_drives(key, value):
     """The same number set for both drives."""
     return [word for drive in DRIVES for word in ("--set", f"{DRIVE}{drive}.{key}={value}")]
 
 
 @pytest.fixture(scope="module")
 def ball():
-    return moved(*BALL)
+    return move_document(*BALL)
 
 
-def called(surface, **settings):
+def move_from_python(surface, **settings):
     return package.load(MECHANISM).at().move(SurfaceWall(1500.0, 3.0), surface, **settings)
 
 
 def test_the_numbers_are_those_of_the_python_call(ball):
-    motion = called(Sphere((0.0, 0.31), 0.05), push=(0.02, 1.0, 0.0), duration=0.3)
-    assert set(Move.keys) <= set(ball)
+    motion = move_from_python(Sphere((0.0, 0.31), 0.05), push=(0.02, 1.0, 0.0), duration=0.3)
+    assert set(MoveCommand.keys) <= set(ball)
     for key, values in (
         ("time_s", motion.time),
         ("position_m", motion.position),
@@ -75,17 +82,19 @@ def test_the_energy_book_closes_and_dampers_only_take(ball):
     assert book["hand"] == pytest.approx(np.dot((0.02, 1.0, 0.0), np.diff(ball["position_m"], axis=0).sum(axis=0)))
     assert book["dampers"] < 0.0
     assert book["gravity"] == book["friction"] == 0.0
-    undamped = moved(*BALL, "--gravity", "1,-2", "--set", "mechanism.damping.mode_ratio=0")["energy_book_J"]
+    undamped = move_document(*BALL, "--gravity", "1,-2", "--set", "mechanism.damping.mode_ratio=0")[
+        "energy_book_J"
+    ]
     assert abs(undamped["gravity"]) > 0.01 * undamped["hand"]
     assert abs(undamped["dampers"]) < 1e-6 * undamped["hand"]
 
 
 def test_a_small_motion_at_a_two_sided_plane_is_that_of_simulate():
     speed, wall = 1e-5, ("--stiffness", 2000, "--damping", 3, "--duration", 0.2)
-    linear = found("simulate", MECHANISM, *wall, "--direction", "0,1", "--start-position", 0,
+    linear = document_of("simulate", MECHANISM, *wall, "--direction", "0,1", "--start-position", 0,
                    "--start-velocity", speed)  # fmt: skip
     plane = ("--plane", "0,0.25,0,-1", "--two-sided")
-    ours = moved(*plane, *wall, "--start-velocity", speed, "--direction", "0,1", "--substeps", 8)
+    ours = move_document(*plane, *wall, "--start-velocity", speed, "--direction", "0,1", "--substeps", 8)
     assert ours["time_s"] == pytest.approx(linear["time_s"])
     handle = np.array(linear["handle_m"])
     size = np.abs(handle).max()
@@ -114,28 +123,30 @@ OPTIONS = [
 
 @pytest.mark.parametrize(("words", "number", "holds"), OPTIONS, ids=[" ".join(map(str, w)) for w, *_ in OPTIONS])
 def test_an_option_changes_what_it_says(ball, words, number, holds):
-    plain, new = number(ball), number(moved(*BALL, *words))
+    plain, new = number(ball), number(move_document(*BALL, *words))
     assert holds(plain, new), (plain, new)
 
 
 def test_substeps_change_little_and_an_assembly_much(ball):
-    finer = moved(*BALL, "--substeps", 16)
+    finer = move_document(*BALL, "--substeps", 16)
     assert 0.0 < np.linalg.norm(last(finer) - last(ball)) < 1e-6
-    other = moved(*BALL, "--assembly", "elbows-in")
+    other = move_document(*BALL, "--assembly", "elbows-in")
     assert abs(other["joint_rad"]["upper-right"][0] - ball["joint_rad"]["upper-right"][0]) > 1.0
 
 
 def test_a_push_of_one_number_is_along_the_direction(ball):
     free = ("--duration", 0.02)
-    assert moved(*free, "--push", 2)["push_N"] == [0.0, 2.0, 0.0]
-    assert moved(*free, "--push", 2, "--direction", "3,4")["push_N"] == pytest.approx([1.2, 1.6, 0.0])
-    fast = moved(*free, "--start-velocity", -0.1, "--direction", "1,0")
+    assert move_document(*free, "--push", 2)["push_N"] == [0.0, 2.0, 0.0]
+    assert move_document(*free, "--push", 2, "--direction", "3,4")["push_N"] == pytest.approx([1.2, 1.6, 0.0])
+    fast = move_document(*free, "--start-velocity", -0.1, "--direction", "1,0")
     assert fast["start_velocity_m_per_s"] == [-0.1, 0.0, 0.0]
 
 
 def test_a_wall_pulls_unless_told_not_to():
     inside = ("--plane", "0,0.24,0,-1", "--stiffness", 300, "--damping", 20, "--duration", 0.1)
-    pulled, let_go = (np.array(moved(*inside, *words)["force_N"])[:, 1].max() for words in ((), ("--no-pull",)))
+    pulled, let_go = (
+        np.array(move_document(*inside, *words)["force_N"])[:, 1].max() for words in ((), ("--no-pull",))
+    )
     assert pulled > 0.0 == let_go
 
 
@@ -150,87 +161,92 @@ def test_planes_boxes_and_hollow_boxes_are_those_of_python():
         (("--box", "0,0.29,0,0.05,0.02,0.01"), Box((0.0, 0.29, 0.0), (0.05, 0.02, 0.01))),
         (("--box", "0,0.25,0.05,0.02", "--hollow"), Box((0.0, 0.25), (0.05, 0.02), hollow=True)),
     ):
-        told = moved(*words, *WALL, "--push", "0,1", "--duration", 0.15)
-        motion = called(surface, push=(0.0, 1.0, 0.0), duration=0.15)
+        told = move_document(*words, *WALL, "--push", "0,1", "--duration", 0.15)
+        motion = move_from_python(surface, push=(0.0, 1.0, 0.0), duration=0.15)
         assert told["depth_m"] == motion.depth.tolist()
         assert told["largest_penetration_m"] > 0.0
         assert told["surface"]["kind"] == type(surface).__name__.lower()
 
 
 def test_counts_limits_and_friction_of_the_file_take_part(ball):
-    counted = moved(*BALL, *each("encoder_counts_per_rev", 500))
+    counted = move_document(*BALL, *for_both_drives("encoder_counts_per_rev", 500))
     assert counted["counted_position_m"][5:40] != ball["counted_position_m"][5:40]
-    exact = moved(*BALL, *each("encoder_counts_per_rev", 500), "--exact")
+    exact = move_document(*BALL, *for_both_drives("encoder_counts_per_rev", 500), "--exact")
     assert exact["counted_position_m"] == ball["counted_position_m"]
     assert exact["encoders_counted"] is False
-    noisy = [*BALL, *each("encoder_counts_per_rev", 5000), *each("encoder_noise_rad", 0.01)]
-    first, again, other = (moved(*noisy, "--seed", seed)["counted_position_m"] for seed in (1, 1, 2))
+    noisy = [*BALL, *for_both_drives("encoder_counts_per_rev", 5000), *for_both_drives("encoder_noise_rad", 0.01)]
+    first, again, other = (move_document(*noisy, "--seed", seed)["counted_position_m"] for seed in (1, 1, 2))
     assert first == again != other
     limited = [*BALL, *WEAK]
-    one, all_alike = moved(*limited), moved(*limited, "--torque-limits", "together")
+    one, all_alike = move_document(*limited), move_document(*limited, "--torque-limits", "together")
     assert one["torque_limit_share"]["motor-left"] == 0.0 < one["torque_limit_share"]["motor-right"] < 0.5
     assert max(map(abs, one["torque_Nm"]["motor-right"])) == pytest.approx(18.6 * 0.01)
     assert last(one) != pytest.approx(last(all_alike), abs=1e-5)
-    rubbing = moved(*BALL, *each("coulomb_Nm", 0.001))
+    rubbing = move_document(*BALL, *for_both_drives("coulomb_Nm", 0.001))
     assert rubbing["energy_book_J"]["friction"] < 0.0
     assert rubbing["friction_loss_J"][-1] == -rubbing["energy_book_J"]["friction"]
 
 
 def test_the_work_of_lagging_motors_is_null():
-    document = moved(*BALL, "--set", "loop.actuator.time_constant_s=0.001")
+    document = move_document(*BALL, "--set", "loop.actuator.time_constant_s=0.001")
     assert document["energy_book_J"]["motors"] is None
     assert set(document["motor_work_J"]) == {None}
-    out = zwidth("move", MECHANISM, *BALL, "--set", "loop.actuator.time_constant_s=0.001").out
+    out = run_command("move", MECHANISM, *BALL, "--set", "loop.actuator.time_constant_s=0.001").out
     assert "motors and dampers, by difference" in out
 
 
 def test_a_motion_that_ends_at_a_singularity_is_an_answer(tmp_path):
     words = ("--push", "0.02,1", "--output", tmp_path / "path.png")
-    document = moved(*words)
+    document = move_document(*words)
     assert document["status"] == "singular"
     assert document["duration_s"] < 0.5 < document["duration_asked_s"] == 1.0
     assert "it is a singularity" in document["ended_because"]
     assert "reason" not in document
     assert document["largest_penetration_m"] is document["contact_share"] is document["started_inside"] is None
     assert set(document["depth_m"]) == {None}
-    assert "ended before its time: after 0.3" in zwidth("move", MECHANISM, *words).out
+    assert "ended before its time: after 0.3" in run_command("move", MECHANISM, *words).out
 
 
 def test_people_read_how_deep_how_hard_and_remarks(tmp_path):
-    out = zwidth("move", MECHANISM, *BALL).out
+    out = run_command("move", MECHANISM, *BALL).out
     assert "largest penetration  4.382 mm, after 102.5 ms" in out
     assert "largest force        6.013 N, after 98.75 ms" in out
     assert "none in the file" in out
-    out = zwidth("move", MECHANISM, "--plane", "0,0.24,0,-1", *WALL, "--duration", 0.02).out
+    out = run_command("move", MECHANISM, "--plane", "0,0.24,0,-1", *WALL, "--duration", 0.02).out
     assert "starts 10.00 mm inside the wall" in out
-    assert "nothing moves it" in zwidth("move", MECHANISM, "--duration", 0.02).out
-    out = zwidth("move", MECHANISM, "--plane", "0,0.28,0,-1", *WALL, "--push", "0,1", "--duration", 0.02).out
+    assert "nothing moves it" in run_command("move", MECHANISM, "--duration", 0.02).out
+    out = run_command("move", MECHANISM, "--plane", "0,0.28,0,-1", *WALL, "--push", "0,1", "--duration", 0.02).out
     assert "the handle never touches the surface" in out
-    parts = (*each("coulomb_Nm", 0.001), *each("encoder_counts_per_rev", 500), "--substeps", 2)
-    out = zwidth("move", MECHANISM, *BALL, *parts, *WEAK).out
+    parts = (
+        *for_both_drives("coulomb_Nm", 0.001),
+        *for_both_drives("encoder_counts_per_rev", 500),
+        "--substeps",
+        2,
+    )
+    out = run_command("move", MECHANISM, *BALL, *parts, *WEAK).out
     assert "with what a chart leaves out: dry friction, encoder steps" in out
     assert "take --substeps 4 or more" in out
     assert "motor-right reached in" in out
     assert "dry friction" in out
     arm = ("arm_mass_kg=1", "arm_stiffness_N_per_m=100", "arm_damping_Ns_per_m=1", "grasp=rigid")
     held = (MECHANISM, *BALL, *(word for key in arm for word in ("--set", f"operator.{key}")))
-    document = found("move", *held)
+    document = document_of("move", *held)
     assert (document["left_out"], document["operator"]) == (["the operator"], None)
-    assert "leaves out the operator: the hand is the push alone" in zwidth("move", *held).out
+    assert "leaves out the operator: the hand is the push alone" in run_command("move", *held).out
 
 
 @pytest.mark.parametrize("kind", ["png", "svg", "pdf", "csv", "json"])
 def test_a_file_holds_what_was_found(tmp_path, ball, kind):
     file = tmp_path / f"path.{kind}"
-    assert moved(*BALL, "--output", file) == ball | {"file": str(file)}
+    assert move_document(*BALL, "--output", file) == ball | {"file": str(file)}
     if kind == "json":
-        assert strict(file.read_text()) == ball | {"file": str(file)}
+        assert parse_strict_json(file.read_text()) == ball | {"file": str(file)}
     elif kind == "csv":
         with file.open(newline="") as stream:
             rows = list(csv.DictReader(stream))
         names = [f"{name}_m" for name in "xyz"] + [f"counted_{name}_m" for name in "xyz"]
         assert list(rows[0])[:8] == ["time_s", *names, "depth_m"]
-        assert {"force_y_N", "torque_motor-left_Nm", "joint_upper-left_rad", *COURSES} <= set(rows[0])
+        assert {"force_y_N", "torque_motor-left_Nm", "joint_upper-left_rad", *ENERGY_KEYS} <= set(rows[0])
         assert [[float(row[f"{name}_m"]) for name in "xyz"] for row in rows] == ball["position_m"]
         assert [float(row["torque_motor-left_Nm"]) for row in rows] == ball["torque_Nm"]["motor-left"]
     else:
@@ -277,22 +293,24 @@ BAD = [
 
 @pytest.mark.parametrize(("words", "said"), BAD, ids=[" ".join(map(str, words)) for words, _ in BAD])
 def test_what_cannot_be_meant_is_refused_on_one_line(words, said):
-    (line,) = refused("move", MECHANISM, *words)
+    (line,) = refusal_lines("move", MECHANISM, *words)
     assert said in line
 
 
 def test_a_device_without_a_mechanism_is_refused():
-    (line,) = refused("move", TWO_MASS)
+    (line,) = refusal_lines("move", TWO_MASS)
     assert "has a [plant] and no [mechanism] to move; `zwidth simulate` takes a [plant]" in line
 
 
 def test_a_start_out_of_reach_has_no_answer():
-    ran = zwidth("move", MECHANISM, *BALL, "--at", "1,1", "--json")
+    ran = run_command("move", MECHANISM, *BALL, "--at", "1,1", "--json")
     assert ran.code == 1
     assert "cannot reach" in ran.document["reason"]
     assert ran.document["time_s"] is ran.document["status"] is None
 
 
 def test_a_programmable_brake_is_refused():
-    (line,) = refused("move", MECHANISM, *BALL, "--set", f"{DRIVE}motor-left.brake_damping_max_Nms_per_rad=0.001")
+    (line,) = refusal_lines(
+        "move", MECHANISM, *BALL, "--set", f"{DRIVE}motor-left.brake_damping_max_Nms_per_rad=0.001"
+    )
     assert "programmable brake" in line

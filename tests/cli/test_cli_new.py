@@ -8,8 +8,8 @@ import tomllib
 
 import pytest
 
-from tests.cli.cli_run import found, refused, zwidth
-from zwidth.device.new import KINDS, new_device
+from tests.cli.command_runner import document_of, refusal_lines, run_command
+from zwidth.device.new_device import KINDS, new_device
 
 
 @pytest.fixture(autouse=True)
@@ -20,23 +20,23 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_new_device_answers_at_once_without_a_word(folder, kind):
-    document = found("new", "mine", "--kind", kind)
+    document = document_of("new", "mine", "--kind", kind)
     assert document == {"name": "mine", "kind": kind, "file": str(folder / "mine.toml")}
     assert (folder / "mine.toml").read_text() == new_device("mine", kind)
-    assert found("chart", "mine.toml")["stiffness_max_N_per_m"] > 500.0
-    assert found("show", "mine.toml")["rigid_mass_kg"] > 0.01
-    assert found("report", "mine.toml", "--output", "mine.html")["file"] == str(folder / "mine.html")
+    assert document_of("chart", "mine.toml")["stiffness_max_N_per_m"] > 500.0
+    assert document_of("show", "mine.toml")["rigid_mass_kg"] > 0.01
+    assert document_of("report", "mine.toml", "--output", "mine.html")["file"] == str(folder / "mine.html")
     for words in (("chart", "mine.toml"), ("show", "mine.toml")):
-        ran = zwidth(*words)
+        ran = run_command(*words)
         assert (ran.code, ran.err) == (0, "")
         assert ran.out.startswith("mine: ")
 
 
 def test_people_are_told_what_to_type_next(folder):
-    ran = zwidth("new", "my device", "--kind", "plant")
+    ran = run_command("new", "my device", "--kind", "plant")
     assert (ran.code, ran.err) == (0, "")
     (line,) = [line for line in ran.out.splitlines() if "zwidth chart" in line]
-    assert zwidth(*shlex.split(line)[1:]).code == 0
+    assert run_command(*shlex.split(line)[1:]).code == 0
     assert f"written: {folder / 'my device.toml'}" in ran.out
 
 
@@ -54,14 +54,14 @@ def test_people_are_told_what_to_type_next(folder):
 )
 def test_a_name_makes_the_file_s_name_and_the_device_s(folder, typed, file, name):
     (folder / "designs").mkdir()
-    ran = zwidth("new", "--kind", "plant", "--json", "--", typed)
+    ran = run_command("new", "--kind", "plant", "--json", "--", typed)
     assert ran.code == 0, ran.err
     assert json.loads(ran.out)["name"] == name
     assert tomllib.loads((folder / file).read_text())["name"] == name
 
 
 def test_another_file_may_be_named(folder):
-    found("new", "My arm", "--kind", "serial-2r", "--output", "arm.toml")
+    document_of("new", "My arm", "--kind", "serial-2r", "--output", "arm.toml")
     assert [path.name for path in folder.iterdir()] == ["arm.toml"]
     assert tomllib.loads((folder / "arm.toml").read_text())["name"] == "My arm"
 
@@ -82,7 +82,7 @@ def test_another_file_may_be_named(folder):
 )
 def test_what_is_refused_leaves_everything_as_it_was(folder, words, said):
     (folder / "there.toml").write_text("somebody's work")
-    (line,) = refused("new", *words)
+    (line,) = refusal_lines("new", *words)
     assert said in line
     assert [path.name for path in folder.iterdir()] == ["there.toml"]
     assert (folder / "there.toml").read_text() == "somebody's work"

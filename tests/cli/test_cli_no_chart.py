@@ -6,7 +6,7 @@ from math import pi
 
 import pytest
 
-from tests.cli.cli_run import MECHANISM, found, refused, zwidth
+from tests.cli.command_runner import MECHANISM, document_of, refusal_lines, run_command
 
 DEVICE = """
 name = "adaptive"
@@ -60,14 +60,14 @@ def device(tmp_path, monkeypatch):
 @pytest.mark.parametrize("more", [(), ("--json",)], ids=["text", "json"])
 def test_what_charts_refuses_in_one_line_and_writes_nothing(device, tmp_path, command, more):
     before = set(tmp_path.iterdir())
-    (line,) = refused(command, device, *COMMANDS[command], *more)
+    (line,) = refusal_lines(command, device, *COMMANDS[command], *more)
     assert line.startswith("adaptive.toml: adaptive windowing is not linear: it has no chart; ask zwidth simulate")
     assert set(tmp_path.iterdir()) == before
 
 
 @pytest.mark.parametrize("command", ["chart", "polar", "bounds"])
 def test_a_mechanism_is_refused_alike(command):
-    (line,) = refused(command, MECHANISM, *LEVANT)
+    (line,) = refusal_lines(command, MECHANISM, *LEVANT)
     assert line.startswith(f"{MECHANISM}: Levant's differentiator is not linear: it has no chart")
 
 
@@ -77,24 +77,24 @@ def test_a_measured_device_is_refused_alike(device, tmp_path):
     rows = [f"{f},{value.real},{value.imag}" for f, value in paddle.items()]
     (tmp_path / "sweep.csv").write_text("\n".join(["frequency_Hz,real_m_per_N,imag_m_per_N", *rows]))
     for words in (("chart",), ("check", *WALL)):
-        (line,) = refused(words[0], "swept.toml", *words[1:])
+        (line,) = refusal_lines(words[0], "swept.toml", *words[1:])
         assert line.startswith("swept.toml: Levant's differentiator is not linear")
 
 
 def test_what_the_line_says_to_do_gives_a_chart(device):
-    (line,) = refused("chart", device)
+    (line,) = refusal_lines("chart", device)
     setting = line.rpartition("with ")[2].split()
     assert tuple(setting) == LINEAR
-    assert found("chart", device, *setting)["stiffness_max_N_per_m"] > 0.0
+    assert document_of("chart", device, *setting)["stiffness_max_N_per_m"] > 0.0
 
 
 def test_what_needs_no_velocity_is_shown_with_the_method():
-    ran = zwidth("show", MECHANISM, *LEVANT)
+    ran = run_command("show", MECHANISM, *LEVANT)
     assert ran.code == 0
     assert "velocity by levant (acceleration max 30)" in ran.out
 
 
 def test_the_method_is_told_with_its_parameters(device):
-    ran = zwidth("show", device)
+    ran = run_command("show", device)
     assert ran.code == 0
     assert "velocity by foaw (samples 20, position noise 5 × 10⁻⁶, best-fit)" in ran.out

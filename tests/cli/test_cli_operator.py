@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import zwidth as package
-from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, refused, zwidth
-from tests.systems import random_operator, second_matrix
+from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of, refusal_lines, run_command
+from tests.systems import random_operator, reference_transition_matrix
 from zwidth.device.read import DEVICES, OPERATORS, bundled_names
 from zwidth.model.operator import Operator, attach
 
@@ -41,14 +41,14 @@ def folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize("device", bundled_names(DEVICES))
 def test_every_bundled_operator_holds_every_bundled_device(device, operator):
     """The chart is that of the plant he is attached to, its stiffest wall on the edge by other eigenvalues."""
-    told = found("chart", device, "--operator", operator)
+    told = document_of("chart", device, "--operator", operator)
     assert told["operator"] == operator
     bare = package.load(device)
     held = package.load(device, operator=operator)
     loop = package.Loop(attach(bare.at().plant, held.operator), bare.controller)
     wall = told["stiffness_max_N_per_m"], told["damping_at_stiffness_max_Ns_per_m"]
     assert package.largest_stiffness(loop).stiffness == pytest.approx(wall[0], rel=1e-9)
-    roots = np.linalg.eigvals(second_matrix(loop, *wall))
+    roots = np.linalg.eigvals(reference_transition_matrix(loop, *wall))
     free = 2 * sum(name.startswith("rigid motion") for name in told["unobserved_modes"])  # roots at 1
     rest = np.delete(roots, np.argsort(np.abs(roots - 1.0))[:free])
     assert np.max(np.abs(rest)) == pytest.approx(1.0, abs=1e-7)
@@ -72,34 +72,35 @@ def test_a_random_operator_of_a_file_is_on_the_edge_where_the_chart_says(folder)
         chart = package.stability_chart(loop, decay=False)
         for arc in chart.boundary:
             i = len(arc.stiffness) // 2
-            roots = np.linalg.eigvals(second_matrix(loop, arc.stiffness[i], arc.damping[i]))
+            roots = np.linalg.eigvals(reference_transition_matrix(loop, arc.stiffness[i], arc.damping[i]))
             assert np.max(np.abs(roots)) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_an_operator_of_the_device_file_is_attached_unless_none_is_asked_for(folder):
     (folder / "mine.toml").write_text(DEVICE + "[operator]\n" + ARM)
     (folder / "alone.toml").write_text(DEVICE)
-    held, alone = found("chart", "mine.toml"), found("chart", "alone.toml")
+    held, alone = document_of("chart", "mine.toml"), document_of("chart", "alone.toml")
     assert (held["operator"], alone["operator"]) == ("as given", None)
     assert held["stiffness_max_N_per_m"] != alone["stiffness_max_N_per_m"]
-    let_go = found("chart", "mine.toml", "--operator", "none")
+    let_go = document_of("chart", "mine.toml", "--operator", "none")
     assert let_go["stiffness_max_N_per_m"] == alone["stiffness_max_N_per_m"]
     assert let_go["operator"] is None
-    given = found("chart", "alone.toml", "--operator", "mine.toml")  # a device file serves, too
+    given = document_of("chart", "alone.toml", "--operator", "mine.toml")  # a device file serves, too
     assert given["stiffness_max_N_per_m"] == held["stiffness_max_N_per_m"]
     assert given["operator"] == "mine.toml"
-    checked = found("check", "mine.toml", "--stiffness", 1.0, "--damping", -1.0)
+    checked = document_of("check", "mine.toml", "--stiffness", 1.0, "--damping", -1.0)
     assert (checked["operator"], checked["points"][0]["verdict"]) == ("as given", "stable")
     assert (
-        found("check", "alone.toml", "--stiffness", 1.0, "--damping", -1.0)["points"][0]["verdict"] == "unstable"
+        document_of("check", "alone.toml", "--stiffness", 1.0, "--damping", -1.0)["points"][0]["verdict"]
+        == "unstable"
     )
 
 
 def test_settings_apply_to_whoever_holds_it(folder):
-    rigid = found("chart", TWO_MASS, "--operator", "thesis-arm", "--set", "operator.grasp=rigid")
+    rigid = document_of("chart", TWO_MASS, "--operator", "thesis-arm", "--set", "operator.grasp=rigid")
     assert (
         rigid["stiffness_max_N_per_m"]
-        == found("chart", TWO_MASS, "--operator", "thesis-arm-rigid")["stiffness_max_N_per_m"]
+        == document_of("chart", TWO_MASS, "--operator", "thesis-arm-rigid")["stiffness_max_N_per_m"]
     )
     heavy = package.load(TWO_MASS, ["operator.arm_mass_kg=1.5"], "my-hand.toml")
     assert heavy.operator == Operator(1.5, 580.0, 5.5, 10000.0, 5.0)
@@ -107,20 +108,23 @@ def test_settings_apply_to_whoever_holds_it(folder):
 
 def test_every_model_is_held_but_the_one_whose_link_side_is_fixed():
     for model in ("full", "two-mass", "rigid"):
-        assert found("chart", MECHANISM, "--model", model, "--operator", "thesis-arm")["operator"] == "thesis-arm"
-    fixed = found("chart", MECHANISM, "--model", "motor-mass", "--operator", "thesis-arm")
+        assert (
+            document_of("chart", MECHANISM, "--model", model, "--operator", "thesis-arm")["operator"]
+            == "thesis-arm"
+        )
+    fixed = document_of("chart", MECHANISM, "--model", "motor-mass", "--operator", "thesis-arm")
     assert fixed["operator"] is None
-    alone = found("chart", MECHANISM, "--model", "motor-mass")
+    alone = document_of("chart", MECHANISM, "--model", "motor-mass")
     assert fixed["stiffness_max_N_per_m"] == alone["stiffness_max_N_per_m"]
 
 
 def test_the_device_is_shown_by_itself():
-    alone, held = found("show", TWO_MASS), found("show", TWO_MASS, "--operator", "thesis-arm")
+    alone, held = document_of("show", TWO_MASS), document_of("show", TWO_MASS, "--operator", "thesis-arm")
     assert held["natural_frequencies_Hz"] == alone["natural_frequencies_Hz"]
 
 
 def test_sensitivities_reach_his_numbers():
-    told = found("sensitivity", ONE_MASS, "--operator", "thesis-arm")
+    told = document_of("sensitivity", ONE_MASS, "--operator", "thesis-arm")
     paths = {number["path"] for number in told["sensitivities"]}
     assert {"operator.arm_mass_kg", "operator.grasp_stiffness_N_per_m"} <= paths
 
@@ -142,7 +146,7 @@ def test_sensitivities_reach_his_numbers():
 )
 @pytest.mark.parametrize("command", [("polar",), ("chart", "--with-direction", "1,0")], ids=["polar", "chart"])
 def test_directions_together_leave_nothing_out_in_silence(command, words, said):
-    (line,) = refused(command[0], MECHANISM, *command[1:], *words)
+    (line,) = refusal_lines(command[0], MECHANISM, *command[1:], *words)
     assert said in line
 
 
@@ -151,7 +155,7 @@ def test_the_heading_names_him_and_what_the_computer_does():
     settings += ["loop.actuator.time_constant_s=0.0002", "loop.force.filter.type=first-order"]
     settings += ["loop.force.filter.time_constant_s=0.001"]
     words = [word for setting in settings for word in ("--set", setting)]
-    ran = zwidth("chart", TWO_MASS, "--operator", "thesis-arm", *words)
+    ran = run_command("chart", TWO_MASS, "--operator", "thesis-arm", *words)
     assert "as given, held by thesis-arm" in ran.out
     assert (
         "velocity by windowed-difference (samples 3), force through a first-order filter of 1 ms, "
@@ -160,7 +164,7 @@ def test_the_heading_names_him_and_what_the_computer_does():
 
 
 def test_the_bundled_operators_are_listed_with_their_sources():
-    operators = found("devices")["operators"]
+    operators = document_of("devices")["operators"]
     assert [operator["name"] for operator in operators] == bundled_names(OPERATORS)
     assert all(operator["description"] and operator["source"] for operator in operators)
 
@@ -189,7 +193,7 @@ BAD = [
 @pytest.mark.parametrize(("text", "said"), BAD, ids=[words[0][:30] for _, words in BAD])
 def test_a_bad_operator_is_one_line_at_his_file(folder, text, said):
     (folder / "hand.toml").write_text(text)
-    lines = refused("chart", TWO_MASS, "--operator", "hand.toml")
+    lines = refusal_lines("chart", TWO_MASS, "--operator", "hand.toml")
     assert len(lines) == len(said)
     for line, words in zip(lines, said, strict=True):
         assert line.startswith(f"hand.toml: {words}")
@@ -211,7 +215,7 @@ def test_a_bad_operator_is_one_line_at_his_file(folder, text, said):
     ],
 )
 def test_a_bad_question_is_one_line(words, said):
-    (line,) = refused("chart", TWO_MASS, *words)
+    (line,) = refusal_lines("chart", TWO_MASS, *words)
     assert said in line
 
 
@@ -224,7 +228,7 @@ def blocks(language):
 
 @pytest.mark.parametrize("line", "".join(blocks("sh")).splitlines())
 def test_an_example_of_the_page_runs(folder, line):
-    ran = zwidth(*shlex.split(line)[1:])
+    ran = run_command(*shlex.split(line)[1:])
     assert (ran.code, ran.err) == (0, "")
 
 

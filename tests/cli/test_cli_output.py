@@ -11,8 +11,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from tests.cli.cli_run import MECHANISM, zwidth
-from zwidth.show.output import OutputError, csv_text, destination, json_text, plain, replacing, write_text
+from tests.cli.command_runner import MECHANISM, run_command
+from zwidth.show.output import OutputError, csv_text, destination, json_text, json_value, replacing, write_text
 
 
 def test_json_is_strict_whatever_the_numbers_are():
@@ -29,7 +29,7 @@ def test_json_is_strict_whatever_the_numbers_are():
     assert back["inner"] == {"list": [1, None, "é\ud800"]}
     assert json_text(document).isascii()
     assert json.loads(json_text({})) == {}
-    assert plain(np.array(2.5)) == 2.5
+    assert json_value(np.array(2.5)) == 2.5
 
 
 def test_csv_loses_no_digit_and_keeps_odd_text():
@@ -104,7 +104,7 @@ def test_the_ending_counts_in_capitals_too(tmp_path):
 )
 def test_a_figure_does_not_hang_on_the_settings_of_matplotlib(words, tmp_path):
     plain, own = tmp_path / "plain.svg", tmp_path / "own.svg"
-    assert zwidth(*words.format(MECHANISM).split(), "--output", str(plain)).code == 0
+    assert run_command(*words.format(MECHANISM).split(), "--output", str(plain)).code == 0
     with mpl.rc_context({"lines.linewidth": 7.0, "axes.facecolor": "red", "font.size": 20.0}):
-        assert zwidth(*words.format(MECHANISM).split(), "--output", str(own)).code == 0
+        assert run_command(*words.format(MECHANISM).split(), "--output", str(own)).code == 0
     assert own.read_bytes() == plain.read_bytes()

@@ -3,14 +3,14 @@
 import csv
 
 import pytest
-from cli_run import MECHANISM, TWO_MASS, zwidth
+from command_runner import MECHANISM, TWO_MASS, run_command
 
 import zwidth as package
 from zwidth.chart.chart import largest_stiffness
 
 
 def test_each_direction_is_the_chart_of_its_own():
-    ran = zwidth("polar", MECHANISM, "--count", 6, "--json")
+    ran = run_command("polar", MECHANISM, "--count", 6, "--json")
     assert ran.code == 0
     document = ran.document
     assert document["plane"] == "xy"
@@ -24,13 +24,13 @@ def test_each_direction_is_the_chart_of_its_own():
 
 
 def test_directions_that_cannot_be_moved_along_are_null_with_a_status():
-    document = zwidth("polar", MECHANISM, "--count", 4, "--plane", "xz", "--json").document
+    document = run_command("polar", MECHANISM, "--count", 4, "--plane", "xz", "--json").document
     assert [value is None for value in document["stiffness_max_N_per_m"]] == [False, True, False, True]
     assert document["status"][1] == "out of motion: the handle cannot move along the direction"
 
 
 def test_a_direction_that_leaves_the_plane_of_motion_is_not_the_stiffest():
-    document = zwidth("polar", "five-bar", "--count", 12, "--plane", "xz", "--json").document
+    document = run_command("polar", "five-bar", "--count", 12, "--plane", "xz", "--json").document
     answered = [k for k, value in enumerate(document["stiffness_max_N_per_m"]) if value is not None]
     assert answered == [0, 6]  # x and its opposite; 1/cos^2 of it is what the others would have said
     assert {document["status"][k] for k in range(12) if k not in answered} == {
@@ -40,7 +40,7 @@ def test_a_direction_that_leaves_the_plane_of_motion_is_not_the_stiffest():
 
 def test_no_stable_wall_anywhere_is_no_answer():
     unstable = ("--set", "loop.delay_samples=1", "--set", "mechanism.damping.ratio=0")
-    ran = zwidth("polar", MECHANISM, "--count", 4, *unstable, "--json")
+    ran = run_command("polar", MECHANISM, "--count", 4, *unstable, "--json")
     assert ran.code in (1, 2)
     if ran.code == 1:
         assert ran.document["reason"] == "no direction has a stable wall with K > 0 and B >= 0"
@@ -48,7 +48,7 @@ def test_no_stable_wall_anywhere_is_no_answer():
 
 
 def test_out_of_reach_is_no_answer():
-    ran = zwidth("polar", MECHANISM, "--at", "1,1", "--json")
+    ran = run_command("polar", MECHANISM, "--at", "1,1", "--json")
     assert ran.code == 1
     assert ran.document["stiffness_max_N_per_m"] is None
     assert "cannot reach" in ran.document["reason"]
@@ -65,14 +65,14 @@ def test_out_of_reach_is_no_answer():
     ],
 )
 def test_bad_input_is_one_line_and_nothing_on_standard_output(words, said):
-    ran = zwidth("polar", *words)
+    ran = run_command("polar", *words)
     assert (ran.code, ran.out) == (2, "")
     assert len(ran.lines) == 1
     assert said in ran.err
 
 
 def test_people_read_the_two_extremes():
-    ran = zwidth("polar", MECHANISM)
+    ran = run_command("polar", MECHANISM)
     assert ran.code == 0
     assert "stiffest     7.997 kN/m" in ran.out
     assert "least stiff  4.109 kN/m" in ran.out
@@ -80,7 +80,7 @@ def test_people_read_the_two_extremes():
 
 def test_files(tmp_path):
     for ending in (".csv", ".json", ".svg"):
-        assert zwidth("polar", MECHANISM, "--count", 4, "--output", tmp_path / f"p{ending}").code == 0
+        assert run_command("polar", MECHANISM, "--count", 4, "--output", tmp_path / f"p{ending}").code == 0
     rows = list(csv.DictReader((tmp_path / "p.csv").read_text().splitlines()))
     assert len(rows) == 4
     assert float(rows[1]["stiffness_max_N_per_m"]) == pytest.approx(7849.441493, rel=1e-9)
@@ -92,12 +92,12 @@ def test_files(tmp_path):
 
 
 def test_a_chart_of_two_directions_under_one_law():
-    ran = zwidth("chart", MECHANISM, "--with-direction", "1,0", "--json")
+    ran = run_command("chart", MECHANISM, "--with-direction", "1,0", "--json")
     assert ran.code == 0
     assert ran.document["directions"] == [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
     assert ran.document["stiffness_max_N_per_m"] == pytest.approx(4148.658573678898, rel=1e-9)
     assert ran.document["fastest_decay"] is None
-    assert "under one law" in zwidth("chart", MECHANISM, "--with-direction", "1,0").out
+    assert "under one law" in run_command("chart", MECHANISM, "--with-direction", "1,0").out
 
 
 @pytest.mark.parametrize(
@@ -108,6 +108,6 @@ def test_a_chart_of_two_directions_under_one_law():
     ],
 )
 def test_directions_that_cannot_be_charted_together(words, said):
-    ran = zwidth("chart", *words)
+    ran = run_command("chart", *words)
     assert (ran.code, ran.out) == (2, "")
     assert said in ran.err

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.cli_run import TWO_MASS, strict
-from tests.interruption import HANGS, interruptible, stopped_by_ctrl_c
-from zwidth.chart.verdict import AT_ONCE
+from tests.cli.command_runner import TWO_MASS, parse_strict_json
+from tests.interruption import HANG_TIMEOUT_S, interruptible, stopped_by_ctrl_c
+from zwidth.chart.verdict import BATCH_SIZE
 
 ZWIDTH = Path(sys.executable).with_name("zwidth")
 HEAVY = {"numpy", "numba", "scipy", "matplotlib", "pydantic", "jinja2", "shapely"}
 
 
-def zwidth(*words: object, **options) -> subprocess.CompletedProcess[str]:
+def run_process(*words: object, **options) -> subprocess.CompletedProcess[str]:
     command = [ZWIDTH, *map(str, words)]
     return subprocess.run(
         command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, **options
@@ -56,9 +56,9 @@ main()
 
 
 def test_a_chart_as_a_process():
-    done = zwidth("chart", TWO_MASS, "--json")
+    done = run_process("chart", TWO_MASS, "--json")
     assert (done.returncode, done.stderr) == (0, "")
-    assert strict(done.stdout)["stiffness_max_N_per_m"] > 7000.0
+    assert parse_strict_json(done.stdout)["stiffness_max_N_per_m"] > 7000.0
 
 
 def test_ctrl_c_while_reading(tmp_path):
@@ -71,7 +71,7 @@ def test_ctrl_c_while_reading(tmp_path):
     )
     with open(pipe, "w"):  # opens once the command reads
         running.send_signal(signal.SIGINT)
-        out, err = running.communicate(timeout=HANGS)
+        out, err = running.communicate(timeout=HANG_TIMEOUT_S)
     assert running.returncode == 130
     assert (out, len(err.splitlines())) == ("", 1)
     assert "interrupted" in err
@@ -81,7 +81,7 @@ def test_ctrl_c_while_computing(tmp_path):
     """Between two batches of walls."""
     walls, verdicts = tmp_path / "walls.csv", tmp_path / "verdicts.csv"
     verdicts.write_text("from before")
-    walls.write_text("stiffness_N_per_m,damping_Ns_per_m\n" + "4000,10\n" * (AT_ONCE + 1))
+    walls.write_text("stiffness_N_per_m,damping_Ns_per_m\n" + "4000,10\n" * (BATCH_SIZE + 1))
     words = ["check", TWO_MASS, "--points", str(walls), "--output", str(verdicts)]
     code, out, err = stopped_by_ctrl_c(words, "zwidth.chart.verdict:verdicts")
     assert (code, out, len(err.splitlines())) == (130, "", 1)
@@ -120,7 +120,7 @@ def test_a_closed_standard_error_leaves_standard_output_to_the_answer(tmp_path):
         for line in lines
     )
     assert (good.returncode, good.stderr) == (0, "")
-    assert strict(good.stdout)["stiffness_max_N_per_m"] > 7000.0
+    assert parse_strict_json(good.stdout)["stiffness_max_N_per_m"] > 7000.0
     assert (tmp_path / "chart.csv").stat().st_size > 1000
     assert (bad.returncode, bad.stdout, bad.stderr) == (2, "", "")
 
@@ -138,7 +138,7 @@ def test_a_full_disk_is_said_on_one_line(words):
 
 
 def test_a_terminal_that_knows_only_ascii(tmp_path):
-    done = zwidth("chart", TWO_MASS, env=os.environ | {"PYTHONIOENCODING": "ascii"})
+    done = run_process("chart", TWO_MASS, env=os.environ | {"PYTHONIOENCODING": "ascii"})
     assert done.returncode == 0
     assert "largest stiffness" in done.stdout
 

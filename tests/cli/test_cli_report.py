@@ -5,16 +5,16 @@ from __future__ import annotations
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.cli.cli_run import MECHANISM, TWO_MASS, found, zwidth
+from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, run_command
 
 
 def test_the_report_is_written_and_its_numbers_are_the_charts(tmp_path):
     file = tmp_path / "here.html"
     question = (MECHANISM, "--at", "-0.1,0.2", "--direction", "-1,0", "--set", "loop.delay_samples=0.25")
-    report = found("report", *question, "--output", file)
+    report = document_of("report", *question, "--output", file)
     assert report["file"] == str(file)
     assert file.read_text(encoding="utf-8").lstrip().lower().startswith("<!doctype html>")
-    chart = found("chart", *question)
+    chart = document_of("chart", *question)
     for key in ("stiffness_max_N_per_m", "damping_max_Ns_per_m", "stable_area_N2s_per_m2"):
         assert_allclose(report[key], chart[key], rtol=1e-9)
     for key in ("name", "device", "position_m", "direction", "assembly", "model", "delay_samples"):
@@ -28,7 +28,7 @@ def test_without_a_name_it_is_called_after_the_device(tmp_path, monkeypatch, dev
     (tmp_path / "folder").mkdir()
     text = 'name = "x"\n[plant]\nmass_kg = 0.05\n[loop]\nsampling_period_s = 0.001\n'
     (tmp_path / "folder" / "my.paddle.toml").write_text(text)
-    ran = zwidth("report", device)
+    ran = run_command("report", device)
     assert (ran.code, ran.err) == (0, "")
     assert f"{name}-report.html" in ran.out
     assert (tmp_path / f"{name}-report.html").stat().st_size > 10_000
@@ -37,13 +37,13 @@ def test_without_a_name_it_is_called_after_the_device(tmp_path, monkeypatch, dev
 def test_a_device_without_stable_walls_has_a_report_and_exit_code_1(tmp_path):
     file = tmp_path / "none.html"
     unstable = ("--set", "plant.damping_Ns_per_m=unset", "--set", "loop.delay_samples=1")
-    ran = zwidth("report", TWO_MASS, *unstable, "--output", file, "--json")
+    ran = run_command("report", TWO_MASS, *unstable, "--output", file, "--json")
     assert ran.code == 1
     assert ran.document["reason"] == "no wall with positive stiffness and without negative damping is stable"
     assert ran.document["stiffness_max_N_per_m"] is None
     assert ran.document["decided"] is True
     assert ran.document["file"] == str(file)
     assert "</html>" in file.read_text(encoding="utf-8")
-    again = zwidth("report", TWO_MASS, *unstable, "--output", file)  # for people
+    again = run_command("report", TWO_MASS, *unstable, "--output", file)  # for people
     assert (again.code, again.lines) == (1, [f"zwidth: {ran.document['reason']}"])
     assert f"written: {file}" in again.out

@@ -8,14 +8,14 @@ import json
 import numpy as np
 import pytest
 
-from tests.cli.cli_run import ONE_MASS, TWO_MASS, found, refused, zwidth
+from tests.cli.command_runner import ONE_MASS, TWO_MASS, document_of, refusal_lines, run_command
 
 QUICK = ("--members", "12", "--unseen", "20")
 MASSES = ("--range", "plant.mass_kg=0.03,0.06", "--set", "plant.damping_Ns_per_m=unset")
 
 
 def test_the_promised_keys_with_the_closed_form_of_free_masses():
-    document = found("robust", ONE_MASS, *MASSES, *QUICK)
+    document = document_of("robust", ONE_MASS, *MASSES, *QUICK)
     assert document["stiffness_max_N_per_m"] == pytest.approx(0.03e6 * (12.0 - 8.0 * np.sqrt(2.0)), rel=1e-9)
     assert document["damping_max_Ns_per_m"] == pytest.approx(60.0, rel=1e-9)
     assert document["lost_stiffness_share"] == pytest.approx(0.5, rel=1e-9)
@@ -36,11 +36,12 @@ def test_the_promised_keys_with_the_closed_form_of_free_masses():
 
 
 def test_operators_by_name_are_members_and_complete():
-    document = found("robust", TWO_MASS, "--operators", "none,thesis-arm")
+    document = document_of("robust", TWO_MASS, "--operators", "none,thesis-arm")
     assert document["members"] == [{"operator": "none"}, {"operator": "thesis-arm"}]
     assert document["violation"] is None
     ones = [
-        found("chart", TWO_MASS, "--operator", name)["stiffness_max_N_per_m"] for name in ("none", "thesis-arm")
+        document_of("chart", TWO_MASS, "--operator", name)["stiffness_max_N_per_m"]
+        for name in ("none", "thesis-arm")
     ]
     assert document["stiffness_max_N_per_m"] <= min(ones) * (1.0 + 1e-9)
 
@@ -48,13 +49,13 @@ def test_operators_by_name_are_members_and_complete():
 def test_operators_from_a_list_file(tmp_path):
     names = tmp_path / "who.txt"
     names.write_text("# who may come\nnone\n\nthesis-arm  # the usual one\n", encoding="utf-8")
-    document = found("robust", TWO_MASS, "--operator-list", names)
+    document = document_of("robust", TWO_MASS, "--operator-list", names)
     assert [member["operator"] for member in document["members"]] == ["none", "thesis-arm"]
-    assert "no such file" in refused("robust", TWO_MASS, "--operator-list", tmp_path / "missing")[0]
+    assert "no such file" in refusal_lines("robust", TWO_MASS, "--operator-list", tmp_path / "missing")[0]
 
 
 def test_people_read_who_binds_what_is_lost_and_what_was_tried():
-    ran = zwidth("robust", ONE_MASS, *MASSES, *QUICK)
+    ran = run_command("robust", ONE_MASS, *MASSES, *QUICK)
     assert ran.code == 0, ran.err
     assert ran.err == ""
     assert "lost against the best  50.00 % of its stiffness" in ran.out
@@ -66,7 +67,7 @@ def test_people_read_who_binds_what_is_lost_and_what_was_tried():
 def test_files_hold_the_edge_with_its_members(tmp_path):
     for ending in ("csv", "json", "png", "svg"):
         file = tmp_path / f"robust.{ending}"
-        document = found("robust", ONE_MASS, *MASSES, *QUICK, "--output", file)
+        document = document_of("robust", ONE_MASS, *MASSES, *QUICK, "--output", file)
         assert document["file"] == str(file)
         assert file.stat().st_size > 1000
     rows = list(csv.DictReader((tmp_path / "robust.csv").read_text().splitlines()))
@@ -79,7 +80,7 @@ def test_files_hold_the_edge_with_its_members(tmp_path):
 def test_no_wall_for_all_is_said_with_the_two_that_exclude_each_other():
     # K must outdo a spring that pushes away, which is more than the other stands
     spring = ("--range", "plant.stiffness_N_per_m=-10000,5000", "--set", "plant.mass_kg=0.01")
-    ran = zwidth("robust", ONE_MASS, "--set", "plant.damping_Ns_per_m=unset", *spring, *QUICK, "--json")
+    ran = run_command("robust", ONE_MASS, "--set", "plant.damping_Ns_per_m=unset", *spring, *QUICK, "--json")
     assert ran.code == 1
     document = ran.document
     assert document["stiffness_max_N_per_m"] is None
@@ -116,13 +117,13 @@ def test_no_wall_for_all_is_said_with_the_two_that_exclude_each_other():
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_one_line(words, expected):
-    lines = refused("robust", ONE_MASS, *words)
+    lines = refusal_lines("robust", ONE_MASS, *words)
     assert any(expected in line for line in lines), lines
     assert len(lines) <= 2
 
 
 def test_a_fixed_range_is_allowed():
-    document = found("robust", ONE_MASS, "--range", "plant.mass_kg=0.03,0.03", *QUICK)
+    document = document_of("robust", ONE_MASS, "--range", "plant.mass_kg=0.03,0.03", *QUICK)
     assert document["members"] == [{"plant.mass_kg": 0.03}]
     assert document["violation"] is None
 
@@ -134,7 +135,7 @@ def test_an_interruption_leaves_nothing_behind(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(module, "_violation", interrupted)
-    ran = zwidth("robust", ONE_MASS, *MASSES, *QUICK, "--output", tmp_path / "robust.svg")
+    ran = run_command("robust", ONE_MASS, *MASSES, *QUICK, "--output", tmp_path / "robust.svg")
     assert ran.code == 130
     assert ran.out == ""
     assert list(tmp_path.iterdir()) == []

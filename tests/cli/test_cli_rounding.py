@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from matplotlib.text import Text
 
-from tests.cli.cli_run import TWO_MASS, found, zwidth
+from tests.cli.command_runner import TWO_MASS, document_of, run_command
 from zwidth.show.figures import style
 
 WALL = ("--stiffness", "4000", "--damping", "10")
-ASKED = {
+COMMANDS = {
     "chart": (),
     "show": (),
     "check": WALL,
@@ -39,7 +39,7 @@ NUMBER = re.compile(
     r"(?<![\w.])(?P<digits>\d+\.?\d*)(?: ?× ?10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
     r"(?: (?P<prefix>[nµmkM]?)(?P<unit>N/m|Ns/m|N²s/m²|Hz|kg|s|m|J|%|×)(?![\w²/]))?"
 )
-RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 BLANKS = str.maketrans("\u00a0\u2009\u2212", "  -")
 
 
@@ -47,7 +47,7 @@ def numbers(text: str) -> Iterator[tuple[str, str, float, float]]:
     """Every number of three digits, with a unit two: its text, its unit, its size, and one of its last digit."""
     for match in NUMBER.finditer(text.translate(BLANKS)):
         digits, unit = match["digits"], match["unit"] or ""
-        scale = PREFIXES[match["prefix"] or ""] * 10.0 ** int((match["power"] or "0").translate(RAISED))
+        scale = PREFIXES[match["prefix"] or ""] * 10.0 ** int((match["power"] or "0").translate(SUPERSCRIPTS))
         if len(digits.replace(".", "").lstrip("0")) >= (2 if unit else 3):
             yield (
                 match[0],
@@ -91,8 +91,9 @@ def derived(documents: dict[str, Any]) -> Iterator[tuple[str, float]]:
 
 
 @pytest.fixture
-def drawn(monkeypatch):
-    """The words in every figure that is saved, those at its axes' ticks left out."""
+def figure_texts(monkeypatch):
+    """The words in every figure that is saved, those at its axes' ticks left out, and its caption, whose numbers
+    are those that were chosen."""
     words: list[str] = []
     save = style.save
 
@@ -104,23 +105,24 @@ def drawn(monkeypatch):
             for axis in (ax.xaxis, ax.yaxis)
             for text in [*axis.get_ticklabels(which="both"), axis.get_offset_text()]
         }
-        words.extend(text.get_text() for text in found if text not in ticks)
+        caption = figure.get_supxlabel()
+        words.extend(text.get_text() for text in found if text not in ticks and text.get_text() != caption)
         save(figure, path)
 
     monkeypatch.setattr(style, "save", kept)
     return words
 
 
-def test_no_number_is_printed_in_two_roundings(drawn, tmp_path):
-    documents = {command: found(command, TWO_MASS, *options) for command, options in ASKED.items()}
+def test_no_number_is_printed_in_two_roundings(figure_texts, tmp_path):
+    documents = {command: document_of(command, TWO_MASS, *options) for command, options in COMMANDS.items()}
     known = {*derived(documents), *(pair for document in documents.values() for pair in exact(document))}
     texts = {}
-    for command, options in ASKED.items():
+    for command, options in COMMANDS.items():
         figure = () if command in ("show", "check", "simulate") else ("--output", tmp_path / f"{command}.svg")
-        texts[command] = zwidth(command, TWO_MASS, *options, *figure).out
-    texts["figures"] = "\n".join(drawn)
+        texts[command] = run_command(command, TWO_MASS, *options, *figure).out
+    texts["figures"] = "\n".join(figure_texts)
     page = tmp_path / "report.html"
-    texts["report"] = zwidth("report", TWO_MASS, "--output", page).out
+    texts["report"] = run_command("report", TWO_MASS, "--output", page).out
     bare = re.sub(r"(?s)<(svg|style|script).*?</\1>|<[^>]*>", " ", page.read_text())
     texts["page"] = html.unescape(bare)
     wrong = {
@@ -128,13 +130,13 @@ def test_no_number_is_printed_in_two_roundings(drawn, tmp_path):
         for where, written in texts.items()
         for text, own, value, last in numbers(written)
         for unit, size in known
-        if own == unit and abs(value - size) <= last and not _right(value, size)
+        if own == unit and abs(value - size) <= last and not _is_rounded(value, size)
     }
     assert not wrong, sorted(wrong)
     seen = {text for written in texts.values() for text, *_ in numbers(written)}
     assert {"7.134 kN/m", "9.975 Ns/m", "174.5 Hz"} <= seen  # the numbers are found at all
 
 
-def _right(value: float, size: float) -> bool:
+def _is_rounded(value: float, size: float) -> bool:
     """Is it the number in four digits, to nearest, or the number itself?"""
     return any(abs(value - right) <= 1e-9 * size for right in (size, float(f"{size:.3e}")))

@@ -6,19 +6,27 @@ import csv
 
 import pytest
 
-from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, refused, strict, zwidth
+from tests.cli.command_runner import (
+    MECHANISM,
+    ONE_MASS,
+    TWO_MASS,
+    document_of,
+    parse_strict_json,
+    refusal_lines,
+    run_command,
+)
 
 LATE = ("--set", "loop.delay_samples=1")
 UNSTABLE = (TWO_MASS, *LATE, "--set", "plant.damping_Ns_per_m=unset")
 
 
-def of(document):
+def by_path(document):
     return {entry["path"]: entry for entry in document["sensitivities"]}
 
 
 def test_the_promised_keys_with_the_closed_form_of_a_free_mass():
-    document = found("sensitivity", ONE_MASS, "--set", "plant.damping_Ns_per_m=unset")
-    entries = of(document)
+    document = document_of("sensitivity", ONE_MASS, "--set", "plant.damping_Ns_per_m=unset")
+    entries = by_path(document)
     assert entries["plant.mass_kg"]["d_ln_stiffness_max_d_ln_value"] == pytest.approx(1.0, abs=1e-9)
     assert entries["loop.sampling_period_s"]["d_ln_stiffness_max_d_ln_value"] == pytest.approx(-2.0, abs=1e-9)
     assert entries["plant.mass_kg"]["value"] == 0.03
@@ -31,12 +39,12 @@ def test_the_promised_keys_with_the_closed_form_of_a_free_mass():
 
 
 def test_sorted_by_magnitude_and_zeros_carry_a_derivative_and_a_reason():
-    document = found("sensitivity", TWO_MASS)
+    document = document_of("sensitivity", TWO_MASS)
     values = [entry["d_ln_stiffness_max_d_ln_value"] for entry in document["sensitivities"]]
     known = [abs(value) for value in values if value is not None]
     assert known == sorted(known, reverse=True)
     assert values[: len(known)] == [value for value in values if value is not None]
-    late = of(document)["loop.delay_samples"]
+    late = by_path(document)["loop.delay_samples"]
     assert late["d_ln_stiffness_max_d_ln_value"] is None
     assert late["d_stiffness_max_d_value_N_per_m"] == pytest.approx(-28078.0756, rel=1e-6)
     assert "0 has no logarithm" in late["reason"]
@@ -44,15 +52,15 @@ def test_sorted_by_magnitude_and_zeros_carry_a_derivative_and_a_reason():
 
 
 def test_the_question_is_that_of_every_command():
-    document = found("sensitivity", MECHANISM, "--model", "rigid", "--direction", "1,0", "--at", "0.02,0.2")
+    document = document_of("sensitivity", MECHANISM, "--model", "rigid", "--direction", "1,0", "--at", "0.02,0.2")
     assert document["model"] == "rigid"
-    entries = of(document)
+    entries = by_path(document)
     assert entries["loop.sampling_period_s"]["d_ln_stiffness_max_d_ln_value"] == pytest.approx(-2.0, abs=1e-9)
     assert "mechanism.reference.position_m.0" in {entry["path"] for entry in document["left_out"]}
 
 
 def test_people_see_the_top_of_the_list_with_units():
-    ran = zwidth("sensitivity", TWO_MASS, "--top", "2")
+    ran = run_command("sensitivity", TWO_MASS, "--top", "2")
     assert ran.code == 0
     rows = [line.split() for line in ran.out.splitlines() if line.startswith((" loop.", " plant."))]
     assert [row[0] for row in rows] == ["loop.sampling_period_s", "plant.mass_kg.1.1"]
@@ -63,30 +71,30 @@ def test_people_see_the_top_of_the_list_with_units():
 
 
 def test_no_stable_wall_is_no_answer():
-    ran = zwidth("sensitivity", *UNSTABLE, "--json")
+    ran = run_command("sensitivity", *UNSTABLE, "--json")
     assert ran.code == 1
-    document = strict(ran.out)
+    document = parse_strict_json(ran.out)
     assert document["sensitivities"] == []
     assert document["stiffness_max_N_per_m"] is None
     assert "no stable wall" in document["reason"]
-    ran = zwidth("sensitivity", *UNSTABLE)
+    ran = run_command("sensitivity", *UNSTABLE)
     assert (ran.code, ran.err.startswith("zwidth: no stable wall")) == (1, True)
 
 
 def test_out_of_reach_is_no_answer_either():
-    ran = zwidth("sensitivity", MECHANISM, "--at", "5,5", "--json")
+    ran = run_command("sensitivity", MECHANISM, "--at", "5,5", "--json")
     assert ran.code == 1
-    assert strict(ran.out)["sensitivities"] is None
+    assert parse_strict_json(ran.out)["sensitivities"] is None
 
 
 def test_the_numbers_of_the_operator_are_among_them(tmp_path):
-    from tests.cli.test_cli_felt import HELD
+    from tests.cli.test_cli_felt import WITH_OPERATOR
 
     file = tmp_path / "held.toml"
-    file.write_text(HELD)
-    entries = of(found("sensitivity", file))
+    file.write_text(WITH_OPERATOR)
+    entries = by_path(document_of("sensitivity", file))
     value = entries["operator.arm_mass_kg"]["d_ln_stiffness_max_d_ln_value"]
-    moved = [found("chart", file, "--set", f"operator.arm_mass_kg={0.8 * share}")["stiffness_max_N_per_m"]
+    moved = [document_of("chart", file, "--set", f"operator.arm_mass_kg={0.8 * share}")["stiffness_max_N_per_m"]
              for share in (1.001, 0.999)]  # fmt: skip
     assert value == pytest.approx((moved[0] / moved[1] - 1.0) / 0.002, abs=1e-5)
     assert "operator.grasp_stiffness_N_per_m" in entries
@@ -94,20 +102,20 @@ def test_the_numbers_of_the_operator_are_among_them(tmp_path):
 
 def test_files(tmp_path):
     table, figure = tmp_path / "all.csv", tmp_path / "bars.svg"
-    found("sensitivity", TWO_MASS, "--output", table)
+    document_of("sensitivity", TWO_MASS, "--output", table)
     with table.open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert rows[0]["path"] == "loop.sampling_period_s"
     assert float(rows[0]["d_ln_stiffness_max_d_ln_value"]) == pytest.approx(-2.8504059866, abs=1e-8)
     assert rows[-1]["d_ln_stiffness_max_d_ln_value"] == ""
-    found("sensitivity", TWO_MASS, "--output", figure)
+    document_of("sensitivity", TWO_MASS, "--output", figure)
     assert "<svg" in figure.read_text()
     empty = tmp_path / "none.png"
-    assert zwidth("sensitivity", *UNSTABLE, "--output", empty).code == 1
+    assert run_command("sensitivity", *UNSTABLE, "--output", empty).code == 1
     assert empty.read_bytes().startswith(b"\x89PNG")
 
 
 def test_what_cannot_be_meant_is_refused(tmp_path):
-    assert refused("sensitivity", TWO_MASS, "--top", "0")
-    assert refused("sensitivity", TWO_MASS, "--output", tmp_path / "a.xyz")
-    assert refused("sensitivity", TWO_MASS, "--at", "0,0")
+    assert refusal_lines("sensitivity", TWO_MASS, "--top", "0")
+    assert refusal_lines("sensitivity", TWO_MASS, "--output", tmp_path / "a.xyz")
+    assert refusal_lines("sensitivity", TWO_MASS, "--at", "0,0")

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import zwidth as package
-from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found, strict, zwidth
-from zwidth.contact.limit_cycles import limit_cycles
-from zwidth.contact.response import SOURCES
-from zwidth.show.cli.simulate import Simulate
+from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of, parse_strict_json, run_command
+from zwidth.contact.harmonic_balance import limit_cycles
+from zwidth.contact.time_response import SOURCES
+from zwidth.show.cli.simulate import SimulateCommand
 
 WALL = ("--stiffness", 4000, "--damping", 10)
 SOFT = ("--stiffness", 500, "--damping", 1)
@@ -29,7 +29,7 @@ coulomb_N = 0.05
 [loop]
 sampling_period_s = 0.001
 """
-COUNTED = "[loop.encoder]\nresolution_m = 2e-5\nnoise_m = 1e-5\n"
+ENCODER = "[loop.encoder]\nresolution_m = 2e-5\nnoise_m = 1e-5\n"
 
 
 @pytest.fixture
@@ -39,13 +39,13 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def simulated(*words):
-    return found("simulate", *words)
+def simulate_document(*words):
+    return document_of("simulate", *words)
 
 
 def test_the_promised_keys_with_their_units():
-    document = simulated(TWO_MASS, *WALL)
-    assert set(Simulate.keys) <= set(document)
+    document = simulate_document(TWO_MASS, *WALL)
+    assert set(SimulateCommand.keys) <= set(document)
     assert "left_out" not in document
     count = len(document["time_s"])
     assert all(len(document[key]) == count for key in SERIES)
@@ -72,37 +72,39 @@ def test_random_walls_are_stable_and_unstable_as_the_eigenvalues_say_and_grow_so
     (tmp_path / "walls.csv").write_text(
         "stiffness_N_per_m,damping_Ns_per_m\n" + "".join(f"{K!r},{B!r}\n" for K, B in walls)
     )
-    points = found("check", *held, "--points", tmp_path / "walls.csv")["points"]
+    points = document_of("check", *held, "--points", tmp_path / "walls.csv")["points"]
     assert {point["verdict"] for point in points} == {"stable", "unstable"}
     compared = 0
     for (K, B), point in zip(walls, points, strict=True):
-        document = simulated(*held, "--stiffness", K, "--damping", B)
+        document = simulate_document(*held, "--stiffness", K, "--damping", B)
         assert document["stable"] is (point["verdict"] == "stable"), (K, B)
         rate = log(point["spectral_radius"])
         assert document["predicted_growth_per_sample"] == pytest.approx(rate, rel=1e-9)
         if abs(rate) < 0.01:  # hundreds of samples, in which the slowest motion is left alone
-            longer = simulated(*held, "--stiffness", K, "--damping", B, "--duration", 15 * loop.period / abs(rate))
+            longer = simulate_document(
+                *held, "--stiffness", K, "--damping", B, "--duration", 15 * loop.period / abs(rate)
+            )
             assert longer["growth_per_sample"] == pytest.approx(rate, rel=0.01)
             compared += 1
     assert compared
 
 
 def test_the_default_lasts_a_tenfold_change():
-    document = simulated(TWO_MASS, "--stiffness", 7500, "--damping", 10)
+    document = simulate_document(TWO_MASS, "--stiffness", 7500, "--damping", 10)
     tenfold = log(10.0) / document["predicted_growth_per_sample"]
     assert document["stable"] is False
     assert document["behaviour"] == "growing"
     assert document["duration_s"] / 0.00125 == pytest.approx(tenfold, abs=1.0)
-    edge = found("chart", TWO_MASS)
+    edge = document_of("chart", TWO_MASS)
     K, B = edge["stiffness_max_N_per_m"], edge["damping_at_stiffness_max_Ns_per_m"]
-    document = simulated(TWO_MASS, "--stiffness", K, "--damping", B, "--substeps", 1)
+    document = simulate_document(TWO_MASS, "--stiffness", K, "--damping", B, "--substeps", 1)
     assert document["duration_s"] == 60.0
     assert document["stable"] is None
 
 
 def test_a_wall_far_beyond_the_edge_grows_and_stays_a_number():
     for K in (20_000, 1e9):
-        document = simulated(TWO_MASS, "--stiffness", K, "--damping", 1)
+        document = simulate_document(TWO_MASS, "--stiffness", K, "--damping", 1)
         assert document["stable"] is False
         assert document["behaviour"] == "growing"
         assert document["amplitude_m"] is not None
@@ -115,8 +117,8 @@ def test_friction_gives_the_limit_cycle_of_harmonic_balance(folder):
     (predicted,) = limit_cycles(device.at().loop, *wall)
     assert not predicted.stable
     words = ("rubbing.toml", "--stiffness", wall[0], "--damping", wall[1], "--duration", 1.5, "--start-position")
-    assert simulated(*words, 0.96 * predicted.amplitude)["stable"] is True
-    assert simulated(*words, 1.04 * predicted.amplitude)["behaviour"] == "growing"
+    assert simulate_document(*words, 0.96 * predicted.amplitude)["stable"] is True
+    assert simulate_document(*words, 1.04 * predicted.amplitude)["behaviour"] == "growing"
 
 
 def test_a_force_limit_gives_the_limit_cycle_of_harmonic_balance(folder):
@@ -127,7 +129,7 @@ def test_a_force_limit_gives_the_limit_cycle_of_harmonic_balance(folder):
     (stable,) = [cycle for cycle in cycles if cycle.stable]
     assert stable.force_amplitude < 1.25 * 10.0
     words = ("limited.toml", "--stiffness", 900, "--damping", 0.2, "--duration", 5)
-    document = simulated(*words, "--start-position", 0.011)
+    document = simulate_document(*words, "--start-position", 0.011)
     assert (document["stable"], document["behaviour"]) == (False, "limit cycle")
     assert document["amplitude_m"] == pytest.approx(stable.amplitude, rel=0.03)
     assert document["dominant_frequency_Hz"] == pytest.approx(stable.frequency_Hz, rel=0.01)
@@ -136,7 +138,7 @@ def test_a_force_limit_gives_the_limit_cycle_of_harmonic_balance(folder):
 
 
 def test_a_one_sided_wall_starts_outside_and_is_pushed():
-    document = simulated(ONE_MASS, *SOFT, "--wall", "one-sided")
+    document = simulate_document(ONE_MASS, *SOFT, "--wall", "one-sided")
     start = {"position_m": -0.001, "velocity_m_per_s": 0.0, "off_the_path_m": None, "inside": False}
     assert document["start"] == start
     assert document["hand"]["push_N"] == 2.0
@@ -144,10 +146,10 @@ def test_a_one_sided_wall_starts_outside_and_is_pushed():
     assert document["predicted_growth_per_sample"] is None
     assert document["handle_m"][-1] == pytest.approx(2.0 / 500.0, rel=1e-6)
     assert max(f for f, x in zip(document["force_N"], document["position_m"], strict=True) if x <= 0.0) == 0.0
-    bouncing = simulated(ONE_MASS, "--stiffness", 2500, "--damping", 0, "--wall", "one-sided")
+    bouncing = simulate_document(ONE_MASS, "--stiffness", 2500, "--damping", 0, "--wall", "one-sided")
     assert (bouncing["stable"], bouncing["behaviour"]) == (False, "bouncing")
     assert 0.0 < bouncing["contact_share"] < 1.0
-    away = simulated(ONE_MASS, *SOFT, "--wall", "one-sided", "--push", 0, "--start-position", 0.001)
+    away = simulate_document(ONE_MASS, *SOFT, "--wall", "one-sided", "--push", 0, "--start-position", 0.001)
     assert (away["stable"], away["behaviour"]) == (False, "lost contact")
     assert away["start"]["inside"] is True
 
@@ -173,14 +175,14 @@ def test_an_option_changes_what_it_says(words, number, holds):
                    "--start-position", 0.004)  # fmt: skip
     if words[0] == "--passivity":
         touched = (ONE_MASS, "--stiffness", 2500, "--damping", 0, "--wall", "one-sided")
-    plain, new = number(simulated(*touched)), number(simulated(*touched, *words))
+    plain, new = number(simulate_document(*touched)), number(simulate_document(*touched, *words))
     assert holds(plain, new), (plain, new)
 
 
 def test_the_passivity_controller_is_held_against_the_same_without_it():
     words = (ONE_MASS, "--stiffness", 2500, "--damping", 0, "--wall", "one-sided")
-    told = simulated(*words, "--passivity", 5)
-    plain = simulated(*words)
+    told = simulate_document(*words, "--passivity", 5)
+    plain = simulate_document(*words)
     assert plain["passivity"] is None
     without = told["passivity"]["without"]
     assert (without["stable"], without["behaviour"]) == (plain["stable"], plain["behaviour"])
@@ -192,29 +194,29 @@ def test_the_passivity_controller_is_held_against_the_same_without_it():
 
 def test_an_arm_reaches_and_stiffens():
     words = (ONE_MASS, *SOFT, "--wall", "one-sided", "--operator", "thesis-arm")
-    alone, reaching = simulated(*words, "--push", 0), simulated(*words, "--reach", "0.02,0.1,0.4")
+    alone, reaching = simulate_document(*words, "--push", 0), simulate_document(*words, "--reach", "0.02,0.1,0.4")
     assert reaching["hand"]["reach"] == {"distance_m": 0.02, "start_s": 0.1, "duration_s": 0.4}
     assert reaching["hand"]["push_N"] == 0.0
     assert max(reaching["handle_m"]) > 0.002 > max(alone["handle_m"])
-    pushed = simulated(*words, "--push", 5)
-    stiff = simulated(*words, "--push", 5, "--reflex", "0.5,4000,40,0.02,0.02")
+    pushed = simulate_document(*words, "--push", 5)
+    stiff = simulate_document(*words, "--push", 5, "--reflex", "0.5,4000,40,0.02,0.02")
     assert stiff["hand"]["reflex"]["latency_s"] == 0.02
     assert stiff["handle_m"][:20] == pytest.approx(pushed["handle_m"][:20], rel=1e-9)
     assert abs(stiff["handle_m"][-1]) < 0.95 * abs(pushed["handle_m"][-1])
 
 
 def test_noise_is_seeded_and_substeps_are_taken(folder):
-    (folder / "counted.toml").write_text(RUBBING.replace("[loop]", "[loop]") + COUNTED)
+    (folder / "counted.toml").write_text(RUBBING.replace("[loop]", "[loop]") + ENCODER)
     words = ("counted.toml", *SOFT, "--duration", 0.2)
-    first, again, other = (simulated(*words, "--seed", seed)["position_m"] for seed in (1, 1, 2))
+    first, again, other = (simulate_document(*words, "--seed", seed)["position_m"] for seed in (1, 1, 2))
     assert first == again != other
-    coarse, fine = (simulated("rubbing.toml", *words[1:], "--substeps", n)["handle_m"] for n in (1, 40))
+    coarse, fine = (simulate_document("rubbing.toml", *words[1:], "--substeps", n)["handle_m"] for n in (1, 40))
     assert coarse != fine
     assert coarse == pytest.approx(fine, abs=2e-5)
 
 
 def test_another_environment_and_one_of_my_own(folder):
-    slot = simulated(ONE_MASS, "--environment", "slot", "--parameter", "width=0.004", "--damping", 1)
+    slot = simulate_document(ONE_MASS, "--environment", "slot", "--parameter", "width=0.004", "--damping", 1)
     assert slot["environment"] == "slot"
     assert slot["parameters"] == {"width": 0.004, "stiffness": 1000.0, "damping": 1.0, "no_pull": 0.0}
     (folder / "own.py").write_text(
@@ -223,28 +225,28 @@ def test_another_environment_and_one_of_my_own(folder):
         "def spring(position, velocity, time, period, parameters, memory):\n"
         "    return -parameters[0] * position\n"
     )
-    own = simulated(ONE_MASS, "--environment", "own.py:spring", "--parameter", "gain=200")
-    wall = simulated(ONE_MASS, "--stiffness", 200, "--damping", 0, "--duration", own["duration_asked_s"])
+    own = simulate_document(ONE_MASS, "--environment", "own.py:spring", "--parameter", "gain=200")
+    wall = simulate_document(ONE_MASS, "--stiffness", 200, "--damping", 0, "--duration", own["duration_asked_s"])
     assert own["handle_m"] == wall["handle_m"]
     assert own["wall_stiffness_N_per_m"] is None
 
 
 def test_a_nonlinear_estimate_is_simulated_though_it_has_no_chart():
     levant = ("--set", "loop.velocity.method=levant", "--set", "loop.velocity.acceleration_max_m_per_s2=30")
-    document = simulated(ONE_MASS, *SOFT, *levant)
+    document = simulate_document(ONE_MASS, *SOFT, *levant)
     assert document["predicted_growth_per_sample"] is None
     assert document["duration_s"] == 2.0
 
 
 def test_a_device_that_goes_with_a_tremor_is_not_called_unstable():
-    document = simulated(TWO_MASS, *WALL, "--tremor", "1,10")
+    document = simulate_document(TWO_MASS, *WALL, "--tremor", "1,10")
     assert (document["stable"], document["behaviour"]) == (None, "forced")
     assert document["dominant_frequency_Hz"] == pytest.approx(10.0, abs=0.05)
 
 
 def test_the_table_holds_what_the_object_does(tmp_path):
     file = tmp_path / "motion.csv"
-    document = simulated(TWO_MASS, *WALL, "--output", file)
+    document = simulate_document(TWO_MASS, *WALL, "--output", file)
     with file.open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert list(rows[0]) == [*SERIES, *(f"{name}_J" for name in document["ledger_J"])]
@@ -252,29 +254,29 @@ def test_the_table_holds_what_the_object_does(tmp_path):
         assert [float(row[key]) for row in rows] == document[key]
     assert {name: float(rows[-1][f"{name}_J"]) for name in document["ledger_J"]} == document["ledger_J"]
     told = tmp_path / "motion.json"
-    simulated(TWO_MASS, *WALL, "--output", told)
-    assert strict(told.read_text()) | {"file": str(file)} == document
+    simulate_document(TWO_MASS, *WALL, "--output", told)
+    assert parse_strict_json(told.read_text()) | {"file": str(file)} == document
 
 
 @pytest.mark.parametrize("words", [WALL, (*WALL, "--duration", 10.0)], ids=["short", "long"])
 def test_a_figure_has_its_four_panels(tmp_path, words):
     file = tmp_path / "motion.svg"
-    simulated(TWO_MASS, *words, "--output", file)
+    simulate_document(TWO_MASS, *words, "--output", file)
     assert "<svg" in file.read_text()
 
 
 def test_the_sound_is_told_and_silence_is_no_answer(tmp_path):
     file = tmp_path / "motion.wav"
-    document = simulated(TWO_MASS, *WALL, "--output", file)
+    document = simulate_document(TWO_MASS, *WALL, "--output", file)
     sound = document["sound"]
     assert sound["speed"] == 8.0
     assert sound["frequency_Hz"] == pytest.approx(8.0 * document["dominant_frequency_Hz"], rel=0.05)
     assert sound["seconds"] >= 1.0
     assert file.read_bytes()[:4] == b"RIFF"
-    out = zwidth("simulate", TWO_MASS, *WALL, "--output", file).out
+    out = run_command("simulate", TWO_MASS, *WALL, "--output", file).out
     assert re.search(r"8 times faster: 17\.\d+ Hz sounds as 13\d\.\d Hz; the run \d+ times over", out)
     file.unlink()
-    ran = zwidth("simulate", TWO_MASS, *WALL, "--start-position", 0, "--json", "--output", file)
+    ran = run_command("simulate", TWO_MASS, *WALL, "--start-position", 0, "--json", "--output", file)
     assert ran.code == 1
     assert "nothing vibrates" in ran.document["reason"]
     assert "file" not in ran.document
@@ -282,16 +284,16 @@ def test_the_sound_is_told_and_silence_is_no_answer(tmp_path):
 
 
 def test_people_read_verdict_growth_energies_and_remarks(folder):
-    out = zwidth("simulate", TWO_MASS, *WALL).out
+    out = run_command("simulate", TWO_MASS, *WALL).out
     assert "stable: the vibration dies away" in out
     assert "by the eigenvalues -0.01122" in out
     assert "stored since the start" in out
-    out = zwidth("simulate", ONE_MASS, *SOFT, "--wall", "one-sided", "--start-position", 0.001).out
+    out = run_command("simulate", ONE_MASS, *SOFT, "--wall", "one-sided", "--start-position", 0.001).out
     assert "starts inside the wall" in out
-    out = zwidth("simulate", "rubbing.toml", *SOFT, "--set", "loop.saturation.force_N=0.1").out
+    out = run_command("simulate", "rubbing.toml", *SOFT, "--set", "loop.saturation.force_N=0.1").out
     assert "at the force limit" in out
     assert "leaves out" not in out
-    out = zwidth("simulate", ONE_MASS, "--stiffness", 200_000, "--damping", 1, "--duration", 1).out
+    out = run_command("simulate", ONE_MASS, "--stiffness", 200_000, "--damping", 1, "--duration", 1).out
     assert "given up" in out
-    out = zwidth("simulate", TWO_MASS, *WALL, "--tremor", "1,10").out
+    out = run_command("simulate", TWO_MASS, *WALL, "--tremor", "1,10").out
     assert "leave --tremor out" in out

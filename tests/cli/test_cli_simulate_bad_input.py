@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.cli.cli_run import MECHANISM, TWO_MASS, refused, zwidth
+from tests.cli.command_runner import MECHANISM, TWO_MASS, refusal_lines, run_command
 
 WALL = ("--stiffness", 4000, "--damping", 10)
 
@@ -23,11 +23,11 @@ def test_what_has_no_model_has_no_answer(folder):
     paddle = {f: 1.0 / ((1.0 + 0.05 * 2j * np.pi * f) * 2j * np.pi * f) for f in range(1, 401)}
     rows = [f"{f},{value.real},{value.imag}" for f, value in paddle.items()]
     (folder / "sweep.csv").write_text("\n".join(["frequency_Hz,real_m_per_N,imag_m_per_N", *rows]))
-    ran = zwidth("simulate", "swept.toml", *WALL, "--json")
+    ran = run_command("simulate", "swept.toml", *WALL, "--json")
     assert ran.code == 1
     assert ran.document["stable"] is None
     assert "no masses" in ran.document["reason"]
-    ran = zwidth("simulate", MECHANISM, *WALL, "--at", "5,5", "--json")
+    ran = run_command("simulate", MECHANISM, *WALL, "--at", "5,5", "--json")
     assert (ran.code, ran.document["time_s"]) == (1, None)
 
 
@@ -69,7 +69,7 @@ BAD = [
 
 @pytest.mark.parametrize(("words", "says"), BAD, ids=[says for _, says in BAD])
 def test_a_bad_question_is_one_line(words, says):
-    (line,) = refused("simulate", TWO_MASS, *words)
+    (line,) = refusal_lines("simulate", TWO_MASS, *words)
     assert says in line
 
 
@@ -78,7 +78,7 @@ def test_a_bad_file_of_my_own_is_one_line(folder, name):
     text, says = OWN[name]
     if text is not None:
         (folder / name.partition(":")[0]).write_text(text)
-    (line,) = refused("simulate", TWO_MASS, "--environment", name)
+    (line,) = refusal_lines("simulate", TWO_MASS, "--environment", name)
     assert line.startswith("--environment: ")
     assert says in line
 
@@ -89,14 +89,14 @@ def test_a_law_that_gives_no_number_is_no_verdict(folder):
         "def silent(position, velocity, time, period, parameters, memory):\n"
         "    return math.nan if time > 0.01 else -1000.0 * position\n"
     )
-    ran = zwidth("simulate", TWO_MASS, "--environment", "law.py:silent", "--json")
+    ran = run_command("simulate", TWO_MASS, "--environment", "law.py:silent", "--json")
     assert (ran.code, ran.document["stable"], ran.document["behaviour"]) == (1, None, None)
     assert "silent gave no finite force at 0.01125 s" in ran.document["reason"]
 
 
 @pytest.mark.parametrize("option", ["--wall-position", "--start-position"])
 def test_a_place_out_of_the_workspace_is_one_line(option):
-    (line,) = refused("simulate", MECHANISM, *WALL, option, 0.5)
+    (line,) = refusal_lines("simulate", MECHANISM, *WALL, option, 0.5)
     assert line.startswith(f"{option}: ")
     assert "out of the workspace: the handle cannot reach (0, 0.75, 0) m" in line
 
@@ -108,12 +108,14 @@ def test_an_interruption_leaves_nothing_half_written(folder, monkeypatch):
     before = set(folder.iterdir())
     monkeypatch.setattr("zwidth.show.output.os.replace", stopped)
     for name in ("motion.wav", "motion.csv", "motion.png"):
-        ran = zwidth("simulate", TWO_MASS, *WALL, "--output", name)
+        ran = run_command("simulate", TWO_MASS, *WALL, "--output", name)
         assert (ran.code, ran.out, len(ran.lines)) == (130, "", 1)
         assert set(folder.iterdir()) == before
 
 
 def test_a_linear_run_outlasts_the_ramp():
-    ran = zwidth("simulate", TWO_MASS, "--stiffness", 4000, "--damping", 10, "--push", 1, "--ramp", 2, "--json")
+    ran = run_command(
+        "simulate", TWO_MASS, "--stiffness", 4000, "--damping", 10, "--push", 1, "--ramp", 2, "--json"
+    )
     assert ran.document["duration_s"] > 2.0
     assert ran.document["penetration_m"][-1] == pytest.approx(1.0 / 4000, rel=0.2)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tests.cli.cli_run import found, refused, strict, zwidth
+from tests.cli.command_runner import document_of, parse_strict_json, refusal_lines, run_command
 from tests.interruption import stopped_by_ctrl_c
 from zwidth.study.store import Store
 from zwidth.study.study_file import read_study
@@ -65,13 +65,13 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_designs_values_and_status(folder):
-    document = found("sweep", "study.toml")
+    document = document_of("sweep", "study.toml")
     assert len(document["designs"]) == len(document["values"]) == len(document["status"]) == 10
     assert document["designs"][3] == {LENGTH: 0.06, OTHER: 0.06, "assembly": "elbows-in"}
     assert document["status"][0] == {"rigid_mass": "out of reach", "isotropy": "out of reach"}
     assert document["values"][0] == {"rigid_mass": None, "isotropy": None}
     assert document["status"][9] == {"rigid_mass": "ok", "isotropy": "ok"}
-    shown = found(
+    shown = document_of(
         "show", "five-bar", "--set", f"{LENGTH}=0.18", "--set", f"{OTHER}=0.18", "--assembly", "elbows-in"
     )
     assert document["values"][9]["rigid_mass"] == pytest.approx(shown["rigid_mass_kg"], rel=1e-12)
@@ -81,13 +81,13 @@ def test_designs_values_and_status(folder):
 
 
 def test_what_people_read(folder):
-    ran = zwidth("sweep", "study.toml")
+    ran = run_command("sweep", "study.toml")
     assert (ran.code, ran.err) == (0, "")
     assert "5 x 2 designs over links.upper-right.length_m, assembly" in ran.out
     assert ran.out.count("out of reach") == 4
     text = STUDY.replace("count = 5", "count = 21") + "[optimise]\nbudget = 3\n"
     (folder / "study.toml").write_text(text)
-    ran = zwidth("sweep", "study.toml")
+    ran = run_command("sweep", "study.toml")
     assert "[optimise] is left aside" in ran.out
     assert re.search(r"lowest +1\.\d+ at links\.upper-right\.length_m = 0\.18, assembly = elbows-", ran.out)
     assert re.search(r"designs +\d+ ok, \d+ out of reach", ran.out)
@@ -99,19 +99,19 @@ def test_reasons_are_told_once_and_not_all_of_them(folder):
     )
     text = text.replace(f'tie = ["{OTHER}"]', "").replace("count = 5", "count = 11")
     (folder / "study.toml").write_text(text)
-    ran = zwidth("sweep", "study.toml")
+    ran = run_command("sweep", "study.toml")
     reasons = [line for line in ran.out.splitlines() if "designs failed" in line]
     assert len(reasons) == 6
     assert reasons[0].startswith(
         "2 designs failed: mechanism.links.distal-left.mass_kg: must be at least 0, got -0.9"
     )
     assert "and 3 more reasons; --json or --output holds them" in ran.out
-    assert len(found("sweep", "study.toml")["notes"]) == 18
+    assert len(document_of("sweep", "study.toml")["notes"]) == 18
 
 
 @pytest.mark.parametrize("kind", ["csv", "json", "nc", "mat", "zarr", "svg"])
 def test_files(folder, kind):
-    document = found("sweep", "study.toml", "--output", f"designs.{kind}")
+    document = document_of("sweep", "study.toml", "--output", f"designs.{kind}")
     path = folder / f"designs.{kind}"
     assert sorted(p.name for p in folder.iterdir()) == sorted(["slow.py", "study.toml", path.name])
     masses = np.array([value["rigid_mass"] for value in document["values"]], dtype=float).reshape(5, 2)
@@ -121,7 +121,7 @@ def test_files(folder, kind):
         assert {row["isotropy_status"] for row in rows} == {"ok", "out of reach"}
         assert rows[3][OTHER] == "0.06"
     elif kind == "json":
-        assert strict(path.read_text()) == document
+        assert parse_strict_json(path.read_text()) == document
     elif kind in ("nc", "zarr"):
         options = {"engine": "scipy"} if kind == "nc" else {"engine": "zarr", "consolidated": True}
         with xr.open_dataset(path, **options) as dataset:
@@ -141,9 +141,9 @@ def test_files(folder, kind):
 
 def test_a_study_in_which_nothing_has_a_value(folder):
     (folder / "study.toml").write_text(STUDY.replace("range = [0.02, 0.18]", "range = [0.01, 0.02]"))
-    ran = zwidth("sweep", "study.toml", "--json")
+    ran = run_command("sweep", "study.toml", "--json")
     assert ran.code == 1
-    document = strict(ran.out)
+    document = parse_strict_json(ran.out)
     assert document["reason"] == "no design has a value: out of reach"
     assert len(document["designs"]) == 10
 
@@ -151,7 +151,7 @@ def test_a_study_in_which_nothing_has_a_value(folder):
 def test_everything_wrong_is_told_at_once(folder):
     wrong = STUDY.replace("rigid_mass", "rigd_mass").replace(OTHER, "links.upper-left.lenght_m")
     (folder / "study.toml").write_text(wrong)
-    assert [line.split(";")[0] for line in refused("sweep", "study.toml")] == [
+    assert [line.split(";")[0] for line in refusal_lines("sweep", "study.toml")] == [
         "study.toml: measures.0: no measure is named 'rigd_mass'",
         "study.toml: axis.0.tie.0: 'links.upper-left.lenght_m' is no key of a device file",
     ]
@@ -183,28 +183,28 @@ def test_what_is_refused(folder, words, said):
     if words[-1] == "no/where":
         (folder / "no").write_text("a file")
         before[folder / "no"] = b"a file"
-    (line,) = refused("sweep", *words)
+    (line,) = refusal_lines("sweep", *words)
     assert said in line
     assert before == {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
 
 
-def kept_in(path):
-    return list(Store(path, sweep_job(read_study("study.toml"))).kept())
+def stored_cells(path):
+    return list(Store(path, sweep_job(read_study("study.toml"))).stored_batches())
 
 
 def test_an_interrupted_run_goes_on_where_it_was(folder):
     """Ctrl-C once three batches are on disk."""
     (folder / "study.toml").write_text(MANY.format(count=200))
     words = ["sweep", "study.toml", "--output", "designs.csv", "--workers", "2", "--json"]
-    code, out, err = stopped_by_ctrl_c(words, "zwidth.study.store:Store.keep", 3, folder)
+    code, out, err = stopped_by_ctrl_c(words, "zwidth.study.store:Store.write_batch", 3, folder)
     assert (code, out) == (130, "")
     assert "designs.csv.progress keeps what is done; the same command goes on from there" in err
     assert "Traceback" not in err
-    batches = kept_in(folder / "designs.csv.progress")
+    batches = stored_cells(folder / "designs.csv.progress")
     assert len(batches) == 3
     kept = sum(len(cells.values) for _, cells in batches)
     before = (folder / "asked").stat().st_size
-    assert zwidth(*words).code == 0
+    assert run_command(*words).code == 0
     assert (folder / "asked").stat().st_size - before == 200 - kept + 1, "and one to see whether it can be asked"
     assert not (folder / "designs.csv.progress").exists(), "what it kept is written"
     rows = list(csv.DictReader((folder / "designs.csv").read_text().splitlines()))
@@ -215,8 +215,8 @@ def test_a_stop_within_compiled_code_is_a_stop(folder, monkeypatch):
     def stopped(*_):
         raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
 
-    monkeypatch.setattr("zwidth.study.executor._computed", stopped)
-    ran = zwidth("sweep", "study.toml", "--output", "out.csv")
+    monkeypatch.setattr("zwidth.study.executor._compute_ranges", stopped)
+    ran = run_command("sweep", "study.toml", "--output", "out.csv")
     assert ran.code == 130
     assert "out.csv.progress keeps what is done; the same command goes on from there" in ran.err
     assert not (folder / "out.csv").exists()
@@ -224,15 +224,15 @@ def test_a_stop_within_compiled_code_is_a_stop(folder, monkeypatch):
 
 def test_a_folder_of_the_user_s_is_kept_and_another_study_begins_anew(folder):
     (folder / "study.toml").write_text(MANY.format(count=4))
-    first = found("sweep", "study.toml", "--resume", "cells")
+    first = document_of("sweep", "study.toml", "--resume", "cells")
     values = folder / "cells" / "values" / "c" / "3" / "0"
     written = values.stat().st_mtime_ns
-    assert found("sweep", "study.toml", "--resume", "cells") == first
+    assert document_of("sweep", "study.toml", "--resume", "cells") == first
     assert values.stat().st_mtime_ns == written, "nothing is computed again"
     (folder / "study.toml").write_text(MANY.format(count=5))
-    assert len(found("sweep", "study.toml", "--resume", "cells")["values"]) == 5
+    assert len(document_of("sweep", "study.toml", "--resume", "cells")["values"]) == 5
     (folder / "slow.py").write_text(SLOW.replace("sampling_period", "sampling_period + 1.0"))
-    assert found("sweep", "study.toml", "--resume", "cells")["values"][0]["slow"] == 1.001
+    assert document_of("sweep", "study.toml", "--resume", "cells")["values"][0]["slow"] == 1.001
 
 
 def test_a_lost_process_is_one_clear_line(folder):
@@ -273,7 +273,7 @@ def arms(folder):
 
 
 def test_the_page_s_study_prints_what_the_page_says(arms):
-    ran = zwidth("sweep", "arms.toml")
+    ran = run_command("sweep", "arms.toml")
     assert (ran.code, ran.err) == (0, "")
     (said,) = blocks("")
     assert ran.out == said
@@ -289,12 +289,12 @@ def test_the_page_s_python_runs(arms):
 
 
 def test_the_page_names_every_key():
-    from zwidth.study.axes import CIRCUMSTANCES
-    from zwidth.study.column import OVER
-    from zwidth.study.study_schema import AxisSection, StudyFile, TieSection, WorkspaceSection
+    from zwidth.study.column import STATISTICS
+    from zwidth.study.sampling import CIRCUMSTANCES
+    from zwidth.study.study_schema import AxisSection, StudyFile, StudyWorkspaceSection, TieSection
 
-    for section in (StudyFile, AxisSection, TieSection, WorkspaceSection):
+    for section in (StudyFile, AxisSection, TieSection, StudyWorkspaceSection):
         for key in section.model_fields:
             assert re.search(rf"\b{key}\b", PAGE), key
     assert all(f"`{key}`" in PAGE for key in CIRCUMSTANCES)
-    assert all(f"`{key}(" in PAGE for key in OVER)
+    assert all(f"`{key}(" in PAGE for key in STATISTICS)

@@ -58,7 +58,7 @@ def bounds(loop):
     return {bound.name: bound for bound in found}
 
 
-def broken(loop):
+def violated_assumptions(loop):
     return {name: set(bound.violated) for name, bound in bounds(loop).items()}
 
 
@@ -125,12 +125,12 @@ def test_where_all_is_met_approximate_means_near():
 
 
 def test_a_rigid_mass_meets_all_that_is_said_of_it():
-    found = broken(one_mass(0.3, 0.001))
+    found = violated_assumptions(one_mass(0.3, 0.001))
     assert all(
         found[name] == set()
         for name in (RIGID, FRICTION, SOFT, DELAYED, ONE_MODE, LINEAR, HAND, SPRINGS, PASSIVE, PASSIVE_LOOP)
     )
-    assert found[LATE] == {assumptions.ONE_LATE}
+    assert found[LATE] == {assumptions.UNIT_DELAY}
     assert found[SPRUNG] == {assumptions.SPRUNG}
 
 
@@ -146,7 +146,10 @@ def test_a_spring_to_the_ground_is_seen():
 
 
 def test_friction_is_seen():
-    light, heavy = broken(one_mass(0.3, 0.001, b=0.1)), broken(one_mass(0.3, 0.001, b=100.0))
+    light, heavy = (
+        violated_assumptions(one_mass(0.3, 0.001, b=0.1)),
+        violated_assumptions(one_mass(0.3, 0.001, b=100.0)),
+    )
     assert light[RIGID] == {assumptions.UNDAMPED}
     assert light[LINEAR] == light[FRICTION] == set()
     assert heavy[LINEAR] == heavy[HAND] == {assumptions.LIGHT}
@@ -176,24 +179,24 @@ def test_friction_that_drags_another_motion_along_is_no_single_mode():
     between = np.array([[1.0, -1.0], [-1.0, 1.0]])
     both = np.array([0.5, 0.5])
     plant = Plant(np.eye(2), np.diag([1.0, 0.0]), 1e4 * between, both, both)
-    found = broken(Loop(plant, Controller(0.001)))
+    found = violated_assumptions(Loop(plant, Controller(0.001)))
     assert assumptions.ONE_MODE in found[ONE_MODE]
     assert assumptions.RIGID in found[FRICTION]
     plant = Plant(np.eye(2), np.diag([1.0, 1.0]), 1e4 * between, both, both)
-    assert broken(Loop(plant, Controller(0.001)))[FRICTION] == set()
+    assert violated_assumptions(Loop(plant, Controller(0.001)))[FRICTION] == set()
 
 
 def test_delay_and_filter_are_seen():
-    late = broken(one_mass(0.3, 0.001, delay=0.4))
-    assert late[RIGID] == {assumptions.AT_ONCE}
-    assert late[LATE] == {assumptions.ONE_LATE}
+    late = violated_assumptions(one_mass(0.3, 0.001, delay=0.4))
+    assert late[RIGID] == {assumptions.UNDELAYED}
+    assert late[LATE] == {assumptions.UNIT_DELAY}
     assert late[LINEAR] == set()
-    assert late[PASSIVE_LOOP] == late[DELAYED] - {assumptions.UNDAMPED} == late[PLANE] == {assumptions.WHOLE}
-    filtered = broken(one_mass(0.3, 0.001, velocity_filter=Butterworth(2, 20.0)))
-    assert filtered[RIGID] == filtered[PASSIVE] == filtered[LINEAR] == {assumptions.UNFILTERED}
+    assert late[PASSIVE_LOOP] == late[DELAYED] - {assumptions.UNDAMPED} == late[PLANE] == {assumptions.WHOLE_DELAY}
+    filtered = violated_assumptions(one_mass(0.3, 0.001, velocity_filter=Butterworth(2, 20.0)))
+    assert filtered[RIGID] == filtered[PASSIVE] == filtered[LINEAR] == {assumptions.VELOCITY_UNFILTERED}
     assert filtered[PASSIVE_LOOP] == filtered[ENCODER] == filtered[PLANE] == set()
     assert filtered[FILTERED] == {assumptions.FIRST_ORDER}
-    smooth = broken(one_mass(0.3, 0.001, velocity_filter=FirstOrder(0.002)))
+    smooth = violated_assumptions(one_mass(0.3, 0.001, velocity_filter=FirstOrder(0.002)))
     assert smooth[FILTERED] == set()
 
 
@@ -202,21 +205,23 @@ def with_controller(**more):
 
 
 def test_other_estimates_of_the_velocity_are_seen():
-    other = broken(with_controller(velocity=WindowedDifference(3)))
+    other = violated_assumptions(with_controller(velocity=WindowedDifference(3)))
     assert assumptions.DIFFERENCE in other[FRICTION] & other[PASSIVE] & other[LINEAR] & other[FILTERED]
     assert other[PASSIVE_LOOP] == other[ENCODER] == other[PLANE] == set()
     for same in (WindowedDifference(1), LeastSquaresSlope(2), AlphaBeta(1.0, 1.0)):
-        assert broken(with_controller(velocity=same))[FRICTION] == set()
-    filtered = broken(with_controller(velocity=WindowedDifference(1), velocity_filter=FirstOrder(0.01)))
+        assert violated_assumptions(with_controller(velocity=same))[FRICTION] == set()
+    filtered = violated_assumptions(
+        with_controller(velocity=WindowedDifference(1), velocity_filter=FirstOrder(0.01))
+    )
     assert filtered[FILTERED] == set()
 
 
 def test_a_filter_of_the_force_and_a_lag_of_the_actuator_are_seen():
     for more, sentence in (
-        ({"force_filter": FirstOrder(0.001)}, assumptions.AS_COMPUTED),
+        ({"force_filter": FirstOrder(0.001)}, assumptions.FORCE_UNFILTERED),
         ({"actuator_time_constant": 0.001}, assumptions.PROMPT),
     ):
-        found = broken(with_controller(**more))
+        found = violated_assumptions(with_controller(**more))
         spared = {PASSIVE_LOOP} if "force_filter" in more else set()
         assert {name for name in NAMES if sentence not in found[name]} == spared
 
@@ -242,7 +247,7 @@ def test_electrical_damping_of_what_no_wall_moves_does_not_count():
     aside = Plant(
         np.eye(2), np.zeros((2, 2)), np.diag([0.0, 1e4]), *2 * (np.array([1.0, 0.0]),), lagged_dampers=lagged
     )
-    assert broken(Loop(aside, Controller(0.001)))[RIGID] == set()
+    assert violated_assumptions(Loop(aside, Controller(0.001)))[RIGID] == set()
 
 
 @pytest.mark.parametrize("grasp", [None, 10000.0], ids=["rigid grasp", "elastic grasp"])

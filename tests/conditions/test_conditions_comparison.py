@@ -27,7 +27,7 @@ def point(friction=None, loop=None, **plant):
 
 
 @pytest.fixture(scope="module")
-def found():
+def bounds_comparison():
     return compare_bounds(point(FRICTION, ENCODER))
 
 
@@ -35,16 +35,16 @@ def by_name(comparison):
     return {bound.name: bound for bound in comparison.bounds}
 
 
-def test_left_out_the_damping_is_that_of_the_stiffest_wall(found):
+def test_left_out_the_damping_is_that_of_the_stiffest_wall(bounds_comparison):
     chart = stability_chart(point().loop, decay=False)
-    assert found.damping == found.damping_at_largest == chart.damping_at_stiffness_max
-    assert found.exact == found.largest == chart.stiffness_max
+    assert bounds_comparison.damping == bounds_comparison.damping_at_largest == chart.damping_at_stiffness_max
+    assert bounds_comparison.exact == bounds_comparison.largest == chart.stiffness_max
 
 
-def test_a_condition_that_holds_exactly_has_the_ratio_one(found):
-    held = by_name(found)["rigid mass with friction"]
+def test_a_condition_that_holds_exactly_has_the_ratio_one(bounds_comparison):
+    held = by_name(bounds_comparison)["rigid mass with friction"]
     assert held.holds
-    assert found.ratio(held) == pytest.approx(1.0, rel=1e-9)
+    assert bounds_comparison.ratio(held) == pytest.approx(1.0, rel=1e-9)
     softer = compare_bounds(point(), damping=5.0)
     assert softer.stiffness_max(held) == pytest.approx(softer.exact, rel=1e-9)
     assert softer.exact < softer.largest
@@ -96,8 +96,8 @@ def test_a_chart_that_is_undecided_leaves_the_conditions(monkeypatch):
     assert "undecided" in repr(found)
 
 
-def test_keys_and_columns(found):
-    document, table = found.document(), found.table()
+def test_keys_and_columns(bounds_comparison):
+    document, table = bounds_comparison.document(), bounds_comparison.table()
     assert document.keys() == {
         "bounds",
         "damping_Ns_per_m",
@@ -106,21 +106,21 @@ def test_keys_and_columns(found):
         "exact_damping_at_largest_Ns_per_m",
         "decided",
     }
-    assert len(document["bounds"]) == len(found.bounds)
-    assert {len(column) for column in table.values()} == {len(found.bounds)}
+    assert len(document["bounds"]) == len(bounds_comparison.bounds)
+    assert {len(column) for column in table.values()} == {len(bounds_comparison.bounds)}
     assert table.keys() == document["bounds"][0].keys() - {"assumptions", "taken"}
-    broken = next(n for n, bound in enumerate(found.bounds) if len(bound.violated) > 1)
-    assert table["violated"][broken] == " ".join(found.bounds[broken].violated)
-    there = [found.stiffness_max(bound) for bound in found.bounds]
+    broken = next(n for n, bound in enumerate(bounds_comparison.bounds) if len(bound.violated) > 1)
+    assert table["violated"][broken] == " ".join(bounds_comparison.bounds[broken].violated)
+    there = [bounds_comparison.stiffness_max(bound) for bound in bounds_comparison.bounds]
     assert table["stiffness_max_N_per_m"] == pytest.approx(there, rel=0.0, abs=0.0, nan_ok=True)
 
 
-def test_the_repr_has_the_main_numbers_in_few_lines(found):
-    lines = repr(found).splitlines()
+def test_the_repr_has_the_main_numbers_in_few_lines(bounds_comparison):
+    lines = repr(bounds_comparison).splitlines()
     assert len(lines) <= 5
     assert max(map(len, lines)) < 100
-    assert f"{found.largest:.6g} N/m" in lines[0]
-    assert f"{len(found.bounds)} conditions" in lines[1]
+    assert f"{bounds_comparison.largest:.6g} N/m" in lines[0]
+    assert f"{len(bounds_comparison.bounds)} conditions" in lines[1]
 
 
 @pytest.mark.parametrize("damping", [float("nan"), float("inf"), "2"])

@@ -9,8 +9,8 @@ import pytest
 from conditions.conditions_cases import one_mass
 
 from zwidth.chart.chart import stability_chart
-from zwidth.conditions import assumptions, compare, gil, thesis_delays
-from zwidth.conditions.exact import stiffness_limit
+from zwidth.conditions import assumptions, compare, gil, thesis_whole_delay
+from zwidth.conditions.comparison import exact_stiffness_limit
 
 PAGE = (Path(__file__).parents[2] / "docs" / "conditions.md").read_text(encoding="utf-8")
 BOUNDS = compare(one_mass(1.0, 0.001, b=0.1))
@@ -63,7 +63,7 @@ def test_every_number_taken_is_explained():
 @pytest.mark.parametrize("row", table("| l |"), ids=lambda row: f"l = {row[0]}")
 def test_the_largest_walls_by_delay(row):
     late = int(row[0])
-    found = [*thesis_delays.largest(1.0, 1.0, late), thesis_delays.largest_damping(1.0, 1.0, late)]
+    found = [*thesis_whole_delay.largest(1.0, 1.0, late), thesis_whole_delay.largest_damping(1.0, 1.0, late)]
     assert row[1:] == [f"{float(value):.6f}" for value in found]
     chart = stability_chart(one_mass(1.0, 1.0, delay=float(late)), decay=False)
     exact = (chart.stiffness_max, chart.damping_at_stiffness_max, chart.damping_max)
@@ -74,7 +74,7 @@ def test_the_largest_walls_by_delay(row):
 def test_the_linear_condition_beside_the_truth(row):
     m, b, T, B, late, exact, linear = map(float, row)
     chart = stability_chart(one_mass(m, T, b=b, delay=late), decay=False)
-    assert stiffness_limit(chart, B) == pytest.approx(exact, abs=6e-4)
+    assert exact_stiffness_limit(chart, B) == pytest.approx(exact, abs=6e-4)
     assert float(gil.stiffness_limit(B, b, T, late * T)) == pytest.approx(linear, abs=6e-4)
 
 

@@ -11,7 +11,7 @@ from zwidth.conditions import abbott_okamura, colgate_schenkel, compare, diolait
 ENCODER, PLANE = "passive spring under an encoder", "passive spring with its delay, under an encoder"
 
 
-def told(loop, **known):
+def conditions_by_name(loop, **known):
     return {bound.name: bound for bound in compare(loop, **known)}
 
 
@@ -41,32 +41,35 @@ def test_the_plane_and_its_passive_quadrant():
     b, f, T, step = 0.5, 0.02, 0.001, 2e-5
     edge = float(abbott_okamura.stiffness_limit(b, f, T, step))
     K = edge * np.array([0.99, 1.01])
-    assert diolaiti.is_passive(*diolaiti.plane(K, b, f, T, step)).tolist() == [True, False]
-    beta, sigma = diolaiti.plane(1000.0, b, f, T, step)
+    assert diolaiti.is_passive(*diolaiti.dimensionless_friction(K, b, f, T, step)).tolist() == [True, False]
+    beta, sigma = diolaiti.dimensionless_friction(1000.0, b, f, T, step)
     assert (float(beta), float(sigma)) == pytest.approx((0.5, 1.0))
     late = float(diolaiti.viscous_stiffness_limit(b, T, 2))
     K = late * np.array([0.99, 1.01])
-    assert diolaiti.is_passive(*diolaiti.plane(K, b, f, T, step), delay_samples=2).tolist() == [True, False]
+    assert diolaiti.is_passive(*diolaiti.dimensionless_friction(K, b, f, T, step), delay_samples=2).tolist() == [
+        True,
+        False,
+    ]
 
 
 def test_missing_numbers_are_named():
-    found = told(one_mass(0.3, 0.001, b=0.5))
+    found = conditions_by_name(one_mass(0.3, 0.001, b=0.5))
     for name in (ENCODER, PLANE):
         assert found[name].lacking == ("coulomb_friction_N", "resolution_m")
         assert not found[name].holds
         assert np.isnan(found[name].stiffness_max)
         assert np.all(np.isnan(found[name].stiffness_max_at([0.0, 1.0])))
-    half = told(one_mass(0.3, 0.001, b=0.5), resolution=1e-5)
+    half = conditions_by_name(one_mass(0.3, 0.001, b=0.5), resolution=1e-5)
     assert half[ENCODER].lacking == ("coulomb_friction_N",)
 
 
 def test_given_numbers_are_used():
-    found = told(one_mass(0.3, 0.001, b=0.5, delay=1.0), coulomb_friction=0.001, resolution=1e-5)
+    found = conditions_by_name(one_mass(0.3, 0.001, b=0.5, delay=1.0), coulomb_friction=0.001, resolution=1e-5)
     assert found[ENCODER].stiffness_max == pytest.approx(200.0)
     assert found[PLANE].stiffness_max == pytest.approx(200.0)
     assert found[ENCODER].damping_at_stiffness_max == 0.0
     assert np.isnan(found[ENCODER].stiffness_max_at(1.0))
-    ample = told(one_mass(0.3, 0.001, b=0.5, delay=1.0), coulomb_friction=0.1, resolution=1e-5)
+    ample = conditions_by_name(one_mass(0.3, 0.001, b=0.5, delay=1.0), coulomb_friction=0.1, resolution=1e-5)
     assert ample[ENCODER].stiffness_max == pytest.approx(1000.0)
     assert ample[PLANE].stiffness_max == pytest.approx(500.0 / 1.5)
     assert ample[PLANE].holds
@@ -74,7 +77,7 @@ def test_given_numbers_are_used():
 
 
 def test_an_encoder_without_steps():
-    found = told(one_mass(0.3, 0.001, b=0.5), coulomb_friction=0.0, resolution=0.0)
+    found = conditions_by_name(one_mass(0.3, 0.001, b=0.5), coulomb_friction=0.0, resolution=0.0)
     assert found[ENCODER].stiffness_max == found[PLANE].stiffness_max == pytest.approx(1000.0)
 
 

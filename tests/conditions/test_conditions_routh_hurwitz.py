@@ -27,7 +27,7 @@ def test_mapped_means_all_roots_inside_the_circle(degree):
     radius = rng.uniform(0.3, 1.4, (300, 1))
     p = np.array([np.poly(r * np.exp(1j * rng.uniform(0, 2 * np.pi, degree))).real for r in radius])
     truth = np.array([np.all(np.abs(np.roots(one)) < 1.0) for one in p])
-    assert np.array_equal(rh.is_stable(rh.mapped(p)), truth)
+    assert np.array_equal(rh.is_stable(rh.bilinear_coefficients(p)), truth)
 
 
 def test_the_map_is_the_one_of_the_thesis():
@@ -38,7 +38,7 @@ def test_the_map_is_the_one_of_the_thesis():
     assert direct.all_coeffs() == [p, 2 * d, 4 - 2 * d - p, 4]
     at = {p: 0.3, d: 0.7}
     numbers = [float(a.subs(at)) for a in sp.Poly(polynomial, z).all_coeffs()]
-    assert rh.mapped(numbers) == pytest.approx([float(a.subs(at)) for a in direct.all_coeffs()])
+    assert rh.bilinear_coefficients(numbers) == pytest.approx([float(a.subs(at)) for a in direct.all_coeffs()])
 
 
 def test_the_minors_are_those_of_hurwitz():
@@ -55,10 +55,10 @@ def test_it_judges_loops_as_eigenvalues_do():
         for _ in range(10):
             L = loop.transition_matrix(rng.uniform(-0.1, 1.0) * m / T**2, rng.uniform(-0.2, 2.0) * m / T)
             inside = bool(np.all(np.abs(np.linalg.eigvals(L)) < 1.0))
-            assert bool(rh.is_stable(rh.mapped(np.poly(L)))) == inside
+            assert bool(rh.is_stable(rh.bilinear_coefficients(np.poly(L)))) == inside
 
 
 def test_a_root_lost_to_infinity_is_not_stable():
-    assert not rh.is_stable(rh.mapped([1.0, -1.0]))
-    assert rh.mapped(np.ones((2, 3, 4))).shape == (2, 3, 4)
+    assert not rh.is_stable(rh.bilinear_coefficients([1.0, -1.0]))
+    assert rh.bilinear_coefficients(np.ones((2, 3, 4))).shape == (2, 3, 4)
     assert rh.hurwitz_matrix(np.ones((2, 4))).shape == (2, 3, 3)

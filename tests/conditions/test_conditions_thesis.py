@@ -13,11 +13,11 @@ from zwidth.conditions import (
     hulin,
     one_mode,
     thesis_damped,
-    thesis_delay,
-    thesis_delays,
     thesis_flexible,
     thesis_flexible_series,
     thesis_rigid,
+    thesis_unit_delay,
+    thesis_whole_delay,
 )
 
 EXACT = 1e-9
@@ -40,7 +40,9 @@ def assert_the_numbers_are_exact(chart, source, *numbers):
     assert float(source.largest_damping(*numbers)) == pytest.approx(chart.damping_max, rel=EXACT)
 
 
-@pytest.mark.parametrize(("source", "delay"), [(thesis_rigid, 0.0), (thesis_delay, 1.0)], ids=["4.14", "4.32"])
+@pytest.mark.parametrize(
+    ("source", "delay"), [(thesis_rigid, 0.0), (thesis_unit_delay, 1.0)], ids=["4.14", "4.32"]
+)
 def test_the_rigid_mass_is_exact(source, delay):
     for m, T, rng in devices(414, 40):
         loop = one_mass(m, T, delay=delay)
@@ -49,13 +51,13 @@ def test_the_rigid_mass_is_exact(source, delay):
         assert_the_numbers_are_exact(stability_chart(loop, decay=False), source, m, T)
 
 
-@pytest.mark.parametrize("source", [thesis_rigid, thesis_delay])
+@pytest.mark.parametrize("source", [thesis_rigid, thesis_unit_delay])
 def test_outside_its_dampings_no_stiffness_is_stable(source):
     for m, T, _ in devices(7, 10):
         top = float(source.largest_damping(m, T))
         B = np.array([-0.1 * top, 0.0, top, 1.1 * top])
         assert np.all(source.stiffness_limit(B, m, T) == 0.0)
-        loop = one_mass(m, T, delay=float(source is thesis_delay))
+        loop = one_mass(m, T, delay=float(source is thesis_unit_delay))
         assert np.all(judge(loop, 1e-3 * m / T**2, B[[0, 3]]).verdict == UNSTABLE)
 
 
@@ -159,7 +161,10 @@ def test_where_4_9_is_incomplete_and_where_its_tip_is_unstable():
     """The root z = -1 cuts into the hyperbola above x = 2.311, off its tip above 3.659, at B = 0 from 3.7208."""
 
     def cut(x):
-        return 2.0 * float(thesis_damped.largest_damping(x, 1.0, 1.0)) < 2.0 / thesis_damped.response(x).old
+        return (
+            2.0 * float(thesis_damped.largest_damping(x, 1.0, 1.0))
+            < 2.0 / thesis_damped.held_force_response(x).old
+        )
 
     def tip_stands(x):
         p, d = thesis_damped.printed_tip(x, 1.0, 1.0)
@@ -172,7 +177,7 @@ def test_where_4_9_is_incomplete_and_where_its_tip_is_unstable():
     assert above < (1.0 - 1e-5) * float(thesis_damped.printed_tip(3.68, 1.0, 1.0)[0])
     # on the axis B = 0 both edges meet at x = 3.7208
     for x, pair_binds in ((3.7207, True), (3.7209, False)):
-        n1, n0, _, flip = thesis_damped.response(x)
+        n1, n0, _, flip = thesis_damped.held_force_response(x)
         assert ((n1 + n0) * x / n0 < flip) == pair_binds
 
 
@@ -190,14 +195,14 @@ def test_the_rigid_mass_is_exact_for_any_whole_delay(late):
     for m, T, rng in devices(426, 4):
         loop = one_mass(m, T, delay=float(late))
         chart = stability_chart(loop, decay=False)
-        K, B = thesis_delays.largest(m, T, late)
-        top = float(thesis_delays.largest_damping(m, T, late))
+        K, B = thesis_whole_delay.largest(m, T, late)
+        top = float(thesis_whole_delay.largest_damping(m, T, late))
         assert float(K) == pytest.approx(chart.stiffness_max, rel=EXACT)
         assert float(B) == pytest.approx(chart.damping_at_stiffness_max, rel=1e-7)
         assert top == pytest.approx(chart.damping_max, rel=EXACT)
         dampings = rng.uniform(0.02, 0.98, 40) * top
-        assert_the_edge_is_exact(loop, thesis_delays.stiffness_limit(dampings, m, T, late), dampings)
-        outside = thesis_delays.stiffness_limit([-0.1 * top, 0.0, 1.0001 * top, 1.1 * top], m, T, late)
+        assert_the_edge_is_exact(loop, thesis_whole_delay.stiffness_limit(dampings, m, T, late), dampings)
+        outside = thesis_whole_delay.stiffness_limit([-0.1 * top, 0.0, 1.0001 * top, 1.1 * top], m, T, late)
         assert np.all(outside == 0.0)
 
 
@@ -213,19 +218,19 @@ def test_the_rigid_mass_is_exact_for_any_whole_delay(late):
     ],
 )
 def test_the_largest_stiffness_by_delay(late, p, d):
-    found = [float(v) for v in thesis_delays.largest(1.0, 1.0, late)]
+    found = [float(v) for v in thesis_whole_delay.largest(1.0, 1.0, late)]
     assert found == [pytest.approx(p, abs=6e-6), pytest.approx(d, abs=6e-6)]
 
 
 def test_the_frequency_along_the_delayed_edge():
     for late in (0, 1, 3):
         angle = np.linspace(0.05, 0.95, 9) * np.pi / (2 * late + 2)
-        p, d = thesis_delays.edge(angle, late)
+        p, d = thesis_whole_delay.edge(angle, late)
         found = judge(one_mass(1.0, 1.0, delay=float(late)), p, d).frequency
         np.testing.assert_allclose(found, angle / (2.0 * np.pi), rtol=1e-9)
 
 
-def order(error, small):
+def convergence_order(error, small):
     """Order of an error in its argument, from halving it."""
     return float(np.log2(error(small) / error(small / 2.0)))
 
@@ -241,7 +246,7 @@ def test_4_12_errs_by_second_order_in_p():
             slope = 1.0 / (thesis_damped.tangent_stiffness_limit(1.0 - x, x, 1.0, 1.0))
             return abs(exact - (slope * p - x))
 
-        assert order(error, 0.02) == pytest.approx(2.0, abs=0.08)
+        assert convergence_order(error, 0.02) == pytest.approx(2.0, abs=0.08)
 
 
 def test_4_47_errs_by_second_order_and_4_48_by_fourth_in_W():
@@ -258,9 +263,9 @@ def test_4_47_errs_by_second_order_and_4_48_by_fourth_in_W():
         line = thesis_flexible_series.linear_stiffness_limit(d, 1.0, W**2, 1.0)
         return abs(float(line / thesis_flexible.stiffness_limit(d, 1.0, W**2, 1.0)) - 1.0)
 
-    assert order(tip, 0.1) == pytest.approx(2.0, abs=0.02)
-    assert order(edge, 0.1) == pytest.approx(2.0, abs=0.02)
-    assert order(slope, 0.4) == pytest.approx(4.0, abs=0.1)
+    assert convergence_order(tip, 0.1) == pytest.approx(2.0, abs=0.02)
+    assert convergence_order(edge, 0.1) == pytest.approx(2.0, abs=0.02)
+    assert convergence_order(slope, 0.4) == pytest.approx(4.0, abs=0.1)
 
 
 def test_4_48_errs_by_first_order_in_d():
@@ -268,7 +273,7 @@ def test_4_48_errs_by_first_order_in_d():
         line = thesis_flexible_series.linear_stiffness_limit(d, 1.0, 1e-8, 1.0)
         return abs(float(line / thesis_flexible.stiffness_limit(d, 1.0, 1e-8, 1.0)) - 1.0)
 
-    assert order(error, 0.01) == pytest.approx(1.0, abs=0.01)
+    assert convergence_order(error, 0.01) == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_series_admits_nothing_where_the_spring_is_too_stiff():
@@ -287,8 +292,8 @@ def test_the_linear_condition_with_a_hand_errs_by_first_order_in_dampings_and_se
         exact = one_mode.one_mode(1.0, 2e-8, W**2, 1.0).stiffness_limit(1e-8)
         return abs(float(hulin.stiffness_limit(1e-8, 0.0, 2e-8, 1.0) / exact) - 1.0)
 
-    assert order(by_damping, 0.02) == pytest.approx(1.0, abs=0.05)
-    assert order(by_spring, 0.1) == pytest.approx(2.0, abs=0.02)
+    assert convergence_order(by_damping, 0.02) == pytest.approx(1.0, abs=0.05)
+    assert convergence_order(by_spring, 0.1) == pytest.approx(2.0, abs=0.02)
     assert by_damping(0.02) < 0.02
     assert by_spring(0.3) < 0.05
 
@@ -314,9 +319,9 @@ def test_literature(m, b, T, B, late, exact, linear):
 def test_printed_numbers():
     assert float(thesis_rigid.largest_stiffness(1.0, 1.0)) == pytest.approx(0.686292, abs=5e-7)
     assert float(thesis_rigid.damping_at_largest_stiffness(1.0, 1.0)) == pytest.approx(0.828427, abs=5e-7)
-    assert float(thesis_delay.largest_stiffness(1.0, 1.0)) == pytest.approx(0.144469, abs=5e-7)
-    assert float(thesis_delay.damping_at_largest_stiffness(1.0, 1.0)) == pytest.approx(0.424694, abs=5e-7)
-    assert float(thesis_delay.largest_damping(1.0, 1.0)) == pytest.approx(0.828427, abs=5e-7)
+    assert float(thesis_unit_delay.largest_stiffness(1.0, 1.0)) == pytest.approx(0.144469, abs=5e-7)
+    assert float(thesis_unit_delay.damping_at_largest_stiffness(1.0, 1.0)) == pytest.approx(0.424694, abs=5e-7)
+    assert float(thesis_unit_delay.largest_damping(1.0, 1.0)) == pytest.approx(0.828427, abs=5e-7)
     assert float(thesis_rigid.largest_stiffness(0.287, 0.00125)) == pytest.approx(126058.022906, rel=1e-11)
 
 
@@ -352,16 +357,16 @@ def test_the_linear_condition_promises_too_much_without_friction_and_too_little_
 
 def test_batches_broadcast():
     B, m = np.linspace(-1.0, 3.0, 5), np.array([[0.5], [1.0], [2.0]])
-    for limit in (thesis_rigid.stiffness_limit, thesis_delay.stiffness_limit):
+    for limit in (thesis_rigid.stiffness_limit, thesis_unit_delay.stiffness_limit):
         whole = limit(B, m, 1.0)
         assert whole.shape == (3, 5)
         assert whole[2, 3] == limit(B[3], 2.0, 1.0)
     assert thesis_flexible.stiffness_limit(B, m, 0.1, 1.0).shape == (3, 5)
     assert np.isnan(thesis_rigid.stiffness_limit(1.0, np.nan, 1.0))
-    assert np.isnan(thesis_delay.stiffness_limit(1.0, np.nan, 1.0))
+    assert np.isnan(thesis_unit_delay.stiffness_limit(1.0, np.nan, 1.0))
     assert thesis_damped.stiffness_limit(B, 0.3, m, 1.0).shape == (3, 5)
-    assert thesis_delays.stiffness_limit(B, m, 1.0, np.array([0, 3]).reshape(2, 1, 1)).shape == (2, 3, 5)
+    assert thesis_whole_delay.stiffness_limit(B, m, 1.0, np.array([0, 3]).reshape(2, 1, 1)).shape == (2, 3, 5)
     for missing in ((np.nan, 0.1, 1.0), (0.1, np.nan, 1.0), (0.1, 0.1, np.nan)):
         assert np.isnan(thesis_damped.stiffness_limit(*missing, 1.0))
     assert np.isnan(thesis_damped.largest(np.nan, 1.0, 1.0)[0])
-    assert np.isnan(thesis_delays.stiffness_limit(1.0, np.nan, 1.0, 1))
+    assert np.isnan(thesis_whole_delay.stiffness_limit(1.0, np.nan, 1.0, 1))

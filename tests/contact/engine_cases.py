@@ -23,13 +23,13 @@ from zwidth.model.nonlinear import Friction, Nonlinear
 PAGE = (Path(__file__).parents[2] / "docs" / "simulation.md").read_text(encoding="utf-8")
 
 
-def stated(what):
+def documented_accuracy(what):
     """How exact a case is at 20 and at 80 substeps by the page, with a tenth of it for rounding."""
     (row,) = (line for line in PAGE.splitlines() if line.startswith(f"| {what} |"))
     return [1.1 * float(cell) for cell in row.split("|")[2:4]]
 
 
-def bench(nonlinear=None, period=0.00125, structural=0.00012, **controller):
+def two_mass_loop(nonlinear=None, period=0.00125, structural=0.00012, **controller):
     """The thesis's two masses, Table 3.4, with what is not linear; the motor is the second."""
     plant = two_mass(0.2616, 0.0254, 15620.0, structural * 15620.0)
     return Loop(replace(plant, nonlinear=nonlinear or Nonlinear()), Controller(period, **controller))
@@ -41,7 +41,7 @@ def one_mass(kilograms, nonlinear=None, period=0.001, damping=0.0, stiffness=0.0
     return Loop(plant, Controller(period, **controller))
 
 
-def dry(level, at=1, size=2, **model):
+def friction_of(level, at=1, size=2, **model):
     """Dry friction of one coordinate."""
     return Friction(np.eye(size)[at], level, **model)
 
@@ -56,7 +56,7 @@ def one_sided(stiffness, damping):
     return lambda y, v: -(stiffness * y + damping * v) if y > 0.0 else 0.0
 
 
-def settled_wall(rng, loop, most=1.0003, tries=40):
+def random_stable_wall(rng, loop, most=1.0003, tries=40):
     """A random wall whose largest eigenvalue is at most `most`; None where there was none."""
     plant, T = loop.plant, loop.period
     m = 1.0 / (plant.actuator @ np.linalg.solve(plant.mass, plant.actuator))
@@ -84,7 +84,7 @@ def run(loop, stiffness, damping, duration, *, sided=2, **circumstances):
 
 
 @dataclass
-class Arm:
+class ReflexSpring:
     """A spring and damper that a reflex adds along a motion: k and b in the end, from `onset` on about `rest`."""
 
     along: np.ndarray
@@ -96,18 +96,18 @@ class Arm:
 
 
 @dataclass
-class Judged:
-    """place, speed (samples, n);  reading (samples,);  work: of loss, friction, hand, actuator since the start."""
+class ReferenceMotion:
+    """position, velocity (samples, n);  reading (samples,);  work of loss, friction, hand, actuator so far."""
 
-    place: np.ndarray
-    speed: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
     reading: np.ndarray
     force: np.ndarray
     work: np.ndarray
 
 
 @dataclass
-class Events:
+class EventSolver:
     """A sampled loop with Coulomb friction in its modes (slip, stick), bristles, bent springs and brakes.
 
     law          (reading, backward-difference velocity) -> force
@@ -130,7 +130,7 @@ class Events:
         self.dry = [f for f in own.friction if f.model == "coulomb"]
         self.bristles = [f for f in own.friction if f.model != "coulomb"]
         self.lag = self.loop.controller.actuator_time_constant
-        self.limit = min(self.loop.controller.saturation, own.force_limit)
+        self.limit = min(self.loop.controller.force_limit, own.force_limit)
         if self.pushed is None:
             self.pushed = plant.sensor if plant.handle is None else plant.handle
         if self.dry:
@@ -219,7 +219,7 @@ class Events:
                 return modes
         raise AssertionError("no consistent way to rub")
 
-    def part(self, s, t, end, command):
+    def integrate(self, s, t, end, command):
         """From t to end under one command, from event to event."""
         if end <= t:
             return s
@@ -297,10 +297,10 @@ class Events:
             for arm in self.arms:
                 if arm.onset == inf and t >= begun - 1e-12:
                     arm.onset, arm.rest = begun, float(arm.along @ s[:n])
-            s = self.part(s, t, t + rest * T, forces[whole + 1])
-            s = self.part(s, t + rest * T, t + T, forces[whole])
+            s = self.integrate(s, t, t + rest * T, forces[whole + 1])
+            s = self.integrate(s, t + rest * T, t + T, forces[whole])
         rows = np.array(rows)
-        return Judged(rows[:, :n], rows[:, n : 2 * n], rows[:, -2], rows[:, -1], rows[:, -6:-2])
+        return ReferenceMotion(rows[:, :n], rows[:, n : 2 * n], rows[:, -2], rows[:, -1], rows[:, -6:-2])
 
     def read(self, x):
         """The encoders' sum."""

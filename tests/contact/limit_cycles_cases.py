@@ -103,18 +103,18 @@ def random_wall(rng, kind, excess=(1.1, 2.5)):
     loop = Loop(plant, Controller(T, delay))
     chart = stability_chart(loop, decay=False)
     B = rng.uniform(0.02, 0.6) * chart.damping_max
-    edge = [K for ring in chart.regions for K in _meets(ring, B)]
+    edge = [K for ring in chart.regions for K in _crossings(ring, B)]
     return loop, rng.uniform(*excess) * max(edge), B
 
 
-def _meets(ring, B):
+def _crossings(ring, B):
     """Stiffnesses at which a ring crosses a damping."""
     K, b = np.asarray(ring).T
     at = np.flatnonzero((b[:-1] - B) * (b[1:] - B) < 0.0)
     return K[at] + (B - b[at]) / (b[at + 1] - b[at]) * (K[at + 1] - K[at])
 
 
-def largest_recovered(loop, K, B, cycle, shape, **parts):
+def recovery_limit(loop, K, B, cycle, shape, **parts):
     """Amplitude between vibrations that die and vibrations that grow: where one started between them lingers."""
     low, high = 0.1, 10.0
     count = 1.0 / (cycle.frequency_Hz * loop.period)

@@ -13,14 +13,14 @@ import numpy as np
 
 from tests.contact.limit_cycles_cases import random_wall, vibration
 from zwidth.contact.environments import wall
-from zwidth.contact.limit_cycles import LimitCycle, limit_cycles
-from zwidth.contact.response import TimeResponse
+from zwidth.contact.harmonic_balance import LimitCycle, limit_cycles
 from zwidth.contact.simulate import Run, simulate_batch
+from zwidth.contact.time_response import TimeResponse
 from zwidth.loop.loop import Loop
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear
 
 
-def with_parts(loop: Loop, *, coulomb: float = 0.0, step: float = 0.0, limit: float = np.inf) -> Loop:
+def with_nonlinearities(loop: Loop, *, coulomb: float = 0.0, step: float = 0.0, limit: float = np.inf) -> Loop:
     """The loop with friction and encoder at the sensor, and a limit on the force."""
     sensor = loop.plant.sensor
     friction = (Friction(sensor, coulomb),) if coulomb else ()
@@ -37,7 +37,7 @@ def run(loop: Loop, K: float, B: float, starts, *, seconds: float, between: bool
     return simulate_batch(runs, wall, duration=seconds)
 
 
-def moving(response: TimeResponse) -> bool:
+def is_moving(response: TimeResponse) -> bool:
     """Does the reading still change in the last quarter?"""
     last = response.reading[-len(response.reading) // 4 :]
     return bool(np.ptp(last) > 0.5 * response.quantum)
@@ -50,7 +50,7 @@ def long_enough(loop: Loop, frequency: float, cycles: float) -> float:
 
 
 @dataclass(frozen=True)
-class Pair:
+class PredictedAndSimulated:
     """A predicted stable cycle and what the simulation has there; nan where it came to rest."""
 
     loop: Loop
@@ -72,35 +72,41 @@ class Pair:
         return 1.0 / (self.cycle.frequency_Hz * self.loop.period)
 
 
-def met(loop: Loop, K: float, B: float, cycle: LimitCycle, *, between: bool = False) -> Pair:
+def simulate_cycle(
+    loop: Loop, K: float, B: float, cycle: LimitCycle, *, between: bool = False
+) -> PredictedAndSimulated:
     """What is found from a little below and a little above a predicted cycle; the nearer one."""
     seconds = long_enough(loop, cycle.frequency_Hz, 1000.0)
     found = []
     for response in run(loop, K, B, cycle.amplitude * np.array([0.7, 1.4]), seconds=seconds, between=between):
-        if response.quantum and not moving(response):
+        if response.quantum and not is_moving(response):
             continue
         found.append(vibration(response.truth, loop.period))
     amplitude, frequency = min(
         found, key=lambda pair: abs(np.log(pair[0] / cycle.amplitude)), default=(np.nan, np.nan)
     )
-    return Pair(loop, cycle, amplitude, frequency)
+    return PredictedAndSimulated(loop, cycle, amplitude, frequency)
 
 
-def saturated(devices: int, excess: tuple[float, float], seed: int = 11) -> Iterator[tuple[float, float, Pair]]:
+def saturated_cycles(
+    devices: int, excess: tuple[float, float], seed: int = 11
+) -> Iterator[tuple[float, float, PredictedAndSimulated]]:
     """Walls beyond the edge by some factor whose force is limited, K and B, and their stable cycles."""
     rng = np.random.default_rng(seed)
     for i in range(devices):
         loop, K, B = random_wall(rng, ("mass", "two-mass")[i % 2], excess)
-        own = with_parts(loop, limit=1.0)
+        own = with_nonlinearities(loop, limit=1.0)
         for cycle in limit_cycles(own, K, B):
             if cycle.stable:
-                yield K, B, met(own, K, B, cycle)
+                yield K, B, simulate_cycle(own, K, B, cycle)
 
 
 STARTS = np.array([0.3, 0.55, 1.3, 3.0, 7.0])  # counts
 
 
-def quantised(devices: int, friction: float = 0.0, seed: int = 12) -> Iterator[tuple[list[Pair], bool]]:
+def quantised_cycles(
+    devices: int, friction: float = 0.0, seed: int = 12
+) -> Iterator[tuple[list[PredictedAndSimulated], bool]]:
     """On a count: stable cycles of stable walls, and does anything move from any of the starts?
 
     friction  C/(K Delta)
@@ -108,23 +114,27 @@ def quantised(devices: int, friction: float = 0.0, seed: int = 12) -> Iterator[t
     rng = np.random.default_rng(seed)
     for i in range(devices):
         loop, K, B = random_wall(rng, ("mass", "two-mass")[i % 2], (0.2, 0.95))
-        own = with_parts(loop, coulomb=friction * K, step=1.0)
-        pairs = [met(own, K, B, cycle) for cycle in limit_cycles(own, K, B) if cycle.stable]
+        own = with_nonlinearities(loop, coulomb=friction * K, step=1.0)
+        pairs = [simulate_cycle(own, K, B, cycle) for cycle in limit_cycles(own, K, B) if cycle.stable]
         responses = run(own, K, B, STARTS, seconds=30_000.0 * loop.period)
-        yield pairs, any(moving(response) for response in responses)
+        yield pairs, any(is_moving(response) for response in responses)
 
 
-def between_counts(devices: int, friction: float, seed: int = 13) -> Iterator[tuple[list[Pair], bool]]:
+def cycles_between_counts(
+    devices: int, friction: float, seed: int = 13
+) -> Iterator[tuple[list[PredictedAndSimulated], bool]]:
     """The same between two counts."""
     rng = np.random.default_rng(seed)
     for i in range(devices):
         loop, K, B = random_wall(rng, ("mass", "two-mass")[i % 2], (0.2, 0.95))
-        own = with_parts(loop, coulomb=friction * K, step=1.0)
+        own = with_nonlinearities(loop, coulomb=friction * K, step=1.0)
         pairs = [
-            met(own, K, B, cycle, between=True) for cycle in limit_cycles(own, K, B, offset=0.5) if cycle.stable
+            simulate_cycle(own, K, B, cycle, between=True)
+            for cycle in limit_cycles(own, K, B, offset=0.5)
+            if cycle.stable
         ]
         responses = run(own, K, B, STARTS, seconds=30_000.0 * loop.period, between=True)
-        yield pairs, any(moving(response) for response in responses)
+        yield pairs, any(is_moving(response) for response in responses)
 
 
 def beyond_the_quiet_limit(devices: int, ratio: float, seed: int = 14) -> int:
@@ -132,8 +142,8 @@ def beyond_the_quiet_limit(devices: int, ratio: float, seed: int = 14) -> int:
     rng, count = np.random.default_rng(seed), 0
     for i in range(devices):
         loop, K, B = random_wall(rng, ("mass", "two-mass")[i % 2], (0.2, 0.95))
-        own = with_parts(loop, coulomb=0.5 * (K + 2.0 * B / loop.period) / ratio, step=1.0)
+        own = with_nonlinearities(loop, coulomb=0.5 * (K + 2.0 * B / loop.period) / ratio, step=1.0)
         seconds = 15_000.0 * loop.period
         found = [run(own, K, B, STARTS, seconds=seconds, between=between) for between in (False, True)]
-        count += any(moving(response) for part in found for response in part)
+        count += any(is_moving(response) for part in found for response in part)
     return count

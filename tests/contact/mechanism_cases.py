@@ -41,7 +41,7 @@ def motion_of(
     return point.move(wall, surface, **settings)
 
 
-def sampled(period=1e-3, **others):
+def sampled_controller(period=1e-3, **others):
     return Controller(sampling_period=period, **others)
 
 

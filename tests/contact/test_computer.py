@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact.engine_cases import bench
+from contact.engine_cases import two_mass_loop
 from contact.mechanism_cases import (
     motion_of,
     paddle,
     planar_chain,
-    sampled,
+    sampled_controller,
     with_drives,
     with_friction,
 )
@@ -41,10 +41,10 @@ from zwidth.loop.estimators import (
     SavitzkyGolay,
     WindowedDifference,
 )
-from zwidth.loop.estimators.running import velocity_of
+from zwidth.loop.estimators.run_estimator import velocity_of
 from zwidth.loop.loop import Loop
 from zwidth.model.damping import GivenDamping
-from zwidth.model.drive_parts import of_drives
+from zwidth.model.drive_nonlinearity import nonlinear_of_drives
 from zwidth.model.nonlinear import Counter, Nonlinear
 from zwidth.model.posture import solve_posture
 from zwidth.model.reduction import reduce_mechanism
@@ -71,7 +71,7 @@ def computer(*controllers, limit=np.inf):
     return computer_at(computers(controllers, [limit] * len(controllers)), len(controllers) - 1)
 
 
-def smoothed(low_pass, signal):
+def low_passed(low_pass, signal):
     """The signal behind a low pass, by coefficients in 1/z instead of factors in z - 1."""
     if isinstance(low_pass, FirstOrder):
         share = low_pass.time_constant / (low_pass.time_constant + PERIOD)
@@ -95,8 +95,10 @@ def walk(rng, samples=200):
 def test_estimates_of_several_coordinates_are_those_of_each_alone(method):
     readings = np.array([walk(np.random.default_rng(seed)) for seed in (1, 2, 3)])
     # beside one that remembers more, and has factors: a batch is padded
-    other = sampled(PERIOD, velocity=SavitzkyGolay(15, 2), velocity_filter=Butterworth(4, 50.0), delay=3.0)
-    own = computer(other, sampled(PERIOD, velocity=method))
+    other = sampled_controller(
+        PERIOD, velocity=SavitzkyGolay(15, 2), velocity_filter=Butterworth(4, 50.0), delay=3.0
+    )
+    own = computer(other, sampled_controller(PERIOD, velocity=method))
     signals, found = signals_of(own, 3, 1), np.empty_like(readings)
     for j in range(readings.shape[1]):
         for s in range(3):
@@ -110,19 +112,21 @@ def test_estimates_of_several_coordinates_are_those_of_each_alone(method):
 def test_low_passes_of_velocity_and_force_are_those_of_a_second_filter(low_pass):
     readings, forces = walk(np.random.default_rng(4)), np.random.default_rng(5).normal(size=(200, 2))
     for method in (BackwardDifference(), Levant(30.0), Foaw(8, 2e-5)):
-        own = computer(sampled(PERIOD, velocity=method, velocity_filter=low_pass, force_filter=low_pass))
+        own = computer(
+            sampled_controller(PERIOD, velocity=method, velocity_filter=low_pass, force_filter=low_pass)
+        )
         signals = signals_of(own, 2, 1)
         speeds = [estimate_velocity(own, signals, 0, reading, j) for j, reading in enumerate(readings)]
         passed = np.array([[filter_force(own, signals, s, force[s]) for s in range(2)] for force in forces]).T
-        expected = smoothed(low_pass, velocity_of(method, readings, PERIOD))
+        expected = low_passed(low_pass, velocity_of(method, readings, PERIOD))
         assert speeds == pytest.approx(expected, abs=1e-9 * np.max(np.abs(expected)))
-        expected = np.array([smoothed(low_pass, force) for force in forces.T])
+        expected = np.array([low_passed(low_pass, force) for force in forces.T])
         assert passed == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.4, 1.0, 2.7])
 def test_a_command_arrives_when_its_delay_is_over(delay):
-    own = computer(sampled(PERIOD, delay=delay))
+    own = computer(sampled_controller(PERIOD, delay=delay))
     signals, whole = signals_of(own, 1, 2), int(delay)
     forces = np.random.default_rng(6).normal(size=(20, 2))
     waited = np.concatenate([np.zeros((4, 2)), forces])
@@ -152,28 +156,28 @@ def test_noise_of_one_seed_is_the_same_in_both():
     """Two arms at rest: what each encoder is off by is its own draw, and the reading has the weighted sum."""
     arms = with_friction(with_drives(planar_chain(2), encoder_counts=np.nan), encoder_noise=1e-6)
     seed, sigma, u = 2**40 + 7, 1e-6 / 18.6, np.array([0.6, 0.8, 0.0])
-    motion = motion_of(arms, GivenDamping(), sampled(PERIOD), duration=0.05, seed=seed)
+    motion = motion_of(arms, GivenDamping(), sampled_controller(PERIOD), duration=0.05, seed=seed)
     draws = np.array([[normal(np.uint64(seed), j, i) for i in range(2)] for j in range(51)])
     posture = solve_posture(arms, arms.reference_position)
     off = motion.counted_position - motion.position
     assert off == pytest.approx(sigma * draws @ posture.jacobian.T, rel=1e-5, abs=1e-12)
-    loop = Loop(reduce_mechanism(arms, posture, u, "full", GivenDamping()), sampled(PERIOD))
+    loop = Loop(reduce_mechanism(arms, posture, u, "full", GivenDamping()), sampled_controller(PERIOD))
     response = simulate(loop, wall, FREE, duration=0.05, seed=seed)
     assert response.reading == pytest.approx(off @ u, abs=1e-12)
     assert np.std(response.reading) > 1e-9
-    others = motion_of(arms, GivenDamping(), sampled(PERIOD), duration=0.05, seed=seed + 1)
+    others = motion_of(arms, GivenDamping(), sampled_controller(PERIOD), duration=0.05, seed=seed + 1)
     assert not np.any(others.counted_position[:, :2] == motion.counted_position[:, :2])
 
 
 def test_a_drive_that_a_direction_leaves_alone_takes_no_noise_from_the_others():
     drives = with_friction(planar_chain(2), encoder_noise=1e-4).drives
-    (counter,) = of_drives(drives, np.array([0.0, 0.3]), *[np.eye(2)] * 3).counters
+    (counter,) = nonlinear_of_drives(drives, np.array([0.0, 0.3]), *[np.eye(2)] * 3).counters
     assert counter.channel == 1
     own = Counter(np.array([0.0, 1.0]), 0.0, 1.0, 2e-6, channel=1)
     two = replace(own, channel=None)  # the second of two, by its place
     silent = replace(own, noise=0.0, weight=0.0, channel=None)
     readings = [
-        simulate(bench(Nonlinear(counters=counters)), wall, FREE, duration=0.05, seed=5).reading
+        simulate(two_mass_loop(Nonlinear(counters=counters)), wall, FREE, duration=0.05, seed=5).reading
         for counters in ((own,), (silent, two), (two,))
     ]
     assert np.array_equal(readings[0], readings[1])
@@ -191,11 +195,13 @@ def test_a_tie_of_the_encoder_rounds_alike_in_both():
         step = 2.0 * np.pi / (counted.drives.encoder_counts[0] * 10.0)
         assert step == 0.25
         at = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
-        motion = motion_of(counted, GivenDamping(), sampled(PERIOD), at=at, duration=0.01)
+        motion = motion_of(counted, GivenDamping(), sampled_controller(PERIOD), at=at, duration=0.01)
         assert set(motion.motors[:, 0]) == {angle}
         seen = 0.5 * np.array([np.cos(count * step), np.sin(count * step), 0.0])
         assert motion.counted_position == pytest.approx(np.tile(seen, (11, 1)), abs=1e-15)
         plant = reduce_mechanism(counted, solve_posture(counted, at), [-at[1] / 0.5, at[0] / 0.5, 0.0], "full",
                                  GivenDamping())  # fmt: skip
-        response = simulate(Loop(plant, sampled(PERIOD)), wall, FREE, duration=0.01, start=([angle], [0.0]))
+        response = simulate(
+            Loop(plant, sampled_controller(PERIOD)), wall, FREE, duration=0.01, start=([angle], [0.0])
+        )
         assert response.reading == pytest.approx(np.full(11, 0.5 * count * step), abs=1e-15)

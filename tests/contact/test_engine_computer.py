@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from contact.engine_cases import bench, dry, one_mass, run
-from contact.test_ledger import everything
+from contact.engine_cases import friction_of, one_mass, run, two_mass_loop
+from contact.test_ledger import with_all_nonlinearities
 from systems import FEATURES, random_loop
 
 from zwidth.contact.environments import one_sided_wall, wall
 from zwidth.contact.hand import Hand, Reflex
-from zwidth.contact.room import TooLarge
 from zwidth.contact.simulate import Run, simulate, simulate_batch
 from zwidth.loop.estimators import BackwardDifference, Foaw, LeastSquaresSlope, Levant, SavitzkyGolay
-from zwidth.loop.estimators.running import velocity_of
+from zwidth.loop.estimators.run_estimator import velocity_of
 from zwidth.loop.loop import Loop
+from zwidth.memory_limit import TooLarge
 from zwidth.model.nonlinear import Counter, Nonlinear
 from zwidth.model.operator import Operator
 from zwidth.model.plant import LaggedDamper
@@ -35,21 +35,21 @@ METHODS = [
 ]
 
 
-def counted(step=1e-5, noise=0.0, **controller):
+def encoder_loop(step=1e-5, noise=0.0, **controller):
     """The two masses with an encoder on the motor."""
-    return bench(Nonlinear(counters=(Counter(MOTOR, step, 1.0, noise),)), **controller)
+    return two_mass_loop(Nonlinear(counters=(Counter(MOTOR, step, 1.0, noise),)), **controller)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 def test_velocities_are_those_of_the_recorded_readings(method):
-    response = run(counted(velocity=method, delay=0.3), 300.0, 1.0, 0.5, start_position=1e-3)
+    response = run(encoder_loop(velocity=method, delay=0.3), 300.0, 1.0, 0.5, start_position=1e-3)
     expected = velocity_of(method, response.reading, response.period)
     assert response.velocity == pytest.approx(expected, rel=1e-9, abs=1e-12)
     assert np.abs(response.velocity).max() > 0.01
 
 
 def test_forces_are_the_laws_limited_and_delayed():
-    loop = counted(saturation=1.5)
+    loop = encoder_loop(force_limit=1.5)
     response = run(loop, 3000.0, 5.0, 0.3, start_position=1e-3)
     asked = -(3000.0 * response.reading + 5.0 * response.velocity)
     assert response.force == pytest.approx(np.clip(asked, -1.5, 1.5), abs=1e-12)
@@ -61,7 +61,7 @@ def test_forces_are_the_laws_limited_and_delayed():
 
 
 def test_an_encoder_counts_to_the_nearest_step():
-    response = run(counted(1e-4), 1000.0, 2.0, 0.5, start_position=1.23e-3)
+    response = run(encoder_loop(1e-4), 1000.0, 2.0, 0.5, start_position=1.23e-3)
     assert response.reading == pytest.approx(1e-4 * np.floor(response.truth / 1e-4 + 0.5), abs=1e-18)
     assert np.abs(response.reading - response.truth).max() <= 0.5e-4 * (1.0 + 1e-9)
 
@@ -70,7 +70,7 @@ def test_an_encoder_counts_to_the_nearest_step():
 def test_the_quantum_of_two_motors_counters_turns_with_the_direction(angle):
     # the reading along u moves by |u_1| step_1 where the first counter counts on, by |u_2| step_2 for the second
     u, steps = np.array([np.cos(angle), np.sin(angle)]), (1e-4, 3e-4)
-    base = bench()
+    base = two_mass_loop()
     plant = replace(
         base.plant,
         stiffness=np.zeros((2, 2)),
@@ -93,16 +93,16 @@ def test_the_quantum_of_two_motors_counters_turns_with_the_direction(angle):
     assert np.abs(response.reading - response.truth).max() <= 0.5 * sum(allowed) * (1.0 + 1e-9)
 
 
-def still(seed, noise=2e-6, duration=25.0, step=0.0):
+def resting_readings(seed, noise=2e-6, duration=25.0, step=0.0):
     """Readings of a device at rest that nothing moves."""
     values = wall.values(stiffness=0.0)
     return simulate(
-        counted(step, noise), wall, values, duration=duration, seed=seed, trail=False, ledger=False
+        encoder_loop(step, noise), wall, values, duration=duration, seed=seed, trail=False, ledger=False
     ).reading
 
 
 def test_noise_has_the_standard_deviation_that_was_asked_for_and_no_memory():
-    found = still(3)
+    found = resting_readings(3)
     n = len(found)
     assert found.std() == pytest.approx(2e-6, rel=4.0 / np.sqrt(2.0 * n))
     assert abs(found.mean()) < 4.0 * 2e-6 / np.sqrt(n)
@@ -114,14 +114,14 @@ def test_noise_has_the_standard_deviation_that_was_asked_for_and_no_memory():
 
 
 def test_seeds_and_channels_differ_and_the_same_seed_repeats():
-    assert np.array_equal(still(3, duration=1.0), still(3, duration=1.0))
-    readings = [still(seed, duration=10.0) for seed in (0, 1, 2, 2**40)]
+    assert np.array_equal(resting_readings(3, duration=1.0), resting_readings(3, duration=1.0))
+    readings = [resting_readings(seed, duration=10.0) for seed in (0, 1, 2, 2**40)]
     for i, one in enumerate(readings):
         for other in readings[:i]:
             assert abs(np.corrcoef(one, other)[0, 1]) < 4.0 / np.sqrt(len(one))
     halves = tuple(Counter(MOTOR, 0.0, 0.5, 2e-6) for _ in range(2))
     two = simulate(
-        bench(Nonlinear(counters=halves)),
+        two_mass_loop(Nonlinear(counters=halves)),
         wall,
         wall.values(stiffness=0.0),
         duration=25.0,
@@ -132,17 +132,17 @@ def test_seeds_and_channels_differ_and_the_same_seed_repeats():
     assert two.std() == pytest.approx(2e-6 / np.sqrt(2.0), rel=0.03)
 
 
-def mixed(count=12):
+def mixed_runs(count=12):
     """Runs on devices of different sizes, elements, delays and estimators."""
     rng, runs = np.random.default_rng(23), []
     for k in range(count):
         features = [feature for feature in FEATURES if rng.random() < 0.5]
         loop = random_loop(rng, kind=str(rng.choice(["chain", "dense", "apart"])), features=features)
         loop = replace(loop, controller=replace(loop.controller, delay=float(rng.choice([0.0, 0.4, 5.0]))))
-        loop = everything(rng, loop) if k % 3 else loop
+        loop = with_all_nonlinearities(rng, loop) if k % 3 else loop
         K = 0.01 / loop.period**2 * 10 ** rng.uniform(-3, -1)
         runs.append(Run(loop, one_sided_wall.values(stiffness=K), Hand(push=1.0), -1e-4, seed=k, bound=1.0))
-    own = bench(Nonlinear(friction=(dry(0.1),)))
+    own = two_mass_loop(Nonlinear(friction=(friction_of(0.1),)))
     own = Loop(replace(own.plant, handle=np.array([1.0, 0.0])), own.controller)
     hand = Hand(Operator(0.8, 580.0, 5.5, 1e4, 5.0), push=4.0, reflex=Reflex(1.0, 0.02, 0.03, 600.0, 20.0))
     runs.append(Run(own, one_sided_wall.values(stiffness=3000.0, damping=2.0), hand, -1e-3))
@@ -150,7 +150,7 @@ def mixed(count=12):
 
 
 def test_a_batch_equals_its_runs_one_by_one_bit_for_bit():
-    runs, durations = mixed()
+    runs, durations = mixed_runs()
     together = simulate_batch(runs, one_sided_wall, duration=durations, substeps=8, ledger=True, trail=True)
     for own, duration, found in zip(runs, durations, together, strict=True):
         (alone,) = simulate_batch([own], one_sided_wall, duration=duration, substeps=8, ledger=True, trail=True)
@@ -164,10 +164,10 @@ THREADS = """
 import sys
 sys.path.insert(0, sys.argv[1])
 import numpy as np
-from contact.test_engine_computer import mixed
+from contact.test_engine_computer import mixed_runs
 from zwidth.contact.environments import one_sided_wall
 from zwidth.contact.simulate import simulate_batch
-runs, durations = mixed()
+runs, durations = mixed_runs()
 found = simulate_batch(runs, one_sided_wall, duration=durations, substeps=8)
 np.save(sys.argv[2], np.concatenate([one.reading for one in found]))
 """
@@ -185,18 +185,18 @@ def test_the_number_of_threads_changes_nothing(tmp_path):
 
 def test_a_run_is_given_up_where_the_reading_leaves_its_bound():
     values = wall.values(stiffness=9000.0, damping=0.0)
-    response = simulate(bench(), wall, values, duration=5.0, start_position=1e-3, bound=0.01)
+    response = simulate(two_mass_loop(), wall, values, duration=5.0, start_position=1e-3, bound=0.01)
     assert response.given_up
     assert len(response.time) < 4001
     assert abs(response.truth[-1]) > 0.01 >= np.abs(response.truth[:-1]).max()
     assert np.all(np.isfinite(response.truth))
-    calm = simulate(bench(), wall, WALL, duration=0.1, start_position=1e-3, bound=0.01)
+    calm = simulate(two_mass_loop(), wall, WALL, duration=0.1, start_position=1e-3, bound=0.01)
     assert not calm.given_up
     assert len(calm.time) == 81
 
 
 def test_a_lagged_damper_of_no_damping_is_none():
-    loop = bench()
+    loop = two_mass_loop()
     plant = replace(loop.plant, lagged_dampers=(LaggedDamper(MOTOR, 0.0, 1e-3),))
     responses = [run(own, 1000.0, 3.0, 0.1, start_position=1e-3) for own in (loop, Loop(plant, loop.controller))]
     assert np.array_equal(responses[0].truth, responses[1].truth)
@@ -204,30 +204,30 @@ def test_a_lagged_damper_of_no_damping_is_none():
 
 def test_the_last_sample_is_at_the_duration_or_just_after():
     for duration, samples in ((0.1, 81), (0.1001, 82), (1e-9, 2)):
-        assert len(run(bench(), 100.0, 1.0, duration, start_position=1e-3).time) == samples
+        assert len(run(two_mass_loop(), 100.0, 1.0, duration, start_position=1e-3).time) == samples
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, float("nan"), float("inf")])
 def test_durations_that_cannot_be_meant_are_refused(duration):
     with pytest.raises(ValueError, match="duration must be positive and finite"):
-        run(bench(), 100.0, 1.0, duration)
+        run(two_mass_loop(), 100.0, 1.0, duration)
 
 
 @pytest.mark.parametrize("substeps", [0, -3, 100_001])
 def test_substeps_that_cannot_be_meant_are_refused(substeps):
     with pytest.raises(ValueError, match="substeps must be from 1 to 100000"):
-        run(bench(), 100.0, 1.0, 0.1, substeps=substeps)
+        run(two_mass_loop(), 100.0, 1.0, 0.1, substeps=substeps)
 
 
 def test_a_start_of_the_wrong_shape_is_refused():
     with pytest.raises(ValueError, match="two arrays of 2 numbers"):
-        run(bench(), 100.0, 1.0, 0.1, start=(np.zeros(3), np.zeros(2)))
+        run(two_mass_loop(), 100.0, 1.0, 0.1, start=(np.zeros(3), np.zeros(2)))
 
 
 def test_days_are_refused_with_the_memory_they_would_take():
     with pytest.raises(
         TooLarge, match=r"1 run of .* samples would take .* GB, of .* GB there are; simulate a shorter"
     ):
-        run(bench(), 100.0, 1.0, 30 * 86400.0)
+        run(two_mass_loop(), 100.0, 1.0, 30 * 86400.0)
     with pytest.raises(TooLarge, match="fewer runs at once"):
-        simulate_batch([Run(bench(), WALL)] * 3, wall, duration=[1.0, 1.0, 1e12])
+        simulate_batch([Run(two_mass_loop(), WALL)] * 3, wall, duration=[1.0, 1.0, 1e12])

@@ -2,11 +2,20 @@
 
 import numpy as np
 import pytest
-from contact.engine_cases import Events, bench, dry, one_mass, one_sided, run, stated, two_sided
+from contact.engine_cases import (
+    EventSolver,
+    documented_accuracy,
+    friction_of,
+    one_mass,
+    one_sided,
+    run,
+    two_mass_loop,
+    two_sided,
+)
 
 from zwidth.contact.hand import Hand
-from zwidth.contact.response import SOURCES
-from zwidth.contact.verdict import dominant_frequency
+from zwidth.contact.motion_verdict import dominant_frequency
+from zwidth.contact.time_response import SOURCES
 from zwidth.model.nonlinear import Brake, Counter, Nonlinear, Spring
 
 DRIVE, MOTOR = np.array([1.0, -1.0]), np.array([0.0, 1.0])
@@ -16,10 +25,10 @@ PUSHED = Hand(push=2.0)
 
 # loop, K, B, sides, start, push, largest difference in the largest reading at 20 substeps, at 80, order
 CASES = {
-    "one-sided wall, pushed": (bench(), 4000.0, 10.0, 1, COMING, 2.0, 1e-10, 1e-10, 0),
-    "one-sided wall, fractional delay": (bench(delay=0.6), 1500.0, 5.0, 1, COMING, 2.0, 1e-10, 1e-10, 0),
+    "one-sided wall, pushed": (two_mass_loop(), 4000.0, 10.0, 1, COMING, 2.0, 1e-10, 1e-10, 0),
+    "one-sided wall, fractional delay": (two_mass_loop(delay=0.6), 1500.0, 5.0, 1, COMING, 2.0, 1e-10, 1e-10, 0),
     "limit and lag": (
-        bench(Nonlinear(force_limit=2.0), actuator_time_constant=8e-4, delay=1.2),
+        two_mass_loop(Nonlinear(force_limit=2.0), actuator_time_constant=8e-4, delay=1.2),
         1500.0,
         4.0,
         2,
@@ -29,9 +38,9 @@ CASES = {
         1e-10,
         0,
     ),
-    "commanded limit": (bench(saturation=1.0), 4000.0, 8.0, 1, COMING, 2.0, 1e-10, 1e-10, 0),
+    "commanded limit": (two_mass_loop(force_limit=1.0), 4000.0, 8.0, 1, COMING, 2.0, 1e-10, 1e-10, 0),
     "hardening spring": (
-        bench(Nonlinear(springs=(Spring(DRIVE, 1e10),))),
+        two_mass_loop(Nonlinear(springs=(Spring(DRIVE, 1e10),))),
         4000.0,
         8.0,
         2,
@@ -42,7 +51,7 @@ CASES = {
         2,
     ),
     "softer one way": (
-        bench(Nonlinear(springs=(Spring(DRIVE, 0.0, 8000.0),))),
+        two_mass_loop(Nonlinear(springs=(Spring(DRIVE, 0.0, 8000.0),))),
         4000.0,
         8.0,
         2,
@@ -52,9 +61,19 @@ CASES = {
         4e-6,
         2,
     ),
-    "brake at once": (bench(Nonlinear(brakes=(Brake(MOTOR, 5.0),))), 4000.0, 3.0, 1, COMING, 2.0, 2e-5, 1e-6, 2),
+    "brake at once": (
+        two_mass_loop(Nonlinear(brakes=(Brake(MOTOR, 5.0),))),
+        4000.0,
+        3.0,
+        1,
+        COMING,
+        2.0,
+        2e-5,
+        1e-6,
+        2,
+    ),
     "brake with lag": (
-        bench(Nonlinear(brakes=(Brake(MOTOR, 5.0, 0.004),))),
+        two_mass_loop(Nonlinear(brakes=(Brake(MOTOR, 5.0, 0.004),))),
         4000.0,
         3.0,
         1,
@@ -65,9 +84,9 @@ CASES = {
         2,
     ),
     "all at once": (
-        bench(
+        two_mass_loop(
             Nonlinear(
-                friction=(dry(0.05), dry(0.05, 0)),
+                friction=(friction_of(0.05), friction_of(0.05, 0)),
                 springs=(Spring(DRIVE, 1e10, 4000.0),),
                 brakes=(Brake(MOTOR, 1.0, 0.004),),
                 force_limit=6.0,
@@ -103,7 +122,7 @@ def test_first_fifth_of_a_second_is_the_ode_solvers(name):
     loop, K, B, sides, (x, v), push, coarse, fine, order = CASES[name]
     x, v = np.array(x), np.array(v)
     law = two_sided(K, B) if sides == 2 else one_sided(K, B)
-    truth = Events(loop, law, push=lambda t: push).run(x, v, 161).place @ loop.plant.sensor
+    truth = EventSolver(loop, law, push=lambda t: push).run(x, v, 161).position @ loop.plant.sensor
     found = []
     for substeps in (20, 40, 80):
         ours = run(
@@ -113,21 +132,21 @@ def test_first_fifth_of_a_second_is_the_ode_solvers(name):
     assert found[0] < coarse
     assert found[2] < fine
     if name in ON_THE_PAGE:
-        assert np.all([found[0], found[2]] <= np.array(stated(ON_THE_PAGE[name]))), found
+        assert np.all([found[0], found[2]] <= np.array(documented_accuracy(ON_THE_PAGE[name]))), found
     if order:
         assert 1.5 < np.log2(found[0] / found[2]) / 2.0 < 2.6, found
 
 
 def test_counted_readings_are_the_ode_solvers_until_one_count_parts_them_and_swing_as_far_later():
-    parts = Nonlinear(friction=(dry(0.1),), counters=(Counter(MOTOR, 1e-5),), force_limit=3.0)
-    loop = bench(parts, delay=0.4, actuator_time_constant=5e-4)
+    parts = Nonlinear(friction=(friction_of(0.1),), counters=(Counter(MOTOR, 1e-5),), force_limit=3.0)
+    loop = two_mass_loop(parts, delay=0.4, actuator_time_constant=5e-4)
     x, v = np.array([1e-3, 1e-3]), np.zeros(2)
-    judged = Events(loop, two_sided(4000.0, 6.0)).run(x, v, 801)
+    judged = EventSolver(loop, two_sided(4000.0, 6.0)).run(x, v, 801)
     ours = run(loop, 4000.0, 6.0, 1.0, start=(x, v), substeps=80)
     same = judged.reading == ours.reading
     first = int(np.argmin(same)) if not same.all() else len(same)
     assert first > 40
-    gap = np.abs(ours.truth - judged.place @ loop.plant.sensor)
+    gap = np.abs(ours.truth - judged.position @ loop.plant.sensor)
     assert gap[:first].max() < 1e-7
     assert ours.force[:first] == pytest.approx(judged.force[:first], abs=1e-9)
     late = slice(400, 801)
@@ -172,7 +191,7 @@ def test_a_hardening_swing_has_the_period_of_its_integral():
 
 
 def test_a_brake_never_gives_energy_and_is_off_outside():
-    loop = bench(Nonlinear(brakes=(Brake(MOTOR, 20.0),)))
+    loop = two_mass_loop(Nonlinear(brakes=(Brake(MOTOR, 20.0),)))
     response = run(loop, 3000.0, 0.0, 0.3, sided=1, start=(np.array(COMING[0]), np.array(COMING[1])))
     taken = response.energies[:, SOURCES.index("brakes")]
     assert np.diff(taken).max() <= 0.0
@@ -182,7 +201,7 @@ def test_a_brake_never_gives_energy_and_is_off_outside():
 
 
 def test_one_sided_is_active_where_the_counted_penetration_exceeds_zero():
-    loop = bench(Nonlinear(counters=(Counter(MOTOR, 1e-4),)))
+    loop = two_mass_loop(Nonlinear(counters=(Counter(MOTOR, 1e-4),)))
     response = run(loop, 3000.0, 5.0, 0.5, sided=1, start_position=-2e-3, hand=PUSHED)
     inside = response.penetration > 0.0
     assert np.all(response.force[~inside] == 0.0)

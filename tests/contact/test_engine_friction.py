@@ -4,25 +4,34 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact.engine_cases import Events, bench, dry, one_mass, one_sided, run, stated, two_sided
+from contact.engine_cases import (
+    EventSolver,
+    documented_accuracy,
+    friction_of,
+    one_mass,
+    one_sided,
+    run,
+    two_mass_loop,
+    two_sided,
+)
 from systems import random_loop
 
 from zwidth.contact.environments import wall
 from zwidth.contact.hand import Hand
-from zwidth.contact.response import SOURCES
 from zwidth.contact.simulate import Run, simulate, simulate_batch
+from zwidth.contact.time_response import SOURCES
 from zwidth.loop.loop import Loop
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear
 
 FRICTION = SOURCES.index("friction")
-FAR = wall.values(stiffness=0.0, damping=0.0)  # a wall that does nothing
+NO_WALL = wall.values(stiffness=0.0, damping=0.0)  # a wall that does nothing
 
 
-def misses(loop, law, x, v, *, sided, K, B, substeps, duration=0.2, hand=None, push=None):
+def relative_errors(loop, law, x, v, *, sided, K, B, substeps, duration=0.2, hand=None, push=None):
     """Largest difference to the ODE solver, in the largest reading, for each number of substeps."""
     samples = 1 + round(duration / loop.period)
     x, v = np.array(x, dtype=float), np.array(v, dtype=float)
-    truth = Events(loop, law, push=push).run(x, v, samples).place @ loop.plant.sensor
+    truth = EventSolver(loop, law, push=push).run(x, v, samples).position @ loop.plant.sensor
     found = []
     for count in substeps:
         ours = run(
@@ -32,12 +41,12 @@ def misses(loop, law, x, v, *, sided, K, B, substeps, duration=0.2, hand=None, p
     return found
 
 
-MOTOR = Nonlinear(friction=(dry(0.1),))
-BOTH = Nonlinear(friction=(dry(0.1), dry(0.15, 0)))
-DAHL = Nonlinear(friction=(dry(0.3, model="dahl", bristle_stiffness=2e4),))
+MOTOR = Nonlinear(friction=(friction_of(0.1),))
+FRICTION_ON_BOTH = Nonlinear(friction=(friction_of(0.1), friction_of(0.15, 0)))
+DAHL = Nonlinear(friction=(friction_of(0.3, model="dahl", bristle_stiffness=2e4),))
 LUGRE = Nonlinear(
     friction=(
-        dry(
+        friction_of(
             0.3,
             model="lugre",
             bristle_stiffness=2e4,
@@ -50,10 +59,10 @@ LUGRE = Nonlinear(
 INSIDE = ([1e-3, 1e-3], [0.0, 0.0])
 # at 20 substeps and at 80, in the largest reading
 CASES = {
-    "Coulomb on the motor": (bench(MOTOR), 4000.0, 10.0, 2, *INSIDE, 0.0, 3e-5, 2e-6),
-    "Coulomb on both masses": (bench(BOTH), 4000.0, 5.0, 2, *INSIDE, 0.0, 2e-5, 2e-6),
+    "Coulomb on the motor": (two_mass_loop(MOTOR), 4000.0, 10.0, 2, *INSIDE, 0.0, 3e-5, 2e-6),
+    "Coulomb on both masses": (two_mass_loop(FRICTION_ON_BOTH), 4000.0, 5.0, 2, *INSIDE, 0.0, 2e-5, 2e-6),
     "with a delay, lag and limit": (
-        bench(MOTOR, delay=0.4, actuator_time_constant=5e-4, saturation=2.0),
+        two_mass_loop(MOTOR, delay=0.4, actuator_time_constant=5e-4, force_limit=2.0),
         3000.0,
         5.0,
         2,
@@ -62,9 +71,19 @@ CASES = {
         6e-4,
         4e-5,
     ),
-    "pushed onto a one-sided wall": (bench(MOTOR), 4000.0, 10.0, 1, [-1e-3, -1e-3], [0.1, 0.1], 2.0, 1e-5, 5e-7),
-    "Dahl": (bench(DAHL), 4000.0, 5.0, 2, *INSIDE, 0.0, 1e-4, 6e-6),
-    "LuGre": (bench(LUGRE), 4000.0, 5.0, 2, *INSIDE, 0.0, 7e-5, 4e-6),
+    "pushed onto a one-sided wall": (
+        two_mass_loop(MOTOR),
+        4000.0,
+        10.0,
+        1,
+        [-1e-3, -1e-3],
+        [0.1, 0.1],
+        2.0,
+        1e-5,
+        5e-7,
+    ),
+    "Dahl": (two_mass_loop(DAHL), 4000.0, 5.0, 2, *INSIDE, 0.0, 1e-4, 6e-6),
+    "LuGre": (two_mass_loop(LUGRE), 4000.0, 5.0, 2, *INSIDE, 0.0, 7e-5, 4e-6),
 }
 ON_THE_PAGE = {
     "Coulomb on the motor": "Coulomb friction on the motor",
@@ -80,13 +99,13 @@ def test_first_fifth_of_a_second_is_the_ode_solvers_and_converges_with_the_subst
     loop, K, B, sided, x, v, push, coarse, fine = CASES[name]
     law = two_sided(K, B) if sided == 2 else one_sided(K, B)
     counts = (10, 20, 40, 80, 160)
-    found = misses(
+    found = relative_errors(
         loop, law, x, v, sided=sided, K=K, B=B, substeps=counts, hand=Hand(push=push), push=lambda t: push
     )
     assert found[1] < coarse
     assert found[3] < fine
     if name in ON_THE_PAGE:
-        assert np.all([found[1], found[3]] <= np.array(stated(ON_THE_PAGE[name]))), found
+        assert np.all([found[1], found[3]] <= np.array(documented_accuracy(ON_THE_PAGE[name]))), found
     order = -np.polyfit(np.log(counts), np.log(found), 1)[0]
     assert 1.6 < order < 2.6, found
 
@@ -94,8 +113,8 @@ def test_first_fifth_of_a_second_is_the_ode_solvers_and_converges_with_the_subst
 def test_sticks_below_the_level_and_breaks_away_at_it():
     # pushed harder and harder: m v' = F - C from the time on when F = C
     m, C, rate = 0.3, 2.0, 4.0
-    loop = one_mass(m, Nonlinear(friction=(dry(C, 0, 1),)))
-    response = simulate(loop, wall, FAR, duration=1.0, hand=Hand(push=rate, ramp=1.0), substeps=20)
+    loop = one_mass(m, Nonlinear(friction=(friction_of(C, 0, 1),)))
+    response = simulate(loop, wall, NO_WALL, duration=1.0, hand=Hand(push=rate, ramp=1.0), substeps=20)
     t, begun = response.time, C / rate
     assert np.all(response.truth[t <= begun] == pytest.approx(0.0, abs=1e-14))
     expected = np.where(t > begun, rate * (t - begun) ** 3 / (6.0 * m), 0.0)
@@ -105,9 +124,9 @@ def test_sticks_below_the_level_and_breaks_away_at_it():
 @pytest.mark.parametrize("level", [0.7, 1.0, 1.3])
 def test_the_slide_decelerates_at_c_over_m_and_stops_at_its_exact_place(level):
     m, v = 0.4, 0.3
-    loop = one_mass(m, Nonlinear(friction=(dry(level, 0, 1),)))
+    loop = one_mass(m, Nonlinear(friction=(friction_of(level, 0, 1),)))
     for substeps, bound in ((20, 1e-4), (200, 1e-6)):
-        response = simulate(loop, wall, FAR, duration=1.0, start_velocity=v, substeps=substeps)
+        response = simulate(loop, wall, NO_WALL, duration=1.0, start_velocity=v, substeps=substeps)
         t, stop = response.time, m * v / level
         expected = np.where(t < stop, v * t - 0.5 * level / m * t**2, v**2 * m / (2.0 * level))
         assert np.abs(response.truth - expected).max() < bound * expected[-1]
@@ -117,11 +136,11 @@ def test_the_slide_decelerates_at_c_over_m_and_stops_at_its_exact_place(level):
 
 def test_nothing_creeps_while_it_sticks():
     # a spring against the friction, with a link that keeps swinging on the other side of the drive
-    loop = bench(Nonlinear(friction=(dry(5.0),)), structural=0.0)
+    loop = two_mass_loop(Nonlinear(friction=(friction_of(5.0),)), structural=0.0)
     start, hand = (np.array([1e-4, 0.0]), np.zeros(2)), Hand(push=0.5)
     for substeps, bound in ((20, 4e-8), (80, 2.5e-9)):
         response = simulate(
-            loop, wall, FAR, duration=10.0, start=start, hand=hand, ledger=False, substeps=substeps
+            loop, wall, NO_WALL, duration=10.0, start=start, hand=hand, ledger=False, substeps=substeps
         )
         # at rest at the end of each substep; within one the force changes by dF, which moves it h^2 dF/(12 m)
         assert np.ptp(response.truth) < bound
@@ -130,9 +149,11 @@ def test_nothing_creeps_while_it_sticks():
 
 
 def test_a_stuck_motor_leaves_the_link_its_exact_swing():
-    loop = bench(Nonlinear(friction=(dry(5.0),)), structural=0.0)
+    loop = two_mass_loop(Nonlinear(friction=(friction_of(5.0),)), structural=0.0)
     loop = Loop(replace(loop.plant, handle=np.array([1.0, 0.0])), loop.controller)
-    response = simulate(loop, wall, FAR, duration=0.5, start=(np.array([1e-4, 0.0]), np.zeros(2)), substeps=160)
+    response = simulate(
+        loop, wall, NO_WALL, duration=0.5, start=(np.array([1e-4, 0.0]), np.zeros(2)), substeps=160
+    )
     expected = 1e-4 * np.cos(np.sqrt(15620.0 / 0.2616) * response.time)
     assert response.handle == pytest.approx(expected, abs=3e-8)
 
@@ -180,13 +201,13 @@ def test_friction_never_gives_energy():
 
 def test_bristles_rub_to_the_breakaway_level_and_slide_at_the_stribeck_curve():
     C, Fs, vs, s0, s1 = 1.0, 1.6, 0.02, 2e4, 20.0
-    friction = dry(
+    friction = friction_of(
         C, 0, 1, model="lugre", bristle_stiffness=s0, bristle_damping=s1, breakaway=Fs, stribeck_velocity=vs
     )
     loop = one_mass(0.5, Nonlinear(friction=(friction,)), damping=0.0)
     for push, sticks in ((0.95 * Fs, True), (1.1 * Fs, False)):
         hand = Hand(push=push, ramp=0.5)
-        response = simulate(loop, wall, FAR, duration=1.0, hand=hand, substeps=40)
+        response = simulate(loop, wall, NO_WALL, duration=1.0, hand=hand, substeps=40)
         moved = response.truth[-1]
         if sticks:  # the bristles bend, g(0)/sigma_0 at most, and the mass creeps as LuGre's model has it
             assert moved < 20.0 * Fs / s0
@@ -198,15 +219,17 @@ def test_bristles_rub_to_the_breakaway_level_and_slide_at_the_stribeck_curve():
 
 
 def test_friction_of_no_level_is_none():
-    free = bench()
-    with_none = bench(Nonlinear(friction=(dry(0.0), dry(0.0, 0, model="dahl", bristle_stiffness=1e4))))
+    free = two_mass_loop()
+    with_none = two_mass_loop(
+        Nonlinear(friction=(friction_of(0.0), friction_of(0.0, 0, model="dahl", bristle_stiffness=1e4)))
+    )
     responses = [run(loop, 1000.0, 3.0, 0.2, start_position=1e-3) for loop in (free, with_none)]
     assert np.array_equal(responses[0].truth, responses[1].truth)
 
 
 def test_the_step_of_an_encoder_and_friction_hold_a_small_motion_still():
     # within one count of the start, nothing acts
-    loop = bench(Nonlinear(friction=(dry(0.05),), counters=(Counter(np.array([0.0, 1.0]), 1e-5),)))
+    loop = two_mass_loop(Nonlinear(friction=(friction_of(0.05),), counters=(Counter(np.array([0.0, 1.0]), 1e-5),)))
     response = run(loop, 2000.0, 5.0, 1.0, start_position=4e-6)
     assert np.all(response.force == 0.0)
     assert response.truth == pytest.approx(np.full(len(response.truth), 4e-6), abs=1e-18)

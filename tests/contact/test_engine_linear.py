@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from contact.engine_cases import bench, run, settled_wall, spectral_radius
-from contact.powers_cases import fine_readings
+from contact.engine_cases import random_stable_wall, run, spectral_radius, two_mass_loop
+from contact.matrix_power_reference import fine_readings
 from systems import FEATURES, random_loop
 
 from zwidth.contact.environments import wall
+from zwidth.contact.motion_verdict import judge_response
 from zwidth.contact.simulate import Run, simulate, simulate_batch
-from zwidth.contact.verdict import judge_response
 from zwidth.loop.controller import Butterworth, FirstOrder
 from zwidth.loop.estimators import (
     AlphaBeta,
@@ -18,10 +18,12 @@ from zwidth.loop.estimators import (
     SavitzkyGolay,
     WindowedDifference,
 )
-from zwidth.model.modes import undeformed
+from zwidth.model.modes import least_deforming_motion
 
-LONG_ENOUGH = np.finfo(np.longdouble).eps < 1e-18
-needs_long_double = pytest.mark.skipif(not LONG_ENOUGH, reason="long double has no more digits than double here")
+HAS_LONG_DOUBLE = np.finfo(np.longdouble).eps < 1e-18
+needs_long_double = pytest.mark.skipif(
+    not HAS_LONG_DOUBLE, reason="long double has no more digits than double here"
+)
 SAMPLES = 10_001
 METHODS = [
     *(SavitzkyGolay(n, 2) for n in range(3, 13)),
@@ -36,9 +38,9 @@ METHODS = [
 ]
 
 
-def gap(loop, K, B, samples=SAMPLES, substeps=20):
+def relative_error(loop, K, B, samples=SAMPLES, substeps=20):
     """Largest difference to the powers, in the largest coordinate on the way."""
-    shape = undeformed(loop.plant)
+    shape = least_deforming_motion(loop.plant)
     readings, largest = fine_readings(loop, K, B, 1e-3 * shape, 0.01 * shape, samples)
     response = run(
         loop,
@@ -60,12 +62,12 @@ def random_gap(seed):
     rng = np.random.default_rng(1000 + seed)
     features = [feature for feature in FEATURES if rng.random() < 0.5]
     loop = random_loop(rng, kind=str(rng.choice(["chain", "dense", "coupled", "apart"])), features=features)
-    found = settled_wall(rng, loop)
+    found = random_stable_wall(rng, loop)
     if found is None:
         found, samples = (1e-6, 1e-6), 300
     else:
         samples = SAMPLES
-    return gap(loop, *found, samples, int(rng.choice([1, 2, 7, 20])))
+    return relative_error(loop, *found, samples, int(rng.choice([1, 2, 7, 20])))
 
 
 @needs_long_double
@@ -85,28 +87,28 @@ def test_the_worst_of_many_random_loops_is_as_the_page_says():
 @needs_long_double
 @pytest.mark.parametrize("delay", [0.3, 1.0, 2.999, 17.0, 40.5, 100.0])
 def test_delays_from_a_part_of_a_sample_to_a_hundred(delay):
-    loop = bench(delay=delay)
+    loop = two_mass_loop(delay=delay)
     K, B = 300.0 / (1.0 + delay), 0.6
     assert spectral_radius(loop, K, B) < 1.0
-    assert gap(loop, K, B) < 1e-10
+    assert relative_error(loop, K, B) < 1e-10
 
 
 @needs_long_double
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 def test_every_estimator_and_windows_of_every_length(method):
-    assert gap(bench(velocity=method, delay=0.4), 500.0, 3.0, 3000) < 1e-11
+    assert relative_error(two_mass_loop(velocity=method, delay=0.4), 500.0, 3.0, 3000) < 1e-11
 
 
 @needs_long_double
 @pytest.mark.parametrize("low_pass", [FirstOrder(0.004), *(Butterworth(order, 60.0) for order in (1, 2, 3, 5))])
 @pytest.mark.parametrize("where", ["velocity_filter", "force_filter"])
 def test_filters_on_velocity_and_force(low_pass, where):
-    loop = bench(**{where: low_pass}, actuator_time_constant=4e-4)
-    assert gap(loop, 300.0, 1.0, 3000) < 1e-11
+    loop = two_mass_loop(**{where: low_pass}, actuator_time_constant=4e-4)
+    assert relative_error(loop, 300.0, 1.0, 3000) < 1e-11
 
 
 def test_substeps_ledger_and_trail_change_nothing_of_a_linear_loop():
-    loop = bench(delay=1.3, actuator_time_constant=3e-4)
+    loop = two_mass_loop(delay=1.3, actuator_time_constant=3e-4)
     plain = run(loop, 200.0, 2.0, 1.0, start_position=1e-3, trail=False, ledger=False)
     for substeps in (1, 3, 20, 200):
         other = run(loop, 200.0, 2.0, 1.0, start_position=1e-3, substeps=substeps)
@@ -115,7 +117,7 @@ def test_substeps_ledger_and_trail_change_nothing_of_a_linear_loop():
 
 def test_trail_is_the_exact_motion_between_samples():
     # each substep of the trail is a sample of the same device under the same held forces
-    loop = bench(delay=0.3)
+    loop = two_mass_loop(delay=0.3)
     response = run(loop, 200.0, 2.0, 0.05, start_position=1e-3, substeps=10)
     fine = run(loop, 200.0, 2.0, 0.05, start_position=1e-3, substeps=40)
     assert np.interp(fine.trail_time[39::40], response.trail_time, response.trail) == pytest.approx(
@@ -183,6 +185,8 @@ def test_verdicts_agree_with_eigenvalues_away_from_the_boundary():
 
 
 def test_a_start_inside_the_wall_moves_on_from_there():
-    response = simulate(bench(), wall, wall.values(stiffness=300, damping=3), duration=1.0, start_position=5e-3)
+    response = simulate(
+        two_mass_loop(), wall, wall.values(stiffness=300, damping=3), duration=1.0, start_position=5e-3
+    )
     assert response.penetration[0] == pytest.approx(5e-3, rel=1e-14)
     assert abs(response.truth[-1]) < 5e-4

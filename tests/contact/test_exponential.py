@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from zwidth.contact.exponential import exponential, multiply
-from zwidth.contact.swing_kernel import held
+from zwidth.contact.vibration_kernel import held_response
 
 
-def balanced(rng, n):
+def random_plant_matrix(rng, n):
     """A vibrating plant between two samples, velocities in metres per sample; a free motion among the modes."""
     angles = np.append(0.0, 10.0 ** rng.uniform(-2.0, 0.7, n - 1))  # of each mode in a sample
     shapes = rng.normal(size=(n, n)) + 2.0 * np.eye(n)
@@ -19,7 +19,7 @@ def balanced(rng, n):
     return A
 
 
-def exactly(A, b, time):
+def reference_exponential(A, b, time):
     """exp(A time), its integral and that times b, by fifty digits."""
     N = len(A)
     with mpmath.workdps(50):
@@ -32,7 +32,7 @@ def exactly(A, b, time):
     return both[:N, :N], both[:N, N:], both[:N, N:] @ b
 
 
-def off(found, expected):
+def relative_difference(found, expected):
     return np.max(np.abs(found - expected)) / np.max(np.abs(expected))
 
 
@@ -40,21 +40,21 @@ def off(found, expected):
 def test_it_is_exact_with_its_integral_and_what_an_input_leaves(seed):
     rng = np.random.default_rng(seed)
     n, time = 1 + seed % 4, (1.0, 0.3, 1e-3)[seed % 3]
-    A, b = balanced(rng, n), rng.normal(size=2 * n)
+    A, b = random_plant_matrix(rng, n), rng.normal(size=2 * n)
     E, G = np.empty_like(A), np.empty_like(A)
     size = float(np.max(np.sum(np.abs(A), axis=1))) * time
     exponential(A, time, size, E, G, np.empty((3, *A.shape)))
-    expected = exactly(A, b, time)
-    assert off(E, expected[0]) < 2e-14
-    assert off(G, expected[1]) < 2e-14
-    E, gain = held(A, b, time)
-    assert off(E, expected[0]) < 2e-14
-    assert off(gain, expected[2]) < 2e-13
+    expected = reference_exponential(A, b, time)
+    assert relative_difference(E, expected[0]) < 2e-14
+    assert relative_difference(G, expected[1]) < 2e-14
+    E, gain = held_response(A, b, time)
+    assert relative_difference(E, expected[0]) < 2e-14
+    assert relative_difference(gain, expected[2]) < 2e-13
 
 
 def test_a_norm_in_other_units_changes_no_digit_that_counts():
     """Velocities in m/s: a thousand times larger numbers, and the same number of doublings."""
-    A = balanced(np.random.default_rng(3), 3)
+    A = random_plant_matrix(np.random.default_rng(3), 3)
     size, units = float(np.max(np.sum(np.abs(A), axis=1))), np.repeat([1.0, 1e3], 3)
     E, G, scaled, integral = (np.empty_like(A) for _ in range(4))
     exponential(A, 1.0, size, E, G, np.empty((3, *A.shape)))

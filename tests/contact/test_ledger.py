@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact.engine_cases import Events, bench, dry, one_mass, run, two_sided
+from contact.engine_cases import EventSolver, friction_of, one_mass, run, two_mass_loop, two_sided
 from contact.test_engine_friction import random_friction
 from systems import FEATURES, random_loop
 
 from zwidth.contact.environments import one_sided_wall, wall
 from zwidth.contact.hand import Hand, Tremor
-from zwidth.contact.passivity import PassivityController
-from zwidth.contact.response import SOURCES
+from zwidth.contact.passivity_controller import PassivityController
 from zwidth.contact.simulate import Run, simulate, simulate_batch
+from zwidth.contact.time_response import SOURCES
 from zwidth.loop.estimators import Foaw, Levant
 from zwidth.loop.loop import Loop
 from zwidth.model.nonlinear import Brake, Counter, Nonlinear, Spring
@@ -25,7 +25,7 @@ def entry(response, name):
     return response.energies[:, SOURCES.index(name)]
 
 
-def everything(rng, loop):
+def with_all_nonlinearities(rng, loop):
     """The loop with all that is not linear, at random."""
     plant, size = loop.plant, loop.plant.size
     stiff = np.trace(plant.stiffness) / size + 100.0
@@ -48,7 +48,7 @@ def test_it_adds_up_with_everything_on():
     rng, runs, durations = np.random.default_rng(17), [], []
     for k in range(120):
         features = [feature for feature in FEATURES if rng.random() < 0.5]
-        loop = everything(
+        loop = with_all_nonlinearities(
             rng, random_loop(rng, kind=str(rng.choice(["chain", "dense", "apart"])), features=features)
         )
         K = 0.02 / loop.period**2 * 10 ** rng.uniform(-3, 0)
@@ -76,30 +76,30 @@ def test_it_adds_up_with_electrical_dampers_far_faster_and_slower_than_the_sampl
 
 
 def test_the_walls_spring_keeps_its_energy():
-    response = run(bench(), 4000.0, 0.0, 1.0, start_position=1e-3, ledger=True)
+    response = run(two_mass_loop(), 4000.0, 0.0, 1.0, start_position=1e-3, ledger=True)
     y = response.truth
     assert entry(response, "wall") == pytest.approx(-2000.0 * (y**2 - y[0] ** 2), abs=1e-12)
 
 
 def test_the_hold_makes_half_k_dy_squared_in_each_period():
     # Gillespie and Cutkosky's leak of a held spring
-    response = run(bench(), 4000.0, 0.0, 1.0, start_position=1e-3)
+    response = run(two_mass_loop(), 4000.0, 0.0, 1.0, start_position=1e-3)
     leak = 0.5 * 4000.0 * np.concatenate([[0.0], np.cumsum(np.diff(response.truth) ** 2)])
     assert entry(response, "hold") == pytest.approx(leak, rel=1e-9, abs=1e-15)
 
 
 def test_the_velocity_estimate_is_charged_for_its_error():
-    loop = bench(delay=0.5)
+    loop = two_mass_loop(delay=0.5)
     response = run(loop, 3000.0, 6.0, 0.3, start_position=1e-3)
-    judged = Events(loop, two_sided(3000.0, 6.0)).run(np.full(2, 1e-3), np.zeros(2), 241)
-    velocity, dy = judged.speed @ loop.plant.sensor, np.diff(judged.place @ loop.plant.sensor)
+    judged = EventSolver(loop, two_sided(3000.0, 6.0)).run(np.full(2, 1e-3), np.zeros(2), 241)
+    velocity, dy = judged.velocity @ loop.plant.sensor, np.diff(judged.position @ loop.plant.sensor)
     estimated = np.concatenate([[0.0], dy / loop.period])
     charged = np.cumsum(-6.0 * (estimated - velocity)[:-1] * dy)
     assert entry(response, "velocity estimate")[1:] == pytest.approx(charged, rel=1e-7, abs=1e-13)
 
 
 def test_the_quantiser_is_charged_for_the_force_that_it_changes():
-    loop = bench(Nonlinear(counters=(Counter(MOTOR, 1e-5),)))
+    loop = two_mass_loop(Nonlinear(counters=(Counter(MOTOR, 1e-5),)))
     response = run(loop, 3000.0, 6.0, 0.5, start_position=1e-3)
     true_speed = np.diff(response.truth, prepend=response.truth[0]) / loop.period
     without = -(3000.0 * response.truth + 6.0 * true_speed)
@@ -108,10 +108,10 @@ def test_the_quantiser_is_charged_for_the_force_that_it_changes():
 
 
 def test_structure_friction_hand_and_stored_are_the_ode_solvers_integrals():
-    parts = Nonlinear(friction=(dry(0.1), dry(0.05, 0)))
-    loop = bench(parts, actuator_time_constant=4e-4, delay=0.3)
+    parts = Nonlinear(friction=(friction_of(0.1), friction_of(0.05, 0)))
+    loop = two_mass_loop(parts, actuator_time_constant=4e-4, delay=0.3)
     x, v = np.array([1e-3, 1e-3]), np.array([0.05, 0.05])
-    judged = Events(loop, two_sided(2500.0, 5.0), push=lambda t: 1.5).run(x, v, 161)
+    judged = EventSolver(loop, two_sided(2500.0, 5.0), push=lambda t: 1.5).run(x, v, 161)
     response = run(loop, 2500.0, 5.0, 0.2, start=(x, v), hand=Hand(push=1.5), substeps=160)
     structure, rubbed, hand, actuated = judged.work.T
     size = np.abs(judged.work).max()
@@ -123,14 +123,14 @@ def test_structure_friction_hand_and_stored_are_the_ode_solvers_integrals():
     plant = loop.plant
     energy = [
         0.5 * (v @ plant.mass @ v + x @ plant.stiffness @ x)
-        for x, v in zip(judged.place, judged.speed, strict=True)
+        for x, v in zip(judged.position, judged.velocity, strict=True)
     ]
     assert response.stored == pytest.approx(np.array(energy) - energy[0], abs=1e-4 * size)
 
 
 def test_linear_losses_are_exact_whatever_the_substep():
-    loop = bench()
-    judged = Events(loop, two_sided(3000.0, 6.0)).run(np.full(2, 1e-3), np.zeros(2), 161)
+    loop = two_mass_loop()
+    judged = EventSolver(loop, two_sided(3000.0, 6.0)).run(np.full(2, 1e-3), np.zeros(2), 161)
     for substeps in (1, 3, 20):
         response = run(loop, 3000.0, 6.0, 0.2, start_position=1e-3, substeps=substeps)
         assert entry(response, "structure") == pytest.approx(
@@ -160,6 +160,6 @@ def test_the_passivity_controllers_own_entry_is_its_force():
 
 
 def test_without_a_ledger_there_is_none():
-    response = run(bench(), 1000.0, 2.0, 0.1, start_position=1e-3, ledger=False)
+    response = run(two_mass_loop(), 1000.0, 2.0, 0.1, start_position=1e-3, ledger=False)
     assert response.energies.size == 0
     assert np.isnan(response.imbalance)

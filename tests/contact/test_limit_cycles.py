@@ -5,15 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.contact.limit_cycles_cases import largest_recovered, random_wall, simulate, vibration
+from tests.contact.limit_cycles_cases import random_wall, recovery_limit, simulate, vibration
 from tests.systems import mass, random_loop
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.verdict import eigenvalues, judge
-from zwidth.contact import describing
-from zwidth.contact.equivalent import equivalent_loop
-from zwidth.contact.limit_cycles import harmonic_balance, limit_cycles
-from zwidth.contact.plane import BOTH, LARGE, PASSIVE, SMALL, device_plane, quiet_limit, region, resting_limit
-from zwidth.contact.swing_kernel import vibrations
+from zwidth.contact import describing_functions
+from zwidth.contact.friction_quantisation_plane import (
+    BOTH,
+    LARGE,
+    PASSIVE,
+    SMALL,
+    device_plane,
+    plane_region,
+    quiet_limit,
+    resting_limit,
+)
+from zwidth.contact.harmonic_balance import harmonic_balance, limit_cycles
+from zwidth.contact.quasi_linear import equivalent_loop
+from zwidth.contact.vibration_kernel import vibrations
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear, Spring
@@ -36,7 +45,7 @@ def edge(loop, B):
 def test_a_linear_loop_has_none():
     assert limit_cycles(ONE_MASS, 400.0, 0.0) == []
     assert limit_cycles(ONE_MASS, 400.0, 0.0, resolution=0.0, coulomb_friction=0.0) == []
-    assert limit_cycles(ONE_MASS, 150.0, 0.0, saturation=1.0) == []
+    assert limit_cycles(ONE_MASS, 150.0, 0.0, force_limit=1.0) == []
 
 
 def test_one_mass_in_closed_form():
@@ -45,12 +54,14 @@ def test_one_mass_in_closed_form():
     (cycle,) = limit_cycles(ONE_MASS, K, 0.0, coulomb_friction=C)
     assert cycle.amplitude == pytest.approx(4.0 * C / (np.pi * np.sqrt(K / 0.1) * (K * T / 2.0 - b)), rel=0.002)
     assert not cycle.stable
-    (cycle,) = limit_cycles(ONE_MASS, K, 0.0, saturation=2.0)
-    assert float(describing.saturation(cycle.force_amplitude, 2.0)) == pytest.approx(2.0 * b / (K * T), rel=0.002)
+    (cycle,) = limit_cycles(ONE_MASS, K, 0.0, force_limit=2.0)
+    assert float(describing_functions.saturation(cycle.force_amplitude, 2.0)) == pytest.approx(
+        2.0 * b / (K * T), rel=0.002
+    )
     assert cycle.stable
 
 
-def slow(*values):
+def slow_cases(*values):
     """Cases for `make slow`."""
     return [pytest.param(*each, marks=pytest.mark.slow) for each in values]
 
@@ -61,9 +72,9 @@ def slow(*values):
         ("friction", 1),
         ("quantiser", 2),
         ("saturation", 3),
-        *slow(*(("friction", seed) for seed in (0, 2, 3))),
-        *slow(*(("quantiser", seed) for seed in (0, 1, 3))),
-        *slow(*(("saturation", seed) for seed in (0, 1, 2))),
+        *slow_cases(*(("friction", seed) for seed in (0, 2, 3))),
+        *slow_cases(*(("quantiser", seed) for seed in (0, 1, 3))),
+        *slow_cases(*(("saturation", seed) for seed in (0, 1, 2))),
     ],
 )
 def test_the_linear_loop_of_a_cycle_is_on_its_edge(what, seed):
@@ -78,16 +89,16 @@ def test_the_linear_loop_of_a_cycle_is_on_its_edge(what, seed):
     K = edge(loop, B) * (0.9 if what == "quantiser" else 1.2)
     if not np.isfinite(K):
         return
-    part = {"friction": "coulomb_friction", "quantiser": "resolution", "saturation": "saturation"}[what]
+    part = {"friction": "coulomb_friction", "quantiser": "resolution", "saturation": "force_limit"}[what]
     for cycle in limit_cycles(loop, K, B, **{part: 1e-3}):
         gain, plant = 1.0, loop.plant
         if what == "friction":
-            b = float(describing.coulomb_damper(1e-3, cycle.velocity_amplitudes[0]))
+            b = float(describing_functions.coulomb_damper(1e-3, cycle.velocity_amplitudes[0]))
             plant = replace(plant, damping=plant.damping + b * np.outer(plant.sensor, plant.sensor))
         elif what == "quantiser":
-            gain = float(describing.quantiser(cycle.amplitude, 1e-3))
+            gain = float(describing_functions.quantiser(cycle.amplitude, 1e-3))
         else:
-            gain = float(describing.saturation(cycle.force_amplitude, 1e-3))
+            gain = float(describing_functions.saturation(cycle.force_amplitude, 1e-3))
         roots = eigenvalues(Loop(plant, loop.controller), gain * K, gain * B)
         on_circle = np.exp(2j * np.pi * cycle.frequency_Hz * loop.period)
         assert np.min(np.abs(roots - on_circle)) < 5e-7
@@ -119,9 +130,9 @@ def test_most_of_these_loops_have_cycles():
         assert limit_cycles(loop, K, B, coulomb_friction=1.0)
 
 
-def shape_of(loop, K, B, cycle, C):
+def initial_state(loop, K, B, cycle, C):
     """States [x, x'] of the equivalent linear loop's critical vibration, as large as the cycle."""
-    b = float(describing.coulomb_damper(C, cycle.velocity_amplitudes[0]))
+    b = float(describing_functions.coulomb_damper(C, cycle.velocity_amplitudes[0]))
     plant = replace(loop.plant, damping=loop.plant.damping + b * np.outer(loop.plant.sensor, loop.plant.sensor))
     w = 2.0 * np.pi * cycle.frequency_Hz
     x = np.linalg.solve(
@@ -131,24 +142,26 @@ def shape_of(loop, K, B, cycle, C):
     return np.concatenate([x, 1j * w * x]).real
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("mass", 0), ("two-mass", 1), *slow(("mass", 1), ("two-mass", 0))])
+@pytest.mark.parametrize(
+    ("kind", "seed"), [("mass", 0), ("two-mass", 1), *slow_cases(("mass", 1), ("two-mass", 0))]
+)
 def test_dry_friction_is_overcome_where_predicted(kind, seed):
     """Within 4 % over the sampling rates, down to 5 samples in a cycle."""
     loop, K, B = random_wall(np.random.default_rng([seed, 5]), kind, (1.02, 1.6))
     cycle = limit_cycles(loop, K, B, coulomb_friction=1.0)[0]
     assert not cycle.stable
-    start = shape_of(loop, K, B, cycle, 1.0)
-    assert largest_recovered(loop, K, B, cycle, start, coulomb=1.0) == pytest.approx(cycle.amplitude, rel=0.04)
+    start = initial_state(loop, K, B, cycle, 1.0)
+    assert recovery_limit(loop, K, B, cycle, start, coulomb=1.0) == pytest.approx(cycle.amplitude, rel=0.04)
 
 
 @pytest.mark.parametrize(
     ("kind", "seed"),
-    [("mass", 0), ("two-mass", 1), *slow(("mass", 1), ("mass", 2), ("two-mass", 0), ("two-mass", 2))],
+    [("mass", 0), ("two-mass", 1), *slow_cases(("mass", 1), ("mass", 2), ("two-mass", 0), ("two-mass", 2))],
 )
 def test_saturation_just_beyond_the_edge(kind, seed):
     """With forces up to a quarter beyond the limit: 12 % in amplitude, 3 % in frequency."""
     loop, K, B = random_wall(np.random.default_rng([seed, 9]), kind, (1.005, 1.03))
-    for cycle in limit_cycles(loop, K, B, saturation=1.0):
+    for cycle in limit_cycles(loop, K, B, force_limit=1.0):
         if not cycle.stable or cycle.force_amplitude > 1.25:
             continue
         start = np.zeros(2 * loop.plant.size)
@@ -192,11 +205,11 @@ def test_parts_of_the_plant_are_found_and_replaced():
         found = harmonic_balance(loop, 400.0, 0.0, amplitudes=(1e-3, 3e-2), **replaced)
         return [cycle.amplitude for cycle in found.cycles]
 
-    given = amplitudes(ONE_MASS, coulomb_friction=[0.01], resolution=1e-5, saturation=1.0)
+    given = amplitudes(ONE_MASS, coulomb_friction=[0.01], resolution=1e-5, force_limit=1.0)
     assert len(given) == 2
     assert amplitudes(own) == pytest.approx(given, rel=1e-9)
-    assert amplitudes(own, coulomb_friction=0.0, resolution=0.0, saturation=np.inf) == []
-    limited = Loop(ONE_MASS.plant, replace(ONE_MASS.controller, saturation=1.0))
+    assert amplitudes(own, coulomb_friction=0.0, resolution=0.0, force_limit=np.inf) == []
+    limited = Loop(ONE_MASS.plant, replace(ONE_MASS.controller, force_limit=1.0))
     assert len(amplitudes(limited)) == 1
 
 
@@ -209,7 +222,7 @@ def test_a_hardening_spring_holds_a_growing_vibration():
 
 
 def test_growth_over_amplitude():
-    found = harmonic_balance(ONE_MASS, 400.0, 0.0, coulomb_friction=0.01, saturation=1.0, amplitudes=(1e-4, 0.1))
+    found = harmonic_balance(ONE_MASS, 400.0, 0.0, coulomb_friction=0.01, force_limit=1.0, amplitudes=(1e-4, 0.1))
     assert found.amplitude[0] == 1e-4
     assert found.growth[0] < 0.0 < np.max(found.growth)
     small, large = found.cycles
@@ -218,7 +231,12 @@ def test_growth_over_amplitude():
 
 
 def test_the_plane():
-    assert [region(1, 1), region(1, 0.4), region(0.4, 1), region(0.4, 0.4)] == [PASSIVE, SMALL, LARGE, BOTH]
+    assert [plane_region(1, 1), plane_region(1, 0.4), plane_region(0.4, 1), plane_region(0.4, 0.4)] == [
+        PASSIVE,
+        SMALL,
+        LARGE,
+        BOTH,
+    ]
     parts = Nonlinear((Friction(2.0 * np.ones(1), 0.01),), (Counter(np.ones(1), 1e-5, 2.0),))
     loop = Loop(replace(ONE_MASS.plant, nonlinear=parts), ONE_MASS.controller)
     found = device_plane(loop, [100.0, 400.0])
@@ -234,8 +252,8 @@ def test_the_plane():
         (lambda: limit_cycles(ONE_MASS, 1.0, 0.0, coulomb_friction=-1.0), "must not be negative"),
         (lambda: limit_cycles(ONE_MASS, 1.0, 0.0, coulomb_friction=[1.0, 1.0]), "one number or 1"),
         (lambda: limit_cycles(ONE_MASS, 1.0, 0.0, resolution=-1.0), "resolution must not be negative"),
-        (lambda: limit_cycles(ONE_MASS, 1.0, 0.0, saturation=0.0), "saturation must be positive"),
-        (lambda: harmonic_balance(ONE_MASS, 1.0, 0.0, saturation=1.0, amplitudes=(2.0, 1.0)), "lower first"),
+        (lambda: limit_cycles(ONE_MASS, 1.0, 0.0, force_limit=0.0), "force_limit must be positive"),
+        (lambda: harmonic_balance(ONE_MASS, 1.0, 0.0, force_limit=1.0, amplitudes=(2.0, 1.0)), "lower first"),
         (lambda: device_plane(ONE_MASS, [0.0], 1.0, 1.0), "positive and finite"),
         (lambda: device_plane(ONE_MASS, [1.0], 1.0), "encoder with steps"),
         (

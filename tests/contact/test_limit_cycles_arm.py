@@ -8,8 +8,8 @@ import scipy.linalg
 
 from tests.systems import mass
 from zwidth.chart.verdict import eigenvalues
-from zwidth.contact.describing import coulomb_damper
-from zwidth.contact.limit_cycles import harmonic_balance
+from zwidth.contact.describing_functions import coulomb_damper
+from zwidth.contact.harmonic_balance import harmonic_balance
 from zwidth.device.load import load
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
@@ -94,7 +94,7 @@ def test_a_search_makes_its_matrices_itself(monkeypatch):
     calls = []
     whole = scipy.linalg.expm
     monkeypatch.setattr(scipy.linalg, "expm", lambda matrix: calls.append(1) or whole(matrix))
-    harmonic_balance(Loop(mass(0.1, 0.1), Controller(0.001)), 400.0, 0.0, coulomb_friction=0.01, saturation=1.0)
+    harmonic_balance(Loop(mass(0.1, 0.1), Controller(0.001)), 400.0, 0.0, coulomb_friction=0.01, force_limit=1.0)
     assert len(calls) < 10
 
 

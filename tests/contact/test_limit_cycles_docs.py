@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 
 import numpy as np
-from later import Later
+from lazy_module import LazyModule
 
-study = Later("gallery.quantisation_limit")
+study = LazyModule("gallery.quantisation_limit")
 
 PAGE = (Path(__file__).parents[2] / "docs" / "limit-cycles.md").read_text(encoding="utf-8")
 

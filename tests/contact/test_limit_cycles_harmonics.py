@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tests.contact.limit_cycles_cases import random_wall, simulate, vibration
-from tests.contact.limit_cycles_study import met, with_parts
+from tests.contact.limit_cycles_study import simulate_cycle, with_nonlinearities
 from tests.systems import mass
+from zwidth.contact.harmonic_balance import limit_cycles
 from zwidth.contact.harmonics import with_harmonics
-from zwidth.contact.limit_cycles import limit_cycles
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 
@@ -19,7 +19,7 @@ def device(number):
     rng = np.random.default_rng(SEED)
     for i in range(number + 1):
         loop, K, B = random_wall(rng, ("mass", "two-mass")[i % 2], (1.03, 1.3))
-    return with_parts(loop, limit=1.0), K, B
+    return with_nonlinearities(loop, limit=1.0), K, B
 
 
 def test_the_whole_force_is_in_the_harmonics():
@@ -27,7 +27,7 @@ def test_the_whole_force_is_in_the_harmonics():
     loop, K, B = device(6)
     (first,) = (cycle for cycle in limit_cycles(loop, K, B) if cycle.stable)
     full = with_harmonics(loop, K, B, first)
-    pair = met(loop, K, B, first)
+    pair = simulate_cycle(loop, K, B, first)
     assert pair.amplitude_ratio > 1.85
     assert pair.frequency_ratio < 0.75
     assert full.amplitude == pytest.approx(pair.amplitude, rel=0.01)
@@ -43,13 +43,13 @@ def test_the_whole_force_is_in_the_harmonics():
 def test_other_devices(number):
     loop, K, B = device(number)
     for first in limit_cycles(loop, K, B):
-        full, pair = with_harmonics(loop, K, B, first), met(loop, K, B, first)
+        full, pair = with_harmonics(loop, K, B, first), simulate_cycle(loop, K, B, first)
         assert full.amplitude == pytest.approx(pair.amplitude, rel=0.02)
         assert full.frequency_Hz == pytest.approx(pair.frequency, rel=0.01)
 
 
 def test_just_beyond_the_edge_nothing_changes():
-    loop = with_parts(Loop(mass(0.1, 0.1), Controller(0.001)), limit=1.0)
+    loop = with_nonlinearities(Loop(mass(0.1, 0.1), Controller(0.001)), limit=1.0)
     (first,) = limit_cycles(loop, 200.1, 0.0)
     full = with_harmonics(loop, 200.1, 0.0, first)
     assert full.amplitude == pytest.approx(first.amplitude, rel=1e-3)
@@ -59,9 +59,9 @@ def test_just_beyond_the_edge_nothing_changes():
 
 def test_the_limit_may_be_given_and_scales():
     loop = Loop(mass(0.1, 0.1), Controller(0.001))
-    (first,) = limit_cycles(loop, 400.0, 0.05, saturation=3.0)
-    (one,) = limit_cycles(loop, 400.0, 0.05, saturation=1.0)
-    full, unit = (with_harmonics(loop, 400.0, 0.05, c, saturation=s) for c, s in ((first, 3.0), (one, 1.0)))
+    (first,) = limit_cycles(loop, 400.0, 0.05, force_limit=3.0)
+    (one,) = limit_cycles(loop, 400.0, 0.05, force_limit=1.0)
+    full, unit = (with_harmonics(loop, 400.0, 0.05, c, force_limit=s) for c, s in ((first, 3.0), (one, 1.0)))
     assert full.amplitude == pytest.approx(3.0 * unit.amplitude, rel=1e-6)
     assert full.frequency_Hz == pytest.approx(unit.frequency_Hz, rel=1e-7)
     with pytest.raises(ValueError, match="limit is inf N"):

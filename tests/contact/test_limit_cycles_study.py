@@ -6,7 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.contact.limit_cycles_study import between_counts, beyond_the_quiet_limit, quantised, saturated
+from tests.contact.limit_cycles_study import (
+    beyond_the_quiet_limit,
+    cycles_between_counts,
+    quantised_cycles,
+    saturated_cycles,
+)
 from zwidth.contact.harmonics import with_harmonics
 
 PAGE = " ".join((Path(__file__).parents[2] / "docs" / "limit-cycles.md").read_text(encoding="utf-8").split())
@@ -33,7 +38,7 @@ def ranges(pairs):
 )
 def test_saturation(excess, first, full):
     pairs, refined = [], []
-    for K, B, pair in saturated(16, excess):
+    for K, B, pair in saturated_cycles(16, excess):
         pairs.append(pair)
         refined.append(replace(pair, cycle=with_harmonics(pair.loop, K, B, pair.cycle)))
     for found, expected in ((pairs, first), (refined, full)):
@@ -44,7 +49,7 @@ def test_saturation(excess, first, full):
 @pytest.mark.slow
 def test_saturation_far_beyond_the_edge():
     """Some vibrations never repeat there: how large they get hangs on the last digit of the wall."""
-    pairs = [(K, B, pair) for K, B, pair in saturated(16, (1.3, 2.5))]
+    pairs = [(K, B, pair) for K, B, pair in saturated_cycles(16, (1.3, 2.5))]
     refined = [replace(pair, cycle=with_harmonics(pair.loop, K, B, pair.cycle)) for K, B, pair in pairs]
     for found, bounds in (([pair for *_, pair in pairs], (1.0, 7.0, 0.4, 1.1)), (refined, (0.8, 2.0, 0.8, 1.1))):
         low, high, slow, fast = ranges(found)
@@ -55,7 +60,7 @@ def test_saturation_far_beyond_the_edge():
 
 @pytest.mark.slow
 def test_an_encoder_without_friction():
-    devices = list(quantised(80))
+    devices = list(quantised_cycles(80))
     pairs = [pair for found, _ in devices for pair in found]
     assert all(moving for _, moving in devices)
     says("all 80 kept moving")
@@ -70,13 +75,13 @@ def test_an_encoder_without_friction():
 @pytest.mark.slow
 @pytest.mark.parametrize(("friction", "count"), [(0.1, 5), (0.2, 1), (0.3, 1)])
 def test_an_encoder_with_friction(friction, count):
-    assert sum(moving for _, moving in quantised(40, friction)) == count
+    assert sum(moving for _, moving in quantised_cycles(40, friction)) == count
     says(f"{count} of 40 at {friction}")
 
 
 @pytest.mark.slow
 def test_between_two_counts_with_friction():
-    devices = [each for friction in (0.2, 0.4) for each in between_counts(20, friction)]
+    devices = [each for friction in (0.2, 0.4) for each in cycles_between_counts(20, friction)]
     assert all(moving for _, moving in devices)
     assert [len(pairs) for pairs, _ in devices] == [1] * 40
     says("predicted and found in all 40")
@@ -91,7 +96,7 @@ def test_between_two_counts_with_friction():
 
 @pytest.mark.slow
 def test_between_the_two_limits():
-    devices = list(between_counts(12, 0.52))
+    devices = list(cycles_between_counts(12, 0.52))
     predicted = [pair for pairs, _ in devices for pair in pairs]
     assert [len(pairs) for pairs, _ in devices] == [1] * 12
     assert all(np.isnan(pair.amplitude) for pair in predicted)

@@ -6,7 +6,7 @@ from contact.mechanism_cases import (
     motion_of,
     paddle,
     planar_chain,
-    sampled,
+    sampled_controller,
     uncoupled_five_bar,
     with_drives,
     with_friction,
@@ -14,14 +14,14 @@ from contact.mechanism_cases import (
 from model.model_cases import rotation_about
 
 import zwidth
-from zwidth.contact.mechanism.checks import MotionError
-from zwidth.contact.mechanism.reach import SurfaceOutOfReach
+from zwidth.contact.mechanism.motion_inputs import MotionError
+from zwidth.contact.mechanism.surface_reach import SurfaceOutOfReach
 from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, depth_and_normal
 from zwidth.contact.mechanism.walls import SurfaceWall
-from zwidth.contact.room import TooLarge
 from zwidth.loop.controller import FirstOrder
 from zwidth.loop.estimators import BackwardDifference, Foaw, Kalman, Levant, WindowedDifference
-from zwidth.loop.estimators.running import velocity_of
+from zwidth.loop.estimators.run_estimator import velocity_of
+from zwidth.memory_limit import TooLarge
 from zwidth.model.damping import ModalDamping
 from zwidth.model.posture import solve_posture
 
@@ -29,9 +29,9 @@ FIVE_BAR, DAMPED = uncoupled_five_bar(), ModalDamping(0.05)
 INTO = Plane((0.0, 0.26), (0.0, -1.0))
 
 
-def moved(mechanism=FIVE_BAR, controller=None, wall=None, surface=None, **settings):
+def push_five_bar(mechanism=FIVE_BAR, controller=None, wall=None, surface=None, **settings):
     settings = {"duration": 0.2, "push": (0.1, 1.0, 0.0)} | settings
-    return motion_of(mechanism, DAMPED, controller or sampled(), wall, surface, **settings)
+    return motion_of(mechanism, DAMPED, controller or sampled_controller(), wall, surface, **settings)
 
 
 # --- counts ---------------------------------------------------------------------------------------------
@@ -41,10 +41,10 @@ def moved(mechanism=FIVE_BAR, controller=None, wall=None, surface=None, **settin
 def test_quanta_of_the_handle_vary_with_the_direction(at):
     """What is seen is off by at most half of sum |u^T J_i| dtheta_i along u, and comes near to it."""
     counted = with_drives(FIVE_BAR, encoder_counts=400.0)
-    motion = moved(counted, duration=2.0, at=at, push=None, start_velocity=(0.004, 0.003, 0.0), substeps=1)
+    motion = push_five_bar(counted, duration=2.0, at=at, push=None, start_velocity=(0.004, 0.003, 0.0), substeps=1)
     J = solve_posture(counted, at).jacobian
     step = 2.0 * np.pi / (400.0 * counted.drives.transmission)
-    exact = moved(FIVE_BAR, duration=2.0, at=at, push=None, start_velocity=(0.004, 0.003, 0.0), substeps=1)
+    exact = push_five_bar(FIVE_BAR, duration=2.0, at=at, push=None, start_velocity=(0.004, 0.003, 0.0), substeps=1)
     off = motion.counted_position - exact.counted_position
     for angle in np.linspace(0.0, np.pi, 7):
         u = np.array([np.cos(angle), np.sin(angle), 0.0])
@@ -55,7 +55,7 @@ def test_quanta_of_the_handle_vary_with_the_direction(at):
 
 def test_what_is_seen_is_the_kinematics_of_the_counts():
     counted = with_drives(planar_chain(2), encoder_counts=1000.0)
-    motion = moved(counted, duration=0.1, push=(0.3, 0.0, 0.0))
+    motion = push_five_bar(counted, duration=0.1, push=(0.3, 0.0, 0.0))
     step = 2.0 * np.pi / (1000.0 * 18.6)
     one, two = np.moveaxis(step * np.round(motion.motors / step), -1, 0)
     there = 0.2 * np.stack([np.cos(one), np.sin(one)]) + 0.15 * np.stack([np.cos(one + two), np.sin(one + two)])
@@ -64,15 +64,15 @@ def test_what_is_seen_is_the_kinematics_of_the_counts():
 
 def test_encoders_on_the_links_and_encoders_as_fine_as_you_like():
     counted = with_drives(FIVE_BAR, encoder_counts=100.0)
-    fine = moved(counted, counted=False)
+    fine = push_five_bar(counted, counted=False)
     assert np.ptp(fine.counted_position - fine.position) > 1e-6  # the drives bend
-    links = moved(counted, counted=False, encoders="link")
+    links = push_five_bar(counted, counted=False, encoders="link")
     assert links.counted_position == pytest.approx(links.position, abs=1e-13)
 
 
 def test_noise_of_the_encoders_comes_from_the_seed():
     noisy = with_friction(FIVE_BAR, encoder_noise=1e-4)
-    one, again, other = (moved(noisy, seed=seed) for seed in (1, 1, 2))
+    one, again, other = (push_five_bar(noisy, seed=seed) for seed in (1, 1, 2))
     assert np.array_equal(one.counted_position, again.counted_position)
     assert not np.array_equal(one.counted_position, other.counted_position)
 
@@ -86,7 +86,7 @@ def test_every_estimator_sees_what_it_sees_elsewhere(velocity):
     """Damping alone against a plane: the force is the estimate of the depth's rate."""
     counted = with_drives(FIVE_BAR, encoder_counts=4000.0)
     plane = Plane((0.0, 0.25), (0.0, 1.0), two_sided=True)
-    motion = moved(counted, sampled(velocity=velocity), SurfaceWall(0.0, 0.5), plane)
+    motion = push_five_bar(counted, sampled_controller(velocity=velocity), SurfaceWall(0.0, 0.5), plane)
     seen = velocity_of(velocity, motion.counted_position[:, 1] - motion.counted_position[0, 1], 1e-3)
     assert motion.force[:, 1] == pytest.approx(-0.5 * seen, rel=1e-9, abs=1e-9 * np.max(np.abs(seen)))
 
@@ -148,7 +148,7 @@ SHAPES = [
 @pytest.mark.parametrize("surface", SHAPES, ids=lambda s: f"{type(s).__name__} {getattr(s, 'hollow', '')}")
 def test_the_force_is_the_walls_at_the_place_that_is_seen(surface):
     """K depth along the normal, from the motors by J^T of that place; nothing outside."""
-    motion = moved(wall=SurfaceWall(500.0), surface=surface, duration=0.25, push=(0.05, 1.0, 0.0))
+    motion = push_five_bar(wall=SurfaceWall(500.0), surface=surface, duration=0.25, push=(0.05, 1.0, 0.0))
     depth, normal = depth_and_normal(surface, motion.counted_position)
     assert np.any(depth > 1e-3)
     assert np.any(depth < 0.0)
@@ -162,15 +162,17 @@ def test_the_force_is_the_walls_at_the_place_that_is_seen(surface):
 def test_a_push_comes_to_rest_where_the_wall_holds_it(surface):
     """1 N into 500 N/m: 2 mm deep as the motors see it."""
     settings = {"duration": 3.0, "push": (0.0, 1.0, 0.0)}
-    motion = motion_of(FIVE_BAR, ModalDamping(0.5), sampled(), SurfaceWall(500.0, 12.0), surface, **settings)
+    motion = motion_of(
+        FIVE_BAR, ModalDamping(0.5), sampled_controller(), SurfaceWall(500.0, 12.0), surface, **settings
+    )
     assert motion.status == "done"
     assert motion.counted_position[-1, 1] == pytest.approx(0.262, abs=2e-5)
     assert motion.force[-1] == pytest.approx([0.0, -1.0, 0.0], abs=1e-2)
 
 
 def test_a_start_inside_the_wall_is_said():
-    assert not moved(surface=INTO, wall=SurfaceWall(500.0)).started_inside
-    assert moved(surface=INTO, wall=SurfaceWall(500.0), at=(0.0, 0.265), push=None).started_inside
+    assert not push_five_bar(surface=INTO, wall=SurfaceWall(500.0)).started_inside
+    assert push_five_bar(surface=INTO, wall=SurfaceWall(500.0), at=(0.0, 0.265), push=None).started_inside
 
 
 # --- limits, delay, pulling -----------------------------------------------------------------------------
@@ -179,7 +181,11 @@ def test_a_start_inside_the_wall_is_said():
 def test_torques_and_forces_stay_within_their_limits():
     tight = with_drives(FIVE_BAR, torque_limit=(1e-3, 2e-3))
     deep = {"at": (0.02, 0.27), "push": None, "surface": INTO, "wall": SurfaceWall(2000.0)}
-    free, each, together = moved(**deep), moved(tight, **deep), moved(tight, torque_limits="together", **deep)
+    free, each, together = (
+        push_five_bar(**deep),
+        push_five_bar(tight, **deep),
+        push_five_bar(tight, torque_limits="together", **deep),
+    )
     limit = np.array([1e-3, 2e-3]) * 18.6
     assert np.all(np.abs(each.torque) <= limit)
     assert np.all(np.abs(together.torque) <= limit * (1 + 1e-12))
@@ -187,21 +193,21 @@ def test_torques_and_forces_stay_within_their_limits():
     turned = [np.linalg.det([limited.torque[0], free.torque[0]]) for limited in (together, each)]
     assert turned[0] == pytest.approx(0.0, abs=1e-15)
     assert abs(turned[1]) > 1e-6
-    cut = moved(FIVE_BAR, sampled(saturation=3.0), **deep)
+    cut = push_five_bar(FIVE_BAR, sampled_controller(force_limit=3.0), **deep)
     assert np.max(np.linalg.norm(cut.force, axis=1)) == pytest.approx(3.0)
 
 
 def test_a_wall_may_pull_unless_told_not_to():
     settings = {"surface": INTO, "at": (0.0, 0.265), "push": None, "start_velocity": (0.0, -0.3)}
-    assert np.max(moved(wall=SurfaceWall(300.0, 20.0), **settings).force[:, 1]) > 0.0
-    assert np.max(moved(wall=SurfaceWall(300.0, 20.0, no_pull=True), **settings).force[:, 1]) == 0.0
+    assert np.max(push_five_bar(wall=SurfaceWall(300.0, 20.0), **settings).force[:, 1]) > 0.0
+    assert np.max(push_five_bar(wall=SurfaceWall(300.0, 20.0, no_pull=True), **settings).force[:, 1]) == 0.0
 
 
 @pytest.mark.parametrize("delay", [1.0, 2.5])
 def test_a_delay_keeps_the_motors_waiting(delay):
     """Nothing moves before the first command arrives, in the middle of a period too."""
-    motion = moved(
-        controller=sampled(delay=delay),
+    motion = push_five_bar(
+        controller=sampled_controller(delay=delay),
         wall=SurfaceWall(500.0),
         surface=INTO,
         at=(0.0, 0.265),
@@ -215,7 +221,7 @@ def test_a_delay_keeps_the_motors_waiting(delay):
 
 def test_a_filter_of_the_force_smooths_it():
     hard = {"wall": SurfaceWall(500.0), "surface": INTO, "at": (0.0, 0.265), "push": None, "duration": 0.01}
-    motion = moved(controller=sampled(force_filter=FirstOrder(9e-3)), **hard)
+    motion = push_five_bar(controller=sampled_controller(force_filter=FirstOrder(9e-3)), **hard)
     assert motion.force[0, 1] == pytest.approx(-0.1 * 500.0 * 5e-3)
 
 
@@ -250,12 +256,12 @@ def test_a_filter_of_the_force_smooths_it():
 )
 def test_inputs_that_cannot_be_meant_are_refused_in_words(settings, said):
     with pytest.raises(ValueError, match=said):
-        moved(**settings)
+        push_five_bar(**settings)
 
 
 def test_days_are_refused_with_the_memory_they_would_need():
     with pytest.raises(TooLarge, match=r"86400000000 samples .* would take .* GB"):
-        moved(duration=1e3 * 86400.0)
+        push_five_bar(duration=1e3 * 86400.0)
 
 
 @pytest.mark.parametrize(
@@ -271,25 +277,26 @@ def test_days_are_refused_with_the_memory_they_would_need():
 )
 def test_a_surface_out_of_the_workspace_is_refused(surface):
     with pytest.raises(SurfaceOutOfReach, match="never touches the surface in assembly 'outward'"):
-        moved(surface=surface, wall=SurfaceWall(500.0))
+        push_five_bar(surface=surface, wall=SurfaceWall(500.0))
 
 
 @pytest.mark.parametrize(
     "surface", [Plane((0.0, 0.34), (0.0, -1.0)), Sphere((0.3, 0.3), 0.1), Plane((-0.34, 0), (1, 0))]
 )
 def test_a_surface_at_the_rim_of_the_workspace_is_not(surface):
-    assert moved(surface=surface, wall=SurfaceWall(500.0), push=None).status == "done"
+    assert push_five_bar(surface=surface, wall=SurfaceWall(500.0), push=None).status == "done"
 
 
 def test_a_paddle_reaches_only_its_circle():
     slow = {"duration": 0.01, "push": None}
     assert (
-        moved(paddle(), wall=SurfaceWall(1.0), surface=Plane((0.0, 0.099), (0.0, -1.0)), **slow).status == "done"
+        push_five_bar(paddle(), wall=SurfaceWall(1.0), surface=Plane((0.0, 0.099), (0.0, -1.0)), **slow).status
+        == "done"
     )
     with pytest.raises(SurfaceOutOfReach):
-        moved(paddle(), wall=SurfaceWall(1.0), surface=Plane((0.0, 0.12), (0.0, -1.0)), **slow)
+        push_five_bar(paddle(), wall=SurfaceWall(1.0), surface=Plane((0.0, 0.12), (0.0, -1.0)), **slow)
     with pytest.raises(SurfaceOutOfReach):
-        moved(paddle(), wall=SurfaceWall(1.0), surface=Sphere((0.0, 0.0), 0.08), **slow)
+        push_five_bar(paddle(), wall=SurfaceWall(1.0), surface=Sphere((0.0, 0.0), 0.08), **slow)
 
 
 def test_several_postures_and_a_negative_seed_are_refused():

@@ -8,7 +8,7 @@ from contact.mechanism_cases import (
     UNDAMPED,
     motion_of,
     paddle,
-    sampled,
+    sampled_controller,
     uncoupled_five_bar,
     with_drives,
     with_friction,
@@ -17,7 +17,7 @@ from systems import random_controller, random_method
 
 from zwidth.contact.environments import ENVIRONMENTS, Parameter, environment
 from zwidth.contact.hand import Hand
-from zwidth.contact.mechanism.checks import MotionError
+from zwidth.contact.mechanism.motion_inputs import MotionError
 from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, depth_and_normal
 from zwidth.contact.mechanism.walls import SurfaceEnvironment, SurfaceWall
 from zwidth.contact.simulate import simulate
@@ -126,7 +126,7 @@ def test_one_arm_at_a_plane_is_the_device_of_the_other_simulator(name, seed):
     T = controller.sampling_period
     K = MASS / T**2 * 10.0 ** rng.uniform(-3.5, -2.5)
     values = values_of(rng, name, K, K * T * rng.uniform(0.0, 1.0))
-    controller = replace(controller, saturation=float(rng.choice([np.inf, 2e-4 * K])))
+    controller = replace(controller, force_limit=float(rng.choice([np.inf, 2e-4 * K])))
     speed, push = 2e-5 / T, 1e-4 * K
     arm, damping = straight_arm(rng)
     if rng.random() < 0.3:
@@ -170,10 +170,10 @@ SURFACES = [
 PUSHED = {"at": (0.0, 0.25), "duration": 0.25, "push": (0.2, 1.0, 0.0)}
 
 
-def pushed(law, surface, mechanism=FIVE_BAR, damping=UNDAMPED, controller=None, **settings):
+def push_into(law, surface, mechanism=FIVE_BAR, damping=UNDAMPED, controller=None, **settings):
     values = LAWS[law].values(**{"friction": 0.4} if law == "friction_patch" else {})
     wall = SurfaceEnvironment(LAWS[law], values)
-    motion = motion_of(mechanism, damping, controller or sampled(), wall, surface, **PUSHED | settings)
+    motion = motion_of(mechanism, damping, controller or sampled_controller(), wall, surface, **PUSHED | settings)
     assert motion.status == "done"
     assert np.max(np.abs(motion.force)) > 0.05
     return motion, values
@@ -184,7 +184,7 @@ def pushed(law, surface, mechanism=FIVE_BAR, damping=UNDAMPED, controller=None, 
 def test_the_force_is_the_laws_along_the_normal_of_the_place_that_is_seen(law, surface):
     """Depth and its estimated rate in, a force along the normal out, once for each sample."""
     counted = with_drives(FIVE_BAR, encoder_counts=2000.0)
-    motion, values = pushed(law, surface, counted, ModalDamping(0.05))
+    motion, values = push_into(law, surface, counted, ModalDamping(0.05))
     depth, normal = depth_and_normal(surface, motion.counted_position)
     rate, memory = -np.sum(normal * motion.velocity, axis=1), np.zeros(8)
     asked = [
@@ -198,7 +198,9 @@ def test_the_force_is_the_laws_along_the_normal_of_the_place_that_is_seen(law, s
 @pytest.mark.parametrize("law", LAWS)
 def test_every_joule_is_accounted_for(law, surface):
     """Without dampers nothing is missing: hand, motors and gravity, whatever the environment gives or takes."""
-    motion, _ = pushed(law, surface, controller=sampled(delay=0.3), gravity=(0.0, -1.0, 0.0), substeps=20)
+    motion, _ = push_into(
+        law, surface, controller=sampled_controller(delay=0.3), gravity=(0.0, -1.0, 0.0), substeps=20
+    )
     stored = motion.kinetic + motion.elastic + motion.gravitational
     missing = stored - stored[0] - motion.hand_work - motion.motor_work
     assert np.ptp(motion.motor_work) > 1e-5
@@ -219,9 +221,9 @@ def test_the_wall_of_a_stiffness_and_a_damping_is_an_environment(wall, two_sided
     given = {"stiffness": wall.stiffness, "damping": wall.damping}
     values = ENVIRONMENTS[name].values(**given, **({"no_pull": 1} if wall.no_pull else {}))
     plane = Plane((0.0, 0.255), (0.2, -1.0))
-    one = motion_of(FIVE_BAR, UNDAMPED, sampled(), wall, replace(plane, two_sided=two_sided), **PUSHED)
+    one = motion_of(FIVE_BAR, UNDAMPED, sampled_controller(), wall, replace(plane, two_sided=two_sided), **PUSHED)
     other = motion_of(
-        FIVE_BAR, UNDAMPED, sampled(), SurfaceEnvironment(ENVIRONMENTS[name], values), plane, **PUSHED
+        FIVE_BAR, UNDAMPED, sampled_controller(), SurfaceEnvironment(ENVIRONMENTS[name], values), plane, **PUSHED
     )
     assert np.any(one.depth > 1e-3)
     for key in ("position", "velocity", "force", "torque", "depth", "motor_work"):
@@ -230,14 +232,14 @@ def test_the_wall_of_a_stiffness_and_a_damping_is_an_environment(wall, two_sided
 
 
 def test_no_environment_acts_without_a_surface_and_none_at_a_balls_centre():
-    free = motion_of(FIVE_BAR, UNDAMPED, sampled(), **PUSHED)
+    free = motion_of(FIVE_BAR, UNDAMPED, sampled_controller(), **PUSHED)
     assert not free.two_sided
     assert not np.any(free.force)
     at = solve_posture(FIVE_BAR, (0.0, 0.25)).position
     values = ENVIRONMENTS["one_sided_wall"].values()
     inside = SurfaceEnvironment(ENVIRONMENTS["one_sided_wall"], values)
     settings = {"at": at, "duration": 0.01, "counted": False}
-    motion = motion_of(FIVE_BAR, UNDAMPED, sampled(), inside, Sphere(at, 0.05), **settings)
+    motion = motion_of(FIVE_BAR, UNDAMPED, sampled_controller(), inside, Sphere(at, 0.05), **settings)
     assert motion.status == "done"
     assert np.all(np.isfinite(motion.force))
 
@@ -247,7 +249,7 @@ def test_no_environment_acts_without_a_surface_and_none_at_a_balls_centre():
 
 def test_an_environment_that_gives_no_number_ends_the_motion_there():
     wall = SurfaceEnvironment(silent, [])
-    motion = motion_of(FIVE_BAR, UNDAMPED, sampled(), wall, SURFACES[0], **PUSHED)
+    motion = motion_of(FIVE_BAR, UNDAMPED, sampled_controller(), wall, SURFACES[0], **PUSHED)
     assert motion.status == "no force"
     depth = depth_and_normal(SURFACES[0], motion.counted_position)[0]
     assert depth[-1] >= 1e-3 > np.max(depth[:-1])
@@ -277,4 +279,4 @@ def test_an_environment_that_gives_no_number_ends_the_motion_there():
 )
 def test_walls_that_cannot_be_meant(wall, surface, said):
     with pytest.raises(MotionError, match=said):
-        motion_of(FIVE_BAR, UNDAMPED, sampled(), wall, surface, **PUSHED)
+        motion_of(FIVE_BAR, UNDAMPED, sampled_controller(), wall, surface, **PUSHED)

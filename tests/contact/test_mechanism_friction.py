@@ -6,7 +6,7 @@ from contact.mechanism_cases import (
     UNDAMPED,
     motion_of,
     paddle,
-    sampled,
+    sampled_controller,
     uncoupled_five_bar,
     with_drives,
     with_friction,
@@ -26,7 +26,7 @@ def test_a_rigid_paddle_slides_to_a_stop():
     motion = motion_of(
         with_friction(paddle(), LEVEL),
         UNDAMPED,
-        sampled(1e-3),
+        sampled_controller(1e-3),
         duration=0.6,
         start_velocity=(0.0, 0.2),
         substeps=3,
@@ -50,14 +50,14 @@ def test_it_sticks_up_to_its_level(share, moves, stiffness):
     mechanism = with_friction(paddle(stiffness), LEVEL)
     ramp = np.minimum(np.arange(3000) / 2000.0, 1.0)
     push = np.outer(ramp, [0.0, share * JOINT_LEVEL / LENGTH, 0.0])
-    motion = motion_of(mechanism, ModalDamping(0.3), sampled(1e-3), duration=3.0, push=push, substeps=2)
+    motion = motion_of(mechanism, ModalDamping(0.3), sampled_controller(1e-3), duration=3.0, push=push, substeps=2)
     assert (np.ptp(motion.motors) > 0.0) == moves
     if not moves:
         assert np.all(motion.motor_rates == 0.0)
         assert np.all(motion.friction_loss == 0.0)
 
 
-def by_events(push, duration, at):
+def reference_angles(push, duration, at):
     """phi, theta of a flexible paddle whose motor sticks and slides; every change is located."""
 
     def rates(t, x, side):
@@ -103,9 +103,9 @@ def test_stick_and_slip_are_those_of_an_event_locating_solver():
     mechanism = with_friction(paddle(0.3), LEVEL)
     for substeps in (4, 16, 64):
         motion = motion_of(
-            mechanism, UNDAMPED, sampled(1e-3), duration=0.2, push=(0.0, push, 0.0), substeps=substeps
+            mechanism, UNDAMPED, sampled_controller(1e-3), duration=0.2, push=(0.0, push, 0.0), substeps=substeps
         )
-        judge = by_events(push, 0.2, motion.time)
+        judge = reference_angles(push, 0.2, motion.time)
         errors.append(np.max(np.abs(motion.motors[:, 0] - judge[:, 1])))
     assert np.ptp(judge[:, 1]) > 0.01
     assert errors[0] < 1e-3 * np.ptp(judge[:, 1])
@@ -123,7 +123,9 @@ def test_several_drives_lose_what_their_frictions_take(stiffness):
         if stiffness is not None:
             rough = with_drives(rough, stiffness=stiffness)
         velocity = (0.05, 0.1, 0.0) if len(rough.links.names) == 4 else (0.05, 0.1, 0.02)
-        motion = motion_of(rough, UNDAMPED, sampled(1e-3), duration=1.0, start_velocity=velocity, substeps=16)
+        motion = motion_of(
+            rough, UNDAMPED, sampled_controller(1e-3), duration=1.0, start_velocity=velocity, substeps=16
+        )
         total = motion.kinetic + motion.elastic + motion.friction_loss
         assert motion.status == "done"
         assert np.all(np.diff(motion.friction_loss) >= 0.0)
@@ -133,7 +135,7 @@ def test_several_drives_lose_what_their_frictions_take(stiffness):
 
 def test_two_rigid_drives_rest_against_a_push_below_their_levels():
     mechanism = with_drives(with_friction(uncoupled_five_bar(), 1e-2), stiffness=np.inf)
-    motion = motion_of(mechanism, UNDAMPED, sampled(1e-3), duration=0.2, push=(0.2, 0.5, 0.0))
+    motion = motion_of(mechanism, UNDAMPED, sampled_controller(1e-3), duration=0.2, push=(0.2, 0.5, 0.0))
     assert np.all(np.ptp(motion.joints, axis=0) == 0.0)
 
 
@@ -165,6 +167,8 @@ def test_bristles_bend_as_their_equations_say(model, bristles):
         force = (bend + 0.15 * LENGTH * np.cos(phi)) / LINK
         return [p, w, force, (-bend - stiff * z - damp * zd) / ROTOR, zd]
 
-    motion = motion_of(mechanism, UNDAMPED, sampled(1e-3), duration=0.2, push=(0.0, 0.15, 0.0), substeps=64)
+    motion = motion_of(
+        mechanism, UNDAMPED, sampled_controller(1e-3), duration=0.2, push=(0.0, 0.15, 0.0), substeps=64
+    )
     judge = solve_ivp(rates, (0.0, 0.2), np.zeros(5), "LSODA", rtol=1e-10, atol=1e-13, t_eval=motion.time).y
     assert motion.motors[:, 0] == pytest.approx(judge[1], abs=1e-4 * np.ptp(judge[1]))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from contact.mechanism_cases import motion_of, sampled, uncoupled_five_bar, with_drives
+from contact.mechanism_cases import motion_of, sampled_controller, uncoupled_five_bar, with_drives
 from model.model_cases import KINDS
 from scipy.linalg import expm
 
@@ -17,7 +17,7 @@ from zwidth.model.reduction import reduce_mechanism
 SPEED = 1e-6  # m/s
 
 
-def stepped(plant, controller, wall, velocity, samples, share):
+def linear_readings(plant, controller, wall, velocity, samples, share):
     """Readings of the linear plant, by exponentials of the augmented matrix; the velocity by differences."""
     n, T, f = plant.size, controller.sampling_period, controller.fractional_delay
     lags, tau = len(plant.lagged_dampers), controller.actuator_time_constant
@@ -49,7 +49,9 @@ def stepped(plant, controller, wall, velocity, samples, share):
     return np.array(readings)
 
 
-def both(mechanism, damping, controller, wall, speed, samples=400, share=0.0, at=None, direction=None):
+def nonlinear_and_linear_readings(
+    mechanism, damping, controller, wall, speed, samples=400, share=0.0, at=None, direction=None
+):
     """What the handle's reading is, nonlinear and linear, per speed of the start."""
     posture = solve_posture(mechanism, mechanism.reference_position if at is None else at)
     u = posture.jacobian @ np.array([1.0, 0.4, -0.3])[: posture.jacobian.shape[1]]
@@ -69,7 +71,7 @@ def both(mechanism, damping, controller, wall, speed, samples=400, share=0.0, at
     plant = reduce_mechanism(mechanism, posture, u, "full", damping)
     rates = np.linalg.lstsq(posture.jacobian, u, rcond=None)[0]
     flexible = np.isfinite(mechanism.drives.stiffness)
-    linear = stepped(plant, controller, wall, np.concatenate([rates, rates[flexible]]), samples, share)
+    linear = linear_readings(plant, controller, wall, np.concatenate([rates, rates[flexible]]), samples, share)
     ours = (motion.counted_position - posture.position) @ u / speed
     return ours, linear
 
@@ -78,18 +80,20 @@ def both(mechanism, damping, controller, wall, speed, samples=400, share=0.0, at
 @pytest.mark.parametrize("delay", [0.0, 0.3, 2.0, 3.7])
 def test_small_motions_are_the_linear_models(damping, delay):
     mechanism = uncoupled_five_bar(damping=2e-4)
-    controller = sampled(1.25e-3, delay=delay)
-    ours, linear = both(
+    controller = sampled_controller(1.25e-3, delay=delay)
+    ours, linear = nonlinear_and_linear_readings(
         mechanism, damping, controller, SurfaceWall(300.0, 2.0), SPEED, at=(0.03, 0.24), direction=(0, 1, 0)
     )
     assert np.max(np.abs(ours - linear)) < 1e-6 * np.max(np.abs(linear))
 
 
 def test_the_difference_shrinks_with_the_amplitude():
-    mechanism, controller = uncoupled_five_bar(), sampled(1.25e-3)
+    mechanism, controller = uncoupled_five_bar(), sampled_controller(1.25e-3)
     errors = []
     for speed in (1e-2, 1e-3, 1e-4):
-        ours, linear = both(mechanism, ModalDamping(0.05), controller, SurfaceWall(800.0, 2.0), speed)
+        ours, linear = nonlinear_and_linear_readings(
+            mechanism, ModalDamping(0.05), controller, SurfaceWall(800.0, 2.0), speed
+        )
         errors.append(np.max(np.abs(ours - linear)) / np.max(np.abs(linear)))
     ratios = np.array(errors[:-1]) / errors[1:]
     assert np.allclose(ratios, 10.0, rtol=0.1)
@@ -104,22 +108,26 @@ def test_random_mechanisms_in_space(kind, seed):
         stiffness = mechanism.drives.stiffness.copy()
         stiffness[0] = np.inf
         mechanism = with_drives(mechanism, stiffness=stiffness)
-    controller = sampled(5e-4, delay=0.6)
-    ours, linear = both(mechanism, ModalDamping(0.1), controller, SurfaceWall(300.0, 1.0), SPEED)
+    controller = sampled_controller(5e-4, delay=0.6)
+    ours, linear = nonlinear_and_linear_readings(
+        mechanism, ModalDamping(0.1), controller, SurfaceWall(300.0, 1.0), SPEED
+    )
     assert np.max(np.abs(ours - linear)) < 1e-6 * np.max(np.abs(linear))
 
 
 def test_windings_and_a_lagging_actuator():
     winding = {"winding_damping": 3e-5, "winding_time_constant": 2e-3}
     mechanism = with_drives(uncoupled_five_bar(), **winding)
-    controller = sampled(1e-3, delay=0.25, actuator_time_constant=8e-4)
-    ours, linear = both(mechanism, ModalDamping(0.05), controller, SurfaceWall(300.0, 1.0), SPEED)
+    controller = sampled_controller(1e-3, delay=0.25, actuator_time_constant=8e-4)
+    ours, linear = nonlinear_and_linear_readings(
+        mechanism, ModalDamping(0.05), controller, SurfaceWall(300.0, 1.0), SPEED
+    )
     assert np.max(np.abs(ours - linear)) < 1e-6 * np.max(np.abs(linear))
 
 
 def test_a_first_order_filter_of_the_velocity():
-    controller = sampled(1e-3, velocity_filter=FirstOrder(4e-3))
-    ours, linear = both(
+    controller = sampled_controller(1e-3, velocity_filter=FirstOrder(4e-3))
+    ours, linear = nonlinear_and_linear_readings(
         uncoupled_five_bar(), ModalDamping(0.05), controller, SurfaceWall(500.0, 4.0), SPEED, share=0.8
     )
     assert np.max(np.abs(ours - linear)) < 1e-6 * np.max(np.abs(linear))
@@ -129,7 +137,7 @@ def test_a_first_order_filter_of_the_velocity():
 def test_growth_follows_the_spectral_radius_through_filters(order):
     """Filters of velocity and force: an unstable wall's motion grows as the loop's largest eigenvalue says."""
     mechanism = uncoupled_five_bar()
-    controller = sampled(
+    controller = sampled_controller(
         1.25e-3, velocity_filter=Butterworth(order, 60.0), force_filter=Butterworth(order, 150.0), delay=1.0
     )
     posture = solve_posture(mechanism, (0.0, 0.25))

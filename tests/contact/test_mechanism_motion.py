@@ -5,25 +5,25 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from contact.five_bar_reference import FiveBarByMultipliers, reference_motion
 from contact.mechanism_cases import (
     UNDAMPED,
     motion_of,
     paddle,
     planar_chain,
-    sampled,
+    sampled_controller,
     uncoupled_five_bar,
     with_drives,
     with_friction,
 )
-from contact.mechanism_judge import FiveBarByMultipliers, judged
 from model.model_cases import KINDS, five_bar, random_five_bar, some_postures, spatial_arm
 from model.model_engines import mjcf
 
 from zwidth.contact.mechanism.surfaces import Plane, Sphere
 from zwidth.contact.mechanism.walls import SurfaceWall
-from zwidth.model.arrays import pack
 from zwidth.model.bias import bias_batch
 from zwidth.model.damping import ModalDamping
+from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture import link_points, solve_posture
 
 GRAVITY = np.array([1.3, -9.2, 2.8])
@@ -41,7 +41,7 @@ def test_a_hand_pushes_a_five_bar_about_and_into_a_wall(seed):
     """Half a second over some centimetres on flexible drives, with delay and gravity, in and out of a wall."""
     rng = np.random.default_rng(seed)
     mechanism = uncoupled_five_bar() if seed is None else with_drives(random_five_bar(rng), encoder_counts=np.nan)
-    controller = sampled(1.25e-3, delay=1.0 if seed is None else 0.4)
+    controller = sampled_controller(1.25e-3, delay=1.0 if seed is None else 0.4)
     wall, push, gravity = SurfaceWall(1500.0, 3.0), np.array([0.1, 1.5]), np.array([0.1, -0.5])
     samples = 400 if seed is None else 60
     ours = motion_of(
@@ -61,7 +61,9 @@ def test_a_hand_pushes_a_five_bar_about_and_into_a_wall(seed):
         normal = np.array([0.1, -1.0]) / np.hypot(0.1, 1.0)
         return -(x - [0.0, 0.265]) @ normal, normal
 
-    judge = judged(mechanism, ModalDamping(0.05), controller, wall, surface, push, samples, gravity, (0.0, 0.25))
+    judge = reference_motion(
+        mechanism, ModalDamping(0.05), controller, wall, surface, push, samples, gravity, (0.0, 0.25)
+    )
     assert ours.status == "done"
     if seed is None:
         assert np.ptp(judge[:, 0]) > 0.03
@@ -73,7 +75,7 @@ def test_a_hand_pushes_a_five_bar_about_and_into_a_wall(seed):
 def test_it_converges_with_the_fourth_power_of_the_substep():
     mechanism, errors = uncoupled_five_bar(), []
     settings = {"duration": 0.4, "push": (0.2, 0.6, 0.0)}
-    scene = (ModalDamping(0.05), sampled(4e-3), SurfaceWall(500.0, 3.0), Sphere((0.03, 0.29), 0.02))
+    scene = (ModalDamping(0.05), sampled_controller(4e-3), SurfaceWall(500.0, 3.0), Sphere((0.03, 0.29), 0.02))
     fine = motion_of(mechanism, *scene, substeps=128, **settings)
     for substeps in (4, 8, 16):
         found = motion_of(mechanism, *scene, substeps=substeps, **settings)
@@ -87,7 +89,13 @@ def test_stiff_drives_set_no_limit_to_the_step(stiffer, error):
     """Modes of 1.3 and of 13 kHz, two steps a millisecond: the linear part is exact however fast it is."""
     plain = uncoupled_five_bar()
     mechanism = with_drives(plain, stiffness=stiffer * plain.drives.stiffness)
-    scene = (mechanism, ModalDamping(0.05), sampled(), SurfaceWall(500.0, 2.0), Plane((0.0, 0.265), (0.1, -1.0)))
+    scene = (
+        mechanism,
+        ModalDamping(0.05),
+        sampled_controller(),
+        SurfaceWall(500.0, 2.0),
+        Plane((0.0, 0.265), (0.1, -1.0)),
+    )
     fine, coarse = (
         motion_of(*scene, duration=0.4, push=(0.1, 1.5, 0.0), substeps=substeps) for substeps in (128, 2)
     )
@@ -108,7 +116,7 @@ def test_free_motion_keeps_its_energy(kind):
     lost = []
     for substeps in (1, 2, 4):
         motion = motion_of(
-            mechanism, UNDAMPED, sampled(2e-3), duration=0.05, start_velocity=velocity, gravity=GRAVITY,
+            mechanism, UNDAMPED, sampled_controller(2e-3), duration=0.05, start_velocity=velocity, gravity=GRAVITY,
             substeps=substeps,
         )  # fmt: skip
         total = energy(motion)
@@ -123,7 +131,8 @@ def test_every_joule_is_accounted_for():
     """Hand, motors, gravity, bent springs; without dampers nothing is missing."""
     mechanism = with_friction(uncoupled_five_bar(), hardening=20.0, backward_stiffness=0.9)
     motion = motion_of(
-        mechanism, UNDAMPED, sampled(1e-3, delay=0.3), SurfaceWall(800.0, 2.0), Plane((0.0, 0.26), (0.0, -1.0)),
+        mechanism, UNDAMPED, sampled_controller(1e-3, delay=0.3), SurfaceWall(800.0, 2.0),
+        Plane((0.0, 0.26), (0.0, -1.0)),
         duration=0.4, push=(0.5, 3.0, 0.0), gravity=(0.0, -1.0, 0.0), substeps=20,
     )  # fmt: skip
     total = energy(motion)
@@ -133,7 +142,7 @@ def test_every_joule_is_accounted_for():
 
 def test_dampers_only_take():
     motion = motion_of(
-        uncoupled_five_bar(), ModalDamping(0.05), sampled(1e-3), SurfaceWall(800.0, 2.0),
+        uncoupled_five_bar(), ModalDamping(0.05), sampled_controller(1e-3), SurfaceWall(800.0, 2.0),
         Plane((0.0, 0.26), (0.0, -1.0)), duration=0.4, push=(0.5, 3.0, 0.0), substeps=4,
     )  # fmt: skip
     steps = np.diff(energy(motion))
@@ -197,7 +206,7 @@ def test_a_chain_swings_as_in_mujoco(make, seed):
     mechanism = with_drives(make(np.random.default_rng(seed)), stiffness=np.inf, encoder_counts=np.nan)
     model, data = engine(mechanism, GRAVITY)
     model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 5e-5
-    motion = motion_of(mechanism, UNDAMPED, sampled(1e-3), duration=0.4, gravity=GRAVITY, substeps=4)
+    motion = motion_of(mechanism, UNDAMPED, sampled_controller(1e-3), duration=0.4, gravity=GRAVITY, substeps=4)
     data.qpos[:] = motion.joints[0]
     for _ in range(round(0.4 / 5e-5)):
         mujoco.mj_step(model, data)
@@ -212,7 +221,12 @@ def test_a_chain_swings_as_in_mujoco(make, seed):
 def test_a_motion_into_a_singularity_ends_there():
     """Pulled outwards the arms of a five-bar stretch and its elbows meet."""
     motion = motion_of(
-        uncoupled_five_bar(), ModalDamping(0.05), sampled(1e-3), duration=2.0, push=(0.0, 5.0, 0.0), substeps=4
+        uncoupled_five_bar(),
+        ModalDamping(0.05),
+        sampled_controller(1e-3),
+        duration=2.0,
+        push=(0.0, 5.0, 0.0),
+        substeps=4,
     )
     assert motion.status in ("singular", "loop lost")
     assert motion.time[-1] < 1.0
@@ -222,7 +236,7 @@ def test_a_motion_into_a_singularity_ends_there():
 
 def test_a_start_next_to_a_singularity_is_told_at_once():
     """A twentieth of a micrometre from where both arms of the five-bar are stretched."""
-    motion = motion_of(uncoupled_five_bar(), UNDAMPED, sampled(), at=(0.0, 0.346 - 5e-8), duration=0.1)
+    motion = motion_of(uncoupled_five_bar(), UNDAMPED, sampled_controller(), at=(0.0, 0.346 - 5e-8), duration=0.1)
     assert motion.status == "singular"
     assert motion.time.size == 0
     assert motion.reason.startswith("after 0 s ")
@@ -230,7 +244,7 @@ def test_a_start_next_to_a_singularity_is_told_at_once():
 
 def test_a_wall_that_is_far_too_stiff_stops_the_motion_too():
     motion = motion_of(
-        uncoupled_five_bar(), UNDAMPED, sampled(5e-3), SurfaceWall(1e6),
+        uncoupled_five_bar(), UNDAMPED, sampled_controller(5e-3), SurfaceWall(1e6),
         Plane((0.0, 0.25), (0.0, -1.0), two_sided=True), duration=2.0, start_velocity=(0.0, 0.01),
     )  # fmt: skip
     assert motion.status != "done"
@@ -239,7 +253,9 @@ def test_a_wall_that_is_far_too_stiff_stops_the_motion_too():
 
 def test_loops_stay_closed():
     mechanism = with_drives(five_bar(), encoder_counts=np.nan)
-    motion = motion_of(mechanism, UNDAMPED, sampled(1e-3), duration=1.0, start_velocity=(0.2, 0.05), substeps=2)
+    motion = motion_of(
+        mechanism, UNDAMPED, sampled_controller(1e-3), duration=1.0, start_velocity=(0.2, 0.05), substeps=2
+    )
     arms = replace(mechanism, drives=mechanism.drives)
     model = FiveBarByMultipliers(arms, np.zeros((4, 4)))
     passive = solve_posture(mechanism, mechanism.reference_position).angles[[1, 3]]
@@ -249,5 +265,7 @@ def test_loops_stay_closed():
 
 
 def test_a_paddle_turns_round_and_round():
-    motion = motion_of(paddle(), UNDAMPED, sampled(1e-3), duration=3.0, start_velocity=(0.0, 1.0), substeps=1)
+    motion = motion_of(
+        paddle(), UNDAMPED, sampled_controller(1e-3), duration=3.0, start_velocity=(0.0, 1.0), substeps=1
+    )
     assert motion.joints[-1, 0] == pytest.approx(30.0, rel=1e-9)

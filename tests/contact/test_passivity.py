@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from zwidth.contact.environments import ENVIRONMENTS
-from zwidth.contact.passivity import (
+from zwidth.contact.passivity_controller import (
     ENERGY,
-    MEMORY,
+    PASSIVITY_MEMORY,
     PassivityController,
     passivity_force,
     rendered_stiffness,
@@ -19,7 +19,7 @@ SPRING, TOUCHED = ENVIRONMENTS["wall"], ENVIRONMENTS["one_sided_wall"]
 
 def play(controller, forces, positions, period):
     """Forces sent and energies counted along a motion that takes no notice of them."""
-    memory = np.zeros(MEMORY)
+    memory = np.zeros(PASSIVITY_MEMORY)
     sent, energy = [], []
     for force, position in zip(forces, positions, strict=True):
         sent.append(passivity_force(memory, controller.parameters, force, position, period))
@@ -27,11 +27,13 @@ def play(controller, forces, positions, period):
     return np.array(sent), np.array(energy)
 
 
-def touch(environment, values, controller, *, mass, damping, period, samples, start=-1e-3, speed=0.0, push=0.0):
+def simulate_touch(
+    environment, values, controller, *, mass, damping, period, samples, start=-1e-3, speed=0.0, push=0.0
+):
     """A mass with a damper, stepped exactly, against an environment fed with backward differences."""
     decay = exp(-damping * period / mass)
     x, v, last = start, speed, start
-    memory, watch = np.zeros(8), np.zeros(MEMORY)
+    memory, watch = np.zeros(8), np.zeros(PASSIVITY_MEMORY)
     places, forces = [], []
     for j in range(samples):
         f = environment.force(x, (x - last) / period, j * period, period, values, memory)
@@ -74,7 +76,7 @@ def test_sampled_energy_is_never_below_its_reference(seed):
 
 
 def test_the_damper_is_the_smallest_that_gives_back_what_is_missing():
-    memory = np.zeros(MEMORY)
+    memory = np.zeros(PASSIVITY_MEMORY)
     parameters = PassivityController(inf).parameters
     assert passivity_force(memory, parameters, 2.0, 0.0, 0.01) == 2.0
     # 2 N over 0.1 m inwards was given out: 0.2 J is missing, so alpha = 0.2/(0.01 * 10^2) = 0.2 N s/m at 10 m/s
@@ -85,14 +87,14 @@ def test_the_damper_is_the_smallest_that_gives_back_what_is_missing():
     ("limits", "extra"), [({"largest_damping": 0.05}, 0.5), ({"largest_damping": inf, "largest_force": 0.3}, 0.3)]
 )
 def test_limits_hold_and_what_is_missing_is_carried_on(limits, extra):
-    memory, parameters = np.zeros(MEMORY), PassivityController(**limits).parameters
+    memory, parameters = np.zeros(PASSIVITY_MEMORY), PassivityController(**limits).parameters
     passivity_force(memory, parameters, 2.0, 0.0, 0.01)
     assert passivity_force(memory, parameters, 2.0, 0.1, 0.01) == pytest.approx(2.0 - extra)
     assert memory[ENERGY] == pytest.approx(-0.2)
 
 
 def test_a_device_at_rest_gets_the_force_as_it_is():
-    memory, parameters = np.zeros(MEMORY), PassivityController(inf).parameters
+    memory, parameters = np.zeros(PASSIVITY_MEMORY), PassivityController(inf).parameters
     for position in (0.0, 0.1, 0.1):
         force = passivity_force(memory, parameters, 2.0, position, 0.01)
     assert force == 2.0
@@ -123,8 +125,8 @@ def test_sampled_counting_does_not_see_what_the_hold_makes():
     """A spring past its limit grows, and yet this observer counts it as passive: K d^2/2 has the wrong sign."""
     case = {"mass": 0.1, "damping": 0.1, "period": 1e-3, "samples": 2000, "start": 0.0, "speed": 0.05}
     values = SPRING.values(stiffness=1000.0)
-    plain, _ = touch(SPRING, values, None, **case)
-    watched, _ = touch(SPRING, values, PassivityController(inf, counting="sampled"), **case)
+    plain, _ = simulate_touch(SPRING, values, None, **case)
+    watched, _ = simulate_touch(SPRING, values, PassivityController(inf, counting="sampled"), **case)
     assert abs(plain[-200:]).max() > 10 * abs(plain[:200]).max()
     np.testing.assert_array_equal(watched, plain)
 
@@ -139,8 +141,8 @@ def test_growing_contacts_come_to_rest_over_random_systems():
         K = min(2 * b / T * rng.uniform(1.3, 4.0), 0.25 * m / T**2)
         case = {"mass": m, "damping": b, "period": T, "samples": 2000}
         values = SPRING.values(stiffness=K)
-        plain, _ = touch(SPRING, values, None, **case)
-        calm, _ = touch(SPRING, values, PassivityController(0.5 * m / T), **case)
+        plain, _ = simulate_touch(SPRING, values, None, **case)
+        calm, _ = simulate_touch(SPRING, values, PassivityController(0.5 * m / T), **case)
         grew += abs(plain[-200:]).max() > 2e-3
         assert abs(calm).max() <= 1.001e-3 * max(1.0, K * T**2 / m * 10)
         assert abs(calm[-200:]).max() < 1e-3 * abs(calm[:200]).max()
@@ -151,8 +153,8 @@ def test_bouncing_on_a_wall_under_a_push_stays_bounded_and_costs_little_stiffnes
     """K = 1000 N/m, five times the limit: jumps of 24 mm without, motion of 1.6 mm about the 1 mm of rest with."""
     case = {"mass": 0.1, "damping": 0.1, "period": 1e-3, "samples": 3000, "speed": 0.05, "push": 1.0}
     values = TOUCHED.values(stiffness=1000.0)
-    plain, _ = touch(TOUCHED, values, None, **case)
-    calm, force = touch(TOUCHED, values, PassivityController(50.0), **case)
+    plain, _ = simulate_touch(TOUCHED, values, None, **case)
+    calm, force = simulate_touch(TOUCHED, values, PassivityController(50.0), **case)
     assert abs(plain[-500:]).max() > 0.02
     assert abs(calm[-500:]).max() < 0.0017
     assert rendered_stiffness(calm, force) == pytest.approx(991.2, abs=0.2)
@@ -160,7 +162,7 @@ def test_bouncing_on_a_wall_under_a_push_stays_bounded_and_costs_little_stiffnes
 
 def test_without_a_limit_the_damper_itself_can_run_away():
     case = {"mass": 0.1, "damping": 0.1, "period": 1e-3, "samples": 3000, "speed": 0.05, "push": 1.0}
-    wild, _ = touch(TOUCHED, TOUCHED.values(stiffness=1000.0), PassivityController(inf), **case)
+    wild, _ = simulate_touch(TOUCHED, TOUCHED.values(stiffness=1000.0), PassivityController(inf), **case)
     assert abs(wild[-500:]).max() > 1e6
 
 

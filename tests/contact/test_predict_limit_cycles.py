@@ -9,9 +9,9 @@ import pytest
 from systems import mass
 
 import zwidth as package
-from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found
+from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of
 from tests.paddle import LENGTH, paddle
-from zwidth.contact.plane import quiet_limit, resting_limit
+from zwidth.contact.friction_quantisation_plane import quiet_limit, resting_limit
 from zwidth.contact.predict_limit_cycles import (
     NoEncoderStepsError,
     NothingNonlinearError,
@@ -22,7 +22,7 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.sections import HysteresisError
 from zwidth.model.nonlinear import Brake, Counter, Friction, Nonlinear
-from zwidth.show.output import plain
+from zwidth.show.output import json_value
 
 ONE = np.ones(1)
 ROUGH = ("loop.encoder.resolution_m=2e-5", "friction.coulomb_N=0.03")
@@ -51,8 +51,8 @@ def test_the_command_says_the_same(name, settings, wall, more):
     predicted = predict_limit_cycles(package.load(name, settings).at(), *wall, **more)
     words = [word for setting in settings for word in ("--set", setting)]
     words += ["--offset", more.get("offset", 0.0)] + ["--no-simulation"] * (not more.get("simulate", True))
-    told = found("limit-cycles", name, "--stiffness", wall[0], "--damping", wall[1], *words)
-    document = plain(predicted.document())
+    told = document_of("limit-cycles", name, "--stiffness", wall[0], "--damping", wall[1], *words)
+    document = json_value(predicted.document())
     assert {key: told[key] for key in document} == document
 
 
@@ -68,8 +68,8 @@ def test_a_limited_force_holds_random_masses_where_it_is_predicted(seed):
     assert simulated.behaviour == "limit cycle"
     assert simulated.amplitude == pytest.approx(cycle.amplitude, rel=0.01)
     assert simulated.frequency == pytest.approx(cycle.frequency_Hz, rel=0.01)
-    assert not predicted.simulated_otherwise
-    assert predicted.otherwise is None
+    assert not predicted.simulation_disagrees
+    assert predicted.small_start_vibration is None
 
 
 def test_the_limits_are_those_of_friction_and_steps():
@@ -85,12 +85,12 @@ def test_the_limits_are_those_of_friction_and_steps():
 def test_a_simulation_at_another_frequency_is_told():
     predicted = predict_limit_cycles(package.load(TWO_MASS, [LIMITED]).at(), 8000.0, 10.0)
     (simulated,) = predicted.simulated
-    assert not predicted.simulated_otherwise
+    assert not predicted.simulation_disagrees
     slower = replace(simulated, frequency=0.5 * simulated.frequency)
-    assert replace(predicted, simulated=(slower,)).simulated_otherwise
+    assert replace(predicted, simulated=(slower,)).simulation_disagrees
     resting = replace(slower, behaviour="converged")
-    assert not replace(predicted, simulated=(resting,)).simulated_otherwise
-    assert not replace(predicted, simulated=(None,)).simulated_otherwise
+    assert not replace(predicted, simulated=(resting,)).simulation_disagrees
+    assert not replace(predicted, simulated=(None,)).simulation_disagrees
 
 
 def test_a_device_moves_as_far_as_its_handle_and_a_given_plant_a_metre(tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from systems import mass, random_loop
 
 import zwidth as package
-from tests.cli.cli_run import MECHANISM, ONE_MASS, TWO_MASS, found
+from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of
 from tests.paddle import LENGTH, paddle
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.verdict import spectral_radius
@@ -18,14 +18,14 @@ from zwidth.contact.contact_arguments import ContactArgumentError, OutOfWorkspac
 from zwidth.contact.environments.environment import environment
 from zwidth.contact.environments.slot import slot
 from zwidth.contact.hand import Hand, Reach, Reflex, Tremor
-from zwidth.contact.room import TooLarge
 from zwidth.contact.run_length import bound_of_run, lengthened, needed_substeps, run_length
 from zwidth.contact.simulate_contact import NoForceError, simulate_contact
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.memory_limit import TooLarge
 from zwidth.model.nonlinear import Friction, Nonlinear
-from zwidth.show.output import plain
+from zwidth.show.output import json_value
 
 SERIES = ("time", "position", "penetration", "velocity", "force", "handle", "energy")
 
@@ -82,8 +82,8 @@ SAME = [
 def test_the_command_says_the_same(name, words, wall, more):
     settings = [word for word in words if isinstance(word, str) and "=" in word and "." in word.partition("=")[0]]
     point = package.load(name, settings).at()
-    document = plain(simulate_contact(point, *wall, **more).document())
-    told = found("simulate", name, *words)
+    document = json_value(simulate_contact(point, *wall, **more).document())
+    told = document_of("simulate", name, *words)
     assert {key: told[key] for key in document} == document
 
 
@@ -92,7 +92,9 @@ def test_an_arm_moves_as_the_command_says():
     reach, reflex = Reach(0.02, 0.1, 0.4), Reflex(0.5, 0.02, 0.03, arm_stiffness=400.0, arm_damping=4.0)
     simulated = simulate_contact(point, 500.0, 1.0, wall="one-sided", reach=reach, reflex=reflex)
     words = ("--wall", "one-sided", "--reach", "0.02,0.1,0.4", "--reflex", "0.5,400,4,0.02,0.03")
-    told = found("simulate", ONE_MASS, "--stiffness", 500, "--damping", 1, "--operator", "thesis-arm", *words)
+    told = document_of(
+        "simulate", ONE_MASS, "--stiffness", 500, "--damping", 1, "--operator", "thesis-arm", *words
+    )
     assert simulated.hand == Hand(point.operator, 0.0, 0.0, reach, None, reflex)
     assert simulated.handle.tolist() == told["handle_m"]
 

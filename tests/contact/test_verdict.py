@@ -2,25 +2,28 @@
 
 import numpy as np
 import pytest
-from contact.engine_cases import bench, dry, one_mass, run
+from contact.engine_cases import friction_of, one_mass, run, two_mass_loop
 
 from zwidth.contact.hand import Hand
-from zwidth.contact.verdict import dominant_frequency, judge_response
+from zwidth.contact.motion_verdict import dominant_frequency, judge_response
 from zwidth.model.nonlinear import Counter, Nonlinear
 
 MOTOR = np.array([0.0, 1.0])
-REAL = Nonlinear(friction=(dry(0.1),), counters=(Counter(MOTOR, 1e-5),))
+FRICTION_AND_ENCODER = Nonlinear(friction=(friction_of(0.1),), counters=(Counter(MOTOR, 1e-5),))
 
 
-def called(response):
+def behaviour_of(response):
     judged = judge_response(response)
     return judged.behaviour, judged.stable
 
 
 def test_linear_walls_die_away_or_grow():
-    assert called(run(bench(), 4000.0, 10.0, 2.0, start_position=1e-3)) == ("decaying", True)
-    assert called(run(bench(), 7500.0, 10.0, 2.0, start_position=1e-3)) == ("growing", False)
-    assert called(run(bench(), 7500.0, 10.0, 2.0, start_position=1e-3, bound=0.1)) == ("growing", False)
+    assert behaviour_of(run(two_mass_loop(), 4000.0, 10.0, 2.0, start_position=1e-3)) == ("decaying", True)
+    assert behaviour_of(run(two_mass_loop(), 7500.0, 10.0, 2.0, start_position=1e-3)) == ("growing", False)
+    assert behaviour_of(run(two_mass_loop(), 7500.0, 10.0, 2.0, start_position=1e-3, bound=0.1)) == (
+        "growing",
+        False,
+    )
 
 
 def test_growth_of_a_decay_is_known_in_closed_form():
@@ -32,7 +35,9 @@ def test_growth_of_a_decay_is_known_in_closed_form():
 
 
 def test_friction_brings_it_to_rest_inside():
-    response = run(bench(REAL), 3000.0, 8.0, 3.0, sided=1, start_position=-2e-3, hand=Hand(push=2.0))
+    response = run(
+        two_mass_loop(FRICTION_AND_ENCODER), 3000.0, 8.0, 3.0, sided=1, start_position=-2e-3, hand=Hand(push=2.0)
+    )
     judged = judge_response(response)
     assert (judged.behaviour, judged.stable) == ("converged", True)
     assert judged.contact == 1.0
@@ -41,8 +46,8 @@ def test_friction_brings_it_to_rest_inside():
 
 def test_a_limit_cycle_is_named_and_its_tone_is_right():
     # friction stops small motions, the force limit large ones, in between it goes round
-    parts = Nonlinear(friction=(dry(0.05),), force_limit=3.0, counters=(Counter(MOTOR, 1e-4),))
-    response = run(bench(parts), 9000.0, 12.0, 6.0, start_position=1e-3)
+    parts = Nonlinear(friction=(friction_of(0.05),), force_limit=3.0, counters=(Counter(MOTOR, 1e-4),))
+    response = run(two_mass_loop(parts), 9000.0, 12.0, 6.0, start_position=1e-3)
     judged = judge_response(response)
     assert (judged.behaviour, judged.stable) == ("limit cycle", False)
     assert abs(judged.growth) < 1e-4
@@ -54,17 +59,17 @@ def test_a_limit_cycle_is_named_and_its_tone_is_right():
 
 def test_undamped_bouncing_has_no_end():
     response = run(one_mass(0.3), 2000.0, -0.5, 4.0, sided=1, start_position=-1e-3, hand=Hand(push=1.0))
-    assert called(response) == ("bouncing", False)
+    assert behaviour_of(response) == ("bouncing", False)
 
 
 def test_a_device_that_flies_off_has_lost_contact():
     response = run(one_mass(0.3), 1000.0, 1.0, 1.0, sided=1, start_position=1e-3)
-    assert called(response) == ("lost contact", False)
+    assert behaviour_of(response) == ("lost contact", False)
 
 
 def test_too_few_samples_say_nothing():
-    response = run(bench(), 4000.0, 10.0, 0.01, start_position=1e-3)
-    assert called(response) == ("undecided", None)
+    response = run(two_mass_loop(), 4000.0, 10.0, 0.01, start_position=1e-3)
+    assert behaviour_of(response) == ("undecided", None)
 
 
 @pytest.mark.parametrize("frequency", [3.7, 50.0, 123.456, 390.0])
@@ -82,5 +87,5 @@ def test_the_tone_of_what_does_not_move_is_none():
 def test_verdicts_do_not_depend_on_the_unit_of_length():
     for scale in (1e-9, 1.0, 1e6):
         for (K, B), expected in (((4000.0, 10.0), "decaying"), ((7500.0, 10.0), "growing")):
-            response = run(bench(), K, B, 2.0, start_position=1e-3 * scale)
+            response = run(two_mass_loop(), K, B, 2.0, start_position=1e-3 * scale)
             assert judge_response(response).behaviour == expected

@@ -10,7 +10,7 @@ import pytest
 from zwidth.device.faults import DeviceError, Fault
 from zwidth.device.load import from_document
 
-PLANT = """
+PLANT_FILE = """
 name = "two masses"
 [plant]
 mass_kg = [[0.3, 0.0], [0.0, 0.02]]
@@ -27,7 +27,7 @@ order = 2
 cutoff_Hz = 20.0
 """
 
-ARM = """
+ARM_FILE = """
 name = "two links"
 [mechanism]
 [[mechanism.links]]
@@ -69,18 +69,18 @@ mode_ratio = 0.05
 sampling_period_s = 0.001
 """
 
-GONE = object()
+REMOVED = object()
 
 
-def changed(text: str, **values: Any) -> dict[str, Any]:
-    """The document with values put at paths (dots written __), whatever they are; GONE removes."""
+def with_changes(text: str, **values: Any) -> dict[str, Any]:
+    """The document with values put at paths (dots written __), whatever they are; REMOVED removes."""
     document = tomllib.loads(text)
     for path, value in values.items():
         *outer, last = [int(step) if step.isdigit() else step for step in path.split("__")]
         table: Any = document
         for step in outer:
             table = table.setdefault(step, {}) if isinstance(table, dict) else table[step]
-        if value is GONE:
+        if value is REMOVED:
             del table[last]
         else:
             table[last] = value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.device.device_cases import ARM, PLANT, changed
+from tests.device.device_cases import ARM_FILE, PLANT_FILE, with_changes
 from zwidth.device import address
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document, load
@@ -12,9 +12,9 @@ from zwidth.device.read import bundled_names, read
 from zwidth.loop.controller import Butterworth, FirstOrder
 
 
-def said(setting: str, text: str = ARM) -> str:
+def error_message(setting: str, text: str = ARM_FILE) -> str:
     with pytest.raises(DeviceError) as caught:
-        address.apply(changed(text), [setting])
+        address.apply(with_changes(text), [setting])
     (fault,) = caught.value.faults
     assert fault.file == "settings"
     return str(fault)
@@ -35,7 +35,7 @@ def said(setting: str, text: str = ARM) -> str:
     ],
 )
 def test_get(path, value):
-    assert address.get(changed(ARM), path) == value
+    assert address.get(with_changes(ARM_FILE), path) == value
 
 
 @pytest.mark.parametrize(
@@ -55,14 +55,16 @@ def test_get(path, value):
     ],
 )
 def test_set(setting, value):
-    document = changed(ARM)
+    document = with_changes(ARM_FILE)
     result = address.apply(document, [setting])
     assert address.get(result, setting.partition("=")[0].strip()) == value
-    assert document == changed(ARM), "the document given is left alone"
+    assert document == with_changes(ARM_FILE), "the document given is left alone"
 
 
 def test_an_element_of_a_matrix():
-    device = from_document(address.apply(changed(PLANT), ["plant.mass_kg.0.0=0.5", ("plant.mass_kg.1.1", 0.01)]))
+    device = from_document(
+        address.apply(with_changes(PLANT_FILE), ["plant.mass_kg.0.0=0.5", ("plant.mass_kg.1.1", 0.01)])
+    )
     assert device.given_plant.mass.tolist() == [[0.5, 0.0], [0.0, 0.01]]
 
 
@@ -77,12 +79,14 @@ def test_an_element_of_a_matrix():
     ],
 )
 def test_setting_one_of_two_exclusive_keys_drops_the_other(settings, samples):
-    assert from_document(address.apply(changed(PLANT), settings)).controller.delay == pytest.approx(samples)
+    assert from_document(address.apply(with_changes(PLANT_FILE), settings)).controller.delay == pytest.approx(
+        samples
+    )
 
 
 def test_setting_one_way_of_damping_drops_the_others():
     document = address.apply(
-        changed(ARM), ["damping.stiffness_coefficient_s=1e-4", "damping.mass_coefficient_1_per_s=2"]
+        with_changes(ARM_FILE), ["damping.stiffness_coefficient_s=1e-4", "damping.mass_coefficient_1_per_s=2"]
     )
     assert document["mechanism"]["damping"] == {
         "stiffness_coefficient_s": 1e-4,
@@ -95,7 +99,7 @@ def test_setting_one_way_of_damping_drops_the_others():
 def test_one_filter_can_be_set_for_the_other():
     filters = "loop.velocity.filter"
     settings = [f"{filters}.type=first-order", f"{filters}.time_constant_s=0.01"]
-    document = address.apply(changed(PLANT), settings)
+    document = address.apply(with_changes(PLANT_FILE), settings)
     assert from_document(document).controller.velocity_filter == FirstOrder(0.01)
     settings = [f"{filters}.type=butterworth", f"{filters}.order=4", f"{filters}.cutoff_Hz=30"]
     assert from_document(address.apply(document, settings)).controller.velocity_filter == Butterworth(4, 30.0)
@@ -104,7 +108,7 @@ def test_one_filter_can_be_set_for_the_other():
 
 def test_a_key_of_the_other_filter_makes_it_that_filter():
     filters = "loop.velocity.filter"
-    document = address.apply(changed(PLANT), [f"{filters}.time_constant_s=0.001"])
+    document = address.apply(with_changes(PLANT_FILE), [f"{filters}.time_constant_s=0.001"])
     assert document["loop"]["velocity"]["filter"] == {"type": "first-order", "time_constant_s": 0.001}
     assert from_document(document).controller.velocity_filter == FirstOrder(0.001)
     back = address.apply(document, [f"{filters}.cutoff_Hz=30", f"{filters}.order=4"])
@@ -114,12 +118,12 @@ def test_a_key_of_the_other_filter_makes_it_that_filter():
 def test_a_key_that_drops_nothing_leaves_the_type_alone():
     filters = "loop.velocity.filter"
     settings = [f"{filters}=unset", f"{filters}.type=first-order", f"{filters}.order=2"]
-    document = address.apply(changed(PLANT), settings)
+    document = address.apply(with_changes(PLANT_FILE), settings)
     assert document["loop"]["velocity"]["filter"] == {"type": "first-order", "order": 2}
 
 
 def test_unset_removes_and_what_is_not_there_is_no_fault():
-    document = changed(ARM)
+    document = with_changes(ARM_FILE)
     assert (
         "stiffness_Nm_per_rad"
         not in address.unset(document, "drives.shoulder.stiffness_Nm_per_rad")["mechanism"]["drives"][0]
@@ -158,11 +162,11 @@ def test_unset_removes_and_what_is_not_there_is_no_fault():
     ],
 )
 def test_a_path_that_leads_nowhere_names_the_nearest_right_one(setting, words):
-    assert words in said(setting)
+    assert words in error_message(setting)
 
 
 def test_a_plant_has_no_shorthand():
-    assert "is no key" in said("links.upper.length_m=1", PLANT)
+    assert "is no key" in error_message("links.upper.length_m=1", PLANT_FILE)
 
 
 def test_all_settings_at_fault_are_reported_together():

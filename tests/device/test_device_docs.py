@@ -11,7 +11,7 @@ import pytest
 
 from zwidth.device import unsupported
 from zwidth.device.load import from_document
-from zwidth.device.schema import file as schema
+from zwidth.device.schema import device_file as schema
 
 PAGE = (Path(__file__).parents[2] / "docs" / "device-files.md").read_text(encoding="utf-8")
 
@@ -46,7 +46,7 @@ TABLES = {
 def rows(path: tuple[str | int, ...]) -> list[str]:
     """The table of the keys at a path, as the page has it: key, unit, meaning, default."""
     lines: dict[str, str] = {}
-    for found in schema.at(path):
+    for found in schema.subschemas(path):
         for key, value in found.get("properties", {}).items():
             default = value.get("default")
             needed = "required" if key in found.get("required", ()) else ""
@@ -93,7 +93,7 @@ def test_the_page_says_what_is_not_supported_yet():
 def test_every_key_has_a_meaning_and_every_physical_one_a_unit():
     """A key that ends in a unit carries it in the schema, too."""
     for path in TABLES.values():
-        for found in schema.at(path):
+        for found in schema.subschemas(path):
             for key, value in found.get("properties", {}).items():
                 assert value.get("description"), key
                 if re.search(r"_(kg|m|s|rad|Hz|kg_m2|per_m3?|per_rad3?|per_s|per_A|N|Nm|samples)$", key):

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from tests import systems
-from tests.cli.cli_run import TWO_MASS, refused, zwidth
-from tests.interruption import HANGS
-from tests.measured_cases import measured
+from tests.cli.command_runner import TWO_MASS, refusal_lines, run_command
+from tests.interruption import HANG_TIMEOUT_S
+from tests.measured_cases import measured_response
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.study.study_file import read_study
@@ -28,7 +28,7 @@ def folder(tmp_path, monkeypatch):
     """A folder in which a right sweep lies beside the device file, one below it, and one outside."""
     inside = tmp_path / "inside"
     (inside / "data").mkdir(parents=True)
-    response, _ = measured(systems.published(), np.linspace(4.0, 400.0, 100))
+    response, _ = measured_response(systems.published(), np.linspace(4.0, 400.0, 100))
     cells = zip(response.frequency, response.value.real, response.value.imag, strict=True)
     text = "frequency_Hz,real_m_per_N,imag_m_per_N\n" + "".join(f"{f!r},{a!r},{b!r}\n" for f, a, b in cells)
     text = text.replace("np.float64(", "").replace(")", "")
@@ -47,7 +47,7 @@ def no_waiting():
         raise TimeoutError("it waits for ever")
 
     before = signal.signal(signal.SIGALRM, late)
-    signal.alarm(int(HANGS))
+    signal.alarm(int(HANG_TIMEOUT_S))
     yield
     signal.alarm(0)
     signal.signal(signal.SIGALRM, before)
@@ -112,7 +112,7 @@ def test_a_pipe_for_a_response_is_refused(folder):
 def test_a_pipe_for_a_file_that_is_read_again_is_one_line(tmp_path, words):
     pipe = tmp_path / "pipe.py"
     os.mkfifo(pipe)
-    (line,) = refused(*(word.format(pipe) for word in words))
+    (line,) = refusal_lines(*(word.format(pipe) for word in words))
     assert "no plain file" in line
 
 
@@ -131,7 +131,7 @@ def test_a_pipe_that_the_user_names_is_read(tmp_path, words, text):
     os.mkfifo(pipe)
     writer = Thread(target=pipe.write_text, args=(text,))
     writer.start()
-    ran = zwidth(*(str(word).format(pipe) for word in words))
+    ran = run_command(*(str(word).format(pipe) for word in words))
     writer.join()
     assert (ran.code, ran.err) == (0, "")
     assert "stable" in ran.out

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.device.device_cases import ARM, GONE, PLANT, changed, faults
-from tests.systems import second_matrix
+from tests.device.device_cases import ARM_FILE, PLANT_FILE, REMOVED, faults, with_changes
+from tests.systems import reference_transition_matrix
 from zwidth.chart.verdict import eigenvalues
 from zwidth.device import address
 from zwidth.device.load import from_document
-from zwidth.device.schema import file as schema
+from zwidth.device.schema import device_file as schema
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import (
     METHODS,
@@ -31,7 +31,7 @@ from zwidth.loop.loop import Loop
 from zwidth.model.operator import Operator, attach
 from zwidth.model.plant import LaggedDamper
 
-NO_FILTER = {"loop__velocity__filter": GONE}
+NO_FILTER = {"loop__velocity__filter": REMOVED}
 VELOCITIES = {
     "backward-difference": ({}, BackwardDifference()),
     "windowed-difference": ({"samples": 4}, WindowedDifference(4)),
@@ -46,7 +46,7 @@ VELOCITIES = {
 
 
 def with_velocity(method, **own):
-    return changed(PLANT, loop__velocity={"method": method, **own})
+    return with_changes(PLANT_FILE, loop__velocity={"method": method, **own})
 
 
 def test_every_method_there_is_can_be_written():
@@ -74,8 +74,8 @@ def test_an_adaptive_window_takes_half_a_step_of_the_encoder():
 
 
 # what is put into the file of the two masses, and the plant and controller that it stands for
-BARE = from_document(changed(PLANT))
-HELD = {
+BARE = from_document(with_changes(PLANT_FILE))
+OPERATOR = {
     "arm_mass_kg": 0.8,
     "arm_stiffness_N_per_m": 580.0,
     "arm_damping_Ns_per_m": 5.5,
@@ -115,7 +115,7 @@ FEATURES = {
         lambda c: c,
     ),
     "operator": (
-        {"operator": HELD, "plant__handle": [1.0, 0.0]},
+        {"operator": OPERATOR, "plant__handle": [1.0, 0.0]},
         lambda p: attach(replace(p, handle=np.array([1.0, 0.0])), Operator(0.8, 580.0, 5.5, 1e4, 5.0)),
         lambda c: c,
     ),
@@ -131,18 +131,20 @@ FEATURES = {
 def test_a_feature_of_the_file_is_the_loop_built_by_hand(feature):
     """And its eigenvalues are those of a matrix built from nothing but the differential equations."""
     changes, plant, controller = FEATURES[feature]
-    device = from_document(changed(PLANT, **changes))
+    device = from_document(with_changes(PLANT_FILE, **changes))
     ours = device.at().loop
     bare = Controller(0.001, 0.5, Butterworth(2, 20.0))
     theirs = Loop(plant(BARE.at().plant), controller(bare))
     for K, B in ((800.0, 3.0), (-200.0, 12.0)):
         assert ours.transition_matrix(K, B) == pytest.approx(theirs.transition_matrix(K, B), rel=1e-12, abs=1e-13)
         found = np.max(np.abs(eigenvalues(ours, K, B)))
-        assert found == pytest.approx(np.max(np.abs(np.linalg.eigvals(second_matrix(ours, K, B)))), abs=2e-7)
+        assert found == pytest.approx(
+            np.max(np.abs(np.linalg.eigvals(reference_transition_matrix(ours, K, B)))), abs=2e-7
+        )
 
 
 def test_a_first_order_force_filter_without_time_constant_is_none():
-    document = changed(PLANT, loop__force={"filter": {"type": "first-order", "time_constant_s": 0.0}})
+    document = with_changes(PLANT_FILE, loop__force={"filter": {"type": "first-order", "time_constant_s": 0.0}})
     assert from_document(document).controller.force_filter is None
 
 
@@ -150,7 +152,7 @@ WINDING = {"torque_constant_Nm_per_A": 0.05, "winding_resistance_ohm": 2.0, "dam
 
 
 def arm(**drive):
-    document = changed(ARM)
+    document = with_changes(ARM_FILE)
     document["mechanism"]["drives"][0] |= drive
     return document
 
@@ -180,11 +182,11 @@ def test_a_rigid_drives_winding_brakes_its_link():
 
 @pytest.mark.parametrize("at", ["link", "handle"])
 def test_encoders_on_the_links_read_the_handle(at):
-    device = from_document(changed(ARM, loop__encoder={"at": at}))
+    device = from_document(with_changes(ARM_FILE, loop__encoder={"at": at}))
     plant = device.at().plant
     assert plant.sensor == pytest.approx(plant.handle)
     assert device.at(model="two-mass").plant.sensor.tolist() == [1.0, 0.0]
-    motor = from_document(changed(ARM, loop__encoder={"at": "motor"})).at().plant
+    motor = from_document(with_changes(ARM_FILE, loop__encoder={"at": "motor"})).at().plant
     assert motor.sensor == pytest.approx(motor.actuator)
 
 
@@ -206,7 +208,7 @@ FAULTS = [
         'is not read with method = "central-difference"; remove it, or set method = "windowed-difference" or',
     ),
     (
-        changed(PLANT, loop__velocity={"alpha": 0.5}),
+        with_changes(PLANT_FILE, loop__velocity={"alpha": 0.5}),
         "loop.velocity.alpha",
         'is not read with method = "backward-difference"; remove it, or set method = "alpha-beta"',
     ),
@@ -251,35 +253,55 @@ FAULTS = [
         "loop.velocity",
         "too much motion",
     ),
-    (changed(PLANT, loop__encoder={"at": "link"}), "loop.encoder.at", "give plant.sensor"),
-    (changed(ARM, loop__encoder={"at": "tip"}), "loop.encoder.at", "must be 'motor', 'link' or 'handle'"),
-    (changed(ARM, loop__encoder={"resolution_m": 1e-6}), "loop.encoder.resolution_m", "is for a [plant]"),
-    (changed(PLANT, loop__actuator={"time_constant_s": -1.0}), "loop.actuator.time_constant_s", "at least 0"),
-    (changed(PLANT, loop__actuator={"time_constant_s": 1e-13}), "loop.actuator.time_constant_s", "1e-06 to 1e+06"),
-    (changed(PLANT, loop__actuator={"time_constant_s": 1e9}), "loop.actuator.time_constant_s", "1e-06 to 1e+06"),
-    (changed(PLANT, loop__actuator={}), "loop.actuator.time_constant_s", "is missing"),
+    (with_changes(PLANT_FILE, loop__encoder={"at": "link"}), "loop.encoder.at", "give plant.sensor"),
     (
-        changed(PLANT, loop__force={"filter": {"type": "butterworth", "order": 2, "cutoff_Hz": 600.0}}),
+        with_changes(ARM_FILE, loop__encoder={"at": "tip"}),
+        "loop.encoder.at",
+        "must be 'motor', 'link' or 'handle'",
+    ),
+    (
+        with_changes(ARM_FILE, loop__encoder={"resolution_m": 1e-6}),
+        "loop.encoder.resolution_m",
+        "is for a [plant]",
+    ),
+    (
+        with_changes(PLANT_FILE, loop__actuator={"time_constant_s": -1.0}),
+        "loop.actuator.time_constant_s",
+        "at least 0",
+    ),
+    (
+        with_changes(PLANT_FILE, loop__actuator={"time_constant_s": 1e-13}),
+        "loop.actuator.time_constant_s",
+        "1e-06 to 1e+06",
+    ),
+    (
+        with_changes(PLANT_FILE, loop__actuator={"time_constant_s": 1e9}),
+        "loop.actuator.time_constant_s",
+        "1e-06 to 1e+06",
+    ),
+    (with_changes(PLANT_FILE, loop__actuator={}), "loop.actuator.time_constant_s", "is missing"),
+    (
+        with_changes(PLANT_FILE, loop__force={"filter": {"type": "butterworth", "order": 2, "cutoff_Hz": 600.0}}),
         "loop.force.filter.cutoff_Hz",
         "below half the sampling frequency, 500 Hz",
     ),
     (
-        changed(PLANT, plant__electrical_damping=[{"resistance_ohm": 2.0}]),
+        with_changes(PLANT_FILE, plant__electrical_damping=[{"resistance_ohm": 2.0}]),
         "plant.electrical_damping.0.force_constant_N_per_A",
         "is missing",
     ),
     (
-        changed(PLANT, plant__electrical_damping=[MOTOR | {"along": [1.0]}]),
+        with_changes(PLANT_FILE, plant__electrical_damping=[MOTOR | {"along": [1.0]}]),
         "plant.electrical_damping.0.along",
         "has 1 numbers, but mass_kg has 2 rows",
     ),
     (
-        changed(PLANT, plant__electrical_damping=[MOTOR | {"inductance_H": 1e-12}]),
+        with_changes(PLANT_FILE, plant__electrical_damping=[MOTOR | {"inductance_H": 1e-12}]),
         "plant.electrical_damping.0.inductance_H",
         "time constant L/R from 1e-06",
     ),
     (
-        changed(PLANT, plant__electrical_damping=[MOTOR | {"force_constant_N_per_A": 1e12}]),
+        with_changes(PLANT_FILE, plant__electrical_damping=[MOTOR | {"force_constant_N_per_A": 1e12}]),
         "plant.electrical_damping.0",
         "more than any device",
     ),
@@ -318,7 +340,7 @@ def test_setting_a_method_drops_what_it_does_not_read():
 
 
 def test_setting_a_key_of_the_other_force_filter_makes_it_that_filter():
-    document = address.apply(changed(PLANT), ["loop.force.filter.type=first-order"])
+    document = address.apply(with_changes(PLANT_FILE), ["loop.force.filter.type=first-order"])
     document = address.apply(document, ["loop.force.filter.time_constant_s=0.01"])
     assert from_document(document).controller.force_filter == FirstOrder(0.01)
     document = address.apply(document, ["loop.force.filter.cutoff_Hz=30", "loop.force.filter.order=2"])
@@ -370,12 +392,12 @@ def test_every_number_can_be_addressed_and_has_a_unit():
         "loop.force.filter.time_constant_s",
         "loop.actuator.time_constant_s",
         "loop.encoder.resolution_m",
-        *(f"operator.{key}" for key in HELD),
+        *(f"operator.{key}" for key in OPERATOR),
     }
     assert new <= paths.keys()
     for path in new:
         doubled = from_document(address.apply(document, [(path, 2.0 * (paths[path] or 1.0))]))
         assert address.get(doubled.document, path) == 2.0 * (paths[path] or 1.0)
         steps = address.resolve(document, path)
-        said = schema.description(steps if isinstance(steps[-1], str) else steps[:-1])
+        said = schema.key_description(steps if isinstance(steps[-1], str) else steps[:-1])
         assert said.endswith("]") or "along" in steps

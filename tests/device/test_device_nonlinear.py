@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from tests.device.device_cases import ARM, PLANT, changed, faults
-from zwidth.conditions.dry import ground_friction, reading_step
+from tests.device.device_cases import ARM_FILE, PLANT_FILE, faults, with_changes
+from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
 from zwidth.device import address
 from zwidth.device.load import from_document, load
 from zwidth.loop.estimators import Kalman
@@ -17,8 +17,8 @@ INF = math.inf
 ONE = {"plant": {"mass_kg": 0.1}, "name": "m", "loop": {"sampling_period_s": 0.001}}
 
 
-def parts(text=PLANT, **values):
-    return from_document(changed(text, **values)).at().plant.nonlinear
+def nonlinear_of(text=PLANT_FILE, **values):
+    return from_document(with_changes(text, **values)).at().plant.nonlinear
 
 
 def arm(**keys):
@@ -27,10 +27,10 @@ def arm(**keys):
 
 
 def test_friction_works_along_each_coordinate_that_has_any():
-    (rubbing,) = parts(friction={"coulomb_N": [0.0, 0.1]}).friction
+    (rubbing,) = nonlinear_of(friction={"coulomb_N": [0.0, 0.1]}).friction
     assert rubbing.along.tolist() == [0.0, 1.0]
     assert (rubbing.coulomb, rubbing.model) == (0.1, "coulomb")
-    both = parts(friction={"coulomb_N": [0.2, 0.1]}).friction
+    both = nonlinear_of(friction={"coulomb_N": [0.2, 0.1]}).friction
     assert [f.coulomb for f in both] == [0.2, 0.1]
     (single,) = from_document(ONE | {"friction": {"coulomb_N": 0.3}}).at().plant.nonlinear.friction
     assert (single.along.tolist(), single.coulomb) == ([1.0], 0.3)
@@ -38,7 +38,7 @@ def test_friction_works_along_each_coordinate_that_has_any():
 
 def test_bristles_are_read():
     dahl = {"coulomb_N": [0.0, 0.1], "model": "dahl", "bristle_stiffness_N_per_m": 1e4}
-    (found,) = parts(friction=dahl).friction
+    (found,) = nonlinear_of(friction=dahl).friction
     assert (found.model, found.bristle_stiffness) == ("dahl", 1e4)
     lugre = dahl | {
         "model": "lugre",
@@ -46,37 +46,37 @@ def test_bristles_are_read():
         "breakaway_N": [0.0, 0.15],
         "stribeck_velocity_m_per_s": 0.01,
     }
-    (found,) = parts(friction=lugre).friction
+    (found,) = nonlinear_of(friction=lugre).friction
     assert (found.bristle_damping, found.breakaway, found.stribeck_velocity) == (3.0, 0.15, 0.01)
 
 
 def test_the_encoder_of_a_plant_is_one_counter_of_its_sensor():
-    (counter,) = parts(loop__encoder={"resolution_m": 1e-5, "noise_m": 2e-6}).counters
+    (counter,) = nonlinear_of(loop__encoder={"resolution_m": 1e-5, "noise_m": 2e-6}).counters
     assert (counter.along.tolist(), counter.step, counter.weight, counter.noise) == ([0.0, 1.0], 1e-5, 1.0, 2e-6)
-    assert parts(loop__encoder={"resolution_m": 0.0}).counters == ()
+    assert nonlinear_of(loop__encoder={"resolution_m": 0.0}).counters == ()
 
 
 def test_a_kalman_filter_takes_its_noise_from_the_step_only_where_it_is_given_none():
     velocity = {"method": "kalman", "acceleration_noise_m_per_s2": 10.0}
     step = {"resolution_m": 1e-5}
-    alone = from_document(changed(PLANT, loop__velocity=velocity, loop__encoder=step))
+    alone = from_document(with_changes(PLANT_FILE, loop__velocity=velocity, loop__encoder=step))
     assert alone.controller.velocity == Kalman.of_encoder(10.0, 1e-5)
     beside = from_document(
-        changed(PLANT, loop__velocity=velocity | {"position_noise_m": 1e-4}, loop__encoder=step)
+        with_changes(PLANT_FILE, loop__velocity=velocity | {"position_noise_m": 1e-4}, loop__encoder=step)
     )
     assert beside.controller.velocity == Kalman(10.0, 1e-4)
     assert beside.at().plant.nonlinear.counters[0].step == 1e-5
 
 
 def test_the_force_is_limited_where_it_is_commanded():
-    device = from_document(changed(PLANT, loop__saturation={"force_N": 20.0}))
-    assert device.controller.saturation == 20.0
-    assert device.left_out == ("the force limit",)
-    assert from_document(changed(PLANT, loop__saturation={"force_N": INF})).left_out == ()
+    device = from_document(with_changes(PLANT_FILE, loop__saturation={"force_N": 20.0}))
+    assert device.controller.force_limit == 20.0
+    assert device.linear_omissions == ("the force limit",)
+    assert from_document(with_changes(PLANT_FILE, loop__saturation={"force_N": INF})).linear_omissions == ()
 
 
 def test_springs_and_brakes_of_a_plant():
-    found = parts(
+    found = nonlinear_of(
         plant__spring=[{"along": [-1.0, 1.0], "hardening_N_per_m3": 1e7, "backward_excess_N_per_m": -200.0}],
         plant__brake=[{"damping_max_Ns_per_m": 2.0, "time_constant_s": 0.01}],
     )
@@ -87,7 +87,7 @@ def test_springs_and_brakes_of_a_plant():
 
 def test_a_two_link_arm_by_hand():
     """Elbow at a right angle, handle at (0.2, 0.2): h = J^T u with u along x, by cross products."""
-    text = ARM.replace("[0.2, 0.2]\ndirection", "[0.2, 0.2, 0.0]\ndirection").replace(
+    text = ARM_FILE.replace("[0.2, 0.2]\ndirection", "[0.2, 0.2, 0.0]\ndirection").replace(
         "upper = 0.5, lower = 1.0", "upper = 0.0, lower = 1.57"
     )
     keys = {
@@ -101,7 +101,7 @@ def test_a_two_link_arm_by_hand():
         "brake_damping_max_Nms_per_rad": 1e-4,
         "brake_time_constant_s": 0.005,
     }
-    device = from_document(changed(text, **arm(**keys), mechanism__drives__1__encoder_counts_per_rev=500.0))
+    device = from_document(with_changes(text, **arm(**keys), mechanism__drives__1__encoder_counts_per_rev=500.0))
     assert device.mechanism.drives.continuous_torque == pytest.approx([0.04, np.nan], nan_ok=True)
     # shoulder at the origin, elbow at (0.2, 0): the handle's x moves by -0.2 per radian of either
     plant = device.at().plant  # phi_1, phi_2, theta_1; the elbow's drive is rigid
@@ -118,7 +118,7 @@ def test_a_two_link_arm_by_hand():
     assert spring.backward_excess == pytest.approx((0.6 - 0.5) * 100)
     assert (brake.along.tolist(), brake.damping) == ([0.0, 0.0, 1.0], pytest.approx(0.01))
     assert brake.time_constant == 0.005
-    linked = from_document(changed(text, **arm(**keys), loop__encoder={"at": "link"}))
+    linked = from_document(with_changes(text, **arm(**keys), loop__encoder={"at": "link"}))
     assert linked.at().plant.nonlinear.counters[0].along.tolist() == [1.0, 0.0, 0.0]
 
 
@@ -130,7 +130,7 @@ def test_the_drives_friction_may_have_bristles():
         "bristle_damping_Nms_per_rad": 0.01,
         "stribeck_velocity_rad_per_s": 5.0,
     }
-    (found,) = parts(ARM, **keys, mechanism__friction=grip).friction
+    (found,) = nonlinear_of(ARM_FILE, **keys, mechanism__friction=grip).friction
     assert (found.coulomb, found.breakaway) == pytest.approx((0.02, 0.03))
     assert (found.bristle_stiffness, found.bristle_damping, found.stribeck_velocity) == pytest.approx(
         (400, 1, 0.5)
@@ -157,126 +157,164 @@ def test_the_drives_friction_may_have_bristles():
     ],
 )
 def test_what_is_set_is_what_linear_answers_leave_out(device, setting, words):
-    assert load(device).left_out == ()
+    assert load(device).linear_omissions == ()
     found = load(device, [setting])
-    assert found.left_out == words
+    assert found.linear_omissions == words
     plant = found.at().plant
-    assert plant.nonlinear.left_out in (words, ())  # a limit of the computer's is not the plant's
+    assert plant.nonlinear.kinds in (words, ())  # a limit of the computer's is not the plant's
     before = load(device).at().plant
     assert plant.mass.tolist() == before.mass.tolist()
     assert plant.stiffness.tolist() == before.stiffness.tolist()
 
 
 def test_a_level_is_addressed_like_any_number():
-    document = address.apply(changed(PLANT), ["friction.coulomb_N=[0.0, 0.1]", "friction.coulomb_N.1=0.2"])
+    document = address.apply(
+        with_changes(PLANT_FILE), ["friction.coulomb_N=[0.0, 0.1]", "friction.coulomb_N.1=0.2"]
+    )
     assert from_document(document).at().plant.nonlinear.friction[0].coulomb == 0.2
     assert "friction" not in address.apply(document, ["friction=unset"])
 
 
 LUGRE = {"coulomb_N": [0.0, 0.1], "model": "lugre", "bristle_stiffness_N_per_m": 1e4}
 FAULTS = [
-    (changed(PLANT, friction={"coulomb_N": [0.0, -0.1]}), "friction.coulomb_N.1", "must be at least 0, got -0.1"),
-    (changed(PLANT, friction={"coulomb_N": 0.1}), "friction.coulomb_N", "has 1 numbers, but mass_kg has 2 rows"),
-    (changed(PLANT, friction={"coulomb_N": "0.1"}), "friction.coulomb_N", "must be a number or a list of numbers"),
-    (changed(PLANT, friction={"coulomb_N": [0, 1e-14]}), "friction.coulomb_N.1", "is the unit right?"),
-    (changed(PLANT, friction={}), "friction.coulomb_N", "is missing"),
     (
-        changed(PLANT, friction=LUGRE | {"model": "stick"}),
+        with_changes(PLANT_FILE, friction={"coulomb_N": [0.0, -0.1]}),
+        "friction.coulomb_N.1",
+        "must be at least 0, got -0.1",
+    ),
+    (
+        with_changes(PLANT_FILE, friction={"coulomb_N": 0.1}),
+        "friction.coulomb_N",
+        "has 1 numbers, but mass_kg has 2 rows",
+    ),
+    (
+        with_changes(PLANT_FILE, friction={"coulomb_N": "0.1"}),
+        "friction.coulomb_N",
+        "must be a number or a list of numbers",
+    ),
+    (with_changes(PLANT_FILE, friction={"coulomb_N": [0, 1e-14]}), "friction.coulomb_N.1", "is the unit right?"),
+    (with_changes(PLANT_FILE, friction={}), "friction.coulomb_N", "is missing"),
+    (
+        with_changes(PLANT_FILE, friction=LUGRE | {"model": "stick"}),
         "friction.model",
         "must be 'coulomb', 'dahl' or 'lugre'",
     ),
     (
-        changed(PLANT, friction=LUGRE | {"model": "coulomb"}),
+        with_changes(PLANT_FILE, friction=LUGRE | {"model": "coulomb"}),
         "friction.bristle_stiffness_N_per_m",
         "is not read with",
     ),
     (
-        changed(PLANT, friction={"coulomb_N": [0, 1], "model": "dahl"}),
+        with_changes(PLANT_FILE, friction={"coulomb_N": [0, 1], "model": "dahl"}),
         "friction.bristle_stiffness_N_per_m",
         'is missing; model = "dahl" needs it',
     ),
     (
-        changed(PLANT, friction=LUGRE | {"breakaway_N": [0.0, 0.05]}),
+        with_changes(PLANT_FILE, friction=LUGRE | {"breakaway_N": [0.0, 0.05]}),
         "friction.breakaway_N.1",
         "at least coulomb_N = 0",
     ),
     (
-        changed(PLANT, friction=LUGRE | {"breakaway_N": [0.2, 0.1]}),
+        with_changes(PLANT_FILE, friction=LUGRE | {"breakaway_N": [0.2, 0.1]}),
         "friction.breakaway_N.0",
         "must be 0 where coulomb_N is 0",
     ),
     (
-        changed(PLANT, friction=LUGRE | {"breakaway_N": [0.0, 0.2]}),
+        with_changes(PLANT_FILE, friction=LUGRE | {"breakaway_N": [0.0, 0.2]}),
         "friction.stribeck_velocity_m_per_s",
         "a breakaway above the level of sliding needs it",
     ),
     (
-        changed(PLANT, friction=LUGRE | {"stribeck_velocity_m_per_s": 0.1}),
+        with_changes(PLANT_FILE, friction=LUGRE | {"stribeck_velocity_m_per_s": 0.1}),
         "friction.stribeck_velocity_m_per_s",
         "is read only with a breakaway",
     ),
-    (changed(ARM, friction={"coulomb_N": [0, 1]}), "friction", "the drives of a mechanism give coulomb_Nm"),
-    (changed(PLANT, loop__saturation={"force_N": 0.0}), "loop.saturation.force_N", "must be greater than 0"),
-    (changed(PLANT, loop__saturation={}), "loop.saturation.force_N", "is missing"),
-    (changed(PLANT, loop__encoder={"resolution_m": -1e-6}), "loop.encoder.resolution_m", "must be at least 0"),
-    (changed(ARM, loop__encoder={"noise_m": 1e-6}), "loop.encoder.noise_m", "give encoder_noise_rad"),
-    (changed(PLANT, plant__spring=[{"hardening_N_per_m3": 1.0}]), "plant.spring.0.along", "is missing; with 2"),
-    (changed(PLANT, plant__spring=[{"along": [1, -1]}]), "plant.spring.0", "says nothing"),
     (
-        changed(PLANT, plant__spring=[{"along": [1], "hardening_N_per_m3": 1.0}]),
+        with_changes(ARM_FILE, friction={"coulomb_N": [0, 1]}),
+        "friction",
+        "the drives of a mechanism give coulomb_Nm",
+    ),
+    (
+        with_changes(PLANT_FILE, loop__saturation={"force_N": 0.0}),
+        "loop.saturation.force_N",
+        "must be greater than 0",
+    ),
+    (with_changes(PLANT_FILE, loop__saturation={}), "loop.saturation.force_N", "is missing"),
+    (
+        with_changes(PLANT_FILE, loop__encoder={"resolution_m": -1e-6}),
+        "loop.encoder.resolution_m",
+        "must be at least 0",
+    ),
+    (with_changes(ARM_FILE, loop__encoder={"noise_m": 1e-6}), "loop.encoder.noise_m", "give encoder_noise_rad"),
+    (
+        with_changes(PLANT_FILE, plant__spring=[{"hardening_N_per_m3": 1.0}]),
+        "plant.spring.0.along",
+        "is missing; with 2",
+    ),
+    (with_changes(PLANT_FILE, plant__spring=[{"along": [1, -1]}]), "plant.spring.0", "says nothing"),
+    (
+        with_changes(PLANT_FILE, plant__spring=[{"along": [1], "hardening_N_per_m3": 1.0}]),
         "plant.spring.0.along",
         "has 1 numbers",
     ),
-    (changed(PLANT, plant__brake=[{}]), "plant.brake.0.damping_max_Ns_per_m", "is missing"),
+    (with_changes(PLANT_FILE, plant__brake=[{}]), "plant.brake.0.damping_max_Ns_per_m", "is missing"),
     (
-        changed(PLANT, plant__brake=[{"damping_max_Ns_per_m": 1.0, "time_constant_s": 1e-12}]),
+        with_changes(PLANT_FILE, plant__brake=[{"damping_max_Ns_per_m": 1.0, "time_constant_s": 1e-12}]),
         "plant.brake.0.time_constant_s",
         "must be 0 (no lag) or from 1e-06",
     ),
-    (changed(ARM, **arm(coulomb_Nm=-0.1)), "mechanism.drives.shoulder.coulomb_Nm", "must be at least 0, got -0.1"),
-    (changed(ARM, **arm(breakaway_Nm=0.1)), "mechanism.drives.shoulder.breakaway_Nm", "is not read with"),
     (
-        changed(ARM, mechanism__friction={"model": "dahl"}),
+        with_changes(ARM_FILE, **arm(coulomb_Nm=-0.1)),
+        "mechanism.drives.shoulder.coulomb_Nm",
+        "must be at least 0, got -0.1",
+    ),
+    (
+        with_changes(ARM_FILE, **arm(breakaway_Nm=0.1)),
+        "mechanism.drives.shoulder.breakaway_Nm",
+        "is not read with",
+    ),
+    (
+        with_changes(ARM_FILE, mechanism__friction={"model": "dahl"}),
         "mechanism.friction",
         "no drive has coulomb_Nm",
     ),
     (
-        changed(ARM, mechanism__drives__1__hardening_Nm_per_rad3=1.0),
+        with_changes(ARM_FILE, mechanism__drives__1__hardening_Nm_per_rad3=1.0),
         "mechanism.drives.elbow.hardening_Nm_per_rad3",
         "needs a flexible transmission",
     ),
     (
-        changed(ARM, **arm(backward_stiffness_Nm_per_rad=0.0)),
+        with_changes(ARM_FILE, **arm(backward_stiffness_Nm_per_rad=0.0)),
         "mechanism.drives.shoulder.backward_stiffness_Nm_per_rad",
         "must be greater than 0",
     ),
     (
-        changed(ARM, **arm(brake_time_constant_s=0.1)),
+        with_changes(ARM_FILE, **arm(brake_time_constant_s=0.1)),
         "mechanism.drives.shoulder.brake_time_constant_s",
         "give brake_damping_max_Nms_per_rad",
     ),
     (
-        changed(ARM, **arm(continuous_torque_Nm=0.0)),
+        with_changes(ARM_FILE, **arm(continuous_torque_Nm=0.0)),
         "mechanism.drives.shoulder.continuous_torque_Nm",
         "must be greater than 0",
     ),
     (
-        changed(ARM, **arm(continuous_torque_Nm=float("inf"))),
+        with_changes(ARM_FILE, **arm(continuous_torque_Nm=float("inf"))),
         "mechanism.drives.shoulder.continuous_torque_Nm",
         "must be finite, got inf",
     ),
     (
-        changed(ARM, **arm(continuous_torque_Nm=1e-13)),
+        with_changes(ARM_FILE, **arm(continuous_torque_Nm=1e-13)),
         "mechanism.drives.shoulder.continuous_torque_Nm",
         "is the unit right?",
     ),
     (
-        changed(ARM, **arm(continuous_torque_Nm=0.2, torque_limit_Nm=0.1)),
+        with_changes(ARM_FILE, **arm(continuous_torque_Nm=0.2, torque_limit_Nm=0.1)),
         "mechanism.drives.shoulder.continuous_torque_Nm",
         "must be at most torque_limit_Nm = 0.1, got 0.2",
     ),
     (
-        changed(ARM, **arm(encoder_counts_per_rev=0)),
+        with_changes(ARM_FILE, **arm(encoder_counts_per_rev=0)),
         "mechanism.drives.shoulder.encoder_counts_per_rev",
         "must be greater than 0",
     ),
@@ -285,9 +323,11 @@ FAULTS = [
 
 @pytest.mark.parametrize("limit", [0.1, 0.2, INF])
 def test_a_motor_bears_for_a_moment_what_it_bears_without_end(limit):
-    device = from_document(changed(ARM, **arm(continuous_torque_Nm=0.1, torque_limit_Nm=limit)))
+    device = from_document(with_changes(ARM_FILE, **arm(continuous_torque_Nm=0.1, torque_limit_Nm=limit)))
     assert device.mechanism.drives.torque_limit[0] == limit
-    assert from_document(changed(ARM, **arm(continuous_torque_Nm=0.1))).left_out == ()  # it limits nothing
+    assert (
+        from_document(with_changes(ARM_FILE, **arm(continuous_torque_Nm=0.1))).linear_omissions == ()
+    )  # it limits nothing
 
 
 @pytest.mark.parametrize(("document", "key", "words"), FAULTS, ids=[f"{i}-{f[1]}" for i, f in enumerate(FAULTS)])

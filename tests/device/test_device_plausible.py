@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.cli.cli_run import zwidth
+from tests.cli.command_runner import run_command
 from zwidth.device.load import bundled, from_document, load
-from zwidth.device.plausible import ImplausibleNumber, implausible
+from zwidth.device.plausibility import ImplausibleNumber, implausible
 from zwidth.model.response import Response
 from zwidth.study.study_file import study_of
 
@@ -62,7 +62,7 @@ def paddle(tmp_path):
 
 LINK, DRIVE, LOOP = "mechanism.links.paddle.", "mechanism.drives.motor.", "loop."
 
-SLIPS = [
+WRONG_UNITS = [
     (LINK + "inertia_kg_m2", 600, "a radius of gyration of 115 m on a device of 75 mm", "g cm^2, write 6e-05"),
     (LINK + "inertia_kg_m2", 0.6, "a radius of gyration of 3.65 m", "kg cm^2, write 6e-05"),
     (LINK + "inertia_kg_m2", [1e4, 6e4, 6e4], "a radius of gyration of", "g mm^2, write 6e-05"),
@@ -82,7 +82,7 @@ SLIPS = [
 ]
 
 
-@pytest.mark.parametrize(("key", "value", "why", "instead"), SLIPS)
+@pytest.mark.parametrize(("key", "value", "why", "instead"), WRONG_UNITS)
 def test_a_slipped_unit_is_warned_of_with_what_to_type(paddle, key, value, why, instead):
     with pytest.warns(ImplausibleNumber) as warned:
         load(paddle, [*([DRIVE + "torque_limit_Nm=unset"] if "continuous" in key else []), (key, value)])
@@ -127,7 +127,7 @@ def test_a_response_in_millimetres_shows_too_little_mass(mass, damping, stiffnes
     assert [fault.key for fault in found] == ["response"] * wrong
 
 
-def a_serial_arm(rng):
+def random_serial_arm(rng):
     """One to three links of 20 mm to 1 m, of plastic tube or of steel with a motor on board, with their drives."""
     count, size = int(rng.integers(1, 4)), 10.0 ** rng.uniform(np.log10(0.02), 0.0)
     links, drives = [], []
@@ -175,7 +175,7 @@ def a_serial_arm(rng):
 def test_random_plausible_arms_are_not_warned_of():
     rng = np.random.default_rng(3)
     for _ in range(1000):
-        device = SimpleNamespace(document=a_serial_arm(rng), label="arm", response=None)
+        device = SimpleNamespace(document=random_serial_arm(rng), label="arm", response=None)
         assert implausible(device) == []
 
 
@@ -186,7 +186,7 @@ def test_bundled_devices_are_not_warned_of(name):
 
 def test_a_warning_changes_neither_the_answer_s_exit_code_nor_its_json(paddle):
     with pytest.warns(ImplausibleNumber, match="more than a full turn"):
-        ran = zwidth("show", paddle, "--set", "mechanism.links.paddle.orientation_rad=[0, 0, 7]", "--json")
+        ran = run_command("show", paddle, "--set", "mechanism.links.paddle.orientation_rad=[0, 0, 7]", "--json")
     assert ran.code == 0
     assert ran.document["link_side_mass_kg"] > 0.0
 

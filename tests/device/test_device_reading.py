@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import bundled, load
-from zwidth.device.read import LARGEST_FILE, parse
-from zwidth.device.text_file import Unreadable, decode
+from zwidth.device.read import LARGEST_FILE, parse_document
+from zwidth.device.text_file import UnreadableFileError, decode
 
 GOOD = b'name = "a mass"\n[plant]\nmass_kg = 0.1\n[loop]\nsampling_period_s = 0.001\n'
 
@@ -117,8 +117,8 @@ def test_a_file_that_may_not_be_read(tmp_path):
 
 @given(st.binary(max_size=60))
 def test_whatever_the_bytes_only_device_errors_come_out(data):
-    with contextlib.suppress(DeviceError, Unreadable):
-        parse(decode(data), "my.toml")
+    with contextlib.suppress(DeviceError, UnreadableFileError):
+        parse_document(decode(data), "my.toml")
 
 
 def test_listing_the_bundled_devices_needs_no_numerics():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests import systems
-from tests.measured_cases import measured, moved
+from tests.measured_cases import encoder_readings, measured_response
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.loop.controller import Controller
@@ -26,7 +26,7 @@ def rows(*columns):
 @pytest.fixture
 def spectrum():
     """Lines of a right file."""
-    response, _ = measured(systems.published(), np.linspace(4.0, 400.0, 100))
+    response, _ = measured_response(systems.published(), np.linspace(4.0, 400.0, 100))
     return [HEAD, *rows(response.frequency, response.value.real, response.value.imag)]
 
 
@@ -80,7 +80,7 @@ def test_coherence_and_repeated_sweeps_are_read(write, spectrum):
 def test_a_raw_sweep_becomes_a_response(write):
     force = np.random.default_rng(0).normal(size=6000)
     loop = Loop(systems.published().plant, Controller(T))
-    lines = [RECORD, *rows(np.arange(6000) * T, force, moved(loop, force))]
+    lines = [RECORD, *rows(np.arange(6000) * T, force, encoder_readings(loop, force))]
     response = load(write(lines, 'file = "sweep.csv"\nintegrators = 2\nsegment_samples = 512')).response
     assert response.coherence is not None
     assert response.note == "from 6000 samples by 22 Hann segments of 512"

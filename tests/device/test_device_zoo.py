@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.device.device_cases import ARM, PLANT, changed
-from zwidth.device import address, build, geometry
+from tests.device.device_cases import ARM_FILE, PLANT_FILE, with_changes
+from zwidth.device import address, build, mechanism_check
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import bundled, from_document, load
 from zwidth.device.read import bundled_names, read
@@ -21,12 +21,12 @@ def test_every_group_of_numbers_has_its_source(name):
     """A number's source stands at its own path or at one that it lies in, * being any step."""
     document, _ = read(name)
     sources = load(name).sources
-    covered = {path for source in sources for path in _under(document, source)}
+    covered = {path for source in sources for path in _matching_addresses(document, source)}
     bare = [path for path in address.numeric_addresses(document) if path not in covered]
     assert bare == []
 
 
-def _under(document, source):
+def _matching_addresses(document, source):
     """Dotted paths of the numbers that a source speaks of."""
     wanted = source.split(".")
     for path in address.numeric_addresses(document):
@@ -62,7 +62,7 @@ def test_one_coordinate_is_driven_read_and_held():
 
 
 def test_no_handle_is_made_up_for_several_coordinates():
-    assert from_document(changed(PLANT)).at().plant.handle is None
+    assert from_document(with_changes(PLANT_FILE)).at().plant.handle is None
 
 
 def test_effective_masses_of_the_device_of_the_thesis():
@@ -108,11 +108,11 @@ def test_what_a_file_is_checked_by_agrees_with_the_solver(seed):
     device = load("five-bar")
     mechanism = device.mechanism
     posture = device.at([rng.uniform(-0.1, 0.1), rng.uniform(0.15, 0.3)]).posture
-    gap, closing = geometry._loops(mechanism, posture.angles)
+    gap, closing = mechanism_check._loops(mechanism, posture.angles)
     assert gap == pytest.approx(np.zeros(3), abs=1e-12)
-    motions = geometry._null_space(closing)
+    motions = mechanism_check._null_space(closing)
     motions = motions @ np.linalg.inv(motions[mechanism.drives.joint])  # unit rates of the drives
-    M = geometry._mass_matrix(mechanism, posture.angles, motions)
+    M = mechanism_check._mass_matrix(mechanism, posture.angles, motions)
     assert pytest.approx(posture.mass_matrix, rel=1e-9) == M
 
 
@@ -121,8 +121,8 @@ def test_the_gaps_derivative_is_their_derivative(seed):
     rng = np.random.default_rng(seed)
     mechanism = load("five-bar").mechanism
     angles, step = rng.uniform(-3, 3, 4), rng.uniform(-1, 1, 4)
-    ahead, behind = (geometry._loops(mechanism, angles + s * step)[0] for s in (1e-6, -1e-6))
-    assert (ahead - behind) / 2e-6 == pytest.approx(geometry._loops(mechanism, angles)[1] @ step, abs=1e-9)
+    ahead, behind = (mechanism_check._loops(mechanism, angles + s * step)[0] for s in (1e-6, -1e-6))
+    assert (ahead - behind) / 2e-6 == pytest.approx(mechanism_check._loops(mechanism, angles)[1] @ step, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -132,7 +132,7 @@ def test_orientation_is_roll_then_pitch_then_yaw_about_fixed_axes(seed):
 
 
 def test_defaults_of_a_mechanism():
-    mechanism = from_document(changed(ARM)).mechanism
+    mechanism = from_document(with_changes(ARM_FILE)).mechanism
     links, drives = mechanism.links, mechanism.drives
     assert links.origin.tolist() == [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]  # the parent's tip
     assert mechanism.handle_point.tolist() == [0.2, 0.0, 0.0]
@@ -144,13 +144,13 @@ def test_defaults_of_a_mechanism():
 
 
 def test_links_may_stand_in_any_order():
-    document = changed(ARM)
+    document = with_changes(ARM_FILE)
     document["mechanism"]["links"].reverse()
     assert from_document(document).mechanism.links.names == ("upper", "lower")
 
 
 def test_an_axis_of_any_length_is_made_a_unit_vector():
-    axis = from_document(changed(ARM, mechanism__links__0__axis=[0, 0, -1e-300])).mechanism.links.axis[0]
+    axis = from_document(with_changes(ARM_FILE, mechanism__links__0__axis=[0, 0, -1e-300])).mechanism.links.axis[0]
     assert axis.tolist() == [0.0, 0.0, -1.0]
 
 
@@ -164,7 +164,7 @@ def test_an_axis_of_any_length_is_made_a_unit_vector():
 )
 def test_ways_of_damping(section, kind, numbers):
     damping = importlib.import_module("zwidth.model.damping")
-    device = from_document(changed(ARM, mechanism__damping=section))
+    device = from_document(with_changes(ARM_FILE, mechanism__damping=section))
     assert device.damping == getattr(damping, kind)(*numbers)
 
 

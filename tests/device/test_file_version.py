@@ -12,7 +12,7 @@ from zwidth.device import address
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document, load, schema
 from zwidth.device.operator_choice import operator_table
-from zwidth.study.job import Cells
+from zwidth.study.job import CellValues
 from zwidth.study.journal import Journal, JournalError, fingerprint
 from zwidth.study.store import Store, StoreError
 from zwidth.study.study_file import read_study
@@ -89,14 +89,14 @@ class Job:
     count, measures, question = 2, ("a",), "q"
 
 
-def kept(path):
+def new_store(path):
     store = Store(path, Job())
     store.begin(2)
-    store.keep(0, Cells(np.ones((2, 1)), np.zeros((2, 1), np.uint8), ((), ())))
+    store.write_batch(0, CellValues(np.ones((2, 1)), np.zeros((2, 1), np.uint8), ((), ())))
     return store
 
 
-def told(path, **changes):
+def change_attributes(path, **changes):
     """Change the attributes of a store on the disk."""
     file = path / "zarr.json"
     document = json.loads(file.read_text())
@@ -107,9 +107,9 @@ def told(path, **changes):
 @pytest.mark.parametrize("changes", [{}, {"question": "another"}, {"batch": "two"}])
 def test_a_newer_store_is_refused_and_left_alone(tmp_path, changes):
     path = tmp_path / "store"
-    kept(path)
+    new_store(path)
     assert json.loads((path / "zarr.json").read_text())["attributes"]["version"] == 1
-    told(path, version=2, **changes)
+    change_attributes(path, version=2, **changes)
     before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
     with pytest.raises(StoreError) as caught:
         Store(path, Job())
@@ -119,17 +119,17 @@ def test_a_newer_store_is_refused_and_left_alone(tmp_path, changes):
 
 def test_a_store_without_a_version_is_of_the_first(tmp_path):
     path = tmp_path / "store"
-    kept(path)
+    new_store(path)
     document = json.loads((path / "zarr.json").read_text())
     document["attributes"].pop("version", None)
     (path / "zarr.json").write_text(json.dumps(document))
-    assert len(list(Store(path, Job()).kept())) == 1
+    assert len(list(Store(path, Job()).stored_batches())) == 1
 
 
 @pytest.mark.parametrize("question", ["how much?", "another"])
 def test_a_newer_journal_is_refused_and_left_alone(tmp_path, question):
     path = tmp_path / "journal"
-    Journal(path, fingerprint("how much?")).ask("first", lambda: [1.5])
+    Journal(path, fingerprint("how much?")).get_or_compute("first", lambda: [1.5])
     head, *lines = path.read_text().splitlines()
     assert json.loads(head)["version"] == 1
     path.write_text("\n".join([json.dumps(json.loads(head) | {"version": 2}), *lines]) + "\n")

@@ -15,12 +15,20 @@ from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
 
-from tests.frozen.accepted import read_accepted, sort_out
-from tests.frozen.answers import Answers, Worker, commands_of, fill, together, warm_up
-from tests.frozen.cases import NUMBERLESS, Case, Walls, cases, chart_case, commands_asked, points_files
-from tests.frozen.commits import CACHE, Side, side
+from tests.frozen.accepted import read_accepted, split_accepted
+from tests.frozen.answers import Answers, CommandWorker, answer_cases, commands_of, run_in_threads, warm_up
+from tests.frozen.cases import (
+    COMMANDS_WITHOUT_NUMBERS,
+    CommandLine,
+    RecordWall,
+    cases,
+    chart_case,
+    commands_with_arguments,
+    points_files,
+)
+from tests.frozen.commits import CACHE, CommitSources, commit_sources
 from tests.frozen.compare import Difference, Tally, compare
-from tests.frozen.devices import Device, faulty_devices, random_devices, studies
+from tests.frozen.devices import RecordDevice, faulty_devices, random_devices, studies
 from tests.frozen.summary import summary
 from tests.revisions import WORKING_TREE
 
@@ -45,28 +53,30 @@ def main() -> int:
     """Compare; returns the exit code."""
     asked = options()
     CACHE.mkdir(parents=True, exist_ok=True)
-    base = side(asked.base, ())
-    new = side(asked.new, tuple(pair_of(text) for text in asked.environment))
+    base = commit_sources(asked.base, ())
+    new = commit_sources(asked.new, tuple(pair_of(text) for text in asked.environment))
     if new.answers == base.answers:
-        new = side(asked.new, (), repeat=True)
+        new = commit_sources(asked.new, (), repeat=True)
     sides = {one: Answers(one.answers, asked.fresh) for one in (base, new)}
     for one in sides:
-        warm_up(one, say)
-    devices, differences = the_devices(base, new)
+        warm_up(one, print_progress)
+    devices, differences = devices_of_record(base, new)
     files = {name: text for device in devices for name, text in device.files.items()} | studies()
     charts = [chart_case(device) for device in devices if device.kind != "faulty"]
-    fill(sides[base], base, charts, files, 2 * asked.jobs, say)
+    answer_cases(sides[base], base, charts, files, 2 * asked.jobs, print_progress)
     walls = {case.words[1]: walls_of(sides[base], case) for case in charts}
     files |= points_files(devices, walls)
-    lines = [case for case in cases(devices, walls, studies()) if wanted(case, asked)]
-    together([partial(fill, sides[one], one, lines, files, asked.jobs, say) for one in sides])
+    lines = [case for case in cases(devices, walls, studies()) if is_selected(case, asked)]
+    run_in_threads(
+        [partial(answer_cases, sides[one], one, lines, files, asked.jobs, print_progress) for one in sides]
+    )
     tally = Tally(differences=differences)
     for case in lines:
         answers = [sides[one].get(case) for one in (base, new)]
         assert answers[0] is not None
         assert answers[1] is not None
         compare(case.name, case.quantised, answers[0], answers[1], tally)
-    left, accepted = sort_out(tally.differences, read_accepted(asked.accepted))
+    left, accepted = split_accepted(tally.differences, read_accepted(asked.accepted))
     for line in summary(tally, left, accepted, CACHE / "differences.tsv"):
         print(line)
     return 1 if left else 0
@@ -80,13 +90,15 @@ def pair_of(text: str) -> tuple[str, str]:
     return name, value
 
 
-def the_devices(base: Side, new: Side) -> tuple[list[Device], list[Difference]]:
+def devices_of_record(base: CommitSources, new: CommitSources) -> tuple[list[RecordDevice], list[Difference]]:
     """Bundled devices of the first commit and all random ones; commands that nothing here asks are told."""
-    worker, other = Worker(base, {}), Worker(new, {})
+    worker, other = CommandWorker(base, {}), CommandWorker(new, {})
     listed = json.loads(worker.ask(["devices", "--json"], 60.0)["out"])
-    bundled = [Device(found["name"], "bundled") for found in listed["devices"]]
+    bundled = [RecordDevice(found["name"], "bundled") for found in listed["devices"]]
     differences = []
-    for command in sorted({*commands_of(worker), *commands_of(other)} - commands_asked() - NUMBERLESS):
+    for command in sorted(
+        {*commands_of(worker), *commands_of(other)} - commands_with_arguments() - COMMANDS_WITHOUT_NUMBERS
+    ):
         reason = "the record has no arguments for this command: add some to cases.py"
         differences.append(Difference(command, "-", "command", reason))
     worker.close()
@@ -94,20 +106,20 @@ def the_devices(base: Side, new: Side) -> tuple[list[Device], list[Difference]]:
     return [*bundled, *random_devices(), *faulty_devices()], differences
 
 
-def walls_of(answers: Answers, case: Case) -> Walls:
+def walls_of(answers: Answers, case: CommandLine) -> RecordWall:
     """Walls to ask about, from the chart of the first commit."""
     answer = answers.get(case)
-    return Walls.of_chart(json.loads(answer["out"])) if answer and answer["out"] else Walls()
+    return RecordWall.of_chart(json.loads(answer["out"])) if answer and answer["out"] else RecordWall()
 
 
-def wanted(case: Case, asked: argparse.Namespace) -> bool:
+def is_selected(case: CommandLine, options: argparse.Namespace) -> bool:
     """Is it among those that were asked for?"""
-    if asked.quick and not case.quick:
+    if options.quick and not case.quick:
         return False
-    return not asked.only or any(fnmatchcase(f"{case.command}/{case.device}", one) for one in asked.only)
+    return not options.only or any(fnmatchcase(f"{case.command}/{case.device}", one) for one in options.only)
 
 
-def say(line: str) -> None:
+def print_progress(line: str) -> None:
     """A line of progress."""
     print(line, file=sys.stderr, flush=True)
 

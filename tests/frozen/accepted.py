@@ -13,7 +13,7 @@ KEYS = {"command", "device", "key", "reason"}
 
 
 @dataclass(frozen=True)
-class Accepted:
+class AcceptedDifference:
     """Patterns as of a shell for what is accepted, and why."""
 
     command: str
@@ -30,7 +30,7 @@ class Accepted:
         )
 
 
-def read_accepted(path: Path | None) -> list[Accepted]:
+def read_accepted(path: Path | None) -> list[AcceptedDifference]:
     """From a TOML file of tables [[accepted]] with command, device, key and reason.
 
     Raises SystemExit where one has other keys, or no reason.
@@ -41,12 +41,12 @@ def read_accepted(path: Path | None) -> list[Accepted]:
     for entry in entries:
         if set(entry) != KEYS or not entry["reason"].strip():
             raise SystemExit(f"{path}: each [[accepted]] has command, device, key and a reason, got {entry}")
-    return [Accepted(**entry) for entry in entries]
+    return [AcceptedDifference(**entry) for entry in entries]
 
 
-def sort_out(
-    differences: list[Difference], accepted: list[Accepted]
-) -> tuple[list[Difference], dict[Accepted, int]]:
+def split_accepted(
+    differences: list[Difference], accepted: list[AcceptedDifference]
+) -> tuple[list[Difference], dict[AcceptedDifference, int]]:
     """Those that nothing accepts, and how many each entry does."""
     counts = dict.fromkeys(accepted, 0)
     left = []

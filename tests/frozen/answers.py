@@ -14,8 +14,8 @@ from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
-from tests.frozen.cases import Case
-from tests.frozen.commits import Side
+from tests.frozen.cases import CommandLine
+from tests.frozen.commits import CommitSources
 
 Answer = dict[str, Any]
 WORKER = Path(__file__).with_name("worker.py")
@@ -52,10 +52,10 @@ class Answers:
         with path.open("a") as file:
             file.write("\n")
 
-    def get(self, case: Case) -> Answer | None:
+    def get(self, case: CommandLine) -> Answer | None:
         return self._by_digest.get(case.digest)
 
-    def add(self, case: Case, answer: Answer) -> None:
+    def add(self, case: CommandLine, answer: Answer) -> None:
         kept = {"digest": case.digest, "name": case.name, **answer}
         with self._lock:
             self._by_digest[case.digest] = kept
@@ -64,10 +64,10 @@ class Answers:
                 file.write((json.dumps(kept) + "\n").encode())
 
 
-class Worker:
+class CommandWorker:
     """A process of one side, started anew when a run has taken it down."""
 
-    def __init__(self, side: Side, files: Mapping[str, str]) -> None:
+    def __init__(self, side: CommitSources, files: Mapping[str, str]) -> None:
         self._side = side
         self._room = tempfile.TemporaryDirectory(prefix="zwidth-record-")
         self._process: subprocess.Popen[str] | None = None
@@ -119,42 +119,42 @@ class Worker:
         )
 
 
-def commands_of(worker: Worker) -> list[str]:
+def commands_of(worker: CommandWorker) -> list[str]:
     """Names of the commands that the help lists."""
     text = worker.ask(["--help"], COMPILING)["out"]
     listed = text.partition("Commands:\n")[2].partition("\n\n")[0]
     return re.findall(r"^  ([a-z][\w-]*)", listed, re.MULTILINE)
 
 
-def warm_up(side: Side, say: Callable[[str], None]) -> None:
+def warm_up(side: CommitSources, say: Callable[[str], None]) -> None:
     """Compile most kernels of a side, once."""
     done = side.folder / f"compiled-{side.answers.stem.removesuffix('-repeat')}"
     if done.exists():
         return
     say(f"{side.label}: compiling kernels, some minutes")
-    worker = Worker(side, {})
+    worker = CommandWorker(side, {})
     for line in WARM:
         worker.ask([*line.split(), "--json"], COMPILING)
     worker.close()
     done.touch()
 
 
-def fill(
+def answer_cases(
     answers: Answers,
-    side: Side,
-    asked: list[Case],
+    side: CommitSources,
+    asked: list[CommandLine],
     files: Mapping[str, str],
     jobs: int,
     say: Callable[[str], None],
 ) -> None:
     """Ask what is not answered yet, in so many processes."""
-    waiting: queue.SimpleQueue[Case] = queue.SimpleQueue()
+    waiting: queue.SimpleQueue[CommandLine] = queue.SimpleQueue()
     missing = [case for case in asked if answers.get(case) is None]
     for case in missing:
         waiting.put(case)
 
     def work() -> None:
-        worker = Worker(side, files)
+        worker = CommandWorker(side, files)
         try:
             while True:
                 case = waiting.get_nowait()
@@ -171,10 +171,10 @@ def fill(
         finally:
             worker.close()
 
-    together([work] * min(jobs, max(1, len(missing))))
+    run_in_threads([work] * min(jobs, max(1, len(missing))))
 
 
-def together(works: list[Callable[[], None]]) -> None:
+def run_in_threads(works: list[Callable[[], None]]) -> None:
     """Run side by side; the first failure is raised when all are done."""
     failures: list[BaseException] = []
 

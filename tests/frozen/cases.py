@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from tests.frozen.devices import Device
+from tests.frozen.devices import RecordDevice
 
 # processor seconds that a run may take
 LIMIT, LONG_LIMIT = 60.0, 180.0
@@ -14,14 +14,14 @@ SAMPLES = 400  # of a run in time
 
 
 @dataclass(frozen=True)
-class Walls:
+class RecordWall:
     """Stiffness [N/m] and damping [N s/m] of a wall about a third into the stable set, two digits each."""
 
     stiffness: float = 1000.0
     damping: float = 1.0
 
     @classmethod
-    def of_chart(cls, document: Mapping[str, object]) -> Walls:
+    def of_chart(cls, document: Mapping[str, object]) -> RecordWall:
         """From the chart that the first of the two commits gives; the default where it gives none."""
         stiffness, damping = document.get("stiffness_max_N_per_m"), document.get("damping_max_Ns_per_m")
         if not isinstance(stiffness, float) or not isinstance(damping, float) or not damping:
@@ -36,7 +36,7 @@ class Walls:
 
 
 @dataclass(frozen=True)
-class Case:
+class CommandLine:
     """One command line.
 
     name     command, device and, where there are several, what tells them apart: "map five-bar worst"
@@ -61,29 +61,33 @@ class Case:
         return self.name.split(" ", 1)[1]
 
 
-def chart_case(device: Device, quick: bool = False) -> Case:
+def chart_case(device: RecordDevice, quick: bool = False) -> CommandLine:
     return _case(device, ("chart", device.word), quick=quick)
 
 
-def cases(devices: list[Device], walls: Mapping[str, Walls], study_files: Mapping[str, str]) -> list[Case]:
+def cases(
+    devices: list[RecordDevice], walls: Mapping[str, RecordWall], study_files: Mapping[str, str]
+) -> list[CommandLine]:
     """Every command line, those that all devices have first: an interrupted comparison has looked at most."""
-    made = [_plain("devices"), _plain("schema")]
+    made = [_case_without_device("devices"), _case_without_device("schema")]
     for index, device in enumerate(devices):
         quick = device.kind == "bundled" or index % 10 == 0
-        made += _about(device, index, walls.get(device.word, Walls()), quick)
+        made += _device_cases(device, index, walls.get(device.word, RecordWall()), quick)
     for name, text in study_files.items():
-        made.append(_plain("sweep", name, "--workers", "1", reads=text, quick=name == "study-plant.toml"))
-    made += [_plain(*words) for words in USAGE]
+        made.append(
+            _case_without_device("sweep", name, "--workers", "1", reads=text, quick=name == "study-plant.toml")
+        )
+    made += [_case_without_device(*words) for words in USAGE]
     return sorted(made, key=lambda case: _SHARE.get(case.command, 1))
 
 
-def commands_asked() -> set[str]:
+def commands_with_arguments() -> set[str]:
     """Names of the commands that there are arguments for."""
     return {"devices", "schema", "sweep"} | set(_SHARE)
 
 
 # commands without a number to compare: `new` writes a template, which tests of its own load and chart
-NUMBERLESS = {"new"}
+COMMANDS_WITHOUT_NUMBERS = {"new"}
 # what is asked of every n-th device only, because it takes long
 _SHARE = {
     "show": 1,
@@ -151,7 +155,7 @@ USAGE = (
 )
 
 
-def _about(device: Device, index: int, wall: Walls, quick: bool) -> Iterator[Case]:
+def _device_cases(device: RecordDevice, index: int, wall: RecordWall, quick: bool) -> Iterator[CommandLine]:
     yield chart_case(device, quick)
     for command, every in _SHARE.items():
         # offset, so that it is not always the same devices that have all the long ones
@@ -162,7 +166,9 @@ def _about(device: Device, index: int, wall: Walls, quick: bool) -> Iterator[Cas
             yield _case(device, (command, device.word, *words), variant, wall.table(), quick and every < 8)
 
 
-def _lines(command: str, device: Device, wall: Walls, index: int) -> Iterator[tuple[str, tuple[str, ...]]]:
+def _lines(
+    command: str, device: RecordDevice, wall: RecordWall, index: int
+) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Variants of one command for a device, by name."""
     K, B, T = wall.stiffness, wall.damping, device.sampling_period
     at_wall = ("--stiffness", f"{K:g}", "--damping", f"{B:g}")
@@ -237,25 +243,31 @@ def _lines(command: str, device: Device, wall: Walls, index: int) -> Iterator[tu
             yield "", ("--stiffnesses", "2", "--tips", "1")
 
 
-def _points(device: Device) -> str:
+def _points(device: RecordDevice) -> str:
     return f"walls-{device.word.removesuffix('.toml')}.csv"
 
 
-def points_files(devices: list[Device], walls: Mapping[str, Walls]) -> dict[str, str]:
+def points_files(devices: list[RecordDevice], walls: Mapping[str, RecordWall]) -> dict[str, str]:
     """Files for --points, by name."""
-    return {_points(device): walls.get(device.word, Walls()).table() for device in devices}
+    return {_points(device): walls.get(device.word, RecordWall()).table() for device in devices}
 
 
-def _case(device: Device, words: tuple[str, ...], variant: str = "", reads: str = "", quick: bool = False) -> Case:
+def _case(
+    device: RecordDevice, words: tuple[str, ...], variant: str = "", reads: str = "", quick: bool = False
+) -> CommandLine:
     name = " ".join(filter(None, (words[0], device.word.removesuffix(".toml"), variant)))
     words = (*words, "--json")
     digest = _digest(*words, reads, *device.files.values())
-    return Case(name, words, digest, device.quantised, quick, LONG_LIMIT if words[0] == "experiment" else LIMIT)
+    return CommandLine(
+        name, words, digest, device.quantised, quick, LONG_LIMIT if words[0] == "experiment" else LIMIT
+    )
 
 
-def _plain(*words: str, reads: str = "", quick: bool = True) -> Case:
+def _case_without_device(*words: str, reads: str = "", quick: bool = True) -> CommandLine:
     line = (*words, "--json")
-    return Case(" ".join((*words[:1], " ".join(words[1:]) or "-")), line, _digest(*line, reads), quick=quick)
+    return CommandLine(
+        " ".join((*words[:1], " ".join(words[1:]) or "-")), line, _digest(*line, reads), quick=quick
+    )
 
 
 def _digest(*parts: str) -> str:

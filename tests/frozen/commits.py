@@ -18,7 +18,7 @@ Environment = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
-class Side:
+class CommitSources:
     """One of the two that are compared.
 
     label        what was asked for: a commit, or "." for the working tree
@@ -35,7 +35,7 @@ class Side:
     environment: Environment
 
 
-def side(label: str, environment: Environment, repeat: bool = False) -> Side:
+def commit_sources(label: str, environment: Environment, repeat: bool = False) -> CommitSources:
     """The sources of a commit, exported unless they are there.
 
     Folders are named by the tree of "src": commits with the same sources share what was compiled and answered.
@@ -48,7 +48,7 @@ def side(label: str, environment: Environment, repeat: bool = False) -> Side:
     export({"src": tree, "pyproject.toml": tree}, folder)
     project = tomllib.loads((folder / "pyproject.toml").read_text())
     answers = folder / f"answers-{installation(environment)}{'-repeat' * repeat}.jsonl"
-    return Side(label, folder, project["project"]["scripts"]["zwidth"], answers, environment)
+    return CommitSources(label, folder, project["project"]["scripts"]["zwidth"], answers, environment)
 
 
 def installation(environment: Environment) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tests.frozen.curves import distance
-from tests.frozen.rules import EARLY, QUANTISED, ROUNDING, SHAPE, SMOOTHNESS, Kind, Rule, rule_of
+from tests.frozen.rules import FIRST_SAMPLES, QUANTISED, ROUNDING, SHAPE, SMOOTHNESS, Kind, Rule, rule_of
 
 UNIT = re.compile(r"_((?:N2s|Nms|Nm|Ns|N|kg|m|J|Hz|s|rad|deg)(?:_per_[A-Za-z0-9]+)?)$")
 NUMBERS = re.compile(r"(?<=[\[ ,:])-?\d")
@@ -33,12 +33,12 @@ class Tally:
     """What a comparison of many command lines comes to.
 
     same, same_numbers  documents that are equal to the last character, and the numbers in them
-    numbers   how many were compared in the others, by kind
-    largest   the largest relative difference, by kind, and where: within tolerance or not
-    added     keys that only the second has, by command and key
-    reworded  sentences that differ, by command and key
-    parted    command lines of runs that parted
-    seconds   processor time of both
+    numbers        how many were compared in the others, by kind
+    largest        the largest relative difference, by kind, and where: within tolerance or not
+    added          keys that only the second has, by command and key
+    reworded       sentences that differ, by command and key
+    diverged_runs  command lines of runs that parted
+    seconds        processor time of both
     """
 
     runs: int = 0
@@ -49,7 +49,7 @@ class Tally:
     largest: dict[Kind, tuple[float, str]] = field(default_factory=dict)
     added: Counter[tuple[str, str]] = field(default_factory=Counter)
     reworded: Counter[tuple[str, str]] = field(default_factory=Counter)
-    parted: list[str] = field(default_factory=list)
+    diverged_runs: list[str] = field(default_factory=list)
     seconds: tuple[float, float] = (0.0, 0.0)
 
 
@@ -114,10 +114,10 @@ class Comparison:
     def documents(self, base: dict[str, Any], new: dict[str, Any]) -> None:
         """Compare all."""
         if self._quantised and self._command in ("simulate", "move"):
-            self._part(base, new)
+            self._find_divergence(base, new)
         self._values("", base, new, {})
 
-    def _part(self, base: dict[str, Any], new: dict[str, Any]) -> None:
+    def _find_divergence(self, base: dict[str, Any], new: dict[str, Any]) -> None:
         """Find the first sample in which a trace differs; what comes later is compared by its size."""
         first = None
         for key, values in base.items():
@@ -136,10 +136,10 @@ class Comparison:
                 first = at if first is None else min(first, at)
         if first is None:
             return
-        if first < EARLY:
-            self._tell("position_m", f"the runs part at sample {first}, before rounding could grow")
+        if first < FIRST_SAMPLES:
+            self._add_difference("position_m", f"the runs part at sample {first}, before rounding could grow")
         self._parted = True
-        self._tally.parted.append(f"{self._name}: sample {first}")
+        self._tally.diverged_runs.append(f"{self._name}: sample {first}")
 
     def _values(self, key: str, base: Any, new: Any, beside: dict[str, Any]) -> None:
         rule = rule_of(self._command, key) or DEFAULT
@@ -156,12 +156,12 @@ class Comparison:
         elif _is_number(base) and _is_number(new):
             self._numbers(key, rule, np.array(float(base)), np.array(float(new)), beside)
         elif base != new:
-            self._tell(key, f"{_shown(base)} became {_shown(new)}")
+            self._add_difference(key, f"{_shown(base)} became {_shown(new)}")
 
     def _objects(self, key: str, base: dict[str, Any], new: dict[str, Any]) -> None:
         inner = f"{key}." if key else ""
         for name in base.keys() - new.keys():
-            self._tell(inner + name, "the key is missing")
+            self._add_difference(inner + name, "the key is missing")
         for name in new.keys() - base.keys():
             self._tally.added[self._command, inner + name] += 1
         for name in base:
@@ -171,7 +171,7 @@ class Comparison:
 
     def _prose(self, key: str, base: Any, new: Any) -> None:
         if type(base) is not type(new):
-            self._tell(key, f"{_shown(base)} became {_shown(new)}")
+            self._add_difference(key, f"{_shown(base)} became {_shown(new)}")
         elif base != new:
             self._tally.reworded[self._command, key] += 1
 
@@ -180,7 +180,7 @@ class Comparison:
         if a is not None and b is not None and a.size and (a.shape == b.shape or self._parted):
             self._numbers(key, rule, a, b, beside)
         elif len(base) != len(new):
-            self._tell(key, f"a list of {len(base)} became one of {len(new)}")
+            self._add_difference(key, f"a list of {len(base)} became one of {len(new)}")
         else:
             for one, other in zip(base, new, strict=True):
                 self._values(key, one, other, beside)
@@ -190,7 +190,7 @@ class Comparison:
         if self._parted:
             a, b = np.array(_peak(a)), np.array(_peak(b))
         if not np.array_equal(np.isnan(a), np.isnan(b)):
-            self._tell(key, "null stands in other places")
+            self._add_difference(key, "null stands in other places")
             return
         if self._parted:
             relative, floor = QUANTISED, QUANTISED
@@ -208,15 +208,15 @@ class Comparison:
         share = np.nan_to_num(share, nan=0.0, posinf=np.inf)
         self._tally.numbers[rule.kind] += a.size
         worst = np.unravel_index(np.argmax(share), share.shape) if share.ndim else ()
-        self._keep(rule.kind, float(share[worst]) * tolerance, key)
+        self._record_largest(rule.kind, float(share[worst]) * tolerance, key)
         if share[worst] > 1.0:
             where = f" at {list(map(int, worst))}" if worst else ""
             size = f"by {share[worst] * tolerance:.1e}, {tolerance:.0e} is allowed"
-            self._tell(key, f"{float(a[worst])!r} became {float(b[worst])!r}{where}: {size}")
+            self._add_difference(key, f"{float(a[worst])!r} became {float(b[worst])!r}{where}: {size}")
 
     def _curves(self, key: str, rule: Rule, base: list[Any], new: list[Any]) -> None:
         if len(base) != len(new):
-            self._tell(key, f"{len(base)} of them became {len(new)}")
+            self._add_difference(key, f"{len(base)} of them became {len(new)}")
             return
         extent: dict[str, float] = {}
         for curve in base:
@@ -228,7 +228,7 @@ class Comparison:
             first, second = _columns(one), _columns(other)
             names = [name for name in first if name in second]
             if not names or any(len({len(columns[name]) for name in names}) > 1 for columns in (first, second)):
-                self._tell(key, f"number {index} has other lists than before")
+                self._add_difference(key, f"number {index} has other lists than before")
                 continue
             a, b = (
                 np.stack([columns[name] / (extent[name] or 1.0) for name in names], axis=-1)
@@ -238,22 +238,24 @@ class Comparison:
             if a.shape == b.shape:
                 apart = float(np.nanmax(np.abs(a - b), initial=0.0))
                 if apart <= SMOOTHNESS:
-                    self._keep(Kind.CURVE, apart, key)
+                    self._record_largest(Kind.CURVE, apart, key)
                     continue
                 # points that moved along the curve by a little must lie on it to all digits
                 allowed = rule.tolerance if apart <= SHAPE else max(SHAPE, rule.tolerance)
             else:
                 allowed = max(SHAPE, rule.tolerance)
             apart = distance(np.nan_to_num(a), np.nan_to_num(b))
-            self._keep(Kind.CURVE, apart, key)
+            self._record_largest(Kind.CURVE, apart, key)
             if apart > allowed:
-                self._tell(key, f"number {index} lies {apart:.1e} of its extent apart, {allowed:.0e} is allowed")
+                self._add_difference(
+                    key, f"number {index} lies {apart:.1e} of its extent apart, {allowed:.0e} is allowed"
+                )
 
-    def _keep(self, kind: Kind, apart: float, key: str) -> None:
+    def _record_largest(self, kind: Kind, apart: float, key: str) -> None:
         if apart > self._tally.largest.get(kind, (0.0, ""))[0]:
             self._tally.largest[kind] = (apart, f"{self._name}: {key}")
 
-    def _tell(self, key: str, reason: str) -> None:
+    def _add_difference(self, key: str, reason: str) -> None:
         told = Difference(self._command, self._device, key, reason)
         last = self._tally.differences[-1:]
         # one for each key, not for each element of a list

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-BETWEEN = 16  # points of the interpolation for each step of the line
-SAME = 1e-10  # points nearer than this are one: cubics through both would divide by next to nothing
+POINTS_PER_STEP = 16  # points of the interpolation for each step of the line
+COINCIDENT = 1e-10  # points nearer than this are one: cubics through both would divide by next to nothing
 
 
 def distance(first: np.ndarray, second: np.ndarray) -> float:
@@ -17,20 +17,20 @@ def distance(first: np.ndarray, second: np.ndarray) -> float:
     h^2 kappa / 8 at a spacing h. Between its points the curve is therefore taken as the nearest of the chord and
     three cubics through four neighbours each, of which one at least does not reach across a corner.
     """
-    return max(_one_way(first, second), _one_way(second, first))
+    return max(_one_sided_distance(first, second), _one_sided_distance(second, first))
 
 
-def _one_way(points: np.ndarray, line: np.ndarray) -> float:
+def _one_sided_distance(points: np.ndarray, line: np.ndarray) -> float:
     step = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    line = line[np.concatenate([[True], step > SAME])]
-    nearest = _from_line(points, line)
+    line = line[np.concatenate([[True], step > COINCIDENT])]
+    nearest = _distances_to_chords(points, line)
     if len(line) >= 4:
         for shift in (-2, -1, 0):
-            nearest = np.minimum(nearest, _from_line(points, _continued(line, shift)))
+            nearest = np.minimum(nearest, _distances_to_chords(points, _cubic_interpolation(line, shift)))
     return float(np.max(nearest))
 
 
-def _from_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
+def _distances_to_chords(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     """Distance of each point from the two chords at the nearest vertex of a line."""
     distances, at = cKDTree(line).query(points)
     for first in (at - 1, at):
@@ -43,7 +43,7 @@ def _from_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     return distances
 
 
-def _continued(line: np.ndarray, shift: int) -> np.ndarray:
+def _cubic_interpolation(line: np.ndarray, shift: int) -> np.ndarray:
     """The line with points between, each step's on the cubic through the four points that begin `shift` before it.
 
     Lagrange's formula in the length along the chords; at the ends the last four points serve.
@@ -51,9 +51,9 @@ def _continued(line: np.ndarray, shift: int) -> np.ndarray:
     at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     steps = np.arange(len(line) - 1)
     four = np.clip(steps + shift, 0, len(line) - 4)[:, None] + np.arange(4)
-    share = np.arange(BETWEEN) / BETWEEN
+    share = np.arange(POINTS_PER_STEP) / POINTS_PER_STEP
     where = at[:-1, None] + share * np.diff(at)[:, None]
-    made = np.zeros((len(steps), BETWEEN, line.shape[1]))
+    made = np.zeros((len(steps), POINTS_PER_STEP, line.shape[1]))
     for j in range(4):
         others = [k for k in range(4) if k != j]
         weight = np.prod([(where - at[four[:, k], None]) for k in others], axis=0)

@@ -20,7 +20,7 @@ QUANTISERS = ("resolution_m", "noise_m", "encoder_counts_per_rev", "coulomb", "f
 
 
 @dataclass(frozen=True)
-class Device:
+class RecordDevice:
     """A device of the record.
 
     word    what DEVICE is on a command line
@@ -51,23 +51,25 @@ class Device:
             return 1e-3
 
 
-def random_devices() -> list[Device]:
+def random_devices() -> list[RecordDevice]:
     """Sixty device files: plants, mechanisms, measured responses and some that have no answer."""
     made = [_device(f"plant-{seed:02d}", "plant", plant_file(seed)) for seed in range(PLANTS)]
     made += [_device(f"mechanism-{seed:02d}", "mechanism", mechanism_file(seed)) for seed in range(MECHANISMS)]
     for seed in range(MEASURED):
         table, beside = measured_file(seed)
         made.append(_device(f"measured-{seed:02d}", "response", table, beside))
-    made += [_device(f"unanswered-{name}", "unanswered", table) for name, table in unanswered().items()]
+    made += [
+        _device(f"unanswered-{name}", "unanswered", table) for name, table in devices_without_answer().items()
+    ]
     return made
 
 
-def faulty_devices() -> list[Device]:
+def faulty_devices() -> list[RecordDevice]:
     """Device files with bad input: of each only the exit code and the number of lines are kept."""
-    return [_device(f"faulty-{name}", "faulty", table) for name, table in faulty().items()]
+    return [_device(f"faulty-{name}", "faulty", table) for name, table in faulty_files().items()]
 
 
-def unanswered() -> dict[str, dict[str, Any]]:
+def devices_without_answer() -> dict[str, dict[str, Any]]:
     """Device files that are right and have no answer: no stable wall, or a posture that is not reached."""
     undamped = _two_mass(damping=0.0) | {"loop": {"sampling_period_s": 0.001, "delay_samples": 1.0}}
     slow = copy.deepcopy(undamped)
@@ -96,7 +98,7 @@ def unanswered() -> dict[str, dict[str, Any]]:
     }
 
 
-def faulty() -> dict[str, dict[str, Any]]:
+def faulty_files() -> dict[str, dict[str, Any]]:
     """Device files with a slip: a key misspelt, a sign, a text, a matrix that is not symmetric, and several."""
     good = _two_mass(damping=2.0) | {"loop": {"sampling_period_s": 0.001}}
 
@@ -165,8 +167,8 @@ def _study(device: str, measures: list[str], axes: list[dict[str, Any]], **more:
     return toml_text({"device": device, "measures": measures, "axis": axes, **more})
 
 
-def _device(name: str, kind: str, table: dict[str, Any], beside: dict[str, str] | None = None) -> Device:
-    return Device(f"{name}.toml", kind, {f"{name}.toml": toml_text(table), **(beside or {})})
+def _device(name: str, kind: str, table: dict[str, Any], beside: dict[str, str] | None = None) -> RecordDevice:
+    return RecordDevice(f"{name}.toml", kind, {f"{name}.toml": toml_text(table), **(beside or {})})
 
 
 def _two_mass(damping: float) -> dict[str, Any]:

@@ -37,7 +37,7 @@ SMOOTHNESS = 1e-9
 ROUNDING = 1e-12  # what rounding makes of a number that is a difference of others, of their size
 SHAPE = 1e-6  # of a curve's extent: how far a curve may lie from itself, sampled at other points and interpolated
 QUANTISED = 0.1  # of amplitudes, energies and frequencies of runs that have parted
-EARLY = 4  # samples that are the same before two runs part: the readings of before the first force
+FIRST_SAMPLES = 4  # samples that are the same before two runs part: the readings of before the first force
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,17 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-from tests.frozen.accepted import Accepted
+from tests.frozen.accepted import AcceptedDifference
 from tests.frozen.compare import Difference, Tally
 
 SHOWN = 60  # lines of differences; the file has all
 
 
-def summary(tally: Tally, left: list[Difference], accepted: dict[Accepted, int], complete: Path) -> Iterable[str]:
+def summary(
+    tally: Tally, unaccepted: list[Difference], accepted: dict[AcceptedDifference, int], complete: Path
+) -> Iterable[str]:
     """Lines of the summary; all differences go into a file besides."""
-    complete.write_text("".join(f"{one.command}\t{one.device}\t{one.key}\t{one.reason}\n" for one in left))
+    complete.write_text("".join(f"{one.command}\t{one.device}\t{one.key}\t{one.reason}\n" for one in unaccepted))
     total = tally.same_numbers + sum(tally.numbers.values())
     took = " and ".join(f"{seconds:.0f} s" for seconds in tally.seconds)
     yield f"{tally.runs} command lines, {total} numbers compared; processor time {took}"
@@ -24,20 +26,20 @@ def summary(tally: Tally, left: list[Difference], accepted: dict[Accepted, int],
         yield f"  {kind.value:9} {count:9}  largest difference {size:.1e}{f' ({where})' if where else ''}"
     yield from _counted("keys added, which is no difference", tally.added)
     yield from _counted("sentences worded anew, which is no difference", tally.reworded)
-    if tally.parted:
-        yield f"quantised runs that parted, compared by amplitude: {len(tally.parted)}"
-        yield from (f"  {line}" for line in tally.parted[:SHOWN])
+    if tally.diverged_runs:
+        yield f"quantised runs that parted, compared by amplitude: {len(tally.diverged_runs)}"
+        yield from (f"  {line}" for line in tally.diverged_runs[:SHOWN])
     for entry, count in accepted.items():
         used = f"accepted {count} times" if count else "accepted, but does not occur: remove the entry"
         yield f"{used}: {entry.command} {entry.device} {entry.key}: {entry.reason}"
-    if not left:
+    if not unaccepted:
         yield "nothing differs"
         return
-    yield from _counted("differences by command and key", Counter((one.command, one.key) for one in left))
-    yield f"{len(left)} differences, all in {complete}"
-    yield from (f"  {one.command} {one.device} {one.key}: {one.reason}" for one in left[:SHOWN])
-    if len(left) > SHOWN:
-        yield f"  and {len(left) - SHOWN} more"
+    yield from _counted("differences by command and key", Counter((one.command, one.key) for one in unaccepted))
+    yield f"{len(unaccepted)} differences, all in {complete}"
+    yield from (f"  {one.command} {one.device} {one.key}: {one.reason}" for one in unaccepted[:SHOWN])
+    if len(unaccepted) > SHOWN:
+        yield f"  and {len(unaccepted) - SHOWN} more"
 
 
 def _counted(title: str, counts: Counter[tuple[str, str]]) -> Iterable[str]:

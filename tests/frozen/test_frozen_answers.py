@@ -6,10 +6,10 @@ import json
 
 import pytest
 
-from tests.frozen.answers import Answers, Worker, commands_of, fill
-from tests.frozen.cases import Case, Walls, cases, commands_asked
-from tests.frozen.commits import Side
-from tests.frozen.devices import Device
+from tests.frozen.answers import Answers, CommandWorker, answer_cases, commands_of
+from tests.frozen.cases import CommandLine, RecordWall, cases, commands_with_arguments
+from tests.frozen.commits import CommitSources
+from tests.frozen.devices import RecordDevice
 
 SCRIPT = """
 import sys
@@ -36,11 +36,11 @@ def side(tmp_path):
     source = tmp_path / "src"
     source.mkdir()
     (source / "script.py").write_text(SCRIPT)
-    return Side("made up", tmp_path, "script:main", tmp_path / "answers.jsonl", ())
+    return CommitSources("made up", tmp_path, "script:main", tmp_path / "answers.jsonl", ())
 
 
 def test_one_process_answers_many_and_a_run_that_takes_too_long_is_ended(side):
-    worker = Worker(side, {"a.txt": "read"})
+    worker = CommandWorker(side, {"a.txt": "read"})
     try:
         assert commands_of(worker) == ["chart", "new-one"]
         refused = worker.ask(["refuse"], 60.0)
@@ -53,22 +53,22 @@ def test_one_process_answers_many_and_a_run_that_takes_too_long_is_ended(side):
 
 
 def test_an_interrupted_run_goes_on_where_it_was(side):
-    asked = [Case(name, (name,), name) for name in ("a.txt", "b.txt")]
+    asked = [CommandLine(name, (name,), name) for name in ("a.txt", "b.txt")]
     first = Answers(side.answers)
     first.add(asked[0], {"code": 0, "out": "kept", "err": "", "seconds": 0.0})
     with side.answers.open("a") as file:
         file.write('{"digest": "b.txt", "co')  # cut off here
     again = Answers(side.answers)
-    fill(again, side, asked, {"a.txt": "new", "b.txt": "new"}, 2, lambda line: None)
+    answer_cases(again, side, asked, {"a.txt": "new", "b.txt": "new"}, 2, lambda line: None)
     last = Answers(side.answers)
     assert [last.get(case)["out"] for case in asked] == ["kept", "new\n"]
     assert Answers(side.answers, fresh=True).get(asked[0]) is None
 
 
 def test_every_command_that_has_arguments_is_asked_somewhere():
-    devices = [Device("five-bar", "bundled"), Device("p.toml", "plant", {"p.toml": "name = 'p'"})]
+    devices = [RecordDevice("five-bar", "bundled"), RecordDevice("p.toml", "plant", {"p.toml": "name = 'p'"})]
     asked = cases(devices, {}, {"study.toml": ""})
-    assert {case.command for case in asked} == commands_asked()
+    assert {case.command for case in asked} == commands_with_arguments()
     assert len({case.name for case in asked}) == len({case.digest for case in asked}) == len(asked)
     assert any(case.quick for case in asked)
     assert not all(case.quick for case in asked)
@@ -76,6 +76,6 @@ def test_every_command_that_has_arguments_is_asked_somewhere():
 
 def test_walls_come_from_a_chart_or_are_the_usual_ones():
     chart = {"stiffness_max_N_per_m": 7849.44, "damping_max_Ns_per_m": 30.636}
-    assert Walls.of_chart(chart) == Walls(3100.0, 9.2)
-    assert Walls.of_chart(chart | {"stiffness_max_N_per_m": None}) == Walls()
-    assert json.dumps(Walls().table()).count("\\n") == 21
+    assert RecordWall.of_chart(chart) == RecordWall(3100.0, 9.2)
+    assert RecordWall.of_chart(chart | {"stiffness_max_N_per_m": None}) == RecordWall()
+    assert json.dumps(RecordWall().table()).count("\\n") == 21

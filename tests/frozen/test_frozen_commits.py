@@ -8,7 +8,7 @@ import pytest
 
 from tests import revisions
 from tests.frozen import commits
-from tests.frozen.commits import installation, side
+from tests.frozen.commits import commit_sources, installation
 
 PROJECT = '[project]\nname = "x"\nscripts = { zwidth = "x.main:main" }\n'
 
@@ -30,11 +30,11 @@ def repository(tmp_path, monkeypatch):
 
 
 def test_the_working_tree_is_exported_with_new_files_and_without_ignored_ones(repository):
-    committed = side("HEAD", ())
-    assert side(".", ()).folder == committed.folder
+    committed = commit_sources("HEAD", ())
+    assert commit_sources(".", ()).folder == committed.folder
     (repository / "src" / "x" / "new.py").write_text("two = 2\n")
     (repository / "src" / "x" / "kernel.nbi").write_text("stale")
-    working = side(".", ())
+    working = commit_sources(".", ())
     assert working.folder != committed.folder
     assert {path.name for path in (working.folder / "src" / "x").iterdir()} == {"main.py", "new.py"}
     assert working.entry == "x.main:main"
@@ -45,10 +45,14 @@ def test_the_working_tree_is_exported_with_new_files_and_without_ignored_ones(re
 def test_answers_are_kept_apart_by_sources_environment_and_side(repository):
     variable = (("OPENBLAS_CORETYPE", "Haswell"),)
     assert installation(()) != installation(variable)
-    files = {side("HEAD", ()).answers, side("HEAD", variable).answers, side("HEAD", (), repeat=True).answers}
+    files = {
+        commit_sources("HEAD", ()).answers,
+        commit_sources("HEAD", variable).answers,
+        commit_sources("HEAD", (), repeat=True).answers,
+    }
     assert len(files) == 3
 
 
 def test_an_unknown_commit_ends_it(repository):
     with pytest.raises(SystemExit, match="no such commit"):
-        side("no-such-branch", ())
+        commit_sources("no-such-branch", ())

@@ -8,8 +8,8 @@ import json
 import numpy as np
 import pytest
 
-from tests.cli.cli_run import TWO_MASS, zwidth
-from tests.frozen.accepted import Accepted, read_accepted, sort_out
+from tests.cli.command_runner import TWO_MASS, run_command
+from tests.frozen.accepted import AcceptedDifference, read_accepted, split_accepted
 from tests.frozen.compare import Difference, Tally, compare
 from tests.frozen.curves import distance
 from tests.frozen.rules import RULES, Kind
@@ -185,7 +185,7 @@ def test_points_that_rounding_keeps_apart_are_one():
 # --- motions --------------------------------------------------------------------------------------------
 
 
-def parted(amplitude=1.0, at=30, behaviour="limit cycle"):
+def diverged_motion(amplitude=1.0, at=30, behaviour="limit cycle"):
     wave = np.array(MOTION["position_m"])
     wave[at:] = amplitude * 0.001 * np.cos(300.0 * TIMES[at:] + 0.4)
     return changed(
@@ -196,24 +196,26 @@ def parted(amplitude=1.0, at=30, behaviour="limit cycle"):
 
 
 def test_a_quantised_run_may_part_and_is_then_compared_by_its_amplitude():
-    tally = compared(MOTION, parted(), "simulate paddle stable", quantised=True)
+    tally = compared(MOTION, diverged_motion(), "simulate paddle stable", quantised=True)
     assert not tally.differences
-    assert tally.parted == ["simulate paddle stable: sample 30"]
+    assert tally.diverged_runs == ["simulate paddle stable: sample 30"]
 
 
 def test_an_amplitude_that_moved_is_found_in_a_quantised_run():
-    tally = compared(MOTION, parted(amplitude=1.3), "simulate paddle stable", quantised=True)
+    tally = compared(MOTION, diverged_motion(amplitude=1.3), "simulate paddle stable", quantised=True)
     assert {"amplitude_m", "position_m"} == set(keys(tally))
 
 
 def test_a_quantised_run_that_parts_at_once_or_ends_otherwise_is_found():
-    assert keys(compared(MOTION, parted(at=1), "simulate paddle stable", quantised=True)) == ["position_m"]
-    told = compared(MOTION, parted(behaviour="growing"), "simulate paddle stable", quantised=True)
+    assert keys(compared(MOTION, diverged_motion(at=1), "simulate paddle stable", quantised=True)) == [
+        "position_m"
+    ]
+    told = compared(MOTION, diverged_motion(behaviour="growing"), "simulate paddle stable", quantised=True)
     assert keys(told) == ["behaviour"]
 
 
 def test_a_linear_run_may_not_part():
-    assert "position_m" in keys(compared(MOTION, parted(), "simulate paddle stable"))
+    assert "position_m" in keys(compared(MOTION, diverged_motion(), "simulate paddle stable"))
 
 
 # --- exit codes, complaints, what is no document --------------------------------------------------------
@@ -249,7 +251,7 @@ def test_a_stiffness_changed_by_a_millionth_is_caught():
     runs = []
     for stiffness in (15620.0, 15620.0, 15620.0 * (1.0 + 1e-6)):
         k = f"plant.stiffness_N_per_m=[[{stiffness!r},-{stiffness!r}],[-{stiffness!r},{stiffness!r}]]"
-        ran = zwidth("chart", TWO_MASS, "--set", k, "--json")
+        ran = run_command("chart", TWO_MASS, "--set", k, "--json")
         runs.append({"code": ran.code, "out": ran.out, "err": ran.err, "seconds": 0.0})
     name = f"chart {TWO_MASS}"
     same, moved = Tally(), Tally()
@@ -261,17 +263,17 @@ def test_a_stiffness_changed_by_a_millionth_is_caught():
 
 # --- what is accepted, the summary ----------------------------------------------------------------------
 
-FOUND = [Difference("map", "arm worst", "values", "moved"), Difference("chart", "arm", "regions", "moved")]
+DIFFERENCES = [Difference("map", "arm worst", "values", "moved"), Difference("chart", "arm", "regions", "moved")]
 
 
 def test_accepted_differences_are_sorted_out_and_unused_entries_counted(tmp_path):
     path = tmp_path / "accepted.toml"
     entry = '[[accepted]]\ncommand = "{}"\ndevice = "*"\nkey = "*"\nreason = "mended"\n'
     path.write_text(entry.format("map") + entry.format("polar"))
-    left, counts = sort_out(FOUND, read_accepted(path))
-    assert left == FOUND[1:]
+    left, counts = split_accepted(DIFFERENCES, read_accepted(path))
+    assert left == DIFFERENCES[1:]
     assert list(counts.values()) == [1, 0]
-    lines = "\n".join(summary(Tally(differences=FOUND), left, counts, tmp_path / "all.tsv"))
+    lines = "\n".join(summary(Tally(differences=DIFFERENCES), left, counts, tmp_path / "all.tsv"))
     assert "accepted 1 times: map" in lines
     assert "does not occur: remove the entry: polar" in lines
     assert (tmp_path / "all.tsv").read_text() == "chart\tarm\tregions\tmoved\n"
@@ -282,7 +284,7 @@ def test_an_accepted_difference_needs_a_reason(tmp_path):
     path.write_text('[[accepted]]\ncommand = "map"\ndevice = "*"\nkey = "*"\nreason = " "\n')
     with pytest.raises(SystemExit, match="a reason"):
         read_accepted(path)
-    assert Accepted("*", "arm*", "values", "why").covers(FOUND[0])
+    assert AcceptedDifference("*", "arm*", "values", "why").covers(DIFFERENCES[0])
 
 
 def test_every_rule_says_why():

@@ -40,7 +40,7 @@ def test_every_feature_stands_in_some_file():
     assert 15 < sum(device.quantised for device in DEVICES) < 45
 
 
-@pytest.mark.filterwarnings("ignore::zwidth.device.plausible.ImplausibleNumber")
+@pytest.mark.filterwarnings("ignore::zwidth.device.plausibility.ImplausibleNumber")
 def test_every_file_is_valid(folder):
     for device in DEVICES:
         zwidth.load(folder / device.word)

@@ -18,9 +18,9 @@ from zwidth.chart.robust.instability import unstable
 from zwidth.chart.verdict import spectral_radius
 from zwidth.device.load import load
 from zwidth.guarantees.coupling import coupling_angles, coupling_region, couplings, softest_limit
-from zwidth.guarantees.nested import nested
-from zwidth.guarantees.spring_family import Springs
-from zwidth.guarantees.springs import nyquist_spring, spring_stable_region
+from zwidth.guarantees.loop_guarantees import find_guarantees
+from zwidth.guarantees.spring_family import SpringFamily
+from zwidth.guarantees.spring_stable import nyquist_spring, spring_stable_region
 from zwidth.guarantees.two_port import allows, llewellyn_demand, sampled_demand
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
@@ -35,17 +35,17 @@ def paddle():
 
 
 @pytest.fixture(scope="module", params=["paddle", "two-mass"])
-def found(request, paddle):
-    return nested(paddle if request.param == "paddle" else published())
+def guarantees(request, paddle):
+    return find_guarantees(paddle if request.param == "paddle" else published())
 
 
 def test_the_nyquist_spring_of_a_mass(paddle):
     assert_allclose(nyquist_spring(paddle), M * (np.pi / T) ** 2, rtol=1e-12)
 
 
-def test_each_guarantee_lies_within_the_next(found):
+def test_each_guarantee_lies_within_the_next(guarantees):
     passive, springs, nyquist, stable = (
-        found[name].region.polygon for name in ("passive", "spring-stable", "nyquist-spring", "stable")
+        guarantees[name].region.polygon for name in ("passive", "spring-stable", "nyquist-spring", "stable")
     )
     for inner, outer in ((passive, springs), (springs, nyquist), (springs, stable)):
         assert inner.area > 0.0
@@ -64,21 +64,21 @@ def inside(region, depth):
     return shapely.get_coordinates(shape) / (B / K, 1.0)
 
 
-def growing(springs, region, count, depth, rng):
+def count_unstable(springs, region, count, depth, rng):
     """How many of so many random springs make a wall inside the edge unstable."""
     walls = inside(region, depth)
     K, B = np.ascontiguousarray(walls[:: max(len(walls) // 200, 1)].T)
-    k = springs.k0 * 10.0 ** rng.uniform(-3.0, 3.0, count)
+    k = springs.reference_stiffness * 10.0 ** rng.uniform(-3.0, 3.0, count)
     tracers = (springs.tracer(share) for share in springs.shares(k).tolist())
     return sum(bool(unstable(tracer.polynomials, K, B).any()) for tracer in tracers)
 
 
-def test_unseen_springs_leave_spring_stable_walls_stable(found):
-    springs = Springs.of(found.loop)
-    region = found["spring-stable"].region
+def test_unseen_springs_leave_spring_stable_walls_stable(guarantees):
+    springs = SpringFamily.of(guarantees.loop)
+    region = guarantees["spring-stable"].region
     depth = 1e-5 if springs.loop.plant.size == 1 else 5e-5  # narrow bites of lightly damped modes
-    assert growing(springs, region, 2000, depth, np.random.default_rng(1)) == 0
-    assert growing(springs, region, 200, -3e-3, np.random.default_rng(1)) > 0  # and the edge is not far
+    assert count_unstable(springs, region, 2000, depth, np.random.default_rng(1)) == 0
+    assert count_unstable(springs, region, 200, -3e-3, np.random.default_rng(1)) > 0  # and the edge is not far
 
 
 def test_springs_with_which_two_modes_have_one_alias_are_found(tmp_path):
@@ -87,7 +87,7 @@ def test_springs_with_which_two_modes_have_one_alias_are_found(tmp_path):
     (tmp_path / device.word).write_text(device.files[device.word])
     described = load(tmp_path / device.word)
     loop = described.at().loop
-    springs, region = Springs.of(loop), spring_stable_region(loop)
+    springs, region = SpringFamily.of(loop), spring_stable_region(loop)
     K, B = np.ascontiguousarray(inside(region, 5e-5)[::20].T)
     shares = np.linspace(0.98545, 0.98585, 41)
     assert not any(unstable(springs.tracer(share).polynomials, K, B).any() for share in shares.tolist())
@@ -96,9 +96,9 @@ def test_springs_with_which_two_modes_have_one_alias_are_found(tmp_path):
 
 
 @pytest.mark.parametrize("depth", [-1e-6, 1e-6])
-def test_a_spring_decides_at_the_stiffest_spring_stable_wall(found, depth):
+def test_a_spring_decides_at_the_stiffest_spring_stable_wall(guarantees, depth):
     """The most unstable spring of the peak, a millionth softer or stiffer, by eigenvalues."""
-    region, springs = found["spring-stable"].region, Springs.of(found.loop)
+    region, springs = guarantees["spring-stable"].region, SpringFamily.of(guarantees.loop)
     wall = region.stiffness_max * (1.0 + depth), region.damping_at_stiffness_max
 
     def growth(share):
@@ -118,7 +118,7 @@ def test_a_spring_decides_at_the_stiffest_spring_stable_wall(found, depth):
 def check_inclusions(seed):
     loop = random_device(np.random.default_rng(seed))
     try:
-        found = nested(loop)
+        found = find_guarantees(loop)
     except ChartError:
         return
     order = [found[name].region for name in ("passive", "spring-stable", "stable")]
@@ -179,7 +179,9 @@ def test_a_region_holds_the_couplings_that_meet_the_demand(paddle):
 def test_a_stiff_wall_is_softened_to_what_is_passive(paddle):
     demand = sampled_demand(paddle, coupling_angles(paddle, ONE), ONE)
     limit = softest_limit(demand, 5000.0, 0.0, T)
-    assert_allclose([limit.felt, limit.stiffness], [2000.0, 1.0 / (1.0 / 2000.0 - 1.0 / 5000.0)], rtol=1e-6)
+    assert_allclose(
+        [limit.felt_stiffness, limit.stiffness], [2000.0, 1.0 / (1.0 / 2000.0 - 1.0 / 5000.0)], rtol=1e-6
+    )
     assert np.isinf(softest_limit(demand, 1500.0, 0.0, T).stiffness)
 
 
@@ -187,7 +189,7 @@ def test_without_a_handle_only_the_actuator_can_be_asked(paddle):
     from dataclasses import replace
 
     bare = Loop(replace(paddle.plant, handle=None), paddle.controller)
-    found = nested(bare)
+    found = find_guarantees(bare)
     assert_allclose(found["passive-at-actuator"].region.stiffness_max, 2000.0, rtol=1e-9)
     assert "no handle" in found["passive"].region.reason
     assert "no handle" in found["spring-stable"].region.reason

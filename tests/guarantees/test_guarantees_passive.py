@@ -23,7 +23,7 @@ from zwidth.model.plant import LaggedDamper, Plant
 ONE = np.ones(1)
 
 
-def held_by(plant, M, B, K):
+def attach_network(plant, M, B, K):
     """The plant with a network of masses, dampers and springs; its first coordinate is the handle."""
     extra = len(M) - 1
     E = np.zeros((extra + 1, plant.size + extra))
@@ -55,7 +55,7 @@ def random_operator(rng, plant, period):
     for i in range(n + 1):
         K[i, i] += (rng.random() < 0.4) * rate() ** 2 * (m[i] or own)
         B[i, i] += (rng.random() < 0.3) * rate() * (m[i] or own) * 10.0 ** rng.uniform(-3, 0)
-    return held_by(plant, M, B, K)
+    return attach_network(plant, M, B, K)
 
 
 def random_device(rng):
@@ -90,7 +90,7 @@ def resonators_at(loop, K, B, aliases=12, gap=1e-4):
         * force_filter_response(loop, near[j : j + 1])
         / (1.0 + 1j * w * loop.controller.actuator_time_constant)
     )
-    swing = -weight * 1j * w * G.back * G.felt
+    swing = -weight * 1j * w * G.port_to_reading * G.actuator_to_port
     turn = towards / abs(towards) * swing.conj() / np.abs(swing)
     inverse = 2.0 * G.dissipation / (1.0 + turn) - 1j * w * G.port
     assert np.max(np.abs(inverse.real / inverse.imag)) < 1e-9  # lossless
@@ -100,7 +100,7 @@ def resonators_at(loop, K, B, aliases=12, gap=1e-4):
     n = len(w)
     M, S = np.diag(np.append(0.0, k / own)), np.diag(np.append(k.sum(), k))
     S[0, 1:] = S[1:, 0] = -k
-    return held_by(plant, M, np.zeros((n + 1, n + 1)), S)
+    return attach_network(plant, M, np.zeros((n + 1, n + 1)), S)
 
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
@@ -180,7 +180,7 @@ def test_just_outside_a_passive_operator_makes_it_vibrate():
     assert spectral_radius(loop, *(1.005 * wall)) < 1.0  # a free hand is no harm
 
 
-def hardly_seen(coupling):
+def weakly_coupled_loop(coupling):
     """Two masses of which the handle's is joined to the sensor's by next to nothing."""
     link = coupling * np.array([[1.0, -1.0], [-1.0, 1.0]])
     motor, hand = np.array([0.0, 1.0]), np.array([1.0, 0.0])
@@ -191,7 +191,7 @@ def hardly_seen(coupling):
 @pytest.mark.parametrize("coupling", [1e-6, 1e-4])
 def test_a_handle_that_the_sensor_hardly_sees_leaves_the_device_s_own_walls(coupling):
     """Its own chart is all that is left as the coupling vanishes, with the stiffest wall (6996.87, 8.2647)."""
-    loop = hardly_seen(coupling)
+    loop = weakly_coupled_loop(coupling)
     region = passive_region(loop)
     assert_allclose(region.stiffness_max, 6996.8689, rtol=1e-7)
     assert_allclose(region.stiffness_max, stability_chart(loop).stiffness_max, rtol=1e-6)

@@ -7,11 +7,11 @@ from math import inf, isinf, isnan
 import pytest
 
 from zwidth.device.load import from_document
-from zwidth.guarantees.nested import guarantees_of
-from zwidth.guarantees.region import empty
+from zwidth.guarantees.loop_guarantees import guarantees_of
+from zwidth.guarantees.region import empty_region
 
-HELD = {"mass_kg": 0.03, "damping_Ns_per_m": 1.0, "handle": 1.0}
-UNHELD = {
+WITH_HANDLE = {"mass_kg": 0.03, "damping_Ns_per_m": 1.0, "handle": 1.0}
+WITHOUT_HANDLE = {
     "mass_kg": [[0.03, 0.0], [0.0, 0.02]],
     "damping_Ns_per_m": [[2.0, -1.0], [-1.0, 1.0]],
     "stiffness_N_per_m": [[1e4, -1e4], [-1e4, 1e4]],
@@ -27,7 +27,7 @@ ARM = {
 }
 
 
-def point(plant=HELD, **more):
+def point(plant=WITH_HANDLE, **more):
     return from_document({"name": "p", "plant": plant, "loop": {"sampling_period_s": 0.001}} | more).at()
 
 
@@ -49,7 +49,7 @@ def test_couplings_are_there_if_they_are_asked_for(coupled):
     plain = guarantees_of(point(), coupling=True)
     assert plain.couplings.limit is None
     assert plain.couplings.sampled.stiffness_max == pytest.approx(2000.0, rel=1e-6)
-    assert coupled.couplings.limit.felt == pytest.approx(2000.0, rel=1e-6)
+    assert coupled.couplings.limit.felt_stiffness == pytest.approx(2000.0, rel=1e-6)
     assert coupled.couplings.limit.needed
     soft = guarantees_of(point(), wall=(1500.0, 0.0)).couplings
     assert isinf(soft.limit.stiffness)
@@ -64,7 +64,7 @@ def test_couplings_are_there_if_they_are_asked_for(coupled):
 
 
 def test_without_a_handle_no_coupling_is_judged():
-    found = guarantees_of(point(UNHELD), coupling=True)
+    found = guarantees_of(point(WITHOUT_HANDLE), coupling=True)
     assert "the plant has none" in found.couplings.reason
     assert found.document()["coupling"] == {"reason": found.couplings.reason}
     assert found.couplings.table()["coupling"] == []
@@ -98,14 +98,14 @@ def test_keys_and_columns(coupled):
 
 
 def test_a_set_that_is_empty_says_why_under_its_keys():
-    region = empty("for want of friction")
+    region = empty_region("for want of friction")
     document = region.document()
     assert document["reason"] == "for want of friction"
     assert isnan(document["stiffness_max_N_per_m"])
     assert repr(region) == "Region(0 rings, largest stiffness none)"
     undamped = guarantees_of(point({"mass_kg": 0.03, "handle": 1.0}))
     assert undamped["passive"].region.reason is not None
-    assert not undamped.none_left
+    assert not undamped.is_empty
     assert "passive none" in repr(undamped)
 
 

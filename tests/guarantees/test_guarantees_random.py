@@ -17,9 +17,9 @@ from zwidth.chart.verdict import UNSTABLE, eigenvalues, judge
 from zwidth.guarantees.disks import response_disks
 from zwidth.guarantees.gauge import gauge
 from zwidth.guarantees.passive import passive_region
-from zwidth.guarantees.port import port, reached
-from zwidth.guarantees.spring_family import Springs, spring_for
-from zwidth.guarantees.springs import spring_stable_region
+from zwidth.guarantees.port import port, without_idle_motions
+from zwidth.guarantees.spring_family import SpringFamily, spring_for
+from zwidth.guarantees.spring_stable import spring_stable_region
 from zwidth.loop.controller import Butterworth
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import undamped_modes
@@ -45,7 +45,10 @@ def random_device(rng, weak):
     handle, sensor = np.eye(n)[int(rng.integers(n))], plant.sensor
     if weak:
         share, handle, sensor = 10.0 ** rng.uniform(-6.0, -1.0), np.eye(n)[0], plant.actuator
-        matrices = [loosened(matrices[0], share, 0.0), *(loosened(X, share, 1.0) for X in matrices[1:])]
+        matrices = [
+            weakened_coupling(matrices[0], share, 0.0),
+            *(weakened_coupling(X, share, 1.0) for X in matrices[1:]),
+        ]
         matrices[1] += max(-1.0001 * float(np.linalg.eigvalsh(matrices[1])[0]), 0.0) * np.eye(n)
     grounded = rng.random() < 0.85  # else a free mechanism, which dissipates in its joints only
     mass, damping, stiffness = matrices
@@ -61,7 +64,7 @@ def random_device(rng, weak):
     return Loop(replace(plant, handle=handle, sensor=sensor), controller)
 
 
-def loosened(matrix, share, free):
+def weakened_coupling(matrix, share, free):
     """A matrix whose first coordinate keeps a share of its couplings; rows keep their sums if free is 1."""
     out = matrix.copy()
     cut = (1.0 - share) * matrix[0, 1:]
@@ -80,7 +83,7 @@ def walls_inside(region, count):
     return walls[np.any(walls != 0.0, axis=1)]
 
 
-def resolved(loop, walls):
+def is_resolved(loop, walls):
     """Walls that double precision can judge: K < 0 not where a mode, too soft beside others, counts as rigid."""
     rigid = np.any(undamped_modes(loop.plant.mass, loop.plant.stiffness)[0] == 0.0)
     return (walls[:, 0] >= 0.0) | (not rigid)
@@ -99,17 +102,17 @@ def check_stable(seed, weak, operators=6, springs=20):
     ]
     for one in held:
         some = walls[:: 1 if one is loop else 4]
-        some = some[resolved(one, some)]
+        some = some[is_resolved(one, some)]
         radius = np.abs(eigenvalues(one, *some.T)).max(axis=-1)
         # only where an eigenvalue is outside at all is its own rounding error asked for
         verdicts = judge(one, *some[radius > 1.0 + 1e-9].T)
         assert not np.any(verdicts.verdict == UNSTABLE), (seed, radius.max() - 1.0)
-    family = Springs.of(Loop(reached(loop.plant), loop.controller))
+    family = SpringFamily.of(Loop(without_idle_motions(loop.plant), loop.controller))
     k = spring_for(family.loop.plant, np.pi / loop.period * np.append(rng.uniform(0.0, 6.0, springs), 1.0))
     K, B = np.ascontiguousarray(walls.T)
     for share in [0.0, *family.shares(k[k > 0.0]).tolist(), 1.0]:
         tracer = family.tracer(share)
-        bad = [] if tracer is None else walls[unstable(tracer.polynomials, K, B) & resolved(tracer.loop, walls)]
+        bad = [] if tracer is None else walls[unstable(tracer.polynomials, K, B) & is_resolved(tracer.loop, walls)]
         # expanded polynomials lose digits where modes are far apart: eigenvalues decide
         assert not len(bad) or not np.any(judge(tracer.loop, *bad.T).verdict == UNSTABLE), (seed, share)
     return len(walls)
@@ -144,7 +147,7 @@ def test_no_wall_of_a_random_passive_set_is_unstable(seed):
 
 
 @pytest.mark.parametrize("seed", [10, 20])
-def test_nor_where_the_handle_is_hardly_seen(seed):
+def test_no_passive_wall_is_unstable_with_a_weakly_coupled_handle(seed):
     assert check_stable(seed, weak=True, operators=2, springs=5) > 0
 
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.chart.test_chart_against_eigenvalues import DAMPED, disagreements, radii
+from tests.chart.test_chart_against_eigenvalues import DAMPED, disagreements, spectral_radii
 from tests.loop.estimators_cases import random_method
 from tests.systems import mass, random_loop
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.verdict import STABLE, UNSTABLE, judge
 from zwidth.loop.controller import Controller
 from zwidth.loop.estimators import LINEAR_METHODS, LeastSquaresSlope, SavitzkyGolay, WindowedDifference
-from zwidth.loop.estimators.response import relative_response
+from zwidth.loop.estimators.frequency_response import relative_response
 from zwidth.loop.loop import Loop
 
 
@@ -49,7 +49,7 @@ def test_verdicts_agree_with_eigenvalues(name):
         size = 10.0 ** rng.uniform(-4.0, 0.3, 12)
         K = inertia / loop.period**2 * size * rng.choice([-0.2, 1.0], 12)
         B = inertia / loop.period * size * rng.uniform(-1.0, 3.0, 12)
-        said, radius = judge(loop, K, B).verdict, radii(loop, K, B)
+        said, radius = judge(loop, K, B).verdict, spectral_radii(loop, K, B)
         clear = np.abs(radius - 1.0) > 1e-6
         np.testing.assert_array_equal(said[clear], np.where(radius < 1.0, STABLE, UNSTABLE)[clear])
 

@@ -16,7 +16,7 @@ from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.estimators import BackwardDifference, Foaw, LeastSquaresSlope, Levant, WindowedDifference
 from zwidth.loop.estimators.foaw_kernel import foaw_estimate
 from zwidth.loop.estimators.levant_kernel import levant_estimate
-from zwidth.loop.estimators.running import velocity_of
+from zwidth.loop.estimators.run_estimator import velocity_of
 
 PAGE = (Path(__file__).parents[2] / "docs" / "estimators.md").read_text(encoding="utf-8")
 FITS = ("end-fit", "best-fit")
@@ -41,7 +41,7 @@ def longest_line(x, longest, bound, fit):
     return slope, periods
 
 
-def written_out(x, longest, bound, fit):
+def reference_slopes(x, longest, bound, fit):
     """Slopes per period and windows of a whole series."""
     pairs = [longest_line(x[: j + 1], longest, bound, fit) for j in range(len(x))]
     return tuple(np.array(column) for column in zip(*pairs, strict=True))
@@ -61,7 +61,7 @@ def test_an_adaptive_window_is_the_longest_that_a_line_fits(fit):
     for _ in range(25):
         x, noise = wandering(rng)
         longest, bound = int(rng.integers(1, 30)), noise * rng.uniform(0.3, 4.0)
-        want, periods = written_out(x, longest, bound, fit)
+        want, periods = reference_slopes(x, longest, bound, fit)
         used.extend(periods)
         found = velocity_of(Foaw(longest, bound, fit), x, T) * T
         np.testing.assert_allclose(found, want, atol=1e-9 * noise)
@@ -90,7 +90,7 @@ def test_on_a_noisy_ramp_the_error_is_within_the_bound_of_its_window(fit):
         noise, speed = 10.0 ** rng.uniform(-7.0, -4.0), rng.normal()
         x = speed * T * np.arange(200) + noise * rng.choice([-1.0, 1.0, rng.uniform(-1.0, 1.0)], 200)
         longest = int(rng.integers(1, 60))
-        _, n = written_out(x, longest, noise, fit)
+        _, n = reference_slopes(x, longest, noise, fit)
         bound = 2.0 * noise / T / np.maximum(n, 1)
         if fit == "best-fit":
             bound = 6.0 * ((n + 1) ** 2 // 2) / np.maximum(n * (n + 1.0) * (n + 2.0), 1.0) * noise / T
@@ -134,7 +134,7 @@ def test_a_jerk_cuts_the_window():
     assert velocity_of(WindowedDifference(40), x, T)[80] == pytest.approx(0.05)
 
 
-def implicit(x, L, period):
+def levant_implicit(x, L, period):
     """Levant's differentiator by backward Euler, solved along the graph of the sign, on which p runs.
 
     From -1 to 1 p is the sign and e is 0; beyond, the sign stays and e grows.
@@ -164,7 +164,7 @@ def test_levants_steps_solve_their_implicit_equation():
         period = 10.0 ** rng.uniform(-4.0, -2.0)
         L = noise / period**2 * 10.0 ** rng.uniform(-2.0, 1.0)
         found = velocity_of(Levant(L), x, period)
-        np.testing.assert_allclose(found, implicit(x, L, period), atol=1e-9 * noise / period)
+        np.testing.assert_allclose(found, levant_implicit(x, L, period), atol=1e-9 * noise / period)
 
 
 def test_levants_differentiator_finds_a_steady_velocity_in_finite_time_and_keeps_it():
@@ -297,7 +297,7 @@ def test_half_a_step_is_an_encoders_noise():
     assert Foaw.of_encoder(9, 1e-5, "best-fit") == Foaw(9, 0.5e-5, "best-fit")
 
 
-def explicit(x, L, period):
+def levant_explicit(x, L, period):
     """Levant's differentiator by explicit steps."""
     z0, z1, out = x[0], 0.0, []
     for reading in x:
@@ -314,7 +314,7 @@ def test_explicit_steps_chatter_as_the_page_says_and_ours_do_not():
     L = 10.0
     assert "11 mm/s for L = 10 m/s² at 1 kHz" in PAGE
     ramp = 0.05 * T * np.arange(3000)
-    jumps = np.abs(np.diff(explicit(ramp, L, T)[2000:]))
+    jumps = np.abs(np.diff(levant_explicit(ramp, L, T)[2000:]))
     np.testing.assert_allclose(jumps, 0.011, rtol=1e-9)
     np.testing.assert_allclose(velocity_of(Levant(L), ramp, T)[2000:], 0.05, rtol=1e-9)
 

@@ -86,7 +86,7 @@ def test_factors_are_as_the_chart_takes_them(method):
     assert estimator.window.dtype == float
 
 
-def test_numpys_whole_numbers_do():
+def test_numpy_integers_are_accepted():
     n = np.int64(400)
     assert SavitzkyGolay(n, np.int32(7)) == SavitzkyGolay(400, 7)
     assert SavitzkyGolay(n, np.int32(7)).estimator(1.0).window.size == 399

@@ -11,7 +11,7 @@ import scipy.signal
 from tests.loop.estimators_cases import METHODS, PERIODS, polynomials, random_method
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators import AlphaBeta, BackwardDifference, Kalman, LeastSquaresSlope, SavitzkyGolay
-from zwidth.loop.estimators.response import low_frequency_delay, phase_delay, relative_response
+from zwidth.loop.estimators.frequency_response import low_frequency_delay, phase_delay, relative_response
 
 
 def by_control(method, period):

@@ -8,10 +8,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from gallery import estimators as gallery
-from tests.systems import second_matrix
+from tests.systems import reference_transition_matrix
 from zwidth.loop.estimators import METHODS, AlphaBeta
-from zwidth.loop.estimators.bounds import quantisation_noise
-from zwidth.loop.estimators.response import phase_delay, relative_response
+from zwidth.loop.estimators.frequency_response import phase_delay, relative_response
+from zwidth.loop.estimators.parameter_checks import quantisation_noise
 
 PAGE = (Path(__file__).parents[2] / "docs" / "estimators.md").read_text(encoding="utf-8")
 
@@ -62,7 +62,10 @@ def test_the_gallerys_stiffest_walls_are_those_of_brute_force(name):
         K, B = chart.stiffness_max, chart.damping_at_stiffness_max
         nearby = np.concatenate([B * np.linspace(0.97, 1.03, 61), chart.damping_max * np.linspace(0.0, 1.5, 40)])
         inside, beyond = (
-            [np.max(np.abs(np.linalg.eigvals(second_matrix(chart.loop, share * K, b)))) for b in nearby]
+            [
+                np.max(np.abs(np.linalg.eigvals(reference_transition_matrix(chart.loop, share * K, b))))
+                for b in nearby
+            ]
             for share in (0.9995, 1.0001)
         )
         assert min(inside) < 1.0 - 1e-7

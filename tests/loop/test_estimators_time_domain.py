@@ -21,7 +21,7 @@ def through_factors(method, positions, period):
     return scipy.signal.lfilter(*polynomials(method.estimator(period)), positions)
 
 
-def written_out(method, positions, period):
+def reference_estimates(method, positions, period):
     """The same estimates as a program on the device would make them; the hand rested at 0 before."""
     match method:
         case BackwardDifference():
@@ -33,16 +33,16 @@ def written_out(method, positions, period):
             x = np.concatenate([np.zeros(n), positions])
             return (x[n:] - x[:-n]) / (n * period)
         case LeastSquaresSlope(n):
-            return fitted(positions, n, 1, 0.0) / period
+            return polynomial_slopes(positions, n, 1, 0.0) / period
         case SavitzkyGolay(n, order, centred):
-            return fitted(positions, n, order, -(n - 1) / 2.0 if centred else 0.0) / period
+            return polynomial_slopes(positions, n, order, -(n - 1) / 2.0 if centred else 0.0) / period
         case AlphaBeta(alpha, beta):
-            return tracked(positions, period, alpha, beta)
+            return alpha_beta_estimates(positions, period, alpha, beta)
         case Kalman():
-            return steady(method, positions, period)
+            return kalman_estimates(method, positions, period)
 
 
-def fitted(positions, n, order, place):
+def polynomial_slopes(positions, n, order, place):
     """Slope per sample at `place` (0: newest) of the polynomial fitted to each window of n positions."""
     x = np.concatenate([np.zeros(n - 1), positions])
     times = np.arange(-(n - 1), 1)
@@ -50,7 +50,7 @@ def fitted(positions, n, order, place):
     return np.array([fit.deriv()(place) for fit in fits])
 
 
-def tracked(positions, period, alpha, beta):
+def alpha_beta_estimates(positions, period, alpha, beta):
     """The tracker's three lines."""
     x = v = 0.0
     estimates = []
@@ -63,7 +63,7 @@ def tracked(positions, period, alpha, beta):
     return np.array(estimates)
 
 
-def steady(method, positions, period):
+def kalman_estimates(method, positions, period):
     """Predict and update with covariances, after they have come to rest."""
     F = np.array([[1.0, period], [0.0, 1.0]])
     G = np.array([period**2 / 2.0, period]) * method.acceleration_noise
@@ -84,7 +84,7 @@ def steady(method, positions, period):
 @pytest.mark.parametrize("method", METHODS, ids=str)
 def test_the_factors_estimate_what_the_recursion_does(method, period):
     positions = np.random.default_rng(0).normal(size=80)
-    want = written_out(method, positions, period)
+    want = reference_estimates(method, positions, period)
     got = through_factors(method, positions, period)
     np.testing.assert_allclose(got, want, rtol=0.0, atol=4e-11 * np.abs(want).max())
 
@@ -95,7 +95,7 @@ def test_random_methods_estimate_what_the_recursion_does():
         period = 10.0 ** -rng.uniform(2.3, 4.3)
         method = random_method(rng, period)
         positions = rng.normal(size=40)
-        got, want = through_factors(method, positions, period), written_out(method, positions, period)
+        got, want = through_factors(method, positions, period), reference_estimates(method, positions, period)
         np.testing.assert_allclose(got, want, rtol=0.0, atol=1e-10 * np.abs(want).max(), err_msg=str(method))
 
 

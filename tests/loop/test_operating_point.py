@@ -12,10 +12,10 @@ from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document, load
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
-from zwidth.loop.multi import MultiLoop
+from zwidth.loop.multi_loop import MultiLoop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import NoMechanismError, OperatingPointError, SeveralDirectionsError
-from zwidth.model.directions import reduce_directions
+from zwidth.model.multi_plant import reduce_directions
 from zwidth.model.operator import Operator, attach
 from zwidth.model.plant import Plant
 from zwidth.model.posture import OK, OUT_OF_REACH, OutOfReach, solve_posture
@@ -30,7 +30,7 @@ def device():
 
 
 @pytest.fixture(scope="module")
-def given():
+def device_with_operator():
     return load("published-two-mass", operator="thesis-arm")
 
 
@@ -52,7 +52,8 @@ def test_what_is_left_out_is_the_file_s(device):
     point = device.at()
     assert_allclose(point.posture.position, device.reference_position)
     assert_allclose(point.direction, [0.0, 1.0, 0.0])
-    assert (point.posture.assembly, point.model, point.asked) == (device.reference_assembly, "full", None)
+    assert (point.posture.assembly, point.model) == (device.reference_assembly, "full")
+    assert point.requested_position is None
 
 
 def test_a_direction_of_any_length_is_its_unit_vector(device):
@@ -104,17 +105,17 @@ def test_a_position_is_projected_within_a_hundredth_of_the_arm_and_refused_beyon
     assert device.at([(0.0, 0.1009)]).status.tolist() == [OUT_OF_REACH]  # in a batch nothing is projected
 
 
-def test_the_operator_holds_the_plant_and_can_be_taken_off(given):
-    point = given.at()
-    assert np.array_equal(point.plant.mass, attach(given.given_plant, given.operator).mass)
-    assert point.unheld_plant is given.given_plant
-    assert point.without_operator.plant is given.given_plant
-    assert given.at(operator="none").operator is None
+def test_the_operator_holds_the_plant_and_can_be_taken_off(device_with_operator):
+    point, alone = device_with_operator.at(), device_with_operator.given_plant
+    assert np.array_equal(point.plant.mass, attach(alone, device_with_operator.operator).mass)
+    assert point.ungripped_plant is alone
+    assert point.without_operator.plant is device_with_operator.given_plant
+    assert device_with_operator.at(operator="none").operator is None
     hand = Operator(0.3, 100.0, 2.0, 5000.0, 10.0)
-    held = given.at(operator=hand)
+    held = device_with_operator.at(operator=hand)
     assert held.operator == hand
-    assert np.array_equal(held.plant.mass, attach(given.given_plant, hand).mass)
-    assert given.operator != hand  # the device itself stays as it is
+    assert np.array_equal(held.plant.mass, attach(device_with_operator.given_plant, hand).mass)
+    assert device_with_operator.operator != hand  # the device itself stays as it is
 
 
 def test_the_same_point_of_another_device_asks_for_the_same(device):
@@ -122,7 +123,7 @@ def test_the_same_point_of_another_device_asks_for_the_same(device):
         device.with_({"links.upper-right.length_m": 0.16, "links.upper-left.length_m": 0.16}) if False else device
     )
     point = device.at(POSITION, DIRECTION, model="rigid")
-    again = longer.like(point)
+    again = longer.at_point(point)
     assert_allclose(again.posture.position[:2], POSITION, atol=1e-9)
     assert (again.model, again.posture.assembly) == ("rigid", point.posture.assembly)
     assert np.array_equal(again.directions, point.directions)
@@ -194,8 +195,8 @@ def test_what_several_directions_leave_out_is_refused_by_name():
 # --- devices without a mechanism ----------------------------------------------------------------------
 
 
-def test_a_given_plant_has_one_point(given):
-    point = given.at()
+def test_a_given_plant_has_one_point(device_with_operator):
+    point = device_with_operator.at()
     assert (point.shape, point.status.tolist(), point.direction_count) == ((), OK, 1)
     assert point[0] is point
     for ask in ("direction", "jacobian", "mass_matrix", "whole_mass_matrix", "drives", "flat"):
@@ -254,9 +255,9 @@ def test_what_cannot_be_meant_is_one_clear_error(device, arguments, words):
 
 
 @pytest.mark.parametrize("arguments", [{"position": (0.0, 0.1)}, {"direction": (1.0, 0.0)}, {"assembly": "a"}])
-def test_circumstances_of_a_mechanism_do_not_apply_to_a_plant(given, arguments):
+def test_circumstances_of_a_mechanism_do_not_apply_to_a_plant(device_with_operator, arguments):
     with pytest.raises(DeviceError, match=r"does not apply to a device given by its \[plant\]"):
-        given.at(**arguments)
+        device_with_operator.at(**arguments)
 
 
 # --- another number -----------------------------------------------------------------------------------

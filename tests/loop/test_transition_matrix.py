@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from tests.systems import mass, published, random_loop, second_matrix, two_mass
+from tests.systems import mass, published, random_loop, reference_transition_matrix, two_mass
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 
 
-def unmatched(ours, theirs):
+def eigenvalue_distance(ours, theirs):
     """Largest distance of our eigenvalues to their partners among theirs."""
     cost = np.abs(ours[:, None] - theirs[None, :])
     rows, columns = linear_sum_assignment(cost)
@@ -25,10 +25,10 @@ def test_eigenvalues_agree_with_a_second_realisation(kind):
         scale = 1.0 / (loop.plant.actuator @ np.linalg.solve(loop.plant.mass, loop.plant.actuator))
         K, B = rng.uniform(0.05, 0.4) * scale / loop.period**2, rng.uniform(0.1, 0.5) * scale / loop.period
         ours = np.linalg.eigvals(loop.transition_matrix(K, B))
-        theirs = np.linalg.eigvals(second_matrix(loop, K, B))
+        theirs = np.linalg.eigvals(reference_transition_matrix(loop, K, B))
         # the largest roots are simple here; small ones crowd z = 0 and are ill-conditioned
         big = ours[np.abs(ours) > 0.5]
-        assert unmatched(big, theirs) <= 2e-6
+        assert eigenvalue_distance(big, theirs) <= 2e-6
 
 
 def test_published_plant_has_the_state_count_of_the_thesis():
@@ -67,7 +67,7 @@ def test_closed_loop_poles_agree_with_python_control(delay):
     wall = K + B * low * (z - 1) / (T * z)
     poles = control.poles(control.feedback(P * z**-delay * wall, 1))
     ours = np.linalg.eigvals(loop.transition_matrix(K, B))
-    assert unmatched(ours[np.abs(ours) > 0.3], poles) <= 1e-6
+    assert eigenvalue_distance(ours[np.abs(ours) > 0.3], poles) <= 1e-6
 
 
 def test_half_a_sample_of_delay_lies_between_none_and_one():

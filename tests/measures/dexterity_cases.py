@@ -16,7 +16,7 @@ TURN = rotation_about(np.array([0.3, -1.0, 0.7]), 1.1)
 SHIFT = np.array([0.4, -0.2, 0.9])
 
 
-def with_data(mechanism, rng):
+def with_drive_data(mechanism, rng):
     """A mechanism whose drives have different ratios, limits, encoders and dry friction."""
     d = len(mechanism.drives.names)
     limit = rng.uniform(0.05, 0.5, d)
@@ -27,12 +27,12 @@ def with_data(mechanism, rng):
         torque_limit=limit,
         continuous_torque=limit * rng.uniform(0.1, 0.9, d),
         encoder_counts=rng.uniform(500.0, 8000.0, d),
-        nonlinearity=dry(rng.uniform(0.0, 0.01, d)),
+        nonlinearity=coulomb_friction(rng.uniform(0.0, 0.01, d)),
     )
     return replace(mechanism, drives=drives)
 
 
-def dry(coulomb):
+def coulomb_friction(coulomb):
     """Drives with Coulomb friction [N m] at the motors and nothing else that is not linear."""
     none, nothing = np.zeros(len(coulomb)), np.full(len(coulomb), np.nan)
     return DriveNonlinearity(
@@ -40,7 +40,7 @@ def dry(coulomb):
     )
 
 
-def place_at(mechanism, positions, direction):
+def operating_points(mechanism, positions, direction):
     """The mechanism with its handle at positions (..., 3), rendering directions (..., 3) of any length."""
     posture = solve_posture(mechanism, np.asarray(positions, float))
     u = np.broadcast_to(np.asarray(direction, float), (*posture.status.shape, 3))
@@ -48,7 +48,7 @@ def place_at(mechanism, positions, direction):
     return OperatingPoint(Controller(0.001), mechanism, posture, units[..., None, :])
 
 
-def moved(mechanism: Mechanism) -> Mechanism:
+def on_moved_base(mechanism: Mechanism) -> Mechanism:
     """The mechanism on a base that is turned by TURN and shifted by SHIFT."""
     links, roots = mechanism.links, mechanism.links.parent < 0
     origin = np.where(roots[:, None], SHIFT + links.origin @ TURN.T, links.origin)
@@ -78,7 +78,9 @@ def permuted(mechanism: Mechanism, order) -> Mechanism:
     names = tuple(drives.names[i] for i in order)
     return replace(
         mechanism,
-        drives=replace(drives, names=names, nonlinearity=dry(drives.nonlinearity.coulomb[order]), **told),
+        drives=replace(
+            drives, names=names, nonlinearity=coulomb_friction(drives.nonlinearity.coulomb[order]), **told
+        ),
     )
 
 
@@ -107,7 +109,7 @@ def scaled(mechanism: Mechanism, length: float, mass: float) -> Mechanism:
             stiffness=moment * drives.stiffness,
             torque_limit=moment * drives.torque_limit,
             continuous_torque=moment * drives.continuous_torque,
-            nonlinearity=dry(moment * drives.nonlinearity.coulomb),
+            nonlinearity=coulomb_friction(moment * drives.nonlinearity.coulomb),
         ),
         handle_point=length * mechanism.handle_point,
         reference_position=length * mechanism.reference_position,

@@ -10,14 +10,14 @@ import pytest
 from systems import mass, random_loop, random_operator, two_mass
 
 import zwidth as package
-from tests.cli.cli_run import MECHANISM, TWO_MASS, found
+from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.verdict import judge
 from zwidth.loop.controller import Controller
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.felt import HandleError, felt_impedance, static_stiffness
 from zwidth.measures.felt_wall import felt_wall
-from zwidth.show.output import plain
+from zwidth.measures.handle_impedance import HandleError, felt_impedance, static_stiffness
+from zwidth.show.output import json_value
 
 WALL = (4000.0, 10.0)
 
@@ -31,8 +31,8 @@ def pair():
     [(TWO_MASS, "none", WALL), (MECHANISM, "none", WALL), (MECHANISM, "thesis-arm", (2000.0, 5.0))],
 )
 def test_the_command_says_the_same(name, operator, wall):
-    told = found("felt", name, "--operator", operator, "--stiffness", wall[0], "--damping", wall[1])
-    document = plain(felt_wall(package.load(name).at(operator=operator), *wall).document())
+    told = document_of("felt", name, "--operator", operator, "--stiffness", wall[0], "--damping", wall[1])
+    document = json_value(felt_wall(package.load(name).at(operator=operator), *wall).document())
     assert {key: told[key] for key in document} == document
 
 
@@ -47,9 +47,9 @@ def test_random_devices_feel_what_the_single_functions_say(seed):
     B = peak.damping if peak else 0.1
     felt = felt_wall(OperatingPoint(loop.controller, given_plant=plant), K, B)
     assert felt.verdict == judge(loop, [K], [B]).names[0]
-    assert (felt.impedance is None) == (felt.verdict != "stable") == (felt.reason is not None)
-    if felt.impedance is not None:
-        assert np.array_equal(felt.impedance, felt_impedance(loop, K, B, felt.frequency))
+    assert (felt.felt_impedance is None) == (felt.verdict != "stable") == (felt.reason is not None)
+    if felt.felt_impedance is not None:
+        assert np.array_equal(felt.felt_impedance, felt_impedance(loop, K, B, felt.frequency))
         assert felt.static_stiffness == float(static_stiffness(plant, K))
     if peak:
         assert felt.static_stiffness_at_stiffness_max == float(static_stiffness(plant, peak.stiffness))
@@ -71,7 +71,7 @@ def test_two_springs_in_series_and_a_hard_limit():
 def test_a_wall_that_is_not_stable_has_a_reason_and_no_impedance():
     felt = felt_wall(pair(), 9000.0, 10.0)
     assert felt.reason == "this wall is unstable, so that there is no steady motion to feel"
-    assert felt.impedance is felt.static_stiffness is None
+    assert felt.felt_impedance is felt.static_stiffness is None
     document, table = felt.document(), felt.table()
     assert document["impedance_real_Ns_per_m"] is document["impedance_imag_Ns_per_m"] is None
     assert document["free_motion_mass_kg"] == pytest.approx(0.287)
@@ -87,7 +87,7 @@ def test_the_operator_decides_what_is_stable_and_feels_the_device_without_himsel
     held = OperatingPoint(Controller(0.00125), given_plant=plant, operator=random_operator(rng))
     felt, alone = felt_wall(held, 1000.0, 5.0), felt_wall(held.without_operator, 1000.0, 5.0)
     assert felt.verdict == alone.verdict == "stable"
-    assert np.array_equal(felt.impedance, alone.impedance)
+    assert np.array_equal(felt.felt_impedance, alone.felt_impedance)
     assert felt.stiffness_max == largest_stiffness(held.loop).stiffness != alone.stiffness_max
 
 

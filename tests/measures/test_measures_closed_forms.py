@@ -17,10 +17,10 @@ from zwidth.loop.estimators import WindowedDifference
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import MEASURES
+from zwidth.measures.definition import NO_VALUE, OK, OUT_OF_REACH, MeasureError, WantedWall
+from zwidth.measures.deformation import structural_distortion
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.fidelity import optimal_mass
-from zwidth.measures.measure import NO_VALUE, OK, OUT_OF_REACH, MeasureError, WantedWall
-from zwidth.measures.structural import structural_distortion
+from zwidth.measures.vibration_decay import optimal_mass
 from zwidth.model.operator import Operator
 
 CLOSED = ("stiffness_max_closed_form", "damping_max_closed_form", "stable_area_closed_form")
@@ -36,17 +36,17 @@ def five_bar(model="full"):
     return zwidth.load("five-bar").at(POSITIONS, model=model)
 
 
-def given(plant, model=None, operator=None, **controller):
+def point_of(plant, model=None, operator=None, **controller):
     return OperatingPoint(Controller(0.00125, **controller), given_plant=plant, model=model, operator=operator)
 
 
-def ask(name, point, wanted=WANTED):
+def measure_value(name, point, wanted=WANTED):
     return evaluate(MEASURES[name].at_wall(wanted), point)
 
 
-def refused(name, point, match, wanted=WANTED):
+def check_refusal(name, point, match, wanted=WANTED):
     with pytest.raises(MeasureError, match=match):
-        ask(name, point, wanted)
+        measure_value(name, point, wanted)
 
 
 # --- closed forms of the impedance range ---
@@ -55,7 +55,7 @@ def refused(name, point, match, wanted=WANTED):
 @pytest.mark.parametrize("model", ["rigid", "motor-mass"])
 def test_they_are_exact_for_the_device_without_damping(model):
     place = five_bar(model)
-    found = [ask(name, place) for name in CLOSED]
+    found = [measure_value(name, place) for name in CLOSED]
     for index in ((0, 0), (0, 1), (1, 0)):
         plant = place[index].plant
         assert (plant.damping[0, 0] > 0.0) == (model == "motor-mass")
@@ -70,8 +70,8 @@ def test_they_are_exact_for_the_device_without_damping(model):
 @pytest.mark.parametrize("model", ["full", "two-mass"])
 def test_other_models_have_none(model):
     for name in CLOSED:
-        refused(name, five_bar(model), "two models only; give model='rigid' or model='motor-mass'")
-    refused(CLOSED[0], given(two_mass(0.26, 0.0254, 15620.0)), "give model=")
+        check_refusal(name, five_bar(model), "two models only; give model='rigid' or model='motor-mass'")
+    check_refusal(CLOSED[0], point_of(two_mass(0.26, 0.0254, 15620.0)), "give model=")
 
 
 def test_a_given_plant_is_seen_for_what_it_is():
@@ -83,9 +83,9 @@ def test_a_given_plant_is_seen_for_what_it_is():
         (pair, "motor-mass", mass(0.0254, 0.0, 15620.0)),
     ):
         chart = stability_chart(Loop(alike, Controller(0.00125)), decay=False)
-        found = [float(ask(name, given(plant, model=model)).values) for name in CLOSED]
+        found = [float(measure_value(name, point_of(plant, model=model)).values) for name in CLOSED]
         assert_allclose(found, [chart.stiffness_max, chart.damping_max, chart.stable_area], rtol=1e-7)
-    late = float(ask(CLOSED[0], given(mass(0.287), delay=2.0)).values)
+    late = float(measure_value(CLOSED[0], point_of(mass(0.287), delay=2.0)).values)
     exact = stability_chart(Loop(mass(0.287), Controller(0.00125, 2.0)), decay=False).stiffness_max
     assert late == pytest.approx(exact, rel=1e-9)
 
@@ -103,31 +103,33 @@ def test_a_given_plant_is_seen_for_what_it_is():
 def test_whatever_else_breaks_an_assumption_is_refused(change, reason):
     mechanism = five_bar("rigid")
     for place in (
-        given(mass(0.287), **change),
+        point_of(mass(0.287), **change),
         replace(mechanism, controller=replace(mechanism.controller, **change)),
     ):
         for name in CLOSED:
-            refused(name, place, reason)
+            check_refusal(name, place, reason)
 
 
 def test_what_only_one_of_them_refuses():
     motors = five_bar("motor-mass")
-    refused(CLOSED[0], replace(motors, controller=replace(motors.controller, delay=1.0)), "without delay")
-    refused(CLOSED[0], replace(motors, encoders="link"), "encoders read the links")
+    check_refusal(CLOSED[0], replace(motors, controller=replace(motors.controller, delay=1.0)), "without delay")
+    check_refusal(CLOSED[0], replace(motors, encoders="link"), "encoders read the links")
     hand = Operator(0.8, 580.0, 5.5, 1e4, 5.0)
-    refused(CLOSED[0], replace(five_bar("rigid"), operator=hand), "operator='none'")
-    refused(CLOSED[0], given(replace(mass(0.287), sensor=np.array([-1.0]))), "where the encoder reads")
-    assert ask(CLOSED[0], replace(motors, operator=hand)).status[0, 0] == OK  # the link side is held still anyhow
+    check_refusal(CLOSED[0], replace(five_bar("rigid"), operator=hand), "operator='none'")
+    check_refusal(CLOSED[0], point_of(replace(mass(0.287), sensor=np.array([-1.0]))), "where the encoder reads")
+    assert (
+        measure_value(CLOSED[0], replace(motors, operator=hand)).status[0, 0] == OK
+    )  # the link side is held still anyhow
 
 
 def test_where_no_wall_is_stable_they_say_why():
-    place = given(mass(0.01, stiffness=15620.0))  # W = 1.562: just below pi/2, where there is one yet
-    assert ask(CLOSED[0], place).status == OK
-    place = given(mass(0.005, stiffness=15620.0))
-    found = ask(CLOSED[0], place)
+    place = point_of(mass(0.01, stiffness=15620.0))  # W = 1.562: just below pi/2, where there is one yet
+    assert measure_value(CLOSED[0], place).status == OK
+    place = point_of(mass(0.005, stiffness=15620.0))
+    found = measure_value(CLOSED[0], place)
     assert found.status == NO_VALUE
     assert "no wall of positive stiffness is stable" in found.notes[0].reason
-    assert [float(ask(name, place).values) for name in CLOSED[1:]] == [0.0, 0.0]
+    assert [float(measure_value(name, place).values) for name in CLOSED[1:]] == [0.0, 0.0]
 
 
 def test_rigid_drives_have_no_spring():
@@ -135,7 +137,7 @@ def test_rigid_drives_have_no_spring():
     drives = replace(place.drives, stiffness=np.full(2, np.inf))
     place = replace(place, mechanism=replace(place.mechanism, drives=drives))
     for name in (*CLOSED, *OPTIMAL):
-        found = ask(name, place)
+        found = measure_value(name, place)
         assert found.status.tolist() == [[NO_VALUE, NO_VALUE], [NO_VALUE, OUT_OF_REACH]]
         assert found.notes[0].count == 3
 
@@ -147,12 +149,12 @@ def test_the_optimum_of_a_mechanism_takes_its_stiffness():
     place = five_bar()
     found = optimal_mass(3000.0, 15.0, place.effective.stiffness, place.controller.sampling_period)
     for name, values in zip(OPTIMAL, (found.spectral_radius, found.mass), strict=True):
-        ours = ask(name, place)
+        ours = measure_value(name, place)
         assert_allclose(ours.values, values)
         assert ours.status.tolist() == [[OK, OK], [OK, OUT_OF_REACH]]
         for model in ("rigid", "two-mass", "motor-mass"):
-            assert_allclose(ask(name, five_bar(model)).values, values)
-    little = ask(OPTIMAL[0], five_bar(), WantedWall(3000.0, 1.0))
+            assert_allclose(measure_value(name, five_bar(model)).values, values)
+    little = measure_value(OPTIMAL[0], five_bar(), WantedWall(3000.0, 1.0))
     assert little.status[0, 0] == NO_VALUE
     assert "B > K T/2" in little.notes[0].reason
 
@@ -160,16 +162,16 @@ def test_the_optimum_of_a_mechanism_takes_its_stiffness():
 def test_the_optimum_of_a_given_plant():
     """Point B of the thesis, on the two-mass plant and on its motor side alone."""
     for plant in (published().plant, mass(0.0254, 1.9, 15620.0)):
-        assert float(ask(OPTIMAL[0], given(plant)).values) == pytest.approx(0.895606, abs=5e-7)
-        assert float(ask(OPTIMAL[1], given(plant)).values) == pytest.approx(0.0510576, abs=5e-8)
-    refused(OPTIMAL[0], given(mass(0.287)), "stiffness between motors and handle")
-    refused(OPTIMAL[0], given(published().plant, delay=1.0), "without delay")
-    refused(OPTIMAL[0], replace(five_bar(), encoders="link"), "encoders read the links")
+        assert float(measure_value(OPTIMAL[0], point_of(plant)).values) == pytest.approx(0.895606, abs=5e-7)
+        assert float(measure_value(OPTIMAL[1], point_of(plant)).values) == pytest.approx(0.0510576, abs=5e-8)
+    check_refusal(OPTIMAL[0], point_of(mass(0.287)), "stiffness between motors and handle")
+    check_refusal(OPTIMAL[0], point_of(published().plant, delay=1.0), "without delay")
+    check_refusal(OPTIMAL[0], replace(five_bar(), encoders="link"), "encoders read the links")
 
 
 def test_the_radius_and_decay_of_any_loop():
     place = five_bar()
-    radius, decay = ask("spectral_radius", place), ask("decay_time", place)
+    radius, decay = measure_value("spectral_radius", place), measure_value("decay_time", place)
     for index in ((0, 0), (0, 1), (1, 0)):
         expected = float(spectral_radius(place[index].loop, 3000.0, 15.0))
         assert radius.values[index] == expected
@@ -177,24 +179,27 @@ def test_the_radius_and_decay_of_any_loop():
             expected, rel=1e-12
         )
     assert radius.status[1, 1] == decay.status[1, 1] == OUT_OF_REACH
-    unstable = ask("decay_time", given(published().plant), WantedWall(20000.0, 10.0))
+    unstable = measure_value("decay_time", point_of(published().plant), WantedWall(20000.0, 10.0))
     assert unstable.status == NO_VALUE
     assert unstable.notes[0].reason == "the wanted wall is unstable here, so that vibration does not decay"
-    assert float(ask("spectral_radius", given(published().plant), WantedWall(20000.0, 10.0)).values) > 1.0
+    assert (
+        float(measure_value("spectral_radius", point_of(published().plant), WantedWall(20000.0, 10.0)).values)
+        > 1.0
+    )
 
 
 def test_felt_at_low_frequency_is_felt_at_rest():
     """K k/(K + k), and the mass in free motion, jw m."""
     slow = WantedWall(4000.0, 15.0, 0.01)
-    place = given(published().plant)
+    place = point_of(published().plant)
     series = 4000.0 * 15620.0 / 19620.0
-    assert float(ask("felt_stiffness", place, slow).values) == pytest.approx(series, rel=1e-5)
-    assert float(ask("free_motion_force", place, slow).values) == pytest.approx(
+    assert float(measure_value("felt_stiffness", place, slow).values) == pytest.approx(series, rel=1e-5)
+    assert float(measure_value("free_motion_force", place, slow).values) == pytest.approx(
         2.0 * np.pi * 0.01 * 0.287, rel=1e-5
     )
     unstable = WantedWall(20000.0, 10.0, 1.0)
     for name, wanted in (("felt_stiffness", unstable), ("decay_time", unstable)):
-        found = ask(name, given(published().plant), wanted)
+        found = measure_value(name, point_of(published().plant), wanted)
         assert found.status == NO_VALUE
         assert "unstable here" in found.notes[0].reason
 
@@ -202,36 +207,40 @@ def test_felt_at_low_frequency_is_felt_at_rest():
 def test_what_is_felt_and_deforms_is_the_device_without_the_hand():
     hand = Operator(0.8, 580.0, 5.5, 1e4, 5.0)
     for name in ("felt_stiffness", "free_motion_force", "structural_distortion"):
-        alone, held = (float(ask(name, given(published().plant, operator=who)).values) for who in (None, hand))
+        alone, held = (
+            float(measure_value(name, point_of(published().plant, operator=who)).values) for who in (None, hand)
+        )
         assert alone == held
     assert (
-        ask("spectral_radius", given(published().plant)).values
-        != ask("spectral_radius", given(published().plant, operator=hand)).values
+        measure_value("spectral_radius", point_of(published().plant)).values
+        != measure_value("spectral_radius", point_of(published().plant, operator=hand)).values
     )
 
 
 def test_the_distortion_of_a_place():
     place = five_bar()
-    found = ask("structural_distortion", place)
+    found = measure_value("structural_distortion", place)
     assert found.values[0, 1] == structural_distortion(place[0, 1].plant, 10.0)
-    assert float(ask("structural_distortion", five_bar("rigid")[0, 0]).values) == 0.0
+    assert float(measure_value("structural_distortion", five_bar("rigid")[0, 0]).values) == 0.0
 
 
 @pytest.mark.parametrize("name", [*OPTIMAL, "spectral_radius", "decay_time", "felt_stiffness"])
 def test_a_wall_has_to_be_told(name):
     for wanted in (WantedWall(frequency=1.0), WantedWall(100.0, None, 1.0), WantedWall(None, 1.0, 1.0)):
-        refused(name, five_bar(), "needs a wanted wall; give stiffness and damping", wanted)
+        check_refusal(name, five_bar(), "needs a wanted wall; give stiffness and damping", wanted)
 
 
 @pytest.mark.parametrize("name", ["felt_stiffness", "free_motion_force", "structural_distortion"])
 def test_a_frequency_has_to_be_told_and_a_handle_to_be_there(name):
-    refused(name, five_bar(), "needs a frequency .* give frequency", WantedWall(100.0, 1.0))
-    refused(name, five_bar(), "above 0 Hz", WantedWall(100.0, 1.0, -1.0))
-    refused(name, five_bar("motor-mass"), "needs a handle, and the model motor-mass has none")
-    refused(name, given(replace(published().plant, handle=None)), "needs a handle, and the device has none")
+    check_refusal(name, five_bar(), "needs a frequency .* give frequency", WantedWall(100.0, 1.0))
+    check_refusal(name, five_bar(), "above 0 Hz", WantedWall(100.0, 1.0, -1.0))
+    check_refusal(name, five_bar("motor-mass"), "needs a handle, and the model motor-mass has none")
+    check_refusal(
+        name, point_of(replace(published().plant, handle=None)), "needs a handle, and the device has none"
+    )
 
 
 def test_only_below_half_the_sampling_frequency_a_wall_is_felt():
-    refused(
+    check_refusal(
         "felt_stiffness", five_bar(), "below half the sampling frequency, 400 Hz", WantedWall(100.0, 1.0, 400.0)
     )

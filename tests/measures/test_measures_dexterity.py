@@ -7,7 +7,7 @@ import pytest
 import sympy
 from numpy.testing import assert_allclose
 
-from tests.device.device_cases import ARM, changed
+from tests.device.device_cases import ARM_FILE, with_changes
 from tests.model.model_cases import random_rotation
 from zwidth.device.load import from_document, load
 from zwidth.measures.dexterity import (
@@ -187,7 +187,7 @@ def test_a_two_link_arm_in_closed_form():
     M = sympy.hessian(energy / 2 + rotor * (rate[0] ** 2 + rate[1] ** 2) / 2, rate)
     numbers = {l1: 0.2, l2: 0.2, c1: 0.1, c2: 0.1, m1: 0.1, m2: 0.1, I1: 4e-4, I2: 4e-4, rotor: 1e-4}
 
-    mechanism = from_document(changed(ARM)).mechanism
+    mechanism = from_document(with_changes(ARM_FILE)).mechanism
     posture = solve_posture(mechanism, [[0.2, 0.2], [0.1, 0.3], [0.3, -0.05]])
     links, rotors = posture.mass_matrix, 1e-4 * np.eye(2)
     for i, angles in enumerate(posture.angles):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.measure import OK
+from zwidth.measures.definition import OK
 
 PAGE = (Path(__file__).parents[2] / "docs" / "measures.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
@@ -19,7 +19,7 @@ POWERS = str.maketrans({"ʳ": "^r", "²": "^2"})
 
 
 @pytest.fixture(scope="module")
-def told() -> list[tuple[str, str, Any]]:
+def documented_values() -> list[tuple[str, str, Any]]:
     """Of each line with a comment that shows a value: its text, what the comment says, what comes out."""
     found: list[tuple[str, str, Any]] = []
     names: dict[str, Any] = {}
@@ -37,9 +37,9 @@ def told() -> list[tuple[str, str, Any]]:
     return found
 
 
-def test_every_number_beside_a_line_is_what_comes_out(told):
+def test_every_number_beside_a_line_is_what_comes_out(documented_values):
     compared = 0
-    for line, said, result in told:
+    for line, said, result in documented_values:
         if not said[:1].isdigit():  # an explanation
             continue
         values = np.concatenate([np.ravel(part) for part in (result if isinstance(result, tuple) else (result,))])
@@ -55,8 +55,8 @@ def digits(number: str) -> int:
     return len(number.replace(".", "").lstrip("0"))
 
 
-def test_what_is_out_of_reach_has_no_number(told):
-    ((_, _, (values, status)),) = [row for row in told if row[0].startswith("force.values")]
+def test_what_is_out_of_reach_has_no_number(documented_values):
+    ((_, _, (values, status)),) = [row for row in documented_values if row[0].startswith("force.values")]
     assert np.isnan(values[2])
     assert status.tolist() == [OK, OK, 1]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.systems import mass, published, random_loop, second_matrix, two_mass
+from tests.systems import mass, published, random_loop, reference_transition_matrix, two_mass
 from zwidth.chart.chart import stability_chart
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
@@ -29,7 +29,7 @@ def random_walls(seed, count):
 def test_every_step_has_the_eigenvalues_and_moves_little():
     for loop, K, B in random_walls(1, 30):
         found = wall_paths(loop, K, B)
-        assert_allclose(found.values[found.asked], B)
+        assert_allclose(found.values[found.requested], B)
         assert np.all(np.diff(found.values) > 0.0)
         L = loop.transition_matrix(K, found.values)
         for z, expected in zip(found.eigenvalues, np.linalg.eigvals(L), strict=True):
@@ -50,7 +50,7 @@ def test_crossings_are_on_the_circle_and_count_the_roots_outside():
         for one in found.crossings:
             assert abs(abs(one.eigenvalue) - 1.0) < 1e-12
             # by a transition matrix that shares nothing with the package
-            other = np.linalg.eigvals(second_matrix(loop, K, one.value))
+            other = np.linalg.eigvals(reference_transition_matrix(loop, K, one.value))
             assert np.min(np.abs(other - one.eigenvalue)) < 1e-6
         crossed += len(found.crossings)
     assert crossed > 50
@@ -82,7 +82,7 @@ def test_a_mass_as_the_number():
     assert found.spectral_radius[0] > 1.0 > found.spectral_radius[-1]
     assert {one.outwards for one in found.crossings} == {False}
     for one in found.crossings:
-        z = np.linalg.eigvals(second_matrix(at(one.value), 5000.0, 25.0))
+        z = np.linalg.eigvals(reference_transition_matrix(at(one.value), 5000.0, 25.0))
         assert np.min(np.abs(z - one.eigenvalue)) < 1e-9
 
 
@@ -112,7 +112,7 @@ def test_steps_are_halved_where_neighbours_could_be_mistaken():
         return L
 
     found = eigenvalue_paths(turning, [0.0, 1.0])
-    assert found.asked.sum() == 2 < len(found.values)
+    assert found.requested.sum() == 2 < len(found.values)
     for z in found.eigenvalues.T:
         assert np.ptp(np.abs(z)) < 1e-12
         assert abs(abs(np.angle(z[-1]) - np.angle(z[0])) - 2.5) < 1e-12

@@ -14,7 +14,7 @@ from tests.systems import (
     mass,
     published,
     random_loop,
-    second_matrix,
+    reference_transition_matrix,
     two_mass,
     velocity_weights,
 )
@@ -23,21 +23,21 @@ from zwidth.device.load import load
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import WindowedDifference
 from zwidth.loop.loop import Loop
-from zwidth.measures.felt import (
+from zwidth.measures.felt_chart import felt_chart
+from zwidth.measures.handle_impedance import (
     HandleError,
     commanded_impedance,
     felt_impedance,
     free_motion_impedance,
     free_motion_mass,
-    hardest_static_stiffness,
     static_stiffness,
+    static_stiffness_limit,
 )
-from zwidth.measures.felt_chart import felt_chart
-from zwidth.model.effective import effective_parameters
+from zwidth.model.effective_parameters import effective_parameters
 from zwidth.model.plant import LaggedDamper, Plant
 
 
-class Filter:
+class SectionFilter:
     """Second-order sections in transposed direct form II, one sample at a time."""
 
     def __init__(self, sections):
@@ -51,7 +51,7 @@ class Filter:
         return v
 
 
-def simulated(loop, K, B, cycles, samples, settle, pieces=32):
+def simulate_impedance(loop, K, B, cycles, samples, settle, pieces=32):
     """Force over velocity at the handle by stepping time: `cycles` of the sine in `samples` samples.
 
     Exact steps of 1/pieces of a sample by the exponential of the plant with its sine and its held force; then the
@@ -82,7 +82,7 @@ def simulated(loop, K, B, cycles, samples, settle, pieces=32):
     state[2 * n] = 1.0
     commands = [0.0] * (late // pieces + 2)
     low_pass, on_force = (
-        Filter(low_pass_sections(f, T)) for f in (controller.velocity_filter, controller.force_filter)
+        SectionFilter(low_pass_sections(f, T)) for f in (controller.velocity_filter, controller.force_filter)
     )
     weights_of = velocity_weights(controller.velocity, T)
     readings = np.zeros(len(weights_of))
@@ -155,10 +155,10 @@ SYSTEMS = {
 def test_a_simulation_feels_the_same(name, cycles, samples):
     plant, controller, K, B = SYSTEMS[name]
     loop = Loop(plant, controller)
-    radius = np.abs(np.linalg.eigvals(second_matrix(loop, K, B))).max()
+    radius = np.abs(np.linalg.eigvals(reference_transition_matrix(loop, K, B))).max()
     settle = int(np.log(1e-9) / np.log(radius))
     assert 0 < settle < 8000
-    frequency, Z = simulated(loop, K, B, cycles, samples, settle)
+    frequency, Z = simulate_impedance(loop, K, B, cycles, samples, settle)
     assert_allclose(felt_impedance(loop, K, B, frequency), Z, rtol=2e-6)
 
 
@@ -182,13 +182,13 @@ def test_at_rest_and_at_slow_motion_the_same_stiffness_is_felt(seed):
 def test_two_masses_are_two_springs_in_series():
     K = np.array([[0.0, 100.0], [15620.0, 1e9]])
     assert_allclose(static_stiffness(two_mass(0.2616, 0.0254, 15620.0), K), K * 15620.0 / (K + 15620.0), rtol=1e-7)
-    assert hardest_static_stiffness(two_mass(0.2616, 0.0254, 15620.0)) == pytest.approx(15620.0, rel=1e-12)
+    assert static_stiffness_limit(two_mass(0.2616, 0.0254, 15620.0)) == pytest.approx(15620.0, rel=1e-12)
 
 
 def test_one_mass_feels_its_wall_and_its_spring():
     assert_allclose(static_stiffness(mass(0.1), [0.0, 700.0]), [0.0, 700.0])
     assert_allclose(static_stiffness(mass(0.1, 0.0, 300.0), [0.0, 700.0]), [300.0, 1000.0])
-    assert hardest_static_stiffness(mass(0.1)) == np.inf
+    assert static_stiffness_limit(mass(0.1)) == np.inf
 
 
 def test_a_mechanism_that_slides_along_its_wall_is_felt_across_it():
@@ -197,7 +197,7 @@ def test_a_mechanism_that_slides_along_its_wall_is_felt_across_it():
     k = float(effective_parameters(device.mechanism, device.at().posture, device.direction()).stiffness)
     for K in (0.0, 500.0, 7800.0):
         assert float(static_stiffness(plant, K)) == pytest.approx(K * k / (K + k), rel=1e-9, abs=1e-9)
-    assert hardest_static_stiffness(plant) == pytest.approx(k, rel=1e-9)
+    assert static_stiffness_limit(plant) == pytest.approx(k, rel=1e-9)
     rigid = float(effective_parameters(device.mechanism, device.at().posture, device.direction()).rigid_mass)
     assert free_motion_mass(plant) == pytest.approx(rigid, rel=1e-9)
 
@@ -210,7 +210,7 @@ def test_actuator_and_sensor_apart_solve_the_same_equations():
         adjugate = np.array([[A[1, 1], -A[0, 1]], [-A[1, 0], A[0, 0]]])
         exact = (A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]) / (plant.handle @ adjugate @ plant.handle)
         assert float(static_stiffness(plant, K)) == pytest.approx(exact, rel=1e-9)
-    assert hardest_static_stiffness(plant) == pytest.approx(float(static_stiffness(plant, 1e12)), rel=1e-6)
+    assert static_stiffness_limit(plant) == pytest.approx(float(static_stiffness(plant, 1e12)), rel=1e-6)
 
 
 def test_free_motion_is_the_device_itself():
@@ -251,7 +251,7 @@ def test_the_felt_chart_is_the_chart_through_the_series_spring():
     chart = stability_chart(published())
     felt = felt_chart(chart)
     series = 15620.0 * chart.stiffness_max / (15620.0 + chart.stiffness_max)
-    assert felt.stiffest == pytest.approx(series, rel=1e-9)
+    assert felt.stiffness_max == pytest.approx(series, rel=1e-9)
     assert felt.limit == pytest.approx(15620.0)
     walls = np.vstack(felt.regions)
     assert walls[:, 0].min() == 0.0
@@ -267,4 +267,4 @@ def test_the_felt_chart_is_the_chart_through_the_series_spring():
 def test_a_device_that_renders_nothing_has_an_empty_felt_chart():
     felt = felt_chart(stability_chart(published(structural=0.0, delay=1.0)))
     assert felt.regions == ()
-    assert np.isnan(felt.stiffest)
+    assert np.isnan(felt.stiffness_max)

@@ -9,11 +9,11 @@ import pytest
 import sympy as sp
 from numpy.testing import assert_allclose
 
-from tests.systems import mass, published, random_loop, second_matrix, two_mass
+from tests.systems import mass, published, random_loop, reference_transition_matrix, two_mass
 from zwidth.chart.verdict import spectral_radius
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
-from zwidth.measures.fidelity import decay_time, fastest_mass, optimal_mass, with_motor_side_mass
+from zwidth.measures.vibration_decay import decay_time, fastest_mass, optimal_mass, with_motor_side_mass
 
 K_E, T = 15620.0, 0.00125
 g, P, D, R, z, W = sp.symbols("g P D R z W", positive=True)
@@ -21,7 +21,9 @@ g, P, D, R, z, W = sp.symbols("g P D R z W", positive=True)
 
 def radius(m, K, B, k=K_E, period=T):
     """Spectral radius of a mass on a spring, from an exponential that shares nothing with the package."""
-    return np.abs(np.linalg.eigvals(second_matrix(Loop(mass(m, stiffness=k), Controller(period)), K, B))).max()
+    return np.abs(
+        np.linalg.eigvals(reference_transition_matrix(Loop(mass(m, stiffness=k), Controller(period)), K, B))
+    ).max()
 
 
 # --- derivation ---
@@ -174,7 +176,7 @@ def test_the_fastest_mass_of_two_masses():
 
     def there(at):
         changed = replace(loop, plant=two_mass(0.2616, at, K_E, 0.00012 * K_E))
-        return np.abs(np.linalg.eigvals(second_matrix(changed, 4000.0, 20.0))).max()
+        return np.abs(np.linalg.eigvals(reference_transition_matrix(changed, 4000.0, 20.0))).max()
 
     scan = [there(at) for at in np.geomspace(0.01, 0.5, 1500)]
     assert least <= min(scan) + 1e-12

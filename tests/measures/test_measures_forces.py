@@ -33,7 +33,7 @@ def random_case(rng, d):
     return J, A @ A.T + 0.1 * np.eye(d), random_direction(rng, J), rng.uniform(0.2, 2.0, d)
 
 
-def most(objective, equal, bounds):
+def largest_by_linear_program(objective, equal, bounds):
     """Largest objective . x with equal @ x = 0 and |x_i| <= bounds_i."""
     found = linprog(-objective, A_eq=equal, b_eq=np.zeros(len(equal)), bounds=[(-b, b) for b in bounds])
     assert found.status == 0
@@ -49,13 +49,17 @@ def test_against_linear_programs(d):
         free = [1e9]
         amount = np.append(np.zeros(d), 1.0)
         statics = np.column_stack([np.eye(d), -J.T @ u])  # t - J^T u f = 0
-        assert_allclose(force_along(J, u, t), most(amount, statics, [*t, *free]), rtol=1e-7)
+        assert_allclose(force_along(J, u, t), largest_by_linear_program(amount, statics, [*t, *free]), rtol=1e-7)
         motion = np.column_stack([J @ np.linalg.inv(M), -u])  # J M^-1 t - u a = 0
-        assert_allclose(acceleration_along(J, M, u, t), most(amount, motion, [*t, *free]), rtol=1e-7)
+        assert_allclose(
+            acceleration_along(J, M, u, t), largest_by_linear_program(amount, motion, [*t, *free]), rtol=1e-7
+        )
         # forces within what the drives control, F = J c: their torques are J^T F
         F = np.column_stack([np.eye(d), -J.T @ J])
         assert_allclose(
-            force_component(J, u, t), most(np.append(np.zeros(d), J.T @ u), F, [*t, *(d * free)]), rtol=1e-7
+            force_component(J, u, t),
+            largest_by_linear_program(np.append(np.zeros(d), J.T @ u), F, [*t, *(d * free)]),
+            rtol=1e-7,
         )
 
 

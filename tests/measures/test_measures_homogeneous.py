@@ -20,7 +20,7 @@ KINDS = {
 }
 
 
-def kind(rng, name):
+def random_jacobian(rng, name):
     """A random Jacobian in metres, and in millimetres."""
     m, n, rotations, prismatic = KINDS[name]
     J = rng.normal(size=(m, n)) * np.exp(rng.normal(size=(m, 1)))
@@ -40,7 +40,7 @@ def condition(H, norm):
 def test_no_other_length_is_better(name, norm):
     rng = np.random.default_rng(8)
     for _ in range(5):
-        J, _, rotations, prismatic = kind(rng, name)
+        J, _, rotations, prismatic = random_jacobian(rng, name)
         L = characteristic_length(J, rotations, prismatic, norm)
         least = condition(homogeneous_jacobian(J, L, rotations, prismatic), norm)
         others = L * np.exp(np.linspace(-8.0, 8.0, 801))
@@ -56,7 +56,7 @@ def test_no_other_length_is_better(name, norm):
 def test_the_unit_of_length_changes_nothing(name, norm):
     rng = np.random.default_rng(9)
     for _ in range(20):
-        J, millimetres, rotations, prismatic = kind(rng, name)
+        J, millimetres, rotations, prismatic = random_jacobian(rng, name)
         L = characteristic_length(J, rotations, prismatic, norm)
         longer = characteristic_length(millimetres, rotations, prismatic, norm)
         H = homogeneous_jacobian(J, L, rotations, prismatic)

@@ -10,8 +10,8 @@ from zwidth.device.load import load
 from zwidth.loop.loop import Loop
 from zwidth.measures.bindings import impedance
 from zwidth.measures.catalogue import MEASURES, find_measure
+from zwidth.measures.definition import NO_VALUE, OK, OUT_OF_REACH
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.measure import NO_VALUE, OK, OUT_OF_REACH
 
 AT = np.array([[[0.0, 0.25, 0.0], [0.08, 0.2, 0.0]], [[-0.12, 0.22, 0.0], [0.9, 0.9, 0.0]]])
 SETTINGS = (

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from tests.systems import mass, two_mass
 from zwidth.chart.chart import stability_chart
-from zwidth.conditions import thesis_delay, thesis_delays, thesis_rigid
+from zwidth.conditions import thesis_rigid, thesis_unit_delay, thesis_whole_delay
 from zwidth.loop.controller import Controller, FirstOrder
 from zwidth.loop.estimators import WindowedDifference
 from zwidth.loop.loop import Loop
@@ -18,7 +18,7 @@ from zwidth.measures.impedance_range import rigid_range, sprung_range
 EXACT = 1e-9
 # A smooth maximum holds its place only to the root of the rounding; the chart's area lies between corners that are
 # known to 1e-7.
-PLACE, AREA = 1e-7, 1e-7
+DAMPING_TOLERANCE, AREA = 1e-7, 1e-7
 
 
 def devices(seed, count):
@@ -31,7 +31,7 @@ def devices(seed, count):
 def assert_the_chart_says_so(found, loop):
     chart = stability_chart(loop, decay=False)
     assert_allclose(found.stiffness_max, chart.stiffness_max, rtol=EXACT)
-    assert_allclose(found.damping_at_stiffness_max, chart.damping_at_stiffness_max, rtol=PLACE)
+    assert_allclose(found.damping_at_stiffness_max, chart.damping_at_stiffness_max, rtol=DAMPING_TOLERANCE)
     assert_allclose(found.damping_max, chart.damping_max, rtol=EXACT)
     assert_allclose(found.stable_area, chart.stable_area, rtol=AREA)
 
@@ -125,8 +125,8 @@ def test_the_area_by_computer_algebra(late):
     d = 2 * ((1 - c) / (1 + c) * sp.chebyshevt(late, c) + (1 - c) * (sp.chebyshevu(late - 1, c) if late else 0))
     whole = sp.integrate(sp.apart(sp.together(p * sp.diff(d, c)), c), c)
     area = whole.subs(c, sp.cos(sp.pi / (2 * late + 2))) - whole.subs(c, 1)
-    assert_allclose(thesis_delays.stable_area(1.0, 1.0, late), float(sp.N(area, 30)), rtol=1e-14)
-    by_hand = {0: thesis_rigid.stable_area, 1: thesis_delay.stable_area}
+    assert_allclose(thesis_whole_delay.stable_area(1.0, 1.0, late), float(sp.N(area, 30)), rtol=1e-14)
+    by_hand = {0: thesis_rigid.stable_area, 1: thesis_unit_delay.stable_area}
     if late in by_hand:
         assert_allclose(by_hand[late](0.3, 0.002), float(sp.N(area, 30)) * 0.3**2 / 0.002**3, rtol=1e-11)
 

@@ -8,19 +8,29 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.device.device_cases import ARM, PLANT, changed
-from tests.measures.dexterity_cases import SHIFT, TURN, moved, permuted, place_at, scaled, with_data
+from tests.device.device_cases import ARM_FILE, PLANT_FILE, with_changes
+from tests.measures.dexterity_cases import (
+    SHIFT,
+    TURN,
+    on_moved_base,
+    operating_points,
+    permuted,
+    scaled,
+    with_drive_data,
+)
 from tests.model.model_cases import KINDS, five_bar, some_postures
 from zwidth.device.load import from_document, load
 from zwidth.measures import dexterity
 from zwidth.measures.catalogue import MEASURES, find_measure
+from zwidth.measures.definition import NO_VALUE, OK, OUT_OF_REACH, MeasureError
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.measure import NO_VALUE, OK, OUT_OF_REACH, MeasureError
 from zwidth.model.damping import GivenDamping
-from zwidth.model.directions import reduce_directions
-from zwidth.model.effective import effective_parameters
+from zwidth.model.effective_parameters import effective_parameters
+from zwidth.model.multi_plant import reduce_directions
 
-MINE = [name for name, m in MEASURES.items() if str(m.function).split(":")[0].endswith(("dexterity", "forces"))]
+TESTED_MEASURES = [
+    name for name, m in MEASURES.items() if str(m.function).split(":")[0].endswith(("dexterity", "forces"))
+]
 # Exponents of lengths and masses in each measure, r being the number of drives; all others have none of either.
 UNITS = {
     "manipulability": (1, 0, True),
@@ -41,7 +51,7 @@ NAMES = ["five-bar", "spatial arm", "spatial loop"]
 def case(name, seed=2):
     """A mechanism with all data, four positions and a direction for each that its handle can move along."""
     rng = np.random.default_rng(seed)
-    mechanism = with_data(KINDS[name](rng), rng)
+    mechanism = with_drive_data(KINDS[name](rng), rng)
     posture = some_postures(mechanism, rng)
     d = posture.jacobian.shape[-1]
     u = np.einsum("kij,kj->ki", posture.jacobian, rng.uniform(0.2, 1.0, (4, d)) * rng.choice([-1.0, 1.0], (4, d)))
@@ -55,32 +65,32 @@ def values(name, place):
 
 
 @pytest.mark.parametrize("kind", NAMES)
-@pytest.mark.parametrize("name", MINE)
+@pytest.mark.parametrize("name", TESTED_MEASURES)
 def test_the_base_frame_and_the_order_of_the_drives_change_nothing(name, kind):
     mechanism, positions, u = case(kind)
-    here = values(name, place_at(mechanism, positions, u))
-    there = place_at(moved(mechanism), SHIFT + positions @ TURN.T, u @ TURN.T)
+    here = values(name, operating_points(mechanism, positions, u))
+    there = operating_points(on_moved_base(mechanism), SHIFT + positions @ TURN.T, u @ TURN.T)
     assert_allclose(values(name, there), here, rtol=1e-7)
     order = np.roll(np.arange(len(mechanism.drives.names)), 1)
-    other = place_at(permuted(mechanism, order), positions, u)
-    assert not np.allclose(other.jacobian, place_at(mechanism, positions, u).jacobian)
+    other = operating_points(permuted(mechanism, order), positions, u)
+    assert not np.allclose(other.jacobian, operating_points(mechanism, positions, u).jacobian)
     assert_allclose(values(name, other), here, rtol=1e-7)
 
 
 @pytest.mark.parametrize("kind", NAMES)
-@pytest.mark.parametrize("name", MINE)
+@pytest.mark.parametrize("name", TESTED_MEASURES)
 def test_units_and_scale(name, kind):
     """In millimetres and grams, and as a device of other size: times the powers that the measure's unit has."""
     mechanism, positions, u = case(kind)
-    here = values(name, place_at(mechanism, positions, u))
+    here = values(name, operating_points(mechanism, positions, u))
     lengths, masses, per_freedom = UNITS.get(name, (0, 0, False))
     r = len(mechanism.drives.names) if per_freedom else 1
     for length, mass in ((1000.0, 1000.0), (1.7, 1.0), (1.0, 3.0)):
-        there = values(name, place_at(scaled(mechanism, length, mass), length * positions, u))
+        there = values(name, operating_points(scaled(mechanism, length, mass), length * positions, u))
         assert_allclose(there, here * (length**lengths * mass**masses) ** r, rtol=1e-7)
 
 
-@pytest.mark.parametrize("name", MINE)
+@pytest.mark.parametrize("name", TESTED_MEASURES)
 def test_units_of_the_catalogue_have_those_powers(name):
     """Metres and kilograms in the unit, seconds and radians aside."""
     lengths, masses, per_freedom = UNITS.get(name, (0, 0, False))
@@ -101,7 +111,7 @@ def test_units_of_the_catalogue_have_those_powers(name):
 def test_only_the_mass_at_the_handle_knows_no_coordinates():
     """Absolute angles of a serial arm in place of those between its links: p = S a with whole numbers."""
     S = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])
-    place = place_at(*case("spatial arm"))
+    place = operating_points(*case("spatial arm"))
     J, M = place.jacobian, place.whole_mass_matrix
     other_J, other_M = J @ S, S.T @ M @ S
     assert_allclose(dexterity.handle_mass_isotropy(other_J, other_M), dexterity.handle_mass_isotropy(J, M))
@@ -114,7 +124,7 @@ def test_only_the_mass_at_the_handle_knows_no_coordinates():
 def test_the_masses_felt_at_the_handle_lie_within_what_its_isotropy_says(kind):
     """Effective masses over all directions, by another way through the mechanism; the mass matrix of (2.16)."""
     mechanism, positions, u = case(kind)
-    place = place_at(mechanism, positions, u)
+    place = operating_points(mechanism, positions, u)
     said = values("handle_mass_isotropy", place)
     rng = np.random.default_rng(0)
     for k in range(4):
@@ -132,18 +142,18 @@ def test_the_masses_felt_at_the_handle_lie_within_what_its_isotropy_says(kind):
 def test_without_rotors_and_links_alone():
     mechanism, positions, u = case("five-bar")
     still = replace(mechanism, drives=replace(mechanism.drives, motor_inertia=np.zeros(2)))
-    place = place_at(still, positions, u)
+    place = operating_points(still, positions, u)
     assert_allclose(values("dynamic_isotropy", place), np.linalg.cond(place.mass_matrix))
     assert_allclose(values("rigid_mass", place), values("link_side_mass", place))
 
 
 def test_where_there_is_no_posture_there_is_no_value():
     rng = np.random.default_rng(4)
-    mechanism = with_data(five_bar(), rng)
+    mechanism = with_drive_data(five_bar(), rng)
     x, y = np.meshgrid(np.linspace(-0.3, 0.3, 7), np.linspace(0.05, 0.35, 4))
-    place = place_at(mechanism, np.stack([x, y, np.zeros_like(x)], axis=-1), [0.3, 1.0, 0.0])
+    place = operating_points(mechanism, np.stack([x, y, np.zeros_like(x)], axis=-1), [0.3, 1.0, 0.0])
     assert (place.status == OUT_OF_REACH).any()
-    for name in MINE:
+    for name in TESTED_MEASURES:
         found = evaluate(find_measure(name), place)
         assert found.values.shape == (4, 7)
         assert np.array_equal(np.isnan(found.values), found.status != OK)
@@ -154,7 +164,7 @@ def test_where_there_is_no_posture_there_is_no_value():
 
 def test_across_the_plane_friction_has_no_value_and_the_handle_no_acceleration():
     rng = np.random.default_rng(4)
-    place = place_at(with_data(five_bar(), rng), [[0.0, 0.25, 0.0]], [0.0, 0.0, 1.0])
+    place = operating_points(with_drive_data(five_bar(), rng), [[0.0, 0.25, 0.0]], [0.0, 0.0, 1.0])
     assert evaluate(find_measure("friction_force"), place).status.tolist() == [NO_VALUE]
     assert values("acceleration_max", place) == [0.0]
     assert values("peak_force", place) == [np.inf]
@@ -162,17 +172,17 @@ def test_across_the_plane_friction_has_no_value_and_the_handle_no_acceleration()
 
 def test_a_batch_of_designs_is_its_designs_side_by_side():
     rng = np.random.default_rng(6)
-    one = with_data(five_bar(), rng)
+    one = with_drive_data(five_bar(), rng)
     drives = one.drives
     n = drives.transmission * np.array([[0.5], [1.0], [2.0]])
     many = replace(
         one, drives=replace(drives, transmission=n, torque_limit=drives.torque_limit + np.zeros((3, 1)))
     )
-    batch = place_at(many, [0.05, 0.22, 0.0], [1.0, 1.0, 0.0])
-    for name in MINE:
+    batch = operating_points(many, [0.05, 0.22, 0.0], [1.0, 1.0, 0.0])
+    for name in TESTED_MEASURES:
         each = [
             find_measure(name).compute(
-                place_at(
+                operating_points(
                     replace(one, drives=replace(drives, transmission=row)), [0.05, 0.22, 0.0], [1.0, 1.0, 0.0]
                 )
             )
@@ -194,8 +204,8 @@ FULL = {
 def arm(**keys):
     """The two-link arm of the device tests, elbow at a right angle, with more keys in both drives."""
     return from_document(
-        changed(
-            ARM.replace("upper = 0.5, lower = 1.0", "upper = 0.0, lower = 1.57"),
+        with_changes(
+            ARM_FILE.replace("upper = 0.5, lower = 1.0", "upper = 0.0, lower = 1.57"),
             **{f"mechanism__drives__{i}__{key}": value for i in (0, 1) for key, value in keys.items()},
         )
     )
@@ -241,7 +251,9 @@ def test_what_the_file_does_not_tell_is_asked_for_by_its_key(name, key):
     measure = find_measure(name)
     with pytest.raises(MeasureError, match=rf"^needs .*give mechanism\.drives\.shoulder\.{key}"):
         evaluate(measure, arm().at())
-    half = from_document(changed(ARM, **{f"mechanism__drives__0__{key}": 0.01 if "Nm" in key else 100.0}))
+    half = from_document(
+        with_changes(ARM_FILE, **{f"mechanism__drives__0__{key}": 0.01 if "Nm" in key else 100.0})
+    )
     if name == "friction_force":  # a drive without the key has none
         assert values(name, half.at()) > 0.0
     else:
@@ -255,12 +267,12 @@ def test_a_limit_of_inf_is_none():
 
 
 def test_a_plant_has_no_drives_and_reads_and_rubs_where_the_wall_acts():
-    given = from_document(changed(PLANT)).at()
-    for name in set(MINE) - {"link_side_mass", "motor_side_mass", "rigid_mass", "stiffness"}:
+    given = from_document(with_changes(PLANT_FILE)).at()
+    for name in set(TESTED_MEASURES) - {"link_side_mass", "motor_side_mass", "rigid_mass", "stiffness"}:
         with pytest.raises(MeasureError):
             evaluate(find_measure(name), given)
     told = {"friction__coulomb_N": [0.0, 0.1], "loop__encoder": {"resolution_m": 2e-5}}
-    place = from_document(changed(PLANT, **told)).at()
+    place = from_document(with_changes(PLANT_FILE, **told)).at()
     assert_allclose(values("position_resolution", place), 2e-5)
     assert_allclose(values("friction_force", place), 0.1)
     assert_allclose(values("rigid_mass", place), 0.32)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from zwidth.measures.definition import FAILED, MISSING, NO_VALUE, OK, OUT_OF_REACH, SINGULAR, UNDECIDED
 from zwidth.measures.dexterity import isotropy
-from zwidth.measures.measure import FAILED, MISSING, NO_VALUE, OK, OUT_OF_REACH, SINGULAR, UNDECIDED
 from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
 
 NAN = float("nan")
@@ -56,7 +56,7 @@ def test_only_ok_counts(status):
     assert_allclose(global_isotropy_index(J, states), 0.5)
 
 
-def test_where_nothing_counts():
+def test_without_any_value_the_numbers_are_nan():
     found = overall([NAN, NAN], better="higher")
     assert np.isnan([found.average, found.worst, found.best, found.uniformity, found.variation]).all()
     assert (found.share, found.reached, found.count) == (0.0, 1.0, 0)

@@ -11,10 +11,10 @@ import pytest
 
 from zwidth.device.load import load
 from zwidth.measures.catalogue import find_measure
-from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure
+from zwidth.measures.definition import FAILED, NO_VALUE, OK, Measure
 from zwidth.measures.user_measures import load_measures, measure
-from zwidth.study.plane import plane_of
-from zwidth.study.workspace import map_job, workspace_map
+from zwidth.study.map import map_job, workspace_map
+from zwidth.study.plane_grid import plane_of
 
 GOOD = '''
 from zwidth import measure
@@ -61,7 +61,7 @@ def test_they_are_mapped_like_others(write):
     own = load_measures(write(GOOD))
     device = load("five-bar")
     plane = plane_of(device, cells=(9, 5))
-    found = workspace_map(device, ["inertial_force", "height", "rigid_mass"], plane, own=own)
+    found = workspace_map(device, ["inertial_force", "height", "rigid_mass"], plane, user_measures=own)
     np.testing.assert_allclose(found["inertial_force"], 10.0 * found["rigid_mass"])
     reach = found["rigid_mass_status"].values == OK
     np.testing.assert_array_equal(found["height"].values[reach], plane.positions[..., 1][reach])
@@ -70,7 +70,7 @@ def test_they_are_mapped_like_others(write):
 def test_they_are_asked_in_other_processes_too(write, tmp_path):
     own = load_measures(write(GOOD))
     device = load("five-bar")
-    job = map_job(device, ["inertial_force"], plane_of(device, cells=(4, 3)), own=own)
+    job = map_job(device, ["inertial_force"], plane_of(device, cells=(4, 3)), user_measures=own)
     data = pickle.dumps(job)
     assert b"__main__" not in data  # which would stand for a function that only this process has
     (tmp_path / "job").write_bytes(data)
@@ -89,7 +89,7 @@ def test_another_text_is_another_question(write):
     device = load("five-bar")
     plane = plane_of(device, cells=(4, 3))
     questions = {
-        map_job(device, ["inertial_force"], plane, own=load_measures(write(text))).question
+        map_job(device, ["inertial_force"], plane, user_measures=load_measures(write(text))).question
         for text in (GOOD, GOOD.replace("10.0", "20.0"), GOOD)
     }
     assert len(questions) == 2
@@ -136,7 +136,7 @@ def test_what_fails_fails_in_its_own_cells(write):
     device = load("five-bar")
     own = load_measures(write(BROKEN))
     plane = plane_of(device, x=(-0.15, 0.05), y=(0.12, 0.32), cells=(5, 11))
-    found = workspace_map(device, [*own, "rigid_mass"], plane, own=own)
+    found = workspace_map(device, [*own, "rigid_mass"], plane, user_measures=own)
     x, y = plane.positions[..., 0], plane.positions[..., 1]
     reach = found["rigid_mass_status"].values == OK
     expected = np.where((x < 0.0) | (y < 0.27), FAILED, np.where(y < 0.29, NO_VALUE, OK))
@@ -216,7 +216,7 @@ def test_the_nearest_name_may_be_a_user_s_own(write):
 def test_what_it_prints_does_not_stand_in_the_answer(write, capsys):
     own = load_measures(write("print('loading')\n" + GOOD.replace("return ACC", "print('asked'); return ACC")))
     device = load("five-bar")
-    workspace_map(device, ["inertial_force"], plane_of(device, cells=(3, 2)), own=own, workers=1)
+    workspace_map(device, ["inertial_force"], plane_of(device, cells=(3, 2)), user_measures=own, workers=1)
     said = capsys.readouterr()
     assert (said.out, set(said.err.split())) == ("", {"loading", "asked"})
 

@@ -17,7 +17,7 @@ from zwidth.model.reduction import ModelError, reduce_mechanism, reduce_plant
 MODELS = ("two-mass", "motor-mass", "rigid")
 
 
-def shorted(kind, seed, stiffness=(0.1, 5.0), lag=2e-3):
+def with_winding_damping(kind, seed, stiffness=(0.1, 5.0), lag=2e-3):
     """A mechanism with windings that brake, one of its postures, and a direction its handle can move in."""
     rng = np.random.default_rng(seed)
     mechanism = KINDS[kind](rng)
@@ -50,7 +50,7 @@ def compliance(plant, s):
 @pytest.mark.parametrize("model", MODELS)
 def test_a_full_plant_reduces_as_its_mechanism_does(kind, encoders, model):
     """Two routes: from drives and posture, and from the full plant's matrices."""
-    mechanism, posture, u = shorted(kind, 3)
+    mechanism, posture, u = with_winding_damping(kind, 3)
     full = reduce_mechanism(mechanism, posture, u, "full", GivenDamping(), encoders)
     if model == "motor-mass" and encoders == "link":
         with pytest.raises(ModelError, match="the sensor reads nothing"):
@@ -91,7 +91,7 @@ def test_the_two_mass_model_of_one_drive_is_exact():
 def test_stiff_drives_brake_as_the_full_model_says(kind, model):
     """To first order in the drag, slow motions of stiff drives lose what the rigid motion does:
     f/y = m s^2 + s r^T C r/(1 + tau s)."""
-    mechanism, posture, u = shorted(kind, 4, stiffness=(1e4, 2e4))
+    mechanism, posture, u = with_winding_damping(kind, 4, stiffness=(1e4, 2e4))
     drives = replace(mechanism.drives, winding_damping=1e-6 * mechanism.drives.winding_damping)
     mechanism = replace(mechanism, drives=drives)
     s, drag = 2j * np.pi, []
@@ -105,7 +105,8 @@ def test_stiff_drives_brake_as_the_full_model_says(kind, model):
 def test_a_lag_of_nothing_is_damping():
     """Its limit, too: a short lag gives what the damping matrix gives."""
     short, none = (
-        reduce_mechanism(*shorted("five-bar", 5, lag=lag), "two-mass", ModalDamping(0.05)) for lag in (1e-9, 0.0)
+        reduce_mechanism(*with_winding_damping("five-bar", 5, lag=lag), "two-mass", ModalDamping(0.05))
+        for lag in (1e-9, 0.0)
     )
     assert none.lagged_dampers == ()
     assert len(short.lagged_dampers) == 2

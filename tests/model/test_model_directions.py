@@ -8,8 +8,8 @@ from model_cases import KINDS, X, Y, five_bar, some_postures
 from scipy.linalg import block_diag
 
 from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
-from zwidth.model.directions import decompose, reduce_directions
-from zwidth.model.effective import effective_parameters
+from zwidth.model.effective_parameters import effective_parameters
+from zwidth.model.multi_plant import decompose, reduce_directions
 from zwidth.model.posture import solve_posture
 from zwidth.model.reduction import DirectionError, ModelError, reduce_mechanism
 
@@ -17,7 +17,7 @@ MODELS = ("full", "two-mass", "motor-mass", "rigid")
 DAMPINGS = (ModalDamping(0.05), ProportionalDamping(0.7, 1e-4), GivenDamping())
 
 
-def driven(kind, seed):
+def random_drives(kind, seed):
     """A mechanism with random drives, and one of its postures."""
     rng = np.random.default_rng(seed)
     mechanism = KINDS[kind](rng)
@@ -33,7 +33,7 @@ def driven(kind, seed):
     return mechanism, solve_posture(mechanism, some_postures(mechanism, rng, 1).position[0])
 
 
-def movable(posture, count, seed):
+def random_directions(posture, count, seed):
     """Independent unit directions in which the handle can move, (count, 3)."""
     found = np.random.default_rng(seed).normal(size=(count, posture.jacobian.shape[1])) @ posture.jacobian.T
     return found / np.linalg.norm(found, axis=1, keepdims=True)
@@ -76,8 +76,8 @@ def test_rendered_mass_is_what_is_felt():
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_one_direction_is_the_single_plant(kind, model, damping):
-    mechanism, posture = driven(kind, 1)
-    u = movable(posture, 1, 2)
+    mechanism, posture = random_drives(kind, 1)
+    u = random_directions(posture, 1, 2)
     several = reduce_directions(mechanism, posture, u, model, damping)
     single = reduce_mechanism(mechanism, posture, u[0], model, damping)
     assert several.count == 1

@@ -24,7 +24,7 @@ from zwidth.model.reduction import ModelError, _motions, reduce_mechanism, reduc
 MODELS = ("full", "two-mass", "motor-mass", "rigid")
 
 
-def random_parts(rng, d, model="lugre"):
+def random_drive_nonlinearity(rng, d, model="lugre"):
     return DriveNonlinearity(
         coulomb=rng.uniform(1e-4, 1e-2, d),
         friction_model=model,
@@ -50,12 +50,12 @@ def random_mechanism(rng, kind):
             transmission=rng.uniform(1.0, 30.0, d),
             torque_limit=rng.uniform(0.05, 1.0, d),
             encoder_counts=rng.uniform(100, 5000, d).round(),
-            nonlinearity=random_parts(rng, d),
+            nonlinearity=random_drive_nonlinearity(rng, d),
         ),
     )
 
 
-def asked(rng, kind):
+def random_case(rng, kind):
     """A mechanism, its reference posture and a direction that the handle can move in."""
     mechanism = random_mechanism(rng, kind)
     posture = solve_posture(mechanism, mechanism.reference_position)
@@ -67,7 +67,7 @@ def asked(rng, kind):
 @pytest.mark.parametrize("seed", range(4))
 def test_the_handle_is_read_by_the_kinematics_of_counted_angles(kind, seed):
     rng = np.random.default_rng(seed)
-    mechanism, posture, u = asked(rng, kind)
+    mechanism, posture, u = random_case(rng, kind)
     drives = mechanism.drives
     plant = reduce_mechanism(mechanism, posture, u, "full", ModalDamping(0.05))
     d = len(drives.names)
@@ -90,7 +90,7 @@ def test_the_handle_is_read_by_the_kinematics_of_counted_angles(kind, seed):
 )
 def test_in_every_model_the_counters_add_up_to_the_sensor(kind, model, encoders):
     for seed in range(5):
-        mechanism, posture, u = asked(np.random.default_rng(seed), kind)
+        mechanism, posture, u = random_case(np.random.default_rng(seed), kind)
         plant = reduce_mechanism(mechanism, posture, u, model, ModalDamping(0.05), encoders)
         told = sum(c.weight * c.along for c in plant.nonlinear.counters)
         assert told == pytest.approx(plant.sensor, abs=1e-9 * np.max(np.abs(plant.sensor)))
@@ -101,7 +101,7 @@ def test_in_every_model_the_counters_add_up_to_the_sensor(kind, model, encoders)
 def test_friction_and_brakes_take_the_power_that_they_take_at_the_motor_shafts(kind):
     for seed in range(5):
         rng = np.random.default_rng(seed)
-        mechanism, posture, u = asked(rng, kind)
+        mechanism, posture, u = random_case(rng, kind)
         drives, parts = mechanism.drives, mechanism.drives.nonlinearity
         full = reduce_mechanism(mechanism, posture, u, "full", ModalDamping(0.05))
         d = len(drives.names)
@@ -126,7 +126,7 @@ def test_the_drives_springs_store_the_energy_that_the_shafts_torque_puts_in(kind
     """Of k d + k_3 d^3 forward, and k_b d + k_3 d^3 backward, d at the motor shaft."""
     for seed in range(5):
         rng = np.random.default_rng(seed)
-        mechanism, posture, u = asked(rng, kind)
+        mechanism, posture, u = random_case(rng, kind)
         drives, parts = mechanism.drives, mechanism.drives.nonlinearity
         full = reduce_mechanism(mechanism, posture, u, "full", ModalDamping(0.05))
         d = len(drives.names)
@@ -147,7 +147,7 @@ def test_the_drives_springs_store_the_energy_that_the_shafts_torque_puts_in(kind
 def test_a_simpler_model_rubs_as_the_full_one_does_in_its_motions(kind, model):
     """The full plant moved as the reduced coordinates say: the same power in friction and brakes."""
     rng = np.random.default_rng(3)
-    mechanism, posture, u = asked(rng, kind)
+    mechanism, posture, u = random_case(rng, kind)
     full = reduce_mechanism(mechanism, posture, u, "full", ModalDamping(0.05))
     reduced = reduce_mechanism(mechanism, posture, u, model, ModalDamping(0.05))
     velocity = rng.normal(size=reduced.size)
@@ -166,7 +166,7 @@ def test_a_simpler_model_rubs_as_the_full_one_does_in_its_motions(kind, model):
 def test_the_largest_force_takes_one_motor_to_its_limit_and_no_other_beyond():
     for kind in KINDS:
         for seed in range(5):
-            mechanism, posture, u = asked(np.random.default_rng(seed), kind)
+            mechanism, posture, u = random_case(np.random.default_rng(seed), kind)
             limit = reduce_mechanism(mechanism, posture, u, "full", ModalDamping(0.05)).nonlinear.force_limit
             share = limit * np.abs(posture.jacobian.T @ u) / mechanism.drives.transmission
             assert np.max(share / mechanism.drives.torque_limit) == pytest.approx(1.0, rel=1e-12)
@@ -175,7 +175,7 @@ def test_the_largest_force_takes_one_motor_to_its_limit_and_no_other_beyond():
 def test_a_rigid_drive_rubs_and_counts_at_its_joint_and_has_no_spring():
     rng = np.random.default_rng(0)
     mechanism = five_bar(stiffness=(np.inf, 0.75))
-    drives = replace(mechanism.drives, nonlinearity=random_parts(rng, 2))
+    drives = replace(mechanism.drives, nonlinearity=random_drive_nonlinearity(rng, 2))
     mechanism = replace(mechanism, drives=drives)
     plant = reduce_mechanism(
         mechanism, solve_posture(mechanism, [0.05, 0.25, 0.0]), [0, 1, 0], "full", ModalDamping(0.05)
@@ -219,7 +219,7 @@ def test_an_operator_adds_a_coordinate_that_neither_rubs_nor_counts():
     held = attach(plant, Operator(0.8, 580.0, 5.5, 1e4, 5.0))
     assert held.nonlinear.friction[0].along.tolist() == [0.0, 1.0, 0.0]
     assert held.nonlinear.brakes[0].along.tolist() == [0.0, 1.0, 0.0]
-    assert held.nonlinear.left_out == ("dry friction", "programmable brakes")
+    assert held.nonlinear.kinds == ("dry friction", "programmable brakes")
 
 
 def test_bristles_are_those_of_one_law():
@@ -236,6 +236,6 @@ def test_a_loops_force_limit_is_the_smaller_of_the_actuators_and_the_computers()
     one = np.ones(1)
     for actuator, computer in ((3.0, 5.0), (5.0, 3.0), (3.0, np.inf)):
         plant = Plant(one[:, None], *np.zeros((2, 1, 1)), one, one, nonlinear=Nonlinear(force_limit=actuator))
-        loop = Loop(plant, Controller(0.001, saturation=computer))
+        loop = Loop(plant, Controller(0.001, force_limit=computer))
         assert loop.nonlinear.force_limit == 3.0
     assert not Loop(replace(plant, nonlinear=Nonlinear()), Controller(0.001)).nonlinear

@@ -9,7 +9,7 @@ from model_cases import KINDS, Y, five_bar, some_postures
 from scipy.linalg import eigh, null_space
 
 from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
-from zwidth.model.effective import effective_parameters
+from zwidth.model.effective_parameters import effective_parameters
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.plant import Plant
 from zwidth.model.posture import solve_posture

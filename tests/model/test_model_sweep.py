@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests import systems
-from tests.measured_cases import chirp, moved, sampled_response
+from tests.measured_cases import chirp, encoder_readings, sampled_response
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.measured.chart import measured_chart
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.response import ResponseError
-from zwidth.model.sweep import sweep_response
+from zwidth.model.sweep_response import sweep_response
 
 T = 0.001
 DEVICE = systems.two_mass(0.26, 0.025, 15000.0, 8.0)
@@ -23,7 +23,7 @@ GROUNDED = systems.mass(0.1, 4.0, 2000.0)
 def test_a_sweep_gives_back_the_response(plant, integrators):
     loop = Loop(plant, Controller(T, delay=1.0))
     force = np.random.default_rng(1).normal(size=120_000)
-    found = sweep_response(force, moved(loop, force), T, integrators, segment=4096)
+    found = sweep_response(force, encoder_readings(loop, force), T, integrators, segment=4096)
     exact = sampled_response(loop, found.frequency)
     apart = np.abs(found.value / exact - 1.0)
     assert np.quantile(apart, 0.9) < 0.01
@@ -38,7 +38,7 @@ def test_a_chirp_through_an_encoder_gives_the_chart_within_its_band(seed):
     controller = Controller(T, 1.0, Butterworth(2, 80.0))
     loop = Loop(DEVICE, controller)
     force = chirp(32_000, T, 1.0, 500.0) + 0.3 * np.random.default_rng(seed).normal(size=32_000)
-    position = moved(loop, force, resolution=1e-6, noise=5e-7, seed=seed)
+    position = encoder_readings(loop, force, resolution=1e-6, noise=5e-7, seed=seed)
     response = sweep_response(force, position, T, 2, segment=2048)
     exact = stability_chart(loop, decay=False)
     chart = measured_chart(response, Controller(T, velocity_filter=controller.velocity_filter))
@@ -49,7 +49,7 @@ def test_a_chirp_through_an_encoder_gives_the_chart_within_its_band(seed):
 def test_the_coherence_tells_noise_and_what_was_not_excited():
     loop = Loop(GROUNDED, Controller(T))
     force = chirp(60_000, T, 1.0, 120.0)
-    found = sweep_response(force, moved(loop, force, noise=2e-5), T, 0, segment=2048)
+    found = sweep_response(force, encoder_readings(loop, force, noise=2e-5), T, 0, segment=2048)
     below, above = found.frequency < 100.0, found.frequency > 250.0
     assert np.median(found.coherence[below]) > 0.9
     assert np.max(found.coherence[above]) < 0.5

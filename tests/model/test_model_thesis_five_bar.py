@@ -5,12 +5,12 @@ Here each centre of mass lies beside its link's axis and the central inertia is 
 
 import numpy as np
 import pytest
-from later import Later
+from lazy_module import LazyModule
 from model_cases import random_five_bar, two_bar_angles
 
 from zwidth.model.posture import OK, inertia_terms, solve_posture
 
-appendix_b = Later("gallery.appendix_b")
+appendix_b = LazyModule("gallery.appendix_b")
 
 RELATIVE = 1e-9
 SIDES = {"outward": (1, -1), "inward": (-1, 1), "right": (1, 1), "left": (-1, -1)}

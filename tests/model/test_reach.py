@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from model_cases import KINDS, five_bar
 
-from zwidth.model import batch
-from zwidth.model.arrays import pack
+from zwidth.model import posture_batch
+from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture import OK, OUT_OF_REACH, solve_posture
-from zwidth.model.reach import beyond, shells
+from zwidth.model.reach_shells import outside_shells, shells
 from zwidth.model.roadmap import roadmap
 
 
@@ -20,7 +20,7 @@ def test_no_position_that_the_handle_takes_is_beyond(kind):
     reference = solve_posture(mechanism, mechanism.reference_position)
     road = roadmap(pack(mechanism), 0, reference.angles)
     assert len(road.position) > 10
-    assert not beyond(pack(mechanism), 0, road.position).any()
+    assert not outside_shells(pack(mechanism), 0, road.position).any()
 
 
 def test_a_five_bar_has_a_shell_for_each_of_its_arms():
@@ -36,7 +36,8 @@ def test_the_short_cut_changes_no_answer(monkeypatch):
     mechanism = five_bar()
     grid = np.stack(np.meshgrid(np.linspace(-0.4, 0.4, 33), np.linspace(-0.4, 0.4, 31)), axis=-1)
     quick = solve_posture(mechanism, grid)
-    monkeypatch.setattr(batch, "beyond", lambda mech, design, goals: np.zeros(len(goals), dtype=bool))
+    nothing_outside = lambda mech, design, goals: np.zeros(len(goals), dtype=bool)  # noqa: E731
+    monkeypatch.setattr(posture_batch, "outside_shells", nothing_outside)
     full = solve_posture(mechanism, grid)
     assert (quick.status == full.status).all()
     assert {OK, OUT_OF_REACH} <= set(np.unique(quick.status).tolist())

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from later import Later
+from lazy_module import LazyModule
 from matplotlib import pyplot
 
 import zwidth
-from gallery.brute_force import Judge
-from gallery.five_bar import bundled, judge
+from gallery.brute_force import BruteForceLoop
+from gallery.five_bar import brute_force_loop, bundled
 
-make_examples = Later("docs.make_examples")
+make_examples = LazyModule("docs.make_examples")
 FILES = sorted((Path(__file__).parents[2] / "gallery").glob("first_*.py"))
 DRAWING = [file for file in FILES if "def figure" in file.read_text(encoding="utf-8")]
 CODE_LINES = 25  # of a script without its docstring and blank lines
@@ -25,12 +25,14 @@ def names_of(number: int) -> dict:
     return make_examples.run(FILES[number - 1]).names
 
 
-def judge_of(point: zwidth.OperatingPoint) -> Judge:
+def judge_of(point: zwidth.OperatingPoint) -> BruteForceLoop:
     """Brute force for the loop of an operating point; its delay is of whole samples."""
     plant, controller = point.plant, point.controller
     assert np.array_equal(plant.actuator, plant.sensor)
     delay = int(controller.delay)
-    return Judge(plant.mass, plant.damping, plant.stiffness, plant.sensor, controller.sampling_period, delay)
+    return BruteForceLoop(
+        plant.mass, plant.damping, plant.stiffness, plant.sensor, controller.sampling_period, delay
+    )
 
 
 # --- as they run, and as the page shows them ------------------------------------------------------------
@@ -88,7 +90,7 @@ def test_the_first_device_has_the_walls_of_brute_force():
     assert chart.stiffness_max == pytest.approx(K, rel=1e-10)
     assert chart.damping_at_stiffness_max == pytest.approx(B, rel=1e-6)
     assert chart.frequencies_at_stiffness_max[0] == pytest.approx(frequency, rel=1e-6)
-    undelayed = Judge(0.05, 0.4, 0.0, 1.0, 0.001)
+    undelayed = BruteForceLoop(0.05, 0.4, 0.0, 1.0, 0.001)
     assert limit.key == "no-delay"
     assert limit.stiffness_max == pytest.approx(undelayed.largest_stiffness(100e3, 200.0)[0], rel=1e-10)
 
@@ -97,10 +99,10 @@ def test_a_changed_number_gives_what_brute_force_gives_and_sensitivities_say():
     names = names_of(2)
     device, point = names["device"], names["device"].at()
     felt = bundled().at(point.posture.position, point.posture.assembly)
-    K, *_ = judge(felt, "full", 0.05, names["period"]).largest_stiffness(100e3, 200.0)
+    K, *_ = brute_force_loop(felt, "full", 0.05, names["period"]).largest_stiffness(100e3, 200.0)
     assert names["period"] == 0.5 * device.controller.sampling_period
     assert names["after"] == pytest.approx(K, rel=1e-9)
-    path, share = names["sensitivities"].wholes[0]
+    path, share = names["sensitivities"].ranking[0]
     changed = [device.with_({path: 0.00125 * factor}).chart().stiffness_max for factor in (0.9999, 1.0001)]
     assert share == pytest.approx(log(changed[1] / changed[0]) / log(1.0001 / 0.9999), rel=1e-6)
 
@@ -120,7 +122,7 @@ def test_it_buzzes_as_predicted():
 
 def test_the_measured_band_holds_the_truth():
     names = names_of(4)
-    by_force = Judge(names["mass"], names["friction"], 0.0, 1.0, names["T"])
+    by_force = BruteForceLoop(names["mass"], names["friction"], 0.0, 1.0, names["T"])
     K, *_ = by_force.largest_stiffness(200e3, 400.0)
     band = names["chart"].band
     assert names["truth"].stiffness_max == pytest.approx(K, rel=1e-10)
@@ -157,7 +159,7 @@ def test_the_map_is_that_of_the_closed_form_and_of_brute_force():
     assert 0.7 < reached.mean() < 0.9
     assert maps["isotropy"].values[reached] == pytest.approx(felt.condition_number[reached], rel=1e-9)
     there = bundled().at((float(worst["x_m"]), float(worst["y_m"])), "elbows-out")
-    K, *_ = judge(there, "full", 0.05, 0.00125).largest_stiffness(10e3, 100.0)
+    K, *_ = brute_force_loop(there, "full", 0.05, 0.00125).largest_stiffness(10e3, 100.0)
     assert float(worst["stiffness_max"]) == pytest.approx(K, rel=1e-9)
     # counted cells have the area but for their size
     meets = (maps["stiffness_max"].values >= 6000.0) & (felt.condition_number <= 1.5)

@@ -4,31 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from later import Later
+from lazy_module import LazyModule
 
-from gallery.brute_force import Judge, butterworth
+from gallery.brute_force import BruteForceLoop, butterworth
 
-algebra = Later("gallery.chapter_4_algebra")
-completed = Later("gallery.chapter_4_completed")
-wall = Later("gallery.fig_3_7_bilateral_wall")
-vibration = Later("gallery.fig_3_8_frequencies")
-undamped = Later("gallery.fig_3_9_no_damping")
-low_pass = Later("gallery.fig_3_11_filter")
-hand = Later("gallery.fig_3_12_operator")
-rigid = Later("gallery.fig_4_1_rigid")
-delay = Later("gallery.fig_4_2_delay")
-spring = Later("gallery.fig_4_3_mass_spring")
-models = Later("gallery.fig_4_4_models")
-base = Later("gallery.fig_5_5_base_distance")
-optimal_mass = Later("gallery.optimal_mass")
-table_3_4 = Later("gallery.table_3_4")
-plane = Later("gallery.rendered_directions")
-worst = Later("gallery.spring_stability")
-where = Later("gallery.which_model_where")
-matrices = Later("gallery.transition_matrices")
-damped = Later("gallery.damped_mass_algebra")
-sprung = Later("gallery.mass_spring_algebra")
-appendix_b = Later("gallery.appendix_b")
+algebra = LazyModule("gallery.chapter_4_algebra")
+completed = LazyModule("gallery.chapter_4_extended_forms")
+wall = LazyModule("gallery.fig_3_7_bilateral_wall")
+vibration = LazyModule("gallery.fig_3_8_frequencies")
+undamped = LazyModule("gallery.fig_3_9_no_damping")
+low_pass = LazyModule("gallery.fig_3_11_filter")
+hand = LazyModule("gallery.fig_3_12_operator")
+rigid = LazyModule("gallery.fig_4_1_rigid")
+delay = LazyModule("gallery.fig_4_2_delay")
+spring = LazyModule("gallery.fig_4_3_mass_spring")
+models = LazyModule("gallery.fig_4_4_models")
+base = LazyModule("gallery.fig_5_5_base_distance")
+optimal_mass = LazyModule("gallery.optimal_mass")
+table_3_4 = LazyModule("gallery.table_3_4")
+plane = LazyModule("gallery.rendered_directions")
+worst = LazyModule("gallery.spring_stability")
+where = LazyModule("gallery.which_model_where")
+matrices = LazyModule("gallery.transition_matrices")
+damped = LazyModule("gallery.damped_mass_algebra")
+sprung = LazyModule("gallery.mass_spring_algebra")
+appendix_b = LazyModule("gallery.appendix_b")
 
 # Transition matrix by matrix exponential, eigenvalues: largest stiffness, its damping and frequency, largest
 # damping for K -> 0. All digits given are right.
@@ -107,7 +107,7 @@ def test_frequencies_along_the_edge():
     assert vibration.delayed_corner_Hz == pytest.approx((9.628, 135.28), abs=5e-3)
     # both roots are on the circle at the corner
     corner = vibration.corner_stiffness, vibration.corner_damping
-    circle = np.abs(Judge(*plant_of(wall.chart)).roots(*corner))
+    circle = np.abs(BruteForceLoop(*plant_of(wall.chart)).roots(*corner))
     assert (np.abs(circle - 1.0) < 1e-9).sum() == 4
 
 
@@ -117,7 +117,7 @@ def plant_of(chart):
 
 
 def test_two_masses_with_a_filter():
-    judge = Judge(*plant_of(low_pass.two_mass), low_pass=butterworth(20.0, low_pass.two_mass.loop.period))
+    judge = BruteForceLoop(*plant_of(low_pass.two_mass), low_pass=butterworth(20.0, low_pass.two_mass.loop.period))
     K, *_ = judge.largest_stiffness(4000.0, 60.0)
     assert low_pass.two_mass.stiffness_max == pytest.approx(K, rel=1e-9)
     assert low_pass.two_mass.stiffness_max == pytest.approx(2598.0368, abs=1e-4)
@@ -145,10 +145,10 @@ def test_the_operators_hand():
         ("motor", 0.0): 11156.4,
         ("motor", 580.0): 10851.7,
     }.items():
-        assert hand.sprung[mass, spring_rate] == pytest.approx((stiffness, stiffness), abs=0.05)
+        assert hand.tips_on_operator_spring[mass, spring_rate] == pytest.approx((stiffness, stiffness), abs=0.05)
     assert (hand.frequency_alone, hand.frequency_held) == pytest.approx((130.727, 131.079), abs=5e-4)
-    assert hand.alone.regions
-    assert np.all(hand.edge(hand.alone)[1] >= -1e-9)
+    assert hand.chart_without_operator.regions
+    assert np.all(hand.edge(hand.chart_without_operator)[1] >= -1e-9)
 
 
 def test_the_rigid_wall():
@@ -193,7 +193,7 @@ def test_the_damped_rigid_wall_completed():
     assert completed.error_of_completed < 1e-12
     assert completed.beta_on_the_axis == pytest.approx(3.7208, abs=5e-5)
     for beta in completed.FRICTIONS:
-        p, d = completed.judged_tips[beta]
+        p, d = completed.tips_by_brute_force[beta]
         assert completed.completed[beta][0] == pytest.approx(p, rel=1e-10)
         assert completed.completed[beta][1] == pytest.approx(d, abs=1e-6)
         assert (completed.printed[beta][0] > 1.0001 * p) == (beta > 3.659)
@@ -227,7 +227,7 @@ def test_the_thesis_transition_matrices():
     assert matrices.error_of_filter < 1e-15
     # another wall is another polynomial
     wall = (4000.0, 10.0)
-    assert matrices.apart(matrices.modal_matrix(*wall), matrices.modal_matrix(4000.0, 10.01)) > 1e-5
+    assert matrices.coefficient_distance(matrices.modal_matrix(*wall), matrices.modal_matrix(4000.0, 10.01)) > 1e-5
 
 
 def test_a_mass_with_friction_and_one_on_a_spring_by_algebra():

@@ -6,10 +6,9 @@ import re
 from dataclasses import replace
 
 import pytest
-from later import Later
+from lazy_module import LazyModule
 
-from docs._numbered import NOT_COVERED, NUMBERED, covered, named, written
-from docs._row import (
+from docs._comparison_row import (
     AGREES,
     ANOTHER_QUESTION,
     MEANING,
@@ -27,9 +26,10 @@ from docs._row import (
     last_digit,
     significant,
 )
+from docs._thesis_items import ITEMS, NOT_COVERED, item_text, items_covered, items_in
 
-make_reproduction = Later("docs.make_reproduction")
-touched = Later("gallery.fig_3_12_one_sided")
+make_reproduction = LazyModule("docs.make_reproduction")
+one_sided_contact = LazyModule("gallery.fig_3_12_one_sided")
 
 
 @pytest.fixture(scope="module")
@@ -127,9 +127,9 @@ FITS, MISSES = Evidence("elsewhere", "0.0254", 0.02537), Evidence("elsewhere", "
             UNEXPLAINED,
             "",
         ),
-        (Number("", "", 1.00000005, judge=1.0), OURS_ONLY, ""),
-        (Number("", "", 1.0000005, judge=1.0), UNEXPLAINED, ""),
-        (Number("", "", float("nan"), judge=1.0), UNEXPLAINED, ""),
+        (Number("", "", 1.00000005, second_value=1.0), OURS_ONLY, ""),
+        (Number("", "", 1.0000005, second_value=1.0), UNEXPLAINED, ""),
+        (Number("", "", float("nan"), second_value=1.0), UNEXPLAINED, ""),
         (Number("", "", 1.0), UNEXPLAINED, ""),
         (Claim("", "", "so", "so it is", True), AGREES, ""),
         (Claim("", "", "so", "not so", False), UNEXPLAINED, ""),
@@ -177,35 +177,35 @@ def test_digits():
 
 
 def test_every_numbered_equation_figure_and_table_is_in_a_row_or_said_to_be_in_none(rows):
-    found, missing = covered(row.place for row in rows), covered(place for place, _ in NOT_COVERED)
-    assert sorted(map(written, (found | missing) - NUMBERED)) == []
-    assert sorted(map(written, NUMBERED - found - missing)) == []
-    assert sorted(map(written, found & missing)) == []
+    found, missing = items_covered(row.place for row in rows), items_covered(place for place, _ in NOT_COVERED)
+    assert sorted(map(item_text, (found | missing) - ITEMS)) == []
+    assert sorted(map(item_text, ITEMS - found - missing)) == []
+    assert sorted(map(item_text, found & missing)) == []
 
 
 def test_what_a_place_names():
-    assert sorted(map(written, named("(2.14)–(2.16), App. B, 3.2.1"))) == ["(2.14)", "(2.15)", "(2.16)"]
-    assert sorted(map(written, named("Figs. 5.12-5.14, (A.2)"))) == [
+    assert sorted(map(item_text, items_in("(2.14)–(2.16), App. B, 3.2.1"))) == ["(2.14)", "(2.15)", "(2.16)"]
+    assert sorted(map(item_text, items_in("Figs. 5.12-5.14, (A.2)"))) == [
         "(A.2)",
         "Fig. 5.12",
         "Fig. 5.13",
         "Fig. 5.14",
     ]
-    assert sorted(map(written, named("Tables 3.3, 3.4, (2.34)"))) == ["(2.34)", "Table 3.3", "Table 3.4"]
-    assert named("Fig. 5.5a") == {("figure", "5", 5)}
-    assert len(NUMBERED) == 153 + 37 + 4
+    assert sorted(map(item_text, items_in("Tables 3.3, 3.4, (2.34)"))) == ["(2.34)", "Table 3.3", "Table 3.4"]
+    assert items_in("Fig. 5.5a") == {("figure", "5", 5)}
+    assert len(ITEMS) == 153 + 37 + 4
     with pytest.raises(ValueError, match="within one chapter"):
-        named("(2.44)–(3.1)")
+        items_in("(2.44)–(3.1)")
 
 
 # The dearest of the gallery's studies, which the page needs too: its tests stand here, where it is computed once.
 
 
 def test_a_pressed_one_sided_wall_has_the_passive_hands_two_sided_edge():
-    assert touched.passive == pytest.approx(touched.two_sided, abs=0.06)
+    assert one_sided_contact.passive == pytest.approx(one_sided_contact.two_sided, abs=0.06)
 
 
 def test_a_reflex_lowers_the_edge():
-    assert (touched.reflex < touched.passive - 0.3).all()
-    assert touched.passive.min() == pytest.approx(-5.83, abs=0.05)
-    assert touched.reflex.min() == pytest.approx(-6.94, abs=0.05)
+    assert (one_sided_contact.reflex < one_sided_contact.passive - 0.3).all()
+    assert one_sided_contact.passive.min() == pytest.approx(-5.83, abs=0.05)
+    assert one_sided_contact.reflex.min() == pytest.approx(-6.94, abs=0.05)

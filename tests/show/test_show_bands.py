@@ -6,7 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from zwidth.show.figures.bands import COLOURS, bands_of, colour_bar, levels_of
+from zwidth.show.figures.colour_bands import COLOURS, bands_of, colour_bar, levels_of
 from zwidth.show.figures.style import figure
 
 

@@ -7,18 +7,18 @@ from matplotlib.collections import LineCollection
 
 from tests.systems import published
 from zwidth.chart.chart import stability_chart
-from zwidth.show.figures.experiment import Barred, draw_experiment
+from zwidth.show.figures.experiment import ErrorBarPoint, draw_experiment
 from zwidth.show.figures.style import figure
 
 POINTS = [
-    Barred(4000.0, 2.4, "lower", 2.2, 2.7),
-    Barred(4000.0, 21.7, "upper", 21.7, 21.7),
-    Barred(7100.0, 10.0, "tip", 6900.0, 7300.0),
+    ErrorBarPoint(4000.0, 2.4, "lower", 2.2, 2.7),
+    ErrorBarPoint(4000.0, 21.7, "upper", 21.7, 21.7),
+    ErrorBarPoint(7100.0, 10.0, "tip", 6900.0, 7300.0),
 ]
-OWN = [Barred(3000.0, 25.0, "upper", np.nan, np.nan)]
+USER_POINTS = [ErrorBarPoint(3000.0, 25.0, "upper", np.nan, np.nan)]
 
 
-def drawn(chart=None, own=()):
+def draw_points(chart=None, own=()):
     made, ax = figure()
     draw_experiment(ax, POINTS, chart, own)
     made.canvas.draw()
@@ -26,7 +26,7 @@ def drawn(chart=None, own=()):
 
 
 def test_bars_run_along_what_was_bisected_and_only_where_trials_differ():
-    bars = [c.get_segments()[0] for c in drawn().collections if isinstance(c, LineCollection)]
+    bars = [c.get_segments()[0] for c in draw_points().collections if isinstance(c, LineCollection)]
     assert sorted(np.round(bar, 6).tolist() for bar in bars) == [
         [[4000.0, 2.2], [4000.0, 2.7]],
         [[6900.0, 10.0], [7300.0, 10.0]],
@@ -34,7 +34,7 @@ def test_bars_run_along_what_was_bisected_and_only_where_trials_differ():
 
 
 def test_axes_legend_and_window():
-    ax = drawn(stability_chart(published(), decay=False), OWN)
+    ax = draw_points(stability_chart(published(), decay=False), USER_POINTS)
     assert ax.get_xlabel() == "Virtual stiffness K [kN/m]"
     assert ax.get_ylabel() == "Virtual damping B [Ns/m]"
     told = [text.get_text() for text in ax.get_legend().get_texts()]
@@ -51,7 +51,7 @@ def test_axes_legend_and_window():
 
 
 def test_a_device_without_a_chart_shows_its_points():
-    ax = drawn()
+    ax = draw_points()
     assert not ax.patches
     assert [line.get_label() for line in ax.lines if not line.get_label().startswith("_")] != []
 
@@ -66,4 +66,4 @@ def test_points_that_are_unsure_are_crossed_and_the_legend_says_so():
     assert "unsure: verdict changes more than once" in told
     made.canvas.draw()
     assert ax.get_legend().get_window_extent().x1 <= made.bbox.x1
-    assert not [line for line in drawn().lines if line.get_marker() == "x"]
+    assert not [line for line in draw_points().lines if line.get_marker() == "x"]

@@ -15,6 +15,7 @@ from matplotlib.patches import Polygon
 
 from tests.systems import mass
 from zwidth.chart.chart import stability_chart
+from zwidth.chart.rings import simple_rings
 from zwidth.chart.verdict import spectral_radius
 from zwidth.device.load import load
 from zwidth.loop.controller import Controller
@@ -24,8 +25,8 @@ from zwidth.show.figures.decay import draw_decay_contours, round_radii, tenfold_
 from zwidth.show.figures.frequency import corners, draw_frequency
 from zwidth.show.figures.mechanism import draw_mechanism
 from zwidth.show.figures.plant import as_chain, draw_chain
-from zwidth.show.figures.stability import draw_chart, draw_models
-from zwidth.show.figures.style import figure, inline_svg, label, save
+from zwidth.show.figures.stability import draw_chart, draw_models, edges_of
+from zwidth.show.figures.style import GREY, figure, fitted_columns, inline_svg, label, number_logarithmic, save
 from zwidth.show.output import OutputError
 
 
@@ -307,16 +308,80 @@ def test_nothing_touches_pyplot():
     assert found.stdout.strip() == "False"
 
 
-def test_broken_conditions_are_grey_under_one_entry_and_every_condition_is_named():
+def bounds_figure(name, changes=()):
     from zwidth.conditions import compare
     from zwidth.show.figures.bounds import draw_bounds
 
-    loop = loop_of("published-two-mass")
-    bounds = compare(loop)
-    ax = Figure().add_subplot()
+    loop = loop_of(name, changes)
+    bounds, ax = compare(loop), figure()[1]
     draw_bounds(ax, bounds, stability_chart(loop, decay=False))
-    said = " ".join(legend_text(ax)).replace("\n", " ")
-    spoken = [bound for bound in bounds if not bound.lacking]
-    assert all(bound.name in said for bound in spoken)
-    assert any(not bound.holds for bound in spoken)
-    assert said.count("assumptions broken") == 1
+    return bounds, ax, [text.replace("\n", " ").replace("\u00a0", "") for text in legend_text(ax)]
+
+
+def test_conditions_that_are_not_met_are_thin_grey_and_listed_apart():
+    bounds, ax, said = bounds_figure("hapkit-course")
+    known = [bound for bound in bounds if not bound.lacking]
+    assert all(any(bound.name in text for text in said) for bound in known)
+    apart = said.index("assumptions not met:")
+    for bound in known:
+        at = [n for n, text in enumerate(said) if text.split(" ", 1)[-1].split(", at most")[0] == bound.name]
+        assert all((n < apart) == bound.holds for n in at)
+        assert at
+    grey = [line for line in ax.lines if line.get_color() == GREY]
+    assert grey
+    assert all(line.get_linewidth() < 1.0 for line in grey)
+
+
+def test_every_line_of_a_condition_has_its_number_and_that_with_the_least_limit_binds():
+    bounds, ax, said = bounds_figure("hapkit-course")
+    listed = {text.split(" ")[0] for text in said if text[:1].isdigit()}
+    written = {number for text in ax.texts for number in text.get_text().split(", ")}
+    assert written == listed
+    assert len(listed) > 5
+    least = min(bound.stiffness_max for bound in bounds if bound.holds and bound.stiffness_max > 0.0)
+    binding = [text for text in said if text.endswith(": binds")]
+    assert binding
+    assert all(f"{least / 1e3:.3f}kN/m" in text for text in binding)
+
+
+def test_other_numbers_of_a_device_bring_another_condition_to_bind():
+    _, _, said = bounds_figure("hapkit-course", ["plant.damping_Ns_per_m=unset"])
+    binding = [text for text in said if text.endswith(": binds")]
+    assert "1rigid mass, at most 20.59kN/m: binds" in [text.replace(" ", "", 1) for text in binding]
+    assert not any("passive" in text for text in binding)
+
+
+def test_the_edges_of_a_set_with_a_hole_leave_out_the_cuts():
+    turn = np.linspace(0.0, 2.0 * np.pi, 41)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    circle[-1] = circle[0]
+    rings = simple_rings([5.0 * circle, 2.0 * circle[::-1]])
+    steps = np.vstack([np.diff(edge, axis=0) for edge in edges_of(rings)])
+    lengths = np.hypot(*steps.T)
+    around = 80.0 * np.sin(np.pi / 40.0) * 7.0  # of both polygons; a cut would add 2 x 3
+    assert np.nansum(lengths) == pytest.approx(around, rel=1e-12)
+    assert all(
+        edge is not ring and len(edge) > len(ring) for edge, ring in zip(edges_of(rings), rings, strict=True)
+    )
+
+
+@pytest.mark.parametrize(("low", "high"), [(143.0, 151.0), (100.0, 180.0), (20.0, 300.0), (1e-9, 10.0)])
+def test_a_logarithmic_axis_has_numbers_over_any_range(low, high):
+    made, ax = figure()
+    ax.set_xscale("log")
+    ax.set_xlim(low, high)
+    number_logarithmic(ax.xaxis, low, high, "m")
+    made.draw_without_rendering()
+    inside = [
+        tick.get_text()
+        for at, tick in zip(ax.get_xticks(), ax.get_xticklabels(), strict=True)
+        if low <= at <= high and tick.get_text()
+    ]
+    assert 2 <= len(inside) <= 10
+    assert len(set(inside)) == len(inside)
+
+
+def test_a_legend_has_as_many_columns_as_the_figure_holds():
+    _, ax = figure()
+    assert fitted_columns(ax, ["short"] * 4, 2) == 2
+    assert fitted_columns(ax, ["a label that is as long as half of the figure"] * 4, 2) == 1

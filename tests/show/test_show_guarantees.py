@@ -5,16 +5,16 @@ from __future__ import annotations
 from itertools import pairwise
 
 from tests.systems import mass
-from zwidth.guarantees.nested import nested
+from zwidth.guarantees.loop_guarantees import find_guarantees
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
-from zwidth.show.figures.guarantees import AREAS, draw_guarantees
+from zwidth.show.figures.guarantees import FILLS, draw_guarantees
 from zwidth.show.figures.style import figure
 
 
 def test_every_guarantee_is_in_the_legend_with_its_largest_stiffness():
     _, ax = figure()
-    draw_guarantees(ax, nested(Loop(mass(0.03, 1.0), Controller(0.001))))
+    draw_guarantees(ax, find_guarantees(Loop(mass(0.03, 1.0), Controller(0.001))))
     words = " ".join(text.get_text().replace("\u00a0", " ") for text in ax.get_legend().get_texts())
     assert "every passive operator: 2.000 kN/m" in words
     assert "every spring: 2.2" in words
@@ -24,7 +24,7 @@ def test_shades_tell_the_sets_apart_in_grey_and_edges_where_they_coincide():
     def lightness(colour):
         return sum(int(colour[i : i + 2], 16) for i in (1, 3, 5))
 
-    shades = [lightness(fill) for fill, *_ in AREAS.values()]
+    shades = [lightness(fill) for fill, *_ in FILLS.values()]
     assert all(a - b > 40 for a, b in pairwise(shades))
-    upwards = sorted(AREAS.values(), key=lambda look: look[3])
+    upwards = sorted(FILLS.values(), key=lambda look: look[3])
     assert all(below[2] > 1.3 * above[2] for below, above in pairwise(upwards))

@@ -8,14 +8,23 @@ from matplotlib.colors import to_rgba
 from matplotlib.patches import PathPatch
 
 from zwidth.device.load import load
-from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, SINGULAR, UNDECIDED, Measure, NoValueError
+from zwidth.measures.definition import (
+    FAILED,
+    NO_VALUE,
+    OK,
+    OUT_OF_REACH,
+    SINGULAR,
+    UNDECIDED,
+    Measure,
+    NoValueError,
+)
 from zwidth.show.figures.map import MARKS, draw_map, map_figure
 from zwidth.show.figures.style import figure, save
 from zwidth.show.units import area_text, percent
 from zwidth.study.common_area import common_area
-from zwidth.study.plane import plane_of
+from zwidth.study.map import workspace_map
+from zwidth.study.plane_grid import plane_of
 from zwidth.study.requirement import parse_requirement
-from zwidth.study.workspace import workspace_map
 
 
 @pytest.fixture(scope="module")

@@ -8,19 +8,19 @@ import pytest
 import zwidth
 from tests.show.show_cases import check_legends_lie_beside
 from zwidth.contact import Box, Plane, Sphere, SurfaceWall
-from zwidth.show.figures.motion import DRAWN
-from zwidth.show.figures.path import draw_path, path_figure
+from zwidth.show.figures.contact_response import LONGEST_LINE
+from zwidth.show.figures.mechanism_motion import draw_mechanism_motion, mechanism_motion_figure
 from zwidth.show.figures.style import save
 
 BALL = Sphere((0.0, 0.31), 0.05)
 
 
-def drawn(surface=BALL, **settings):
+def move_and_draw(surface=BALL, **settings):
     wall = None if surface is None else SurfaceWall(1500.0, 3.0)
     settings = {"push": (0.02, 1.0, 0.0), "duration": 0.25} | settings
     motion = zwidth.load("five-bar").at().move(wall, surface, **settings)
-    made, axes = path_figure()
-    draw_path(axes, motion)
+    made, axes = mechanism_motion_figure()
+    draw_mechanism_motion(axes, motion)
     made.canvas.draw()
     return motion, made, axes
 
@@ -29,19 +29,19 @@ def texts(ax):
     return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
-def named(ax, name):
+def line_of(ax, name):
     return next(line for line in ax.lines if line.get_label() == name)
 
 
 def test_the_panels_name_their_units_and_hold_the_motion(tmp_path):
-    motion, made, (overall, close, depth, force, energy) = drawn()
+    motion, made, (overall, close, depth, force, energy) = move_and_draw()
     assert [ax.get_ylabel() for ax in (overall, close, depth, force, energy)] == [
         "y [m]", "y [m]", "Depth [mm]", "Force [N]", "Energy [mJ]",
     ]  # fmt: skip
     assert texts(overall) == ["start", "end", "path", "wall"]
     assert texts(close) == ["as read", "path", "start", "end", "wall"]
     for ax in (overall, close):
-        assert np.array_equal(named(ax, "path").get_xydata(), motion.position[:, :2])
+        assert np.array_equal(line_of(ax, "path").get_xydata(), motion.position[:, :2])
         assert ax.get_aspect() == 1.0
     assert depth.lines[0].get_ydata() == pytest.approx(motion.depth)
     assert force.lines[0].get_ydata() == pytest.approx(np.linalg.norm(motion.force, axis=1))
@@ -56,10 +56,10 @@ def walls(ax):
 
 
 def test_the_wall_is_drawn_where_it_is():
-    _, _, (overall, *_) = drawn()
+    _, _, (overall, *_) = move_and_draw()
     outline = walls(overall)
     assert np.hypot(*(outline - (0.0, 0.31)).T) == pytest.approx(0.05, abs=1e-4)
-    _, _, (_, close, *_) = drawn(Box((0.0, 0.25), (0.03, 0.02), hollow=True))
+    _, _, (_, close, *_) = move_and_draw(Box((0.0, 0.25), (0.03, 0.02), hollow=True))
     assert any(np.all(np.abs(walls(close) - (0.0, 0.27)) < 1e-3, axis=1))
     box = np.abs(walls(close) - (0.0, 0.25)) / (0.03, 0.02)
     assert np.all(np.max(box, axis=1) > 0.99)
@@ -70,7 +70,7 @@ def test_the_wall_reaches_the_edges_of_what_is_shown():
         Plane((0.0, 0.26), (0.0, -1.0)),
         Sphere((0.0, 0.25), 0.012, hollow=True),
     ):
-        _, _, (overall, close, *_) = drawn(surface)
+        _, _, (overall, close, *_) = move_and_draw(surface)
         for ax in (overall, close):
             low, high = walls(ax).min(axis=0), walls(ax).max(axis=0)
             assert low[0] < ax.get_xlim()[0] < ax.get_xlim()[1] < high[0]
@@ -78,15 +78,15 @@ def test_the_wall_reaches_the_edges_of_what_is_shown():
 
 
 def test_legends_do_not_lie_on_panels():
-    _, made, axes = drawn(gravity=(0.0, -1.0, 0.0))
+    _, made, axes = move_and_draw(gravity=(0.0, -1.0, 0.0))
     check_legends_lie_beside(made, axes)
 
 
 def test_a_free_motion_to_a_singularity_and_a_long_one_are_drawn():
-    motion, _, (overall, _, depth, *_) = drawn(None, duration=1.0)
+    motion, _, (overall, _, depth, *_) = move_and_draw(None, duration=1.0)
     assert motion.status == "singular"
     assert not depth.get_visible()
     assert "path" in texts(overall)
-    motion, _, (*_, force, _) = drawn(Sphere((0.0, 0.25), 0.02, hollow=True), duration=10.0)
-    assert len(motion.time) > DRAWN
+    motion, _, (*_, force, _) = move_and_draw(Sphere((0.0, 0.25), 0.02, hollow=True), duration=10.0)
+    assert len(motion.time) > LONGEST_LINE
     assert force.collections

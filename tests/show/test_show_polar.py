@@ -7,38 +7,38 @@ from zwidth.show.figures.polar import draw_polar
 from zwidth.show.figures.style import figure, save
 
 
-def made(stiffness, status=None):
+def directions_of(stiffness, status=None):
     k = len(stiffness)
     some = np.array(stiffness, dtype=float)
     return ByDirection(circle(k), some, some / 500.0, np.full(k, 100.0), tuple(status or ["ok"] * k))
 
 
-def drawn(found):
+def draw_directions(found):
     drawing, ax = figure(4.6, 5.2)
     draw_polar(ax, found, 360.0 * np.arange(len(found.stiffness)) / len(found.stiffness))
     return drawing, ax
 
 
 def test_the_outline_is_closed_and_as_far_out_as_the_stiffness():
-    _, ax = drawn(made([1000.0, 2000.0, 3000.0, 2000.0]))
+    _, ax = draw_directions(directions_of([1000.0, 2000.0, 3000.0, 2000.0]))
     outline = ax.lines[0].get_xydata()
     assert np.hypot(*outline.T).tolist() == [1000.0, 2000.0, 3000.0, 2000.0, 1000.0]
     assert ax.get_aspect() == 1.0
 
 
 def test_the_stiffest_and_the_least_stiff_direction_are_named():
-    _, ax = drawn(made([1000.0, 2000.0, 3000.0, 2000.0]))
+    _, ax = draw_directions(directions_of([1000.0, 2000.0, 3000.0, 2000.0]))
     texts = [text.get_text().replace("\u00a0", " ") for text in ax.get_legend().get_texts()]
     assert "stiffest: 3.000 kN/m along 180°" in texts
     assert "least stiff: 1.000 kN/m along 0°" in texts
 
 
 def test_directions_without_an_answer_are_marked_and_open_the_outline():
-    _, ax = drawn(made([1000.0, np.nan, 3000.0, 2000.0], ["ok", "no stable wall", "ok", "ok"]))
+    _, ax = draw_directions(directions_of([1000.0, np.nan, 3000.0, 2000.0], ["ok", "no stable wall", "ok", "ok"]))
     assert "no answer" in [text.get_text() for text in ax.get_legend().get_texts()]
     assert not [patch for patch in ax.patches if patch.get_alpha() is None and patch.get_fill()]
 
 
 def test_nothing_at_all_can_be_drawn(tmp_path):
-    drawing, _ = drawn(made([np.nan] * 4, ["no stable wall"] * 4))
+    drawing, _ = draw_directions(directions_of([np.nan] * 4, ["no stable wall"] * 4))
     assert save(drawing, tmp_path / "none.png").stat().st_size > 0

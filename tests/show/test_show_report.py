@@ -7,9 +7,11 @@ import re
 import shutil
 import subprocess
 from functools import cache
+from html import escape, unescape
 from html.parser import HTMLParser
 
 import pytest
+from markupsafe import Markup
 
 from zwidth.chart.arc_joining import ChartError
 from zwidth.device.load import from_document, load
@@ -17,18 +19,18 @@ from zwidth.model.posture import OutOfReach
 from zwidth.show.output import json_text
 from zwidth.show.report import facts as facts_module
 from zwidth.show.report.facts import gather
-from zwidth.show.report.report import page, write_report
+from zwidth.show.report.report import keep_units, page, write_report
 
-EMPTY = ["plant.damping_Ns_per_m=unset", "loop.delay_samples=1"]
+NO_STABLE_WALL = ["plant.damping_Ns_per_m=unset", "loop.delay_samples=1"]
 CASES = {
     "five-bar": ("five-bar", []),
     "late": ("five-bar", ["loop.delay_samples=1"]),
     "two-mass": ("published-two-mass", []),
-    "nothing stable": ("published-two-mass", EMPTY),
+    "nothing stable": ("published-two-mass", NO_STABLE_WALL),
     "one mass": ("hapkit-course", []),
 }
 VOID = {"meta", "br", "link", "img", "wbr", "hr"}
-NAUGHTY = "<script>alert('x')</script> & \"quotes\" {{ 7*7 }} --> ü"
+HTML_IN_NAME = "<script>alert('x')</script> & \"quotes\" {{ 7*7 }} --> ü"
 
 
 class Page(HTMLParser):
@@ -77,12 +79,12 @@ def report_of(tmp_path_factory):
 
 
 @pytest.fixture(params=CASES)
-def written(request, report_of):
+def report(request, report_of):
     return report_of(request.param)
 
 
-def test_the_page_stands_alone(written):
-    parsed = Page(written[2])
+def test_the_page_stands_alone(report):
+    parsed = Page(report[2])
     assert not {"script", "link", "img", "iframe", "object", "base"} & set(parsed.tags)
     for name, value in parsed.attributes:
         if name in ("src", "href", "xlink:href", "action", "data"):
@@ -90,20 +92,20 @@ def test_the_page_stands_alone(written):
         assert not name.startswith("on")
         for target in re.findall(r"url\(([^)]*)\)", value or ""):
             assert target.strip("'\"").startswith("#")
-    assert "@import" not in written[2]
+    assert "@import" not in report[2]
 
 
-def test_every_id_is_given_once_and_every_reference_leads_somewhere(written):
-    parsed = Page(written[2])
+def test_every_id_is_given_once_and_every_reference_leads_somewhere(report):
+    parsed = Page(report[2])
     ids = [value for name, value in parsed.attributes if name == "id"]
     assert len(ids) == len(set(ids))
     references = [value[1:] for name, value in parsed.attributes if name == "href"]
-    references += re.findall(r"url\(#([^)]*)\)", written[2])
+    references += re.findall(r"url\(#([^)]*)\)", report[2])
     assert set(references) <= set(ids)
 
 
-def test_what_it_says_is_what_it_returns(written):
-    path, found, text = written
+def test_what_it_says_is_what_it_returns(report):
+    path, found, text = report
     shown = Page(text).text
     assert found["file"] == str(path)
     for sentence in found["summary"]:
@@ -111,12 +113,12 @@ def test_what_it_says_is_what_it_returns(written):
     json.loads(json_text(found))
 
 
-def test_all_sections_are_there(written):
-    _, found, text = written
+def test_all_sections_are_there(report):
+    _, found, text = report
     headings = ["Which walls it renders", "What limits it", "What simpler models say", "The device",
                 "What published conditions say", "Where the numbers come from"]  # fmt: skip
     if found["stiffness_max_N_per_m"] is not None:
-        headings += ["At which vibration it fails", "How fast it comes to rest", "What to change first"]
+        headings += ["At which frequency it oscillates", "How fast it comes to rest", "What to change first"]
     shown = Page(text).text
     assert [heading for heading in headings if heading not in shown] == []
     for entry in found["bounds"]:
@@ -149,9 +151,11 @@ def test_the_numbers_of_what_to_change_is_felt_and_may_be_simplified(report_of):
     assert found["models"]["first_natural_frequency_Hz"] == pytest.approx(130.727, abs=1e-3)
     assert models["rigid"]["frequency_ranges_Hz"][0][1] == pytest.approx(20.29, abs=0.01)
     # the figures are there, and only where they say something
-    assert all(f'<figure id="{name}">' in text for name in ("felt", "answers", "fits"))
+    assert all(f'<figure id="{name}">' in text for name in ("felt", "sensitivities", "validity"))
     _, _, text = report_of("one mass")
-    assert [name for name in ("felt", "answers", "fits") if f'<figure id="{name}">' in text] == ["answers"]
+    assert [name for name in ("felt", "sensitivities", "validity") if f'<figure id="{name}">' in text] == [
+        "sensitivities"
+    ]
 
 
 def test_nothing_stable_has_a_reason_and_nulls(report_of):
@@ -164,13 +168,51 @@ def test_nothing_stable_has_a_reason_and_nulls(report_of):
     assert found["static_stiffness_at_stiffness_max_N_per_m"] is None
 
 
+@pytest.mark.parametrize("case", ["five-bar", "one mass"])
+def test_conditions_that_do_not_apply_are_folded(report_of, case):
+    _, _, text = report_of(case)
+    bounds = gather(load(*CASES[case])).bounds
+    published = text[text.index("What published conditions say") : text.index("Where the numbers come from")]
+    visible, _, folded = published.partition("<details>")
+    for bound in bounds:
+        name = f'<th scope="row">{escape(bound.name)}<br>'
+        assert (name in visible) == bound.holds
+        assert (name in folded) == (not bound.holds)
+        for sentence in bound.violated:
+            assert escape(sentence) in folded.replace("\u00a0", " ")
+        assert all(re.search(rf"It needs [^.]*\b{name}\b", folded) for name in bound.lacking)
+    assert published.count("this report") == ("<table" in visible) + bool(folded)
+
+
+def test_the_page_says_which_question_each_answer_is_to(report_of):
+    shown = Page(report_of("five-bar")[2]).text
+    assert "This asks for the cause: one thing at a time is changed, whether or not that can be built" in shown
+    assert "This asks what can be done: each number of the device file is changed by 1 %" in shown
+    assert "“What limits it” asks for the cause and names another: the flexibility of the drives" in shown
+    for label in ("rigid drives (ideal)", "no delay", "half the sampling period"):
+        assert label in shown
+    assert "half the sampling period (ideal)" not in shown
+    assert "no delay (ideal)" in Page(report_of("late")[2]).text
+
+
+def test_numbers_keep_with_their_units(report):
+    text = re.sub(r"<svg.*?</svg>|<style.*?</style>", "", report[2], flags=re.DOTALL)
+    assert re.findall(r"\d (?:%|[kMmµ]?(?:Hz|N/m|s|m)\b|Ns/m|kg|samples?\b)", text) == []
+    assert keep_units("at 0.25 m, 1 kN/m and 3 masses") == "at 0.25\u00a0m, 1\u00a0kN/m and 3 masses"
+    assert keep_units(Markup("1 Hz")) == "1 Hz"
+
+
 def test_names_cannot_do_harm(tmp_path):
-    document = load("hapkit-course").document | {"name": NAUGHTY, "description": NAUGHTY, "source": NAUGHTY}
-    document["sources"] = {"plant.mass_kg": NAUGHTY}
+    document = load("hapkit-course").document | {
+        "name": HTML_IN_NAME,
+        "description": HTML_IN_NAME,
+        "source": HTML_IN_NAME,
+    }
+    document["sources"] = {"plant.mass_kg": HTML_IN_NAME}
     text = page(gather(from_document(document)))
     parsed = Page(text)
     assert "script" not in parsed.tags
-    assert NAUGHTY in parsed.text.replace("  ", " ")
+    assert HTML_IN_NAME in parsed.text.replace("  ", " ")
     assert "{{ 7*7 }}" in text
 
 
@@ -248,13 +290,48 @@ def test_a_page_that_asks_elsewhere_would_be_noticed(tmp_path):
     assert asked
 
 
+MEASURE = """<pre id="measured"></pre><script>onload = () => {
+const page = document.querySelector("iframe").contentDocument;
+const boxes = [...page.querySelectorAll("h1, h2, p, th, td, code, figcaption, summary, small")];
+const svg = page.querySelector("figure svg");
+document.getElementById("measured").textContent = JSON.stringify({
+  page: page.documentElement.scrollWidth,
+  right: Math.max(...boxes.map(box => box.getBoundingClientRect().right)),
+  cut: boxes.filter(box => box.clientWidth && box.scrollWidth > box.clientWidth + 1).map(box => box.textContent),
+  scale: svg.getBoundingClientRect().width / svg.viewBox.baseVal.width,
+})};</script>"""
+LONG = "/data/laboratory/haptics/measurements/2024-11-03/frequency_response_of_the_first_prototype_with_name.csv"
+
+
+def measured_in_browser(folder, text, width):
+    """Of a page in a frame of this width [px]: its own, its rightmost text, texts cut off, pixels per point."""
+    unrestricted = re.sub(r"<meta http-equiv=.*?>", "", text).replace("<details>", "<details open>")
+    frame = folder / "frame.html"
+    frame.write_text(f'<iframe width="{width}" height="2000" srcdoc="{escape(unrestricted)}"></iframe>{MEASURE}')
+    result = browse(folder, "--dump-dom", frame.as_uri())
+    measured = re.findall(r'<pre id="measured">(.*?)</pre>', result.stdout.decode(), re.DOTALL)[-1]
+    return json.loads(unescape(measured))
+
+
 @needs_browser
-def test_it_prints_on_a4(tmp_path, written):
+@pytest.mark.parametrize("width", [400, 720, 1200])
+def test_nothing_is_cut_off_or_too_small_to_be_read(tmp_path, width):
+    document = load("published-two-mass").document | {"name": LONG, "description": LONG, "source": LONG}
+    document["sources"] = {"plant.mass_kg": LONG, "plant.stiffness_N_per_m": "a table"}
+    found = measured_in_browser(tmp_path, page(gather(from_document(document))), width)
+    assert found["page"] <= width
+    assert found["right"] <= width
+    assert found["cut"] == []
+    assert found["scale"] * 6.5 > 8.0  # the smallest text of a figure has 6.5 points
+
+
+@needs_browser
+def test_it_prints_on_a4(tmp_path, report):
     pdf = tmp_path / "report.pdf"
-    browse(tmp_path, "--no-pdf-header-footer", f"--print-to-pdf={pdf}", written[0].as_uri())
-    written = pdf.read_bytes()
-    assert written.startswith(b"%PDF")
-    pages = len(re.findall(rb"/Type\s*/Page\b", written))
+    browse(tmp_path, "--no-pdf-header-footer", f"--print-to-pdf={pdf}", report[0].as_uri())
+    printed = pdf.read_bytes()
+    assert printed.startswith(b"%PDF")
+    pages = len(re.findall(rb"/Type\s*/Page\b", printed))
     assert 2 <= pages <= 8
-    sizes = re.findall(rb"/MediaBox\s*\[\s*0 0 ([\d.]+) ([\d.]+)\s*\]", written)
+    sizes = re.findall(rb"/MediaBox\s*\[\s*0 0 ([\d.]+) ([\d.]+)\s*\]", printed)
     assert {(round(float(w) / 72 * 25.4), round(float(h) / 72 * 25.4)) for w, h in sizes} == {(210, 297)}

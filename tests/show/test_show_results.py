@@ -15,8 +15,8 @@ from matplotlib.axes import Axes
 import zwidth
 from zwidth.result import Result
 from zwidth.show.figures.plots import DRAWINGS
-from zwidth.show.output import plain
-from zwidth.study.plane import plane_of
+from zwidth.show.output import json_value
+from zwidth.study.plane_grid import plane_of
 from zwidth.study.study_arguments import study_over
 
 LINES = 8
@@ -58,11 +58,11 @@ def results():
         "limit cycles": rubbing().at().limit_cycles(2600.0, 0.0, simulate=False),
         "boundary": point.without_operator.measure_boundary(plan),
         "sensitivities": device().sensitivities(),
-        **of_functions(point, arms),
+        **function_results(point, arms),
     }
 
 
-def of_functions(point, arms):
+def function_results(point, arms):
     """Results of functions that are no verbs of an operating point."""
     loop, wall = point.without_operator.loop, zwidth.contact.ENVIRONMENTS["wall"]
     maps = zwidth.workspace_map(arms, "rigid_mass", plane_of(arms, cells=(15, 9)))
@@ -84,18 +84,19 @@ def of_functions(point, arms):
 
 
 @pytest.fixture(scope="module")
-def found():
+def all_results():
     return results()
 
 
 # What is on the way to results: devices, plants, loops, and what they are made of or asked with.
 STAGES = """
     Device OperatingPoint Posture Plant MultiPlant Response Loop Controller Estimator AlphaBeta Nonlinear
-    Measure Requirement Environment Plane Study RangeFault Cells MeasureError ForceLaw Function OwnPoint Walls
+    Measure Requirement Environment PlaneGrid Study RangeFault CellValues MeasureError ForceLaw Function UserPoint
+    Walls
 """
 # Plain values, arrays, and a few numbers by name, such as the rows of a result; datasets show themselves.
 NUMBERS = """
-    Any None bool int float str complex dict list tuple Iterator Callable NDArray np bool_ complex128 float64
+    Any Self None bool int float str complex dict list tuple Iterator Callable NDArray np bool_ complex128 float64
     Floats Complex Complexes ArrayLike Mapping Sequence xr Dataset Axes
     Peak FastestDecay EffectiveParameters ImpedanceRange OptimalMass Overall Judgement Bound LimitCycle Variant
 """
@@ -131,29 +132,29 @@ NAMES = [
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_result_knows_its_keys_and_columns(found, name):
-    result = found[name]
+def test_a_result_knows_its_keys_and_columns(all_results, name):
+    result = all_results[name]
     assert isinstance(result, Result)
     document = result.document()
     assert document
     assert all(isinstance(key, str) for key in document)
-    json.dumps(plain(document), allow_nan=False)
+    json.dumps(json_value(document), allow_nan=False)
     table = result.table()
     assert table
     assert len({len(column) for column in table.values()}) == 1
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_result_shows_itself_in_a_few_lines(found, name):
-    text = repr(found[name])
+def test_a_result_shows_itself_in_a_few_lines(all_results, name):
+    text = repr(all_results[name])
     assert 1 <= len(text.splitlines()) <= LINES
     assert max(map(len, text.splitlines())) <= 240
     assert "array(" not in text
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_result_draws_itself_and_stands_in_a_notebook(found, name):
-    result = found[name]
+def test_a_result_draws_itself_and_stands_in_a_notebook(all_results, name):
+    result = all_results[name]
     figure, ax = pyplot.subplots()
     assert result.plot(ax) is ax
     assert ax.lines or ax.collections or ax.patches or ax.images or ax.texts
@@ -167,27 +168,27 @@ def test_a_result_draws_itself_and_stands_in_a_notebook(found, name):
     assert "<svg" in page
 
 
-def test_two_figures_of_one_notebook_share_no_id(found):
-    pages = [found[NAMES[0]]._repr_html_() for _ in range(2)]
+def test_two_figures_of_one_notebook_share_no_id(all_results):
+    pages = [all_results[NAMES[0]]._repr_html_() for _ in range(2)]
     first, second = (set(re.findall(r' id="([^"]+)"', page)) for page in pages)
     assert first
     assert second
     assert not first & second
 
 
-def test_every_kind_of_result_is_tried(found):
-    tried = {kind.__name__ for result in found.values() for kind in type(result).__mro__}
+def test_every_kind_of_result_is_tried(all_results):
+    tried = {kind.__name__ for result in all_results.values() for kind in type(result).__mro__}
     assert DRAWINGS.keys() - tried == {"Couplings"}  # which `guarantees` carries
-    kinds = {kind.__name__ for kind in _kinds(Result)}
+    kinds = {kind.__name__ for kind in _subclasses(Result)}
     assert kinds - tried - {"Couplings", "MeasuredChart", "MeasuredVerdicts"} == set()
 
 
 def test_whatever_a_public_function_returns_is_a_result_or_known_not_to_be():
     """Read off the annotations: a new type has to become a `Result`, or be named below."""
-    known = {*STAGES.split(), *NUMBERS.split()} | {kind.__name__ for kind in _kinds(Result)}
+    known = {*STAGES.split(), *NUMBERS.split()} | {kind.__name__ for kind in _subclasses(Result)}
     unknown = {
         f"{word} of {where}"
-        for where, returned in _returned()
+        for where, returned in _return_annotations()
         for word in re.findall(r"\w+", re.sub(r"Literal\[.*?\]", "", returned))
         if word not in known
     }
@@ -197,7 +198,7 @@ def test_whatever_a_public_function_returns_is_a_result_or_known_not_to_be():
 def test_a_motion_that_ends_before_its_first_sample_has_nulls():
     motion = zwidth.load("five-bar").at((0.0, 0.346 - 5e-8)).move(duration=0.1)
     assert len(motion.time) == 0
-    document = plain(motion.document())
+    document = json_value(motion.document())
     assert document["duration_s"] is document["energy_book_J"]["hand"] is document["force_limit_share"] is None
     assert "singularity" in repr(motion)
     assert "singularity" in motion.plot().get_title(loc="left")
@@ -248,18 +249,18 @@ def test_what_has_no_drawing_says_so():
         Bare().plot()
 
 
-def test_a_single_measure_is_a_number(found):
-    assert math.isclose(float(found["measured once"]), 1.37612507, rel_tol=1e-6)
+def test_a_single_measure_is_a_number(all_results):
+    assert math.isclose(float(all_results["measured once"]), 1.37612507, rel_tol=1e-6)
 
 
-def _kinds(kind):
+def _subclasses(kind):
     for one in kind.__subclasses__():
         if one.__module__.startswith("zwidth"):
             yield one
-            yield from _kinds(one)
+            yield from _subclasses(one)
 
 
-def _returned():
+def _return_annotations():
     """(name, annotation) of every public function, and of every public method of a public class."""
     packages = [zwidth, *(getattr(zwidth, name) for name in PACKAGES)]
     for package in packages:

@@ -5,15 +5,18 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import cache
+from math import nan
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from zwidth.device.load import from_document, load
-from zwidth.show.motions import counted
-from zwidth.show.report import answers, sentences
+from zwidth.loop.motion_names import group_names
+from zwidth.show.report import sentences
 from zwidth.show.report.facts import gather
+from zwidth.study.sensitivity_result import Sensitivity
+from zwidth.study.what_if import Variant, limiting_change
 
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"
 FIRST_ORDER = "loop.velocity.filter={type='first-order', time_constant_s=0.002}"
@@ -47,14 +50,14 @@ def far_sensor(stiffness=2000.0):
 
 
 @cache
-def held_back():
+def reversed_sensor_facts():
     """A wall of reversed sign takes away the spring to the ground: K = 500 N/m, whatever else is changed."""
     plant = {"mass_kg": 0.1, "damping_Ns_per_m": 2.0, "stiffness_N_per_m": 500.0, "sensor": [-1.0]}
     return gather(from_document({"name": "back", "plant": plant, "loop": {"sampling_period_s": 0.001}}))
 
 
 @cache
-def runaway(damping=1.0, stiffness=-50.0):
+def unstable_mode_facts(damping=1.0, stiffness=-50.0):
     plant = {
         "mass_kg": [[0.1, 0.0], [0.0, 0.2]],
         "damping_Ns_per_m": [[1.0, 0.0], [0.0, damping]],
@@ -69,16 +72,17 @@ def plain(text):
     return text.replace("\u00a0", " ")
 
 
-HERE = "Along y at (0, 0.25) m this device renders walls of up to"
+FIVE_BAR_OPENING = "Along y at (0, 0.25) m this device renders walls of up to"
 BY_DRIVES = (
-    "What limits it is the flexibility of the drives, at 101.3 Hz and 130.8 Hz: with rigid drives it would reach"
+    "What limits it is the flexibility of the drives, at 101.3 Hz and 130.8 Hz: with rigid drives, which cannot "
+    "be built, it would reach"
 )
-BY_SPRING = "it is its flexibility, at 130.7 Hz: if it were rigid it would reach"
+BY_SPRING = "it is its flexibility, at 130.7 Hz: with a rigid structure, which cannot be built, it would reach"
 ONE_LATE = "with one sample of delay it would"
 
-RENDERS = [
-    (lambda: facts("five-bar"), f"{HERE} 7.849 kN/m, at 10.82 Ns/m of virtual damping."),
-    (lambda: facts("five-bar", LATE), f"{HERE} 1.708 kN/m, at 3.216 Ns/m of virtual damping."),
+STIFFNESS_SENTENCES = [
+    (lambda: facts("five-bar"), f"{FIVE_BAR_OPENING} 7.849 kN/m, at 10.82 Ns/m of virtual damping."),
+    (lambda: facts("five-bar", LATE), f"{FIVE_BAR_OPENING} 1.708 kN/m, at 3.216 Ns/m of virtual damping."),
     (
         lambda: facts("five-bar", position=(0.02, 0.2), direction=(-1.0, 0.0)),
         "Along −x at (0.02, 0.2) m this device renders walls of up to ",
@@ -93,7 +97,7 @@ RENDERS = [
     ),
     (
         lambda: facts("hapkit-course", FILTER),
-        "This device renders walls of up to 2.011 kN/m, those without any virtual damping; every bit",
+        "This device renders walls of up to 2.011 kN/m, at no virtual damping; any damping lowers the largest",
     ),
     (
         lambda: facts("published-two-mass", UNDAMPED, LATE),
@@ -102,9 +106,9 @@ RENDERS = [
 ]
 
 
-@pytest.mark.parametrize(("of", "text"), RENDERS)
+@pytest.mark.parametrize(("of", "text"), STIFFNESS_SENTENCES)
 def test_what_it_renders(of, text):
-    assert plain(sentences.renders(of())).startswith(text)
+    assert plain(sentences.largest_stiffness(of())).startswith(text)
 
 
 LIMIT = [
@@ -113,11 +117,13 @@ LIMIT = [
     (lambda: facts("five-bar", LATE), f"{BY_DRIVES} 26.53 kN/m."),
     (
         lambda: facts("five-bar", *RIGID),
-        "What limits it is its mass of 0.2870 kg, sampled at 800 Hz: sampled twice as fast it would reach 504.2",
+        "What limits it is the sampling of its mass of 0.2870 kg at 800 Hz: sampled twice as fast it would "
+        "reach 504.2",
     ),
     (
         lambda: facts("five-bar", *RIGID, LATE),
-        "What limits it is the delay of 1 sample (1.25 ms): without this delay it would reach 126.0 kN/m.",
+        "What limits it is the delay of 1 sample (1.25 ms): without any delay, which can only be approached, it "
+        "would reach 126.0 kN/m.",
     ),
     (
         lambda: facts("five-bar", FILTER),
@@ -125,12 +131,12 @@ LIMIT = [
     ),
     (
         lambda: one_mass(0.1, 9.347, 1669590.0),
-        "What limits it is how little it damps its own vibrations: with twice the structural damping it",
+        "What limits it is its low structural damping: with twice the structural damping it",
     ),
-    (lambda: held_back(), "None of the single changes tried lets it render a stiffer wall"),
+    (lambda: reversed_sensor_facts(), "None of the single changes tried lets it render a stiffer wall"),
     (
         lambda: far_sensor(),
-        "What limits it is that the sensor does not sit where the wall acts: with the sensor at the actuator it "
+        "What limits it is that the sensor is not where the wall acts: with the sensor at the actuator it "
         "would reach",
     ),
     (
@@ -146,33 +152,65 @@ def test_what_limits_it(of, text):
     assert plain(sentences.limit(of())).startswith(text)
 
 
-VIBRATION = [
-    (lambda: facts("five-bar"), "A stiffer wall vibrates at 170.5 Hz."),
-    (lambda: facts("published-two-mass", LATE), "There two vibrations set in at once, at 9.628 Hz and 135.3 Hz."),
+OSCILLATION = [
+    (lambda: facts("five-bar"), "At the limit it oscillates at 170.5 Hz."),
     (
-        lambda: one_mass(0.03, 300.0),
-        "A stiffer wall makes the force alternate from sample to sample, at 500.0 Hz.",
+        lambda: facts("published-two-mass", LATE),
+        "At the limit two oscillations begin at once, at 9.628 Hz and 135.3 Hz.",
     ),
+    (lambda: one_mass(0.03, 300.0), "At the limit the force alternates from sample to sample, at 500.0 Hz."),
+    (lambda: reversed_sensor_facts(), "Beyond the limit the handle drifts away without oscillating."),
     (lambda: facts("published-two-mass", UNDAMPED, LATE), ""),
 ]
 
 
-@pytest.mark.parametrize(("of", "text"), VIBRATION)
-def test_at_which_vibration(of, text):
-    assert plain(sentences.vibration(of())) == text
+@pytest.mark.parametrize(("of", "text"), OSCILLATION)
+def test_what_happens_at_the_limit(of, text):
+    assert plain(sentences.oscillation(of())) == text
 
 
-NEXT = [
-    (lambda: facts("five-bar"), "The next best single change, half the sampling period, would reach 42.08 kN/m."),
-    (lambda: facts("five-bar", LATE), "The next best single change, no delay, would reach 7.849 kN/m."),
+NEXT_CHANGE_SENTENCES = [
+    (
+        lambda: facts("five-bar"),
+        "The best of the changes tried that can be made, half the sampling period, would reach 42.08 kN/m.",
+    ),
+    (
+        lambda: facts("five-bar", LATE),
+        "The best of the changes tried that can be made, half the sampling period, would reach 6.127 kN/m.",
+    ),
+    (
+        lambda: facts("hapkit-course"),
+        "The next best single change, twice the friction, would reach 23.34 kN/m.",
+    ),
     (lambda: facts("five-bar", *RIGID), ""),
-    (lambda: held_back(), ""),
+    (lambda: reversed_sensor_facts(), ""),
 ]
 
 
-@pytest.mark.parametrize(("of", "text"), NEXT)
-def test_the_runner_up(of, text):
+@pytest.mark.parametrize(("of", "text"), NEXT_CHANGE_SENTENCES)
+def test_the_best_change_that_can_be_made(of, text):
     assert plain(sentences.next_best(of())) == text
+
+
+def test_the_next_best_change_may_be_ideal_or_none_may_gain():
+    here = facts("five-bar", FILTER)
+    assert limiting_change(here.variants).key == "no-filter"
+
+    def of(**stiffest):
+        changed = [
+            replace(v, chart=SimpleNamespace(stiffness_max=stiffest[key]))
+            for v in here.variants
+            if (key := v.key.replace("-", "_")) in stiffest
+        ]
+        return SimpleNamespace(variants=(here.base, *changed), base=here.base)
+
+    best = here.base.stiffness_max
+    ideal = of(half_period=3.0 * best, no_delay=2.0 * best)
+    assert sentences.next_best(ideal).startswith(
+        "The next best single change, no delay (which can only be approached), would reach"
+    )
+    only_ideal = of(rigid_drives=3.0 * best, no_delay=2.0 * best, half_period=1.001 * best)
+    assert plain(sentences.next_best(only_ideal)) == "None of the changes tried that can be made gains 1 %."
 
 
 def test_separate_regions_are_counted():
@@ -183,31 +221,43 @@ def test_separate_regions_are_counted():
 
 def test_unobserved_motions_are_named():
     assert sentences.unobserved(facts("hapkit-course")) == ""
-    assert "rigid motion (0 Hz)" in sentences.unobserved(facts("five-bar"))
+    assert sentences.unobserved(facts("five-bar")) == (
+        "The rigid motion (0 Hz) is not affected by a wall in this direction and left out of the stability test."
+    )
+    stable = unstable_mode_facts(1.0, 50.0)
+    assert re.fullmatch(
+        r"The mode at \S+ Hz.* is not affected by a wall and left out of the stability test\.",
+        plain(sentences.unobserved(stable)),
+    )
+    both = SimpleNamespace(
+        runs_away=False, posture=None, chart=SimpleNamespace(unobserved_modes=["mode at 9 Hz"] * 2)
+    )
+    assert sentences.unobserved(both).startswith("2 modes at 9 Hz are not affected by a wall and left out")
 
 
 def test_equal_motions_are_counted():
-    assert counted(["rigid motion (0 Hz)"] * 2) == ["2 rigid motions (0 Hz)"]
-    assert counted(["mode at 9 Hz (x)", "mode at 8 Hz"]) == ["mode at 9 Hz (x)", "mode at 8 Hz"]
+    assert group_names(["rigid motion (0 Hz)"] * 2) == ["2 rigid motions (0 Hz)"]
+    assert group_names(["mode at 9 Hz (x)", "mode at 8 Hz"]) == ["mode at 9 Hz (x)", "mode at 8 Hz"]
 
 
 def test_a_device_that_runs_away_is_warned_of_first():
-    for of in (runaway(), runaway(-1.0, 50.0), runaway(-1.0, 0.0)):
-        assert sentences.summary(of)[0].startswith("Warning: this device runs away whatever the wall")
+    for of in (unstable_mode_facts(), unstable_mode_facts(-1.0, 50.0), unstable_mode_facts(-1.0, 0.0)):
+        assert sentences.summary(of)[0].startswith("Warning: this device is unstable with any wall")
         assert sentences.unobserved(of) == ""
-    for of in (runaway(1.0, 50.0), runaway(1.0, 0.0), facts("five-bar")):
+    for of in (unstable_mode_facts(1.0, 50.0), unstable_mode_facts(1.0, 0.0), facts("five-bar")):
         assert sentences.warning(of) == ""
 
 
 def test_what_happens_outside_depends_on_the_edge():
-    assert "the straight edge at K = 0 (0 Hz), the handle drifts away" in sentences.outside(facts("five-bar"))
+    at_zero = plain(sentences.outside(facts("five-bar")))
+    assert "the straight edge at K = 0 (0 Hz), the handle drifts away" in at_zero
     assert "at K = −5.000 kN/m (0 Hz)" in plain(sentences.outside(one_mass(0.1, 1.0, 5000.0)))
 
 
 @pytest.mark.parametrize("of", [lambda: facts("five-bar"), lambda: facts("five-bar", LATE), far_sensor])
 def test_up_to_is_the_limit_in_four_digits(of):
     found = of()
-    (kilo,) = re.search(r"up to ([\d.]+) kN/m", plain(sentences.renders(found))).groups()
+    (kilo,) = re.search(r"up to ([\d.]+) kN/m", plain(sentences.largest_stiffness(found))).groups()
     assert 1e3 * float(kilo) == pytest.approx(float(f"{found.base.stiffness_max:.3e}"), rel=1e-12)
 
 
@@ -241,10 +291,26 @@ def test_the_fastest_wall():
     assert sentences.decay(facts("published-two-mass", UNDAMPED, LATE)) == ""
 
 
-def test_conditions_that_hold_are_named():
-    assert "the assumptions of none of these" in sentences.conditions(facts("five-bar"))
+def test_conditions_that_apply_are_named():
+    assert sentences.conditions(facts("five-bar")) == (
+        "None of these 18 published conditions applies to this device."
+    )
     assert "“passive wall”" in sentences.conditions(facts("hapkit-course"))
     assert "“rigid mass”" in sentences.conditions(facts("five-bar", *RIGID))
+    holds, fails = SimpleNamespace(name="a", holds=True), SimpleNamespace(name="b", holds=False)
+    one = sentences.conditions(SimpleNamespace(bounds=(holds, fails)))
+    assert one == "1 of these 2 published conditions applies to this device: “a”."
+
+
+def test_conditions_that_do_not_apply_are_counted():
+    assert sentences.conditions_not_met(facts("five-bar")).startswith("18 of 18 do not apply: what they would")
+    holding = sum(bound.holds for bound in facts("hapkit-course").bounds)
+    assert sentences.conditions_not_met(facts("hapkit-course")).startswith(f"{18 - holding} of 18 do not apply")
+    holds, fails = SimpleNamespace(holds=True), SimpleNamespace(holds=False)
+    assert sentences.conditions_not_met(SimpleNamespace(bounds=(holds, fails))).startswith(
+        "1 of 2 does not apply: what it would promise"
+    )
+    assert sentences.conditions_not_met(SimpleNamespace(bounds=(holds,))) == ""
 
 
 SETTING = [
@@ -280,12 +346,12 @@ def test_directions(direction, name):
 
 def test_the_summary_leads_with_what_and_why():
     said = sentences.summary(facts("five-bar"))
-    assert said[0] == sentences.renders(facts("five-bar"))
+    assert said[0] == sentences.largest_stiffness(facts("five-bar"))
     assert said[1] == sentences.limit(facts("five-bar"))
     assert all(sentence.endswith(".") for sentence in said)
 
 
-FIRST = [
+FIRST_CHANGE_SENTENCES = [
     (
         lambda: facts("five-bar"),
         "What to change first is loop.sampling_period_s: 1 % less of it gives 2.661 % more stiffness, 208.8 N/m; "
@@ -302,41 +368,118 @@ FIRST = [
         "then plant.mass_kg (1 % more gives 1.202 %) and plant.stiffness_N_per_m (1 % less gives 0.6483 %).",
     ),
     (
-        lambda: held_back(),
+        lambda: reversed_sensor_facts(),
         "What to change first is plant.stiffness_N_per_m: 1 % more of it gives 1.000 % more stiffness, 5.000 N/m.",
     ),
     (lambda: facts("published-two-mass", UNDAMPED, LATE), ""),
 ]
 
 
-@pytest.mark.parametrize(("of", "text"), FIRST)
+@pytest.mark.parametrize(("of", "text"), FIRST_CHANGE_SENTENCES)
 def test_what_to_change_first(of, text):
-    said = plain(answers.first_change(of()))
+    said = plain(sentences.first_change(of()))
     assert said.startswith(text)
     assert bool(said) == bool(text)
 
 
-def test_another_summit_is_spoken_of_where_it_is_near():
+COMPARISONS = [
+    (
+        lambda: facts("five-bar"),
+        "“What limits it” asks for the cause and names another: the flexibility of the drives, at 101.3 Hz and "
+        "130.8 Hz. No drives are rigid, and with 1 % stiffer drives the largest stiffness falls by 0.3303 %.",
+    ),
+    (
+        lambda: facts("published-two-mass"),
+        "“What limits it” asks for the cause and names another: its flexibility, at 130.7 Hz. No structure is "
+        "rigid, and with a 1 % stiffer structure the largest stiffness falls by 0.6483 %.",
+    ),
+    (lambda: facts("hapkit-course"), "“What limits it” names the same cause."),
+    (
+        lambda: one_mass(0.1, 9.347, 1669590.0),
+        "“What limits it” asks for the cause and names another: its low structural damping. With 1 % more "
+        "structural damping the largest stiffness rises by",
+    ),
+    (
+        lambda: far_sensor(),
+        "“What limits it” asks for the cause and names another: that the sensor is not where the wall acts.",
+    ),
+    (lambda: reversed_sensor_facts(), ""),
+    (lambda: facts("published-two-mass", UNDAMPED, LATE), ""),
+]
+
+
+@pytest.mark.parametrize(("of", "text"), COMPARISONS)
+def test_the_cause_and_the_change_are_compared(of, text):
+    said = plain(sentences.compare_answers(of()))
+    assert said.startswith(text)
+    assert bool(said) == bool(text)
+
+
+STEPS = [
+    ("no-delay", "loop.delay_samples", -0.5, "A delay can be shortened but not removed, and with 1 % less delay"),
+    ("no-filter", "loop.velocity.filter.time_constant_s", -0.5, "With a 1 % faster filter"),
+    ("no-filter", "loop.velocity.filter.cutoff_Hz", 0.5, "With a 1 % faster filter"),
+    ("half-period", "loop.sampling_period_s", -0.5, "With a 1 % shorter sampling period"),
+    ("twice-damping", "mechanism.damping.mode_ratio", 0.5, "With 1 % more structural damping"),
+]
+
+
+@pytest.mark.parametrize(("key", "path", "slope", "text"), STEPS)
+def test_a_first_step_towards_the_cause(key, path, slope, text):
+    here = facts("five-bar", LATE)
+
+    def said(slope):
+        chart = SimpleNamespace(stiffness_max=9.0 * here.base.stiffness_max)
+        variant = Variant(key, "twice the structural damping", None, chart)
+        number = Sensitivity(path, 1.0, "", slope, nan, 0.0)
+        found = SimpleNamespace(ranking=(("plant.mass_kg", 5.0),), numbers=(number,))
+        of = SimpleNamespace(
+            variants=(here.base, variant), sensitivities=found, loop=here.loop, device=here.device,
+            natural_frequencies=here.natural_frequencies, effective=here.effective,
+        )  # fmt: skip
+        return plain(sentences.compare_answers(of))
+
+    assert said(slope).endswith(f"{text} the largest stiffness rises by 0.5000 %.")
+    assert said(-slope).endswith("the largest stiffness falls by 0.5000 %.")
+    assert said(0.0).endswith("the largest stiffness stays the same.")
+    assert "the largest stiffness" not in said(nan)
+
+
+def test_the_same_number_in_the_other_direction_is_another_cause():
+    here = facts("five-bar")
+    path = "mechanism.drives.motor-left.stiffness_Nm_per_rad"
+    for slope, same in ((9.0, True), (-9.0, False)):
+        number = Sensitivity(path, 1.0, "", slope, 1.0, 0.0)
+        found = SimpleNamespace(ranking=((path, slope),), numbers=(number,))
+        of = SimpleNamespace(
+            variants=here.variants, sensitivities=found, loop=here.loop, device=here.device,
+            natural_frequencies=here.natural_frequencies, effective=here.effective,
+        )  # fmt: skip
+        assert (sentences.compare_answers(of) == "“What limits it” names the same cause.") == same
+
+
+def test_another_peak_is_mentioned_where_it_is_nearly_as_high():
     here = facts("published-two-mass")
-    assert answers.summit(here) == ""
+    assert sentences.second_peak(here) == ""
     for share, text in (
         (0.85, ""),
-        (0.95, "Another summit of the edge stands at 6.777 kN/m: "),
-        (1.0, "Two walls"),
+        (0.95, "Another peak of the edge is at 6.777 kN/m: "),
+        (1.0, "The edge has two equal peaks"),
     ):
-        of = SimpleNamespace(base=here.base, answers=replace(here.answers, rival=share * here.base.stiffness_max))
-        assert plain(answers.summit(of)).startswith(text)
-        assert bool(answers.summit(of)) == bool(text)
+        found = replace(here.sensitivities, second_peak=share * here.base.stiffness_max)
+        of = SimpleNamespace(base=here.base, sensitivities=found)
+        assert plain(sentences.second_peak(of)).startswith(text)
+        assert bool(sentences.second_peak(of)) == bool(text)
 
 
 FELT = [
     (
         lambda: facts("five-bar"),
-        "At rest the hand feels the stiffest wall with 4.713 kN/m, 60.04 % of its stiffness; whatever is "
+        "At rest the stiffest wall is felt as 4.713 kN/m, 60.04 % of its stiffness; whatever is "
         "commanded, nothing stiffer than 11.79 kN/m can be felt.",
     ),
-    (lambda: facts("published-two-mass"), "At rest the hand feels the stiffest wall with 4.897 kN/m, 68.65 % of"),
-    (lambda: facts("hapkit-course"), "Nothing gives way between the wall and the hand: at rest a wall is felt as"),
+    (lambda: facts("published-two-mass"), "At rest the stiffest wall is felt as 4.897 kN/m, 68.65 % of"),
+    (lambda: facts("hapkit-course"), "Nothing between wall and handle is flexible: at rest a wall is felt as"),
     (lambda: facts("five-bar", model="motor-mass"), ""),
     (lambda: facts("published-two-mass", UNDAMPED, LATE), ""),
 ]
@@ -344,49 +487,51 @@ FELT = [
 
 @pytest.mark.parametrize(("of", "text"), FELT)
 def test_what_the_hand_feels(of, text):
-    said = plain(answers.felt(of()))
+    said = plain(sentences.felt(of()))
     assert said.startswith(text)
     assert bool(said) == bool(text)
 
 
-ALIKE = "within 10 % of it in stiffness, damping and frequency"
-WHICH = [
+ALIKE = "within 10 % in stiffness, damping and frequency"
+AGREEING = f"Simpler models that agree with it {ALIKE}:"
+MODEL_SENTENCES = [
     (
         lambda: facts("published-two-mass"),
-        "The walls of the full model fail at up to 211.9 Hz, 1.621 times its first natural frequency of 130.7 Hz. "
-        f"There are {ALIKE}: rigid below 20.29 Hz (15.52 % of that); motor mass with damping above 144.9 Hz "
-        "(110.9 % of that); and nowhere motor mass without damping.",
+        "Along its edge the full model oscillates at up to 211.9 Hz, 1.621 times its first natural frequency of "
+        f"130.7 Hz. {AGREEING} rigid below 20.29 Hz (15.52 % of that); motor mass with damping above 144.9 Hz "
+        "(110.9 % of that); motor mass without damping nowhere.",
     ),
     (
         lambda: facts("five-bar", LATE),
-        "The walls of the full model fail at up to 138.2 Hz, 1.364 times its first natural frequency of 101.3 Hz. "
-        f"There are {ALIKE}: rigid below 17.46 Hz (17.23 % of that); two masses with damping below 9.959 Hz "
-        "(9.831 % of that); and nowhere motor mass with damping, motor mass without damping and two masses "
-        "without damping.",
+        "Along its edge the full model oscillates at up to 138.2 Hz, 1.364 times its first natural frequency of "
+        f"101.3 Hz. {AGREEING} rigid below 17.46 Hz (17.23 % of that); two masses with damping below 9.959 Hz "
+        "(9.831 % of that); motor mass with damping, motor mass without damping and two masses "
+        "without damping nowhere.",
     ),
     (lambda: facts("hapkit-course"), ""),
     (lambda: facts("published-two-mass", UNDAMPED, LATE), ""),
 ]
 
 
-@pytest.mark.parametrize(("of", "text"), WHICH)
+@pytest.mark.parametrize(("of", "text"), MODEL_SENTENCES)
 def test_which_model_where(of, text):
-    assert plain(answers.which_model(of())) == text
+    assert plain(sentences.which_model(of())) == text
 
 
-def test_a_model_that_fits_everywhere_between_or_not_at_all():
-    here = facts("published-two-mass").fits
+def test_a_model_that_agrees_everywhere_between_or_not_at_all():
+    here = facts("published-two-mass").validity
     low, high = float(here.frequency[0]), float(here.frequency[-1])
 
-    def said(*within, natural=here.first_natural):
-        fit = replace(here.fits[0], within=within)
-        return plain(answers.which_model(SimpleNamespace(fits=replace(here, fits=(fit,), first_natural=natural))))
+    def said(*ranges, natural=here.first_natural):
+        fit = replace(here.fits[0], valid_ranges=ranges)
+        changed = replace(here, fits=(fit,), first_natural=natural)
+        return plain(sentences.which_model(SimpleNamespace(validity=changed)))
 
-    assert said((low, high)).endswith(f"There is {ALIKE}: rigid everywhere.")
+    assert said((low, high)).endswith(f"{AGREEING} rigid everywhere.")
     assert said((3.0, 9.0)).endswith("rigid between 3.000 Hz and 9.000 Hz.")
     both = said((low, 5.0), (150.0, high))
     assert both.endswith("below 5.000 Hz (3.825 % of that) and above 150.0 Hz (114.7 % of that).")
-    assert said().endswith(f"None of the simpler models is {ALIKE}, at any frequency.")
+    assert said().endswith(f"None of the simpler models agrees with it {ALIKE}, at any frequency.")
     assert "natural" not in said((low, 5.0), natural=np.nan)
     assert said((low, 5.0), natural=np.nan).endswith("rigid below 5.000 Hz.")
 
@@ -394,7 +539,7 @@ def test_a_model_that_fits_everywhere_between_or_not_at_all():
 def test_what_is_not_linear_is_said_to_be_left_out():
     assert sentences.left_out(facts("hapkit-course")) == ""
     said = sentences.left_out(facts("hapkit-course", "friction.coulomb_N=0.1"))
-    assert said == "All of this is linear and leaves out dry friction; zwidth simulate has them."
+    assert said == "All of this is linear and leaves out dry friction, which zwidth simulate includes."
     both = facts("hapkit-course", "friction.coulomb_N=0.1", "loop.saturation.force_N=5")
-    assert "leaves out dry friction and the force limit;" in sentences.left_out(both)
+    assert "leaves out dry friction and the force limit," in sentences.left_out(both)
     assert sentences.summary(both)[-1] == sentences.left_out(both)

@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 from matplotlib.collections import LineCollection, QuadMesh
 
-from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS
-from zwidth.show.figures.parallel import _lines
+from zwidth.measures.definition import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS
+from zwidth.show.figures.parallel_coordinates import _lines
 from zwidth.show.figures.study import study_figure
 from zwidth.show.figures.style import save
 
@@ -53,7 +53,7 @@ def hypercube(count=30, lost=0):
     return xr.Dataset({"mass": ("design", values, about), "mass_status": ("design", status)}, coords)
 
 
-def drawn(made):
+def panels_of(made):
     """The panels, colour bars left out, after drawing."""
     made.canvas.draw()
     return [ax for ax in made.axes if not hasattr(ax, "_colorbar")]
@@ -66,7 +66,7 @@ def texts(made):
 
 def test_curves_over_one_axis_a_panel_for_each_column():
     data = dataset("length_m")
-    panels = drawn(study_figure(data))
+    panels = panels_of(study_figure(data))
     assert len(panels) == 2
     for panel, name in zip(panels, ("stiffness", "mass"), strict=True):
         (line,) = panel.lines
@@ -79,7 +79,7 @@ def test_curves_over_one_axis_a_panel_for_each_column():
 def test_a_line_for_each_assembly_in_order_of_the_legend():
     data = dataset("assembly", "length_m", columns=("mass",))
     made = study_figure(data)
-    (panel,) = drawn(made)
+    (panel,) = panels_of(made)
     assert texts(made) == [f"assembly {name}" for name in NAMES]
     for line, name in zip(panel.lines, NAMES, strict=True):
         assert np.array_equal(line.get_ydata(), data["mass"].sel(assembly=name))
@@ -90,7 +90,7 @@ def test_a_line_for_each_assembly_in_order_of_the_legend():
 def test_gaps_are_marked_below_all_curves(lost):
     data = dataset("assembly", "length_m", columns=("mass",), lost=lost)
     made = study_figure(data)
-    (panel,) = drawn(made)
+    (panel,) = panels_of(made)
     assert STATUS[lost] in texts(made)
     feet = [
         line
@@ -107,7 +107,7 @@ def test_gaps_are_marked_below_all_curves(lost):
 
 def test_texts_alone_are_points():
     data = dataset("assembly", columns=("mass",))
-    (panel,) = drawn(study_figure(data))
+    (panel,) = panels_of(study_figure(data))
     (line,) = panel.lines
     assert line.get_linestyle() == "None"
     assert [label.get_text() for label in panel.get_xticklabels()] == NAMES
@@ -116,7 +116,7 @@ def test_texts_alone_are_points():
 def test_heat_maps_over_two_axes_each_cell_in_its_place():
     data = dataset("period_s", "length_m", lost=FAILED)
     made = study_figure(data)
-    panels = drawn(made)
+    panels = panels_of(made)
     assert len(panels) == 2
     assert texts(made) == ["failed"]
     for panel, name in zip(panels, ("stiffness", "mass"), strict=True):
@@ -140,7 +140,7 @@ def test_heat_maps_over_two_axes_each_cell_in_its_place():
 
 def test_heat_maps_of_each_assembly_have_one_scale():
     data = dataset("length_m", "period_s", "assembly", columns=("mass",))
-    panels = drawn(study_figure(data))
+    panels = panels_of(study_figure(data))
     assert [panel.get_title(loc="left") for panel in panels] == [f"assembly {name}" for name in NAMES]
     norms = [next(c for c in panel.collections if isinstance(c, QuadMesh)).norm.boundaries for panel in panels]
     assert all(np.array_equal(norm, norms[0]) for norm in norms)
@@ -148,7 +148,7 @@ def test_heat_maps_of_each_assembly_have_one_scale():
 
 def test_parallel_coordinates_have_an_upright_for_each_axis_and_column():
     made = study_figure(hypercube(lost=4))
-    (panel,) = drawn(made)
+    (panel,) = panels_of(made)
     names = [text.get_text() for text in panel.texts]
     assert {"length_m [m]", "assembly", "Rigid mass [kg]", "4 without", "colour: rigid mass"} <= set(names)
     assert not any("tied" in name for name in names)
@@ -168,7 +168,7 @@ def test_a_grid_of_many_axes_is_drawn_by_parallel_coordinates():
     data = dataset("length_m", "period_s", "assembly", columns=("stiffness", "mass", "ratio"))
     data = data.expand_dims(model=["full", "rigid"])
     data["model"].attrs.update(units="", long_name="model", role="axis")
-    (panel,) = drawn(study_figure(data))
+    (panel,) = panels_of(study_figure(data))
     lines = [found for found in panel.collections if isinstance(found, LineCollection)]
     assert len(lines[0].get_segments()) == 2 * 5 * 4 * 3
 
@@ -182,16 +182,16 @@ def test_a_study_in_which_nothing_has_a_value_is_drawn_all_the_same(axes):
         data[name] = data[name] * np.nan
         data[f"{name}_status"] = data[f"{name}_status"] * 0 + FAILED
         data[name].attrs = {"unit": "kg", "title": "Mass"}
-    drawn(study_figure(data))
+    panels_of(study_figure(data))
 
 
 def test_one_design_is_drawn():
-    drawn(study_figure(dataset("length_m", "period_s").isel(length_m=[0], period_s=[0])))
-    drawn(study_figure(dataset("length_m").isel(length_m=[0])))
+    panels_of(study_figure(dataset("length_m", "period_s").isel(length_m=[0], period_s=[0])))
+    panels_of(study_figure(dataset("length_m").isel(length_m=[0])))
 
 
 def test_a_logarithmic_axis_is_numbered_below_the_last_panel_only():
-    upper, lower = drawn(study_figure(dataset("period_s")))
+    upper, lower = panels_of(study_figure(dataset("period_s")))
     assert upper.get_xscale() == lower.get_xscale() == "log"
     shown = [
         [text.get_text() for text in panel.get_xticklabels(which="both") if text.get_visible() and text.get_text()]
@@ -204,7 +204,7 @@ def test_a_logarithmic_axis_is_numbered_below_the_last_panel_only():
 
 def test_an_axis_of_one_value_is_told_beside_the_curves():
     made = study_figure(dataset("length_m", "period_s", columns=("mass",)).isel(length_m=[2]))
-    (panel,) = drawn(made)
+    (panel,) = panels_of(made)
     assert panel.get_xlabel().startswith("period_s")
     assert len(panel.lines) == 1
     assert texts(made)[0].startswith("length_m 0.")
@@ -225,7 +225,7 @@ def test_values_listed_in_any_order_are_drawn_in_theirs():
     data = dataset("length_m", "period_s", columns=("mass",))
     mixed = data.isel(length_m=[3, 0, 4, 1, 2], period_s=[1, 0, 3, 2])
     meshes = [
-        next(c for c in drawn(study_figure(one))[0].collections if isinstance(c, QuadMesh))
+        next(c for c in panels_of(study_figure(one))[0].collections if isinstance(c, QuadMesh))
         for one in (data, mixed)
     ]
     assert np.array_equal(meshes[0].get_array(), meshes[1].get_array())

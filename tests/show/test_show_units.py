@@ -14,7 +14,7 @@ from zwidth.show.units import (
     PREFIXES,
     amount,
     area_text,
-    given,
+    as_written,
     number,
     percent,
     point,
@@ -90,14 +90,14 @@ def test_changes_shares_and_errors():
 
 @over(st.floats(1e-12, 1e15))
 def test_damping_takes_no_prefix(value):
-    assert all(write(value, "Ns/m").endswith("\u00a0Ns/m") for write in (quantity, given))
+    assert all(write(value, "Ns/m").endswith("\u00a0Ns/m") for write in (quantity, as_written))
     assert scaled(-3, "Ns/m") == "10⁻³\u00a0Ns/m"
     assert (scaled(3, "N/m"), scaled(9, "N/m")) == ("kN/m", "10⁹\u00a0N/m")
 
 
 def test_what_somebody_chose_is_not_padded():
-    assert given(0.00125, "s") == "1.25\u00a0ms"
-    assert given(1000.0, "Hz") == "1\u00a0kHz"
+    assert as_written(0.00125, "s") == "1.25\u00a0ms"
+    assert as_written(1000.0, "Hz") == "1\u00a0kHz"
 
 
 def test_points():

@@ -30,8 +30,8 @@ from collections.abc import Iterator
 from dataclasses import asdict
 
 from tests.revisions import WORKING_TREE, texts_below, tree_of
-from tests.structure.counts import MOST_ARGUMENTS, Structure, structure
 from tests.structure.modules import modules_of
+from tests.structure.structure_numbers import MOST_ARGUMENTS, Structure, structure
 
 UNKNOWN = "-"
 
@@ -61,16 +61,16 @@ def structure_of(label: str, folder: str, left_out: list[str]) -> Structure:
 
 def number_rows(before: Structure, after: Structure) -> Iterator[tuple[str, str, str]]:
     """Rows of the table of numbers: what, before, after."""
-    for what in joined(before.numbers, after.numbers):
+    for what in merged_keys(before.numbers, after.numbers):
         yield what, text_of(before, what), text_of(after, what)
 
 
 def name_lines(before: Structure, after: Structure) -> Iterator[str]:
     """Names under the heading of their number, with what is said of each: "-" before only, "+" after only."""
-    for what in joined(before.lists, after.lists):
+    for what in merged_keys(before.lists, after.lists):
         old, new = before.lists.get(what, {}), after.lists.get(what, {})
         yield from ("", what)
-        for name in joined(old, new):
+        for name in merged_keys(old, new):
             if old.get(name) == new.get(name):
                 yield f"  {name}: {new[name]}"
             else:
@@ -79,7 +79,7 @@ def name_lines(before: Structure, after: Structure) -> Iterator[str]:
                 )
 
 
-def joined(old: dict[str, object], new: dict[str, object]) -> list[str]:
+def merged_keys(old: dict[str, object], new: dict[str, object]) -> list[str]:
     """Keys of both: the new ones in their order, each old one that is gone after the one that it stood behind."""
     keys = list(new)
     for i, key in enumerate(old):

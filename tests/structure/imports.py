@@ -30,7 +30,7 @@ def import_graph(modules: list[Module], left_out: Collection[str] = ()) -> dict[
 
 def circles(graph: Graph) -> list[list[str]]:
     """Groups of modules that import each other, directly or through others, the largest first."""
-    reached = {name: _reached(graph, name) for name in graph}
+    reached = {name: _imported_modules(graph, name) for name in graph}
     groups = {tuple(sorted(other for other in reached[name] if name in reached[other])) for name in graph}
     return sorted((list(group) for group in groups if group), key=lambda group: (-len(group), group))
 
@@ -43,7 +43,7 @@ def single_importers(graph: Graph) -> dict[str, str]:
     }
 
 
-def _reached(graph: Graph, start: str) -> set[str]:
+def _imported_modules(graph: Graph, start: str) -> set[str]:
     """All that a module imports, directly or through others; itself only where it is on a circle."""
     reached: set[str] = set()
     queue = list(graph[start])
@@ -57,7 +57,7 @@ def _reached(graph: Graph, start: str) -> set[str]:
 
 def _imported(module: Module, names: Collection[str]) -> Iterator[str | None]:
     """What a module imports, as the longest name of a module in it; None for what is no module of the package."""
-    for node in _while_running(module.tree):
+    for node in _runtime_nodes(module.tree):
         if isinstance(node, ast.Import):
             yield from (_module_in(alias.name, names) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -71,9 +71,9 @@ def _module_in(name: str, names: Collection[str]) -> str | None:
     return next((one for one in (name, name.rpartition(".")[0]) if one in names), None)
 
 
-def _while_running(node: ast.AST) -> Iterator[ast.AST]:
+def _runtime_nodes(node: ast.AST) -> Iterator[ast.AST]:
     """All nodes but those that only a type checker sees."""
     yield node
     typed = isinstance(node, ast.If) and ast.unparse(node.test).split(".")[-1] == "TYPE_CHECKING"
     for child in node.orelse if typed else ast.iter_child_nodes(node):
-        yield from _while_running(child)
+        yield from _runtime_nodes(child)

@@ -12,7 +12,7 @@ from tests.structure.modules import Function, Module
 
 CONSTANT = re.compile(r"[A-Z][A-Z0-9_]+")
 # What a list of names is put together with; nothing else can be called while `__all__` is worked out.
-PURE: dict[str, Any] = {
+ALLOWED_FUNCTIONS: dict[str, Any] = {
     "__builtins__": {},
     **{f.__name__: f for f in (dict, frozenset, list, map, set, sorted, str, sum, tuple, zip)},
 }
@@ -80,9 +80,9 @@ def public_names(top: Module) -> list[str] | None:
     """The package's `__all__`, sorted; without one its names at the top level that begin with no underscore.
 
     The assignments of the file are worked out one after the other as far as they are made of literals, of each
-    other and of PURE; nothing is imported. Returns None where `__all__` is made of anything else.
+    other and of ALLOWED_FUNCTIONS; nothing is imported. Returns None where `__all__` is made of anything else.
     """
-    known: dict[str, Any] = dict(PURE)
+    known: dict[str, Any] = dict(ALLOWED_FUNCTIONS)
     bound: set[str] = set()
     for node in _top_level(top.tree):
         if isinstance(node, ast.Import | ast.ImportFrom):

@@ -8,8 +8,7 @@ import subprocess
 import pytest
 
 from tests import revisions
-from tests.structure.__main__ import joined, main
-from tests.structure.counts import LONG, structure
+from tests.structure.__main__ import main, merged_keys
 from tests.structure.imports import circles, import_graph, single_importers
 from tests.structure.modules import functions, modules_of
 from tests.structure.names import (
@@ -21,6 +20,7 @@ from tests.structure.names import (
     stub_names,
 )
 from tests.structure.sizes import argument_counts, file_lines, function_lengths, lines_of, percentile
+from tests.structure.structure_numbers import LONG, structure
 
 
 def module(text, path="a.py"):
@@ -34,7 +34,7 @@ def modules(folders=None, **files):
 
 # --- sizes ------------------------------------------------------------------------------------------
 
-COUNTED = '''"""A file.
+SAMPLE_SOURCE = '''"""A file.
 
 Two paragraphs.
 """
@@ -62,7 +62,7 @@ class Wall:
 
 def test_lines_of_code_are_told_from_docstrings_comments_and_blanks():
     # code: x, text of two lines that are not blank, class, def, return and its two lines
-    assert lines_of(module(COUNTED)) == (8, 3 + 1 + 2)
+    assert lines_of(module(SAMPLE_SOURCE)) == (8, 3 + 1 + 2)
 
 
 def test_a_text_that_is_no_docstring_is_code():
@@ -70,7 +70,7 @@ def test_a_text_that_is_no_docstring_is_code():
 
 
 def test_the_lines_of_a_file_are_those_of_wc():
-    assert file_lines([module(COUNTED), module("\n# one\n")]) == COUNTED.count("\n") + 2
+    assert file_lines([module(SAMPLE_SOURCE), module("\n# one\n")]) == SAMPLE_SOURCE.count("\n") + 2
 
 
 def test_functions_are_found_wherever_they_stand():
@@ -334,9 +334,9 @@ def test_a_package_without_functions_or_a_file_of_its_own_has_numbers_too():
 
 
 def test_rows_of_both_stand_in_the_new_order():
-    assert joined({"a": 1, "gone": 1, "b": 1}, {"a": 1, "new": 1, "b": 1}) == ["a", "gone", "new", "b"]
-    assert joined({"gone": 1, "b": 1}, {"b": 1}) == ["gone", "b"]
-    assert joined({"a": 1, "one": 1, "two": 1}, {"a": 1}) == ["a", "one", "two"]
+    assert merged_keys({"a": 1, "gone": 1, "b": 1}, {"a": 1, "new": 1, "b": 1}) == ["a", "gone", "new", "b"]
+    assert merged_keys({"gone": 1, "b": 1}, {"b": 1}) == ["gone", "b"]
+    assert merged_keys({"a": 1, "one": 1, "two": 1}, {"a": 1}) == ["a", "one", "two"]
 
 
 @pytest.fixture

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from zwidth.measures.measure import FAILED, NO_VALUE, OK, MeasureError, Note
-from zwidth.study.job import Cells
+from zwidth.measures.definition import FAILED, NO_VALUE, OK, MeasureError, Note
+from zwidth.study.job import CellValues
 
 LEFT_OUT = "is a multiple of seven"
 
 
 @dataclass
-class Roots:
+class RootsJob:
     """Square root and reciprocal of the cell's number; every seventh has no root, and each of those its note.
 
     seconds  per cell
@@ -26,21 +26,21 @@ class Roots:
     seconds: float = 0.0
     measures: tuple[str, ...] = ("root", "reciprocal")
     question: str = "roots"
-    asked: list[tuple[int, int]] = field(default_factory=list)
+    computed_ranges: list[tuple[int, int]] = field(default_factory=list)
 
     def compute(self, first, last):
-        self.asked.append((first, last))
+        self.computed_ranges.append((first, last))
         time.sleep(self.seconds * (last - first))
         n = np.arange(first, last)
         none = n % 7 == 0
         values = np.stack([np.where(none, np.nan, np.sqrt(n)), 1.0 / (n + 0.1)], axis=-1)
         status = np.stack([np.where(none, NO_VALUE, OK), np.full(n.shape, OK)], axis=-1).astype(np.uint8)
         told = (Note(NO_VALUE, LEFT_OUT, int(none.sum()), (int(n[none][0]),)),) if none.any() else ()
-        return Cells(values, status, (told, ()))
+        return CellValues(values, status, (told, ()))
 
 
 @dataclass
-class Processes(Roots):
+class ProcessNumbersJob(RootsJob):
     """The number of the process that computed each cell, and numbers of its threads."""
 
     def compute(self, first, last):
@@ -48,11 +48,11 @@ class Processes(Roots):
 
         found = super().compute(first, last)
         values = np.tile([float(os.getpid()), float(numba.get_num_threads())], (last - first, 1))
-        return Cells(values, np.full(values.shape, OK, dtype=np.uint8), found.notes)
+        return CellValues(values, np.full(values.shape, OK, dtype=np.uint8), found.notes)
 
 
 @dataclass
-class Deadly(Roots):
+class KilledProcessJob(RootsJob):
     """One whose cell 12 kills the process that computes it, if it is not the first."""
 
     first: int = 0
@@ -64,14 +64,14 @@ class Deadly(Roots):
 
 
 @dataclass
-class Talkative(Roots):
+class PrintingJob(RootsJob):
     def compute(self, first, last):
         print("talkative", flush=True)
         return super().compute(first, last)
 
 
 @dataclass
-class Refusing(Talkative):
+class FailingJob(PrintingJob):
     def compute(self, first, last):
         if first <= 12 < last:
             raise MeasureError("cannot be asked")
@@ -79,16 +79,16 @@ class Refusing(Talkative):
 
 
 @dataclass
-class Odd(Roots):
+class NotedJob(RootsJob):
     """Each cell fails for a reason of its own."""
 
     def compute(self, first, last):
         found = super().compute(first, last)
         notes = tuple(Note(FAILED, f"cell {n}", 1, (n,)) for n in range(first, last))
-        return Cells(found.values, found.status, ((), notes))
+        return CellValues(found.values, found.status, ((), notes))
 
 
-def alike(one: Cells, other: Cells) -> bool:
+def same_cells(one: CellValues, other: CellValues) -> bool:
     """The same bits, and the same notes."""
     return (
         one.values.tobytes() == other.values.tobytes()

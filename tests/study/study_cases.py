@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from zwidth.device.faults import DeviceError
-from zwidth.measures.measure import OK
+from zwidth.measures.definition import OK
 from zwidth.study.study import Study
 from zwidth.study.study_file import study_of
 
 FIVE_BAR, TWO_MASS = "five-bar", "published-two-mass"
-LENGTH, OTHER = "links.upper-right.length_m", "links.upper-left.length_m"
+RIGHT_LENGTH, LEFT_LENGTH = "links.upper-right.length_m", "links.upper-left.length_m"
 
 
 def axis(key: str, *values: Any, **more: Any) -> dict[str, Any]:
@@ -20,12 +20,12 @@ def axis(key: str, *values: Any, **more: Any) -> dict[str, Any]:
     return {"key": key, **({"values": list(values)} if values else {}), **more}
 
 
-def tables(*axes: dict[str, Any], measures: Any = ("rigid_mass",), **more: Any) -> dict[str, Any]:
+def study_document(*axes: dict[str, Any], measures: Any = ("rigid_mass",), **more: Any) -> dict[str, Any]:
     return {"device": FIVE_BAR, "measures": list(measures), "axis": list(axes), **more}
 
 
 def study(*axes: dict[str, Any], **more: Any) -> Study:
-    return study_of(tables(*axes, **more))
+    return study_of(study_document(*axes, **more))
 
 
 def faults(document: dict[str, Any]) -> list[str]:
@@ -37,6 +37,6 @@ def faults(document: dict[str, Any]) -> list[str]:
     return []
 
 
-def kept(values: Any, status: Any) -> bool:
+def numbers_match_status(values: Any, status: Any) -> bool:
     """Is there a number wherever the status is OK, and only there?"""
     return bool((np.isfinite(values) == (status == OK)).all())

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from zwidth.device.load import load
-from zwidth.measures.measure import Measure
-from zwidth.study.common_area import common_area, filled
-from zwidth.study.plane import plane_of
+from zwidth.measures.definition import Measure
+from zwidth.study.common_area import common_area, nonnegative_region
+from zwidth.study.map import workspace_map
+from zwidth.study.plane_grid import plane_of
+from zwidth.study.reach_outline import KEY, reach_outline
 from zwidth.study.requirement import parse_requirement
-from zwidth.study.workspace import workspace_map
 
 MIDDLE = (0.02, 0.2)
 
@@ -68,16 +69,36 @@ def test_the_area_converges_with_the_square_of_the_step(device):
     assert errors[-1] < 1e-4 * np.pi * R**2
 
 
-def test_at_the_edge_of_reach_it_converges_with_the_step():
+def test_at_the_edge_of_reach_it_is_exact_at_any_step():
     """The ring between both arms stretched and folded, of a device whose reach is nothing else."""
     device = load("five-bar", ["mechanism.workspace=unset"])
     ring = np.pi * ((0.147 + 0.199) ** 2 - (0.199 - 0.147) ** 2)
-    errors = []
-    for count in (41, 81, 161):
+    for count in (41, 81):
         found = areas(device, ["height>=-1"], (count, count), x=(-0.36, 0.36), y=(-0.36, 0.36))
-        assert found.common.area == found.reach.area
-        errors.append(1.0 - found.reach.area / ring)
-    assert 0.0 < errors[2] < 0.6 * errors[1] < 0.4 * errors[0] < 0.04
+        assert found.common.area == pytest.approx(found.reach.area, rel=1e-12)
+        assert found.reach.area == pytest.approx(ring, rel=1e-5)
+
+
+def test_a_requirement_met_up_to_the_edge_of_reach_ends_at_that_edge():
+    """A segment of the outer circle: what lies above a line."""
+    device, R, h = load("five-bar", ["mechanism.workspace=unset"]), 0.147 + 0.199, 0.3
+    segment = R**2 * np.arccos(h / R) - h * np.sqrt(R**2 - h**2)
+    errors = []
+    for count in (31, 61, 121):
+        found = areas(device, [f"height>={h}"], (count, count), x=(-0.36, 0.36), y=(-0.36, 0.36))
+        errors.append(abs(found.common.area / segment - 1.0))
+    assert max(errors) < 5e-5
+
+
+def test_where_lengths_alone_do_not_decide_the_edge_is_that_of_the_cells(device):
+    plane = plane_of(device, cells=(41, 41))
+    dataset = workspace_map(device, list(OWN.values()), plane)
+    exact = common_area(dataset, [parse_requirement("height>=-1", OWN)])
+    longer = np.array(dataset.attrs[KEY])
+    longer[4::5] *= 1.2  # links that would reach farther than the postures say
+    staircase = common_area(dataset.assign_attrs({KEY: longer.tolist()}), [parse_requirement("height>=-1", OWN)])
+    assert reach_outline(dataset.assign_attrs({KEY: longer.tolist()}), "height") is None
+    assert staircase.reach.area < exact.reach.area < 1.05 * staircase.reach.area
 
 
 def test_a_hole_is_left_out(device):
@@ -95,17 +116,17 @@ def test_requirements_that_nothing_or_everything_meets(device):
 
 def test_a_bound_that_is_just_met_is_met():
     grid = np.linspace(0.0, 1.0, 5)
-    assert filled(grid, grid, np.zeros((5, 5))).area == pytest.approx(1.0)
-    assert filled(grid, grid, np.full((5, 5), -1e-3)).area == 0.0
-    assert filled(grid, grid, np.full((5, 5), np.nan)).area == 0.0
+    assert nonnegative_region(grid, grid, np.zeros((5, 5))).area == pytest.approx(1.0)
+    assert nonnegative_region(grid, grid, np.full((5, 5), -1e-3)).area == 0.0
+    assert nonnegative_region(grid, grid, np.full((5, 5), np.nan)).area == 0.0
 
 
 def test_infinite_margins_lie_on_their_side():
     grid = np.linspace(0.0, 1.0, 5)
     right = np.broadcast_to(np.where(grid < 0.4, -np.inf, np.inf), (5, 5))
-    assert filled(grid, grid, right).area == pytest.approx(1.0 - 0.375)
+    assert nonnegative_region(grid, grid, right).area == pytest.approx(1.0 - 0.375)
     step = np.broadcast_to(np.where(grid < 0.4, -1.0, np.inf), (5, 5))
-    assert 0.5 <= filled(grid, grid, step).area <= 0.75
+    assert 0.5 <= nonnegative_region(grid, grid, step).area <= 0.75
 
 
 def test_a_cell_without_a_value_is_no_part_of_a_region():
@@ -113,7 +134,7 @@ def test_a_cell_without_a_value_is_no_part_of_a_region():
     margin = np.ones((5, 5))
     margin[2, 2] = np.nan
     # with the point go the halves next to it of its four squares
-    assert filled(grid, grid, margin).area == pytest.approx(1.0 - 4 * 0.5 * 0.25**2)
+    assert nonnegative_region(grid, grid, margin).area == pytest.approx(1.0 - 4 * 0.5 * 0.25**2)
 
 
 def test_the_map_must_hold_the_measures(device):

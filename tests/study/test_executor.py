@@ -10,19 +10,28 @@ import sys
 import numpy as np
 import pytest
 
-from tests.interruption import HANGS, interruptible
-from tests.study.executor_cases import LEFT_OUT, Deadly, Odd, Processes, Refusing, Roots, Talkative, alike
-from zwidth.contact.room import TooLarge
-from zwidth.measures.measure import FAILED, MISSING, NO_VALUE, MeasureError, Note
-from zwidth.study.executor import MORE, merged, run
+from tests.interruption import HANG_TIMEOUT_S, interruptible
+from tests.study.executor_cases import (
+    LEFT_OUT,
+    FailingJob,
+    KilledProcessJob,
+    NotedJob,
+    PrintingJob,
+    ProcessNumbersJob,
+    RootsJob,
+    same_cells,
+)
+from zwidth.measures.definition import FAILED, MISSING, NO_VALUE, MeasureError, Note
+from zwidth.memory_limit import TooLarge
+from zwidth.study.executor import MORE, merge_notes, run
 from zwidth.study.store import Store
-from zwidth.study.workers import WorkerLost, cores, packed
+from zwidth.study.workers import WorkerLost, cores, pack_job
 
-NOW = -1.0  # patience that is over at once
+NO_PATIENCE = -1.0  # patience that is over at once
 
 
 def test_the_cells_are_those_of_the_job():
-    found = run(Roots(100), workers=1)
+    found = run(RootsJob(100), workers=1)
     n = np.arange(100.0)
     assert np.array_equal(found.values[:, 0], np.where(n % 7 == 0, np.nan, np.sqrt(n)), equal_nan=True)
     assert not (found.status == MISSING).any()
@@ -31,13 +40,13 @@ def test_the_cells_are_those_of_the_job():
 
 @pytest.mark.parametrize("batch", [1, 3, 99, 100, 1000, None])
 def test_batches_of_any_size_give_the_same(batch):
-    assert alike(run(Roots(100), workers=1, batch=batch), Roots(100).compute(0, 100))
+    assert same_cells(run(RootsJob(100), workers=1, batch=batch), RootsJob(100).compute(0, 100))
 
 
 def test_processes_give_the_same_and_say_how_far_they_are(capfd):
     told = []
-    found = run(Roots(60), None, lambda *now: told.append(now), 2, batch=7, patience=NOW, stage="roots")
-    assert alike(found, Roots(60).compute(0, 60))
+    found = run(RootsJob(60), None, lambda *now: told.append(now), 2, batch=7, patience=NO_PATIENCE, stage="roots")
+    assert same_cells(found, RootsJob(60).compute(0, 60))
     assert told[0] == ("roots", 0, 60)
     assert told[-1] == ("roots", 60, 60)
     assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
@@ -45,49 +54,49 @@ def test_processes_give_the_same_and_say_how_far_they_are(capfd):
 
 
 def test_processes_take_over_once_the_rest_takes_long():
-    job = Processes(40, seconds=0.01)
+    job = ProcessNumbersJob(40, seconds=0.01)
     found = run(job, workers=2, batch=5, patience=0.1)
     mine = found.values[:, 0] == os.getpid()
     assert mine[:10].all()
     assert not mine[10:].any()
     assert 1 <= len(set(found.values[10:, 0])) <= 2
     assert (found.values[10:, 1] == 1.0).all(), "one thread in each process"
-    quick = run(Processes(40), workers=2, batch=5)
+    quick = run(ProcessNumbersJob(40), workers=2, batch=5)
     assert (quick.values[:, 0] == os.getpid()).all()
 
 
 def test_what_a_job_raises_in_a_process_is_raised(capfd):
     with pytest.raises(MeasureError, match="cannot be asked"):
-        run(Refusing(40), workers=2, batch=5, patience=NOW)
+        run(FailingJob(40), workers=2, batch=5, patience=NO_PATIENCE)
     out, err = capfd.readouterr()
     assert out == 2 * "talkative\n", "what this one prints, before they start"
     assert "Traceback" not in err
-    found = run(Talkative(40), workers=2, batch=5, patience=NOW)
-    assert alike(found, Roots(40).compute(0, 40)), "what they print does not get between their replies"
+    found = run(PrintingJob(40), workers=2, batch=5, patience=NO_PATIENCE)
+    assert same_cells(found, RootsJob(40).compute(0, 40)), "what they print does not get between their replies"
     assert capfd.readouterr().err.count("talkative") == 6
 
 
 def test_a_killed_process_is_one_clear_error_and_what_is_done_is_kept(tmp_path):
-    job, path = Deadly(40, first=os.getpid()), tmp_path / "cells"
+    job, path = KilledProcessJob(40, first=os.getpid()), tmp_path / "cells"
     with pytest.raises(WorkerLost, match=r"was killed .SIGKILL., perhaps for lack of memory; fewer workers"):
-        run(job, Store(path, job), workers=1 + 1, batch=5, patience=NOW)
-    again = Roots(40)
-    kept = [first for first, _ in Store(path, again).kept()]
+        run(job, Store(path, job), workers=1 + 1, batch=5, patience=NO_PATIENCE)
+    again = RootsJob(40)
+    kept = [first for first, _ in Store(path, again).stored_batches()]
     assert kept[:2] == [0, 5]
     assert 10 not in kept
-    assert alike(run(again, Store(path, again), workers=1), Roots(40).compute(0, 40))
-    assert (0, 5) not in again.asked
+    assert same_cells(run(again, Store(path, again), workers=1), RootsJob(40).compute(0, 40))
+    assert (0, 5) not in again.computed_ranges
 
 
 def test_what_another_process_would_not_understand_stays_here():
-    class Local(Processes):
+    class Local(ProcessNumbersJob):
         pass
 
-    assert packed(Local(40)) is None
-    found = run(Local(40), workers=2, batch=5, patience=NOW)
+    assert pack_job(Local(40)) is None
+    found = run(Local(40), workers=2, batch=5, patience=NO_PATIENCE)
     assert (found.values[:, 0] == os.getpid()).all()
     Local.__module__, Local.__qualname__ = "__main__", "Local"
-    assert packed(Local(40)) is None
+    assert pack_job(Local(40)) is None
 
 
 def test_a_script_needs_no_guard(tmp_path):
@@ -96,9 +105,9 @@ def test_a_script_needs_no_guard(tmp_path):
     script.write_text(
         "import sys\n"
         f"sys.path[:0] = {sys.path!r}\n"
-        "from tests.study.executor_cases import Roots\n"
+        "from tests.study.executor_cases import RootsJob\n"
         "from zwidth.study.executor import run\n"
-        "print('once', run(Roots(20), workers=2, batch=5, patience=-1.0).values.shape)\n"
+        "print('once', run(RootsJob(20), workers=2, batch=5, patience=-1.0).values.shape)\n"
     )
     done = subprocess.run([sys.executable, script], capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("once (20, 2)\n", "")
@@ -108,10 +117,10 @@ ENDLESS = """
 import sys
 from pathlib import Path
 sys.path[:0] = {path!r}
-from tests.study.executor_cases import Roots
+from tests.study.executor_cases import RootsJob
 from zwidth.study.executor import run
 from zwidth.study.store import Store
-job = Roots({count}, seconds=0.2)
+job = RootsJob({count}, seconds=0.2)
 def progress(stage, done, of):
     print(done, flush=True)
 run(job, Store(Path("cells"), job), progress, 2, batch=2, patience=0.1)
@@ -137,35 +146,35 @@ def test_ctrl_c_stops_and_leaves_no_process(tmp_path):
     assert len(children) == 2
     assert running.pid not in {os.getpgid(int(child)) for child in children}, "ctrl-C is not for them"
     os.killpg(running.pid, signal.SIGINT)  # as the terminal does
-    _, err = running.communicate(timeout=HANGS)
+    _, err = running.communicate(timeout=HANG_TIMEOUT_S)
     assert err.decode().count("KeyboardInterrupt") == 1, "the processes say nothing"
     for child in children:
         with pytest.raises(ProcessLookupError):
             os.kill(int(child), 0)
-    job = Roots(count)
-    kept = [first for first, _ in Store(tmp_path / "cells", job).kept()]
+    job = RootsJob(count)
+    kept = [first for first, _ in Store(tmp_path / "cells", job).stored_batches()]
     assert len(kept) >= 6
     assert all(first % 2 == 0 for first in kept)
 
 
 def test_what_does_not_fit_into_memory_is_refused_with_its_size():
-    job = Roots(10**13)
+    job = RootsJob(10**13)
     with pytest.raises(TooLarge, match=r"10000000000000 cells of 2 measures would take 3\.6e\+05 GB, of .* ask"):
         run(job)
-    assert job.asked == []
+    assert job.computed_ranges == []
 
 
 def test_notes_are_the_same_in_any_order_and_not_endless():
     notes = [Note(FAILED, f"cell {n}", 1, (n,)) for n in range(150)]
-    told = merged(notes)
-    assert told == merged(notes[::-1])
+    told = merge_notes(notes)
+    assert told == merge_notes(notes[::-1])
     assert len(told) == 101
     assert told[-1] == Note(FAILED, MORE, 50, (100,))
-    assert alike(run(Odd(150), workers=1, batch=4), run(Odd(150), workers=1, batch=150))
+    assert same_cells(run(NotedJob(150), workers=1, batch=4), run(NotedJob(150), workers=1, batch=150))
 
 
 def test_an_empty_job_has_no_cells():
-    assert run(Roots(0)).values.shape == (0, 2)
+    assert run(RootsJob(0)).values.shape == (0, 2)
 
 
 def test_there_is_a_core():

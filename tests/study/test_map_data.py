@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.cli.cli_run import found, zwidth
+from tests.cli.command_runner import document_of, run_command
 from zwidth.device.load import load
-from zwidth.measures.measure import Measure, NoValueError
-from zwidth.show.output import csv_text, plain
+from zwidth.measures.definition import Measure, NoValueError
+from zwidth.show.output import csv_text, json_value
 from zwidth.study.common_area import common_area
+from zwidth.study.map import map_job, measures_of, workspace_map
 from zwidth.study.map_data import map_document, map_table, why_no_cell
-from zwidth.study.plane import plane_of
+from zwidth.study.plane_grid import plane_of
 from zwidth.study.requirement import parse_requirement
-from zwidth.study.workspace import map_job, measures_of, workspace_map
 
 DEVICE = "five-bar"
 COUNTS = (7, 5)
@@ -37,18 +37,18 @@ def device():
 
 
 @pytest.fixture(scope="module")
-def mapped(device):
+def map_dataset(device):
     return workspace_map(device, ["stiffness", "isotropy"], plane_of(device, cells=COUNTS), "worst", workers=1)
 
 
 @pytest.fixture(scope="module")
-def area(mapped):
-    return common_area(mapped, [parse_requirement("isotropy<=2")])
+def area(map_dataset):
+    return common_area(map_dataset, [parse_requirement("isotropy<=2")])
 
 
-def test_the_document_is_what_the_command_prints(device, mapped, area):
-    printed = found(*WORDS)
-    document = plain(map_document(mapped, device, area))
+def test_the_document_is_what_the_command_prints(device, map_dataset, area):
+    printed = document_of(*WORDS)
+    document = json_value(map_document(map_dataset, device, area))
     assert document == {key: printed[key] for key in document}
     assert set(printed) - set(document) == {
         "name",
@@ -64,15 +64,15 @@ def test_the_document_is_what_the_command_prints(device, mapped, area):
     }
 
 
-def test_without_a_device_what_needs_its_postures_is_left_out(device, mapped):
-    with_it, without = map_document(mapped, device), map_document(mapped)
+def test_without_a_device_what_needs_its_postures_is_left_out(device, map_dataset):
+    with_it, without = map_document(map_dataset, device), map_document(map_dataset)
     missing = with_it["measures"]["isotropy"]["overall"].keys() - without["measures"]["isotropy"]["overall"].keys()
     assert missing == {"isotropy_index"}
 
 
-def test_the_table_is_what_the_command_writes(mapped, tmp_path):
-    assert zwidth(*WORDS, "--output", tmp_path / "map.csv").code == 0
-    assert csv_text(map_table(mapped)) == (tmp_path / "map.csv").read_text()
+def test_the_table_is_what_the_command_writes(map_dataset, tmp_path):
+    assert run_command(*WORDS, "--output", tmp_path / "map.csv").code == 0
+    assert csv_text(map_table(map_dataset)) == (tmp_path / "map.csv").read_text()
 
 
 def test_one_measure_needs_no_list(device):
@@ -100,8 +100,8 @@ def test_a_folder_keeps_a_map(device, tmp_path):
     assert seen == [("mapping", 35, 35)], "nothing is computed again"
 
 
-def test_why_no_cell_has_a_value(device, mapped):
-    assert why_no_cell(mapped) is None
+def test_why_no_cell_has_a_value(device, map_dataset):
+    assert why_no_cell(map_dataset) is None
 
     def refuses(point):
         raise NoValueError("never here")

@@ -9,14 +9,14 @@ import pytest
 
 from tests.systems import published
 from zwidth.chart.chart import stability_chart
-from zwidth.contact.bench import BenchError
-from zwidth.contact.experiment import EdgePoint, Place
+from zwidth.contact.boundary_experiment import EdgePoint, StableExtent
+from zwidth.contact.stability_trial import TrialError
 from zwidth.device.load import from_document, load
-from zwidth.study.experiment import measure, measure_boundary
+from zwidth.study.experiment import measure_boundary, run_experiment
 from zwidth.study.experiment_plan import Plan
 from zwidth.study.journal import JournalError
 from zwidth.study.measured_boundary import Cause, Experiment, MeasuredPoint
-from zwidth.study.own_points import OwnPoint
+from zwidth.study.user_points import UserPoint
 
 FEWEST = Plan(stiffnesses=1, tips=0)
 
@@ -27,34 +27,34 @@ def point():
 
 
 @pytest.fixture(scope="module")
-def kept(point, tmp_path_factory):
+def boundary_and_file(point, tmp_path_factory):
     """A small experiment, and the file that kept it."""
     file = tmp_path_factory.mktemp("boundary") / "run.progress"
-    return measure_boundary(point, FEWEST, [OwnPoint(4000.0, 2.6, "lower")], file=file), file
+    return measure_boundary(point, FEWEST, [UserPoint(4000.0, 2.6, "lower")], file=file), file
 
 
-def test_a_point_is_measured_as_its_loop_is(point, kept):
-    found, _ = kept
-    assert found.points == measure(point.loop, plan=FEWEST).points
+def test_a_point_is_measured_as_its_loop_is(point, boundary_and_file):
+    found, _ = boundary_and_file
+    assert found.points == run_experiment(point.loop, plan=FEWEST).points
     assert [one.edge for one in found.points] == ["lower", "upper"]
-    assert all(found.deviation(one) < 1e-3 for one in found.compared)
+    assert all(found.deviation(one) < 1e-3 for one in found.compared_points)
     assert found.causes == ()
-    (own,) = found.own.points
+    (own,) = found.user_points.points
     assert own.deviation == pytest.approx(0.18, abs=0.01)
 
 
-def test_what_is_done_is_kept_and_not_computed_again(point, kept, monkeypatch):
-    first, file = kept
+def test_what_is_done_is_kept_and_not_computed_again(point, boundary_and_file, monkeypatch):
+    first, file = boundary_and_file
 
     def measured_again(*_):
         raise AssertionError("measured again")
 
-    for name in ("find_place", "measure_edges", "measure_tips"):
+    for name in ("find_stable_walls", "measure_edges", "measure_tips"):
         monkeypatch.setattr(f"zwidth.study.experiment.{name}", measured_again)
     again = measure_boundary(point, FEWEST, file=str(file))
     assert again.points == first.points
-    assert again.kept == 3
-    assert again.own is None
+    assert again.journal_entries == 3
+    assert again.user_points is None
 
 
 def test_a_file_that_holds_something_else_is_left_alone(point, tmp_path):
@@ -69,7 +69,7 @@ def test_trials_of_the_largest_disturbance_that_a_plan_may_have_are_run(point):
     """Half of them are larger than it."""
     found = measure_boundary(point, replace(FEWEST, disturbance=1.0, trials=6, spread=0.5))
     assert [one.edge for one in found.points] == ["lower", "upper"]
-    assert all(found.deviation(one) < 0.01 for one in found.compared)
+    assert all(found.deviation(one) < 0.01 for one in found.compared_points)
 
 
 def test_parts_that_are_not_linear_are_left_out_one_by_one_unless_not_wanted():
@@ -83,15 +83,15 @@ def test_parts_that_are_not_linear_are_left_out_one_by_one_unless_not_wanted():
     ).at()
     (cause,) = measure_boundary(dry, FEWEST).causes
     assert cause.name == "dry friction"
-    assert max(abs(one.damping - other) for one, other in cause.compared) > 1.0
+    assert max(abs(one.damping - other) for one, other in cause.comparisons) > 1.0
     assert measure_boundary(dry, FEWEST, causes=False).causes == ()
 
 
 def test_subjects_need_somebody_who_holds_the_device(point):
-    with pytest.raises(BenchError, match="subjects differ in the arm that holds the device") as caught:
+    with pytest.raises(TrialError, match="subjects differ in the arm that holds the device") as caught:
         measure_boundary(point, replace(FEWEST, subjects=2))
     assert caught.value.argument == "subjects"
-    with pytest.raises(BenchError, match="nobody does; give an operator") as caught:
+    with pytest.raises(TrialError, match="nobody does; give an operator") as caught:
         measure_boundary(point, replace(FEWEST, reflex=True))
     assert caught.value.argument == "reflex"
 
@@ -101,15 +101,15 @@ def test_the_operator_of_the_point_holds_the_device(monkeypatch):
 
     def held_by(loop, operator, *_):
         asked.append((loop, operator))
-        raise BenchError("push", "is asked about no further")
+        raise TrialError("push", "is asked about no further")
 
-    monkeypatch.setattr("zwidth.study.experiment.measure", held_by)
+    monkeypatch.setattr("zwidth.study.experiment.run_experiment", held_by)
     held = load("published-two-mass").at(operator="thesis-arm")
     for one in (held, held.without_operator, held.in_model("motor-mass")):
-        with pytest.raises(BenchError):
+        with pytest.raises(TrialError):
             measure_boundary(one, FEWEST)
     (bare, arm), (_, nobody), (_, fixed) = asked
-    assert bare.plant.mass.shape == held.unheld_plant.mass.shape
+    assert bare.plant.mass.shape == held.ungripped_plant.mass.shape
     assert arm is held.operator
     assert nobody is fixed is None  # the motor mass has no handle
 
@@ -125,7 +125,7 @@ def test_the_operator_of_the_point_holds_the_device(monkeypatch):
     ],
 )
 def test_a_plan_that_cannot_be_meant_is_refused(numbers, argument, says):
-    with pytest.raises(BenchError, match=f"{argument} {says}") as caught:
+    with pytest.raises(TrialError, match=f"{argument} {says}") as caught:
         Plan(**numbers)
     assert (caught.value.argument, caught.value.reason[: len(says)]) == (argument, says)
 
@@ -135,18 +135,18 @@ def test_a_one_sided_wall_is_touched_as_usual_unless_said_otherwise():
     assert Plan.touching(push=3.0, tips=2) == Plan(one_sided=True, push=3.0, speed=0.02, tips=2)
 
 
-def measured(K, B, edge, exact, *, low=None, high=None):
+def measured_point(K, B, edge, exact, *, low=None, high=None):
     value = K if edge == "tip" else B
     spread = (value if low is None else low, value if high is None else high)
     return MeasuredPoint(K, B, edge, *spread, 1, (value,), exact, "growing", 1e-4, 90.0)
 
 
 def experiment(*points, chart=None):
-    return Experiment(Plan(visible=0.0), Place(4e3, 5.0, 11.0, True), points, 1, (None,), chart, (), 0)
+    return Experiment(Plan(visible=0.0), StableExtent(4e3, 5.0, 11.0, True), points, 1, (None,), chart, (), 0)
 
 
-EDGES = (measured(2e3, 1.0, "lower", 1.1), measured(2e3, 11.0, "upper", nan))
-TIP = measured(4e3, 5.0, "tip", 4.4e3, low=3.9e3, high=4.1e3)
+EDGES = (measured_point(2e3, 1.0, "lower", 1.1), measured_point(2e3, 11.0, "upper", nan))
+TIP = measured_point(4e3, 5.0, "tip", 4.4e3, low=3.9e3, high=4.1e3)
 
 
 def test_deviations_are_shares_of_the_range_and_of_a_tip_s_stiffness():
@@ -154,13 +154,13 @@ def test_deviations_are_shares_of_the_range_and_of_a_tip_s_stiffness():
     assert found.damping_range == 10.0
     assert found.deviation(EDGES[0]) == pytest.approx(0.01)
     assert found.deviation(TIP) == pytest.approx(0.4 / 4.4)
-    assert found.compared == [EDGES[0], TIP]
+    assert found.compared_points == [EDGES[0], TIP]
     assert isnan(experiment(EDGES[0]).damping_range)
-    assert experiment(EDGES[0]).compared == []
+    assert experiment(EDGES[0]).compared_points == []
 
 
 def test_the_stiffest_is_a_tip_where_there_is_one():
-    stiffer = measured(5e3, 3.0, "lower", 3.0)
+    stiffer = measured_point(5e3, 3.0, "lower", 3.0)
     assert experiment(stiffer, TIP).stiffest is TIP
     assert experiment(*EDGES, stiffer).stiffest is stiffer
     assert experiment().stiffest is None
@@ -203,8 +203,8 @@ def test_edges_that_appear_or_vanish_without_a_part_are_counted_apart():
         return EdgePoint(2e3, damping, "lower", "growing", 1e-4, 90.0)
 
     cause = Cause("dry friction", (edge(1.0), edge(2.0), edge(nan), edge(nan)), (1.5, nan, 3.0, nan))
-    assert cause.compared == [(cause.points[0], 1.5)]
-    assert cause.vanished == 2
+    assert cause.comparisons == [(cause.points[0], 1.5)]
+    assert cause.unpaired_count == 2
 
 
 def test_the_repr_has_the_main_numbers_in_few_lines():

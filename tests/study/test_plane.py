@@ -12,7 +12,7 @@ from tests.model.model_cases import random_five_bar, spatial_arm
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.model.posture import Singular, reachable_positions, solve_posture
-from zwidth.study.plane import PlaneError, plane_of, reach_of, rounded_outwards
+from zwidth.study.plane_grid import PlaneError, plane_of, reachable_set, rounded_outwards
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def test_the_default_range_holds_all_that_is_reached_and_little_more(planar, see
     """Postures of which only the angles are known, the stretched ones among them, against the range."""
     mechanism = make(np.random.default_rng(seed))
     name = next(iter(mechanism.assemblies))
-    reach = reach_of(mechanism, name)
+    reach = reachable_set(mechanism, name)
     near = reachable_positions(mechanism, name)
     rng = np.random.default_rng(seed)
     size = float(np.abs(near).max())

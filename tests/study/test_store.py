@@ -9,51 +9,53 @@ import numpy as np
 import pytest
 import zarr
 
-from tests.study.executor_cases import Odd, Roots, alike
-from zwidth.measures.measure import MISSING, STATUS
+from tests.study.executor_cases import NotedJob, RootsJob, same_cells
+from zwidth.measures.definition import MISSING, STATUS
 from zwidth.study.executor import run
 from zwidth.study.store import Store, StoreError
 
 
-def part_of(path, job, batches, size=5):
+def partial_store(path, job, batches, size=5):
     """A store in which only some batches are done."""
     store = Store(path, job)
     store.begin(size)
     for n in batches:
-        store.keep(n * size, job.compute(n * size, min((n + 1) * size, job.count)))
+        store.write_batch(n * size, job.compute(n * size, min((n + 1) * size, job.count)))
 
 
-@pytest.mark.parametrize("kind", [Roots, Odd])
+@pytest.mark.parametrize("kind", [RootsJob, NotedJob])
 def test_only_what_is_missing_is_computed(tmp_path, kind):
     path = tmp_path / "cells"
-    part_of(path, kind(33), [0, 2, 6])
+    partial_store(path, kind(33), [0, 2, 6])
     job = kind(33)
     told = []
     found = run(job, Store(path, job), lambda *now: told.append(now), workers=1, batch=11)
-    assert alike(found, kind(33).compute(0, 33))
-    assert job.asked == [(5, 10), (15, 20), (20, 25), (25, 30)]
+    assert same_cells(found, kind(33).compute(0, 33))
+    assert job.computed_ranges == [(5, 10), (15, 20), (20, 25), (25, 30)]
     assert told[0] == ("computing", 13, 33)
     again = kind(33)
-    assert alike(run(again, Store(path, again)), found)
-    assert again.asked == []
+    assert same_cells(run(again, Store(path, again)), found)
+    assert again.computed_ranges == []
 
 
 def test_another_question_begins_anew(tmp_path):
     path = tmp_path / "cells"
-    part_of(path, Roots(33), [0])
-    for other in (Roots(34), Roots(33, question="else"), Roots(33, measures=("root", "other"))):
+    partial_store(path, RootsJob(33), [0])
+    for other in (RootsJob(34), RootsJob(33, question="else"), RootsJob(33, measures=("root", "other"))):
         store = Store(path, other)
         assert store.batch is None
-        assert [first for first, _ in Store(path, Roots(33)).kept()] == [0], "nothing is lost before it is begun"
+        assert [first for first, _ in Store(path, RootsJob(33)).stored_batches()] == [0], (
+            "nothing is lost before it is begun"
+        )
     store.begin(4)
     assert Store(path, other).batch == 4
-    assert list(store.kept()) == []
-    assert Store(path, Roots(33)).batch is None
+    assert list(store.stored_batches()) == []
+    assert Store(path, RootsJob(33)).batch is None
     assert sorted(p.name for p in tmp_path.iterdir()) == ["cells"]
 
 
 def test_others_can_read_it(tmp_path):
-    job = Roots(12)
+    job = RootsJob(12)
     run(job, Store(tmp_path / "cells", job), batch=5)
     group = zarr.open_group(str(tmp_path / "cells"), mode="r")
     assert group["values"].shape == (12, 2)
@@ -69,7 +71,7 @@ def test_others_can_read_it(tmp_path):
 @pytest.mark.parametrize("damage", ["cut", "gone", "empty"])
 @pytest.mark.parametrize("array", ["values", "status"])
 def test_a_damaged_batch_is_computed_again(tmp_path, array, damage):
-    path, job = tmp_path / "cells", Roots(20)
+    path, job = tmp_path / "cells", RootsJob(20)
     run(job, Store(path, job), workers=1, batch=10)
     chunk = path / array / "c" / "1" / "0"
     data = chunk.read_bytes()
@@ -77,10 +79,10 @@ def test_a_damaged_batch_is_computed_again(tmp_path, array, damage):
         chunk.unlink()
     else:
         chunk.write_bytes(data[: len(data) // 2 if damage == "cut" else 0])
-    again = Roots(20)
+    again = RootsJob(20)
     found = run(again, Store(path, again), workers=1)
-    assert alike(found, Roots(20).compute(0, 20))
-    assert again.asked == [(10, 20)]
+    assert same_cells(found, RootsJob(20).compute(0, 20))
+    assert again.computed_ranges == [(10, 20)]
 
 
 @pytest.mark.parametrize("what", ["file", "folder", "group"])
@@ -94,19 +96,19 @@ def test_what_is_no_store_is_left_alone(tmp_path, what):
         zarr.open_group(str(path), mode="w").attrs["mine"] = 1
     before = sorted(tmp_path.rglob("*"))
     with pytest.raises(StoreError, match="precious: is not the store of a study; name another folder"):
-        Store(path, Roots(3))
+        Store(path, RootsJob(3))
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_an_empty_folder_is_begun(tmp_path):
     (tmp_path / "cells").mkdir()
-    job = Roots(12)
+    job = RootsJob(12)
     run(job, Store(tmp_path / "cells", job), batch=5)
-    assert len(list(Store(tmp_path / "cells", job).kept())) == 3
+    assert len(list(Store(tmp_path / "cells", job).stored_batches())) == 3
 
 
 def test_a_store_can_be_removed_again(tmp_path):
-    job, path = Roots(3), tmp_path / "cells"
+    job, path = RootsJob(3), tmp_path / "cells"
     store = Store(path, job)
     store.remove()
     store.begin(1)
@@ -120,5 +122,5 @@ def test_what_does_not_fit_on_the_disk_is_refused_with_its_size(tmp_path, monkey
     with pytest.raises(
         StoreError, match=r"cells: 1000000 cells of 2 measures would take 0\.018 GB of disk, of 0\.001"
     ):
-        Store(tmp_path / "cells", Roots(10**6))
+        Store(tmp_path / "cells", RootsJob(10**6))
     assert list(tmp_path.iterdir()) == []

@@ -6,9 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from tests.study.study_cases import FIVE_BAR, LENGTH, OTHER, TWO_MASS, axis, faults, study, tables
-from zwidth.contact.room import TooLarge
+from tests.study.study_cases import (
+    FIVE_BAR,
+    LEFT_LENGTH,
+    RIGHT_LENGTH,
+    TWO_MASS,
+    axis,
+    faults,
+    study,
+    study_document,
+)
 from zwidth.device.faults import DeviceError
+from zwidth.memory_limit import TooLarge
 from zwidth.study.study_file import read_study
 
 DELAY = axis("loop.delay_samples", 0.0, 1.0)
@@ -60,35 +69,41 @@ WRONG = [
 
 @pytest.mark.parametrize(("change", "line"), WRONG, ids=[line for _, line in WRONG])
 def test_a_fault_is_told_with_its_key_and_what_is_allowed(change, line):
-    told = faults({**tables(DELAY), **change})
+    told = faults({**study_document(DELAY), **change})
     assert any(one.startswith(line) or f": {line}" in one for one in told), told
 
 
 @pytest.mark.parametrize("fault", [{"assembly": "elbows-up"}, {"seed": 3}, {"workspace": {"count": 1}}])
 def test_one_fault_is_not_taken_for_a_second_of_the_workspace(fault):
     change = {"measures": ["average(isotropy)"], **fault}
-    assert len(faults({**tables(DELAY), **change})) == 1
+    assert len(faults({**study_document(DELAY), **change})) == 1
 
 
 R = {"range": [0.1, 0.2]}
 WRONG_AXES = [
     ({}, "axis.0.key: is missing"),
-    ({"key": LENGTH}, "axis.0: has no values; give range = [low, high] and count, or values"),
-    ({"key": LENGTH, **R}, "axis.0: has no count"),
-    ({"key": LENGTH, **R, "count": 0}, "axis.0.count: must be at least 1, got 0"),
-    ({"key": LENGTH, **R, "count": 2.5}, "axis.0.count: must be a whole number, got 2.5"),
-    ({"key": LENGTH, **R, "values": [1.0]}, "axis.0.values: stands beside a range"),
-    ({"key": LENGTH, "values": [0.1], "count": 3}, "axis.0.count: is read with a range only"),
-    ({"key": LENGTH, "values": [0.1, 0.2, 0.1]}, "axis.0.values.2: 0.1 is listed already"),
-    ({"key": LENGTH, "values": []}, "axis.0.values: must have at least 1 element"),
-    ({"key": LENGTH, "range": [0.2, 0.1], "count": 3}, "axis.0.range: must be [lower, upper] with lower < upper"),
-    ({"key": LENGTH, "range": [0.1, 0.1], "count": 3}, "axis.0.range: must be [lower, upper] with lower < upper"),
-    ({"key": LENGTH, "range": [0.1], "count": 3}, "axis.0.range: must have at least 2 elements, got 1"),
+    ({"key": RIGHT_LENGTH}, "axis.0: has no values; give range = [low, high] and count, or values"),
+    ({"key": RIGHT_LENGTH, **R}, "axis.0: has no count"),
+    ({"key": RIGHT_LENGTH, **R, "count": 0}, "axis.0.count: must be at least 1, got 0"),
+    ({"key": RIGHT_LENGTH, **R, "count": 2.5}, "axis.0.count: must be a whole number, got 2.5"),
+    ({"key": RIGHT_LENGTH, **R, "values": [1.0]}, "axis.0.values: stands beside a range"),
+    ({"key": RIGHT_LENGTH, "values": [0.1], "count": 3}, "axis.0.count: is read with a range only"),
+    ({"key": RIGHT_LENGTH, "values": [0.1, 0.2, 0.1]}, "axis.0.values.2: 0.1 is listed already"),
+    ({"key": RIGHT_LENGTH, "values": []}, "axis.0.values: must have at least 1 element"),
     (
-        {"key": LENGTH, "range": [0.0, 1.0], "count": 3, "scale": "log"},
+        {"key": RIGHT_LENGTH, "range": [0.2, 0.1], "count": 3},
+        "axis.0.range: must be [lower, upper] with lower < upper",
+    ),
+    (
+        {"key": RIGHT_LENGTH, "range": [0.1, 0.1], "count": 3},
+        "axis.0.range: must be [lower, upper] with lower < upper",
+    ),
+    ({"key": RIGHT_LENGTH, "range": [0.1], "count": 3}, "axis.0.range: must have at least 2 elements, got 1"),
+    (
+        {"key": RIGHT_LENGTH, "range": [0.0, 1.0], "count": 3, "scale": "log"},
         "axis.0.range: must be above 0 to be divided",
     ),
-    ({"key": LENGTH, **R, "count": 3, "scale": "ln"}, "axis.0.scale: must be 'linear' or 'log'"),
+    ({"key": RIGHT_LENGTH, **R, "count": 3, "scale": "ln"}, "axis.0.scale: must be 'linear' or 'log'"),
     ({"key": "links.uper-right.length_m", "values": [1]}, "axis.0.key: 'links.uper-right.length_m' is no key"),
     (
         {"key": "links.upper-right", "values": [1]},
@@ -97,9 +112,12 @@ WRONG_AXES = [
     ({"key": "loop", "values": [1]}, "axis.0.key: 'loop' names no number"),
     ({"key": "assemblies", "values": ["elbows-in"]}, "axis.0.key: 'assemblies' names no number"),
     ({"key": "asembly", "values": ["elbows-in"]}, "axis.0.key: 'asembly' is no key of a device file"),
-    ({"key": LENGTH, "values": [0.1, "long"]}, f"axis.0.values.1: must be a number for '{LENGTH}', got the text"),
-    ({"key": LENGTH, "values": [True]}, "axis.0.values.0: must be no true or false"),
-    ({"key": LENGTH, "values": [[0.1]]}, "axis.0.values.0: must be a number"),
+    (
+        {"key": RIGHT_LENGTH, "values": [0.1, "long"]},
+        f"axis.0.values.1: must be a number for '{RIGHT_LENGTH}', got the text",
+    ),
+    ({"key": RIGHT_LENGTH, "values": [True]}, "axis.0.values.0: must be no true or false"),
+    ({"key": RIGHT_LENGTH, "values": [[0.1]]}, "axis.0.values.0: must be a number"),
     ({"key": "loop.velocity.samples", "range": [1, 5], "count": 5}, "axis.0.range: cannot be divided"),
     ({"key": "loop.velocity.samples", "values": [1.5]}, "axis.0.values.0: must be a whole number"),
     ({"key": "loop.velocity.method", "range": [0, 1], "count": 2}, "axis.0.range: needs a number, but 'loop.vel"),
@@ -113,67 +131,82 @@ WRONG_AXES = [
     ({"key": "at", "values": [[0.1], 3]}, "axis.0.values.1: must be 2 or 3 numbers, got 3"),
     ({"key": "operator", "values": ["no-one"]}, "no-one: is neither a file nor a bundled operator"),
     ({"key": "frequency_Hz", "values": [0.0]}, "axis.0.values.0: must be a finite number, above 0, got 0"),
-    ({"key": "assembly", "values": ["elbows-in"], "tie": [OTHER]}, "axis.0.tie: goes with a number of the device"),
     (
-        {"key": LENGTH, "values": [0.1], "tie": ["links.upper-left.lenth_m"]},
+        {"key": "assembly", "values": ["elbows-in"], "tie": [LEFT_LENGTH]},
+        "axis.0.tie: goes with a number of the device",
+    ),
+    (
+        {"key": RIGHT_LENGTH, "values": [0.1], "tie": ["links.upper-left.lenth_m"]},
         "axis.0.tie.0: 'links.upper-left.lenth",
     ),
-    ({"key": LENGTH, "values": [0.1], "tie": ["links.upper-left"]}, "axis.0.tie.0: 'links.upper-left' names no"),
-    ({"key": LENGTH, "values": [0.1], "tie": [{"power": 1}]}, "axis.0.tie.0.key: is missing"),
-    ({"key": LENGTH, "values": [0.1], "tie": [LENGTH]}, f"axis.0.tie.0: '{LENGTH}' is set by the axis"),
     (
-        {"key": LENGTH, "values": [0.1], "tie": [{"key": OTHER, "power": 1, "factor": 2}]},
+        {"key": RIGHT_LENGTH, "values": [0.1], "tie": ["links.upper-left"]},
+        "axis.0.tie.0: 'links.upper-left' names no",
+    ),
+    ({"key": RIGHT_LENGTH, "values": [0.1], "tie": [{"power": 1}]}, "axis.0.tie.0.key: is missing"),
+    (
+        {"key": RIGHT_LENGTH, "values": [0.1], "tie": [RIGHT_LENGTH]},
+        f"axis.0.tie.0: '{RIGHT_LENGTH}' is set by the axis",
+    ),
+    (
+        {"key": RIGHT_LENGTH, "values": [0.1], "tie": [{"key": LEFT_LENGTH, "power": 1, "factor": 2}]},
         "axis.0.tie.0.factor: stands beside a power",
     ),
     (
-        {"key": "loop.delay_samples", "values": [1.0], "tie": [{"key": OTHER, "power": 1}]},
+        {"key": "loop.delay_samples", "values": [1.0], "tie": [{"key": LEFT_LENGTH, "power": 1}]},
         "axis.0.tie.0.power: needs a value of 'loop.delay_samples' other than 0",
     ),
     (
-        {"key": LENGTH, "values": [0.1, -0.1], "tie": [{"key": OTHER, "power": 1}]},
-        f"axis.0.tie.0.power: needs values of the sign that '{LENGTH}' has",
+        {"key": RIGHT_LENGTH, "values": [0.1, -0.1], "tie": [{"key": LEFT_LENGTH, "power": 1}]},
+        f"axis.0.tie.0.power: needs values of the sign that '{RIGHT_LENGTH}' has",
     ),
     (
         {"key": "loop.delay_samples", "values": [1.0], "tie": ["loop.delay_s"]},
         "axis.0.tie.0: 'loop.delay_s' excludes 'loop.delay_samples', which is set by the axis",
     ),
     (
-        {"key": "operator.arm_mass_kg", "values": [1.0], "tie": [{"key": LENGTH, "power": 1}]},
+        {"key": "operator.arm_mass_kg", "values": [1.0], "tie": [{"key": RIGHT_LENGTH, "power": 1}]},
         "axis.0.tie.0.power: needs a value of 'operator.arm_mass_kg' other than 0 in the device file, which gives",
     ),
-    ({"key": LENGTH, "values": [0.1], "tie": [3]}, "axis.0.tie.0: must be a path, or a table with a key, got 3"),
-    ({"key": LENGTH, "values": [0.1, float("nan")]}, "axis.0.values.1: must be a number for"),
+    (
+        {"key": RIGHT_LENGTH, "values": [0.1], "tie": [3]},
+        "axis.0.tie.0: must be a path, or a table with a key, got 3",
+    ),
+    ({"key": RIGHT_LENGTH, "values": [0.1, float("nan")]}, "axis.0.values.1: must be a number for"),
     (
         {"key": "loop.velocity.method", "values": ["kalman", "windowed"]},
         "axis.0.values.1: must be one of backward-difference, windowed-difference, ",
     ),
-    ({"key": LENGTH, "values": [0.1], "steps": 3}, "axis.0.steps: is not a key of an [[axis]]"),
+    ({"key": RIGHT_LENGTH, "values": [0.1], "steps": 3}, "axis.0.steps: is not a key of an [[axis]]"),
 ]
 
 
 @pytest.mark.parametrize(("table", "line"), WRONG_AXES, ids=[line for _, line in WRONG_AXES])
 def test_a_fault_of_an_axis_is_told(table, line):
-    told = faults(tables(table))
+    told = faults(study_document(table))
     assert any(one.startswith(line) for one in told), told
 
 
 def test_what_goes_with_two_axes_is_told():
-    told = faults(tables(axis(LENGTH, 0.1, tie=[OTHER]), axis(OTHER, 0.1)))
-    assert told == [f"axis.1.key: '{OTHER}' goes with the axis '{LENGTH}' already; each number may be set once"]
+    told = faults(study_document(axis(RIGHT_LENGTH, 0.1, tie=[LEFT_LENGTH]), axis(LEFT_LENGTH, 0.1)))
+    assert told == [
+        f"axis.1.key: '{LEFT_LENGTH}' goes with the axis '{RIGHT_LENGTH}' already; each number may be set once"
+    ]
 
 
 def test_what_is_set_twice_is_told():
-    twice = axis(LENGTH, 0.1), axis(f"mechanism.{LENGTH}", 0.2), DELAY, axis("model", "full")
-    told = faults(tables(*twice, model="rigid"))
+    twice = axis(RIGHT_LENGTH, 0.1), axis(f"mechanism.{RIGHT_LENGTH}", 0.2), DELAY, axis("model", "full")
+    told = faults(study_document(*twice, model="rigid"))
     assert told == [
-        f"axis.1.key: 'mechanism.{LENGTH}' is set by the axis '{LENGTH}' already; each number may be set once",
+        f"axis.1.key: 'mechanism.{RIGHT_LENGTH}' is set by the axis '{RIGHT_LENGTH}' already; "
+        "each number may be set once",
         "model: is an axis, too; remove one of them",
     ]
 
 
 COM = "links.upper-right.center_of_mass_m"
-LATER = [  # an axis beside LENGTH with the centre of mass tied to it, and DELAY
-    (f"{COM}.0", f"axis.2.key: '{COM}.0' overlaps '{COM}', which goes with the axis '{LENGTH}' already"),
+LATER = [  # an axis beside RIGHT_LENGTH with the centre of mass tied to it, and DELAY
+    (f"{COM}.0", f"axis.2.key: '{COM}.0' overlaps '{COM}', which goes with the axis '{RIGHT_LENGTH}' already"),
     (
         "loop.delay_s",
         "axis.2.key: 'loop.delay_s' excludes 'loop.delay_samples', which is set by the axis 'loop.del",
@@ -183,7 +216,7 @@ LATER = [  # an axis beside LENGTH with the centre of mass tied to it, and DELAY
 
 @pytest.mark.parametrize(("key", "line"), LATER)
 def test_what_an_axis_would_take_from_another_is_told(key, line):
-    told = faults(tables(axis(LENGTH, 0.1, tie=[{"key": COM, "power": 1}]), DELAY, axis(key, 0.01)))
+    told = faults(study_document(axis(RIGHT_LENGTH, 0.1, tie=[{"key": COM, "power": 1}]), DELAY, axis(key, 0.01)))
     assert len(told) == 1
     assert told[0].startswith(line)
 
@@ -195,7 +228,7 @@ def test_numbers_of_an_operator_may_be_varied_beside_whose_they_are():
 
 
 def test_a_hypercube_has_one_count():
-    told = faults(tables(axis(LENGTH, **R, count=3), sampling="latin-hypercube", count=10))
+    told = faults(study_document(axis(RIGHT_LENGTH, **R, count=3), sampling="latin-hypercube", count=10))
     assert told == [
         "axis.0.count: is that of a grid; a Latin hypercube has one count for all axes: move it to the top"
     ]
@@ -207,7 +240,7 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file():
         "measures": ["stiffnes_max"],
         "assembly": "sideways",
         "set": ["loop.dely_s=1"],
-        "axis": [{"key": "loop.delays", "values": [1]}, {"key": LENGTH, "range": [2, 1], "count": 1}],
+        "axis": [{"key": "loop.delays", "values": [1]}, {"key": RIGHT_LENGTH, "range": [2, 1], "count": 1}],
         "optimise": {"budget": 0},
     }
     keys = [one.split(":")[0] for one in faults(document)]
@@ -234,7 +267,7 @@ def test_a_measured_device_has_no_numbers_to_vary(tmp_path):
     (tmp_path / "m.toml").write_text(
         'name = "m"\n[response]\nfile = "sweep.csv"\nintegrators = 2\n[loop]\nsampling_period_s = 0.001\n'
     )
-    told = faults(tables(axis("loop.sampling_period_s", 0.001), device=str(tmp_path / "m.toml")))
+    told = faults(study_document(axis("loop.sampling_period_s", 0.001), device=str(tmp_path / "m.toml")))
     assert any("has a measured [response] and no model" in one for one in told), told
 
 
@@ -262,4 +295,4 @@ def test_a_study_that_would_not_fit_is_refused_with_its_size(hypercube):
     more = {"sampling": "latin-hypercube", "count": 10**9} if hypercube else {}
     designs = "1000000000" if hypercube else "1000000000000"
     with pytest.raises(TooLarge, match=rf"^{designs} designs of 1 measures would take .* GB, of .* lower a count"):
-        study(axis(LENGTH, **span), axis(OTHER, **span), **more)
+        study(axis(RIGHT_LENGTH, **span), axis(LEFT_LENGTH, **span), **more)

@@ -7,9 +7,9 @@ import tomllib
 import numpy as np
 import pytest
 
-from tests.study.study_cases import FIVE_BAR, LENGTH, OTHER, TWO_MASS, axis, study
+from tests.study.study_cases import FIVE_BAR, LEFT_LENGTH, RIGHT_LENGTH, TWO_MASS, axis, study
 from zwidth.device.load import load
-from zwidth.study.axes import Axis, Sampling, settings, spread
+from zwidth.study.sampling import Axis, Sampling, settings, spread
 from zwidth.study.study_file import read_study, study_of
 
 DELAY = axis("loop.delay_samples", 0.0, 1.0)
@@ -23,7 +23,7 @@ def design(found, number):
 
 
 def test_a_grid_has_every_combination_the_last_axis_fastest():
-    found = study(axis(LENGTH, range=[0.1, 0.2], count=3), axis("assembly", "elbows-out", "elbows-in"))
+    found = study(axis(RIGHT_LENGTH, range=[0.1, 0.2], count=3), axis("assembly", "elbows-out", "elbows-in"))
     assert found.sampling.shape == (3, 2)
     designs = [found.sampling.values(n) for n in range(6)]
     assert designs == [(v, name) for v in (0.1, 0.15000000000000002, 0.2) for name in ("elbows-out", "elbows-in")]
@@ -44,7 +44,7 @@ def test_ranges_keep_their_ends():
 def test_a_latin_hypercube_has_one_design_in_each_part_of_each_axis(seed):
     more = {} if seed is None else {"seed": seed}
     axes = (
-        axis(LENGTH, range=[0.1, 0.2]),
+        axis(RIGHT_LENGTH, range=[0.1, 0.2]),
         axis("loop.sampling_period_s", range=[1e-4, 1e-2], scale="log"),
         axis("assembly", "elbows-out", "elbows-in"),
     )
@@ -79,15 +79,15 @@ def test_mass_and_inertia_go_with_a_length():
     """A link of the same section: its mass goes with the length, its inertia with the cube, its centre with it."""
     link, given = "links.upper-right", load(FIVE_BAR).document["mechanism"]["links"][0]
     tie = [
-        OTHER,
+        LEFT_LENGTH,
         {"key": f"{link}.mass_kg", "power": 1},
         {"key": f"{link}.inertia_kg_m2", "power": 3.0},
         {"key": f"{link}.center_of_mass_m", "power": 1},
         {"key": "links.distal-left.length_m", "factor": 1.5},
     ]
-    found = study(axis(LENGTH, 2 * given["length_m"], tie=tie))
+    found = study(axis(RIGHT_LENGTH, 2 * given["length_m"], tie=tie))
     changed = design(found, 0)
-    assert changed[OTHER] == changed[LENGTH] == 0.294
+    assert changed[LEFT_LENGTH] == changed[RIGHT_LENGTH] == 0.294
     assert changed[f"{link}.mass_kg"] == pytest.approx(2 * given["mass_kg"], rel=1e-15)
     assert changed[f"{link}.inertia_kg_m2"] == pytest.approx(8 * given["inertia_kg_m2"], rel=1e-15)
     assert changed[f"{link}.center_of_mass_m"] == pytest.approx(
@@ -98,9 +98,10 @@ def test_mass_and_inertia_go_with_a_length():
 
 def test_powers_speak_of_the_file_as_it_is_set():
     found = study(
-        axis(LENGTH, 0.3, tie=[{"key": OTHER, "power": 2}]), set=["links.upper-right.length_m=0.1", f"{OTHER}=0.2"]
+        axis(RIGHT_LENGTH, 0.3, tie=[{"key": LEFT_LENGTH, "power": 2}]),
+        set=["links.upper-right.length_m=0.1", f"{LEFT_LENGTH}=0.2"],
     )
-    assert design(found, 0)[OTHER] == pytest.approx(9 * 0.2, rel=1e-15)
+    assert design(found, 0)[LEFT_LENGTH] == pytest.approx(9 * 0.2, rel=1e-15)
 
 
 def test_an_element_of_a_symmetric_matrix_takes_its_mirror_image_along():

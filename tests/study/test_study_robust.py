@@ -13,13 +13,13 @@ import pytest
 
 from zwidth.chart.verdict import judge
 from zwidth.device.load import from_document, load
-from zwidth.study.robust import RobustError, promised_walls, robust_study
-from zwidth.study.robust_family import Family, Point, Range, RangeError
+from zwidth.study.robust import RobustError, robust_study, sample_walls
+from zwidth.study.robust_family import Family, FamilyMember, Range, RangeError
 
 PAGE = Path(__file__).parents[2] / "docs" / "robust.md"
 
 
-def plain(**plant):
+def one_mass_device(**plant):
     return from_document(
         {
             "name": "m",
@@ -33,7 +33,7 @@ def family(device, *ranges, operators=()):
     return Family(device, ranges, operators, device.at())
 
 
-def held():
+def device_with_operator():
     return load("published-two-mass", (), "thesis-arm")
 
 
@@ -46,12 +46,14 @@ ARM = (
 
 def test_of_a_range_of_masses_and_delays_the_worst_ends_bind():
     study = robust_study(
-        family(plain(), Range("plant.mass_kg", 0.1, 0.3), Range("loop.delay_samples", 0.2, 1.0)), 40, 200
+        family(one_mass_device(), Range("plant.mass_kg", 0.1, 0.3), Range("loop.delay_samples", 0.2, 1.0)), 40, 200
     )
     worst = {"plant.mass_kg": 0.1, "loop.delay_samples": 1.0}
     (at_peak,) = study.chart.members_at_stiffness_max
     assert study.members[at_peak] == worst
-    alone = robust_study(family(plain(), Range("plant.mass_kg", 0.1, 0.1), Range("loop.delay_samples", 1.0, 1.0)))
+    alone = robust_study(
+        family(one_mass_device(), Range("plant.mass_kg", 0.1, 0.1), Range("loop.delay_samples", 1.0, 1.0))
+    )
     assert study.chart.stiffness_max == pytest.approx(alone.chart.stiffness_max, rel=1e-12)
     assert alone.violation is None
     assert study.violation.unseen == 200
@@ -62,7 +64,7 @@ def test_of_a_range_of_masses_and_delays_the_worst_ends_bind():
 
 
 def test_corners_come_first_and_the_rest_lies_within():
-    study = robust_study(family(held(), *ARM), 26, 20)
+    study = robust_study(family(device_with_operator(), *ARM), 26, 20)
     corners = {(m, k, d) for m in (0.3, 3.0) for k in (1e3, 3e4) for d in (0.0, 0.3)}
     seen = [tuple(member.values()) for member in study.members]
     rounded = {tuple(round(value, 9) for value in values) for values in seen[: study.sampled]}
@@ -74,7 +76,9 @@ def test_corners_come_first_and_the_rest_lies_within():
 
 
 def test_a_seed_gives_the_same_answer_again_and_another_seed_others():
-    one, two, three = (robust_study(family(held(), *ARM[:2]), 8, 40, seed=seed) for seed in (3, 3, 4))
+    one, two, three = (
+        robust_study(family(device_with_operator(), *ARM[:2]), 8, 40, seed=seed) for seed in (3, 3, 4)
+    )
     assert one.members == two.members
     assert one.violation == two.violation
     assert one.chart.stiffness_max == two.chart.stiffness_max
@@ -84,20 +88,20 @@ def test_a_seed_gives_the_same_answer_again_and_another_seed_others():
 def test_the_search_finds_what_the_sample_missed():
     from zwidth.study import robust as module
 
-    study = robust_study(family(held(), *ARM), 46, 5)
+    study = robust_study(family(device_with_operator(), *ARM), 46, 5)
     # the same members without any that the search found
-    few = module.robust_of(
+    few = module.robust_chart_of_members(
         {k: module.chart_member(k, loop) for k, loop in study.chart.members.items() if k < study.sampled}, {}
     )
     assert len(study.members) > study.sampled
     assert study.chart.stable_area <= few.stable_area
-    missed = sum(study.chart.spectral_radius(*promised_walls(few).T) > 1.0 + 1e-9)
+    missed = sum(study.chart.spectral_radius(*sample_walls(few).T) > 1.0 + 1e-9)
     assert missed > 0
 
 
 def test_promised_walls_are_stable_for_every_member_by_eigenvalues():
-    study = robust_study(family(held(), *ARM), 16, 10)
-    walls = promised_walls(study.chart)
+    study = robust_study(family(device_with_operator(), *ARM), 16, 10)
+    walls = sample_walls(study.chart)
     assert len(walls) > 200
     assert np.all(study.chart.spectral_radius(*walls.T) < 1.0 + 1e-9)
 
@@ -111,17 +115,17 @@ def test_an_honest_violation_is_stated_where_members_are_too_few():
         "grasp_stiffness_N_per_m": (1e3, 3e4),
         "grasp_damping_Ns_per_m": (0.0, 50.0),
     }.items())  # fmt: skip
-    study = robust_study(family(held(), *ranges), 2, 200)
+    study = robust_study(family(device_with_operator(), *ranges), 2, 200)
     violation = study.violation
     assert 0 < violation.violating < 200
     assert violation.worst_spectral_radius > 1.0 + 1e-6
     assert 0.0 < violation.worst_stiffness_share < 1.0
-    assert set(violation.worst) == {one.path for one in ranges}
+    assert set(violation.worst_member) == {one.path for one in ranges}
     # softening every wall by that share of the largest stiffness makes them stable for the member that is worst
-    fam = family(held(), *ranges)
-    shares = tuple((violation.worst[r.path] - r.low) / (r.high - r.low) for r in ranges)
-    loop = fam.loop(Point(0, shares))
-    walls = promised_walls(study.chart)
+    fam = family(device_with_operator(), *ranges)
+    shares = tuple((violation.worst_member[r.path] - r.low) / (r.high - r.low) for r in ranges)
+    loop = fam.loop(FamilyMember(0, shares))
+    walls = sample_walls(study.chart)
     walls = walls[(walls[:, 0] > 0.0) & (walls[:, 1] >= 0.0)]
     bad = walls[judge(loop, *walls.T).spectral_radius > 1.0 + 1e-9]
     assert len(bad)
@@ -153,16 +157,16 @@ def test_operators_and_ranges_go_together():
 
 
 def test_members_in_which_only_the_operator_differs_are_built_the_same_both_ways():
-    quick = family(held(), *ARM[:2])
-    slow = family(held(), *ARM)
+    quick = family(device_with_operator(), *ARM[:2])
+    slow = family(device_with_operator(), *ARM)
     for shares in ((0.0, 0.0), (0.3, 0.8), (1.0, 0.5)):
-        one, two = quick.loop(Point(0, shares)), slow.loop(Point(0, (*shares, 0.0)))
+        one, two = quick.loop(FamilyMember(0, shares)), slow.loop(FamilyMember(0, (*shares, 0.0)))
         assert np.array_equal(one.transition_matrix(500.0, 2.0), two.transition_matrix(500.0, 2.0))
 
 
 def test_a_number_off_the_diagonal_moves_with_its_mirror_image():
     one = Range("plant.stiffness_N_per_m.0.1", -16000.0, -15620.0)
-    document = family(load("published-two-mass"), one).document(Point(0, (0.5,)))
+    document = family(load("published-two-mass"), one).document(FamilyMember(0, (0.5,)))
     assert document["plant"]["stiffness_N_per_m"][0][1] == document["plant"]["stiffness_N_per_m"][1][0] == -15810.0
 
 
@@ -183,7 +187,7 @@ def test_a_number_off_the_diagonal_moves_with_its_mirror_image():
 )
 def test_ranges_that_cannot_be_meant_are_refused_in_one_line(ranges, expected):
     with pytest.raises(RangeError) as caught:
-        robust_study(family(from_document(plain().document, "m"), *ranges), 4, 4)
+        robust_study(family(from_document(one_mass_device().document, "m"), *ranges), 4, 4)
     lines = [str(fault) for fault in caught.value.faults]
     assert any(expected in line for line in lines), lines
     assert all("\n" not in line and line.startswith(f"{ranges[0].path}: ") for line in lines)
@@ -193,7 +197,7 @@ def test_ranges_that_cannot_be_meant_are_refused_in_one_line(ranges, expected):
 
 def test_a_range_s_advice_is_in_the_words_of_who_asks():
     whole, logarithmic = (
-        family(plain(), one).faults()[0]
+        family(one_mass_device(), one).faults()[0]
         for one in (Range("loop.velocity.samples", 1, 2), Range("plant.mass_kg", -0.1, 0.2, True))
     )
     assert str(whole).endswith("is a whole number and has no range; compute it for each value with Device.with_")
@@ -225,7 +229,7 @@ def test_members_that_cannot_be_built_are_counted_and_named():
 
 
 def test_nobody_to_chart_is_an_error(monkeypatch):
-    fam = family(plain(), Range("plant.mass_kg", 0.1, 0.2))
+    fam = family(one_mass_device(), Range("plant.mass_kg", 0.1, 0.2))
     monkeypatch.setattr(Family, "loop", lambda self, point: (_ for _ in ()).throw(ValueError("no such thing")))
     with pytest.raises(RobustError, match="not one of 3 members could be charted; the first: no such thing"):
         robust_study(fam, 4, 4)

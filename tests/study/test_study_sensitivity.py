@@ -19,8 +19,7 @@ from zwidth.device.load import from_document, load
 from zwidth.loop.loop import Loop
 from zwidth.model.plant import Plant
 from zwidth.study.derivative import central_derivative, one_sided_derivative
-from zwidth.study.local_maxima import rival_stiffness
-from zwidth.study.optimum import optimum
+from zwidth.study.optimum import optimum, second_peak_stiffness
 from zwidth.study.sensitivity import sensitivities
 
 LATE = "loop.delay_samples=1"
@@ -37,7 +36,7 @@ def logarithmic(device):
 
 
 @cache
-def answered(name, *settings):
+def sensitivities_of(name, *settings):
     return sensitivities(load(name, settings))
 
 
@@ -46,7 +45,7 @@ def largest(device):
     return peak.stiffness
 
 
-def differenced(device, path, step):
+def finite_difference(device, path, step):
     """The same by the whole search for the largest stiffness, at two steps with one extrapolation."""
     value = address.get(device.document, path)
 
@@ -106,7 +105,7 @@ DEVICES = [
 @pytest.mark.parametrize(("name", "settings", "kind"), DEVICES)
 def test_mass_and_time_have_units(name, settings, kind):
     """K is kg/s^2: scaling all kilograms scales it by as much, scaling all seconds by the inverse square."""
-    device, found = load(name, settings), answered(name, *settings)
+    device, found = load(name, settings), sensitivities_of(name, *settings)
     assert found.kind == kind
     of = {n.path: n.logarithmic for n in found.numbers} | {g.path: g.logarithmic for g in found.groups}
     if device.mechanism is not None:
@@ -135,9 +134,9 @@ def test_mass_and_time_have_units(name, settings, kind):
 )
 def test_the_whole_search_differenced_agrees(name, settings, path):
     device = load(name, settings)
-    found = {number.path: number.logarithmic for number in answered(name, *settings).numbers}[path]
+    found = {number.path: number.logarithmic for number in sensitivities_of(name, *settings).numbers}[path]
     for step in (2e-3,) if device.mechanism else (2e-3, 1e-3):
-        assert found == pytest.approx(differenced(device, path, step), abs=3e-6)
+        assert found == pytest.approx(finite_difference(device, path, step), abs=3e-6)
 
 
 def scaled_plant(loop, what, factor):
@@ -147,8 +146,8 @@ def scaled_plant(loop, what, factor):
     return Loop(Plant(**parts, actuator=plant.actuator, sensor=plant.sensor), T)
 
 
-def moved_by(loop, held, what):
-    return lambda factor: held.moves(scaled_plant(loop, what, factor))
+def change_over_factor(loop, held, what):
+    return lambda factor: held.stiffness_to_first_order(scaled_plant(loop, what, factor))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -162,13 +161,13 @@ def test_random_loops_move_as_their_whole_search_says(seed):
             peak = largest_stiffness(loop)
         except ChartError:
             continue
-        if peak is None or rival_stiffness(stability_chart(loop, decay=False)) > 0.99 * peak.stiffness:
+        if peak is None or second_peak_stiffness(stability_chart(loop, decay=False)) > 0.99 * peak.stiffness:
             continue
         tried += 1
         held = optimum(loop, peak)
-        assert held.moves(loop) == pytest.approx(peak.stiffness, rel=1e-9)
+        assert held.stiffness_to_first_order(loop) == pytest.approx(peak.stiffness, rel=1e-9)
         for what in ("mass", "damping", "stiffness"):
-            slope = central_derivative(moved_by(loop, held, what), 1.0, 1.0)
+            slope = central_derivative(change_over_factor(loop, held, what), 1.0, 1.0)
             h = 1e-4
             peaks = [largest_stiffness(scaled_plant(loop, what, 1.0 + sign * h)).stiffness for sign in (1, -1)]
             assert slope.value == pytest.approx((peaks[0] - peaks[1]) / (2 * h), abs=2e-5 * peak.stiffness)
@@ -182,13 +181,13 @@ def test_a_wall_held_by_a_real_root_moves_with_it(damping, kind):
     assert found.kind == kind
     numbers = {number.path: number.logarithmic for number in found.numbers}
     for path in ("plant.mass_kg", "plant.damping_Ns_per_m", "loop.sampling_period_s"):
-        assert numbers[path] == pytest.approx(differenced(device, path, 1e-3), abs=1e-7)
+        assert numbers[path] == pytest.approx(finite_difference(device, path, 1e-3), abs=1e-7)
 
 
 def corners(loop):
     """Every corner of a pair's arc with the line of a real root: the wall, and the angles there."""
     arcs, _ = closed_rings(Tracer.of(loop))
-    for arc, number in zip(arcs, arcs.following, strict=True):
+    for arc, number in zip(arcs, arcs.next_arc, strict=True):
         following = arcs[number]
         kinds = {arc.kind, following.kind}
         angles = sorted({arc.end, following.start})
@@ -212,7 +211,7 @@ def test_corners_on_lines_of_real_roots_move_as_charts_say():
             continue
         for corner, plus, minus in zip(here, *moved, strict=True):
             held = optimum(loop, corner)
-            slope = central_derivative(moved_by(loop, held, "mass"), 1.0, 1.0).value
+            slope = central_derivative(change_over_factor(loop, held, "mass"), 1.0, 1.0).value
             scale = abs(corner.stiffness) + abs(slope)
             assert slope == pytest.approx((plus.stiffness - minus.stiffness) / 2e-5, abs=1e-3 * scale)
             seen[corner.angles[0] if corner.angles[0] == 0.0 else corner.angles[1]] += 1
@@ -252,7 +251,7 @@ def test_a_symmetric_matrix_stays_symmetric():
 
 
 def test_numbers_that_say_where_are_left_out_and_named():
-    found = answered("five-bar")
+    found = sensitivities_of("five-bar")
     assert not any("reference" in n.path or "assemblies" in n.path for n in found.numbers)
     assert "where the device is asked about" in found.left_out["mechanism.reference.position_m.1"]
     paths = {n.path for n in found.numbers} | found.left_out.keys() | {"loop.delay_samples"}
@@ -260,7 +259,7 @@ def test_numbers_that_say_where_are_left_out_and_named():
 
 
 def test_sorted_by_what_helps_most_and_failures_are_data():
-    found = answered("five-bar", FILTER)
+    found = sensitivities_of("five-bar", FILTER)
     magnitudes = [abs(n.logarithmic) for n in found.numbers if not np.isnan(n.logarithmic)]
     assert magnitudes == sorted(magnitudes, reverse=True)
     of = {n.path: n for n in found.numbers}
@@ -287,7 +286,7 @@ def test_a_second_summit_is_named_and_a_tie_is_called_so():
             chart = stability_chart(loop, decay=False)
         except ChartError:
             continue
-        rival = rival_stiffness(chart)
+        rival = second_peak_stiffness(chart)
         if np.isnan(rival):
             continue
         seen += 1
@@ -297,7 +296,7 @@ def test_a_second_summit_is_named_and_a_tie_is_called_so():
         assert chart.check(rival * (1.0 + 1e-4), B).names != "stable"
     found = sensitivities(one_mass())
     assert not found.tie
-    assert replace(found, rival=found.peak.stiffness).tie
+    assert replace(found, second_peak=found.peak.stiffness).tie
 
 
 def test_slopes_know_what_they_are_worth():

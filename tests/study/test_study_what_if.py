@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zwidth.chart.chart import stability_chart
+from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.device.load import from_document, load
 from zwidth.loop.controller import Butterworth
+from zwidth.loop.loop import Loop
+from zwidth.model.operator import attach
 from zwidth.study.what_if import (
     BASE,
-    MODELS,
     REMEDIES,
-    find,
+    VARIANT_MODELS,
+    find_variant,
     half_period,
     limiting_change,
     usual_filter,
@@ -54,7 +58,7 @@ IN_THE_FILE = {
 @pytest.mark.parametrize("key", IN_THE_FILE)
 @pytest.mark.parametrize("start", [[], ["loop.delay_samples=0.4"], [FILTER]], ids=["plain", "late", "filtered"])
 def test_a_change_is_the_same_as_in_the_file(key, start):
-    found = find(what_if(load("five-bar", start)), key)
+    found = find_variant(what_if(load("five-bar", start)), key)
     if found.chart is None:
         assert start in ([], ["loop.delay_samples=0.4"], [FILTER])
         assert found.reason.startswith("the device has")
@@ -69,22 +73,24 @@ def test_a_change_is_the_same_as_in_the_file(key, start):
 def test_models_are_those_of_the_device(model):
     expected = stiffest("five-bar", model=model)
     key = f"model-{model}" if model != "rigid" else "model-rigid-undamped"
-    assert find(what_if(load("five-bar")), key).stiffness_max == pytest.approx(expected.stiffness_max, rel=1e-9)
+    assert find_variant(what_if(load("five-bar")), key).stiffness_max == pytest.approx(
+        expected.stiffness_max, rel=1e-9
+    )
 
 
 def test_the_models_of_the_published_plant():
     variants = what_if(load("published-two-mass"))
-    assert find(variants, BASE).stiffness_max == pytest.approx(7133.86929380, rel=1e-9)
-    assert find(variants, "one-sample").stiffness_max == pytest.approx(1101.30206608, rel=1e-9)
-    assert find(variants, "rigid-drives").stiffness_max == pytest.approx(126058.022906, rel=1e-8)
-    assert find(variants, "model-two-mass").reason == "the device as described is this model"
+    assert find_variant(variants, BASE).stiffness_max == pytest.approx(7133.86929380, rel=1e-9)
+    assert find_variant(variants, "one-sample").stiffness_max == pytest.approx(1101.30206608, rel=1e-9)
+    assert find_variant(variants, "rigid-drives").stiffness_max == pytest.approx(126058.022906, rel=1e-8)
+    assert find_variant(variants, "model-two-mass").reason == "the device as described is this model"
 
 
 def test_the_order_is_always_the_same():
     keys = [variant.key for variant in what_if(load("hapkit-course"))]
     assert keys[0] == BASE
     assert set(REMEDIES) < set(keys)
-    assert keys[-len(MODELS) :] == [f"model-{name}" for name in MODELS]
+    assert keys[-len(VARIANT_MODELS) :] == [f"model-{name}" for name in VARIANT_MODELS]
     assert keys == [variant.key for variant in what_if(load("five-bar"))]
 
 
@@ -96,7 +102,7 @@ def test_every_variant_has_a_chart_or_a_reason():
 
 
 def test_a_plant_tied_to_the_ground_has_no_rigid_drives():
-    reason = find(what_if(one_mass(0.1, 1.0, 5000.0)), "rigid-drives").reason
+    reason = find_variant(what_if(one_mass(0.1, 1.0, 5000.0)), "rigid-drives").reason
     assert "ties it to the ground" in reason
 
 
@@ -113,7 +119,7 @@ def test_the_usual_filter_stays_well_below_nyquist(period):
 
 def test_where_nothing_is_stable_the_stiffness_is_zero_and_not_unknown():
     device = load("published-two-mass", ["plant.damping_Ns_per_m=unset", "loop.delay_samples=1"])
-    base = find(what_if(device), BASE)
+    base = find_variant(what_if(device), BASE)
     assert (base.stiffness_max, base.area, base.frequencies) == (0.0, 0.0, ())
 
 
@@ -132,14 +138,14 @@ FAR = {
 
 def test_the_sensor_moves_to_the_actuator():
     moved = from_document(FAR | {"plant": FAR["plant"] | {"sensor": [1.0, 0.0]}})
-    found = find(what_if(from_document(FAR)), "collocated")
+    found = find_variant(what_if(from_document(FAR)), "collocated")
     assert found.stiffness_max == pytest.approx(what_if(moved)[0].stiffness_max, rel=1e-9)
-    assert find(what_if(moved), "collocated").reason == "the sensor reads where the wall acts already"
+    assert find_variant(what_if(moved), "collocated").reason == "the sensor reads where the wall acts already"
 
 
 def test_rigid_is_called_after_what_becomes_rigid():
-    assert find(what_if(load("five-bar")), "rigid-drives").label == "rigid drives"
-    assert find(what_if(load("published-two-mass")), "rigid-drives").label == "rigid structure"
+    assert find_variant(what_if(load("five-bar")), "rigid-drives").label == "rigid drives"
+    assert find_variant(what_if(load("published-two-mass")), "rigid-drives").label == "rigid structure"
 
 
 LIMITS = {
@@ -180,6 +186,66 @@ def test_nothing_limits_where_no_change_helps():
 @given(st.floats(0.01, 2.0), st.floats(0.1, 50.0), st.sampled_from([0.0, 1.0, 2.5]))
 def test_halving_the_period_of_a_mass_is_scaling(mass, damping, delay):
     """K T^2/m and B T/m alone count, so that m, b, T/2 is m, b/2, T with K four times and B twice as large."""
-    here = find(what_if(one_mass(mass, damping, delay_samples=delay)), "half-period")
+    here = find_variant(what_if(one_mass(mass, damping, delay_samples=delay)), "half-period")
     scaled = what_if(one_mass(mass, damping / 2.0, delay_samples=delay))[0]
     assert here.stiffness_max == pytest.approx(4.0 * scaled.stiffness_max, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def device():
+    return load("published-two-mass", operator="thesis-arm")
+
+
+@pytest.fixture(scope="module")
+def variants(device):
+    return what_if(device)
+
+
+def largest_of(device, plant):
+    return largest_stiffness(Loop(plant, device.controller)).stiffness
+
+
+def test_twice_the_damping_is_the_devices_and_not_the_arms(device, variants):
+    alone = device.at().ungripped_plant
+    twice = attach(replace(alone, damping=2.0 * alone.damping), device.operator)
+    assert find_variant(variants, "twice-damping").stiffness_max == pytest.approx(
+        largest_of(device, twice), rel=1e-12
+    )
+
+
+def test_a_model_without_damping_keeps_the_operators(device, variants):
+    alone = device.at(model="rigid").ungripped_plant
+    bare = replace(alone, damping=0.0 * alone.damping)
+    expected = largest_of(device, attach(bare, device.operator))
+    assert find_variant(variants, "model-rigid-undamped").stiffness_max == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_motor_mass_holds_the_operator_fixed(device, variants):
+    fixed = find_variant(variants, "model-motor-mass")
+    assert fixed.loop.plant.size == 1
+    assert fixed.stiffness_max == pytest.approx(largest_of(device, device.at(model="motor-mass").ungripped_plant))
+
+
+def test_a_model_that_the_device_is_already_is_seen_to_be(device, variants):
+    assert device.at().ungripped_plant is device.at(model="two-mass").ungripped_plant
+    assert find_variant(variants, "model-two-mass").reason == "the device as described is this model"
+
+
+def test_a_kalman_filter_that_half_the_period_would_blind_is_left_out_with_the_reason():
+    velocity = {"method": "kalman", "acceleration_noise_m_per_s2": 9.0, "position_noise_m": 1.0}
+    device = load("hapkit-course", [("loop.velocity", velocity)])
+    left_out = find_variant(what_if(device), "half-period")
+    assert left_out.chart is None
+    assert "too little motion within a period of 0.0005 s" in left_out.reason
+
+
+def test_windings_that_brake_are_damping_to_leave_out():
+    settings = [("plant.electrical_damping", [{"force_constant_N_per_A": 2.0, "resistance_ohm": 4.0,
+                                               "inductance_H": 0.01}])]  # fmt: skip
+    device = load("published-two-mass", settings)
+    found = what_if(device)
+    lossless = find_variant(found, "model-motor-mass-undamped").loop.plant
+    assert lossless.lagged_dampers == ()
+    assert not np.any(lossless.damping)
+    (motor,) = find_variant(found, "model-motor-mass").loop.plant.lagged_dampers
+    assert (motor.damping, motor.time_constant, motor.along.tolist()) == (1.0, 0.0025, [1.0])

@@ -7,27 +7,47 @@ import pickle
 import numpy as np
 import pytest
 
-from tests.study.executor_cases import alike
-from tests.study.study_cases import FIVE_BAR, LENGTH, OTHER, TWO_MASS, axis, kept, study, tables
+from tests.study.executor_cases import same_cells
+from tests.study.study_cases import (
+    FIVE_BAR,
+    LEFT_LENGTH,
+    RIGHT_LENGTH,
+    TWO_MASS,
+    axis,
+    numbers_match_status,
+    study,
+    study_document,
+)
 from zwidth.chart.chart import largest_stiffness
 from zwidth.device.device import Device
 from zwidth.device.load import load
+from zwidth.measures.definition import (
+    FAILED,
+    NO_VALUE,
+    OK,
+    OUT_OF_REACH,
+    STATUS,
+    Measure,
+    MeasureError,
+    WantedWall,
+)
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.measure import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS, Measure, MeasureError, WantedWall
-from zwidth.model.effective import effective_parameters
+from zwidth.model.effective_parameters import effective_parameters
 from zwidth.study.executor import run
+from zwidth.study.map import workspace_map
 from zwidth.study.store import Store
 from zwidth.study.study_file import study_of
 from zwidth.study.sweep import Sweep, run_study
 from zwidth.study.sweep_job import sweep_job
-from zwidth.study.workspace import workspace_map
 from zwidth.study.workspace_summary import over_the_workspace
 
-LENGTHS = axis(LENGTH, range=[0.11, 0.18], count=4, tie=[OTHER, {"key": "links.upper-left.mass_kg", "power": 1}])
+LENGTHS = axis(
+    RIGHT_LENGTH, range=[0.11, 0.18], count=4, tie=[LEFT_LENGTH, {"key": "links.upper-left.mass_kg", "power": 1}]
+)
 ASSEMBLIES = axis("assembly", "elbows-out", "elbows-in")
 
 
-def asked(*axes, **more) -> Sweep:
+def run_axes(*axes, **more) -> Sweep:
     return run_study(study(*axes, **more), workers=1)
 
 
@@ -39,13 +59,17 @@ def stiffest(device: Device, *asked, **circumstances) -> float:
 
 def test_each_design_is_the_device_file_with_its_numbers():
     """By the ordinary way: load with --set, place, chart."""
-    found = asked(LENGTHS, ASSEMBLIES, measures=["stiffness_max", "rigid_mass"]).dataset()
+    found = run_axes(LENGTHS, ASSEMBLIES, measures=["stiffness_max", "rigid_mass"]).dataset()
     mass = load(FIVE_BAR).document["mechanism"]["links"][2]["mass_kg"]
-    for length in found[LENGTH].values:
-        settings = [(LENGTH, length), (OTHER, length), ("links.upper-left.mass_kg", mass * length / 0.147)]
+    for length in found[RIGHT_LENGTH].values:
+        settings = [
+            (RIGHT_LENGTH, length),
+            (LEFT_LENGTH, length),
+            ("links.upper-left.mass_kg", mass * length / 0.147),
+        ]
         device = load(FIVE_BAR, settings)
         for name in found["assembly"].values:
-            cell = found.sel({LENGTH: length, "assembly": name})
+            cell = found.sel({RIGHT_LENGTH: length, "assembly": name})
             assert float(cell["stiffness_max"]) == pytest.approx(stiffest(device, assembly=name), rel=1e-9)
             posture = device.at(assembly=name).posture
             assert device.mechanism is not None
@@ -61,7 +85,7 @@ def test_circumstances_are_those_asked_for():
         axis("model", "full", "rigid"),
         axis("operator", "none", "thesis-arm"),
     )
-    found = asked(*axes, measures=["stiffness_max"])
+    found = run_axes(*axes, measures=["stiffness_max"])
     values = found.cells.values[:, 0].reshape(2, 3, 2, 2)
     for i, at in enumerate([(0.0, 0.25), (0.05, 0.2)]):
         for j, direction in enumerate([(0, 1), (1, 0), (3, 4)]):
@@ -74,7 +98,7 @@ def test_circumstances_are_those_asked_for():
 
 def test_an_axis_of_the_computer_and_the_study_s_own_circumstances():
     axes = axis("loop.delay_samples", 0.0, 0.7), axis("loop.sampling_period_s", range=[2e-4, 2e-3], count=3)
-    found = asked(
+    found = run_axes(
         *axes,
         measures=["stiffness_max"],
         at=[0.04, 0.22],
@@ -89,7 +113,11 @@ def test_an_axis_of_the_computer_and_the_study_s_own_circumstances():
 
 def test_a_posture_that_is_known_is_not_another_design_s():
     """Numbers of the computer leave a posture as it is; those of the mechanism, and the place, do not."""
-    axes = axis(LENGTH, 0.12, 0.16), axis("loop.delay_samples", 0.0, 1.0), axis("at", [0.0, 0.25], [0.05, 0.2])
+    axes = (
+        axis(RIGHT_LENGTH, 0.12, 0.16),
+        axis("loop.delay_samples", 0.0, 1.0),
+        axis("at", [0.0, 0.25], [0.05, 0.2]),
+    )
     columns = ["rigid_mass", "average(rigid_mass)"]
     job = sweep_job(study(*axes, measures=columns, workspace={"count": 3}))
     together = job.compute(0, 8)
@@ -125,15 +153,15 @@ def test_over_the_workspace_a_design_has_what_its_map_has():
 
 def test_a_workspace_out_of_reach_has_no_value_and_says_so():
     space = {"x_m": [0.6, 0.7], "y_m": [0.6, 0.7], "count": 2}
-    found = asked(LENGTHS, measures=["average(isotropy)", "share(isotropy)"], workspace=space)
+    found = run_axes(LENGTHS, measures=["average(isotropy)", "share(isotropy)"], workspace=space)
     assert (found.cells.status[:, 0] == OUT_OF_REACH).all()
     assert (found.cells.values[:, 1] == 0.0).all()
 
 
 def test_what_is_no_device_and_what_is_out_of_reach_is_told_and_the_rest_is_kept():
-    lengths = axis(LENGTH, 0.01, 0.147, tie=[OTHER])
+    lengths = axis(RIGHT_LENGTH, 0.01, 0.147, tie=[LEFT_LENGTH])
     masses = axis("links.distal-left.mass_kg", range=[-0.05, 0.05], count=3)
-    found = asked(lengths, masses, measures=["stiffness_max", "isotropy"])
+    found = run_axes(lengths, masses, measures=["stiffness_max", "isotropy"])
     assert [[STATUS[s] for s in row] for row in found.cells.status] == [
         ["failed"] * 2,
         ["out of reach"] * 2,
@@ -142,7 +170,7 @@ def test_what_is_no_device_and_what_is_out_of_reach_is_told_and_the_rest_is_kept
         ["ok"] * 2,
         ["ok"] * 2,
     ]
-    assert kept(found.cells.values, found.cells.status)
+    assert numbers_match_status(found.cells.values, found.cells.status)
     (note,) = found.cells.notes[0]
     said = "mechanism.links.distal-left.mass_kg: must be at least 0, got -0.05 (mass; 0 for a massless link [kg])"
     assert note.reason == said
@@ -176,7 +204,7 @@ def test_a_user_s_measure_that_raises_or_returns_the_wrong_shape_fails_in_its_ce
         "        raise ZeroDivisionError('too slow')\n"
         "    return [1.0, 2.0] if period > 1.5e-3 else period\n"
     )
-    document = tables(axis("loop.sampling_period_s", 1e-3, 2e-3, 3e-3), measures=["spoilt", "rigid_mass"])
+    document = study_document(axis("loop.sampling_period_s", 1e-3, 2e-3, 3e-3), measures=["spoilt", "rigid_mass"])
     found = run_study(study_of({**document, "measures_file": "own.py"}, str(tmp_path / "study.toml")), workers=1)
     assert [STATUS[s] for s in found.cells.status[:, 0]] == ["ok", "failed", "failed"]
     assert (found.cells.status[:, 1] == OK).all()
@@ -211,29 +239,33 @@ def test_what_a_measure_wants_is_told_by_the_keys_of_a_study(name, more, said):
 
 def test_a_plant_s_numbers_can_be_varied():
     coupling = axis("plant.stiffness_N_per_m.0.1", -10000.0, -15000.0, tie=[])
-    found = asked(coupling, device=TWO_MASS, measures=["stiffness_max"])
+    found = run_axes(coupling, device=TWO_MASS, measures=["stiffness_max"])
     for n in range(2):
         expected = stiffest(load(TWO_MASS, list(found.design(n).items())))
         assert found.cells.values[n, 0] == pytest.approx(expected, rel=1e-12)
 
 
 def test_no_wall_is_no_value():
-    found = asked(axis("plant.damping_Ns_per_m", 0.0, 1.0), device="hapkit-course", measures=["stiffness_max"])
+    found = run_axes(axis("plant.damping_Ns_per_m", 0.0, 1.0), device="hapkit-course", measures=["stiffness_max"])
     assert set(found.cells.status[:, 0]) <= {OK, NO_VALUE}
-    assert kept(found.cells.values, found.cells.status)
+    assert numbers_match_status(found.cells.values, found.cells.status)
 
 
 def test_the_same_bits_however_it_is_cut_and_whoever_computes_it(tmp_path):
-    axes = axis(LENGTH, range=[0.01, 0.2], tie=[OTHER]), axis("loop.delay_samples", range=[0.0, 2.0]), ASSEMBLIES
+    axes = (
+        axis(RIGHT_LENGTH, range=[0.01, 0.2], tie=[LEFT_LENGTH]),
+        axis("loop.delay_samples", range=[0.0, 2.0]),
+        ASSEMBLIES,
+    )
     measures = ["stiffness_max", "isotropy", "average(rigid_mass)"]
     job = sweep_job(
         study(*axes, measures=measures, workspace={"count": 4}, sampling="latin-hypercube", count=24, seed=3)
     )
     whole = job.compute(0, 24)
     assert set(np.unique(whole.status)) > {OK}
-    assert alike(run(job, workers=1, batch=1), whole)
-    assert alike(run(job, Store(tmp_path / "cells", job), workers=1, batch=7), whole)
-    assert alike(run(job, workers=2, batch=5, patience=-1.0), whole)
+    assert same_cells(run(job, workers=1, batch=1), whole)
+    assert same_cells(run(job, Store(tmp_path / "cells", job), workers=1, batch=7), whole)
+    assert same_cells(run(job, workers=2, batch=5, patience=-1.0), whole)
 
 
 def test_the_question_is_the_study_s():
@@ -251,29 +283,29 @@ def test_the_question_is_the_study_s():
 
 
 def test_a_grid_as_a_dataset():
-    found = asked(LENGTHS, ASSEMBLIES, measures=["rigid_mass", "stiffness_max"])
+    found = run_axes(LENGTHS, ASSEMBLIES, measures=["rigid_mass", "stiffness_max"])
     dataset = found.dataset()
-    assert dataset["rigid_mass"].dims == (LENGTH, "assembly")
-    assert dict(dataset.sizes) == {LENGTH: 4, "assembly": 2}
+    assert dataset["rigid_mass"].dims == (RIGHT_LENGTH, "assembly")
+    assert dict(dataset.sizes) == {RIGHT_LENGTH: 4, "assembly": 2}
     assert dataset["stiffness_max"].attrs["unit"] == "N/m"
-    assert dataset[LENGTH].attrs["units"] == "m"
-    assert dataset[OTHER].dims == (LENGTH,)
-    assert np.array_equal(dataset[OTHER], dataset[LENGTH])
+    assert dataset[RIGHT_LENGTH].attrs["units"] == "m"
+    assert dataset[LEFT_LENGTH].dims == (RIGHT_LENGTH,)
+    assert np.array_equal(dataset[LEFT_LENGTH], dataset[RIGHT_LENGTH])
     assert dataset["links.upper-left.mass_kg"].attrs["units"] == "kg"
     assert dataset["rigid_mass_status"].attrs["flag_meanings"].split()[OUT_OF_REACH] == "out_of_reach"
     for n in range(8):
         design = found.design(n)
-        cell = dataset.sel({LENGTH: design[LENGTH], "assembly": design["assembly"]})
+        cell = dataset.sel({RIGHT_LENGTH: design[RIGHT_LENGTH], "assembly": design["assembly"]})
         assert float(cell["rigid_mass"]) == found.cells.values[n, 0]
 
 
 def test_a_hypercube_and_lists_as_a_dataset():
     centre = {"key": "links.upper-left.center_of_mass_m", "power": 1}
-    spans = axis(LENGTH, range=[0.1, 0.2], tie=[centre]), axis("at", [0.0, 0.25], [0.05, 0.2])
-    dataset = asked(*spans, sampling="latin-hypercube", count=6).dataset()
+    spans = axis(RIGHT_LENGTH, range=[0.1, 0.2], tie=[centre]), axis("at", [0.0, 0.25], [0.05, 0.2])
+    dataset = run_axes(*spans, sampling="latin-hypercube", count=6).dataset()
     assert dataset["rigid_mass"].dims == ("design",)
-    assert dataset[LENGTH].dims == ("design",)
+    assert dataset[RIGHT_LENGTH].dims == ("design",)
     assert set(dataset["at"].values) == {"0, 0.25", "0.05, 0.2"}
     assert set(dataset["at_x"].values) == {0.0, 0.05}
-    ratio = dataset["links.upper-left.center_of_mass_m.0"] / dataset[LENGTH]
+    ratio = dataset["links.upper-left.center_of_mass_m.0"] / dataset[RIGHT_LENGTH]
     assert np.allclose(ratio, -0.04565 / 0.147, rtol=1e-12)

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 import zwidth
-from tests.study.study_cases import FIVE_BAR, LENGTH, TWO_MASS, axis, study
+from tests.study.study_cases import FIVE_BAR, RIGHT_LENGTH, TWO_MASS, axis, study
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
-from zwidth.measures.measure import FAILED, OK, Measure, MeasureError
-from zwidth.study.plane import plane_of
+from zwidth.measures.definition import FAILED, OK, Measure, MeasureError
+from zwidth.study.plane_grid import plane_of
 from zwidth.study.study_arguments import study_over
 from zwidth.study.sweep import run_study, sweep
 from zwidth.study.sweep_job import sweep_job
 
 PERIOD, DELAY = "loop.sampling_period_s", "loop.delay_samples"
-OWN = Measure(
+PERIOD_MEASURE = Measure(
     "period", "Sampling period", "s", None, "", lambda point: point.controller.sampling_period, each=True
 )
 
@@ -41,7 +41,11 @@ def test_the_line_of_the_contract(device):
 
 def test_it_is_the_study_that_a_file_asks(device):
     """The same question, so that what one has kept serves the other; the same numbers, to the last bit."""
-    axes = {LENGTH: [0.13, 0.16], "assembly": ["elbows-out", "elbows-in"], "operator": ["none", "thesis-arm"]}
+    axes = {
+        RIGHT_LENGTH: [0.13, 0.16],
+        "assembly": ["elbows-out", "elbows-in"],
+        "operator": ["none", "thesis-arm"],
+    }
     names = ["stiffness_max", "average(rigid_mass)"]
     plane = plane_of(device, cells=(3, 3))
     asked = study_over(device, axes, names, direction=(1.0, 1.0), model="two-mass", plane=plane)
@@ -90,9 +94,15 @@ def test_the_wanted_wall_is_told_by_its_numbers(device):
 
 
 def test_measures_of_one_s_own_by_name_and_themselves(device):
-    found = sweep(device, {PERIOD: [1e-3, 2e-3]}, ["period", "average(period)"], own={"period": OWN}, workers=1)
+    found = sweep(
+        device,
+        {PERIOD: [1e-3, 2e-3]},
+        ["period", "average(period)"],
+        user_measures={"period": PERIOD_MEASURE},
+        workers=1,
+    )
     assert found["period"].values.tolist() == found["average(period)"].values.tolist() == [1e-3, 2e-3]
-    found = sweep(device, {PERIOD: [1e-3, 2e-3]}, OWN, workers=1)
+    found = sweep(device, {PERIOD: [1e-3, 2e-3]}, PERIOD_MEASURE, workers=1)
     assert found["period"].values.tolist() == [1e-3, 2e-3]
     assert found["period"].attrs["unit"] == "s"
 
@@ -148,14 +158,14 @@ WRONG = [
 ]
 
 
-def asked(device, **given):
+def sweep_delays(device, **given):
     return sweep(device, **{"axes": {DELAY: [0.0, 1.0]}, "measures": "isotropy", **given})
 
 
 @pytest.mark.parametrize(("given", "begin", "hint"), WRONG, ids=[begin for _, begin, _ in WRONG])
 def test_a_mistake_is_one_line_in_the_words_of_python(device, given, begin, hint):
     with pytest.raises(DeviceError) as caught:
-        asked(device, **given)
+        sweep_delays(device, **given)
     (fault,) = caught.value.faults
     assert str(fault).startswith(begin)
     assert hint in str(fault)
@@ -163,7 +173,7 @@ def test_a_mistake_is_one_line_in_the_words_of_python(device, given, begin, hint
 
 def test_several_mistakes_are_told_at_once(device):
     with pytest.raises(DeviceError) as caught:
-        asked(device, axes={DELAY: ["late"], "model": ["stiff"]}, measures="isotrop", stiffness=-1.0)
+        sweep_delays(device, axes={DELAY: ["late"], "model": ["stiff"]}, measures="isotrop", stiffness=-1.0)
     said = [str(fault).partition(":")[0] for fault in caught.value.faults]
     assert sorted(said) == ["axes", "axes", "measures", "stiffness"]
 
@@ -181,12 +191,12 @@ def test_several_mistakes_are_told_at_once(device):
         ({"axes": {"at": (0.0, 0.2)}}, "axes['at'] must be a list of values, got a tuple; write [[0.0, 0.2]]"),
         ({"measures": 3}, "measures must be a name, a Measure or a list of them, got 3"),
         ({"measures": ["isotropy", None]}, "measures must be a name, a Measure or a list of them, got None"),
-        ({"plane": "xy"}, "plane must be a Plane, got the text 'xy'; write plane_of(device, 'xy')"),
+        ({"plane": "xy"}, "plane must be a PlaneGrid, got the text 'xy'; write plane_of(device, 'xy')"),
     ],
 )
 def test_an_argument_of_another_kind_is_told_with_what_to_type(device, given, said):
     with pytest.raises(TypeError) as caught:
-        asked(device, **given)
+        sweep_delays(device, **given)
     assert str(caught.value) == said
 
 
@@ -196,7 +206,7 @@ def test_an_argument_of_another_kind_is_told_with_what_to_type(device, given, sa
 )
 def test_nothing_to_vary(device, axes, said):
     with pytest.raises(ValueError) as caught:  # noqa: PT011
-        asked(device, axes=axes)
+        sweep_delays(device, axes=axes)
     assert str(caught.value).startswith(said)
 
 
@@ -204,12 +214,12 @@ def test_a_plane_is_for_measures_over_it(device):
     with pytest.raises(
         DeviceError, match=r"^plane: is read by measures over it only, such as average\(isotropy\)"
     ):
-        asked(device, plane=plane_of(device, cells=(3, 3)))
+        sweep_delays(device, plane=plane_of(device, cells=(3, 3)))
 
 
 def test_a_plant_has_no_workspace_and_a_response_no_numbers(tmp_path):
     with pytest.raises(DeviceError, match=r"^measures: average\(stiffness_max\) is over a workspace"):
-        asked(load(TWO_MASS), measures="average(stiffness_max)")
+        sweep_delays(load(TWO_MASS), measures="average(stiffness_max)")
     (tmp_path / "sweep.csv").write_text(
         "frequency_Hz,real_m_per_N,imag_m_per_N\n" + "".join(f"{f},{-1.0 / f**2},-1e-9\n" for f in range(1, 40))
     )
@@ -217,7 +227,7 @@ def test_a_plant_has_no_workspace_and_a_response_no_numbers(tmp_path):
         'name = "m"\n[response]\nfile = "sweep.csv"\nintegrators = 2\n[loop]\nsampling_period_s = 0.001\n'
     )
     with pytest.raises(DeviceError, match=r"^device: has a measured \[response\] and no model"):
-        asked(load(tmp_path / "measured.toml"))
+        sweep_delays(load(tmp_path / "measured.toml"))
 
 
 @pytest.mark.parametrize(
@@ -229,7 +239,7 @@ def test_a_plant_has_no_workspace_and_a_response_no_numbers(tmp_path):
 )
 def test_what_a_measure_wants_is_told_by_arguments(device, name, given, said):
     with pytest.raises(MeasureError) as caught:
-        asked(device, measures=name, **given)
+        sweep_delays(device, measures=name, **given)
     assert str(caught.value).endswith(said)
 
 
@@ -237,30 +247,30 @@ def test_what_a_measure_wants_is_told_by_arguments(device, name, given, said):
 
 
 @pytest.fixture(scope="module")
-def swept():
-    lengths = axis(LENGTH, 0.02, 0.14, 0.18, tie=["links.upper-left.length_m"])
+def sweep_of_file():
+    lengths = axis(RIGHT_LENGTH, 0.02, 0.14, 0.18, tie=["links.upper-left.length_m"])
     return run_study(study(lengths, measures=["rigid_mass", "isotropy"]), workers=1)
 
 
-def test_a_sweep_knows_its_keys_and_its_columns(swept):
-    document = swept.document()
+def test_a_sweep_knows_its_keys_and_its_columns(sweep_of_file):
+    document = sweep_of_file.document()
     assert list(document) == ["sampling", "seed", "axes", "units", "designs", "values", "status", "notes"]
     assert document["axes"] == [
-        {"key": LENGTH, "unit": "m", "values": (0.02, 0.14, 0.18), "tied": ["links.upper-left.length_m"]}
+        {"key": RIGHT_LENGTH, "unit": "m", "values": (0.02, 0.14, 0.18), "tied": ["links.upper-left.length_m"]}
     ]
-    assert document["designs"][1] == {LENGTH: 0.14, "links.upper-left.length_m": 0.14}
+    assert document["designs"][1] == {RIGHT_LENGTH: 0.14, "links.upper-left.length_m": 0.14}
     assert document["status"][0] == {"rigid_mass": "out of reach", "isotropy": "out of reach"}
-    table = swept.table()
-    assert list(table)[:3] == [LENGTH, "links.upper-left.length_m", "rigid_mass_kg"]
+    table = sweep_of_file.table()
+    assert list(table)[:3] == [RIGHT_LENGTH, "links.upper-left.length_m", "rigid_mass_kg"]
     assert table["rigid_mass_kg"][1:] == [values["rigid_mass"] for values in document["values"][1:]]
     assert {len(column) for column in table.values()} == {3}
 
 
-def test_what_a_sweep_shows_of_itself_is_short(swept):
-    lines = repr(swept).splitlines()
-    assert lines[0] == f"Sweep: 3 designs of 'five-bar' over {LENGTH}"
+def test_what_a_sweep_shows_of_itself_is_short(sweep_of_file):
+    lines = repr(sweep_of_file).splitlines()
+    assert lines[0] == f"Sweep: 3 designs of 'five-bar' over {RIGHT_LENGTH}"
     assert lines[1].endswith("kg, 2 of 3 have a value")
-    low, high = np.nanmin(swept.cells.values[:, 0]), np.nanmax(swept.cells.values[:, 0])
+    low, high = np.nanmin(sweep_of_file.cells.values[:, 0]), np.nanmax(sweep_of_file.cells.values[:, 0])
     assert f"rigid_mass: {low:.4g} to {high:.4g} kg" in lines[1]
     assert len(lines) == 3
     many = run_study(
@@ -268,13 +278,13 @@ def test_what_a_sweep_shows_of_itself_is_short(swept):
     )
     assert len(repr(many).splitlines()) == 5
     assert repr(many).endswith("and 1 more")
-    for one in (swept.study, swept.job, pickle.loads(pickle.dumps(swept.job))):
+    for one in (sweep_of_file.study, sweep_of_file.job, pickle.loads(pickle.dumps(sweep_of_file.job))):
         assert len(repr(one)) < 300
 
 
-def test_why_nothing_has_a_value(swept):
-    assert swept.reason is None
-    far = run_study(study(axis(LENGTH, 0.01, 0.02), measures=["isotropy"]), workers=1)
+def test_why_nothing_has_a_value(sweep_of_file):
+    assert sweep_of_file.reason is None
+    far = run_study(study(axis(RIGHT_LENGTH, 0.01, 0.02), measures=["isotropy"]), workers=1)
     assert far.reason == "no design has a value: out of reach"
     none = run_study(study(axis("links.distal-left.mass_kg", -0.1), measures=["isotropy"]), workers=1)
     assert none.reason is not None

@@ -13,8 +13,7 @@ from tests.model.model_cases import random_five_bar, spatial_arm
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.evaluate import answered
-from zwidth.measures.measure import (
+from zwidth.measures.definition import (
     FAILED,
     NO_VALUE,
     OK,
@@ -25,13 +24,14 @@ from zwidth.measures.measure import (
     NoValueError,
     WantedWall,
 )
+from zwidth.measures.evaluate import evaluate_safely
 from zwidth.model.posture import PostureError
-from zwidth.study.plane import PlaneError, plane_of
+from zwidth.study.map import MapJob, as_dataset, map_job, workspace_map
+from zwidth.study.plane_grid import PlaneError, plane_of
 from zwidth.study.store import Store
-from zwidth.study.workspace import MapJob, as_dataset, map_job, workspace_map
 from zwidth.study.workspace_summary import over_the_workspace, positions
 
-EACH = Measure(
+SINGLE_POINT_MEASURE = Measure(
     "each", "Asked one by one", "N", "lower", "", lambda place: 10.0 * float(place.effective.rigid_mass), each=True
 )
 
@@ -51,7 +51,7 @@ def random_device(seed, make=random_five_bar):
     )
 
 
-def left(place):
+def left_half_only(place):
     """A measure without a value on the right, and with none for x = 0."""
     x = place.posture.position[0]
     if x > 0.0:
@@ -61,7 +61,7 @@ def left(place):
     return -x
 
 
-LEFT = Measure("left", "Left", "m", "higher", "", left, each=True, along=False)
+LEFT_HALF_MEASURE = Measure("left", "Left", "m", "higher", "", left_half_only, each=True, along=False)
 
 
 def test_what_a_map_holds(device):
@@ -90,7 +90,7 @@ def test_each_cell_is_the_question_asked_alone(seed, make):
     device = random_device(seed, make)
     x, y, _ = device.reference_position
     plane = plane_of(device, "xy", x=(x - 0.12, x + 0.12), y=(y - 0.12, y + 0.12), cells=(7, 6))
-    names = ["rigid_mass", "stiffness", "manipulability", "isotropy", EACH]
+    names = ["rigid_mass", "stiffness", "manipulability", "isotropy", SINGLE_POINT_MEASURE]
     direction = np.array([0.6, -0.8, 0.0])
     found = workspace_map(device, names, plane, direction)
     for row in range(6):
@@ -106,7 +106,7 @@ def test_each_cell_is_the_question_asked_alone(seed, make):
                 assert np.isnan(found["rigid_mass"].values[row, column])
                 continue
             for one in names:
-                measure = MEASURES.get(one, EACH)
+                measure = MEASURES.get(one, SINGLE_POINT_MEASURE)
                 value = float(measure.compute(place))
                 assert found[measure.name].values[row, column] == pytest.approx(value, rel=1e-9)
                 assert found[f"{measure.name}_status"].values[row, column] == OK
@@ -155,7 +155,7 @@ def test_extreme_directions_of_a_symmetric_device_mirror_each_other():
 
 def test_a_cell_that_fails_says_so_and_the_rest_is_kept(device):
     plane = plane_of(device, x=(-0.2, 0.2), y=(0.1, 0.3), cells=(5, 3))
-    found = workspace_map(device, [LEFT, "rigid_mass"], plane)
+    found = workspace_map(device, [LEFT_HALF_MEASURE, "rigid_mass"], plane)
     expected = np.array([[OK, OK, FAILED, NO_VALUE, NO_VALUE]] * 3)
     reach = found["rigid_mass_status"].values == OK
     np.testing.assert_array_equal(found["left_status"].values[reach], expected[reach])
@@ -193,7 +193,7 @@ def test_what_was_stored_is_not_computed_again(device, tmp_path):
 
 
 def test_results_do_not_depend_on_how_cells_are_cut(device):
-    job = map_job(device, ["rigid_mass", EACH], plane_of(device, cells=(11, 6)), "lowest")
+    job = map_job(device, ["rigid_mass", SINGLE_POINT_MEASURE], plane_of(device, cells=(11, 6)), "lowest")
     whole, parts = job.compute(0, 66), [job.compute(a, a + 6) for a in range(0, 66, 6)]
     values = np.concatenate([part.values for part in parts])
     np.testing.assert_allclose(whole.values[:, [0, 4]], values[:, [0, 4]], rtol=1e-10)
@@ -277,6 +277,6 @@ def test_the_unit_of_a_volume_has_its_power(device):
 
 def test_one_question_alone_is_answered_as_in_a_map(device):
     place = device.at()
-    value, status, reason = answered(lambda: EACH.compute(place))
+    value, status, reason = evaluate_safely(lambda: SINGLE_POINT_MEASURE.compute(place))
     assert (status, reason) == (OK, "")
     assert value == pytest.approx(10.0 * float(place.effective.rigid_mass))

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Wall = tuple[float, float]
-Walk = tuple[Floats, Floats, Floats]  # angles, K and B along an arc
+ArcPoints = tuple[Floats, Floats, Floats]  # angles, K and B along an arc
 
 # Kinds: a pair of roots at rho exp(+-i theta); a real root at +rho, at -rho; a chord of a curve, where rounding
 # hides a pair or where the curve was measured.
@@ -32,7 +32,7 @@ PAIR, PLUS, MINUS, CHORD = range(4)
 # Components of walls, and dK/dtheta along a curve.
 STIFFNESS, DAMPING, SLOPE = range(3)
 # By this share of a step an arc's ends are drawn in where sign changes are looked for: there it may touch an axis.
-DRAWN_IN: Final = 1e-6
+END_MARGIN: Final = 1e-6
 
 
 class Arc(NamedTuple):
@@ -72,7 +72,7 @@ class Curve(Protocol):
     def zeros(self, arc: Arc, component: int) -> Floats:
         """Angles on an arc at which K, B or dK/dtheta changes sign, to rounding.
 
-        Looked for between the angles that found the arc, its ends drawn in by DRAWN_IN.
+        Looked for between the angles that found the arc, its ends drawn in by END_MARGIN.
         """
 
     def dense_angles(self, arc: Arc) -> Floats:
@@ -92,7 +92,7 @@ class Arcs:
     kind, member  (n,)
     first, last   (n, 2)  walls [K, B]
     start, end    (n,)    angles there; nan where they are not known
-    following     (n,)    number of the arc that the ring goes on with
+    next_arc      (n,)    number of the arc that the ring goes on with
     thetas        (m,)    angles strictly between the ends, arc after arc
     offsets       (n + 1,)  where each arc's begin in these
     """
@@ -103,7 +103,7 @@ class Arcs:
     last: Floats
     start: Floats
     end: Floats
-    following: Whole
+    next_arc: Whole
     thetas: Floats
     offsets: Whole
 
@@ -119,7 +119,7 @@ class Arcs:
             last=numbers[:, 2:4].copy(),
             start=numbers[:, 4],
             end=numbers[:, 5],
-            following=_following([len(ring) for ring in rings]),
+            next_arc=_next_arcs([len(ring) for ring in rings]),
             thetas=np.concatenate([np.empty(0), *(arc.thetas for arc in arcs)]),
             offsets=np.array([0, *accumulate(len(arc.thetas) for arc in arcs)]),
         )
@@ -136,7 +136,7 @@ class Arcs:
             last=np.vstack([np.empty((0, 2)), *(ring[1:] for ring in rings)]),
             start=np.full(n, np.nan),
             end=np.full(n, np.nan),
-            following=_following(counts),
+            next_arc=_next_arcs(counts),
             thetas=np.empty(0),
             offsets=np.zeros(n + 1, dtype=np.int64),
         )
@@ -156,7 +156,7 @@ class Arcs:
     @cached_property
     def rings(self) -> tuple[range, ...]:
         """Numbers of the arcs of each ring."""
-        ends = (np.flatnonzero(self.following <= np.arange(len(self))) + 1).tolist()
+        ends = (np.flatnonzero(self.next_arc <= np.arange(len(self))) + 1).tolist()
         return tuple(range(low, high) for low, high in zip([0, *ends][:-1], ends, strict=True))
 
     @property
@@ -173,7 +173,7 @@ class Arcs:
         return crossed, first + share[:, None] * (last - first)
 
 
-def _following(counts: Sequence[int]) -> Whole:
+def _next_arcs(counts: Sequence[int]) -> Whole:
     """For rings of so many arcs, one after the other, the number of the arc after each."""
     following: list[int] = []
     for count in counts:
@@ -182,7 +182,7 @@ def _following(counts: Sequence[int]) -> Whole:
     return np.array(following, dtype=np.int64)
 
 
-def sampled(arcs: Arcs, curves: Curves) -> list[Walk]:
+def sample_arcs(arcs: Arcs, curves: Curves) -> list[ArcPoints]:
     """Angles, K and B (k,) along each arc from first to last: chords between them lie on the edge."""
     walks = []
     for arc in arcs:

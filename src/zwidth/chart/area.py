@@ -20,7 +20,7 @@ def quadrant_area(arcs: Arcs, curves: Curves) -> float:
     for k in arcs.curved:
         arc = arcs[k]
         along[k] = curves[arc.member].integral(arc)
-    corners = straight_integrals(arcs.last, arcs.first[arcs.following]).tolist()
+    corners = straight_integrals(arcs.last, arcs.first[arcs.next_arc]).tolist()
     return max(sum(sum(step for k in ring for step in (along[k], corners[k])) for ring in arcs.rings), 0.0)
 
 

@@ -9,14 +9,14 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arc_joining import closed_rings
+from zwidth.chart.chart_base import Chart
 from zwidth.chart.decay import fastest_decay, fastest_decay_in_first_quadrant
 from zwidth.chart.peak import Peak
-from zwidth.chart.result import Chart
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 
 Floats = NDArray[np.float64]
 
@@ -64,12 +64,12 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     if not 0.0 < radius <= 1.0:
         raise ValueError(f"radius must be a number with 0 < radius <= 1, got {radius:g}")
     tracer = Tracer.of(loop, radius)
-    edge, blur = traced(tracer)
+    edge, blur = trace_edge(tracer)
     fastest = fastest_decay(tracer, edge.outlines) if decay else None
     return StabilityChart(
         loop=loop,
         radius=radius,
-        **edge.readings(loop.period, tracer.stable),
+        **edge.chart_fields(loop.period, tracer.stable),
         fastest_decay=fastest,
         fastest_decay_in_first_quadrant=fastest_decay_in_first_quadrant(tracer, edge.outlines, fastest),
         corner_blur=blur,
@@ -79,7 +79,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
 def largest_stiffness(loop: Loop) -> Peak | None:
     """Only the stiffest stable wall with K > 0, B >= 0; None if there is none."""
     require("loop", loop, Loop)
-    edge, _ = traced(Tracer.of(loop))
+    edge, _ = trace_edge(Tracer.of(loop))
     return edge.peak
 
 
@@ -92,7 +92,7 @@ def boundary_points(
     return K, B, thetas / (2.0 * np.pi * loop.period), edge
 
 
-def traced(tracer: Tracer, member: int = 0) -> tuple[TracedEdge, float]:
+def trace_edge(tracer: Tracer, member: int = 0) -> tuple[TracedEdge, float]:
     """The edge of a loop's stable set, and the share of its size to which corners are known.
 
     An outline that crosses itself has passed a small loop of the curve between two samples: then the curve is
@@ -100,11 +100,11 @@ def traced(tracer: Tracer, member: int = 0) -> tuple[TracedEdge, float]:
 
     member  number of the loop among others
     """
-    seen = None
+    extra_angles = None
     for _ in range(2):
-        arcs, blur = closed_rings(tracer, seen)
+        arcs, blur = closed_rings(tracer, extra_angles)
         edge = TracedEdge.of(replace(arcs, member=np.full(len(arcs), member)), {member: tracer})
         if all(shapely.Polygon(outline).is_valid for outline in edge.outlines):
             break
-        seen = np.concatenate([thetas[1:-1] for thetas, _, _ in edge.walks])
+        extra_angles = np.concatenate([thetas[1:-1] for thetas, _, _ in edge.arc_points])
     return edge, blur

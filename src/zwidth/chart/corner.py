@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from zwidth.chart.arcs import Wall
 from zwidth.chart.curve import wall_alone, wall_at, zero_between
-from zwidth.chart.hurwitz import edges_stable_set, working_room
+from zwidth.chart.hurwitz import edges_stable_set, work_array
 from zwidth.chart.tracer import ROOTS, RealRoot, Tracer
 from zwidth.compiled import compiled
-from zwidth.loop.evaluate import Factors
+from zwidth.loop.factor_kernels import Factors
 
 Floats = NDArray[np.float64]
 LAST_DIGITS = 1e-14  # of an angle
@@ -19,7 +19,7 @@ LAST_DIGITS = 1e-14  # of an angle
 @compiled
 def _bisect_flag(factors: Factors, polynomials: Floats, radius: float, on: float, off: float) -> float:
     """The last angle from `on` towards `off` that is an edge."""
-    room = working_room(polynomials.shape[1] - 1)
+    room = work_array(polynomials.shape[1] - 1)
     for _ in range(60):
         middle = 0.5 * (on + off)
         if middle in (on, off):
@@ -33,7 +33,7 @@ def _bisect_flag(factors: Factors, polynomials: Floats, radius: float, on: float
 
 
 @compiled
-def meet(factors: Factors, radius: float, one: float, other: float) -> tuple[float, float, bool]:
+def solve_crossing(factors: Factors, radius: float, one: float, other: float) -> tuple[float, float, bool]:
     """Newton for wall(one) = wall(other), from close by; False if it wanders off or does not settle."""
     a, b = one, other
     settled = False
@@ -53,7 +53,7 @@ def meet(factors: Factors, radius: float, one: float, other: float) -> tuple[flo
 
 
 @compiled
-def steadier(factors: Factors, radius: float, one: float, other: float) -> float:
+def better_conditioned(factors: Factors, radius: float, one: float, other: float) -> float:
     """Of the two angles of a corner the one on whose branch the wall moves less with the angle's last digits."""
     _, _, dK, dB = wall_at(factors, radius, one)
     _, _, eK, eB = wall_at(factors, radius, other)
@@ -89,7 +89,7 @@ def wall_on_line(tracer: Tracer, root: RealRoot, theta: float) -> Wall:
 
 def _last_edge(tracer: Tracer, on: float, off: float) -> float:
     """The last angle from `on` towards `off` that is an edge."""
-    if tracer.certain(on) and tracer.certain(off):
+    if tracer.polynomials_decide(on) and tracer.polynomials_decide(off):
         return _bisect_flag(tracer.factors, tracer.polynomials, tracer.radius, on, off)
     for _ in range(50):  # polynomials cannot tell: a long delay, or roots that stay close to the circle
         middle = 0.5 * (on + off)
@@ -124,7 +124,7 @@ def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, f
     wall = tracer.wall(theta)[:2]
     partner = _partner(tracer, theta, wall)
     if 0.0 < partner < np.pi:
-        one, other, found = meet(tracer.factors, tracer.radius, theta, partner)
-        if found and abs(one - theta) <= 1e-5 * theta:
-            return one, tracer.wall(steadier(tracer.factors, tracer.radius, one, other))[:2], other
+        one, other, settled = solve_crossing(tracer.factors, tracer.radius, theta, partner)
+        if settled and abs(one - theta) <= 1e-5 * theta:
+            return one, tracer.wall(better_conditioned(tracer.factors, tracer.radius, one, other))[:2], other
     return theta, wall, partner

@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.hurwitz import edges_stable_set, working_room
+from zwidth.chart.hurwitz import edges_stable_set, work_array
 from zwidth.compiled import compiled, compiled_inline, compiled_lean
-from zwidth.loop.evaluate import Factors, divide, plant_response, velocity_response
+from zwidth.loop.factor_kernels import Factors, divide, plant_response, velocity_response
 
 Floats = NDArray[np.float64]
 
@@ -140,7 +140,7 @@ def trace(
     """K, B and whether the wall edges the stable set (1 yes, -1 no, 0 lost in rounding) at angles in (0, pi)."""
     n = len(thetas)
     K, B, edge = np.empty(n), np.empty(n), np.empty(n, dtype=np.int64)
-    room = working_room(polynomials.shape[1] - 1)
+    room = work_array(polynomials.shape[1] - 1)
     for i in range(n):
         K[i], B[i] = wall_alone(factors, radius, thetas[i])
         edge[i] = edges_stable_set(polynomials, thetas[i], K[i], B[i], room)

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.grid import angles
+from zwidth.chart.angle_sampling import sample_angles
 from zwidth.chart.roots import polynomial_radius, spread_roots
 from zwidth.chart.tracer import Tracer
-from zwidth.compiled import compiled
-from zwidth.loop.evaluate import Factors, characteristic, degree_of_loop
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.loop.factor_kernels import Factors, characteristic, degree_of_loop
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ ROUNDS = 20  # of looking for faster walls, at each
 ALL = np.full(2, -np.inf)  # least K and B of the walls that are searched
 QUADRANT = np.zeros(2)
 # Walls along an axis, as shares of its stable part; dense near its origin, where the walls of a light device are.
-ALONG = np.union1d(np.linspace(0.0, 1.0, 200), np.logspace(-6.0, 0.0, 60))
+AXIS_SHARES = np.union1d(np.linspace(0.0, 1.0, 200), np.logspace(-6.0, 0.0, 60))
 ZOOMS, ZOOMED = 9, 33  # how often a minimum along an axis is closed in on, and walls in each
 VALLEYS = 4  # minima along an axis that are
 
@@ -64,7 +64,7 @@ class FastestDecay:
 
 
 @compiled
-def _value(polynomials: Floats, radius: float, K: float, B: float, p: Floats, roots: Complexes) -> float:
+def _radius_of_wall(polynomials: Floats, radius: float, K: float, B: float, p: Floats, roots: Complexes) -> float:
     for i in range(len(p)):
         p[i] = polynomials[0, i] + K * polynomials[1, i] + B * polynomials[2, i]
     return polynomial_radius(p, radius, roots)
@@ -78,7 +78,7 @@ def scatter_values(polynomials: Floats, radius: float, K: Floats, B: Floats) -> 
     out = np.empty(len(K))
     for i in range(len(K)):
         spread_roots(roots)
-        out[i] = _value(polynomials, radius, K[i], B[i], p, roots)
+        out[i] = _radius_of_wall(polynomials, radius, K[i], B[i], p, roots)
     return out
 
 
@@ -94,54 +94,62 @@ def descend(
     p, roots = np.empty(N + 1), np.empty(N, dtype=np.complex128)
     spread_roots(roots)
     x, f = np.empty((3, 2)), np.empty(3)
-    best = start.copy()
-    value = _bounded(polynomials, radius, best, least, p, roots)
-    trial = np.empty((4, 2))
+    best_K, best_B = start[0], start[1]
+    value = _bounded(polynomials, radius, best_K, best_B, least, p, roots)
     for size in sizes:
         for i in range(3):
-            x[i] = best
-            if i:
-                x[i, i - 1] += size * extent[i - 1]
-            f[i] = value if i == 0 else _bounded(polynomials, radius, x[i], least, p, roots)
+            x[i, 0] = best_K + (size * extent[0] if i == 1 else 0.0)
+            x[i, 1] = best_B + (size * extent[1] if i == 2 else 0.0)
+            f[i] = value if i == 0 else _bounded(polynomials, radius, x[i, 0], x[i, 1], least, p, roots)
         for _ in range(60):
-            order = np.argsort(f)
-            x, f = x[order], f[order]
+            _sort_corners(x, f)
             spread = max(abs(x[2, 0] - x[0, 0]) / extent[0], abs(x[2, 1] - x[0, 1]) / extent[1])
             if spread < 0.01 * size:
                 break
-            middle = 0.5 * (x[0] + x[1])
-            away = middle - x[2]
-            reflected = _bounded(polynomials, radius, middle + away, least, p, roots)
+            K, B = 0.5 * (x[0, 0] + x[1, 0]), 0.5 * (x[0, 1] + x[1, 1])
+            away_K, away_B = K - x[2, 0], B - x[2, 1]
+            reflected = _bounded(polynomials, radius, K + away_K, B + away_B, least, p, roots)
             if reflected < f[0]:
-                trial[0] = middle + 2.0 * away
-                farther = _bounded(polynomials, radius, trial[0], least, p, roots)
-                if farther < reflected:
-                    x[2], f[2] = trial[0], farther
-                else:
-                    x[2], f[2] = middle + away, reflected
+                farther = _bounded(polynomials, radius, K + 2.0 * away_K, B + 2.0 * away_B, least, p, roots)
+                step = 2.0 if farther < reflected else 1.0
+                x[2, 0], x[2, 1], f[2] = K + step * away_K, B + step * away_B, min(farther, reflected)
             elif reflected < f[1]:
-                x[2], f[2] = middle + away, reflected
+                x[2, 0], x[2, 1], f[2] = K + away_K, B + away_B, reflected
             else:
-                trial[0] = middle + (0.5 if reflected < f[2] else -0.5) * away
-                inner = _bounded(polynomials, radius, trial[0], least, p, roots)
+                step = 0.5 if reflected < f[2] else -0.5
+                inner = _bounded(polynomials, radius, K + step * away_K, B + step * away_B, least, p, roots)
                 if inner < min(reflected, f[2]):
-                    x[2], f[2] = trial[0], inner
+                    x[2, 0], x[2, 1], f[2] = K + step * away_K, B + step * away_B, inner
                 else:
                     for i in range(1, 3):
-                        x[i] = 0.5 * (x[0] + x[i])
-                        f[i] = _bounded(polynomials, radius, x[i], least, p, roots)
-        k = np.argmin(f)
-        best, value = x[k].copy(), f[k]
-    return max(best[0], least[0]), max(best[1], least[1]), value
+                        x[i, 0], x[i, 1] = 0.5 * (x[0, 0] + x[i, 0]), 0.5 * (x[0, 1] + x[i, 1])
+                        f[i] = _bounded(polynomials, radius, x[i, 0], x[i, 1], least, p, roots)
+        _sort_corners(x, f)
+        best_K, best_B, value = x[0, 0], x[0, 1], f[0]
+    return max(best_K, least[0]), max(best_B, least[1]), value
+
+
+@compiled_lean
+def _sort_corners(x: Floats, f: Floats) -> None:
+    """Corners of a triangle by ascending value; equal ones stay in their order."""
+    for i in range(1, 3):
+        j = i
+        while j > 0 and f[j] < f[j - 1]:
+            f[j - 1], f[j] = f[j], f[j - 1]
+            for c in range(2):
+                x[j - 1, c], x[j, c] = x[j, c], x[j - 1, c]
+            j -= 1
 
 
 @compiled
-def _bounded(polynomials: Floats, radius: float, x: Floats, least: Floats, p: Floats, roots: Complexes) -> float:
-    return _value(polynomials, radius, max(x[0], least[0]), max(x[1], least[1]), p, roots)
+def _bounded(
+    polynomials: Floats, radius: float, K: float, B: float, least: Floats, p: Floats, roots: Complexes
+) -> float:
+    return _radius_of_wall(polynomials, radius, max(K, least[0]), max(B, least[1]), p, roots)
 
 
 @compiled
-def coalesced(factors: Factors, positive: bool, low: float, high: float) -> tuple[float, float, float]:
+def double_root_wall(factors: Factors, positive: bool, low: float, high: float) -> tuple[float, float, float]:
     """K, B and radius of the wall with a double real root at +rho (or -rho) and another root of the same modulus.
 
     A double root makes the two outermost coefficients of p vanish: K and B follow from rho. The modulus of the
@@ -186,7 +194,7 @@ def fastest_decay(tracer: Tracer, outlines: list[Floats]) -> FastestDecay | None
     the best wall has a double real root, as it mostly has, its place is then solved for.
     """
     best = _fastest(tracer, outlines, ALL)
-    return _sharpened(tracer, best, ALL) if best else None
+    return _refine_at_double_root(tracer, best, ALL) if best else None
 
 
 def fastest_decay_in_first_quadrant(
@@ -199,7 +207,7 @@ def fastest_decay_in_first_quadrant(
     if of_all is None or min(of_all.stiffness, of_all.damping) >= 0.0:
         return of_all
     best = _fastest(tracer, outlines, QUADRANT)
-    return _on_axes(tracer.loop, _sharpened(tracer, best, QUADRANT)) if best else None
+    return _on_axes(tracer.loop, _refine_at_double_root(tracer, best, QUADRANT)) if best else None
 
 
 def _fastest(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDecay | None:
@@ -218,20 +226,22 @@ def _fastest(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDe
     return best
 
 
-def _sharpened(tracer: Tracer, best: FastestDecay, least: Floats) -> FastestDecay:
+def _refine_at_double_root(tracer: Tracer, best: FastestDecay, least: Floats) -> FastestDecay:
     """The wall with a coalesced real root next to a found one if there is one no worse; else the found one."""
     for reach in REACHES if tracer.degree > 2 else ():
         away = reach * (1.0 - best.spectral_radius)
         low, high = max(best.spectral_radius - away, 1e-6), min(best.spectral_radius + away, 1.0)
         for positive in (True, False):
-            K, B, radius = coalesced(tracer.factors, positive, low, high) if low < high else (0.0, 0.0, np.inf)
+            K, B, radius = (
+                double_root_wall(tracer.factors, positive, low, high) if low < high else (0.0, 0.0, np.inf)
+            )
             inside = bool(np.all(np.array([K, B]) >= least))
             if inside and radius <= best.spectral_radius + 1e-12:
                 best = FastestDecay(float(K), float(B), float(radius))
     return best
 
 
-def _judged(loop: Loop, K: float, B: float) -> FastestDecay:
+def _decay_by_eigenvalues(loop: Loop, K: float, B: float) -> FastestDecay:
     """A wall with its radius by eigenvalues: where three roots meet, the polynomial's may be far too small."""
     return FastestDecay(K, B, float(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max()))
 
@@ -239,7 +249,7 @@ def _judged(loop: Loop, K: float, B: float) -> FastestDecay:
 def _on_axes(loop: Loop, best: FastestDecay) -> FastestDecay:
     """The same wall with K or B exactly zero where that decays as fast to within rounding."""
     for K, B in ((0.0, 0.0), (0.0, best.damping), (best.stiffness, 0.0)):
-        found = _judged(loop, K, B)
+        found = _decay_by_eigenvalues(loop, K, B)
         if found.spectral_radius <= best.spectral_radius + 1e-12:
             return found
     return best
@@ -248,19 +258,19 @@ def _on_axes(loop: Loop, best: FastestDecay) -> FastestDecay:
 def _search(tracer: Tracer, outline: Floats, least: Floats, best: FastestDecay | None) -> FastestDecay | None:
     """A search from the best of the middles between points of an outline, no softer or less damped than the least;
     the better of its end and `best`."""
-    part = outline if least is ALL else _in_quadrant(outline)
-    if not len(part):
+    points = outline if least is ALL else _in_quadrant(outline)
+    if not len(points):
         return best
-    picks = part[np.linspace(0, len(part) - 1, 15).astype(int)[:-1]]
+    picks = points[np.linspace(0, len(points) - 1, 15).astype(int)[:-1]]
     i, j = np.triu_indices(len(picks), 1)
     starts = np.vstack([(picks[i] + picks[j]) / 2.0, picks.mean(axis=0)[None], picks])
     if least is QUADRANT:
-        starts = np.vstack([starts, *(_along(tracer, part, axis) for axis in (0, 1))])
+        starts = np.vstack([starts, *(_best_on_axis(tracer, points, axis) for axis in (0, 1))])
     values = scatter_values(tracer.polynomials, tracer.radius, starts[:, 0].copy(), starts[:, 1].copy())
     extent = np.maximum(np.ptp(outline, axis=0), 1e-300)
     for start in starts[np.argsort(values)[:STARTS]]:
         K, B, _ = descend(tracer.polynomials, tracer.radius, start, extent, RESTARTS, least)
-        found = _judged(tracer.loop, float(K), float(B))
+        found = _decay_by_eigenvalues(tracer.loop, float(K), float(B))
         if found.spectral_radius < (best.spectral_radius if best else tracer.radius):
             best = found
     return best
@@ -281,10 +291,10 @@ def _in_quadrant(outline: Floats) -> Floats:
     return every[(every >= 0.0).all(axis=1)]
 
 
-def _along(tracer: Tracer, part: Floats, axis: int) -> Floats:
-    """The wall (1, 2) of smallest spectral radius on an axis, as far as the part goes; K (0) or B (1) is zero."""
-    farthest = part[:, 1 - axis].max()
-    t = ALONG * farthest
+def _best_on_axis(tracer: Tracer, points: Floats, axis: int) -> Floats:
+    """The wall (1, 2) of smallest spectral radius on an axis, as far as the points go; K (0) or B (1) is zero."""
+    farthest = points[:, 1 - axis].max()
+    t = AXIS_SHARES * farthest
 
     def radii(t: Floats) -> Floats:
         zero = np.zeros(len(t))
@@ -297,11 +307,11 @@ def _along(tracer: Tracer, part: Floats, axis: int) -> Floats:
         low, high = t[max(k - 1, 0)], t[min(k + 1, len(t) - 1)]
         for _ in range(ZOOMS):
             closer = np.linspace(low, high, ZOOMED)
-            own = radii(closer)
-            n = int(np.argmin(own))
+            radii_closer = radii(closer)
+            n = int(np.argmin(radii_closer))
             low, high = closer[max(n - 1, 0)], closer[min(n + 1, ZOOMED - 1)]
-            if own[n] < best[1]:
-                best = closer[n], own[n]
+            if radii_closer[n] < best[1]:
+                best = closer[n], radii_closer[n]
     wall = np.zeros((1, 2))
     wall[0, 1 - axis] = best[0]
     return wall
@@ -309,5 +319,5 @@ def _along(tracer: Tracer, part: Floats, axis: int) -> Floats:
 
 def _edge_walls(tracer: Tracer) -> Floats:
     """Walls (k, 2) on whatever edge the curve has on the tracer's circle."""
-    K, B, edge = tracer.trace(angles(tracer.features(), tracer.radius, 0.2, tracer.longest_step))
+    K, B, edge = tracer.trace(sample_angles(tracer.features(), tracer.radius, 0.2, tracer.longest_step))
     return np.column_stack([K[edge], B[edge]])

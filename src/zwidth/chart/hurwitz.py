@@ -22,7 +22,7 @@ ROUNDING = 1e-15
 
 
 @compiled
-def working_room(degree: int) -> Floats:
+def work_array(degree: int) -> Floats:
     """The working array for polynomials up to this degree."""
     return np.zeros((8, degree + 2))
 
@@ -75,7 +75,7 @@ def _start(room: Floats, row: int, degree: int, sign: float) -> None:
 
 
 @compiled_lean
-def _plainly_hurwitz(room: Floats, row: int, degree: int) -> int:
+def _hurwitz_by_one_bound(room: Floats, row: int, degree: int) -> int:
     """Routh's array with one error bound for all of it: 1 or -1 where that settles the question, else 0.
 
     The largest relative error is taken for every entry and grows by each cancellation.
@@ -115,7 +115,7 @@ def hurwitz(room: Floats, row: int, degree: int) -> int:
     its terms, is carried through the array; a sign that it could turn decides nothing, and the answer is 0: a
     root on the axis, as far as double precision can tell. So do numbers that are not finite.
     """
-    plainly = _plainly_hurwitz(room, row, degree)
+    plainly = _hurwitz_by_one_bound(room, row, degree)
     if plainly != 0:
         return plainly
     sign = 1.0 if room[row, degree] > 0.0 else -1.0

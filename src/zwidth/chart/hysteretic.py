@@ -2,8 +2,8 @@
 
 A loss factor has no motion in time (it would begin before its cause), so there is no transition matrix. But the
 boundary of the stable set asks for the steady response to the held force at one frequency alone, which
-`chart.aliases` gives. It is sampled until what is interpolated between its angles is right too. From there on it
-is treated as a measured response, and cells are counted by Nyquist's criterion.
+`chart.hysteretic_response` gives. It is sampled until what is interpolated between its angles is right too. From
+there on it is treated as a measured response, and cells are counted by Nyquist's criterion.
 
 As the loss tends to 0 the chart tends to that of the undamped plant, in proportion to it. How small it must be for
 that is another matter: a wall that drives a mode by less than its loss brakes it is stable, and is not without the
@@ -17,14 +17,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.aliases import SampledResponse
-from zwidth.chart.grid import angles
+from zwidth.chart.angle_sampling import sample_angles
+from zwidth.chart.hysteretic_response import SampledResponse
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.response_interpolation import interpolate_response
 from zwidth.chart.tracer import Tracer
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import HysteresisError
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.model.modes import undamped_modes
 from zwidth.model.response import Response, ResponseError, integrators_of
 
@@ -32,11 +32,11 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 STEP = 0.1  # first angles, in shares of the distance to the nearest singularity of the viscous plant
-CLOSE = 1e-9  # relative error of P that interpolation may leave
+INTERPOLATION_ERROR = 1e-9  # relative error of P that interpolation may leave
 FINEST = 1e-7  # shares of an angle between two; and how near to pi one may lie
 TOO_SMALL = "too small for this loop to be charted; leave it out (0), give a larger one, or give damping"
-MOST = 100_000  # angles
-LEAST = 1e-5  # of the stiffness: with less the response turns too fast to be followed along the circle
+MOST_SAMPLES = 100_000  # angles
+LEAST_LOSS_FACTOR = 1e-5  # of the stiffness: with less the response turns too fast to be followed along the circle
 
 
 def hysteretic_chart(loop: Loop) -> MeasuredChart:
@@ -56,12 +56,14 @@ def hysteretic_chart(loop: Loop) -> MeasuredChart:
     require("loop", loop, Loop)
     if loop.plant.hysteresis is None:
         raise HysteresisError("the plant has no loss factor; stability_chart charts it")
-    if np.max(np.abs(loop.plant.hysteresis)) < LEAST * (1.0 - 1e-9) * np.max(np.abs(loop.plant.stiffness)):
-        raise HysteresisError(f"the loss factor is below {LEAST:.0e}, {TOO_SMALL}")
+    if np.max(np.abs(loop.plant.hysteresis)) < LEAST_LOSS_FACTOR * (1.0 - 1e-9) * np.max(
+        np.abs(loop.plant.stiffness)
+    ):
+        raise HysteresisError(f"the loss factor is below {LEAST_LOSS_FACTOR:.0e}, {TOO_SMALL}")
     # what the response holds already is not asked of the computer again
-    left = replace(loop.controller, delay=0.0, actuator_time_constant=0.0, force_filter=None)
+    remaining_controller = replace(loop.controller, delay=0.0, actuator_time_constant=0.0, force_filter=None)
     try:
-        chart = measured_chart(_response(loop), left)
+        chart = measured_chart(_response(loop), remaining_controller)
     except ResponseError:
         raise HysteresisError(f"the loss factor is {TOO_SMALL}") from None
     if chart.open:
@@ -75,28 +77,28 @@ def _response(loop: Loop) -> Response:
     squared, _ = undamped_modes(loop.plant.mass, loop.plant.stiffness)
     braked = loop.plant.damping.any() or loop.plant.lagged_dampers
     tracer = Tracer.of(sampled.reference)
-    thetas = angles(tracer.features(), 1.0, STEP, tracer.longest_step)
+    thetas = sample_angles(tracer.features(), 1.0, STEP, tracer.longest_step)
     thetas = np.append(thetas[thetas < np.pi * (1.0 - FINEST)], np.pi)
-    found = Response(
+    response = Response(
         frequency=thetas / (2.0 * np.pi * loop.period),
         value=sampled(thetas),
         integrators=2 if np.any(squared == 0.0) and not braked else None,
         note="computed from the loss factor",
     )
-    thetas, P = _resolved(sampled, thetas, found.value, integrators_of(found, loop.period))
-    return replace(found, frequency=thetas / (2.0 * np.pi * loop.period), value=P)
+    thetas, P = _refine_angles(sampled, thetas, response.value, integrators_of(response, loop.period))
+    return replace(response, frequency=thetas / (2.0 * np.pi * loop.period), value=P)
 
 
-def _resolved(
+def _refine_angles(
     sampled: SampledResponse, thetas: Floats, P: Complexes, integrators: int
 ) -> tuple[Floats, Complexes]:
-    """The angles and P (n,) there, with those between added until P is interpolated to CLOSE in every middle."""
+    """The angles and P (n,) there, refined until P is interpolated to INTERPOLATION_ERROR in every middle."""
     unsure = np.ones(len(thetas) - 1, dtype=bool)
-    while unsure.any() and len(thetas) < MOST:
+    while unsure.any() and len(thetas) < MOST_SAMPLES:
         middle = 0.5 * (thetas[:-1] + thetas[1:])[unsure]
         exact = sampled(middle)
         curve = interpolate_response(thetas, P, integrators, closed=True)
-        allowed = CLOSE + sampled.rounding(middle) / np.abs(exact)
+        allowed = INTERPOLATION_ERROR + sampled.rounding(middle) / np.abs(exact)
         missed = np.abs(exact * curve.inverse(middle) - 1.0) > allowed
         wide = np.diff(thetas)[unsure] > FINEST * middle
         new = np.flatnonzero(unsure)[missed & wide] + 1

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.curve import plant_on_circle
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.loop.evaluate import Factors, velocity_response
+from zwidth.loop.factor_kernels import Factors, velocity_response
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -35,13 +35,17 @@ def terms_at(factors: Factors, radius: float, theta: float) -> tuple[complex, co
     for k in range(factors.rows.shape[0]):
         A *= (d + factors.rows[k, 0]) * d + factors.rows[k, 1]
         A /= abs(A)
-    for k in range(factors.shared_bottom.shape[0]):
-        A *= (factors.shared_bottom[k, 0] * d + factors.shared_bottom[k, 1]) * d + factors.shared_bottom[k, 2]
+    for k in range(factors.force_denominator.shape[0]):
+        A *= (
+            factors.force_denominator[k, 0] * d + factors.force_denominator[k, 1]
+        ) * d + factors.force_denominator[k, 2]
         A /= abs(A)
-    for k in range(factors.bottom.shape[0]):
-        A *= (factors.bottom[k, 0] * d + factors.bottom[k, 1]) * d + factors.bottom[k, 2]
+    for k in range(factors.velocity_denominator.shape[0]):
+        A *= (
+            factors.velocity_denominator[k, 0] * d + factors.velocity_denominator[k, 1]
+        ) * d + factors.velocity_denominator[k, 2]
         A /= abs(A)
-    late = factors.whole + factors.split + factors.window.shape[0] - 1
+    late = factors.whole_delay + factors.split + factors.window.shape[0] - 1
     A *= complex(np.cos(late * theta), np.sin(late * theta))
     scale = 1.0 / max(1.0, abs(P), abs(P * w))
     return A * scale, A * P * scale, A * P * w * scale
@@ -57,7 +61,7 @@ def terms_along(factors: Factors, radius: float, thetas: Floats) -> Complexes:
 
 
 @compiled_lean
-def _turn(before: complex, after: complex) -> float:
+def _phase_change(before: complex, after: complex) -> float:
     """Change of phase from one value to the next, within half a turn."""
     ratio = after * before.conjugate()
     turn: float = np.arctan2(ratio.imag, ratio.real)
@@ -92,7 +96,7 @@ def _halved(
         if position + step < high:
             a, s, v = terms_at(factors, radius, position + step)
             after = (a + K * s + B * v) * _side(position + step, pair)
-        turn = _turn(value, after)
+        turn = _phase_change(value, after)
         if abs(turn) > FAR / 2.0:
             length = 0.5 * step
             continue
@@ -123,7 +127,7 @@ def roots_inside(
         if first < 0:
             first = i
         else:
-            turn = _turn(before, after)
+            turn = _phase_change(before, after)
             if abs(turn) > FAR / 2.0:
                 turn = _halved(factors, radius, wall, thetas[at], thetas[i], before, after)
             total += turn

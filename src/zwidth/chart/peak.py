@@ -33,7 +33,7 @@ class Peak:
 
 
 @compiled
-def prevails(K: float, B: float, stiffness: float, damping: float) -> bool:
+def is_stiffer(K: float, B: float, stiffness: float, damping: float) -> bool:
     """Whether a wall is stiffer than another one, or as stiff and more damped.
 
     Where the edge stands upright at its largest stiffness, rounding would choose among its ends otherwise.
@@ -42,26 +42,26 @@ def prevails(K: float, B: float, stiffness: float, damping: float) -> bool:
 
 
 @compiled
-def topmost(K: Floats, B: Floats, least: float) -> int:
-    """Number of the stiffest of several walls with K > least and B >= 0, by `prevails`; -1 if there is none."""
+def stiffest_index(K: Floats, B: Floats, least: float) -> int:
+    """Number of the stiffest of several walls with K > least and B >= 0, by `is_stiffer`; -1 if there is none."""
     best = -1
     for k in range(len(K)):
-        if K[k] > least and B[k] >= 0.0 and (best < 0 or prevails(K[k], B[k], K[best], B[best])):
+        if K[k] > least and B[k] >= 0.0 and (best < 0 or is_stiffer(K[k], B[k], K[best], B[best])):
             best = k
     return best
 
 
-def stiffest(arcs: Arcs, curves: Curves, width: float) -> Peak | None:
+def find_peak(arcs: Arcs, curves: Curves, stiffness_scale: float) -> Peak | None:
     """The largest stiffness over the whole stable set within K > 0, B >= 0; None if there is no such wall.
 
     It is attained on the edge: at a smooth maximum of K (dK/dtheta = 0), at a corner, or where the edge crosses
     B = 0.
 
-    width  largest |K| on the edge: what is stiff by rounding of this is no wall
+    stiffness_scale  largest |K| on the edge: what is stiff by rounding of this is no wall
     """
     crossed, crossings = arcs.crossings(DAMPING)
     crossings[:, DAMPING] = 0.0
-    walls = [arcs.last, arcs.first[arcs.following], crossings]
+    walls = [arcs.last, arcs.first[arcs.next_arc], crossings]
     # number of the arc and angle of each wall that is no corner
     along = list(zip(crossed.tolist(), arcs.start[crossed].tolist(), strict=True))
     for k in arcs.curved:
@@ -74,12 +74,12 @@ def stiffest(arcs: Arcs, curves: Curves, width: float) -> Peak | None:
                 walls.append(np.column_stack([K, np.zeros_like(K) if component == DAMPING else B]))
                 along += [(k, theta) for theta in thetas.tolist()]
     K, B = np.vstack(walls).T
-    best, corners = topmost(K, B, 1e-10 * width), 2 * len(arcs)
+    best, corners = stiffest_index(K, B, 1e-10 * stiffness_scale), 2 * len(arcs)
     if best < 0:
         return None
     if best < corners:
         last = best % len(arcs)
-        after = arcs.following[last]
+        after = arcs.next_arc[last]
         roots = {(float(arcs.end[last]), last), (float(arcs.start[after]), after)}
     else:
         last, angle = along[best - corners]
@@ -88,17 +88,19 @@ def stiffest(arcs: Arcs, curves: Curves, width: float) -> Peak | None:
     return Peak(float(K[best]), float(B[best]), angles, members)
 
 
-def largest_damping(arcs: Arcs, curves: Curves, width: float, stable: Callable[[float, float], bool]) -> float:
+def largest_damping(
+    arcs: Arcs, curves: Curves, stiffness_scale: float, stable: Callable[[float, float], bool]
+) -> float:
     """Supremum of B >= 0 that is stable for all sufficiently small K > 0; 0 if there is none.
 
     The stable intervals of the line K = 0+ end where the edge crosses or touches K = 0; each interval is tested at
     its middle.
 
-    width   largest |K| on the edge
-    stable  whether a wall (K, B) is
+    stiffness_scale  largest |K| on the edge
+    stable           whether a wall (K, B) is
     """
     corners: list[list[float]] = [*arcs.first.tolist(), *arcs.last.tolist()]
-    stops = {0.0, *(B for K, B in corners if abs(K) <= 1e-8 * width)}
+    stops = {0.0, *(B for K, B in corners if abs(K) <= 1e-8 * stiffness_scale)}
     stops.update(arcs.crossings(STIFFNESS)[1][:, 1].tolist())
     for k in arcs.curved:
         arc = arcs[k]
@@ -107,6 +109,6 @@ def largest_damping(arcs: Arcs, curves: Curves, width: float, stable: Callable[[
     ordered = sorted(stop for stop in stops if stop >= 0.0)
     spacing = 1e-9 * (ordered[-1] or 1.0)
     for low, high in zip(ordered[-2::-1], ordered[:0:-1], strict=True):
-        if high - low > spacing and stable(1e-7 * width, 0.5 * (low + high)):
+        if high - low > spacing and stable(1e-7 * stiffness_scale, 0.5 * (low + high)):
             return high
     return 0.0

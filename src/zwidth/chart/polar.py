@@ -16,8 +16,8 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import check_several_directions
 from zwidth.loop.sections import UnmovedError
-from zwidth.model.arguments import check_choice, require
-from zwidth.model.directions import DEPENDENT
+from zwidth.model.argument_checks import check_choice, require
+from zwidth.model.multi_plant import DEPENDENT
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import DirectionError, ModelError
 from zwidth.result import Result
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 OK, NO_WALL = "ok", "no stable wall"
 OUT_OF_MOTION = "out of motion: the handle cannot move along the direction"
 NONE_STABLE = "no direction has a stable wall with K > 0 and B >= 0"
-OFF = 1e-6  # of a direction, outside what the handle can do
+OUT_OF_MOTION_TOLERANCE = 1e-6  # of a direction, outside what the handle can do
 
 
 PLANES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -149,13 +149,13 @@ def largest_stiffness_by_direction(point: OperatingPoint, directions: ArrayLike)
         raise ValueError("directions must be an array (k, 3) of vectors that have a length")
     units = given / length
     plant = _plants(point)
-    moving = _motions(point.jacobian)
+    motions = _motions(point.jacobian)
     results: dict[tuple[float, ...], tuple[float, float, float, str]] = {}
     rows = []
     for unit in units:
-        key = _either_way(unit)
+        key = _direction_key(unit)
         if key not in results:
-            off = np.linalg.norm(unit - moving.T @ (moving @ unit)) > OFF
+            off = np.linalg.norm(unit - motions.T @ (motions @ unit)) > OUT_OF_MOTION_TOLERANCE
             none = float("nan")
             results[key] = (none, none, none, OUT_OF_MOTION) if off else _stiffest(plant, unit, point.controller)
         rows.append(results[key])
@@ -163,7 +163,7 @@ def largest_stiffness_by_direction(point: OperatingPoint, directions: ArrayLike)
     return ByDirection(units, np.array(stiffness), np.array(damper), np.array(frequency), status)
 
 
-def _either_way(unit: Floats) -> tuple[float, ...]:
+def _direction_key(unit: Floats) -> tuple[float, ...]:
     """One name for a direction and its opposite."""
     rounded = np.round(unit, 13) + 0.0
     lead = next(x for x in rounded if x != 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.compiled import compiled
-from zwidth.loop.evaluate import divide
+from zwidth.loop.factor_kernels import divide
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

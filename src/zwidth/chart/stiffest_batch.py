@@ -15,21 +15,22 @@ Instead the answer is put to the test, and a loop that leaves a doubt is to be a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.corner import meet, steadier
+from zwidth.chart.angle_sampling import MOST_ANGLES, angles_around_crossings, computer_points, fill_sample_angles
+from zwidth.chart.corner import better_conditioned, solve_crossing
 from zwidth.chart.curve import OF_B, OF_SLOPE, wall_alone, wall_at, zero_between
-from zwidth.chart.grid import MOST_ANGLES, angles_among, around_crossings, computer_points
-from zwidth.chart.hurwitz import combine, deflate, edges_on_line, edges_stable_set, is_stable, working_room
-from zwidth.chart.peak import prevails
+from zwidth.chart.hurwitz import combine, deflate, edges_on_line, edges_stable_set, is_stable, work_array
+from zwidth.chart.peak import is_stiffer
 from zwidth.chart.roots import find_roots, spread_roots
-from zwidth.chart.tracer import LONG
-from zwidth.compiled import compiled, compiled_parallel
-from zwidth.loop.evaluate import Factors, characteristic, degree_of_loop, divide, plant_numerator
+from zwidth.chart.tracer import HIGH_DEGREE
+from zwidth.compiled import compiled
+from zwidth.loop.factor_kernels import Factors, characteristic, degree_of_loop, divide, plant_numerator
+from zwidth.threads import in_chunks
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -38,7 +39,7 @@ FOUND: Final = 0
 NO_WALL: Final = 1
 DOUBTFUL: Final = 2
 
-# Steps along the curve, in shares of the distance to its nearest feature (`grid.angles`).
+# Steps along the curve, in shares of the distance to its nearest feature (`angle_sampling.sample_angles`).
 SHARE: Final = 0.3
 LONGEST: Final = 0.1
 # Where the curve begins and ends, in shares of the nearest feature's angle: what is softer is never the stiffest.
@@ -53,7 +54,7 @@ SLACK: Final = 1.01
 
 
 @dataclass(frozen=True)
-class Stiffest:
+class StiffestWalls:
     """The stiffest stable wall with K > 0, B >= 0 of each of N loops.
 
     stiffness, damping  (N,)    nan unless the status is FOUND
@@ -76,51 +77,20 @@ class Samples(NamedTuple):
     flags: NDArray[np.int8]
 
 
-def stiffest_walls(factors: Factors, rows: Floats, used: NDArray[np.int64]) -> Stiffest:
+def stiffest_walls(factors: Factors, rows: Floats, section_count: NDArray[np.int64]) -> StiffestWalls:
     """The stiffest walls of loops that have one computer and different plants.
 
-    factors  of any one of the loops: its rows are not looked at
-    rows     (N, m, 9)  the plants' sections, see `loop.sections`
-    used     (N,)       how many of them each plant has; 0: no wall moves it, which is DOUBTFUL
+    factors        of any one of the loops: its rows are not looked at
+    rows           (N, m, 9)  the plants' sections, see `loop.sections`
+    section_count  (N,)       how many of them each plant has; 0: no wall moves it, which is DOUBTFUL
     """
     N = len(rows)
-    late = factors.whole + len(factors.window)
-    blind = len(factors.window) > 1 or len(factors.bottom) > 1 or len(factors.shared_bottom) > 0
-    found = Stiffest(np.full(N, np.nan), np.full(N, np.nan), np.full((N, 2), np.nan), np.empty(N, np.uint8))
-    _batch(
-        np.ascontiguousarray(rows),
-        used,
-        factors,
-        computer_points(factors, 1.0),
-        min(LONGEST, 0.5 / late),
-        blind,
-        found.stiffness,
-        found.damping,
-        found.angles,
-        found.status,
-    )
+    late = factors.whole_delay + len(factors.window)
+    blind = len(factors.window) > 1 or len(factors.velocity_denominator) > 1 or len(factors.force_denominator) > 0
+    found = StiffestWalls(np.full(N, np.nan), np.full(N, np.nan), np.full((N, 2), np.nan), np.empty(N, np.uint8))
+    loops = (np.ascontiguousarray(rows), section_count, factors, computer_points(factors, 1.0))
+    in_chunks(partial(_several, *loops, min(LONGEST, 0.5 / late), blind, *vars(found).values()), N)
     return found
-
-
-@compiled_parallel
-def _batch(
-    rows: Floats,
-    used: NDArray[np.int64],
-    factors: Factors,
-    points: Complexes,
-    longest: float,
-    blind: bool,
-    stiffness: Floats,
-    damping: Floats,
-    angles: Floats,
-    status: NDArray[np.uint8],
-) -> None:
-    """The parallel loop holds nothing but the call, as in `model.batch`."""
-    count = rows.shape[0]
-    chunks = min(count, 64)
-    for chunk in numba.prange(chunks):
-        first, last = count * chunk // chunks, count * (chunk + 1) // chunks
-        _several(rows, used, factors, points, longest, blind, stiffness, damping, angles, status, first, last)
 
 
 @compiled
@@ -147,10 +117,11 @@ def _several(
         if used[i] == 0:
             continue
         one = Factors(
-            rows[i, : used[i]], factors.whole, factors.split, factors.shared_top, factors.shared_bottom,
-            factors.top, factors.bottom, factors.window,
+            rows[i, : used[i]], factors.whole_delay, factors.split,
+            factors.force_numerator, factors.force_denominator,
+            factors.velocity_numerator, factors.velocity_denominator, factors.window,
         )  # fmt: skip
-        if degree_of_loop(one) > LONG:
+        if degree_of_loop(one) > HIGH_DEGREE:
             continue
         status[i], K, B, theta, partner = stiffest_wall(one, points, longest, blind, samples)
         if status[i] == FOUND:
@@ -160,7 +131,7 @@ def _several(
 
 @compiled
 def features(factors: Factors, points: Complexes) -> Complexes:
-    """What `grid.singular_points` lists, for the unit circle; the computer's own points are given."""
+    """What `angle_sampling.singular_points` lists, for the unit circle; the computer's own points are given."""
     rows, numerator = factors.rows, plant_numerator(factors, 1.0)
     top = len(numerator) - 1
     while top > 0 and abs(numerator[top]) <= 1e-300:
@@ -197,8 +168,8 @@ def stiffest_wall(
 ) -> tuple[int, float, float, float, float]:
     """Status, stiffness, damping and the angles of the two roots on the circle there."""
     polynomials = characteristic(factors, 1.0)
-    room = working_room(polynomials.shape[1] - 1)
-    n = _sampled(factors, polynomials, points, longest, blind, samples, room)
+    room = work_array(polynomials.shape[1] - 1)
+    n = _fill_samples(factors, polynomials, points, longest, blind, samples, room)
     thetas, K, B, flags = samples
     best, at, partner, unsure, widest = 0.0, 0.0, 0.0, 0.0, 0.0
     damping = 0.0
@@ -207,7 +178,7 @@ def stiffest_wall(
             unsure = max(unsure, K[i])
         if flags[i] > 0 and B[i] >= 0.0:
             widest = max(widest, B[i])
-            if prevails(K[i], B[i], best, damping):
+            if is_stiffer(K[i], B[i], best, damping):
                 best, damping, at, partner = K[i], B[i], thetas[i], thetas[i]
     for i in range(n):
         if flags[i] <= 0:
@@ -227,13 +198,13 @@ def stiffest_wall(
                 if B[i] * B[j] < 0.0 and max(K[i], K[j]) * SLACK > best:
                     theta = zero_between(factors, 1.0, OF_B, thetas[i], thetas[j])
                     wall = wall_at(factors, 1.0, theta)
-                    if prevails(wall[0], 0.0, best, damping):
+                    if is_stiffer(wall[0], 0.0, best, damping):
                         best, damping, at, partner = wall[0], 0.0, theta, theta
                 back = -step * wall_at(factors, 1.0, thetas[j])[2] * h
                 if rise > 0.0 and back > 0.0 and min(K[i] + rise, K[j] + back) * SLACK > best:
                     theta = zero_between(factors, 1.0, OF_SLOPE, thetas[i], thetas[j])
                     wall = wall_at(factors, 1.0, theta)
-                    if wall[1] >= 0.0 and prevails(wall[0], wall[1], best, damping):
+                    if wall[1] >= 0.0 and is_stiffer(wall[0], wall[1], best, damping):
                         best, damping, at, partner = wall[0], wall[1], theta, theta
                 continue
             if max(K[i], K[i] + rise, K[j]) * SLACK < best:
@@ -241,22 +212,24 @@ def stiffest_wall(
             theta, other, settled = corner_between(factors, polynomials, thetas[i], thetas[j], room)
             if not settled:
                 return DOUBTFUL, np.nan, np.nan, np.nan, np.nan
-            wall = wall_at(factors, 1.0, steadier(factors, 1.0, theta, other) if 0.0 < other < np.pi else theta)
+            wall = wall_at(
+                factors, 1.0, better_conditioned(factors, 1.0, theta, other) if 0.0 < other < np.pi else theta
+            )
             if wall[1] * B[i] < 0.0:
                 crossing = zero_between(factors, 1.0, OF_B, min(thetas[i], theta), max(thetas[i], theta))
                 stiff = wall_at(factors, 1.0, crossing)[0]
-                if prevails(stiff, 0.0, best, damping):
+                if is_stiffer(stiff, 0.0, best, damping):
                     best, damping, at, partner = stiff, 0.0, crossing, crossing
-            if wall[1] >= 0.0 and prevails(wall[0], wall[1], best, damping):
+            if wall[1] >= 0.0 and is_stiffer(wall[0], wall[1], best, damping):
                 best, damping, at, partner = wall[0], wall[1], theta, other
             if rise > 0.0 and step * wall_at(factors, 1.0, theta)[2] < 0.0:
                 top = zero_between(factors, 1.0, OF_SLOPE, min(thetas[i], theta), max(thetas[i], theta))
                 wall = wall_at(factors, 1.0, top)
-                if wall[1] >= 0.0 and prevails(wall[0], wall[1], best, damping):
+                if wall[1] >= 0.0 and is_stiffer(wall[0], wall[1], best, damping):
                     best, damping, at, partner = wall[0], wall[1], top, top
     if n > 0 and flags[n - 1] > 0 and _end_beyond(polynomials, best):
         return DOUBTFUL, np.nan, np.nan, np.nan, np.nan
-    if (unsure > 0.0 and unsure * SLACK > best) or _more_beyond(polynomials, best, damping, widest, room):
+    if (unsure > 0.0 and unsure * SLACK > best) or _may_be_stiffer(polynomials, best, damping, widest, room):
         return DOUBTFUL, np.nan, np.nan, np.nan, np.nan
     if best == 0.0:
         return NO_WALL, np.nan, np.nan, np.nan, np.nan
@@ -266,7 +239,7 @@ def stiffest_wall(
 
 
 @compiled
-def _sampled(
+def _fill_samples(
     factors: Factors,
     polynomials: Floats,
     points: Complexes,
@@ -279,9 +252,9 @@ def _sampled(
     neighbour, and -1 elsewhere. Returns their number."""
     thetas, K, B, flags = samples
     places = features(factors, points)
-    n = angles_among(places, 1.0, SHARE, longest, NEAR_END, np.empty(len(places)), thetas)
+    n = fill_sample_angles(places, 1.0, SHARE, longest, NEAR_END, np.empty(len(places)), thetas)
     if blind:
-        more = around_crossings(factors, 1.0, thetas[:n])
+        more = angles_around_crossings(factors, 1.0, thetas[:n])
         every = np.sort(np.concatenate((thetas[:n], more)))
         n = min(len(every), MOST_ANGLES)
         thetas[:n] = every[:n]
@@ -333,7 +306,7 @@ def corner_between(
         z = divide(1.0 + root, 1.0 - root)
         if abs(abs(z) - 1.0) < nearest:
             nearest, partner = abs(abs(z) - 1.0), abs(np.arctan2(z.imag, z.real))
-    one, other, met = meet(factors, 1.0, edge, partner)
+    one, other, met = solve_crossing(factors, 1.0, edge, partner)
     return one, other, met and abs(one - edge) <= 1e-5 * edge
 
 
@@ -347,7 +320,7 @@ def _end_beyond(polynomials: Floats, stiffness: float) -> bool:
 
 
 @compiled
-def _more_beyond(polynomials: Floats, stiffness: float, damping: float, widest: float, room: Floats) -> bool:
+def _may_be_stiffer(polynomials: Floats, stiffness: float, damping: float, widest: float, room: Floats) -> bool:
     """Whether anything speaks for a stable wall stiffer than the stiffest found."""
     degree = polynomials.shape[1] - 1
     scale = max(widest, damping)

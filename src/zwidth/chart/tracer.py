@@ -9,20 +9,20 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.chart.angle_sampling import LONGEST_STEP, sample_angles, singular_points
+from zwidth.chart.arc_kernels import CHORD, MOST_POINTS, quadrant_integral, refined_angles, sign_changes
 from zwidth.chart.arcs import Arc, Wall
 from zwidth.chart.curve import trace, wall_at, walls
-from zwidth.chart.curve_pieces import CHORD, MOST_POINTS, quadrant_integral, refined_angles, sign_changes
-from zwidth.chart.grid import LONGEST_STEP, angles, singular_points
-from zwidth.chart.hurwitz import edges_on_line, is_stable, working_room
+from zwidth.chart.hurwitz import edges_on_line, is_stable, work_array
 from zwidth.chart.nyquist import phase_flags, terms_along
-from zwidth.loop.evaluate import Factors, characteristic, factor_arrays, velocity_response
+from zwidth.loop.factor_kernels import Factors, characteristic, factor_arrays, velocity_response
 from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
 # A root this near the circle is on neither side of it.
-UNDECIDED = 1e-9
+CIRCLE_TOLERANCE = 1e-9
 # Degree from which coefficients have too few digits left, and the phase along the circle is followed instead.
-LONG = 24
+HIGH_DEGREE = 24
 RealRoot = Literal["plus", "minus"]
 ROOTS: tuple[RealRoot, RealRoot] = ("plus", "minus")
 
@@ -59,7 +59,7 @@ class Tracer:
         return int(self.polynomials.shape[1]) - 1
 
     def features(self) -> NDArray[np.complex128]:
-        """Where the curve's shape comes from: see `grid.singular_points`."""
+        """Where the curve's shape comes from: see `angle_sampling.singular_points`."""
         return singular_points(self.factors, self.radius)
 
     def wall(self, theta: float) -> tuple[float, float, float, float]:
@@ -93,7 +93,7 @@ class Tracer:
         K, B, flags = self._flagged(thetas)
         unsure = np.flatnonzero(flags == 0)
         if len(unsure):
-            if not self.long:
+            if not self.is_high_degree:
                 flags[unsure] = self._edge_by_eigenvalues(thetas[unsure], K[unsure], B[unsure])
             sure = np.flatnonzero(flags)
             if len(sure):
@@ -102,20 +102,20 @@ class Tracer:
 
     def _flagged(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.int64]]:
         """K, B and flag 1, -1, or 0 where eigenvalues must be asked."""
-        if not self.long:
+        if not self.is_high_degree:
             return trace(self.factors, self.polynomials, self.radius, thetas)
         K, B = walls(self.factors, self.radius, thetas)
         return K, B, self._by_phase(np.column_stack([K, B]), thetas, 0)
 
     @property
-    def long(self) -> bool:
+    def is_high_degree(self) -> bool:
         """Whether the loop's degree is too high for polynomials."""
-        return self.degree > LONG
+        return self.degree > HIGH_DEGREE
 
     @cached_property
     def _circle(self) -> tuple[Floats, NDArray[np.complex128]]:
         """Samples of the circle, and the loop's terms along them."""
-        thetas = angles(self.features(), self.radius, 0.2, self.longest_step)
+        thetas = sample_angles(self.features(), self.radius, 0.2, self.longest_step)
         # soft walls have roots as near to z = 1 as one likes
         closer = np.logspace(-8.0, -1.0, 8)
         thetas = np.concatenate([closer * thetas[0], thetas, np.pi - closer[::-1] * (np.pi - thetas[-1])])
@@ -127,12 +127,12 @@ class Tracer:
     @property
     def longest_step(self) -> float:
         """Between samples of the circle: what is late by n samples turns n times as fast as z."""
-        late = self.factors.whole + len(self.factors.window)
+        late = self.factors.whole_delay + len(self.factors.window)
         return min(LONGEST_STEP, 0.5 / late)
 
-    def certain(self, theta: float) -> bool:
+    def polynomials_decide(self, theta: float) -> bool:
         """Whether polynomials alone can tell if the wall at one angle edges the stable set."""
-        return not self.long and bool(self._flagged(np.array([theta]))[2][0])
+        return not self.is_high_degree and bool(self._flagged(np.array([theta]))[2][0])
 
     def edge_flag(self, theta: float) -> int:
         """Whether the wall at one angle edges the stable set: 1, -1, or 0 where nothing can tell."""
@@ -143,7 +143,7 @@ class Tracer:
     def _edge_by_eigenvalues(self, thetas: Floats, K: Floats, B: Floats) -> NDArray[np.int64]:
         """The flag from all eigenvalues but the pair at each angle."""
         z = np.abs(self.roots_without_pair(thetas, K, B)).max(axis=-1) - self.radius
-        return np.where(z < -UNDECIDED, 1, np.where(z > UNDECIDED, -1, 0))
+        return np.where(z < -CIRCLE_TOLERANCE, 1, np.where(z > CIRCLE_TOLERANCE, -1, 0))
 
     def roots_without_pair(self, thetas: Floats, K: Floats, B: Floats) -> NDArray[np.complex128]:
         """Eigenvalues (..., N - 2) of walls on the curve, without the pair at rho exp(+-i theta)."""
@@ -156,10 +156,10 @@ class Tracer:
 
     def stable(self, K: float, B: float) -> bool:
         """Whether all roots of a wall lie inside the circle; False too where rounding hides it."""
-        if self.long:
+        if self.is_high_degree:
             flag = int(self._by_phase(np.array([[K, B]]), np.zeros(1), 0)[0])
         else:
-            flag = is_stable(self.polynomials, K, B, working_room(self.degree))
+            flag = is_stable(self.polynomials, K, B, work_array(self.degree))
         if flag == 0:
             return bool(np.abs(np.linalg.eigvals(self.loop.transition_matrix(K, B))).max() < self.radius)
         return bool(flag > 0)
@@ -182,14 +182,14 @@ class Tracer:
 
     def edge_on_line(self, root: RealRoot, K: float, B: float) -> bool:
         """Whether a wall on that line has all its other roots inside."""
-        if self.long:
+        if self.is_high_degree:
             flag = int(self._by_phase(np.array([[K, B]]), np.zeros(1), 1)[0])
         else:
-            flag = edges_on_line(self.polynomials, int(root == "plus"), K, B, working_room(self.degree))
+            flag = edges_on_line(self.polynomials, int(root == "plus"), K, B, work_array(self.degree))
         if flag == 0:
             z = np.linalg.eigvals(self.loop.transition_matrix(K, B))
             own = np.argmin(np.abs(z - (self.radius if root == "plus" else -self.radius)))
-            return bool(np.abs(np.delete(z, own)).max() < self.radius - UNDECIDED)
+            return bool(np.abs(np.delete(z, own)).max() < self.radius - CIRCLE_TOLERANCE)
         return bool(flag > 0)
 
     def curve_end(self, root: RealRoot) -> Wall | None:

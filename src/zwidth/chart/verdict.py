@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.loop.loop import Loop
-from zwidth.loop.multi import MultiLoop
-from zwidth.model.arguments import require, walls
+from zwidth.loop.multi_loop import MultiLoop
+from zwidth.model.argument_checks import broadcast_walls, require
 from zwidth.result import Result
 
 Floats = NDArray[np.float64]
@@ -20,7 +20,7 @@ BAND = 1e-9
 # Rounding of an eigenvalue in units of its own condition number.
 ROUNDING = 1e-15
 UNSTABLE, UNDECIDED, STABLE = -1, 0, 1
-AT_ONCE = 20_000  # walls judged in one batch of transition matrices
+BATCH_SIZE = 20_000  # walls judged in one batch of transition matrices
 NAMES = {STABLE: "stable", UNDECIDED: "undecided", UNSTABLE: "unstable"}
 
 
@@ -85,7 +85,7 @@ class Verdicts(WallVerdicts):
 def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.complex128]:
     """All eigenvalues z (..., N) of the transition matrix (thesis eq. 2.41), unobserved motions left out."""
     require("loop", loop, Loop)
-    K, B = walls(wall_stiffness, wall_damping, finite=True)
+    K, B = broadcast_walls(wall_stiffness, wall_damping, finite=True)
     return np.asarray(np.linalg.eigvals(loop.transition_matrix(K, B)), dtype=complex)
 
 
@@ -109,10 +109,10 @@ def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Ver
 
 def verdicts(loop: Loop | MultiLoop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
     """`judge`, for loops of several directions, too."""
-    K, B = walls(wall_stiffness, wall_damping)
+    K, B = broadcast_walls(wall_stiffness, wall_damping)
     judged = [
-        _judged(loop, K.ravel()[first : first + AT_ONCE], B.ravel()[first : first + AT_ONCE])
-        for first in range(0, max(K.size, 1), AT_ONCE)
+        _judged(loop, K.ravel()[first : first + BATCH_SIZE], B.ravel()[first : first + BATCH_SIZE])
+        for first in range(0, max(K.size, 1), BATCH_SIZE)
     ]
     verdict, frequency, radius, width = (
         np.concatenate(parts).reshape(K.shape) for parts in zip(*judged, strict=True)

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, DIRECT, RESISTIVE, RIGID, Case
+from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -39,14 +39,14 @@ def stiffness_limit(
     return np.asarray(np.minimum(2.0 * np.maximum(b, 0.0) / T, np.where(np.isnan(step), np.nan, blind)))
 
 
-def only_spring(stiffness: float, wall_damping: Floats) -> Floats:
+def pure_spring_limit(stiffness: float, wall_damping: Floats) -> Floats:
     """The limit of a condition on pure springs: nan where B is not 0."""
     return np.where(wall_damping == 0.0, stiffness, np.nan)
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """The two limits on a loop."""
-    b, T = case.traits.drag, case.loop.period
+    b, T = case.traits.ground_damping, case.loop.period
     largest = float(stiffness_limit(b, case.coulomb_friction, T, case.resolution))
     return case.bound(
         name="passive spring under an encoder",
@@ -54,13 +54,13 @@ def condition(case: Case) -> Bound:
         kind="passivity",
         claim="sufficient",
         statement="B = 0 and K <= min(2 b/T, 2 f_c/Delta), with dry friction f_c and the encoder's step Delta",
-        assumptions=(RIGID, COLLOCATED, AT_ONCE, *DIRECT, RESISTIVE),
+        assumptions=(RIGID, COLLOCATED, UNDELAYED, *DIRECT, RESISTIVE),
         taken={
             "damping_Ns_per_m": b,
             "sampling_period_s": T,
             "coulomb_friction_N": case.coulomb_friction,
             "resolution_m": case.resolution,
         },
-        limit=partial(only_spring, largest),
+        limit=partial(pure_spring_limit, largest),
         largest=(largest, 0.0),
     )

@@ -26,13 +26,13 @@ SPRUNG: Final = "The motor side rests on one spring, whose far end stands still.
 ONE_MODE: Final = "Device and hand move along the wall as one mass, on at most one spring and one damper."
 UNDAMPED: Final = "Nothing in the device dissipates."
 COLLOCATED: Final = "The wall acts where the encoder reads."
-AT_ONCE: Final = "The force acts without delay."
-ONE_LATE: Final = "The force acts exactly one sample late."
-WHOLE: Final = "The delay is a whole number of samples."
+UNDELAYED: Final = "The force acts without delay."
+UNIT_DELAY: Final = "The force acts exactly one sample late."
+WHOLE_DELAY: Final = "The delay is a whole number of samples."
 DIFFERENCE: Final = "The velocity is the backward difference of two successive readings."
-UNFILTERED: Final = "The velocity is not filtered."
+VELOCITY_UNFILTERED: Final = "The velocity is not filtered."
 FIRST_ORDER: Final = "The velocity passes a first-order filter."
-AS_COMPUTED: Final = "The force is not filtered."
+FORCE_UNFILTERED: Final = "The force is not filtered."
 PROMPT: Final = "The actuator follows at once."
 RESISTIVE: Final = "No electrical damping lags behind the motion."
 NYQUIST_BELOW_CORNER: Final = "Electrical damping has its corner frequency R/L above half the sampling rate."
@@ -41,12 +41,12 @@ LIGHT_WALL: Final = f"The wall's damping is light: B T/m is at most {LIGHT_FRICT
 SLOW: Final = f"The spring is slow against the sampling: W is at most {SLOW_SPRING:g}."
 
 # The computer that most sources have in mind, but for its delay: for springs, and for walls with damping.
-DIRECT: Final = (AS_COMPUTED, PROMPT)
-PLAIN: Final = (DIFFERENCE, UNFILTERED, *DIRECT)
+DIRECT: Final = (FORCE_UNFILTERED, PROMPT)
+PLAIN: Final = (DIFFERENCE, VELOCITY_UNFILTERED, *DIRECT)
 
 
 @dataclass(frozen=True)
-class Case:
+class ConditionCase:
     """A loop as the conditions see it.
 
     wall_damping      B of the walls asked about [N s/m]; nan: any
@@ -97,10 +97,14 @@ class Case:
         )
 
 
-def case_of(loop: Loop, wall_damping: float = nan, coulomb_friction: float = nan, resolution: float = nan) -> Case:
+def case_of(
+    loop: Loop, wall_damping: float = nan, coulomb_friction: float = nan, resolution: float = nan
+) -> ConditionCase:
     """Measure a loop once for all conditions."""
     found = traits(loop)
-    return Case(loop, found, wall_damping, coulomb_friction, resolution, _unmet(loop, found, wall_damping))
+    return ConditionCase(
+        loop, found, wall_damping, coulomb_friction, resolution, _unmet(loop, found, wall_damping)
+    )
 
 
 def _silent(wall_damping: Floats) -> Floats:
@@ -110,24 +114,28 @@ def _silent(wall_damping: Floats) -> Floats:
 
 def _unmet(loop: Loop, found: Traits, wall_damping: float) -> frozenset[str]:
     T = loop.period
-    mass, drag = (found.mode_mass, found.mode_drag) if found.single else (found.rigid_mass, found.drag)
-    sprung, spring = (mass, found.mode_stiffness) if found.single else (found.side_mass, found.side_stiffness)
+    mass, drag = (
+        (found.mode_mass, found.mode_damping) if found.has_one_mode else (found.rigid_mass, found.ground_damping)
+    )
+    sprung, spring = (
+        (mass, found.mode_stiffness) if found.has_one_mode else (found.side_mass, found.side_stiffness)
+    )
     met = {
         RIGID: found.free,
         SPRUNG: found.sprung,
-        ONE_MODE: found.single,
-        UNDAMPED: found.undamped and not found.corners,
+        ONE_MODE: found.has_one_mode,
+        UNDAMPED: found.undamped and not found.corner_frequencies,
         COLLOCATED: found.collocated,
-        AT_ONCE: loop.whole_delay == 0 and loop.fractional_delay == 0.0,
-        ONE_LATE: loop.whole_delay == 1 and loop.fractional_delay == 0.0,
-        WHOLE: loop.fractional_delay == 0.0,
-        DIFFERENCE: found.differences,
-        UNFILTERED: loop.controller.velocity_filter is None,
-        FIRST_ORDER: found.first_order,
-        AS_COMPUTED: not found.force_filtered,
+        UNDELAYED: loop.whole_delay == 0 and loop.fractional_delay == 0.0,
+        UNIT_DELAY: loop.whole_delay == 1 and loop.fractional_delay == 0.0,
+        WHOLE_DELAY: loop.fractional_delay == 0.0,
+        DIFFERENCE: found.uses_backward_difference,
+        VELOCITY_UNFILTERED: loop.controller.velocity_filter is None,
+        FIRST_ORDER: found.has_first_order_filter,
+        FORCE_UNFILTERED: not found.force_filtered,
         PROMPT: not found.actuator_lags,
-        RESISTIVE: not found.corners,
-        NYQUIST_BELOW_CORNER: all(corner * T >= np.pi for corner in found.corners),
+        RESISTIVE: not found.corner_frequencies,
+        NYQUIST_BELOW_CORNER: all(corner * T >= np.pi for corner in found.corner_frequencies),
         # a number that is not there breaks nothing
         LIGHT: not drag * T > LIGHT_FRICTION * mass,
         LIGHT_WALL: not abs(wall_damping) * T > LIGHT_FRICTION * mass,

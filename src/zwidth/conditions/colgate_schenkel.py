@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.conditions.assumptions import (
-    AT_ONCE,
     COLLOCATED,
     DIFFERENCE,
     DIRECT,
@@ -25,7 +24,8 @@ from zwidth.conditions.assumptions import (
     PLAIN,
     RESISTIVE,
     RIGID,
-    Case,
+    UNDELAYED,
+    ConditionCase,
 )
 from zwidth.conditions.bound import Bound
 from zwidth.loop.controller import FirstOrder
@@ -73,25 +73,25 @@ def stiffness_limit_filtered(
     return np.asarray(2.0 * np.maximum(b - burden, 0.0) / T)
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """The unfiltered, undelayed wall on a loop."""
-    b, T = case.traits.drag, case.loop.period
+    b, T = case.traits.ground_damping, case.loop.period
     return case.bound(
         name="passive wall",
         source="Colgate and Schenkel 1997; thesis eq. 4.15",
         kind="passivity",
         claim="sufficient",
         statement="b > K T/2 + |B|",
-        assumptions=(RIGID, COLLOCATED, AT_ONCE, *PLAIN, RESISTIVE),
+        assumptions=(RIGID, COLLOCATED, UNDELAYED, *PLAIN, RESISTIVE),
         taken={"damping_Ns_per_m": b, "sampling_period_s": T},
         limit=partial(stiffness_limit, device_damping=b, sampling_period=T),
         largest=(float(stiffness_limit(0.0, b, T)), 0.0),
     )
 
 
-def filtered_condition(case: Case) -> Bound:
+def filtered_condition(case: ConditionCase) -> Bound:
     """The wall with a first-order velocity filter on a loop."""
-    b, T = case.traits.drag, case.loop.period
+    b, T = case.traits.ground_damping, case.loop.period
     low_pass = case.loop.controller.velocity_filter
     tau = low_pass.time_constant if isinstance(low_pass, FirstOrder) else nan
     return case.bound(
@@ -100,7 +100,7 @@ def filtered_condition(case: Case) -> Bound:
         kind="passivity",
         claim="sufficient",
         statement="B >= 0: b > K T/2 + B (1 - a)/(1 + a); B < 0: b > K T/2 + |B|; with a = tau/(tau + T)",
-        assumptions=(RIGID, COLLOCATED, AT_ONCE, DIFFERENCE, FIRST_ORDER, *DIRECT, RESISTIVE),
+        assumptions=(RIGID, COLLOCATED, UNDELAYED, DIFFERENCE, FIRST_ORDER, *DIRECT, RESISTIVE),
         taken={"damping_Ns_per_m": b, "sampling_period_s": T, "time_constant_s": tau},
         limit=partial(stiffness_limit_filtered, device_damping=b, sampling_period=T, time_constant=tau),
         largest=(float(stiffness_limit_filtered(0.0, b, T, tau)), 0.0),

@@ -6,14 +6,17 @@ from dataclasses import dataclass
 from math import nan
 from typing import Any
 
+import numpy as np
+from scipy.optimize import brentq
+
 from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.verdict import spectral_radius
 from zwidth.conditions.bound import Bound
-from zwidth.conditions.dry import ground_friction, reading_step
-from zwidth.conditions.exact import stiffness_limit
+from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
 from zwidth.conditions.registry import compare
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.arguments import check_number, require
+from zwidth.model.argument_checks import check_number, require
 from zwidth.result import Result
 
 # Keys of a bound that are no columns of a table: one is the same for every device, the other a table itself.
@@ -59,7 +62,7 @@ class BoundsComparison(Result):
 
     def document(self) -> dict[str, Any]:
         """The conditions and the exact limit by key and unit."""
-        told = {} if self.chart is not None else {"undecided": self.undecided}
+        undecided = {} if self.chart is not None else {"undecided": self.undecided}
         return {
             "bounds": [self._entry(bound) for bound in self.bounds],
             "damping_Ns_per_m": self.damping,
@@ -67,7 +70,7 @@ class BoundsComparison(Result):
             "exact_largest_N_per_m": self.largest,
             "exact_damping_at_largest_Ns_per_m": self.damping_at_largest,
             "decided": self.chart is not None,
-            **told,
+            **undecided,
         }
 
     def table(self) -> dict[str, list[Any]]:
@@ -137,7 +140,7 @@ def compare_bounds(point: OperatingPoint, damping: float | None = None) -> Bound
         undecided = str(error)
     if damping is None:
         damping = chart.damping_at_stiffness_max if chart is not None and chart.stiffness_max > 0.0 else 0.0
-    exact = nan if chart is None else stiffness_limit(chart, damping)
+    exact = nan if chart is None else exact_stiffness_limit(chart, damping)
     return BoundsComparison(tuple(bounds_of(point, damping)), damping, exact, chart, undecided)
 
 
@@ -154,6 +157,58 @@ def bounds_of(point: OperatingPoint, wall_damping: float = nan) -> list[Bound]:
         coulomb_friction=ground_friction(plant) if point.friction_known else nan,
         resolution=reading_step(plant) if point.resolution_known else nan,
     )
+
+
+def exact_stiffness_limit(chart: StabilityChart, wall_damping: float) -> float:
+    """Supremum of the stable stiffnesses K > 0 at a damping B [N s/m], all cells together [N/m].
+
+    0 where no wall with K > 0 is stable. The chart's edge says where; eigenvalues close in on it.
+
+    >>> import numpy as np
+    >>> from zwidth.chart.chart import stability_chart
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.loop.loop import Loop
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> free_mass = Plant(np.array([[1.0]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
+    >>> chart = stability_chart(Loop(free_mass, Controller(sampling_period=1.0)))
+    >>> round(exact_stiffness_limit(chart, 1.0), 9)             # 2 d (2 - d)/(2 + d), thesis eq. 4.14
+    0.666666667
+    """
+    if wall_damping == chart.damping_at_stiffness_max:
+        return chart.stiffness_max
+    crossings = _crossings(chart, wall_damping)
+    width = max((float(np.max(np.abs(ring[:, 0]))) for ring in chart.regions), default=0.0)
+    for stiffness in sorted((K for K in crossings if 1e-9 * width < K), reverse=True):
+        refined = _refined(chart, stiffness, wall_damping, width)
+        if refined is not None:
+            return refined
+    return 0.0
+
+
+def _crossings(chart: StabilityChart, wall_damping: float) -> list[float]:
+    """Stiffnesses at which the edge's samples cross the line of this damping."""
+    found: list[float] = []
+    for arc in chart.boundary:
+        off = arc.damping - wall_damping
+        n = np.flatnonzero((off[:-1] * off[1:] <= 0.0) & (off[:-1] != off[1:]))
+        share = off[n] / (off[n] - off[n + 1])
+        found += (arc.stiffness[n] + share * (arc.stiffness[n + 1] - arc.stiffness[n])).tolist()
+    return found
+
+
+def _refined(chart: StabilityChart, stiffness: float, wall_damping: float, width: float) -> float | None:
+    """The edge near a stiffness by eigenvalues; None where walls just below it are not stable."""
+
+    def excess(K: float) -> float:
+        return float(spectral_radius(chart.loop, K, wall_damping)) - chart.radius
+
+    # chords lie beside the curve by no more than the chart's tolerance
+    for reach in (1e-6, 1e-5, 1e-4, 1e-3):
+        low, high = max(stiffness - reach * width, 0.0), stiffness + reach * width
+        if excess(low) < 0.0 < excess(high):
+            return float(brentq(excess, low, high, xtol=1e-13 * width, rtol=1e-13))
+    return None
 
 
 def _ratio(admitted: float, exact: float) -> float:

@@ -11,14 +11,14 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.abbott_okamura import only_spring
-from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, WHOLE, Case
+from zwidth.conditions.abbott_okamura import pure_spring_limit
+from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, WHOLE_DELAY, ConditionCase
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
 
 
-def plane(
+def dimensionless_friction(
     wall_stiffness: ArrayLike,
     device_damping: ArrayLike,
     coulomb_friction: ArrayLike,
@@ -67,9 +67,9 @@ def is_passive(beta: ArrayLike, sigma: ArrayLike, delay_samples: ArrayLike = 0) 
     return np.asarray((b >= l + 0.5) & (s >= 0.5))
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """The passive quadrant on a loop: the stiffness at which its corner is reached."""
-    loop, b = case.loop, case.traits.drag
+    loop, b = case.loop, case.traits.ground_damping
     viscous = float(viscous_stiffness_limit(b, loop.period, loop.controller.delay))
     dry = 2.0 * case.coulomb_friction / case.resolution if case.resolution != 0.0 else np.inf
     largest = float(np.minimum(viscous, dry))
@@ -79,7 +79,7 @@ def condition(case: Case) -> Bound:
         kind="passivity",
         claim="sufficient",
         statement="B = 0, b/(K T) >= l + 1/2 and f_c/(K Delta) >= 1/2",
-        assumptions=(RIGID, COLLOCATED, WHOLE, *DIRECT, RESISTIVE),
+        assumptions=(RIGID, COLLOCATED, WHOLE_DELAY, *DIRECT, RESISTIVE),
         taken={
             "damping_Ns_per_m": b,
             "sampling_period_s": loop.period,
@@ -87,6 +87,6 @@ def condition(case: Case) -> Bound:
             "coulomb_friction_N": case.coulomb_friction,
             "resolution_m": case.resolution,
         },
-        limit=partial(only_spring, largest),
+        limit=partial(pure_spring_limit, largest),
         largest=(largest, 0.0),
     )

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import COLLOCATED, LIGHT, LIGHT_WALL, PLAIN, RESISTIVE, RIGID, Case
+from zwidth.conditions.assumptions import COLLOCATED, LIGHT, LIGHT_WALL, PLAIN, RESISTIVE, RIGID, ConditionCase
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -38,9 +38,9 @@ def stiffness_limit(
     return np.asarray(np.maximum(b + B, 0.0) / (T / 2.0 + late))
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """The linear condition on a loop."""
-    b, T = case.traits.drag, case.loop.period
+    b, T = case.traits.ground_damping, case.loop.period
     late = case.loop.controller.delay * T
     return case.bound(
         name="linear condition",

@@ -7,7 +7,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import COLLOCATED, LIGHT, LIGHT_WALL, ONE_MODE, PLAIN, RESISTIVE, SLOW, Case
+from zwidth.conditions.assumptions import (
+    COLLOCATED,
+    LIGHT,
+    LIGHT_WALL,
+    ONE_MODE,
+    PLAIN,
+    RESISTIVE,
+    SLOW,
+    ConditionCase,
+)
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -46,9 +55,9 @@ def stiffness_limit(
     return np.asarray(np.maximum(b + hand + B, 0.0) / (T / 2.0 + late))
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """The linear condition on a loop, with all friction of device and hand that the wall feels."""
-    drag, T = case.traits.mode_drag if case.traits.single else float("nan"), case.loop.period
+    drag, T = case.traits.mode_damping if case.traits.has_one_mode else float("nan"), case.loop.period
     late = case.loop.controller.delay * T
     return case.bound(
         name="linear condition with a hand",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.conditions import colgate_schenkel
-from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, NYQUIST_BELOW_CORNER, PLAIN, RIGID, Case
+from zwidth.conditions.assumptions import COLLOCATED, NYQUIST_BELOW_CORNER, PLAIN, RIGID, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -49,16 +49,16 @@ def stiffness_limit(
     return colgate_schenkel.stiffness_limit(wall_damping, b + e, sampling_period)
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """The condition on a loop."""
-    b, e, T = case.traits.drag, case.traits.electrical_damping, case.loop.period
+    b, e, T = case.traits.ground_damping, case.traits.electrical_damping, case.loop.period
     return case.bound(
         name="passive wall with electrical damping",
         source="Mehling, Colgate and Peshkin 2005 (known by its abstract)",
         kind="passivity",
         claim="approximate",
         statement="b + b_e > K T/2 + |B|, where b_e/(1 + s L/R) is the electrical damping",
-        assumptions=(RIGID, COLLOCATED, AT_ONCE, *PLAIN, NYQUIST_BELOW_CORNER),
+        assumptions=(RIGID, COLLOCATED, UNDELAYED, *PLAIN, NYQUIST_BELOW_CORNER),
         taken={"damping_Ns_per_m": b, "electrical_damping_Ns_per_m": e, "sampling_period_s": T},
         limit=partial(stiffness_limit, device_damping=b, electrical_damping=e, sampling_period=T),
         largest=(float(stiffness_limit(0.0, b, e, T)), 0.0),

@@ -24,7 +24,7 @@ from math import inf, isfinite, nan, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, ONE_MODE, PLAIN, RESISTIVE, Case
+from zwidth.conditions.assumptions import COLLOCATED, ONE_MODE, PLAIN, RESISTIVE, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
 from zwidth.loop.hold import denominator, step_response
 
@@ -120,17 +120,17 @@ def _roots(a: float, b: float, c: float) -> list[float]:
     return [root for root in found if isfinite(root)]
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """The exact region of one mode on a loop."""
     t, T = case.traits, case.loop.period
     taken = {
         "mode_mass_kg": t.mode_mass,
-        "mode_damping_Ns_per_m": t.mode_drag,
+        "mode_damping_Ns_per_m": t.mode_damping,
         "mode_stiffness_N_per_m": t.mode_stiffness,
         "sampling_period_s": T,
     }
     known = all(map(isfinite, taken.values()))
-    mode = one_mode(t.mode_mass, t.mode_drag, t.mode_stiffness, T) if known else None
+    mode = one_mode(t.mode_mass, t.mode_damping, t.mode_stiffness, T) if known else None
     return case.bound(
         name="one mass, spring and damper",
         source="as thesis eq. 4.9 and 4.43, for both together; derived here",
@@ -138,7 +138,7 @@ def condition(case: Case) -> Bound:
         claim="exact",
         statement="e - h + c (g - r e) - r g c^2 > r (1 + n c) K, with c = B/T and the motion sampled as "
         "P = (n q + g)/(q^2 + e q + h), q = z - 1, r = g - n; and the roots z = 1 and z = -1",
-        assumptions=(ONE_MODE, COLLOCATED, AT_ONCE, *PLAIN, RESISTIVE),
+        assumptions=(ONE_MODE, COLLOCATED, UNDELAYED, *PLAIN, RESISTIVE),
         taken=taken,
         limit=mode.stiffness_limit if mode else partial(np.full_like, fill_value=nan),
         largest=mode.largest() if mode else (nan, nan),

@@ -18,11 +18,11 @@ from math import isfinite, nan
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import COLLOCATED, PROMPT, RESISTIVE, RIGID, WHOLE, Case
+from zwidth.conditions.assumptions import COLLOCATED, PROMPT, RESISTIVE, RIGID, WHOLE_DELAY, ConditionCase
 from zwidth.conditions.bound import Bound
+from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
-from zwidth.loop.response import product, window_response
 
 Floats = NDArray[np.float64]
 
@@ -80,15 +80,21 @@ def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
     sine = np.sin(t / 2.0)
     d = 2.0 * sine * (1j * np.cos(t / 2.0) - sine)  # e^jt - 1 without cancellation
     force, own, z = force_filter(loop.controller), loop.estimator, 1.0 + d
-    w = product(own.numerator, own.denominator, d) * window_response(own.window, z)
-    late = d * np.exp(-1j * (l + 1) * t) * product(force.numerator, force.denominator, d) * T / (4.0 * sine**2)
+    w = factor_response(own.numerator, own.denominator, d) * window_response(own.window, z)
+    late = (
+        d
+        * np.exp(-1j * (l + 1) * t)
+        * factor_response(force.numerator, force.denominator, d)
+        * T
+        / (4.0 * sine**2)
+    )
     return PassiveSet(device_damping, np.real(late), np.real(late * w))
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """The theorem on a loop with its own delay and velocity estimate."""
-    loop, b = case.loop, case.traits.drag
-    known = WHOLE not in case.unmet and isfinite(b)
+    loop, b = case.loop, case.traits.ground_damping
+    known = WHOLE_DELAY not in case.unmet and isfinite(b)
     passive = passive_set(loop, b) if known else None
     return case.bound(
         name="passive wall with its delay and filters",
@@ -97,7 +103,7 @@ def condition(case: Case) -> Bound:
         claim="sufficient",
         statement="b > (T/2)/(1 - cos wT) Re{(1 - e^-jwT) H(e^jwT)} for 0 < w <= pi/T, "
         "with H = z^-l F(z) (K + B w(z))",
-        assumptions=(RIGID, COLLOCATED, WHOLE, PROMPT, RESISTIVE),
+        assumptions=(RIGID, COLLOCATED, WHOLE_DELAY, PROMPT, RESISTIVE),
         taken={
             "damping_Ns_per_m": b,
             "sampling_period_s": loop.period,

@@ -15,23 +15,23 @@ from zwidth.conditions import (
     passivity,
     spring_stability,
     thesis_damped,
-    thesis_delay,
-    thesis_delays,
     thesis_flexible,
     thesis_flexible_series,
     thesis_rigid,
+    thesis_unit_delay,
+    thesis_whole_delay,
 )
 from zwidth.conditions.assumptions import case_of
 from zwidth.conditions.bound import Bound
 from zwidth.loop.loop import Loop
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 
 CONDITIONS = (
     thesis_rigid.condition,
     thesis_damped.condition,
     thesis_damped.tangent_condition,
-    thesis_delay.condition,
-    thesis_delays.condition,
+    thesis_unit_delay.condition,
+    thesis_whole_delay.condition,
     thesis_flexible.condition,
     thesis_flexible_series.condition,
     thesis_flexible_series.linear_condition,

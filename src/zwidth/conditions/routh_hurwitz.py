@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 
-def mapped(characteristic: ArrayLike) -> Floats:
+def bilinear_coefficients(characteristic: ArrayLike) -> Floats:
     """Coefficients in sigma of (sigma - 1)^n p(z) with z = (sigma + 1)/(sigma - 1).
 
     The map takes the unit disk onto the left half plane (thesis, above eq. 4.4 and 4.38; there the polynomial of
@@ -22,7 +22,7 @@ def mapped(characteristic: ArrayLike) -> Floats:
     characteristic  (..., n + 1)  coefficients of p, highest power first
     Returns         (..., n + 1)  highest power first
 
-    >>> mapped([1.0, 0.0, 0.0])                  # both roots z = 0: (sigma + 1)^2
+    >>> bilinear_coefficients([1.0, 0.0, 0.0])                  # both roots z = 0: (sigma + 1)^2
     array([1., 2., 1.])
     """
     p = np.asarray(characteristic, dtype=float)
@@ -76,7 +76,7 @@ def is_stable(coefficients: ArrayLike) -> NDArray[np.bool_]:
     Where a0 > 0 and all minors are positive (thesis eq. A.3). A polynomial with a0 < 0 is judged with its sign
     turned; a0 = 0 has lost a root to infinity and is not stable.
 
-    >>> bool(is_stable([1.0, 3.0, 2.0])), bool(is_stable(mapped([1.0, 0.0, -1.1])))
+    >>> bool(is_stable([1.0, 3.0, 2.0])), bool(is_stable(bilinear_coefficients([1.0, 0.0, -1.1])))
     (True, False)
     """
     a = np.asarray(coefficients, dtype=float)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, PLAIN, RESISTIVE, RIGID, Case
+from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RESISTIVE, RIGID, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
 from zwidth.conditions.one_mode import OneMode, one_mode
 
@@ -21,16 +21,18 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class SpringStable:
+class SpringStability:
     """A device of one mass with friction b [N s/m]: free, and held by the spring m (pi/T)^2."""
 
     friction: float
     free: OneMode
-    held: OneMode
+    on_nyquist_spring: OneMode
 
     def stiffness_limit(self, wall_damping: ArrayLike) -> Floats:
         """Largest stiffness that is stable free and held, at dampings B (...) [N/m]; 0 where there is none."""
-        return np.minimum(self.free.stiffness_limit(wall_damping), self.held.stiffness_limit(wall_damping))
+        return np.minimum(
+            self.free.stiffness_limit(wall_damping), self.on_nyquist_spring.stiffness_limit(wall_damping)
+        )
 
     def largest(self) -> tuple[float, float]:
         """Largest of these stiffnesses over B >= 0 and its damping [N/m], [N s/m]; (0, nan) without friction.
@@ -39,17 +41,21 @@ class SpringStable:
         the free device, which takes more, catches up.
         """
         at = 0.0
-        if self._room(0.0) > 0.0:
+        if self._stiffness_margin(0.0) > 0.0:
             # held, no stiffness is left well before twice the friction
-            at = float(brentq(self._room, 0.0, 2.0 * self.friction, xtol=1e-15 * self.friction, rtol=1e-14))
+            at = float(
+                brentq(self._stiffness_margin, 0.0, 2.0 * self.friction, xtol=1e-15 * self.friction, rtol=1e-14)
+            )
         stiffness = float(self.stiffness_limit(at))
         return (stiffness, at) if stiffness > 0.0 else (0.0, nan)
 
-    def _room(self, wall_damping: float) -> float:
-        return float(self.held.stiffness_limit(wall_damping) - self.free.stiffness_limit(wall_damping))
+    def _stiffness_margin(self, wall_damping: float) -> float:
+        return float(
+            self.on_nyquist_spring.stiffness_limit(wall_damping) - self.free.stiffness_limit(wall_damping)
+        )
 
 
-def spring_stable(mass: float, device_damping: float, sampling_period: float) -> SpringStable:
+def spring_stable(mass: float, device_damping: float, sampling_period: float) -> SpringStability:
     """The walls that a device renders stably whatever spring holds it.
 
     The spring on which the mass vibrates at the Nyquist frequency, k = m (pi/T)^2, is Colgate and Schenkel's
@@ -64,16 +70,16 @@ def spring_stable(mass: float, device_damping: float, sampling_period: float) ->
     0.0
     """
     spring = mass * (pi / sampling_period) ** 2
-    return SpringStable(
+    return SpringStability(
         device_damping,
         one_mode(mass, device_damping, 0.0, sampling_period),
         one_mode(mass, device_damping, spring, sampling_period),
     )
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """Spring stability of the bare device on a loop."""
-    m, b, T = case.traits.rigid_mass, case.traits.drag, case.loop.period
+    m, b, T = case.traits.rigid_mass, case.traits.ground_damping, case.loop.period
     device = spring_stable(m, b, T) if isfinite(m) and isfinite(b) else None
     return case.bound(
         name="spring stability",
@@ -81,7 +87,7 @@ def condition(case: Case) -> Bound:
         kind="stability",
         claim="sufficient",
         statement="stable both free and on a spring k = m (pi/T)^2 to the ground, by their exact regions",
-        assumptions=(RIGID, COLLOCATED, AT_ONCE, *PLAIN, RESISTIVE),
+        assumptions=(RIGID, COLLOCATED, UNDELAYED, *PLAIN, RESISTIVE),
         taken={"rigid_mass_kg": m, "damping_Ns_per_m": b, "sampling_period_s": T},
         limit=device.stiffness_limit if device else np.zeros_like,
         largest=device.largest() if device else (nan, nan),

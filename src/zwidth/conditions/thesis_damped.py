@@ -22,13 +22,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammainc
 
-from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, LIGHT, LIGHT_WALL, PLAIN, RESISTIVE, RIGID, Case
+from zwidth.conditions.assumptions import (
+    COLLOCATED,
+    LIGHT,
+    LIGHT_WALL,
+    PLAIN,
+    RESISTIVE,
+    RIGID,
+    UNDELAYED,
+    ConditionCase,
+)
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
 
 
-class Response(NamedTuple):
+class HeldForceResponse(NamedTuple):
     """n1 and n0 of the module's text, E, and the p + 2 d at which a root is z = -1, all (...)."""
 
     new: Floats
@@ -37,7 +46,7 @@ class Response(NamedTuple):
     flip: Floats
 
 
-def response(x: ArrayLike) -> Response:
+def held_force_response(x: ArrayLike) -> HeldForceResponse:
     """The mass's answer to a held force, without cancellation for any x = b T/m >= 0 (...)."""
     x = np.asarray(x, dtype=float)
     tiny = x < 1e-8
@@ -48,7 +57,7 @@ def response(x: ArrayLike) -> Response:
     # below x = 1 the root z = -1 is far from binding, and its formula cancels
     half = np.maximum(x / 2.0, 0.5)
     flip = 4.0 * half / (1.0 - np.tanh(half) / half)
-    return Response(new + 0.0 * x, old, np.exp(-x), flip)
+    return HeldForceResponse(new + 0.0 * x, old, np.exp(-x), flip)
 
 
 def stiffness_limit(
@@ -70,7 +79,7 @@ def stiffness_limit(
     """
     B, b, m, T = (np.asarray(v, dtype=float) for v in (wall_damping, device_damping, mass, sampling_period))
     d, x = B * T / m, b * T / m
-    n1, n0, _, flip = response(x)
+    n1, n0, _, flip = held_force_response(x)
     inside = (d > -x) & (n0 * d < 1.0)
     safe = np.where(inside, d, 0.0)
     p = np.minimum((n1 + n0) * (x + safe) * (1.0 - n0 * safe) / (n0 * (1.0 + n1 * safe)), flip - 2.0 * safe)
@@ -90,7 +99,7 @@ def printed_tip(device_damping: ArrayLike, mass: ArrayLike, sampling_period: Arr
 
 
 def _printed_tip(x: Floats) -> tuple[Floats, Floats]:
-    n1, n0, E, _ = response(x)
+    n1, n0, E, _ = held_force_response(x)
     d = E / (n0 + np.sqrt(n0**2 + n0 * n1 * E))
     return (n1 + n0) * (x + d) * (1.0 - n0 * d) / (n0 * (1.0 + n1 * d)), d
 
@@ -106,7 +115,7 @@ def largest(device_damping: ArrayLike, mass: ArrayLike, sampling_period: ArrayLi
     """
     b, m, T = (np.asarray(v, dtype=float) for v in (device_damping, mass, sampling_period))
     x = b * T / m
-    n1, n0, _, flip = response(x)
+    n1, n0, _, flip = held_force_response(x)
     tip_p, tip_d = _printed_tip(x)
     # where both edges meet: a d^2 + 2 h d + c = 0; the pair's edge is the higher one beyond its larger root
     a = n0 * (n1 - n0)
@@ -128,7 +137,7 @@ def largest_damping(device_damping: ArrayLike, mass: ArrayLike, sampling_period:
     2 m/T without friction.
     """
     b, m, T = (np.asarray(v, dtype=float) for v in (device_damping, mass, sampling_period))
-    _, n0, _, flip = response(b * T / m)
+    _, n0, _, flip = held_force_response(b * T / m)
     return np.asarray(np.minimum(1.0 / n0, flip / 2.0) * m / T)
 
 
@@ -149,13 +158,13 @@ def tangent_stiffness_limit(
     """
     B, b, m, T = (np.asarray(v, dtype=float) for v in (wall_damping, device_damping, mass, sampling_period))
     x = b * T / m
-    n1, n0, _, _ = response(x)
+    n1, n0, _, _ = held_force_response(x)
     return np.asarray(np.maximum(B + b, 0.0) / T * (n1 + n0) * (1.0 + x) / n0)
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """(4.9) with the root z = -1 on a loop."""
-    m, b, T = case.traits.rigid_mass, case.traits.drag, case.loop.period
+    m, b, T = case.traits.rigid_mass, case.traits.ground_damping, case.loop.period
     return case.bound(
         name="rigid mass with friction",
         source="thesis eq. 4.9-4.11, with the root z = -1 that it omits",
@@ -163,23 +172,23 @@ def condition(case: Case) -> Bound:
         claim="exact",
         statement="0 < p < (n1 + n0)(x + d)(1 - n0 d)/(n0 (1 + n1 d)) and p + 2 d < 2 x/(1 - tanh(x/2)/(x/2)), "
         "with x = b T/m, n1 = (x - 1 + e^-x)/x^2 and n0 = (1 - e^-x - x e^-x)/x^2",
-        assumptions=(RIGID, COLLOCATED, AT_ONCE, *PLAIN, RESISTIVE),
+        assumptions=(RIGID, COLLOCATED, UNDELAYED, *PLAIN, RESISTIVE),
         taken={"rigid_mass_kg": m, "damping_Ns_per_m": b, "sampling_period_s": T},
         limit=partial(stiffness_limit, device_damping=b, mass=m, sampling_period=T),
         largest=tuple(map(float, largest(b, m, T))),  # type: ignore[arg-type]
     )
 
 
-def tangent_condition(case: Case) -> Bound:
+def tangent_condition(case: ConditionCase) -> Bound:
     """(4.12) on a loop."""
-    m, b, T = case.traits.rigid_mass, case.traits.drag, case.loop.period
+    m, b, T = case.traits.rigid_mass, case.traits.ground_damping, case.loop.period
     return case.bound(
         name="rigid mass with friction, soft walls",
         source="thesis eq. 4.12",
         kind="stability",
         claim="approximate",
         statement="p < (d + x) x (1 - e^-x)(1 + x)/(1 - e^-x - x e^-x), for p well below 1",
-        assumptions=(RIGID, LIGHT, LIGHT_WALL, COLLOCATED, AT_ONCE, *PLAIN, RESISTIVE),
+        assumptions=(RIGID, LIGHT, LIGHT_WALL, COLLOCATED, UNDELAYED, *PLAIN, RESISTIVE),
         taken={"rigid_mass_kg": m, "damping_Ns_per_m": b, "sampling_period_s": T},
         limit=partial(tangent_stiffness_limit, device_damping=b, mass=m, sampling_period=T),
     )

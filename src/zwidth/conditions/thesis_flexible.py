@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, PLAIN, SPRUNG, UNDAMPED, Case
+from zwidth.conditions.assumptions import COLLOCATED, PLAIN, SPRUNG, UNDAMPED, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -130,7 +130,7 @@ def _tip(mass: Floats, stiffness: Floats, period: Floats) -> tuple[Floats, Float
     return c / (np.sqrt(1.0 + c) + 1.0), s
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """(4.43) on a loop."""
     m, k, T = case.traits.side_mass, case.traits.side_stiffness, case.loop.period
     return case.bound(
@@ -140,7 +140,7 @@ def condition(case: Case) -> Bound:
         claim="exact",
         statement="-W^2 < p < 2 d (W^2 cos W - d (1 - cos W))/(W^2 + d (1 - cos W)), "
         "with p = K T^2/m, d = B T/m and W^2 = k T^2/m",
-        assumptions=(SPRUNG, UNDAMPED, COLLOCATED, AT_ONCE, *PLAIN),
+        assumptions=(SPRUNG, UNDAMPED, COLLOCATED, UNDELAYED, *PLAIN),
         taken={"motor_side_mass_kg": m, "stiffness_N_per_m": k, "sampling_period_s": T},
         limit=partial(stiffness_limit, mass=m, stiffness=k, sampling_period=T),
         largest=(float(largest_stiffness(m, k, T)), float(damping_at_largest_stiffness(m, k, T))),

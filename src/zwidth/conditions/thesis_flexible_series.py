@@ -11,7 +11,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, LIGHT_WALL, PLAIN, SLOW, SPRUNG, UNDAMPED, Case
+from zwidth.conditions.assumptions import (
+    COLLOCATED,
+    LIGHT_WALL,
+    PLAIN,
+    SLOW,
+    SPRUNG,
+    UNDAMPED,
+    UNDELAYED,
+    ConditionCase,
+)
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -72,7 +81,7 @@ def linear_stiffness_limit(
     return np.asarray(np.maximum(B, 0.0) * np.maximum(2.0 - k * T**2 / m, 0.0) / T)
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """(4.47) on a loop."""
     m, k, T = case.traits.side_mass, case.traits.side_stiffness, case.loop.period
     stiffness, damping = largest(m, k, T)
@@ -82,14 +91,14 @@ def condition(case: Case) -> Bound:
         kind="stability",
         claim="approximate",
         statement="0 < p < 2 d (2 - d - W^2)/(2 + d), for W well below 1",
-        assumptions=(SPRUNG, SLOW, UNDAMPED, COLLOCATED, AT_ONCE, *PLAIN),
+        assumptions=(SPRUNG, SLOW, UNDAMPED, COLLOCATED, UNDELAYED, *PLAIN),
         taken={"motor_side_mass_kg": m, "stiffness_N_per_m": k, "sampling_period_s": T},
         limit=partial(stiffness_limit, mass=m, stiffness=k, sampling_period=T),
         largest=(float(stiffness), float(damping)),
     )
 
 
-def linear_condition(case: Case) -> Bound:
+def linear_condition(case: ConditionCase) -> Bound:
     """(4.48) on a loop."""
     m, k, T = case.traits.side_mass, case.traits.side_stiffness, case.loop.period
     return case.bound(
@@ -98,7 +107,7 @@ def linear_condition(case: Case) -> Bound:
         kind="stability",
         claim="approximate",
         statement="K < B (2 - W^2)/T, for W and d well below 1",
-        assumptions=(SPRUNG, SLOW, LIGHT_WALL, UNDAMPED, COLLOCATED, AT_ONCE, *PLAIN),
+        assumptions=(SPRUNG, SLOW, LIGHT_WALL, UNDAMPED, COLLOCATED, UNDELAYED, *PLAIN),
         taken={"motor_side_mass_kg": m, "stiffness_N_per_m": k, "sampling_period_s": T},
         limit=partial(linear_stiffness_limit, mass=m, stiffness=k, sampling_period=T),
     )

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.assumptions import AT_ONCE, COLLOCATED, PLAIN, RIGID, UNDAMPED, Case
+from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RIGID, UNDAMPED, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,7 @@ def stable_area(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
     return np.asarray((12.0 - 16.0 * np.log(2.0)) * np.asarray(mass) ** 2 / np.asarray(sampling_period) ** 3)
 
 
-def condition(case: Case) -> Bound:
+def condition(case: ConditionCase) -> Bound:
     """(4.14) on a loop."""
     m, T = case.traits.rigid_mass, case.loop.period
     return case.bound(
@@ -67,7 +67,7 @@ def condition(case: Case) -> Bound:
         kind="stability",
         claim="exact",
         statement="0 < p < 2 d (2 - d)/(2 + d), with p = K T^2/m and d = B T/m",
-        assumptions=(RIGID, UNDAMPED, COLLOCATED, AT_ONCE, *PLAIN),
+        assumptions=(RIGID, UNDAMPED, COLLOCATED, UNDELAYED, *PLAIN),
         taken={"rigid_mass_kg": m, "sampling_period_s": T},
         limit=partial(stiffness_limit, mass=m, sampling_period=T),
         largest=(float(largest_stiffness(m, T)), float(damping_at_largest_stiffness(m, T))),

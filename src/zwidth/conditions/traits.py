@@ -24,47 +24,49 @@ UNDAMPED = 1e-12
 class Traits:
     """A loop in the words of the published conditions; a number that the plant does not have is nan.
 
-    rigid_mass     1/(a^T Z (Z^T M Z)^-1 Z^T a), Z the free motions and a the actuator [kg]
-    drag           x^T B x of the free motion x that one metre at the actuator makes: friction against the
-                   ground [N s/m]
-    side_mass      the mass that (4.43) means: of a plant that the wall moves as one mass on a grounded spring
-                   that mass, else the motor side's, 1/(a^T M^-1 a) with two sides [kg]
+    rigid_mass                1/(a^T Z (Z^T M Z)^-1 Z^T a), Z the free motions and a the actuator [kg]
+    ground_damping            x^T B x of the free motion x that one metre at the actuator makes: friction against
+                              the ground [N s/m]
+    side_mass                 the mass that (4.43) means: of a plant that the wall moves as one mass on a grounded
+                              spring that mass, else the motor side's, 1/(a^T M^-1 a) with two sides [kg]
     side_stiffness the spring of that mass, else the effective stiffness between actuator and handle [N/m]
-    mode_mass      of a plant that the wall moves as one mass, on at most one spring and one damper to the ground,
-    mode_drag      its mass, friction and spring [kg], [N s/m], [N/m]
+    mode_mass                 of a plant that the wall moves as one mass, on at most one spring and one damper to
+                              the ground,
+    mode_damping              its mass, friction and spring [kg], [N s/m], [N/m]
     mode_stiffness
     electrical_damping  b_e of what brakes the free motion with b_e/(1 + s L/R), all together [N s/m]
-    corners        the corner frequencies R/L of the lagged dampers that brake what the wall moves [rad/s]
-    free           the wall moves only free motion: one rigid mass, tied to nothing
-    sprung         the wall moves only one motion, of one frequency, on springs to the ground
-    undamped       no viscous damping acts on what the wall moves
-    collocated     the wall acts where the encoder reads
-    differences    the velocity is estimated by the backward difference, whatever filter follows
-    first_order    a first-order filter follows
+    corner_frequencies        the corner frequencies R/L of the lagged dampers that brake what the wall moves
+                              [rad/s]
+    free                      the wall moves only free motion: one rigid mass, tied to nothing
+    sprung                    the wall moves only one motion, of one frequency, on springs to the ground
+    undamped                  no viscous damping acts on what the wall moves
+    collocated                the wall acts where the encoder reads
+    uses_backward_difference  the velocity is estimated by the backward difference, whatever filter follows
+    has_first_order_filter    a first-order filter follows
     force_filtered the force is filtered in the computer
-    actuator_lags  the actuator follows with a time constant
+    actuator_lags             the actuator follows with a time constant
     """
 
     rigid_mass: float
-    drag: float
+    ground_damping: float
     side_mass: float
     side_stiffness: float
     mode_mass: float
-    mode_drag: float
+    mode_damping: float
     mode_stiffness: float
     electrical_damping: float
-    corners: tuple[float, ...]
+    corner_frequencies: tuple[float, ...]
     free: bool
     sprung: bool
     undamped: bool
     collocated: bool
-    differences: bool
-    first_order: bool
+    uses_backward_difference: bool
+    has_first_order_filter: bool
     force_filtered: bool
     actuator_lags: bool
 
     @property
-    def single(self) -> bool:
+    def has_one_mode(self) -> bool:
         """Does the wall move one mass only, on at most one spring and one damper to the ground?"""
         return not isnan(self.mode_mass)
 
@@ -74,7 +76,7 @@ def traits(loop: Loop) -> Traits:
     plant = loop.plant
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     push, read = shapes.T @ plant.actuator, shapes.T @ plant.sensor
-    moved = _moved(squared, push, read)
+    moved = _moved_modes(squared, push, read)
     rates = [float(np.mean(squared[run])) for run in moved]
     single = len(rates) == 1 and _by_itself(plant, shapes, moved[0], push)
     sprung = single and rates[0] > 0.0
@@ -88,28 +90,28 @@ def traits(loop: Loop) -> Traits:
         side_mass, side_stiffness = float(numbers.motor_side_mass), float(numbers.stiffness)
     return Traits(
         rigid_mass=mass,
-        drag=drag,
+        ground_damping=drag,
         side_mass=side_mass,
         side_stiffness=side_stiffness,
         mode_mass=mode_mass,
-        mode_drag=mode_drag,
+        mode_damping=mode_drag,
         mode_stiffness=mode_stiffness,
         electrical_damping=electrical,
-        corners=corners,
+        corner_frequencies=corners,
         free=single and rates == [0.0],
         sprung=sprung,
         undamped=not _is_damped(plant, shapes, moved),
         collocated=bool(
             np.allclose(plant.actuator, plant.sensor, rtol=0.0, atol=1e-9 * np.max(np.abs(plant.sensor)))
         ),
-        differences=_differences(loop),
-        first_order=isinstance(loop.controller.velocity_filter, FirstOrder),
+        uses_backward_difference=_differences(loop),
+        has_first_order_filter=isinstance(loop.controller.velocity_filter, FirstOrder),
         force_filtered=loop.controller.force_filter is not None,
         actuator_lags=loop.controller.actuator_time_constant > 0.0,
     )
 
 
-def _moved(squared: Floats, push: Floats, read: Floats) -> list[slice]:
+def _moved_modes(squared: Floats, push: Floats, read: Floats) -> list[slice]:
     """Groups of equal frequency that the wall moves and the encoder sees."""
     scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
     whole = float(np.linalg.norm(push) * np.linalg.norm(read))

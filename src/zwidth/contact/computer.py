@@ -56,7 +56,7 @@ class Computer(NamedTuple):
 class Computers(NamedTuple):
     """D computers, each number of `Computer` with a leading axis (D, ...), padded to one size with zeros.
 
-    windowed, estimating, filtering  (D,)  how many weights and factors each has
+    window_size, estimator_size, filter_size  (D,)  how many weights and factors each has
     """
 
     period: Floats
@@ -65,11 +65,11 @@ class Computers(NamedTuple):
     tuning: Floats
     memory: Ints
     window: Floats
-    windowed: Ints
+    window_size: Ints
     estimator: Floats
-    estimating: Ints
+    estimator_size: Ints
     filter: Floats
-    filtering: Ints
+    filter_size: Ints
     limit: Floats
 
 
@@ -90,7 +90,7 @@ class Signals(NamedTuple):
     queue: Floats
 
 
-class Velocity(NamedTuple):
+class EstimateParameters(NamedTuple):
     """A velocity estimate in numbers, as in `Computer`; for FOAW and LEVANT `linear` is the filter behind it."""
 
     method: int
@@ -99,20 +99,22 @@ class Velocity(NamedTuple):
     linear: Estimator
 
 
-def velocity_estimate(controller: Controller) -> Velocity:
+def estimate_parameters(controller: Controller) -> EstimateParameters:
     """How the computer estimates velocities."""
     own = controller.velocity
     if not isinstance(own, Foaw | Levant):
         found = velocity_estimator(controller)
-        return Velocity(LINEAR, np.zeros(1), len(found.window), found)
+        return EstimateParameters(LINEAR, np.zeros(1), len(found.window), found)
     factors = low_pass_factors(controller.velocity_filter, controller.sampling_period)
     rows = (np.array(part, dtype=np.float64).reshape(-1, 3) for part in factors)
-    return Velocity(FOAW if isinstance(own, Foaw) else LEVANT, own.parameters, own.memory_size, Estimator(*rows))
+    return EstimateParameters(
+        FOAW if isinstance(own, Foaw) else LEVANT, own.parameters, own.memory_size, Estimator(*rows)
+    )
 
 
 def computers(controllers: Sequence[Controller], limits: Sequence[float]) -> Computers:
     """The computers of these controllers, whose largest forces are `limits` [N]."""
-    estimates = [velocity_estimate(controller) for controller in controllers]
+    estimates = [estimate_parameters(controller) for controller in controllers]
     windows = [found.linear.window for found in estimates]
     factors = [np.stack([found.linear.numerator, found.linear.denominator], axis=1) for found in estimates]
     low_passes = [force_filter(controller) for controller in controllers]
@@ -124,11 +126,11 @@ def computers(controllers: Sequence[Controller], limits: Sequence[float]) -> Com
         tuning=_stacked([found.tuning for found in estimates]),
         memory=np.array([max(found.memory, 1) for found in estimates], dtype=np.int64),
         window=_stacked(windows),
-        windowed=np.array([len(window) for window in windows], dtype=np.int64),
+        window_size=np.array([len(window) for window in windows], dtype=np.int64),
         estimator=_stacked(factors),
-        estimating=np.array([len(rows) for rows in factors], dtype=np.int64),
+        estimator_size=np.array([len(rows) for rows in factors], dtype=np.int64),
         filter=_stacked(filters),
-        filtering=np.array([len(rows) for rows in filters], dtype=np.int64),
+        filter_size=np.array([len(rows) for rows in filters], dtype=np.int64),
         limit=np.array(limits, dtype=np.float64),
     )
 
@@ -151,9 +153,9 @@ def computer_at(batch: Computers, d: int) -> Computer:
         batch.method[d],
         batch.tuning[d],
         batch.memory[d],
-        batch.window[d, : batch.windowed[d]],
-        batch.estimator[d, : batch.estimating[d]],
-        batch.filter[d, : batch.filtering[d]],
+        batch.window[d, : batch.window_size[d]],
+        batch.estimator[d, : batch.estimator_size[d]],
+        batch.filter[d, : batch.filter_size[d]],
         batch.limit[d],
     )
 

@@ -8,7 +8,7 @@ from typing import Final
 from zwidth.contact.environments.environment import Environment, Floats
 from zwidth.contact.environments.load import load_environment
 from zwidth.contact.hand import Hand, Reach, Reflex, Tremor
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.model.operator import Operator
 from zwidth.model.posture import PostureError
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from zwidth.contact.environments.environment import Environment, Floats
 from zwidth.contact.hand import Hand
-from zwidth.contact.passivity import rendered_stiffness
-from zwidth.contact.response import SOURCES, TimeResponse, as_key
+from zwidth.contact.motion_verdict import Behaviour, Judgement, judge_response
+from zwidth.contact.passivity_controller import rendered_stiffness
 from zwidth.contact.run_length import RunLength
-from zwidth.contact.verdict import Behaviour, Judgement, judge_response
+from zwidth.contact.time_response import SOURCES, TimeResponse, as_key
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.result import Result
@@ -34,7 +34,7 @@ class RangeExit:
 class PassivityComparison(NamedTuple):
     """What a passivity controller costs and does.
 
-    rendered_stiffness      felt with the controller, by `passivity.rendered_stiffness` [N/m]
+    rendered_stiffness      felt with the controller, by `passivity_controller.rendered_stiffness` [N/m]
     uncontrolled_stiffness  the same without it [N/m]
     uncontrolled            what the run without it says
     """
@@ -82,7 +82,7 @@ class ContactSimulation(Result):
 
     @property
     def behaviour(self) -> Behaviour | Literal["forced"]:
-        """As judged (see `verdict.Judgement`); "forced" where the device only goes with the hand's tremor,
+        """As judged (see `motion_verdict.Judgement`); "forced" where the device only goes with the hand's tremor,
         "growing" where it was gone before there was anything to judge."""
         judged, tremor = self.judgement, self.hand.tremor
         if self.response.given_up and judged.behaviour == "undecided":
@@ -138,7 +138,7 @@ class ContactSimulation(Result):
 
     @property
     def ledger(self) -> dict[str, float]:
-        """What each has put in by the end, by its name (`response.SOURCES`) [J]."""
+        """What each has put in by the end, by its name (`time_response.SOURCES`) [J]."""
         return dict(zip(SOURCES, self.response.energies[-1].tolist(), strict=True))
 
     # --- what was simulated ---------------------------------------------------------------------------

@@ -8,11 +8,9 @@ substep that the substep's own motion asks for, second order in its length (see 
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
-from zwidth.compiled import compiled, compiled_inline, compiled_parallel
-from zwidth.contact.account import Account, account, energy_of, enter_substep, settle
+from zwidth.compiled import compiled, compiled_inline
 from zwidth.contact.computer import (
     Computer,
     Computers,
@@ -27,21 +25,30 @@ from zwidth.contact.computer import (
     signals_of,
 )
 from zwidth.contact.elements import COULOMB, VARYING
-from zwidth.contact.environments import MEMORY, environment_at
-from zwidth.contact.hand import follow_varying, hand_force, set_varying
-from zwidth.contact.machine import (
+from zwidth.contact.energy_ledger import Ledger, energy_of, enter_sample, enter_substep, new_ledger
+from zwidth.contact.engine_arrays import (
     FORCE,
     HANDLE,
     READING,
     TRUTH,
     VELOCITY,
-    Devices,
-    Members,
+    PlantArrays,
     Records,
+    RunArrays,
 )
-from zwidth.contact.passivity import MEMORY as PASSIVITY
-from zwidth.contact.passivity import passivity_force
-from zwidth.contact.plant_step import Motion, answer, hold, look_ahead, motion_from, rub, step
+from zwidth.contact.environments import MEMORY, environment_at
+from zwidth.contact.hand import hand_force, sample_brakes_and_reflexes, step_brakes_and_reflexes
+from zwidth.contact.passivity_controller import PASSIVITY_MEMORY as PASSIVITY
+from zwidth.contact.passivity_controller import passivity_force
+from zwidth.contact.plant_step import (
+    PlantState,
+    motion_from,
+    predict_motions,
+    set_held_increment,
+    solve_forces,
+    step,
+    step_with_friction,
+)
 from zwidth.model.mechanism import Floats, Ints
 
 
@@ -55,7 +62,7 @@ def dot(a: Floats, row: int, b: Floats, start: int, count: int) -> float:
 
 
 @compiled_inline
-def read_sensor(devices: Devices, d: int, states: Floats, truth: float, seed: np.uint64, sample: int) -> float:
+def read_sensor(devices: PlantArrays, d: int, states: Floats, truth: float, seed: np.uint64, sample: int) -> float:
     """The reading as the encoders count it; the true one where they have neither steps nor noise."""
     reading, exact = 0.0, True
     for c in range(devices.weight.shape[1]):
@@ -68,61 +75,61 @@ def read_sensor(devices: Devices, d: int, states: Floats, truth: float, seed: np
 
 
 @compiled_inline
-def advance(
-    devices: Devices,
+def advance_substeps(
+    devices: PlantArrays,
     d: int,
     part: int,
     begin: int,
     end: int,
     time: float,
     command: float,
-    members: Members,
+    members: RunArrays,
     m: int,
-    own: Motion,
+    state: PlantState,
     trail: Floats,
     first: int,
-    book: Account,
+    book: Ledger,
 ) -> None:
     """Substeps from begin to end of one part of an interval, which begins at `time`."""
     A, inputs, h, n = devices.transition, devices.inputs, devices.length[d, part], devices.size[d]
     hand, E, kept, booked = members.push, devices.kind.shape[1], trail.shape[1] > 0, book.entries.size > 0
     steady = hand[m, 1] == 0.0 and hand[m, 5] == 0.0 and hand[m, 6] == 0.0
-    push, here = hand[m, 0], own
+    push, here = hand[m, 0], state
     if E == 1 and devices.kind[d, 0] == COULOMB and steady and not (kept or booked) and end > begin:
-        hold(inputs, d, part, command, push, own.held)
-        rub(A, inputs, d, part, devices.numbers[d, 0, 0], end - begin, own)
+        set_held_increment(inputs, d, part, command, push, state.held_increment)
+        step_with_friction(A, inputs, d, part, devices.numbers[d, 0, 0], end - begin, state)
         return
     for j in range(begin, end):
         if not steady:
             push = hand_force(hand, m, time + (j + 0.5) * h)
         if not steady or j == begin:
-            hold(inputs, d, part, command, push, here.held)
+            set_held_increment(inputs, d, part, command, push, here.held_increment)
         if E:
-            look_ahead(A, d, part, here)
-            answer(devices, d, part, here)
+            predict_motions(A, d, part, here)
+            solve_forces(devices, d, part, here)
         step(A, inputs, d, part, here)
         if booked:
-            enter_substep(devices, d, part, here.states, here.spare, command, push, here.forces, book)
-        here = Motion(here.spare, here.states, here.forces, here.memory, here.held)
+            enter_substep(devices, d, part, here.states, here.next_states, command, push, here.forces, book)
+        here = PlantState(here.next_states, here.states, here.forces, here.memory, here.held_increment)
         if kept:
             trail[m, first + j] = dot(devices.handle, d, here.states, 0, n)
     if (end - begin) % 2:
-        for i in range(own.states.size):
-            own.states[i] = own.spare[i]
+        for i in range(state.states.size):
+            state.states[i] = state.next_states[i]
 
 
 @compiled_inline
-def through_interval(
-    devices: Devices,
-    members: Members,
+def advance_interval(
+    devices: PlantArrays,
+    members: RunArrays,
     m: int,
     time: float,
     j: int,
     records: Records,
-    own: Motion,
+    state: PlantState,
     computer: Computer,
     signals: Signals,
-    book: Account,
+    book: Ledger,
     varies: bool,
 ) -> None:
     """From sample j to the next: part 0 with the command of one sample more of delay, then part 1."""
@@ -134,15 +141,17 @@ def through_interval(
         stride = 1 if varies else max(count, 1)
         for k in range(0, count, stride):
             if varies:
-                follow_varying(devices, d, members.reflex, m, begun + k * h, h, period, own.memory)
-            advance(devices, d, part, k, k + stride, begun, command, members, m, own, trail, first, book)
+                step_brakes_and_reflexes(devices, d, members.reflex, m, begun + k * h, h, period, state.memory)
+            advance_substeps(
+                devices, d, part, k, k + stride, begun, command, members, m, state, trail, first, book
+            )
 
 
 @compiled
 def run_member(
-    devices: Devices,
+    devices: PlantArrays,
     computers: Computers,
-    members: Members,
+    members: RunArrays,
     m: int,
     samples: int,
     address: int,
@@ -161,22 +170,35 @@ def run_member(
     states, watch, observer = own.states, members.observer[m], np.zeros(PASSIVITY)
     reflex, traces = members.reflex[m], records.traces
     watched, booked = not np.isnan(watch[0]), records.ledger.shape[1] > 0
-    varies = bool(np.any(devices.kind[d] == VARYING))
-    book, started = account(devices, booked), energy_of(devices, d, states)
+    varies = False
+    for element in range(devices.kind.shape[1]):
+        varies = varies or devices.kind[d, element] == VARYING
+    book, started = new_ledger(devices, booked), energy_of(devices, d, states)
     for j in range(samples):
         time, truth = j * T, dot(devices.sensor, d, states, 0, n)
         counted = read_sensor(devices, d, states, truth, members.seed[m], j)
         speed = estimate_velocity(computer, signals, 0, counted, j)
-        asked = force(counted - wall, speed, time, T, values, memory)
-        given = passivity_force(observer, watch, asked, counted, T) if watched else asked
+        environment_force = force(counted - wall, speed, time, T, values, memory)
+        controlled_force = (
+            passivity_force(observer, watch, environment_force, counted, T) if watched else environment_force
+        )
         if booked:
             smooth = estimate_velocity(computer, exact, 0, truth, j)
-            sampled = force(truth - wall, smooth, time, T, values, sampled_memory)
+            unquantised_force = force(truth - wall, smooth, time, T, values, sampled_memory)
             true_speed = dot(devices.sensor, d, states, n, n)
-            law = force(truth - wall, true_speed, time, T, values, law_memory)
-            settle(book, truth, law, sampled, asked, given, energy_of(devices, d, states) - started)
-            records.ledger[m, j] = book.entries
-        command = clip(filter_force(computer, signals, 0, given), computer.limit)
+            ideal_force = force(truth - wall, true_speed, time, T, values, law_memory)
+            enter_sample(
+                book,
+                truth,
+                ideal_force,
+                unquantised_force,
+                environment_force,
+                controlled_force,
+                energy_of(devices, d, states) - started,
+            )
+            for entry in range(book.entries.size):
+                records.ledger[m, j, entry] = book.entries[entry]
+        command = clip(filter_force(computer, signals, 0, controlled_force), computer.limit)
         send(signals, 0, command)
         traces[m, j, READING], traces[m, j, TRUTH], traces[m, j, VELOCITY] = counted, truth, speed
         traces[m, j, FORCE], traces[m, j, HANDLE] = command, dot(devices.handle, d, states, 0, n)
@@ -184,15 +206,21 @@ def run_member(
         if not abs(truth - wall) <= members.bound[m]:
             break
         if varies:
-            set_varying(devices, d, reflex, time, T, given, states, own.memory)
-        through_interval(devices, members, m, time, j, records, own, computer, signals, book, varies)
+            sample_brakes_and_reflexes(devices, d, reflex, time, T, controlled_force, states, own.memory)
+        advance_interval(devices, members, m, time, j, records, own, computer, signals, book, varies)
 
 
-@compiled_parallel
-def run_batch(
-    devices: Devices, computers: Computers, members: Members, samples: Ints, address: int, records: Records
+@compiled
+def run_several(
+    devices: PlantArrays,
+    computers: Computers,
+    members: RunArrays,
+    samples: Ints,
+    address: int,
+    records: Records,
+    first: int,
+    last: int,
 ) -> None:
-    """All members, spread over the cores: samples (m,), and where the environment's machine code is."""
-    for m in numba.prange(members.device.size):
-        # the loop's own counter has no sign: all that is called would be compiled for it once more
-        run_member(devices, computers, members, np.int64(m), samples[m], address, records)  # type: ignore[arg-type]
+    """Runs first to last - 1: samples (m,), and where the environment's machine code is."""
+    for m in range(first, last):
+        run_member(devices, computers, members, m, samples[m], address, records)

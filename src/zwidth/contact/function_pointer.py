@@ -6,25 +6,11 @@ function itself over would compile the kernel anew for each (a kernel's type nam
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numba
 from numba.core import cgutils
 from numba.extending import intrinsic
-
-
-def compiled_as(signature: Any, function: Callable[..., float]) -> Any:
-    """Compile `function` for one signature now; its machine code is kept on disk beside its source.
-
-    signature  a numba signature, such as float64(float64, float64)
-    Returns    numba's dispatcher; keep it as long as its address is in use
-    Raises     numba.core.errors.NumbaError where numba cannot compile it
-    """
-    try:
-        return numba.njit(signature, cache=True, error_model="numpy")(function)
-    except RuntimeError:  # the function is in no file, or its folder and the user's own cannot be written to
-        return numba.njit(signature, error_model="numpy")(function)
 
 
 def address_of(dispatcher: Any) -> int:
@@ -50,7 +36,7 @@ def function_at(signature: Any) -> Any:
     kind = numba.types.FunctionType(signature)
     proxy: Any = cgutils.create_struct_proxy
 
-    @intrinsic
+    @intrinsic  # type: ignore[untyped-decorator]
     def at(typing_context: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
             structure = proxy(kind)(context, builder)

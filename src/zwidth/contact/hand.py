@@ -10,7 +10,7 @@ import numpy as np
 
 from zwidth.compiled import compiled_lean
 from zwidth.contact.elements import VARYING
-from zwidth.contact.machine import Devices
+from zwidth.contact.engine_arrays import PlantArrays
 from zwidth.model.mechanism import Floats
 from zwidth.model.operator import Operator
 
@@ -131,7 +131,7 @@ class Hand:
 
     @property
     def reflex_numbers(self) -> Floats:
-        """What `set_varying` takes; an infinite threshold for none."""
+        """What `sample_brakes_and_reflexes` takes; an infinite threshold for none."""
         own = self.reflex
         if own is None:
             return np.array([inf, *np.zeros(REFLEX_NUMBERS - 1)])
@@ -160,8 +160,8 @@ def hand_force(numbers: Floats, m: int, time: float) -> float:
 
 
 @compiled_lean
-def set_varying(
-    devices: Devices,
+def sample_brakes_and_reflexes(
+    devices: PlantArrays,
     d: int,
     reflex: Floats,
     time: float,
@@ -195,8 +195,8 @@ def set_varying(
 
 
 @compiled_lean
-def follow_varying(
-    devices: Devices, d: int, reflex: Floats, m: int, time: float, h: float, period: float, memory: Floats
+def step_brakes_and_reflexes(
+    devices: PlantArrays, d: int, reflex: Floats, m: int, time: float, h: float, period: float, memory: Floats
 ) -> None:
     """Over a substep from `time` on: what brakes and reflexes of run m are worth on the average."""
     for e in range(devices.kind.shape[1]):

@@ -16,8 +16,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.contact.equivalent import equivalent_loop
-from zwidth.contact.limit_cycles import LimitCycle
+from zwidth.contact.harmonic_balance import LimitCycle
+from zwidth.contact.quasi_linear import equivalent_loop
 from zwidth.loop.loop import Loop
 from zwidth.model.nonlinear import Nonlinear
 
@@ -31,7 +31,7 @@ FAR = 4.0  # times: a step to another cycle is none
 
 
 def with_harmonics(
-    loop: Loop, wall_stiffness: float, wall_damping: float, cycle: LimitCycle, saturation: float | None = None
+    loop: Loop, wall_stiffness: float, wall_damping: float, cycle: LimitCycle, force_limit: float | None = None
 ) -> LimitCycle:
     """The same limit cycle with up to 16 odd harmonics: amplitude, frequency and force are half peak to peak.
 
@@ -39,31 +39,31 @@ def with_harmonics(
     it could follow is returned, of the first alone the one that was given.
 
     cycle       by `limit_cycles` of a loop without dry friction, counters and bent springs that act
-    saturation  largest force [N]; None: the smaller of the controller's and the actuator's limits
+    force_limit  largest force [N]; None: the smaller of the controller's and the actuator's limits
     Raises      ValueError   where nothing limits the force
 
-    >>> from zwidth.contact.limit_cycles import limit_cycles
+    >>> from zwidth.contact.harmonic_balance import limit_cycles
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant
     >>> one = np.ones(1)
     >>> plant = Plant(0.1 * one[:, None], 0.1 * one[:, None], np.zeros((1, 1)), one, one)
     >>> loop = Loop(plant, Controller(0.001))
-    >>> [first] = limit_cycles(loop, 400.0, 0.05, saturation=1.0)
-    >>> full = with_harmonics(loop, 400.0, 0.05, first, saturation=1.0)
+    >>> [first] = limit_cycles(loop, 400.0, 0.05, force_limit=1.0)
+    >>> full = with_harmonics(loop, 400.0, 0.05, first, force_limit=1.0)
     >>> round(full.amplitude / first.amplitude, 3), round(full.frequency_Hz / first.frequency_Hz, 3)
     (1.04, 0.975)
     """
-    limit = loop.nonlinear.force_limit if saturation is None else saturation
+    limit = loop.nonlinear.force_limit if force_limit is None else force_limit
     if not 0.0 < limit < np.inf:
         raise ValueError(f"harmonics are those of a limited force, and its limit is {limit} N")
-    transition, gain, command = equivalent_loop(loop, wall_stiffness, wall_damping, Nonlinear()).opened()
+    transition, gain, command = equivalent_loop(loop, wall_stiffness, wall_damping, Nonlinear()).open_at_limit()
     sensor = np.zeros(len(gain))
     sensor[: loop.plant.size] = loop.plant.sensor
-    cut = _Cut(transition, gain, np.stack([command, sensor]))
+    cut = _OpenLoop(transition, gain, np.stack([command, sensor]))
     T, found = loop.period, cycle
     start = np.array([np.log(cycle.force_amplitude / limit), np.log(2.0 * np.pi * cycle.frequency_Hz * T)])
     for count in COUNTS:
-        solution = cut.solved(_longer(start, count), count)
+        solution = cut.solve(_longer(start, count), count)
         if solution is None or np.max(np.abs(solution[:2] - start[:2])) > np.log(FAR):
             break
         start = solution
@@ -85,20 +85,20 @@ def _longer(start: Floats, count: int) -> Floats:
     return np.concatenate([start[: before + 1], more, start[before + 1 :], more])
 
 
-class _Cut:
+class _OpenLoop:
     """The loop cut at its limit, forces in units of it."""
 
     def __init__(self, transition: Floats, force: Floats, rows: Floats) -> None:
         self.transition, self.force, self.rows = transition, force, rows
         self.phases = 2.0 * np.pi * np.arange(PHASES) / PHASES
 
-    def solved(self, start: Floats, count: int) -> Floats | None:
+    def solve(self, start: Floats, count: int) -> Floats | None:
         """Newton's method from a start; None where it fails."""
         from scipy.optimize import root
 
         def left(unknown: Floats) -> Floats:
             W, angle = _parts(unknown, count)
-            rest = (self._passed(angle, count)[0] * self._limited(W) - W) / abs(W[0])
+            rest = (self._loop_response(angle, count)[0] * self._limited(W) - W) / abs(W[0])
             return np.concatenate([rest.real, rest.imag])
 
         with np.errstate(all="ignore"):
@@ -109,11 +109,11 @@ class _Cut:
     def vibration(self, solution: Floats, count: int) -> tuple[float, float, float]:
         """Half of peak to peak of the force that is asked for and of the position, and the angle per sample."""
         W, angle = _parts(solution, count)
-        position = self._passed(angle, count)[1] * self._limited(W)
+        position = self._loop_response(angle, count)[1] * self._limited(W)
         force, place = (0.5 * float(np.ptp(self._over_phases(part))) for part in (W, position))
         return force, place, angle
 
-    def _passed(self, angle: float, count: int) -> Complexes:
+    def _loop_response(self, angle: float, count: int) -> Complexes:
         """(2, h) the force that is asked for, and the sensor's motion, by the force that acts."""
         size, orders = len(self.transition), np.arange(1, 2 * count, 2)
         z = np.exp(1j * angle * orders)[:, None, None]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import pi
 from typing import Any, Final
 
-from zwidth.contact.limit_cycles import HarmonicBalance, LimitCycle
+from zwidth.contact.harmonic_balance import HarmonicBalance, LimitCycle
 from zwidth.result import Result
 
 OTHERWISE: Final = 1.5  # ratio of frequencies from which a simulation does not have the vibration predicted
@@ -19,7 +19,7 @@ class SimulatedVibration:
     """What a simulation finds.
 
     start, duration  [m] from the middle of the vibration, [s]
-    behaviour        as in `verdict.Judgement`
+    behaviour        as in `motion_verdict.Judgement`
     amplitude        of the sensor's motion in the last quarter [m];   frequency  [Hz]
     """
 
@@ -45,18 +45,18 @@ class LimitCyclePrediction(Result):
     """Limit cycles of a device on one two-sided wall.
 
     wall_stiffness, wall_damping   [N/m], [N s/m]
-    offset           middle of the vibrations, as a share of an encoder's step beyond a count
-    verdict          of the linear loop: "stable", "unstable" or "undecided"
-    nonlinear        what of the device depends on the amplitude, in words
-    left_out         what of the device the prediction leaves out, in words
-    predicted_by     the method, and what it is worth
-    balance          growth of vibrations over their amplitude, and as far as the device can move
-    cycles           by amplitude
-    simulated        what a simulation finds for each; None: not simulated, as is none that is unstable or beyond
-                     the range
-    otherwise        what it finds where no stable cycle is predicted within the range; None: not simulated
-    resting_limit    stiffest wall on which there is a place to rest under every push [N/m]; None: not known
-    quiet_limit      stiffest wall, of this damping, without any hunting [N/m]; None: not known
+    offset                 middle of the vibrations, as a share of an encoder's step beyond a count
+    verdict                of the linear loop: "stable", "unstable" or "undecided"
+    nonlinear              what of the device depends on the amplitude, in words
+    left_out               what of the device the prediction leaves out, in words
+    predicted_by           the method, and what it is worth
+    balance                growth of vibrations over their amplitude, and as far as the device can move
+    cycles                 by amplitude
+    simulated              what a simulation finds for each; None: not simulated, as is none that is unstable or
+                           beyond the range
+    small_start_vibration  what it finds where no stable cycle is predicted within the range; None: not simulated
+    resting_limit          stiffest wall on which there is a place to rest under every push [N/m]; None: not known
+    quiet_limit            stiffest wall, of this damping, without any hunting [N/m]; None: not known
     """
 
     wall_stiffness: float
@@ -69,7 +69,7 @@ class LimitCyclePrediction(Result):
     balance: HarmonicBalance
     cycles: tuple[LimitCycle, ...]
     simulated: tuple[SimulatedVibration | None, ...]
-    otherwise: SimulatedVibration | None
+    small_start_vibration: SimulatedVibration | None
     resting_limit: float | None
     quiet_limit: float | None
 
@@ -84,7 +84,7 @@ class LimitCyclePrediction(Result):
         return self.balance.leaves_range
 
     @property
-    def simulated_otherwise(self) -> bool:
+    def simulation_disagrees(self) -> bool:
         """Does a simulation go round at another frequency than is predicted? Then believe the simulation."""
         return any(
             found is not None
@@ -107,7 +107,7 @@ class LimitCyclePrediction(Result):
                 _cycle_document(cycle) | {"simulated": found and found.document()}
                 for cycle, found in zip(self.cycles, self.simulated, strict=True)
             ],
-            "otherwise": self.otherwise and self.otherwise.document(),
+            "otherwise": self.small_start_vibration and self.small_start_vibration.document(),
             "largest_motion_m": self.largest_motion,
             "leaves_range": self.leaves_range,
             "resting_limit_N_per_m": self.resting_limit,

@@ -12,78 +12,81 @@ import numpy as np
 
 from zwidth.compiled import compiled, compiled_inline, compiled_lean
 from zwidth.contact.elements import BRISTLES, bristles_bend, element_force
+from zwidth.contact.engine_arrays import PlantArrays
 from zwidth.contact.friction import coulomb_force
-from zwidth.contact.machine import Devices
 from zwidth.model.mechanism import Floats
 
 SWEEPS = 60  # of elements that work on one another, over one substep
 SETTLED = 1e-14  # relative change of their forces that is none
 
 
-class Motion(NamedTuple):
+class PlantState(NamedTuple):
     """What moves of one run, and room for a substep.
 
-    states, spare  (R,)    now, and after the substep: N states, then place and speed of each element's motion
-    forces         (E,)    of the elements
-    memory         (E, 4)  what they remember
-    held           (R,)    what command and push add over a substep
+    states, next_states  (R,)    now, and after the substep: N states, then place and speed of each element's
+                         motion
+    forces               (E,)    of the elements
+    memory               (E, 4)  what they remember
+    held_increment       (R,)    what command and push add over a substep
     """
 
     states: Floats
-    spare: Floats
+    next_states: Floats
     forces: Floats
     memory: Floats
-    held: Floats
+    held_increment: Floats
 
 
 @compiled
-def motion_from(devices: Devices, start: Floats) -> Motion:
+def motion_from(devices: PlantArrays, start: Floats) -> PlantState:
     """In the start states."""
     E = devices.kind.shape[1]
     R = start.size
-    return Motion(start.copy(), np.zeros(R), np.zeros(E), np.zeros((E, 4)), np.zeros(R))
+    return PlantState(start.copy(), np.zeros(R), np.zeros(E), np.zeros((E, 4)), np.zeros(R))
 
 
 @compiled_inline
-def hold(inputs: Floats, d: int, part: int, command: float, push: float, held: Floats) -> None:
+def set_held_increment(inputs: Floats, d: int, part: int, command: float, push: float, held: Floats) -> None:
     """What command and push add over a substep."""
     for i in range(held.size):
         held[i] = inputs[d, part, 0, i] * command + inputs[d, part, 1, i] * push
 
 
 @compiled_inline
-def look_ahead(A: Floats, d: int, part: int, own: Motion) -> None:
+def predict_motions(A: Floats, d: int, part: int, state: PlantState) -> None:
     """The elements' motions after the substep, if none of them acts."""
     for i in range(A.shape[3], A.shape[2]):
-        total = own.held[i]
+        total = state.held_increment[i]
         for k in range(A.shape[3]):
-            total += A[d, part, i, k] * own.states[k]
-        own.spare[i] = total
+            total += A[d, part, i, k] * state.states[k]
+        state.next_states[i] = total
 
 
 @compiled_inline
-def step(A: Floats, inputs: Floats, d: int, part: int, own: Motion) -> None:
+def step(A: Floats, inputs: Floats, d: int, part: int, state: PlantState) -> None:
     """The substep: all states anew, with the forces of the elements.
 
     In one go and from one array into the other; to add to what has just been stored would wait for the store.
     """
     for i in range(A.shape[2]):
-        total = own.held[i]
+        total = state.held_increment[i]
         for k in range(A.shape[3]):
-            total += A[d, part, i, k] * own.states[k]
-        for e in range(own.forces.size):
-            total += inputs[d, part, 2 + e, i] * own.forces[e]
-        own.spare[i] = total
+            total += A[d, part, i, k] * state.states[k]
+        for e in range(state.forces.size):
+            total += inputs[d, part, 2 + e, i] * state.forces[e]
+        state.next_states[i] = total
 
 
 @compiled_lean
-def rub(A: Floats, inputs: Floats, d: int, part: int, level: float, count: int, own: Motion) -> None:
+def step_with_friction(
+    A: Floats, inputs: Floats, d: int, part: int, level: float, count: int, state: PlantState
+) -> None:
     """So many substeps under one Coulomb friction alone and a force that stays.
 
-    The very numbers of `look_ahead`, `answer` and `step`, without asking each time what there is; in so short a
-    loop that costs more than the algebra.
+    The very numbers of `predict_motions`, `solve_forces` and `step`, without asking each time what there is; in so
+    short a loop that costs more than the algebra.
     """
-    N, held, here, there = A.shape[3], own.held, own.states, own.spare
+    N, held, here, there = A.shape[3], state.held_increment, state.states, state.next_states
     speed, mobility, force = N + 1, inputs[d, part, 2, N + 1], 0.0
     for _ in range(count):
         w = held[speed]
@@ -97,64 +100,64 @@ def rub(A: Floats, inputs: Floats, d: int, part: int, level: float, count: int, 
             there[i] = total + inputs[d, part, 2, i] * force
         there[speed] = w + mobility * force
         here, there = there, here
-    own.forces[0] = force
+    state.forces[0] = force
     # the motion's place is asked for by nobody on the way: `there` has what it came from
     place = held[N]
     for k in range(N):
         place += A[d, part, N, k] * there[k]
     here[N] = place + inputs[d, part, 2, N] * force
     if count % 2:
-        for i in range(own.states.size):
-            own.states[i] = own.spare[i]
+        for i in range(state.states.size):
+            state.states[i] = state.next_states[i]
 
 
 @compiled_inline
-def answer(devices: Devices, d: int, part: int, own: Motion) -> None:
+def solve_forces(devices: PlantArrays, d: int, part: int, state: PlantState) -> None:
     """The forces of the elements; those that move one another settle by Gauss-Seidel."""
-    forces, E = own.forces, own.forces.size
+    forces, E = state.forces, state.forces.size
     if E == 1:
-        forces[0] = _force(devices, d, part, 0, own)
+        forces[0] = _force(devices, d, part, 0, state)
     else:
         for e in range(E):
             forces[e] = 0.0
         for _ in range(SWEEPS):
             change, largest = 0.0, 0.0
             for e in range(E):
-                f = _force(devices, d, part, e, own)
+                f = _force(devices, d, part, e, state)
                 change, largest = max(change, abs(f - forces[e])), max(largest, abs(f))
                 forces[e] = f
             if change <= SETTLED * largest:
                 break
     for e in range(E):
         if devices.kind[d, e] == BRISTLES:
-            _bend(devices, d, part, e, own)
+            _bend(devices, d, part, e, state)
 
 
 @compiled_inline
-def _ahead(devices: Devices, d: int, part: int, e: int, own: Motion) -> tuple[float, float]:
+def _ahead(devices: PlantArrays, d: int, part: int, e: int, state: PlantState) -> tuple[float, float]:
     """Place and speed of motion e after the substep under the forces of all other elements."""
     at, inputs = devices.energy.shape[1] + 2 * e, devices.inputs
-    place, speed = own.spare[at], own.spare[at + 1]
-    for k in range(own.forces.size):
+    place, speed = state.next_states[at], state.next_states[at + 1]
+    for k in range(state.forces.size):
         if k != e:
-            place += inputs[d, part, 2 + k, at] * own.forces[k]
-            speed += inputs[d, part, 2 + k, at + 1] * own.forces[k]
+            place += inputs[d, part, 2 + k, at] * state.forces[k]
+            speed += inputs[d, part, 2 + k, at + 1] * state.forces[k]
     return place, speed
 
 
 @compiled_inline
-def _force(devices: Devices, d: int, part: int, e: int, own: Motion) -> float:
+def _force(devices: PlantArrays, d: int, part: int, e: int, state: PlantState) -> float:
     """The force of element e under those of all others."""
     at, inputs = devices.energy.shape[1] + 2 * e, devices.inputs
-    place, speed = _ahead(devices, d, part, e, own)
+    place, speed = _ahead(devices, d, part, e, state)
     return element_force(
         devices.kind[d, e],
         devices.numbers,
-        own.memory,
+        state.memory,
         d,
         e,
-        own.states[at],
-        own.states[at + 1],
+        state.states[at],
+        state.states[at + 1],
         place,
         speed,
         inputs[d, part, 2 + e, at],
@@ -164,9 +167,9 @@ def _force(devices: Devices, d: int, part: int, e: int, own: Motion) -> float:
 
 
 @compiled_inline
-def _bend(devices: Devices, d: int, part: int, e: int, own: Motion) -> None:
+def _bend(devices: PlantArrays, d: int, part: int, e: int, state: PlantState) -> None:
     """Let the bristles of element e bend."""
     at = devices.energy.shape[1] + 2 * e
-    _, speed = _ahead(devices, d, part, e, own)
+    _, speed = _ahead(devices, d, part, e, state)
     mobility, h = devices.inputs[d, part, 2 + e, at + 1], devices.length[d, part]
-    bristles_bend(devices.numbers, own.memory, d, e, own.states[at + 1], speed, mobility, h)
+    bristles_bend(devices.numbers, state.memory, d, e, state.states[at + 1], speed, mobility, h)

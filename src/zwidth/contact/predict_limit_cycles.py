@@ -8,18 +8,18 @@ from typing import Final
 import numpy as np
 
 from zwidth.chart.verdict import judge
-from zwidth.conditions.dry import reading_step
+from zwidth.conditions.friction_and_resolution import reading_step
 from zwidth.contact.environments.wall import wall
+from zwidth.contact.friction_quantisation_plane import device_plane
+from zwidth.contact.harmonic_balance import Floats, LimitCycle, Progress, harmonic_balance
 from zwidth.contact.harmonics import with_harmonics
 from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction, SimulatedVibration
-from zwidth.contact.limit_cycles import Floats, LimitCycle, Progress, harmonic_balance
-from zwidth.contact.plane import device_plane
+from zwidth.contact.motion_verdict import judge_response
 from zwidth.contact.simulate import LARGEST_MOTION, Run, simulate_batch
-from zwidth.contact.verdict import judge_response
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.arguments import check_number, require
-from zwidth.model.modes import undeformed
+from zwidth.model.argument_checks import check_number, require
+from zwidth.model.modes import least_deforming_motion
 
 NOT_PREDICTED: Final = ("noise", "programmable brakes")
 STARTS: Final = (0.7, 1.4)  # of the predicted amplitude; the run that ends nearer to it is told
@@ -103,7 +103,7 @@ def predict_limit_cycles(
         tell("simulating", 0, 1)
         simulated = tuple(_simulated(loop, K, B, offset, cycle) if settles(cycle) else None for cycle in cycles)
         if not any(map(settles, cycles)):
-            otherwise = _simulated_close_by(loop, K, B, offset, cycles)
+            otherwise = _simulate_small_start(loop, K, B, offset, cycles)
         tell("simulating", 1, 1)
     resting, quiet = _limits(loop, K, B)
     return LimitCyclePrediction(
@@ -112,12 +112,12 @@ def predict_limit_cycles(
         offset=offset,
         verdict=judge(loop, [K], [B]).names[0],
         nonlinear=parts,
-        left_out=tuple(name for name in point.left_out if name in NOT_PREDICTED),
+        left_out=tuple(name for name in point.linear_omissions if name in NOT_PREDICTED),
         predicted_by=by,
         balance=balance,
         cycles=cycles,
         simulated=simulated,
-        otherwise=otherwise,
+        small_start_vibration=otherwise,
         resting_limit=resting,
         quiet_limit=quiet,
     )
@@ -134,7 +134,7 @@ def amplitude_dependent(point: OperatingPoint, offset: float = 0.0) -> tuple[str
         raise ValueError(f"offset must be from -0.5 to 0.5 of an encoder's step, got {offset:g}")
     loop = point.loop
     _ = loop.sections  # refuses plants that no wall moves, or not in time
-    parts = tuple(name for name in loop.nonlinear.left_out if name not in NOT_PREDICTED)
+    parts = tuple(name for name in loop.nonlinear.kinds if name not in NOT_PREDICTED)
     if not parts:
         raise NothingNonlinearError
     if offset and "encoder steps" not in parts:
@@ -178,7 +178,7 @@ def _simulated(loop: Loop, K: float, B: float, offset: float, cycle: LimitCycle)
     return min(alive or found, key=lambda run: abs(log(max(run.amplitude, 1e-300) / cycle.amplitude)))
 
 
-def _simulated_close_by(
+def _simulate_small_start(
     loop: Loop, K: float, B: float, offset: float, cycles: tuple[LimitCycle, ...]
 ) -> SimulatedVibration:
     """What becomes of a start some counts off, and well within the smallest cycle, below which it should die."""
@@ -195,7 +195,7 @@ def _runs(
     T = loop.period
     seconds = float(np.clip(CYCLES / frequency, FEWEST * T, MOST * T))
     middle, place = _middle(loop, offset)
-    shape = undeformed(loop.plant)
+    shape = least_deforming_motion(loop.plant)
     own = wall.values(stiffness=K, damping=B)
     runs = [
         Run(

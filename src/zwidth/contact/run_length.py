@@ -64,7 +64,7 @@ def predicted_growth(loop: Loop, environment: Environment, values: Floats) -> Pr
     return PredictedGrowth(log(radius) if known else None, frequency if isfinite(frequency) else 0.0)
 
 
-def length_of_contact(
+def contact_run_length(
     loop: Loop,
     hand: Hand,
     growth: PredictedGrowth,
@@ -166,5 +166,5 @@ def bound_of_run(offset: float, growth: float | None) -> float:
 def needed_substeps(loop: Loop, hand: Hand, substeps: int) -> int:
     """As many, but of a linear device under a steady push no more than show what is between samples."""
     steady = hand.reflex is None and hand.tremor is None and hand.reach is None and not hand.ramp
-    linear = not set(loop.plant.nonlinear.left_out) - COUNTED
+    linear = not set(loop.plant.nonlinear.kinds) - COUNTED
     return min(substeps, SHOWN_BETWEEN) if steady and linear else substeps

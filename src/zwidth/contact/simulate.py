@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from math import ceil, inf, isfinite, isinf
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions.dry import reading_noise, reading_step
-from zwidth.contact.assemble import Apparatus, devices, motions_of
+from zwidth.conditions.friction_and_resolution import reading_noise, reading_step
 from zwidth.contact.computer import computers
-from zwidth.contact.engine import run_batch
+from zwidth.contact.engine import run_several
+from zwidth.contact.engine_arrays import ENTRIES, TRACES, PlantArrays, Records, RunArrays
+from zwidth.contact.engine_inputs import HeldDevice, motions_of, pack_plants
 from zwidth.contact.environments.environment import Environment
 from zwidth.contact.hand import PUSH_NUMBERS, REFLEX_NUMBERS, Hand
-from zwidth.contact.machine import ENTRIES, TRACES, Devices, Members, Records
-from zwidth.contact.passivity import PassivityController
-from zwidth.contact.response import Plan, TimeResponse
-from zwidth.contact.room import check_room
+from zwidth.contact.passivity_controller import PassivityController
+from zwidth.contact.time_response import RunSettings, TimeResponse
 from zwidth.loop.estimators import Foaw, Levant
 from zwidth.loop.loop import Loop
-from zwidth.model.arguments import require
+from zwidth.memory_limit import check_memory
+from zwidth.model.argument_checks import require
+from zwidth.threads import in_chunks
 
 Floats = NDArray[np.float64]
 
@@ -113,55 +115,62 @@ def simulate_batch(
     """
     lengths = np.broadcast_to(np.asarray(duration, dtype=float), (len(runs),))
     _check(lengths, substeps)
-    rigs, index = _apparatus(runs)
-    period = np.array([rig.loop.period for rig in rigs])[index]
+    held_devices, index = _held_devices(runs)
+    period = np.array([held_device.loop.period for held_device in held_devices])[index]
     samples = np.array([1 + ceil(length / T * (1.0 - 1e-12)) for length, T in zip(lengths, period, strict=True)])
     m, S = len(runs), int(samples.max())
-    if not trail and not ledger and not any(rig.elements for rig in rigs):
+    if not trail and not ledger and not any(held_device.elements for held_device in held_devices):
         substeps = 1
     fine = S * max(substeps, 2) if trail else 0
-    check_room(
+    check_memory(
         m * float(S * (TRACES + (ENTRIES if ledger else 0)) + fine),
         f"{m} run{'s' * (m > 1)} of {S} samples",
         "simulate a shorter time, or fewer runs at once",
     )
-    plants = devices(rigs, substeps)
-    own = computers([rig.loop.controller for rig in rigs], [rig.limit for rig in rigs])
+    plants = pack_plants(held_devices, substeps)
+    own = computers(
+        [held_device.loop.controller for held_device in held_devices],
+        [held_device.limit for held_device in held_devices],
+    )
     records = Records(
         np.zeros(m, dtype=np.int64),
         np.full((m, S, TRACES), np.nan),
         np.full((m, fine), np.nan),
         np.zeros((m, S if ledger else 0, ENTRIES)),
     )
-    members = _members(runs, rigs, index, plants)
-    run_batch(plants, own, members, samples, environment.address, records)
+    members = _members(runs, held_devices, index, plants)
+    in_chunks(partial(run_several, plants, own, members, samples, environment.address, records), m)
     return [
-        TimeResponse.of(_plan(run, rigs[index[i]], plants, index[i], int(samples[i]), environment), records, i)
+        TimeResponse.of(
+            _plan(run, held_devices[index[i]], plants, index[i], int(samples[i]), environment), records, i
+        )
         for i, run in enumerate(runs)
     ]
 
 
-def _plan(run: Run, rig: Apparatus, plants: Devices, d: int, samples: int, environment: Environment) -> Plan:
+def _plan(
+    run: Run, held_device: HeldDevice, plants: PlantArrays, d: int, samples: int, environment: Environment
+) -> RunSettings:
     """What was asked for of one run."""
-    counters = rig.counters
-    plain = not rig.elements and run.passivity is None and isinf(rig.limit)
-    plain = plain and not isinstance(rig.loop.controller.velocity, Foaw | Levant)
+    counters = held_device.counters
+    plain = not held_device.elements and run.passivity is None and isinf(held_device.limit)
+    plain = plain and not isinstance(held_device.loop.controller.velocity, Foaw | Levant)
     exact = all(counter.step == 0.0 and counter.noise == 0.0 for counter in counters)
     steady = run.hand.tremor is None and run.hand.reach is None
-    return Plan(
+    return RunSettings(
         samples=samples,
         offsets=_offsets(plants, d),
-        period=rig.loop.period,
+        period=held_device.loop.period,
         wall_position=run.wall_position,
-        quantum=reading_step(rig.plant),
-        noise=reading_noise(rig.plant),
+        quantum=reading_step(held_device.modal_plant),
+        noise=reading_noise(held_device.modal_plant),
         linear=plain and exact and steady and environment.linear,
         surface=environment.surface,
         held=bool(np.any(run.hand.push_numbers)) or run.hand.operator is not None,
     )
 
 
-def _offsets(plants: Devices, d: int) -> Floats:
+def _offsets(plants: PlantArrays, d: int) -> Floats:
     """Ends of the substeps after a sample [s]."""
     (early, late), (first, second) = plants.substeps[d], plants.length[d]
     return np.concatenate([first * np.arange(1, early + 1), early * first + second * np.arange(1, late + 1)])
@@ -175,33 +184,35 @@ def _check(lengths: Floats, substeps: int) -> None:
         raise ValueError(f"substeps must be from 1 to 100000, got {substeps!r}")
 
 
-def _apparatus(runs: Sequence[Run]) -> tuple[list[Apparatus], NDArray[np.int64]]:
+def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], NDArray[np.int64]]:
     """One apparatus for runs with the same loop and arm, and which run has which."""
     found: dict[tuple[object, ...], int] = {}
-    rigs: list[Apparatus] = []
+    held_devices: list[HeldDevice] = []
     index = []
     for run in runs:
         key = (id(run.loop), run.hand.operator, run.hand.reflex is not None)
         if key not in found:
-            found[key] = len(rigs)
+            found[key] = len(held_devices)
             _ = run.loop.sections  # refuses plants that cannot be moved, or not in time
-            rigs.append(Apparatus(run.loop, run.hand))
+            held_devices.append(HeldDevice(run.loop, run.hand))
         index.append(found[key])
-    return rigs, np.array(index, dtype=np.int64)
+    return held_devices, np.array(index, dtype=np.int64)
 
 
-def _members(runs: Sequence[Run], rigs: list[Apparatus], index: NDArray[np.int64], plants: Devices) -> Members:
+def _members(
+    runs: Sequence[Run], held_devices: list[HeldDevice], index: NDArray[np.int64], plants: PlantArrays
+) -> RunArrays:
     m, (R, N) = len(runs), plants.transition.shape[-2:]
     start = np.zeros((m, R))
     for i, run in enumerate(runs):
-        rig = rigs[index[i]]
-        n = rig.given.size
-        x, v = _start(rig, run)
-        start[i, :n], start[i, n : 2 * n] = rig.modal(x), rig.modal(v)
+        held_device = held_devices[index[i]]
+        n = held_device.attached_plant.size
+        x, v = _start(held_device, run)
+        start[i, :n], start[i, n : 2 * n] = held_device.modal(x), held_device.modal(v)
         start[i, N:] = motions_of(plants, int(index[i]), N) @ start[i, :N]
     watched = [np.array([np.nan]) if run.passivity is None else run.passivity.parameters for run in runs]
     width = max(len(numbers) for numbers in watched)
-    return Members(
+    return RunArrays(
         device=index,
         start=start,
         wall=np.array([run.wall_position for run in runs], dtype=float),
@@ -214,10 +225,10 @@ def _members(runs: Sequence[Run], rigs: list[Apparatus], index: NDArray[np.int64
     )
 
 
-def _start(rig: Apparatus, run: Run) -> tuple[Floats, Floats]:
-    n = rig.given.size
+def _start(held_device: HeldDevice, run: Run) -> tuple[Floats, Floats]:
+    n = held_device.attached_plant.size
     if run.start is None:
-        return run.start_position * rig.undeformed, run.start_velocity * rig.undeformed
+        return run.start_position * held_device.undeformed, run.start_velocity * held_device.undeformed
     x, v = (np.asarray(part, dtype=float) for part in run.start)
     if x.shape != (n,) or v.shape != (n,):
         raise ValueError(f"start must be two arrays of {n} numbers, got shapes {x.shape} and {v.shape}")

@@ -19,23 +19,23 @@ from zwidth.contact.contact_simulation import ContactSimulation, RangeExit
 from zwidth.contact.environments import ENVIRONMENTS
 from zwidth.contact.environments.environment import Environment
 from zwidth.contact.hand import Reach, Reflex, Tremor
-from zwidth.contact.passivity import PassivityController
-from zwidth.contact.response import TimeResponse
+from zwidth.contact.motion_verdict import judge_response
+from zwidth.contact.passivity_controller import PassivityController
 from zwidth.contact.run_length import (
     RunLength,
     bound_of_run,
-    length_of_contact,
+    contact_run_length,
     lengthened,
     needed_substeps,
     predicted_growth,
 )
 from zwidth.contact.simulate import SUBSTEPS, Run, simulate_batch
-from zwidth.contact.verdict import judge_response
+from zwidth.contact.time_response import TimeResponse
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.arguments import check_choice, check_number, require
+from zwidth.model.argument_checks import check_choice, check_number, require
 from zwidth.model.posture import PostureError
 
-Wall = Literal["two-sided", "one-sided"]
+WallSides = Literal["two-sided", "one-sided"]
 
 DEPTH: Final = 1e-3  # m, at the start: inside what acts everywhere, outside what has a surface
 
@@ -60,7 +60,7 @@ def simulate_contact(
     stiffness: float | None = None,
     damping: float | None = None,
     *,
-    wall: Wall = "two-sided",
+    wall: WallSides = "two-sided",
     no_pull: bool = False,
     environment: str | Environment | None = None,
     parameters: Mapping[str, float] | None = None,
@@ -106,7 +106,7 @@ def simulate_contact(
                                   that need an operator
             OutOfWorkspaceError   (one of these) for a start or a wall that the handle cannot be moved to
             NoForceError          where the environment returns no number
-            TooLarge              (contact.room) for more samples than there is memory for
+            TooLarge              (memory_limit) for more samples than there is memory for
             ValueError            for numbers that are out of range
             what `OperatingPoint.plant` raises
 
@@ -132,7 +132,7 @@ def simulate_contact(
         damping=damping,
         no_pull=no_pull,
     )
-    arm = point.operator if point.unheld_plant.handle is not None else None
+    arm = point.operator if point.ungripped_plant.handle is not None else None
     hand = active_hand(arm, touched.surface, push, ramp, tremor, reach, reflex)
     if start_position is None:
         start_position = wall_position + (-DEPTH if touched.surface else DEPTH)
@@ -160,7 +160,7 @@ def simulate_contact(
         length = RunLength(duration, "as asked")
         responses = simulate(duration=duration)
     else:
-        length = length_of_contact(loop, hand, growth, controlled=controlled, seconds_to_hear=seconds_to_hear)
+        length = contact_run_length(loop, hand, growth, controlled=controlled, seconds_to_hear=seconds_to_hear)
         length, responses = _long_enough(simulate, length, loop.period, seconds_to_hear)
     _check_forces(responses, touched)
     return ContactSimulation(
@@ -220,7 +220,7 @@ def _check_numbers(
         raise ValueError(f"seed must be zero or positive, got {seed}")
 
 
-def _wall_or(environment: str | Environment | None, wall: Wall, *, has_stiffness: bool) -> str | Environment:
+def _wall_or(environment: str | Environment | None, wall: WallSides, *, has_stiffness: bool) -> str | Environment:
     """The other environment, or the wall that acts on these sides.
 
     Raises  ContactArgumentError  where both are given, or the wall has no stiffness

@@ -11,10 +11,10 @@ import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final
 
-from zwidth.device.faults import SETTINGS, DeviceError, Fault, Path, dotted, fail, listed, nearest, quote
+from zwidth.device.faults import SETTINGS, DeviceError, Fault, KeyPath, comma_list, dotted, fail, nearest, quote
 from zwidth.device.read import within_depth
-from zwidth.device.schema import file as schema
-from zwidth.device.toml_access import copied
+from zwidth.device.schema import device_file as schema
+from zwidth.device.toml_access import deep_copy
 
 UNSET: Final = object()
 
@@ -50,12 +50,12 @@ def exists(document: dict[str, Any], path: str) -> bool:
     return bool(places)
 
 
-def allowed(path: str) -> bool:
+def in_schema(path: str) -> bool:
     """Whether a path of keys, with * for list elements, leads to a key the schema has, given or not."""
-    steps: Path = ()
+    steps: KeyPath = ()
     for part in path.split("."):
-        steps = (*steps, part) if schema.at((*steps, part)) else (*steps, 0)
-        if not schema.at(steps) or (steps[-1] == 0 and part != "*"):
+        steps = (*steps, part) if schema.subschemas((*steps, part)) else (*steps, 0)
+        if not schema.subschemas(steps) or (steps[-1] == 0 and part != "*"):
             return False
     return True
 
@@ -77,7 +77,7 @@ def assign_all(document: dict[str, Any], settings: Iterable[tuple[str, Any]]) ->
     >>> assign_all({"loop": {"delay_s": 0.1}}, [("loop.sampling_period_s", 0.01), ("loop.delay_samples", 2.0)])
     {'loop': {'sampling_period_s': 0.01, 'delay_samples': 2.0}}
     """
-    document = copied(document)
+    document = deep_copy(document)
     for path, value in settings:
         _set(document, path, value)
     return document
@@ -103,7 +103,7 @@ def _set(document: dict[str, Any], path: str, value: Any) -> None:
     if tag == last == "method" and value in kinds:
         for key in schema.keys(tuple(outer)) - kinds[value]:
             table.pop(key, None)
-    dropped = [key for key in _rivals(tuple(outer), last) if table.pop(key, UNSET) is not UNSET]
+    dropped = [key for key in _exclusive_keys(tuple(outer), last) if table.pop(key, UNSET) is not UNSET]
     if dropped:  # the table may now be of another kind, as a filter is that gets the other filter's key
         table.update((tag, kind) for kind, keys in kinds.items() if last in keys)
 
@@ -143,7 +143,7 @@ def parse(setting: str | tuple[str, Any]) -> tuple[str, Any]:
     return path, _parsed(value, path) if isinstance(value, str) else value
 
 
-def numbers(document: Any, path: Path = ()) -> Iterator[tuple[Path, float]]:
+def numbers(document: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, float]]:
     """Path and value of every number in the document, in its order; `dotted` writes a path as users do."""
     if isinstance(document, dict):
         for key, inner in document.items():
@@ -160,29 +160,29 @@ def numeric_addresses(document: dict[str, Any]) -> dict[str, float]:
     return {dotted(path, document): value for path, value in numbers(document)}
 
 
-def resolve(document: dict[str, Any], path: str) -> Path:
+def resolve(document: dict[str, Any], path: str) -> KeyPath:
     """The steps of a dotted path as keys and indices, whether or not the last ones are given in the file.
 
     Raises DeviceError  if neither the document nor the schema knows the path
     """
     parts = _split(document, path)
     steps: list[str | int] = []
-    place: Any = document
+    value: Any = document
     for depth, part in enumerate(parts):
-        index = _element(place, part) if isinstance(place, list) else None
-        if isinstance(place, dict) and (part in place or part in schema.keys(tuple(steps)) or _free(steps)):
+        index = _element(value, part) if isinstance(value, list) else None
+        if isinstance(value, dict) and (part in value or part in schema.keys(tuple(steps)) or _free(steps)):
             step: str | int = part
         elif index is not None:
             step = index
         else:
-            raise _unknown(document, path, steps, parts, depth, place)
+            raise _unknown(document, path, steps, parts, depth, value)
         steps.append(step)
-        place = _value(place, (step,))
-        if place is UNSET:
-            place = {}
-        elif depth + 1 < len(parts) and not isinstance(place, dict | list):
+        value = _value(value, (step,))
+        if value is UNSET:
+            value = {}
+        elif depth + 1 < len(parts) and not isinstance(value, dict | list):
             raise fail(
-                SETTINGS, path, f"{dotted(tuple(steps), document)} holds {quote(place)}, nothing is inside it"
+                SETTINGS, path, f"{dotted(tuple(steps), document)} holds {quote(value)}, nothing is inside it"
             )
     return tuple(steps)
 
@@ -206,7 +206,9 @@ def _unknown(
     if near:
         right = ".".join([here, near, *parts[depth + 1 :]])
         return fail(SETTINGS, path, f"is no key of a device file; did you mean '{right}'?")
-    return fail(SETTINGS, path, f"is no key of a device file; {here} has: {listed(choices) or 'nothing inside'}")
+    return fail(
+        SETTINGS, path, f"is no key of a device file; {here} has: {comma_list(choices) or 'nothing inside'}"
+    )
 
 
 def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
@@ -220,10 +222,10 @@ def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
         near = nearest(first, schema.keys((section,))) if section in document else None
         if near:
             return f"did you mean '{'.'.join([section, near, *rest])}'?"
-    return f"a device file has: {listed(sorted(schema.keys(())))}"
+    return f"a device file has: {comma_list(sorted(schema.keys(())))}"
 
 
-def _choices(place: Any, steps: Path) -> list[str]:
+def _choices(place: Any, steps: KeyPath) -> list[str]:
     """The keys or elements there are at a place, sorted."""
     if isinstance(place, list):
         names = [e.get("name") if isinstance(e, dict) else None for e in place]
@@ -233,7 +235,7 @@ def _choices(place: Any, steps: Path) -> list[str]:
 
 def _free(steps: list[str | int]) -> bool:
     """Whether the table here takes keys of any name, as assemblies do."""
-    return any(isinstance(found.get("additionalProperties"), dict) for found in schema.at(tuple(steps)))
+    return any(isinstance(found.get("additionalProperties"), dict) for found in schema.subschemas(tuple(steps)))
 
 
 def _element(elements: list[Any], part: str) -> int | None:
@@ -246,7 +248,7 @@ def _element(elements: list[Any], part: str) -> int | None:
     return None
 
 
-def _value(place: Any, steps: Path) -> Any:
+def _value(place: Any, steps: KeyPath) -> Any:
     for step in steps:
         if isinstance(place, dict) and step not in place:
             return UNSET
@@ -263,7 +265,7 @@ def _children(place: Any, part: str) -> list[Any]:
     return [] if index is None else [place[index]]
 
 
-def _rivals(table: Path, key: str | int) -> list[str]:
+def _exclusive_keys(table: KeyPath, key: str | int) -> list[str]:
     groups = EXCLUSIVE.get(tuple(str(step) for step in table), ())
     if not any(key in group for group in groups):
         return []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from zwidth.device import parts
+from zwidth.device import build_nonlinear
 from zwidth.device.schema.friction import FrictionSection
 from zwidth.device.schema.loop import EncoderSection, LoopSection
 from zwidth.device.schema.mechanism import (
@@ -25,7 +25,7 @@ from zwidth.device.schema.response import ResponseSection
 from zwidth.device.schema.velocity import ButterworthFilter, FirstOrderFilter, FoawSection, KalmanSection
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, Foaw, Kalman, VelocityMethod
-from zwidth.model.dampers import with_dampers
+from zwidth.model.electrical_damping import add_dampers
 from zwidth.model.mechanism import FIXED, REVOLUTE, Closures, Drives, Floats, Links, Mechanism
 from zwidth.model.operator import Operator
 from zwidth.model.plant import LaggedDamper, Plant
@@ -46,7 +46,7 @@ def controller(loop: LoopSection) -> Controller:
         velocity=_velocity(loop),
         force_filter=_low_pass(loop.force.filter),
         actuator_time_constant=loop.actuator.time_constant_s,
-        saturation=math.inf if loop.saturation is None else loop.saturation.force_N,
+        force_limit=math.inf if loop.saturation is None else loop.saturation.force_N,
     )
 
 
@@ -84,7 +84,7 @@ def plant(
         handle=None if handle is None else np.array(handle),
         names=tuple(f"coordinate {i}" for i in range(n)),
     )
-    bare = replace(bare, nonlinear=parts.of_plant(bare, section, friction, encoder))
+    bare = replace(bare, nonlinear=build_nonlinear.nonlinear_of_plant(bare, section, friction, encoder))
     if section.loss_factor:
         bare = replace(bare, hysteresis=section.loss_factor * bare.stiffness)
     motors = [
@@ -95,7 +95,7 @@ def plant(
         )
         for motor in section.electrical_damping
     ]
-    return with_dampers(bare, motors)
+    return add_dampers(bare, motors)
 
 
 def operator(section: OperatorSection) -> Operator:
@@ -208,7 +208,7 @@ def _drives(section: MechanismSection, index: dict[str, int]) -> Drives:
     drives = section.drives
 
     def column(key: str, omitted: float) -> Floats:
-        return parts.column(drives, key, omitted)
+        return build_nonlinear.per_drive(drives, key, omitted)
 
     windings = [_winding(drive) for drive in drives]
     return Drives(
@@ -224,7 +224,7 @@ def _drives(section: MechanismSection, index: dict[str, int]) -> Drives:
         continuous_torque=column("continuous_torque_Nm", math.nan),
         winding_damping=np.array([damping for damping, _ in windings]),
         winding_time_constant=np.array([lag for _, lag in windings]),
-        nonlinearity=parts.of_drives(drives, section.friction),
+        nonlinearity=build_nonlinear.drive_nonlinearity(drives, section.friction),
     )
 
 

@@ -15,17 +15,17 @@ from zwidth import _verbs
 from zwidth.device.faults import DeviceError, fail, quote, suggestion
 from zwidth.device.posture_arguments import joint_angles, positions, unit_vectors
 from zwidth.loop.controller import Controller
-from zwidth.loop.left_out import left_out
+from zwidth.loop.linear_omissions import linear_omissions
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response
 
 if TYPE_CHECKING:
-    from zwidth.chart.result import Chart
+    from zwidth.chart.chart_base import Chart
     from zwidth.chart.verdict import WallVerdicts
     from zwidth.loop.operating_point import OperatingPoint, Position
+    from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
-    from zwidth.measures.measure import Measure, Measured
     from zwidth.model.damping import Damping
     from zwidth.model.operator import Operator
     from zwidth.model.posture import Posture
@@ -94,9 +94,9 @@ class Device:
         return self.document.get("loop", {}).get("encoder", {}).get("resolution_m") is not None
 
     @property
-    def left_out(self) -> tuple[str, ...]:
+    def linear_omissions(self) -> tuple[str, ...]:
         """What of the device a linear answer leaves out, in words; () if it leaves out nothing."""
-        return left_out(self.mechanism, self.given_plant, self.controller)
+        return linear_omissions(self.mechanism, self.given_plant, self.controller)
 
     def at(
         self,
@@ -140,17 +140,17 @@ class Device:
             raise fail(self.label, "model", f"must be one of {', '.join(MODELS)}, got {quote(model)}")
         if direction is not None and directions is not None:
             raise fail(self.label, "directions", "are given beside a direction; give one of the two")
-        posture = rendered = asked = None
+        posture = rendered = requested_position = None
         if self.mechanism is None:
             refused = {} if self.response is None else {"model": model}
             self._refuse(at=position, direction=direction, directions=directions, assembly=assembly, **refused)
         else:
-            rendered = self._rendered(direction, directions)
+            rendered = self._unit_directions(direction, directions)
             posture = self._posture(position, assembly)
             shape = np.broadcast_shapes(posture.status.shape, rendered.shape[:-2])
             posture = posture.broadcast_to(shape)
             rendered = np.broadcast_to(rendered, (*shape, *rendered.shape[-2:]))
-            asked = self._asked(position)
+            requested_position = self._requested_position(position)
         return OperatingPoint(
             controller=self.controller,
             mechanism=self.mechanism,
@@ -166,24 +166,27 @@ class Device:
             friction_known=self.friction_known,
             resolution_known=self.resolution_known,
             name=self.name,
-            asked=asked,
+            requested_position=requested_position,
         )
 
-    def plant(self, *asked: Any, **circumstances: Any) -> Any:
+    def plant(self, *arguments: Any, **options: Any) -> Any:
         """`at(...).plant`, which this was before; goes with the next release."""
-        return _verbs.old_plant(self, *asked, **circumstances)
+        return _verbs.old_plant(self, *arguments, **options)
 
-    def posture(self, *asked: Any, **circumstances: Any) -> Any:
+    def posture(self, *arguments: Any, **options: Any) -> Any:
         """`at(...).posture`, which this was before; goes with the next release."""
-        return _verbs.old_posture(self, *asked, **circumstances)
+        return _verbs.old_posture(self, *arguments, **options)
 
-    def like(self, point: OperatingPoint) -> OperatingPoint:
+    def at_point(self, point: OperatingPoint) -> OperatingPoint:
         """This device where another was asked about, at a single point: the same position asked for (or the same
         joint angles), directions, assembly and model. Raises what `at` raises."""
         if point.posture is None:
             return self.at(model=point.model)
         return self.at(
-            point.asked, directions=point.directions, assembly=point.posture.assembly, model=point.model
+            point.requested_position,
+            directions=point.directions,
+            assembly=point.posture.assembly,
+            model=point.model,
         )
 
     def held_by(self, operator: Operator | str | os.PathLike[str]) -> Device:
@@ -214,7 +217,7 @@ class Device:
         stiffness: float | None = None,
         damping: float | None = None,
         frequency: float | None = None,
-    ) -> Measured:
+    ) -> MeasureValues:
         """A measure by its name, or one of your own, at the device's reference; see `OperatingPoint.measure`."""
         return self.at().measure(measure, stiffness=stiffness, damping=damping, frequency=frequency)
 
@@ -223,7 +226,8 @@ class Device:
 
         point  where: `device.at(...)`; left out: the reference
         """
-        return _verbs.device_sensitivities(self, point or self.at())
+        point = point or self.at()
+        return _verbs.device_sensitivities(self, point).about(point)
 
     def report(self, path: str | os.PathLike[str], point: OperatingPoint | None = None) -> dict[str, Any]:
         """Write everything about the device into one HTML file; returns the numbers in it. See `write_report`.
@@ -267,7 +271,7 @@ class Device:
         self._mechanism(direction=direction)
         return unit_vectors(self.label, "direction", self.reference_direction if direction is None else direction)
 
-    def _asked(self, position: Position | ArrayLike | Posture | None) -> Position | Floats | None:
+    def _requested_position(self, position: Position | ArrayLike | Posture | None) -> Position | Floats | None:
         """What a point remembers of the position asked for: enough to ask another device for the same."""
         from zwidth.model.posture import Posture
 
@@ -275,7 +279,7 @@ class Device:
             return position
         return position.position if isinstance(position, Posture) else self.position(position)
 
-    def _rendered(self, direction: ArrayLike | None, directions: ArrayLike | None) -> Floats:
+    def _unit_directions(self, direction: ArrayLike | None, directions: ArrayLike | None) -> Floats:
         """Unit vectors (..., m, 3) of the directions rendered together."""
         if directions is None:
             return self.direction(direction)[..., None, :]
@@ -285,7 +289,7 @@ class Device:
         return together
 
     def _posture(self, position: Position | ArrayLike | Posture | None, assembly: str | None) -> Posture:
-        from zwidth.loop.operating_point import PROJECTED
+        from zwidth.loop.operating_point import PROJECTION_TOLERANCE
         from zwidth.model.posture import Posture, solve_posture
 
         if isinstance(position, Posture):
@@ -293,7 +297,7 @@ class Device:
         mechanism, goal = self._mechanism(), self.position(position, assembly)
         single = goal.ndim == 1 and not mechanism.design_shape
         with self._solving(assembly) as name:
-            return solve_posture(mechanism, goal, name, tolerance=PROJECTED if single else 0.0)
+            return solve_posture(mechanism, goal, name, tolerance=PROJECTION_TOLERANCE if single else 0.0)
 
     @contextmanager
     def _solving(self, assembly: str | None) -> Iterator[str | None]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Final
 
-Path = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 LONGEST_QUOTE: Final = 60
 
@@ -89,15 +89,15 @@ def suggestion(word: str, allowed: Collection[str], noun: str = "allowed") -> st
     near = nearest(word, allowed)
     if near is not None:
         return f"did you mean '{near}'?"
-    return f"{noun}: {listed(sorted(allowed))}" if allowed else "nothing is allowed here"
+    return f"{noun}: {comma_list(sorted(allowed))}" if allowed else "nothing is allowed here"
 
 
-def listed(words: Sequence[str], most: int = 30) -> str:
+def comma_list(words: Sequence[str], most: int = 30) -> str:
     """The words separated by commas, shortened."""
     return ", ".join(words[:most]) + (", ..." if len(words) > most else "")
 
 
-def dotted(path: Path, document: Any = None) -> str:
+def dotted(path: KeyPath, document: Any = None) -> str:
     """The path as users write it; list elements go by their name where the document gives one."""
     parts = []
     for part in path:

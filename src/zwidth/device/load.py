@@ -8,20 +8,20 @@ from typing import Any, Final, TypeAlias
 
 from pydantic import ValidationError
 
-from zwidth.device import address, build, geometry, unsupported
+from zwidth.device import address, build, mechanism_check, unsupported
+from zwidth.device.consistency import inconsistencies
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Fault, Path, dotted
-from zwidth.device.operator_choice import held_by
-from zwidth.device.plausible import warn_of_implausible
+from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted
+from zwidth.device.format_version import refuse_newer, without_version
+from zwidth.device.operator_choice import document_held_by
+from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.read import bundled, read
-from zwidth.device.relations import relations
-from zwidth.device.schema.file import DeviceFile, schema
-from zwidth.device.translate import sentences
-from zwidth.device.version import refuse_newer, without_version
-from zwidth.model.arguments import refusal
+from zwidth.device.schema.device_file import DeviceFile, schema
+from zwidth.device.validation_messages import validation_messages
+from zwidth.model.argument_checks import wrong_type
 from zwidth.model.operator import Operator
 
-AS_GIVEN: Final = "as given"  # an operator without a name
+UNNAMED_OPERATOR: Final = "as given"  # an operator without a name
 
 Settings: TypeAlias = Mapping[str, Any] | Sequence[str | tuple[str, Any]]
 
@@ -45,15 +45,15 @@ def load(
            TypeError    for a name or settings of another kind
     """
     if not isinstance(name_or_path, str | os.PathLike):
-        raise refusal("name_or_path", "a bundled name or a path", name_or_path)
+        raise wrong_type("name_or_path", "a bundled name or a path", name_or_path)
     changes = _listed(settings)
     document, label = read(name_or_path, pipes=True)
-    device = from_document(address.apply(held_by(document, operator), changes), label)
+    device = from_document(address.apply(document_held_by(document, operator), changes), label)
     warn_of_implausible(device)
     return device
 
 
-def changed(device: Device, settings: Settings) -> Device:
+def device_with_settings(device: Device, settings: Settings) -> Device:
     """The device with settings applied, checked again; see `Device.with_`.
 
     Whether the mechanism can be put together is asked again only where one of its numbers has changed, and of
@@ -61,59 +61,60 @@ def changed(device: Device, settings: Settings) -> Device:
     """
     document = address.apply(device.document, _listed(settings))
     same = document.get("mechanism") == device.document.get("mechanism")
-    made = from_document(document, device.label, put_together=same, compiled=True)
+    made = from_document(document, device.label, skip_assembly_check=same, compiled=True)
     warn_of_implausible(made)
     return made
 
 
-def held(device: Device, operator: Operator | str | os.PathLike[str]) -> Device:
+def device_held_by(device: Device, operator: Operator | str | os.PathLike[str]) -> Device:
     """The device with another operator at its handle; see `Device.held_by`."""
-    return from_document(held_by(device.document, operator), device.label, put_together=True)
+    return from_document(document_held_by(device.document, operator), device.label, skip_assembly_check=True)
 
 
 def _listed(settings: Settings) -> Sequence[str | tuple[str, Any]]:
     """Settings as a sequence. Raises TypeError for a single text."""
     if isinstance(settings, str):
-        raise refusal("settings", "a list or a dictionary", settings, f"write [{settings!r}]")
+        raise wrong_type("settings", "a list or a dictionary", settings, f"write [{settings!r}]")
     return list(settings.items()) if isinstance(settings, Mapping) else settings
 
 
 def from_document(
-    document: dict[str, Any], label: str = "device", *, put_together: bool = False, compiled: bool = False
+    document: dict[str, Any], label: str = "device", *, skip_assembly_check: bool = False, compiled: bool = False
 ) -> Device:
     """The device that a document describes; `label` is what messages call it.
 
     Single keys and what they say about each other are checked together; whether the mechanism can be put
     together is asked once all of that is right, which takes most of the time.
 
-    put_together  True: it is known that it can, since it is a device already checked with numbers little changed
-    compiled      True: ask compiled code first, which takes a tenth of the time and half a second to load
+    skip_assembly_check  True: it is known that it can, since it is a device already checked with numbers little
+                         changed
+    compiled             True: ask compiled code first, which takes a tenth of the time and half a second to load
     Raises DeviceError  with all faults found
     """
     if not isinstance(document, dict):
         hint = f"write load({document!r})" if isinstance(document, str) else ""
-        raise refusal("document", "a dictionary", document, hint)
+        raise wrong_type("document", "a dictionary", document, hint)
     refuse_newer(document, label)
     cleaned, found = unsupported.refuse(document)
     checked: DeviceFile | None = None
     try:
         checked = DeviceFile.model_validate(cleaned)
     except ValidationError as error:
-        found += sentences(error, cleaned)
-    found += relations(cleaned, document)
+        found += validation_messages(error, cleaned)
+    found += inconsistencies(cleaned, document)
     if found or checked is None:
         raise DeviceError(in_order(found, document, label))
     device = _device(checked, without_version(document), label)
-    if device.mechanism is not None and checked.mechanism is not None and not put_together:
+    if device.mechanism is not None and checked.mechanism is not None and not skip_assembly_check:
         assembled = compiled and _assembled(device)
-        found += geometry.disagreements(device.mechanism, checked.mechanism, assembled=assembled)
+        found += mechanism_check.mechanism_faults(device.mechanism, checked.mechanism, assembled=assembled)
     if found:
         raise DeviceError(in_order(found, document, label))
     return device
 
 
 def _assembled(device: Device) -> bool:
-    from zwidth.device.assembled import assembles
+    from zwidth.device.compiled_mechanism_check import assembles
 
     assert device.mechanism is not None
     return assembles(device.mechanism, device.reference_assembly)
@@ -139,27 +140,27 @@ def _device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device
         if reference and section
         else None,
         operator=build.operator(checked.operator) if checked.operator else None,
-        operator_name=(checked.operator.name or AS_GIVEN) if checked.operator else None,
+        operator_name=(checked.operator.name or UNNAMED_OPERATOR) if checked.operator else None,
         encoders="motor" if checked.loop.encoder.at in (None, "motor") else "link",
         document=document,
     )
 
 
-def in_order(found: Iterable[tuple[Path, str]], document: dict[str, Any], label: str) -> list[Fault]:
+def in_order(found: Iterable[tuple[KeyPath, str]], document: dict[str, Any], label: str) -> list[Fault]:
     """The faults in the order of the file's keys; of several about one key, each is kept."""
     order = {path: place for place, path in enumerate(_paths(document))}
     ranked = sorted(found, key=lambda item: _rank(item[0], order))
     return [Fault(label, dotted(path, document), message) for path, message in ranked]
 
 
-def _rank(path: Path, order: dict[Path, int]) -> int:
+def _rank(path: KeyPath, order: dict[KeyPath, int]) -> int:
     """Place of the path in the file, or of the table it is missing from."""
     while path and path not in order:
         path = path[:-1]
     return order.get(path, -1)
 
 
-def _paths(value: Any, path: Path = ()) -> Iterable[Path]:
+def _paths(value: Any, path: KeyPath = ()) -> Iterable[KeyPath]:
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, inner in items:
         yield (*path, key)

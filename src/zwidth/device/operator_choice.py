@@ -7,13 +7,13 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
+from zwidth.device.consistency import operator_inconsistencies
 from zwidth.device.faults import DeviceError, Fault, dotted, fail
+from zwidth.device.format_version import KEY, without_version
 from zwidth.device.read import OPERATORS, read
-from zwidth.device.relations import operator_relations
-from zwidth.device.schema.numbers import VERSION, Section, WholeNumber
 from zwidth.device.schema.operator import OperatorSection
-from zwidth.device.translate import sentences
-from zwidth.device.version import KEY, without_version
+from zwidth.device.schema.value_types import VERSION, Section, WholeNumber
+from zwidth.device.validation_messages import validation_messages
 from zwidth.model.operator import Operator
 
 NOBODY: Final = "none"
@@ -26,7 +26,9 @@ class OperatorFile(Section):
     operator: OperatorSection
 
 
-def held_by(document: dict[str, Any], operator: Operator | str | os.PathLike[str] | None) -> dict[str, Any]:
+def document_held_by(
+    document: dict[str, Any], operator: Operator | str | os.PathLike[str] | None
+) -> dict[str, Any]:
     """The device's document with another operator.
 
     operator  an Operator; a bundled operator's name, a file with an [operator], "none" for nobody; None: as the
@@ -36,7 +38,7 @@ def held_by(document: dict[str, Any], operator: Operator | str | os.PathLike[str
     if operator is None:
         return document
     if isinstance(operator, Operator):
-        return with_operator(document, table_of(operator))
+        return with_operator(document, table_of_operator(operator))
     return with_operator(document, None if operator == NOBODY else operator_table(operator))
 
 
@@ -46,7 +48,7 @@ def with_operator(document: dict[str, Any], table: dict[str, Any] | None) -> dic
     return without if table is None else without | {"operator": table}
 
 
-def table_of(operator: Operator) -> dict[str, Any]:
+def table_of_operator(operator: Operator) -> dict[str, Any]:
     """An operator as the [operator] of a device file."""
     table: dict[str, Any] = {
         "arm_mass_kg": operator.arm_mass,
@@ -80,11 +82,11 @@ def operator_table(name_or_path: str | os.PathLike[str]) -> dict[str, Any]:
         )
     table = document["operator"]
     document = {"operator": table} | version
-    found = list(operator_relations(document))
+    found = list(operator_inconsistencies(document))
     try:
         OperatorFile.model_validate(document)
     except ValidationError as error:
-        found += sentences(error, document)
+        found += validation_messages(error, document)
     if found:
         raise DeviceError(Fault(label, dotted(path), message) for path, message in found)
     return {"name": label, **table}

@@ -9,55 +9,55 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
-from zwidth.device.faults import fail, listed, nearest
-from zwidth.device.text_file import Unreadable, read_text
-from zwidth.device.version import refuse_newer
+from zwidth.device.faults import comma_list, fail, nearest
+from zwidth.device.format_version import refuse_newer
+from zwidth.device.text_file import UnreadableFileError, read_text
 
 
 @dataclass(frozen=True)
-class Shelf:
+class BundledFiles:
     """Files that come with the package.
 
-    folder  in this package
-    noun    what each describes
-    file    the same with "file" and its article
-    needs   what a file of this kind must hold, as a sentence
+    folder     in this package
+    noun       what each describes
+    file_noun  the same with "file" and its article
+    needs      what a file of this kind must hold, as a sentence
     """
 
     folder: str
     noun: str
-    file: str
+    file_noun: str
     needs: str
 
 
-DEVICES: Final[Shelf] = Shelf(
+DEVICES: Final[BundledFiles] = BundledFiles(
     "zoo", "device", "a device file", "a device needs a name, [loop], and [mechanism], [plant] or [response]"
 )
-OPERATORS: Final[Shelf] = Shelf(
+OPERATORS: Final[BundledFiles] = BundledFiles(
     "operators", "operator", "an operator file", "an operator needs an [operator] table"
 )
 LARGEST_FILE: Final = 10_000_000  # bytes; the bundled ones have a few thousand
 DEEPEST: Final = 20  # tables and lists within each other; a mechanism needs 5
 
 
-def bundled_names(shelf: Shelf = DEVICES) -> list[str]:
+def bundled_names(shelf: BundledFiles = DEVICES) -> list[str]:
     """Names of the bundled devices, sorted."""
     entries = (entry.name for entry in _place(shelf).iterdir())
     return sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml"))
 
 
-def bundled(shelf: Shelf = DEVICES) -> list[tuple[str, str, str]]:
+def bundled(shelf: BundledFiles = DEVICES) -> list[tuple[str, str, str]]:
     """(name, description, source) of every bundled device; their numbers are not checked here."""
     listing = []
     for name in bundled_names(shelf):
-        document = parse(_bundled_text(name, shelf), name, shelf)
-        told = document.get("operator", document)
-        listing.append((name, str(told.get("description", "")), str(told.get("source", ""))))
+        document = parse_document(_bundled_text(name, shelf), name, shelf)
+        table = document.get("operator", document)
+        listing.append((name, str(table.get("description", "")), str(table.get("source", ""))))
     return listing
 
 
 def read(
-    name_or_path: str | os.PathLike[str], shelf: Shelf = DEVICES, *, pipes: bool = False
+    name_or_path: str | os.PathLike[str], shelf: BundledFiles = DEVICES, *, pipes: bool = False
 ) -> tuple[dict[str, Any], str]:
     """The document of a bundled device (or operator) or of a file, and what to call it in messages.
 
@@ -68,14 +68,14 @@ def read(
     label = os.fspath(name_or_path)
     names = bundled_names(shelf)
     if not label:
-        message = f"the name is empty; give {shelf.file}, or a bundled name: {listed(names)}"
+        message = f"the name is empty; give {shelf.file_noun}, or a bundled name: {comma_list(names)}"
         raise fail(shelf.noun, "", message)
     if label in names:
-        return parse(_bundled_text(label, shelf), label, shelf), label
-    return parse(_text(label, shelf, pipes), label, shelf), label
+        return parse_document(_bundled_text(label, shelf), label, shelf), label
+    return parse_document(_text(label, shelf, pipes), label, shelf), label
 
 
-def parse(text: str, label: str, shelf: Shelf = DEVICES) -> dict[str, Any]:
+def parse_document(text: str, label: str, shelf: BundledFiles = DEVICES) -> dict[str, Any]:
     """The document a TOML text holds; never empty, never nested beyond reason, never of a newer version."""
     try:
         document = tomllib.loads(text)
@@ -108,26 +108,26 @@ def within_depth(value: Any, deepest: int = DEEPEST) -> bool:
     return False
 
 
-def _text(label: str, shelf: Shelf, pipes: bool) -> str:
+def _text(label: str, shelf: BundledFiles, pipes: bool) -> str:
     try:
         return read_text(label, LARGEST_FILE, pipes=pipes)
-    except Unreadable as error:
-        wrong = _not_found(label, shelf) if error.missing else f"{error}; give {shelf.file} or a bundled name"
+    except UnreadableFileError as error:
+        wrong = _not_found(label, shelf) if error.missing else f"{error}; give {shelf.file_noun} or a bundled name"
         raise fail(label, "", wrong) from None
 
 
-def _not_found(label: str, shelf: Shelf) -> str:
+def _not_found(label: str, shelf: BundledFiles) -> str:
     names = bundled_names(shelf)
     near = nearest(Path(label).name.removesuffix(".toml"), names)
     hint = f"did you mean '{near}'? " if near else ""
-    return f"is neither a file nor a bundled {shelf.noun}; {hint}bundled: {listed(names)}"
+    return f"is neither a file nor a bundled {shelf.noun}; {hint}bundled: {comma_list(names)}"
 
 
-def _bundled_text(name: str, shelf: Shelf) -> str:
+def _bundled_text(name: str, shelf: BundledFiles) -> str:
     return str((_place(shelf) / f"{name}.toml").read_text(encoding="utf-8"))
 
 
-def _place(shelf: Shelf) -> Any:
+def _place(shelf: BundledFiles) -> Any:
     return files("zwidth.device") / shelf.folder
 
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from zwidth.device.faults import DeviceError, Fault, fail, quote
 from zwidth.device.schema.response import ResponseSection
-from zwidth.device.text_file import LARGEST_TABLE, Unreadable, filled, header_fault, read_text
+from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, header_fault, non_blank_rows, read_text
 from zwidth.model.response import Response, ResponseError
-from zwidth.model.sweep import sweep_response
+from zwidth.model.sweep_response import sweep_response
 
 Floats = NDArray[np.float64]
 Table = dict[str, Floats]  # columns, with the line of each row under LINE
@@ -30,7 +30,7 @@ OPTIONAL: Final = ("coherence", "sweep")
 LINE: Final = ""
 MOST_LINES: Final = 3  # told of one cause
 UNEVEN: Final = 0.05  # of the sampling period, by which time stamps may jitter
-OFF: Final = 1e-3  # relative, by which their mean may differ from it
+PERIOD_TOLERANCE: Final = 1e-3  # relative, by which their mean may differ from it
 
 
 def read_response(section: ResponseSection, label: str, period: float) -> Response:
@@ -72,7 +72,7 @@ def _responses(path: Path, section: ResponseSection, period: float) -> Iterator[
     """What one file holds: a response, several by their `sweep`, or a raw sweep turned into one."""
     table = _table(path)
     if "time_s" in table:
-        yield _recorded(path, table, section, period)
+        yield _response_of_record(path, table, section, period)
         return
     if "sweep" not in table:
         yield _spectrum(path, table, section, period)
@@ -124,7 +124,7 @@ def _spectrum(path: Path, table: Table, section: ResponseSection, period: float)
     return Response(f, value, section.integrators, coherence, section.averages or 1.0)
 
 
-def _recorded(path: Path, table: Table, section: ResponseSection, period: float) -> Response:
+def _response_of_record(path: Path, table: Table, section: ResponseSection, period: float) -> Response:
     """A raw sweep as a response, its time stamps checked against the loop's sampling period."""
     time, lines = table["time_s"], table[LINE].astype(int)
     steps = np.diff(time)
@@ -148,7 +148,7 @@ def _recorded(path: Path, table: Table, section: ResponseSection, period: float)
             "evenly spaced",
         )
     mean = float((time[-1] - time[0]) / len(steps))
-    if abs(mean - period) > OFF * period:
+    if abs(mean - period) > PERIOD_TOLERANCE * period:
         raise fail(
             str(path),
             "time_s",
@@ -170,11 +170,11 @@ def _table(path: Path) -> Table:
     lines: list[int] = []
     uneven: list[tuple[int, str]] = []
     try:
-        header = [name.strip() for name in next(filled(rows), [])]
+        header = [name.strip() for name in next(non_blank_rows(rows), [])]
         columns = _columns(path, header)
         places = [header.index(name) for name in columns]
         wrong: dict[str, list[tuple[int, str]]] = {name: [] for name in columns}
-        for row in filled(rows):
+        for row in non_blank_rows(rows):
             if len(row) > len(header):
                 told = f"has {len(row)} cells, but the header names {len(header)} columns"
                 uneven.append((rows.line_num, f"{told}; write a decimal point, not a comma"))
@@ -249,6 +249,6 @@ def _lies_in(folder: Path, path: Path) -> bool:
 def _text(path: Path) -> str:
     try:
         return read_text(path, LARGEST_TABLE)
-    except Unreadable as error:
+    except UnreadableFileError as error:
         hint = "response.file is meant beside the device file" if error.missing else "give a CSV file"
         raise fail(str(path), "", f"{error}; {hint}") from None

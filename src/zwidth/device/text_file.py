@@ -12,7 +12,7 @@ SEPARATORS: Final = {";": "';'", "\t": "tabs", "|": "'|'"}  # that tables are wr
 _KINDS: Final = ((stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
 
 
-class Unreadable(ValueError):
+class UnreadableFileError(ValueError):
     """A file that is not read; the text says why, without its name and its contents.
 
     missing  is there no such file?
@@ -32,20 +32,20 @@ def read_plain(path: str | os.PathLike[str], largest: int, *, pipes: bool = Fals
     """
     try:
         if wrong := _no_plain_file(os.stat(path).st_mode, pipes):
-            raise Unreadable(wrong)
+            raise UnreadableFileError(wrong)
         with open(path, "rb") as stream:
             data = stream.read(largest + 1)
     except FileNotFoundError:
-        raise Unreadable("no such file", missing=True) from None
+        raise UnreadableFileError("no such file", missing=True) from None
     except OSError as error:
         reason = error.strerror or str(error)
-        raise Unreadable(f"cannot be read: {reason[:1].lower() + reason[1:]}") from None
+        raise UnreadableFileError(f"cannot be read: {reason[:1].lower() + reason[1:]}") from None
     except ValueError as error:
-        if isinstance(error, Unreadable):
+        if isinstance(error, UnreadableFileError):
             raise
-        raise Unreadable("cannot be read: its name holds a zero byte") from None
+        raise UnreadableFileError("cannot be read: its name holds a zero byte") from None
     if len(data) > largest:
-        raise Unreadable(f"is larger than {largest // 1_000_000} MB")
+        raise UnreadableFileError(f"is larger than {largest // 1_000_000} MB")
     return data
 
 
@@ -71,17 +71,17 @@ def read_text(path: str | os.PathLike[str], largest: int, *, pipes: bool = False
 def decode(data: bytes) -> str:
     """Text of bytes in UTF-8, with or without a byte order mark. Raises Unreadable for what is not such text."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise Unreadable("is UTF-16 text, not UTF-8")
+        raise UnreadableFileError("is UTF-16 text, not UTF-8")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise Unreadable(f"is not UTF-8 text (byte {error.start} is 0x{data[error.start]:02x})") from None
+        raise UnreadableFileError(f"is not UTF-8 text (byte {error.start} is 0x{data[error.start]:02x})") from None
     if "\x00" in text:
-        raise Unreadable(f"is a binary file (byte {data.index(0)} is zero)")
+        raise UnreadableFileError(f"is a binary file (byte {data.index(0)} is zero)")
     return text
 
 
-def filled(rows: Iterator[list[str]]) -> Iterator[list[str]]:
+def non_blank_rows(rows: Iterator[list[str]]) -> Iterator[list[str]]:
     """The rows of a table that are not blank."""
     return (row for row in rows if any(cell.strip() for cell in row))
 

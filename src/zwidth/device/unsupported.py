@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final
 
-from zwidth.device.faults import Path
-from zwidth.device.toml_access import copied
+from zwidth.device.faults import KeyPath
+from zwidth.device.toml_access import deep_copy
 
 VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str, frozenset[str] | None]]] = {
     ("loop", "velocity", "method"): (
@@ -36,10 +36,10 @@ VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str, frozenset[str] | 
 beside it that are checked with it (None: all); what is left out are parameters of the refused value."""
 
 
-def refuse(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[Path, str]]]:
+def refuse(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[KeyPath, str]]]:
     """The document without what is not supported yet, and a sentence for each thing taken out."""
-    document = copied(document)
-    refused: list[tuple[Path, str]] = []
+    document = deep_copy(document)
+    refused: list[tuple[KeyPath, str]] = []
     for pattern, (names, stand_in, beside) in VALUES.items():
         for path, table in _places(document, pattern):
             value = table[pattern[-1]]
@@ -51,7 +51,9 @@ def refuse(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[Path, s
     return document, refused
 
 
-def _places(document: Any, pattern: tuple[str, ...], path: Path = ()) -> Iterator[tuple[Path, dict[str, Any]]]:
+def _places(
+    document: Any, pattern: tuple[str, ...], path: KeyPath = ()
+) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
     """Where the last key of the pattern stands: its path and the table that holds it."""
     first, rest = pattern[0], pattern[1:]
     if first == "*":

@@ -4,8 +4,8 @@
     spring-stable  stable with whatever spring holds the handle
     stable         stable with the handle as the device is described: the stability chart
 
-Each is a set of walls (K, B) inside the next; `nested` puts them side by side. `two_port` and `coupling` ask the
-same of a virtual coupling between the device and an environment that is passive and otherwise unknown.
+Each is a set of walls (K, B) inside the next; `find_guarantees` puts them side by side. `two_port` and `coupling`
+ask the same of a virtual coupling between the device and an environment that is passive and otherwise unknown.
 """
 
 import lazy_loader

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from zwidth.guarantees.disks import Aliases, force_filter_response, one_less_z_inverse
 from zwidth.guarantees.port import Floats, Port, port
+from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.loop import Loop
-from zwidth.loop.response import product, window_response
 
 Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
@@ -113,14 +113,14 @@ def conics(loop: Loop, held: Floats) -> Conics | None:
     return Conics(angles, np.ascontiguousarray(pieces), np.repeat(wide, PIECES), limit)
 
 
-def panel_ends(loop: Loop, held: Port) -> Floats:
+def panel_ends(loop: Loop, held_port: Port) -> Floats:
     """Ascending ends of the first panels, from the lowest angle to pi.
 
     Panels grow geometrically away from zero and from each singularity.
     """
-    poles = np.abs(held.poles) * loop.period
+    poles = np.abs(held_port.poles) * loop.period
     lowest = min(LOWEST, BELOW * float(np.min(poles[poles > SLOWEST], initial=1.0)))
-    centre, width, turns = _singularities(loop, held)
+    centre, width, turns = _singularities(loop, held_port)
     seen = turns > 1e-3 * lowest
     centre, width = centre[seen], np.maximum(width, 1e-9 * turns)[seen]
     steps = 2.0 ** np.arange(0, 31)
@@ -134,12 +134,12 @@ def panel_ends(loop: Loop, held: Port) -> Floats:
     return np.concatenate([[lowest], ends[apart], [np.pi]])
 
 
-def _singularities(loop: Loop, held: Port) -> tuple[Floats, Floats, Floats]:
+def _singularities(loop: Loop, held_port: Port) -> tuple[Floats, Floats, Floats]:
     """Where centres and radii have poles: at those of the plant, and the radii where the port takes in no power.
 
     Angles folded into (0, pi), distances from the circle and angles not folded, each (n,).
     """
-    singular = np.append(held.poles, held.spectral_zeros) * loop.period
+    singular = np.append(held_port.poles, held_port.spectral_zeros) * loop.period
     singular = singular[singular.imag > 0.0]
     turn = np.mod(singular.imag, 2.0 * np.pi)
     centre = np.where(turn > np.pi, 2.0 * np.pi - turn, turn)
@@ -173,7 +173,9 @@ def velocity_estimate(loop: Loop, angles: Floats) -> Complexes:
     """w at angles (k,), to full accuracy near zero."""
     z, own = np.exp(1j * angles), loop.estimator
     d = z * one_less_z_inverse(angles)
-    return np.asarray(product(own.numerator, own.denominator, d) * window_response(own.window, z), dtype=complex)
+    return np.asarray(
+        factor_response(own.numerator, own.denominator, d) * window_response(own.window, z), dtype=complex
+    )
 
 
 def _resolved(values: Floats, rounding: Floats) -> tuple[Flags, Flags]:

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from zwidth.guarantees.grid import angle_grid
-from zwidth.guarantees.port import Floats
-from zwidth.guarantees.region import Region, empty, largest, outlines
+from zwidth.guarantees.port import Floats, hold_fixed, port
+from zwidth.guarantees.region import Region, empty_region, outline_columns, stiffness_text
 from zwidth.guarantees.two_port import (
     Demand,
     coupling_impedance,
@@ -27,6 +26,10 @@ DIRECTIONS, STEPS = 721, 60
 LEVEL = 1e-7
 NOTHING = "no coupling meets the condition at all frequencies: the device dissipates too little at the handle"
 NO_HANDLE = "a coupling is judged at the handle, and the plant has none; give plant.handle"
+# Lowest angle.
+LOWEST = 3e-4
+# Steps across a resonance, in units of its width, on both sides.
+ACROSS = np.sinh(np.linspace(-6.0, 6.0, 41)) / 4.0
 
 
 @dataclass(frozen=True)
@@ -34,12 +37,12 @@ class Coupling:
     """The stiffest coupling that a wall may be rendered through.
 
     stiffness, damping  k_c [N/m], b_c [N s/m]; inf and 0 where the wall needs none, 0 where none is soft enough
-    felt                stiffness of wall and coupling in series, k_c K/(k_c + K) [N/m]
+    felt_stiffness      stiffness of wall and coupling in series, k_c K/(k_c + K) [N/m]
     """
 
     stiffness: float
     damping: float
-    felt: float
+    felt_stiffness: float
 
     @property
     def needed(self) -> bool:
@@ -76,23 +79,23 @@ class Couplings(Result):
             and {
                 "stiffness_N_per_m": limit.stiffness,
                 "damping_Ns_per_m": limit.damping,
-                "felt_stiffness_N_per_m": limit.felt,
+                "felt_stiffness_N_per_m": limit.felt_stiffness,
                 "needed": limit.needed,
             }
         }
 
     def table(self) -> dict[str, list[Any]]:
         """The outlines as columns, region after region."""
-        return outlines(self.regions, "coupling")
+        return outline_columns(self.regions, "coupling")
 
     def __repr__(self) -> str:
         if self.reason is not None:
             return f"Couplings: none: {self.reason}"
-        told = "Couplings: " + ", ".join(f"{name} {largest(one)}" for name, one in self.regions.items())
+        told = "Couplings: " + ", ".join(f"{name} {stiffness_text(one)}" for name, one in self.regions.items())
         if self.limit is None:
             return told
         needed = f"at most {self.limit.stiffness:.6g} N/m" if self.limit.needed else "no coupling"
-        return f"{told}\n  the wall needs {needed}, felt {self.limit.felt:.6g} N/m"
+        return f"{told}\n  the wall needs {needed}, felt {self.limit.felt_stiffness:.6g} N/m"
 
 
 def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None) -> Couplings:
@@ -109,7 +112,7 @@ def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None)
 
 def without_handle() -> Couplings:
     """The couplings of a plant that nobody can hold: none, and why."""
-    none = empty(NO_HANDLE)
+    none = empty_region(NO_HANDLE)
     return Couplings(none, none, none, None, NO_HANDLE)
 
 
@@ -127,7 +130,7 @@ def coupling_region(demand: Demand, period: float) -> Region:
     ellipse, so that the set is convex.
     """
     if not np.all(np.isfinite(demand.conductance)):
-        return empty(NOTHING)
+        return empty_region(NOTHING)
 
     def reach(direction: Floats) -> Floats:
         Z = coupling_impedance(np.cos(direction) / period, np.sin(direction), demand.angles, period)
@@ -140,7 +143,7 @@ def coupling_region(demand: Demand, period: float) -> Region:
     far = reach(direction)
     k, b = far * np.cos(direction) / period, far * np.sin(direction)
     if not np.max(k) > 0.0 or not np.all(np.isfinite(far)):
-        return empty(NOTHING)
+        return empty_region(NOTHING)
     ring = np.vstack([np.column_stack([k, b]), [[k[0], b[0]]]])
     best = _stiffest(reach, direction[int(np.argmax(np.where(direction >= 0.0, k, -np.inf)))])
     top = float(reach(np.array([best]))[0])
@@ -199,3 +202,26 @@ def softest_limit(demand: Demand, wall_stiffness: float, wall_damping: float, pe
     top = float(reach(np.array([best]))[0])
     k, b = top * float(np.cos(best)) / period, top * float(np.sin(best))
     return Coupling(k, b, k * wall_stiffness / (k + wall_stiffness))
+
+
+def angle_grid(loop: Loop, held: Floats) -> Floats:
+    """Ascending angles (k,) in (0, pi] to look at a loop at: even, geometric towards zero, and across every
+    resonance, where its response varies fast.
+
+    Resonances are the plant's, free, held fixed, and with its actuator held fixed (where it dissipates little seen
+    from outside), folded into (0, pi).
+    """
+    plant = loop.plant
+    seen = (plant, hold_fixed(plant, held), hold_fixed(plant, plant.actuator))
+    poles = np.concatenate([port(one, one.actuator).poles for one in seen if one.size])
+    poles = poles[poles.imag > 0.0] * loop.period
+    turn = np.mod(poles.imag, 2.0 * np.pi)
+    centre = np.where(turn > np.pi, 2.0 * np.pi - turn, turn)
+    width = np.maximum(-poles.real, 1e-9 * np.abs(poles.imag))
+    lowest = min(LOWEST, 0.02 * float(np.min(np.abs(poles), initial=1.0)))
+    lowest = max(lowest, 1e-6)
+    across = (centre[:, None] + width[:, None] * ACROSS).ravel()
+    even = np.linspace(0.0, np.pi, 401)[1:]
+    slow = np.geomspace(lowest, 0.3, int(30 * np.log10(0.3 / lowest)))
+    angles = np.unique(np.concatenate([across, even, slow, [lowest, np.pi]]))
+    return angles[(angles >= lowest) & (angles <= np.pi)]

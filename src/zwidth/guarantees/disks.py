@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from scipy.special import gamma, roots_genlaguerre, zeta
 
 from zwidth.guarantees.port import Floats, Port, port_response
+from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
-from zwidth.loop.response import product
 
 Complexes = NDArray[np.complex128]
 
@@ -59,9 +59,9 @@ class Disks:
     power: Floats
 
 
-def response_disks(loop: Loop, held: Port, angles: Floats) -> Disks:
+def response_disks(loop: Loop, held_port: Port, angles: Floats) -> Disks:
     """The disks of a loop held at a port, at angles in (0, pi]; relative error about 1e-12."""
-    return Aliases.of(loop, held).disks(angles)
+    return Aliases.of(loop, held_port).disks(angles)
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Aliases:
     """
 
     loop: Loop
-    held: Port
+    held_port: Port
     near: int
     centre: Complexes
     radius: Floats
@@ -89,7 +89,7 @@ class Aliases:
         near, far = _ranges(loop, held)
         expansion = _expansion(loop, held, far)
         for _ in range(MOVES):
-            if expansion.missed < MISSED or np.isinf(expansion.missed):
+            if expansion.misfit < MISSED or np.isinf(expansion.misfit):
                 break
             far *= 4
             expansion = _expansion(loop, held, far)
@@ -104,7 +104,7 @@ class Aliases:
         """The disks at angles (k,) in (0, pi]."""
         theta = np.asarray(angles, dtype=float)
         k = np.arange(-self.near, self.near + 1)
-        direct, swing = _terms(self.loop, self.held, theta[:, None] / (2.0 * np.pi) + k)
+        direct, swing = _terms(self.loop, self.held_port, theta[:, None] / (2.0 * np.pi) + k)
         p, q, others = direct[:, self.near], swing[:, self.near], k != 0
         at = theta / np.pi
         late = np.exp(-1j * theta * self.loop.whole_delay)
@@ -142,16 +142,18 @@ def force_filter_response(loop: Loop, theta: Floats) -> Complexes:
     """The discrete filter of the whole force."""
     top, bottom = low_pass_factors(loop.controller.force_filter, loop.period)
     d = np.exp(1j * theta) * one_less_z_inverse(theta)
-    return np.asarray(product(np.array(top).reshape(-1, 3), np.array(bottom).reshape(-1, 3), d), dtype=complex)
+    return np.asarray(
+        factor_response(np.array(top).reshape(-1, 3), np.array(bottom).reshape(-1, 3), d), dtype=complex
+    )
 
 
-def _terms(loop: Loop, held: Port, cycles: Floats) -> tuple[Complexes, Complexes]:
+def _terms(loop: Loop, held_port: Port, cycles: Floats) -> tuple[Complexes, Complexes]:
     """Of single aliases at w = 2 pi cycles / T, without the factor common to all: the response p to the actuator
     and the swing q that operators add. The alias's disk has centre p - q and radius |q|; inf where it has none."""
     T = loop.period
     w = 2.0 * np.pi * cycles / T
-    response = port_response(held, w)
-    moved = response.back * response.felt
+    response = port_response(held_port, w)
+    moved = response.port_to_reading * response.actuator_to_port
     weight = np.exp(-2j * np.pi * cycles * loop.fractional_delay) / T
     weight = weight / (1.0 + 1j * w * loop.controller.actuator_time_constant)
     dead = ~(response.dissipation > 0.0) & (np.abs(moved) > 0.0)
@@ -160,10 +162,10 @@ def _terms(loop: Loop, held: Port, cycles: Floats) -> tuple[Complexes, Complexes
     return weight * response.direct / (1j * w), np.where(dead, np.inf, swing)
 
 
-def _ranges(loop: Loop, held: Port) -> tuple[int, int]:
+def _ranges(loop: Loop, held_port: Port) -> tuple[int, int]:
     """Aliases summed one by one, and where the expansion begins: beyond the poles in their units 2 pi/T."""
     lag = loop.controller.actuator_time_constant
-    poles = np.append(held.poles, -1.0 / lag if lag > 0.0 else 0.0) * loop.period / (2.0 * np.pi)
+    poles = np.append(held_port.poles, -1.0 / lag if lag > 0.0 else 0.0) * loop.period / (2.0 * np.pi)
     # a pole further than six turns from the frequency axis bends nothing that the nodes could miss
     close = np.abs(poles.imag[np.abs(poles.real) < 6.0])
     near = ceil(float(np.max(close, initial=0.0))) + 6
@@ -174,19 +176,19 @@ def _ranges(loop: Loop, held: Port) -> tuple[int, int]:
 class Expansion:
     """Far terms as  t^2 (c0 + c1 t + ...),  t = far / cycles; centres without their turning by the delay.
 
-    missed  largest misfit of all far terms together, as a share of a near one; inf where nothing is dissipated
+    misfit  largest misfit of all far terms together, as a share of a near one; inf where nothing is dissipated
     """
 
     far: int
     centre: Complexes
     radius: Complexes
-    missed: float
+    misfit: float
 
 
-def _expansion(loop: Loop, held: Port, far: int) -> Expansion:
+def _expansion(loop: Loop, held_port: Port, far: int) -> Expansion:
     t = (1.05 + chebyshev.chebpts1(2 * TERMS)) / 2.05
     cycles = far / t
-    direct, swing = _terms(loop, held, cycles)
+    direct, swing = _terms(loop, held_port, cycles)
     radius = np.abs(swing)
     if not np.all(np.isfinite(radius)):
         return Expansion(far, np.zeros(TERMS, dtype=complex), np.zeros(TERMS, dtype=complex), np.inf)
@@ -194,7 +196,7 @@ def _expansion(loop: Loop, held: Port, far: int) -> Expansion:
     values = np.column_stack([upright, radius]) / (t * t)[:, None]
     powers = t[:, None] ** np.arange(TERMS)
     fit, *_ = np.linalg.lstsq(powers.astype(complex), values, rcond=None)
-    direct, swing = _terms(loop, held, np.array([0.5]))
+    direct, swing = _terms(loop, held_port, np.array([0.5]))
     centre, radius = np.abs(direct - swing)[0], np.abs(swing)[0]
     near = np.maximum([centre, radius], SEEN * (centre + radius)) if centre + radius > 0.0 else np.ones(2)
     misfit = far * (np.abs(powers @ fit - values).max(axis=0) / near).max()
@@ -203,7 +205,7 @@ def _expansion(loop: Loop, held: Port, far: int) -> Expansion:
 
 def _sums_beyond(expansion: Expansion, x: Floats, shift: float) -> tuple[Complexes, Floats]:
     """Sum over k > far of the terms at x + k, x (m,) in (-1/2, 1/2), term by term of the expansion."""
-    if not expansion.missed < FALLS:
+    if not expansion.misfit < FALLS:
         return np.zeros(len(x), dtype=complex), np.full(len(x), np.inf)
     first = expansion.far + 1
     orders = np.arange(2, TERMS + 2)

@@ -18,8 +18,8 @@ import shapely
 from zwidth.chart.curve import wall_at
 from zwidth.compiled import compiled
 from zwidth.guarantees.port import Floats
-from zwidth.guarantees.spring_family import Springs
-from zwidth.loop.evaluate import Factors, velocity_response
+from zwidth.guarantees.spring_family import SpringFamily
+from zwidth.loop.factor_kernels import Factors, velocity_response
 
 # Largest distance of a touching point from the cubic through its neighbours, and of chords from the cubic, in
 # shares of the set's size.
@@ -39,18 +39,18 @@ WINDOWS = np.array([0.002, 0.02, 0.2, 1.0])
 
 
 @dataclass(frozen=True)
-class Touch:
+class TouchingPoint:
     """Where the curve of one spring touches the envelope.
 
     share, theta  spring and angle
     wall          [K unit, B]
-    along         tangent, of length 1, the stable side on its left
+    tangent       tangent, of length 1, the stable side on its left
     """
 
     share: float
     theta: float
     wall: Floats
-    along: Floats
+    tangent: Floats
 
 
 @compiled
@@ -87,9 +87,11 @@ def _touches(own: Factors, beside: Factors, first: float, last: float, pieces: i
     return out[:n]
 
 
-def touches(springs: Springs, share: float, first: float, last: float, pieces: int = PIECES) -> list[Touch]:
+def touching_points(
+    springs: SpringFamily, share: float, first: float, last: float, pieces: int = PIECES
+) -> list[TouchingPoint]:
     """All touching points of a spring between two angles."""
-    pair = springs.beside(share)
+    pair = springs.neighbour_pair(share)
     if pair is None:
         return []
     own, beside = pair[0].factors, pair[1].factors
@@ -101,26 +103,30 @@ def touches(springs: Springs, share: float, first: float, last: float, pieces: i
         z = complex(np.exp(1j * theta))
         left = 1.0 if velocity_response(own, z, z - 1.0)[0].imag > 0.0 else -1.0
         along = left * np.array([dK * unit, dB])
-        found.append(Touch(share, float(theta), np.array([K * unit, B]), along / max(np.hypot(*along), 1e-300)))
+        found.append(
+            TouchingPoint(share, float(theta), np.array([K * unit, B]), along / max(np.hypot(*along), 1e-300))
+        )
     return found
 
 
-def nearest_touch(springs: Springs, share: float, theta: float, reach: float) -> Touch | None:
+def nearest_touching_point(
+    springs: SpringFamily, share: float, theta: float, reach: float
+) -> TouchingPoint | None:
     """The touching point of a spring nearest to an angle, within reach of it."""
     for wide in reach * WINDOWS:
-        found = touches(springs, share, theta - wide, theta + wide, 8)
+        found = touching_points(springs, share, theta - wide, theta + wide, 8)
         if found:
             return min(found, key=lambda touch: abs(touch.theta - theta))
     return None
 
 
-def stretch(
-    springs: Springs,
-    one: Touch,
-    other: Touch,
+def envelope_between(
+    springs: SpringFamily,
+    one: TouchingPoint,
+    other: TouchingPoint,
     shape: shapely.Geometry,
     size: float,
-    lost: list[float],
+    lost_shares: list[float],
     depth: int = HALVINGS,
 ) -> list[tuple[Floats, float, float]]:
     """The envelope between two touching points where it is near a shape.
@@ -135,9 +141,9 @@ def stretch(
         return [(np.array([one.wall, other.wall])[:: _way(one, other)], one.share, other.share)]
     share = 0.5 * (one.share + other.share)
     reach = 0.75 * abs(other.theta - one.theta) + 1e-9
-    middle = nearest_touch(springs, share, 0.5 * (one.theta + other.theta), reach)
+    middle = nearest_touching_point(springs, share, 0.5 * (one.theta + other.theta), reach)
     if middle is None:
-        lost.append(share)
+        lost_shares.append(share)
         return []
     halves = _cubic(one, middle, size), _cubic(middle, other, size)
     whole = _cubic(one, other, size)
@@ -150,10 +156,10 @@ def stretch(
             # rounding can put the middle beyond an end, and a walk that turns back has its outside on both sides
             return [((walk if _goes_ahead(walk) else whole)[:: _way(one, other)], one.share, other.share)]
     if depth == 0:
-        lost.append(share)
+        lost_shares.append(share)
         return []
-    first = stretch(springs, one, middle, shape, size, lost, depth - 1)
-    return first + stretch(springs, middle, other, shape, size, lost, depth - 1)
+    first = envelope_between(springs, one, middle, shape, size, lost_shares, depth - 1)
+    return first + envelope_between(springs, middle, other, shape, size, lost_shares, depth - 1)
 
 
 def _goes_ahead(walk: Floats) -> bool:
@@ -162,12 +168,12 @@ def _goes_ahead(walk: Floats) -> bool:
     return bool(np.all(np.sum(steps[1:] * steps[:-1], axis=1) >= 0.0))
 
 
-def _way(one: Touch, other: Touch) -> int:
+def _way(one: TouchingPoint, other: TouchingPoint) -> int:
     """1 if the stable side is on the left from one to the other, -1 if on the right."""
-    return 1 if float((other.wall - one.wall) @ one.along) >= 0.0 else -1
+    return 1 if float((other.wall - one.wall) @ one.tangent) >= 0.0 else -1
 
 
-def _cubic(one: Touch, other: Touch, size: float) -> Floats | None:
+def _cubic(one: TouchingPoint, other: TouchingPoint, size: float) -> Floats | None:
     """The cubic over the chord of two touching points with their tangents, as points; None if it is steep."""
     gap = other.wall - one.wall
     length = float(np.hypot(*gap))
@@ -179,7 +185,7 @@ def _cubic(one: Touch, other: Touch, size: float) -> Floats | None:
     if _way(one, other) != -_way(other, one):
         return None  # a cusp
     for touch in (one, other):
-        run, rise = float(touch.along @ ahead), float(touch.along @ aside)
+        run, rise = float(touch.tangent @ ahead), float(touch.tangent @ aside)
         if abs(rise) > STEEPEST * abs(run):
             return None
         slopes.append(rise / run)

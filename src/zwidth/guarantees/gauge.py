@@ -165,19 +165,19 @@ def _largest(
     out, at = np.zeros(count), np.zeros(count)
     a, b, D, size = np.empty(n + 1), np.empty(n + 1), np.empty(n + 1), np.empty(n + 1)
     for k in range(count):
-        best, place = 0.0, 0
+        best, worst_piece = 0.0, 0
         for i in range(n + 1):
             j = min(i, n - 1)
             a[i], b[i], D[i], size[i] = _state(K[k], B[k], pieces[j], wide[j], float(i - j))
             mu = _mu(a[i], b[i], D[i])
             if mu > best:
-                best, place = mu, j
+                best, worst_piece = mu, j
         for i in range(n):
             ea, eb = _sags(K[k], B[k], pieces[i], 0.5, 1.0)
             above = max(_bound(a[i], b[i], D[i], ea, eb), _bound(a[i + 1], b[i + 1], D[i + 1], ea, eb))
             if above > best + SHARE * best + ROUNDING * size[i]:
                 inner = _within(K[k], B[k], pieces[i], wide[i], best)
                 if inner > best:
-                    best, place = inner, i
-        out[k], at[k] = best, angles[place]
+                    best, worst_piece = inner, i
+        out[k], at[k] = best, angles[worst_piece]
     return out, at

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from zwidth.guarantees.gauge import Gauge, gauge
 from zwidth.guarantees.port import Floats
-from zwidth.guarantees.region import Region, empty
+from zwidth.guarantees.region import Region, empty_region
 from zwidth.loop.loop import Loop
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 
 Complexes = NDArray[np.complex128]
 
@@ -54,10 +54,10 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     held = loop.plant.handle if held is None else held
     if held is None:
         raise ValueError("the plant has no handle: say with `held` where the operator holds it")
-    found = gauge(loop, held)
-    directions, ends = _outline(found, loop.period)
+    loop_gauge = gauge(loop, held)
+    directions, ends = _outline(loop_gauge, loop.period)
     if not np.any(ends):
-        return empty(NOTHING)
+        return empty_region(NOTHING)
     corners = np.append(ends[:1], ends[1:][ends[1:] != ends[:-1]])
     ring = np.column_stack([corners.real / loop.period, corners.imag])
     ring = np.vstack([ring, ring[:1]])
@@ -67,7 +67,7 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
         return Region((ring,), float("nan"), float("nan"), NO_SPRING)
     best = int(np.argmax(np.where(usable, K, -np.inf)))
     low, high = max(directions[best - 1], 0.0), min(directions[best + 1], np.pi / 2.0)
-    return Region((ring,), *_stiffest(found, loop.period, low, high))
+    return Region((ring,), *_stiffest(loop_gauge, loop.period, low, high))
 
 
 def _walls(directions: Floats, reach: Floats, period: float) -> tuple[Floats, Floats]:
@@ -103,7 +103,7 @@ def _outline(found: Gauge, period: float) -> tuple[Floats, Complexes]:
             directions, ends = np.insert(directions, left + 1, middle), np.insert(ends, left + 1, between)
             left = (left + np.arange(len(left)))[off]
             left = np.sort(np.concatenate([left, left + 1]))
-        bites = _bites(found, directions, ends, period)
+        bites = _missed_directions(found, directions, ends, period)
         if not len(bites):
             break
         at = np.searchsorted(directions, bites)
@@ -114,7 +114,7 @@ def _outline(found: Gauge, period: float) -> tuple[Floats, Complexes]:
     return directions, ends
 
 
-def _bites(found: Gauge, directions: Floats, ends: Complexes, period: float) -> Floats:
+def _missed_directions(found: Gauge, directions: Floats, ends: Complexes, period: float) -> Floats:
     """Directions in which some angle's disk reaches into the outline's chords, where it reaches farthest."""
     if found.conics is None:
         return np.zeros(0)

@@ -26,15 +26,15 @@ class Port:
 
     squared  (n,)    squared natural frequencies, rigid ones exactly 0 [1/s^2]
     damping  (n, n)  modal damping, symmetric [1/s]
-    push, read, hold  (n,)  participation of actuator, sensor and port
+    modal_actuator, modal_sensor, modal_port  (n,)  participation of actuator, sensor and port
     lagged   dampers with a lag, in modal coordinates
     """
 
     squared: Floats
     damping: Floats
-    push: Floats
-    read: Floats
-    hold: Floats
+    modal_actuator: Floats
+    modal_sensor: Floats
+    modal_port: Floats
     lagged: tuple[LaggedDamper, ...]
 
     @property
@@ -68,7 +68,7 @@ class Port:
         A, n = self.generator, len(self.squared)
         N = len(A)
         b = np.zeros(N)
-        b[n : 2 * n] = self.hold
+        b[n : 2 * n] = self.modal_port
         pencil = np.zeros((2 * N + 1, 2 * N + 1))
         pencil[:N, :N], pencil[N:-1, N:-1] = A, -A.T
         pencil[:N, -1], pencil[N:-1, -1] = b, -b
@@ -96,15 +96,17 @@ def port(plant: Plant, held: Floats) -> Port:
 class PortResponse:
     """At angular frequencies w (...): compliances [m/N] and what the port takes in.
 
-    direct       G_ya  from the actuator's force to the reading
-    back, felt   G_yh, G_ha  from the port's force to the reading, from the actuator's force to the port
-    port         G_hh  at the port itself
-    dissipation  Re(jw G_hh), power taken in at the port by a force of one newton (times 2) [m/(N s)]
+    direct                             G_ya  from the actuator's force to the reading
+    port_to_reading, actuator_to_port  G_yh, G_ha  from the port's force to the reading, from the actuator's force
+                                       to the port
+    port                               G_hh  at the port itself
+    dissipation                        Re(jw G_hh), power taken in at the port by a force of one newton (times 2)
+                                       [m/(N s)]
     """
 
     direct: Complexes
-    back: Complexes
-    felt: Complexes
+    port_to_reading: Complexes
+    actuator_to_port: Complexes
     port: Complexes
     dissipation: Floats
 
@@ -129,12 +131,16 @@ def port_response(held: Port, frequency: Floats) -> PortResponse:
     index = np.arange(len(held.squared))
     D[..., index, index] += stiff
     D = D * scale[..., :, None] * scale[..., None, :]
-    sources = np.stack([held.push, held.hold], axis=-1) * scale[..., :, None]
+    sources = np.stack([held.modal_actuator, held.modal_port], axis=-1) * scale[..., :, None]
     X = np.linalg.solve(D, sources.astype(complex)) * scale[..., :, None]
     pushed, pulled = X[..., 0], X[..., 1]
     power = np.einsum("...i,...ij,...j->...", pulled.conj(), damping.real, pulled).real
     return PortResponse(
-        pushed @ held.read, pulled @ held.read, pushed @ held.hold, pulled @ held.hold, w**2 * power
+        pushed @ held.modal_sensor,
+        pulled @ held.modal_sensor,
+        pushed @ held.modal_port,
+        pulled @ held.modal_port,
+        w**2 * power,
     )
 
 
@@ -143,7 +149,7 @@ def static_compliances(plant: Plant, held: Floats) -> tuple[float, float]:
 
     inf (with its sign) where a rigid motion gives way without end; the two are the ends of what springs make.
     """
-    return _static(plant), _static(fixed(plant, held))
+    return _static(plant), _static(hold_fixed(plant, held))
 
 
 def _static(plant: Plant) -> float:
@@ -159,12 +165,12 @@ def _static(plant: Plant) -> float:
     return float(np.sum(share[~rigid] / squared[~rigid]))
 
 
-def fixed(plant: Plant, held: Floats) -> Plant:
+def hold_fixed(plant: Plant, held: Floats) -> Plant:
     """The plant with the coordinate `held` . x held fixed, in coordinates of what is left."""
     return _within(plant, np.linalg.svd(held[None, :])[2][1:].T, None)
 
 
-def reached(plant: Plant) -> Plant:
+def without_idle_motions(plant: Plant) -> Plant:
     """The plant without the free motions that no wall, no reading and no operator has to do with.
 
     A mechanism that slides along the wall keeps its sliding out of what an operator at the handle couples.

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.polygon import orient
 
 from zwidth.chart.arcs import Arcs
-from zwidth.chart.peak import stiffest
+from zwidth.chart.peak import find_peak
 from zwidth.result import Result
 
 Floats = NDArray[np.float64]
@@ -59,27 +59,27 @@ class Region(Result):
 
     def table(self) -> dict[str, list[Any]]:
         """The corners of its rings as columns, ring after ring and counted from 0."""
-        columns = outlines({"": self}, "name")
+        columns = outline_columns({"": self}, "name")
         del columns["name"]
         return columns
 
     def __repr__(self) -> str:
-        return f"Region({len(self.rings)} rings, largest stiffness {largest(self)})"
+        return f"Region({len(self.rings)} rings, largest stiffness {stiffness_text(self)})"
 
 
-def largest(region: Region) -> str:
+def stiffness_text(region: Region) -> str:
     """A region's largest stiffness in words.
 
-    >>> largest(Region((), 2000.0, 0.5)), largest(empty("for want of friction"))
+    >>> stiffness_text(Region((), 2000.0, 0.5)), stiffness_text(empty_region("for want of friction"))
     ('2000 N/m', 'none')
     """
     return "none" if region.reason is not None else f"{region.stiffness_max:.6g} N/m"
 
 
-def outlines(regions: Mapping[str, Region], named: str) -> dict[str, list[Any]]:
+def outline_columns(regions: Mapping[str, Region], name_column: str) -> dict[str, list[Any]]:
     """The rings of several regions as columns, one corner a row, region after region.
 
-    named  what the column of their names is called; the column `region` counts the rings of each from 0
+    name_column  what the column of their names is called; the column `region` counts the rings of each from 0
     """
     rows = [
         (name, n, float(K), float(B))
@@ -87,11 +87,11 @@ def outlines(regions: Mapping[str, Region], named: str) -> dict[str, list[Any]]:
         for n, ring in enumerate(region.rings)
         for K, B in ring
     ]
-    columns = (named, "region", "stiffness_N_per_m", "damping_Ns_per_m")
+    columns = (name_column, "region", "stiffness_N_per_m", "damping_Ns_per_m")
     return {column: [row[i] for row in rows] for i, column in enumerate(columns)}
 
 
-def empty(reason: str) -> Region:
+def empty_region(reason: str) -> Region:
     """No wall at all, and why."""
     return Region((), float("nan"), float("nan"), reason)
 
@@ -105,5 +105,5 @@ def rings_of(shape: Any) -> tuple[Floats, ...]:
 
 def stiffest_corner(rings: Iterable[Floats]) -> tuple[float, float]:
     """Largest K over the rings within K > 0, B >= 0, and its B; nan where there is none."""
-    found = stiffest(Arcs.chords(list(rings)), (), 0.0)
+    found = find_peak(Arcs.chords(list(rings)), (), 0.0)
     return (found.stiffness, found.damping) if found else (float("nan"), float("nan"))

@@ -10,9 +10,9 @@ import shapely
 from numpy.typing import NDArray
 
 from zwidth.chart.robust.instability import unstable
-from zwidth.chart.robust.members import Member, chart_member, polygons
+from zwidth.chart.robust.members import Member, chart_member, member_polygons
 from zwidth.chart.tracer import Tracer
-from zwidth.guarantees.port import Floats, fixed
+from zwidth.guarantees.port import Floats, hold_fixed
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import UnmovedError
 from zwidth.model.modes import undamped_modes
@@ -32,7 +32,7 @@ def with_spring(plant: Plant, stiffness: float) -> Plant:
     """
     handle = handle_of(plant)
     if np.isinf(stiffness):
-        return fixed(plant, handle)
+        return hold_fixed(plant, handle)
     return replace(plant, stiffness=plant.stiffness + stiffness * np.outer(handle, handle))
 
 
@@ -56,21 +56,21 @@ def spring_for(plant: Plant, frequency: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Springs:
+class SpringFamily:
     """All springs of one loop, by their share  s = k/(k + k0),  0 for none and 1 for a fixed handle.
 
-    loop  without motions that nobody reaches
-    k0    a spring whose mode is near the Nyquist frequency [N/m]
+    loop                 without motions that nobody reaches
+    reference_stiffness  a spring whose mode is near the Nyquist frequency [N/m]
     """
 
     loop: Loop
-    k0: float
+    reference_stiffness: float
     _tracers: dict[float, Tracer | None] = field(default_factory=dict, repr=False)
     _beside: dict[float, Tracer | None] = field(default_factory=dict, repr=False)
     _members: dict[float, Member] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, loop: Loop) -> Springs:
+    def of(cls, loop: Loop) -> SpringFamily:
         """The springs of a loop whose plant has a handle."""
         w = np.pi / loop.period * np.linspace(0.5, 1.5, 11)
         k = np.abs(spring_for(loop.plant, w))
@@ -80,18 +80,18 @@ class Springs:
     def unit(self) -> float:
         """Seconds by which K is multiplied to be of the size of B over the walls in question, for distances."""
         T = self.loop.period
-        some = [polygons(m, T) for share in (0.0, 0.45, 1.0) if (m := self.member(share)) is not None]
+        some = [member_polygons(m, T) for share in (0.0, 0.45, 1.0) if (m := self.member(share)) is not None]
         left, low, right, high = shapely.intersection_all(some).bounds if some else (np.nan,) * 4
         return float(T * (high - low) / (right - left)) if right > left else T
 
     def stiffness(self, share: float) -> float:
         """k [N/m]."""
-        return self.k0 * share / (1.0 - share) if share < 1.0 else float("inf")
+        return self.reference_stiffness * share / (1.0 - share) if share < 1.0 else float("inf")
 
     def shares(self, stiffness: Floats) -> Floats:
         """s of springs k (n,)."""
         with np.errstate(invalid="ignore"):
-            return np.where(np.isinf(stiffness), 1.0, stiffness / (stiffness + self.k0))
+            return np.where(np.isinf(stiffness), 1.0, stiffness / (stiffness + self.reference_stiffness))
 
     def tracer(self, share: float) -> Tracer | None:
         """The loop with that spring; None where the wall then moves nothing, which is stable."""
@@ -109,7 +109,7 @@ class Springs:
         except UnmovedError:
             return None
 
-    def beside(self, share: float) -> tuple[Tracer, Tracer] | None:
+    def neighbour_pair(self, share: float) -> tuple[Tracer, Tracer] | None:
         """The loop with that spring and with a slightly stiffer one, softer at the end of all."""
         if share not in self._beside:
             step = STEP * share * (1.0 - share) or (STEP_AT_ENDS if share == 0.0 else -STEP_AT_ENDS)
@@ -137,7 +137,7 @@ class Springs:
         return out
 
 
-def parts(shape: shapely.Geometry) -> list[shapely.Polygon]:
+def polygons_of(shape: shapely.Geometry) -> list[shapely.Polygon]:
     """The polygons of a geometry."""
     found = shapely.get_parts(shapely.get_parts(shape))
     return [part for part in found if isinstance(part, shapely.Polygon) and part.area > 0.0]

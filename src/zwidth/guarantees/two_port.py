@@ -66,7 +66,12 @@ def hybrid_matrix(loop: Loop, angles: Floats, held: Floats) -> tuple[Complexes, 
     D = hold * np.exp(-1j * angles * loop.controller.delay) * force_filter_response(loop, angles) / lag
     # Re h11 from the dissipation: no digits lost against the mass
     h11 = G.dissipation / np.abs(s * G.port) ** 2 + 1j * np.imag(1.0 / (s * G.port))
-    return h11, D * G.felt / G.port, -G.back / G.port, D * s * (G.direct - G.back * G.felt / G.port)
+    return (
+        h11,
+        D * G.actuator_to_port / G.port,
+        -G.port_to_reading / G.port,
+        D * s * (G.direct - G.port_to_reading * G.actuator_to_port / G.port),
+    )
 
 
 def llewellyn_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:

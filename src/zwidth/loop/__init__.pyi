@@ -10,9 +10,9 @@ from .estimators import LeastSquaresSlope as LeastSquaresSlope
 from .estimators import Levant as Levant
 from .estimators import SavitzkyGolay as SavitzkyGolay
 from .estimators import WindowedDifference as WindowedDifference
-from .estimators.running import velocity_of as velocity_of
+from .estimators.run_estimator import velocity_of as velocity_of
 from .loop import Loop as Loop
-from .multi import MultiLoop as MultiLoop
+from .multi_loop import MultiLoop as MultiLoop
 from .operating_point import OperatingPoint as OperatingPoint
 from .point_errors import NoMechanismError as NoMechanismError
 from .point_errors import OperatingPointError as OperatingPointError

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from zwidth.loop.estimators import BackwardDifference, VelocityMethod
-from zwidth.model.arguments import check_choice, check_number, refusal, told
+from zwidth.model.argument_checks import check_choice, check_number, describe_value, wrong_type
 
 Discretisation = Literal["tustin", "tustin-prewarped"]
 
@@ -34,7 +34,7 @@ class Butterworth:
 
     def __post_init__(self) -> None:
         if not isinstance(self.order, int | np.integer) or self.order < 1:
-            raise ValueError(f"order must be a whole number from 1 on, got {told(self.order)}")
+            raise ValueError(f"order must be a whole number from 1 on, got {describe_value(self.order)}")
         check_number("cutoff_Hz", self.cutoff_Hz, "Hz", above=0.0)
         check_choice("discretisation", self.discretisation, get_args(Discretisation))
 
@@ -49,7 +49,7 @@ class Controller:
     velocity                how the velocity is estimated
     force_filter            F, acts on the whole force; None: none
     actuator_time_constant  tau of the actuator, tau a' + a = held force [s]; 0: none
-    saturation              largest force that is commanded [N]; charts know nothing of it
+    force_limit              largest force that is commanded [N]; charts know nothing of it
     Raises  TypeError   for an estimate or a filter that is none
             ValueError  for a number out of range, a prewarped cutoff from half the sampling frequency on
     """
@@ -60,20 +60,20 @@ class Controller:
     velocity: VelocityMethod = field(default_factory=BackwardDifference)
     force_filter: FirstOrder | Butterworth | None = None
     actuator_time_constant: float = 0.0
-    saturation: float = inf
+    force_limit: float = inf
 
     def __post_init__(self) -> None:
         T = self.sampling_period
         check_number("sampling_period", T, "s", above=0.0, hint="is it a frequency?")
         check_number("delay", self.delay, "samples", least=0.0)
         check_number("actuator_time_constant", self.actuator_time_constant, "s", least=0.0)
-        check_number("saturation", self.saturation, "N", above=0.0, infinite=True)
+        check_number("force_limit", self.force_limit, "N", above=0.0, infinite=True)
         if not isinstance(self.velocity, VelocityMethod):
-            raise refusal("velocity", "an estimate such as WindowedDifference(4)", self.velocity)
+            raise wrong_type("velocity", "an estimate such as WindowedDifference(4)", self.velocity)
         for name in ("velocity_filter", "force_filter"):
             low_pass = getattr(self, name)
             if not isinstance(low_pass, FirstOrder | Butterworth | None):
-                raise refusal(name, "a FirstOrder, a Butterworth or None", low_pass)
+                raise wrong_type(name, "a FirstOrder, a Butterworth or None", low_pass)
             if not isinstance(low_pass, Butterworth) or low_pass.discretisation == "tustin":
                 continue
             if low_pass.cutoff_Hz >= 0.5 / T:  # which prewarping would send beyond infinity

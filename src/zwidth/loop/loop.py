@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth import _verbs
 from zwidth.loop.controller import Controller
 from zwidth.loop.estimator import Estimator
+from zwidth.loop.factor_response import factor_response, rows_response, window_response
 from zwidth.loop.filters import Filter, force_path, velocity_estimator
 from zwidth.loop.realisation import StateSpace, realise
-from zwidth.loop.response import product, rows_response, window_response
 from zwidth.loop.sections import Sections, sampled_sections
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
 
@@ -103,7 +103,7 @@ class Loop:
         """What of plant and computer is not linear, a nonlinear estimate apart; its force limit is the smaller of
         the actuator's and the computer's."""
         own = self.plant.nonlinear
-        return replace(own, force_limit=min(own.force_limit, self.controller.saturation))
+        return replace(own, force_limit=min(own.force_limit, self.controller.force_limit))
 
     @cached_property
     def sections(self) -> Sections:
@@ -125,14 +125,16 @@ class Loop:
         """P(z) (...) from force command to reading, at complex z (...): hold, delay, filter and lag included."""
         at: Complexes = np.asarray(z, dtype=complex)
         force, split = self.force_path, self.fractional_delay > 0.0
-        passed = product(force.numerator, force.denominator, at - 1.0) / at**self.whole_delay
+        passed = factor_response(force.numerator, force.denominator, at - 1.0) / at**self.whole_delay
         return np.asarray(rows_response(self.sections.rows, split, at) * passed)
 
     def velocity_response(self, z: ArrayLike) -> Complexes:
         """w(z) (...), the velocity estimate per reading, at complex z (...)."""
         at: Complexes = np.asarray(z, dtype=complex)
         own = self.estimator
-        return np.asarray(product(own.numerator, own.denominator, at - 1.0) * window_response(own.window, at))
+        return np.asarray(
+            factor_response(own.numerator, own.denominator, at - 1.0) * window_response(own.window, at)
+        )
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:

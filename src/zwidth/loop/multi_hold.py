@@ -18,13 +18,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
-from zwidth.loop.motions import motion_name, pole_name
-from zwidth.model.directions import MultiPlant
+from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED, undamped_modes
+from zwidth.model.multi_plant import MultiPlant
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +31,7 @@ DEFECTIVE = 1e7
 
 
 @dataclass(frozen=True)
-class Motion:
+class ContinuousPlant:
     """x' = A x + B f,  y = C x: what walls move of a plant.
 
     A (N, N), B (N, m), C (m, N)
@@ -47,7 +45,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Held:
+class SampledPlant:
     """x_{j+1} = (1 + step) x_j + new u_{j-l} + old u_{j-l-1},  y = C x.
 
     step  (N, N);  new, old  (N, m);  reading  (m, N)
@@ -59,7 +57,7 @@ class Held:
     reading: Floats
 
 
-def moved(plant: MultiPlant, period: float, fraction: float) -> Motion:
+def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> ContinuousPlant:
     """The motions that walls move and encoders read, in states of comparable size.
 
     What moves them is a force held for a sampling period T [s], after the fraction f of a delay.
@@ -76,6 +74,8 @@ def moved(plant: MultiPlant, period: float, fraction: float) -> Motion:
     inputs, outputs = shapes.T @ plant.actuators.T, plant.sensors @ shapes
     total = float(np.linalg.norm(inputs, axis=1).sum() * np.linalg.norm(outputs, axis=0).sum())
     coupled = np.abs(damping - np.diag(np.diag(damping))) > REPEATED * level
+    from scipy.sparse.csgraph import connected_components  # heavy: a fifth of a second with what it imports
+
     count, of = connected_components(coupled, directed=False)
     alone = np.array([int(np.sum(of == of[k])) == 1 for k in range(len(of))], dtype=bool)
     same = [float(REPEATED * scale), float(REPEATED * level)]
@@ -89,8 +89,10 @@ def moved(plant: MultiPlant, period: float, fraction: float) -> Motion:
         if len(members) > 1:
             block = damping[np.ix_(members, members)]
             parts.append(_coupled(squared[members], block, inputs[members], outputs[:, members], period))
-    A = scipy.linalg.block_diag(*(part.A for part in parts))
-    return Motion(
+    from scipy.linalg import block_diag
+
+    A = block_diag(*(part.A for part in parts))
+    return ContinuousPlant(
         A.reshape(-1, sum(len(part.A) for part in parts)),
         np.vstack([part.B for part in parts]),
         np.hstack([part.C for part in parts]),
@@ -112,7 +114,7 @@ def _groups(squared: Floats, drag: Floats, members: NDArray[np.int64], same: lis
     return groups
 
 
-def _pairs(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float) -> Motion:
+def _pairs(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float) -> ContinuousPlant:
     """Second-order modes as states [x; v / rate]: a slow mode's pair stays well apart from z = 1."""
     k = len(squared)
     rate = np.maximum(np.sqrt(np.abs(squared)), np.abs(np.diag(damping)))
@@ -121,12 +123,12 @@ def _pairs(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, pe
         [[np.zeros((k, k)), np.diag(rate)], [-np.diag(squared / rate), -damping * (rate / rate[:, None])]]
     )
     B = np.vstack([np.zeros_like(inputs), inputs / rate[:, None]])
-    return Motion(A, B, np.hstack([outputs, np.zeros_like(outputs)]), ())
+    return ContinuousPlant(A, B, np.hstack([outputs, np.zeros_like(outputs)]), ())
 
 
 def _equal_poles(
     squared: float, drag: float, inputs: Floats, outputs: Floats, sampling: tuple[float, float], total: float
-) -> Motion:
+) -> ContinuousPlant:
     """Modes of one pair of poles: as many as the rank of their residue, by its singular values."""
     period, decay = sampling[0], drag / 2.0
     left, strength, right = np.linalg.svd(outputs @ inputs)
@@ -135,19 +137,19 @@ def _equal_poles(
     root = np.sqrt(strength[:rank])
     enters, leaves = root[:, None] * right[:rank], left[:, :rank] * root
     found = _pairs(np.full(rank, squared), drag * np.eye(rank), enters, leaves, period)
-    return Motion(found.A, found.B, found.C, (motion_name(squared, decay),) * (len(inputs) - rank))
+    return ContinuousPlant(found.A, found.B, found.C, (motion_name(squared, decay),) * (len(inputs) - rank))
 
 
 def _reach(squared: float, drag: float, period: float, fraction: float) -> float:
     """How far a held force moves a mode, in shares of a free mass: none at multiples of the sampling rate."""
     one = np.ones((1, 1))
     mode = _pairs(np.array([squared]), np.array([[drag]]), one, one, period)
-    held = hold(mode, period, fraction, 0.0)
+    held = sample_plant(mode, period, fraction, 0.0)
     size = np.array([[1.0], [period * mode.A[0, 1]]]) / period**2
     return float(max(np.max(np.abs(held.new * size)), np.max(np.abs(held.old * size))))
 
 
-def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float) -> Motion:
+def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, period: float) -> ContinuousPlant:
     """Modes that their damping couples; damped modes that no wall moves are split off by their eigenvectors."""
     whole = _pairs(squared, damping, inputs, outputs, period)
     poles, right = np.linalg.eig(whole.A)
@@ -169,10 +171,10 @@ def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, 
     rows = np.vstack([np.vstack([2.0 * dual[k].real, -2.0 * dual[k].imag]) for k in chosen])
     real = np.concatenate([[poles[k].imag == 0.0] * 2 for k in chosen])
     rows = np.where(real[:, None], rows / 2.0, rows)[~(real & (np.arange(len(rows)) % 2 == 1))]
-    return Motion(rows @ whole.A @ basis, rows @ whole.B, whole.C @ basis, tuple(names))
+    return ContinuousPlant(rows @ whole.A @ basis, rows @ whole.B, whole.C @ basis, tuple(names))
 
 
-def hold(motion: Motion, period: float, fraction: float, lag: float) -> Held:
+def sample_plant(motion: ContinuousPlant, period: float, fraction: float, lag: float) -> SampledPlant:
     """The motion under forces held for a period T [s], with a fraction f of delay and a lag tau [s]."""
     A, B, C = motion.A, motion.B, motion.C
     N, m = B.shape
@@ -183,7 +185,7 @@ def hold(motion: Motion, period: float, fraction: float, lag: float) -> Held:
     _, whole = _integrals(A, period)
     late, new = _integrals(A, (1.0 - fraction) * period)
     _, early = _integrals(A, fraction * period)
-    return Held(A @ whole, new @ B, late @ early @ B, C)
+    return SampledPlant(A @ whole, new @ B, late @ early @ B, C)
 
 
 def _integrals(A: Floats, time: float) -> tuple[Floats, Floats]:
@@ -191,5 +193,7 @@ def _integrals(A: Floats, time: float) -> tuple[Floats, Floats]:
     N = len(A)
     whole = np.zeros((2 * N, 2 * N))
     whole[:N, :N], whole[:N, N:] = A * time, np.eye(N)
-    found = scipy.linalg.expm(whole)
+    from scipy.linalg import expm
+
+    found = expm(whole)
     return found[:N, :N], found[:N, N:] * time

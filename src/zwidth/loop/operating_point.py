@@ -5,56 +5,79 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final, TypeAlias, get_args
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from zwidth import _verbs
 from zwidth.loop.controller import Controller
-from zwidth.loop.left_out import left_out
+from zwidth.loop.linear_omissions import linear_omissions
 from zwidth.loop.loop import Loop
-from zwidth.loop.multi import MultiLoop
+from zwidth.loop.multi_loop import MultiLoop
 from zwidth.loop.point_errors import NoMechanismError, OperatingPointError, check_several_directions
-from zwidth.loop.point_verbs import PointVerbs
-from zwidth.model.arguments import check_choice
+from zwidth.model.argument_checks import check_choice
 from zwidth.model.damping import Damping, GivenDamping
-from zwidth.model.directions import MultiPlant, reduce_directions
-from zwidth.model.effective import EffectiveParameters, effective_parameters
+from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters
 from zwidth.model.mechanism import Drives, Floats, Mechanism
+from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import Operator, attach
 from zwidth.model.plant import Plant
 from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solve_posture
 from zwidth.model.reduction import Encoders, Model, plant_effective_parameters, reduce_mechanism, reduce_plant
 from zwidth.model.response import Response
 
+if TYPE_CHECKING:
+    from zwidth.chart.chart_base import Chart
+    from zwidth.chart.polar import ByDirection
+    from zwidth.chart.verdict import WallVerdicts
+    from zwidth.conditions.comparison import BoundsComparison
+    from zwidth.contact.contact_simulation import ContactSimulation
+    from zwidth.contact.environments.environment import Environment
+    from zwidth.contact.hand import Reach, Reflex, Tremor
+    from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction
+    from zwidth.contact.mechanism.motion import MechanismMotion
+    from zwidth.contact.mechanism.surfaces import Surface
+    from zwidth.contact.mechanism.walls import SurfaceRendering
+    from zwidth.guarantees.loop_guarantees import Guarantees
+    from zwidth.measures.definition import Measure, MeasureValues
+    from zwidth.measures.description import Description
+    from zwidth.measures.felt_wall import FeltWall
+    from zwidth.study.experiment_plan import Plan
+    from zwidth.study.measured_boundary import Experiment
+    from zwidth.study.validity import Validity
+
 # Where the handle is: x, y or x, y, z [m], or the angle of every driven joint by the name of its link [rad].
 Position: TypeAlias = Sequence[float] | Mapping[str, float]
+Progress: TypeAlias = Callable[[str, int, int], None]
 
 # Share of the arm's length within which a single position is projected onto the nearest that the handle has.
-PROJECTED: Final = 0.01
+PROJECTION_TOLERANCE: Final = 0.01
 
 
 @dataclass(frozen=True, repr=False)
-class OperatingPoint(PointVerbs):
+class OperatingPoint:
     """A device in one posture or in many, rendering one direction or several at once in each, and who holds it.
 
     Just one of mechanism, given_plant and response is there. A mechanism comes with postures and directions, whose
     leading axes broadcast to `shape`; a given plant and a response have one posture, of shape ().
 
-    controller     the computer that closes the loop
-    mechanism      links, joints, loops and drives
-    posture        (...) solved postures
-    directions     (..., m, 3) unit vectors; the m directions of one posture are rendered together, under one law
-    given_plant    dynamics of the rendered direction, as given
-    response       measured response from force command to reading
-    model          "full", "two-mass", "motor-mass" or "rigid"; None: full, or the plant as given
-    damping        of the mechanism's flexible modes
-    encoders       what a mechanism's encoders read: "motor" or "link"
-    operator       the arm and grasp at the handle; None: nobody
-    operator_name  what he is called; None: nobody
+    controller          the computer that closes the loop
+    mechanism           links, joints, loops and drives
+    posture             (...) solved postures
+    directions          (..., m, 3) unit vectors; the m directions of one posture are rendered together, under one
+                        law
+    given_plant         dynamics of the rendered direction, as given
+    response            measured response from force command to reading
+    model               "full", "two-mass", "motor-mass" or "rigid"; None: full, or the plant as given
+    damping             of the mechanism's flexible modes
+    encoders            what a mechanism's encoders read: "motor" or "link"
+    operator            the arm and grasp at the handle; None: nobody
+    operator_name       what he is called; None: nobody
     friction_known, resolution_known   is the dry friction told, and the encoders' step, be they 0?
-    name           what the device is called in results and figures
-    asked          the position asked for, before it was projected; None: the device's reference
+    name                what the device is called in results and figures
+    requested_position  the position asked for, before it was projected; None: the device's reference
     """
 
     controller: Controller
@@ -71,7 +94,7 @@ class OperatingPoint(PointVerbs):
     friction_known: bool = True
     resolution_known: bool = True
     name: str = ""
-    asked: Position | Floats | None = None
+    requested_position: Position | Floats | None = None
 
     def __post_init__(self) -> None:
         """Raise ValueError for what does not go together."""
@@ -97,9 +120,9 @@ class OperatingPoint(PointVerbs):
         if self.shape:
             where = f"{int(np.prod(self.shape))} postures of shape {self.shape}"
         else:
-            place = ", ".join(f"{x:.6g}" for x in np.round(self.posture.position, 12) + 0.0)
+            position = ", ".join(f"{x:.6g}" for x in np.round(self.posture.position, 12) + 0.0)
             ways = [", ".join(f"{x:.4g}" for x in np.round(u, 12) + 0.0) for u in self.directions]
-            where = f"handle at ({place}) m, along " + " and ".join(f"({way})" for way in ways)
+            where = f"handle at ({position}) m, along " + " and ".join(f"({way})" for way in ways)
         model = f"assembly {self.posture.assembly}, model {self.model or 'full'}{held}"
         return f"OperatingPoint of {self.name or 'a device'}: {where}\n  {model}\n  {computer}"
 
@@ -243,7 +266,7 @@ class OperatingPoint(PointVerbs):
         moves = handle_motions(self._posture)
         way = moves @ (moves.T @ self.direction)
         goal = self._posture.position + displacement / (way @ self.direction) * way
-        reached = solve_posture(self.mechanism, goal, self._posture.assembly, tolerance=PROJECTED)
+        reached = solve_posture(self.mechanism, goal, self._posture.assembly, tolerance=PROJECTION_TOLERANCE)
         return float(reached.projected)
 
     # --- the next stages ------------------------------------------------------------------------------
@@ -255,10 +278,10 @@ class OperatingPoint(PointVerbs):
         Raises  OperatingPointError  for several points or directions, and for a measured response
                 ModelError, DirectionError  (model.reduction) where the model, or the direction, does not apply
         """
-        return self.hold(self.unheld_plant)
+        return self.attach_operator(self.ungripped_plant)
 
     @cached_property
-    def unheld_plant(self) -> Plant:
+    def ungripped_plant(self) -> Plant:
         """The rendered direction's dynamics without the operator. Raises what `plant` raises."""
         if self.response is not None:
             raise OperatingPointError(_NO_MODEL)
@@ -270,7 +293,7 @@ class OperatingPoint(PointVerbs):
             self.mechanism, self._posture, self.direction, self.model or "full", self.damping, self.encoders
         )
 
-    def hold(self, plant: Plant) -> Plant:
+    def attach_operator(self, plant: Plant) -> Plant:
         """A plant of this device with the operator at its handle.
 
         Returns  the plant itself where there is no operator, or no handle: a model that holds the link side fixed
@@ -313,12 +336,175 @@ class OperatingPoint(PointVerbs):
                 ".measure(name), which answers for all"
             )
 
+    # --- what can be asked of it: each verb forwards to the function that answers ---------------------
+
+    def chart(self, radius: float = 1.0, *, decay: bool = True) -> Chart:
+        """The stable walls at a single point, exactly; see `chart.point_chart.chart_at`.
+
+        radius  less than 1 for the walls whose slowest motion shrinks at least by that factor per sample
+        decay   False skips the search for the fastest-decaying walls, most of the time
+        """
+        return _verbs.chart(self, radius, decay).about(self)
+
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
+        """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast; see `chart.point_chart`."""
+        return _verbs.check(self, wall_stiffness, wall_damping).about(self)
+
+    def by_direction(self, plane: str | None = None, count: int = 72) -> ByDirection:
+        """The largest stiffness along directions round a plane; see `chart.polar.largest_stiffness_around`.
+
+        plane  "xy", "xz" or "yz"; left out: one that the handle can move all over
+        """
+        return _verbs.by_direction(self, plane, count).about(self)
+
+    def describe(self) -> Description:
+        """Masses, stiffness, frequencies and dexterity of the device by itself at a single point."""
+        return _verbs.describe(self).about(self)
+
+    def measure(
+        self,
+        measure: str | Measure,
+        *,
+        stiffness: float | None = None,
+        damping: float | None = None,
+        frequency: float | None = None,
+    ) -> MeasureValues:
+        """A measure of the catalogue by its name, or one of your own, at all points; see `measures.evaluate`.
+
+        stiffness, damping  of the wanted wall, for measures about one [N/m], [N s/m]
+        frequency           at which the hand moves [Hz]
+        """
+        return _verbs.measure(self, measure, stiffness, damping, frequency).about(self)
+
+    def bounds(self, damping: float | None = None) -> BoundsComparison:
+        """Every published condition beside the exact limit; see `conditions.comparison.compare_bounds`.
+
+        damping  of the walls compared [N s/m]; left out: that of the stiffest stable wall
+        """
+        return _verbs.bounds(self, damping).about(self)
+
+    def guarantees(self, *, coupling: bool = False, wall: tuple[float, float] | None = None) -> Guarantees:
+        """The walls that are stable with every passive operator, every spring, and as they are; see
+        `guarantees.loop_guarantees.guarantees_of`.
+
+        coupling  also virtual couplings;   wall  K, B that one of them is to render [N/m], [N s/m]
+        """
+        return _verbs.guarantees(self, coupling, wall).about(self.without_operator)
+
+    def felt(self, stiffness: float, damping: float) -> FeltWall:
+        """What the hand feels of a wall [N/m], [N s/m]; see `measures.felt_wall`."""
+        return _verbs.felt(self, stiffness, damping).about(self)
+
+    def simulate(
+        self,
+        stiffness: float | None = None,
+        damping: float | None = None,
+        *,
+        wall: Literal["two-sided", "one-sided"] = "two-sided",
+        no_pull: bool = False,
+        environment: str | Environment | None = None,
+        parameters: Mapping[str, float] | None = None,
+        wall_position: float = 0.0,
+        start_position: float | None = None,
+        start_velocity: float = 0.0,
+        push: float | None = None,
+        ramp: float = 0.0,
+        tremor: Tremor | None = None,
+        reach: Reach | None = None,
+        reflex: Reflex | None = None,
+        passivity_damping: float | None = None,
+        duration: float | None = None,
+        substeps: int = 20,
+        seed: int = 0,
+    ) -> ContactSimulation:
+        """What happens on contact with a wall, or something else; see `contact.simulate_contact`, which has all
+        arguments, for their meaning."""
+        return _verbs.simulate(
+            self,
+            stiffness,
+            damping,
+            wall=wall,
+            no_pull=no_pull,
+            environment=environment,
+            parameters=parameters,
+            wall_position=wall_position,
+            start_position=start_position,
+            start_velocity=start_velocity,
+            push=push,
+            ramp=ramp,
+            tremor=tremor,
+            reach=reach,
+            reflex=reflex,
+            passivity_damping=passivity_damping,
+            duration=duration,
+            substeps=substeps,
+            seed=seed,
+        )
+
+    def move(
+        self,
+        wall: SurfaceRendering | None = None,
+        surface: Surface | None = None,
+        *,
+        duration: float = 1.0,
+        start_velocity: ArrayLike | None = None,
+        push: ArrayLike | None = None,
+        gravity: ArrayLike | None = None,
+        substeps: int = 4,
+        counted: bool = True,
+        torque_limits: Literal["each", "together"] = "each",
+        seed: int = 0,
+    ) -> MechanismMotion:
+        """The large motion of the whole mechanism from here, at a surface or free; see
+        `contact.simulate_mechanism`, which says what each argument means."""
+        return _verbs.move(
+            self,
+            wall,
+            surface,
+            duration=duration,
+            start_velocity=start_velocity,
+            push=push,
+            gravity=gravity,
+            substeps=substeps,
+            counted=counted,
+            torque_limits=torque_limits,
+            seed=seed,
+        )
+
+    def limit_cycles(
+        self,
+        stiffness: float,
+        damping: float,
+        *,
+        offset: float = 0.0,
+        simulate: bool = True,
+        progress: Progress | None = None,
+    ) -> LimitCyclePrediction:
+        """Vibrations that keep themselves up on a wall, and what simulations find of them; see
+        `contact.predict_limit_cycles`."""
+        return _verbs.limit_cycles(self, stiffness, damping, offset, simulate, progress).about(self)
+
+    def measure_boundary(
+        self,
+        plan: Plan | None = None,
+        user_points: Sequence[object] = (),
+        *,
+        file: str | Path | None = None,
+        progress: Progress | None = None,
+    ) -> Experiment:
+        """A stability boundary as it is measured on a device; see `study.experiment.measure_boundary`."""
+        return _verbs.measure_boundary(self, plan, user_points, file, progress).about(self)
+
+    def validity(self, tolerance: float = 0.1) -> Validity:
+        """How far along the edge of the full model a simpler one tells the same; see `study.validity`."""
+        return _verbs.validity(self, tolerance).about(self)
+
     # --- what results say of it -----------------------------------------------------------------------
 
     @property
-    def left_out(self) -> tuple[str, ...]:
+    def linear_omissions(self) -> tuple[str, ...]:
         """What of the device a linear answer leaves out, in words; () if it leaves out nothing."""
-        return left_out(self.mechanism, self.given_plant, self.controller)
+        return linear_omissions(self.mechanism, self.given_plant, self.controller)
 
     @property
     def charted_by_response(self) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.loop.chain import Chain
+from zwidth.loop.coupled_hold import SampledForm
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.filters import Filter
 from zwidth.loop.sections import Sections
@@ -64,7 +64,7 @@ class _Signal:
     states: Floats
     force: float
 
-    def into(self, at: slice, gain: Floats, space: StateSpace) -> None:
+    def drive(self, at: slice, gain: Floats, space: StateSpace) -> None:
         """Let the signal drive some states with a gain each."""
         space.open[at] += np.outer(gain, self.states)
         space.input[at] += gain * self.force
@@ -97,21 +97,21 @@ def realise(sections: Sections, whole_delay: int, split: bool, force: Filter, es
 
 def _plant_states(sections: Sections) -> int:
     """Number of states of the plant."""
-    if sections.chain is None:
+    if sections.sampled_form is None:
         return 2 * len(sections.rows)
-    return 2 * _leading(sections) + len(sections.chain.output)
+    return 2 * _leading(sections) + len(sections.sampled_form.output)
 
 
 def _leading(sections: Sections) -> int:
     """How many rows stand before the chain, which begins at the last row that is not chained."""
-    return int(np.flatnonzero(sections.rows[:, 8] == 0.0)[-1]) if sections.chain else len(sections.rows)
+    return int(np.flatnonzero(sections.rows[:, 8] == 0.0)[-1]) if sections.sampled_form else len(sections.rows)
 
 
 def _queued(space: StateSpace, signal: _Signal, count: int, start: int) -> list[_Signal]:
     """The signal and its `count` past values, newest first."""
     signals = [signal]
     for at in range(start, start + count):
-        signals[-1].into(slice(at, at + 1), np.ones(1), space)
+        signals[-1].drive(slice(at, at + 1), np.ones(1), space)
         signals.append(_Signal(np.eye(1, len(space.open), at)[0], 0.0))
     return signals
 
@@ -121,8 +121,8 @@ def _plant(space: StateSpace, sections: Sections, new: _Signal, old: _Signal | N
     reading = np.zeros(len(space.open))
     leading = _leading(sections)
     _row_states(space, sections.rows[:leading], new, old, reading)
-    if sections.chain is not None:
-        _chain_states(space, sections.chain, slice(2 * leading, _plant_states(sections)), new, old, reading)
+    if sections.sampled_form is not None:
+        _chain_states(space, sections.sampled_form, slice(2 * leading, _plant_states(sections)), new, old, reading)
     return reading
 
 
@@ -134,7 +134,7 @@ def _row_states(space: StateSpace, rows: Floats, new: _Signal, old: _Signal | No
         space.open[at, at], t = pole_pair(d1, d0)
         for signal, (c2, c1, c0) in ((new, (n2, n1, n0)), (old, (o2, o1, o0))):
             if signal is not None:
-                signal.into(at, _numerator_input(c1 - c2 * d1, c0 - c2 * d0, d1, t), space)
+                signal.drive(at, _numerator_input(c1 - c2 * d1, c0 - c2 * d0, d1, t), space)
                 reading += c2 * signal.states
         if chained:
             space.open[2 * k - 2 : 2 * k, 2 * k] += before
@@ -144,14 +144,14 @@ def _row_states(space: StateSpace, rows: Floats, new: _Signal, old: _Signal | No
 
 
 def _chain_states(
-    space: StateSpace, sampled: Chain, at: slice, new: _Signal, old: _Signal | None, reading: Floats
+    space: StateSpace, sampled: SampledForm, at: slice, new: _Signal, old: _Signal | None, reading: Floats
 ) -> None:
     """The states that the chained rows come from."""
     space.open[at, at] = np.eye(len(sampled.output)) + sampled.growth
     reading[at] += sampled.output
     for signal, source, direct in ((new, sampled.new, sampled.direct_new), (old, sampled.old, sampled.direct_old)):
         if signal is not None:
-            signal.into(at, source, space)
+            signal.drive(at, source, space)
             reading += direct * signal.states
 
 
@@ -160,7 +160,7 @@ def _through(space: StateSpace, signal: _Signal, numerator: Floats, denominator:
     at = start
     for (c2, c1, c0), (lead, d1, d0) in zip(numerator, denominator, strict=True):
         if lead == 0.0:
-            signal.into(slice(at, at + 1), np.ones(1), space)
+            signal.drive(slice(at, at + 1), np.ones(1), space)
             space.open[at, at] += 1.0 - d0
             signal = signal.scaled(c1)
             signal.states[at] += c0 - c1 * d0
@@ -169,7 +169,7 @@ def _through(space: StateSpace, signal: _Signal, numerator: Floats, denominator:
             block, t = pole_pair(d1, d0)
             pair = slice(at, at + 2)
             space.open[pair, pair] += block
-            signal.into(pair, _numerator_input(c1 - c2 * d1, c0 - c2 * d0, d1, t), space)
+            signal.drive(pair, _numerator_input(c1 - c2 * d1, c0 - c2 * d0, d1, t), space)
             signal = signal.scaled(c2)
             signal.states[at] += 1.0
             at += 2

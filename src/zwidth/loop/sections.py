@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.loop.chain import Chain, chain, chain_rows
+from zwidth.loop.coupled_hold import SampledForm, form_rows, sample_form
 from zwidth.loop.hold import modal_row
-from zwidth.loop.motions import motion_name, pole_name
-from zwidth.model.first_order import FirstOrderForm, first_order_form, seen
+from zwidth.loop.motion_names import motion_name, pole_name
+from zwidth.model.first_order_form import FirstOrderForm, first_order_form, without_hidden_poles
 from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes
 from zwidth.model.plant import Plant
 
@@ -33,16 +33,16 @@ class HysteresisError(ValueError):
 class Sections:
     """The sampled plant, one row per observed pair of poles, and the names of what was cancelled.
 
-    rows        (m, 9)  d1, d0, n2, n1, n0, o2, o1, o0 as in `loop.hold`, and 1 where the row is divided by the
-                        denominators of the row before it too (and of those that one is divided by), else 0
-    unobserved  motions that the wall force does not move or the sensor does not read
-    chain       states that the chained rows, which come last, are made from; None: rows have no better than their
-                own
+    rows          (m, 9)  d1, d0, n2, n1, n0, o2, o1, o0 as in `loop.hold`, and 1 where the row is divided by the
+                          denominators of the row before it too (and of those that one is divided by), else 0
+    unobserved    motions that the wall force does not move or the sensor does not read
+    sampled_form  states that the chained rows, which come last, are made from; None: rows have no better than
+                  their own
     """
 
     rows: Floats
     unobserved: tuple[str, ...]
-    chain: Chain | None = None
+    sampled_form: SampledForm | None = None
 
 
 def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: float = 0.0) -> Sections:
@@ -105,20 +105,20 @@ def _equal_modes(modes: RealModes) -> list[list[int]]:
 def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag: float) -> Sections:
     """Rows of a first-order form, and of the free motion beside it."""
     alone = []
-    if form.free:
+    if form.free_residue:
         row = modal_row(0.0, 0.0, period, fraction, lag)
-        row[2:] *= form.free
+        row[2:] *= form.free_residue
         alone.append([*row, 0.0])
     unobserved = [motion_name(0.0, 0.0)] * (form.free_count - len(alone))
-    unobserved += [pole_name(pole) for pole in form.hidden if pole.imag >= 0.0]
-    sampled = chain(form, period, fraction, lag)
-    rows = chain_rows(form, sampled, period)
+    unobserved += [pole_name(pole) for pole in form.hidden_poles if pole.imag >= 0.0]
+    sampled = sample_form(form, period, fraction, lag)
+    rows = form_rows(form, sampled, period)
     m = len(rows)
     while m and _repeats(rows[m - 1], rows[: m - 1]):
         m -= 1
     unobserved += ["motion that decays as another one does"] * (len(rows) - m)
-    if len(form.hidden):
-        sampled = chain(seen(form), period, fraction, lag)
+    if len(form.hidden_poles):
+        sampled = sample_form(without_hidden_poles(form), period, fraction, lag)
     states = sampled if m == len(rows) else None
     chained = np.column_stack([rows[:m], np.arange(m) > 0])
     return Sections(np.vstack([np.array(alone).reshape(-1, 9), chained]), tuple(unobserved), states)

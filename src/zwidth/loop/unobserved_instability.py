@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from zwidth.loop.hold import denominator
 from zwidth.loop.loop import Loop
-from zwidth.model.first_order import first_order_form
+from zwidth.model.first_order_form import first_order_form
 from zwidth.model.modes import real_modes
 from zwidth.model.plant import Plant
 
@@ -23,8 +23,8 @@ def unobserved_instability(loop: Loop) -> bool:
     """
     if not loop.unobserved_modes:
         return False
-    seen = _of_sections(loop.sections.rows[:, :2])
-    return _growing(_poles(loop.plant, loop.period)) > _growing(seen)
+    observed_poles = _of_sections(loop.sections.rows[:, :2])
+    return _growing(_poles(loop.plant, loop.period)) > _growing(observed_poles)
 
 
 def _poles(plant: Plant, period: float) -> Complex:
@@ -32,7 +32,7 @@ def _poles(plant: Plant, period: float) -> Complex:
     modes = real_modes(plant)
     if modes is None:
         form = first_order_form(plant, period)
-        return np.expm1(np.concatenate([form.poles, form.hidden]) * period)
+        return np.expm1(np.concatenate([form.poles, form.hidden_poles]) * period)
     pairs = zip(modes.decay.tolist(), modes.frequency_squared.tolist(), strict=True)
     return _of_sections(np.array([denominator(decay, squared, period) for decay, squared in pairs]))
 

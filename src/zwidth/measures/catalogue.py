@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Final
 
-from zwidth.measures.measure import Better, Measure
-from zwidth.model.arguments import refusal
+from zwidth.measures.definition import Better, Measure
+from zwidth.model.argument_checks import wrong_type
 
 _BINDINGS: Final = "zwidth.measures.bindings"
 _OF_THE_MECHANISM: Final = ("dexterity", "forces")  # in these files nothing is asked of a loop
-_OF_A_WALL: Final = "fidelity"  # in this file every measure is about a wanted wall
+_WALL_FILE: Final = "wanted_wall"  # in this file every measure is about a wanted wall
 
 
-def _of(
+def _measure(
     file: str,
     name: str,
     title: str,
@@ -27,13 +27,13 @@ def _of(
 ) -> Measure:
     linear = file not in _OF_THE_MECHANISM
     function = f"{_BINDINGS}.{file}:{name}"
-    return Measure(name, title, unit, better, source, function, each, along, linear, of_wall=file == _OF_A_WALL)
+    return Measure(name, title, unit, better, source, function, each, along, linear, of_wall=file == _WALL_FILE)
 
 
 _YOSHIKAWA = "Yoshikawa 1985"
 _MEASURES: Final = (
     # what the mechanism is
-    _of(
+    _measure(
         "dexterity",
         "manipulability",
         "Manipulability",
@@ -42,7 +42,7 @@ _MEASURES: Final = (
         f"{_YOSHIKAWA}; thesis eq. 5.1",
         along=False,
     ),
-    _of(
+    _measure(
         "dexterity",
         "isotropy",
         "Condition number of the Jacobian",
@@ -51,7 +51,7 @@ _MEASURES: Final = (
         "Salisbury and Craig 1982; thesis eq. 5.2",
         along=False,
     ),
-    _of(
+    _measure(
         "dexterity",
         "isotropy_frobenius",
         "Condition number of the Jacobian, Frobenius",
@@ -60,7 +60,7 @@ _MEASURES: Final = (
         "thesis eq. 5.2, Frobenius norm",
         along=False,
     ),
-    _of(
+    _measure(
         "dexterity",
         "dynamic_manipulability",
         "Dynamic manipulability",
@@ -69,7 +69,7 @@ _MEASURES: Final = (
         f"{_YOSHIKAWA}; thesis eq. 5.3",
         along=False,
     ),
-    _of(
+    _measure(
         "dexterity",
         "dynamic_isotropy",
         "Condition number of the inertia matrix",
@@ -78,7 +78,7 @@ _MEASURES: Final = (
         "Ma and Angeles 1993; thesis 5.1",
         along=False,
     ),
-    _of(
+    _measure(
         "dexterity",
         "handle_mass_isotropy",
         "Largest over smallest mass felt at the handle",
@@ -87,13 +87,17 @@ _MEASURES: Final = (
         "condition number of (J M^-1 J^T)^-1; Khatib 1987, thesis eq. 2.16",
         along=False,
     ),
-    _of("dexterity", "link_side_mass", "Link-side mass", "kg", None, "thesis eq. 2.28"),
-    _of("dexterity", "motor_side_mass", "Motor-side mass", "kg", None, "thesis eq. 2.28"),
-    _of("dexterity", "rigid_mass", "Rigid mass of links and rotors", "kg", None, "Khatib 1987; thesis eq. 2.18"),
-    _of("dexterity", "stiffness", "Structural stiffness", "N/m", "higher", "thesis eq. 2.34"),
+    _measure("dexterity", "link_side_mass", "Link-side mass", "kg", None, "thesis eq. 2.28"),
+    _measure("dexterity", "motor_side_mass", "Motor-side mass", "kg", None, "thesis eq. 2.28"),
+    _measure(
+        "dexterity", "rigid_mass", "Rigid mass of links and rotors", "kg", None, "Khatib 1987; thesis eq. 2.18"
+    ),
+    _measure("dexterity", "stiffness", "Structural stiffness", "N/m", "higher", "thesis eq. 2.34"),
     # which walls it can render
-    _of("impedance", "stiffness_max", "Largest virtual stiffness", "N/m", "higher", "exact, by D-decomposition"),
-    _of(
+    _measure(
+        "impedance", "stiffness_max", "Largest virtual stiffness", "N/m", "higher", "exact, by D-decomposition"
+    ),
+    _measure(
         "impedance",
         "damping_max",
         "Largest virtual damping",
@@ -102,7 +106,7 @@ _MEASURES: Final = (
         "exact, by D-decomposition",
         each=True,
     ),
-    _of(
+    _measure(
         "impedance",
         "stable_area",
         "Area of stable walls",
@@ -111,7 +115,7 @@ _MEASURES: Final = (
         "exact, by D-decomposition",
         each=True,
     ),
-    _of(
+    _measure(
         "impedance",
         "fastest_decay",
         "Smallest spectral radius of all walls",
@@ -120,7 +124,7 @@ _MEASURES: Final = (
         "exact, by D-decomposition",
         each=True,
     ),
-    _of(
+    _measure(
         "closed_forms",
         "stiffness_max_closed_form",
         "Largest virtual stiffness, closed form of the undamped device",
@@ -128,7 +132,7 @@ _MEASURES: Final = (
         "higher",
         "thesis eq. 5.4, 5.6, 5.7; structural damping left out",
     ),
-    _of(
+    _measure(
         "closed_forms",
         "damping_max_closed_form",
         "Largest virtual damping, closed form of the undamped device",
@@ -136,7 +140,7 @@ _MEASURES: Final = (
         "higher",
         "thesis eq. 5.4, 5.6, 5.7; structural damping left out",
     ),
-    _of(
+    _measure(
         "closed_forms",
         "stable_area_closed_form",
         "Area of stable walls, closed form of the undamped device",
@@ -145,24 +149,24 @@ _MEASURES: Final = (
         "thesis eq. 5.5, 5.8; structural damping left out",
     ),
     # how a wanted wall feels
-    _of(
-        "fidelity",
+    _measure(
+        "wanted_wall",
         "optimal_spectral_radius",
         "Optimal spectral radius",
         "",
         "lower",
         "thesis eq. 5.15; motor side on its spring, structural damping left out",
     ),
-    _of(
-        "fidelity",
+    _measure(
+        "wanted_wall",
         "optimal_motor_side_mass",
         "Optimal motor-side mass",
         "kg",
         None,
         "thesis eq. 5.14; motor side on its spring, structural damping left out",
     ),
-    _of(
-        "fidelity",
+    _measure(
+        "wanted_wall",
         "spectral_radius",
         "Spectral radius at the wanted wall",
         "",
@@ -170,8 +174,8 @@ _MEASURES: Final = (
         "thesis eq. 2.40",
         each=True,
     ),
-    _of(
-        "fidelity",
+    _measure(
+        "wanted_wall",
         "decay_time",
         "Time in which vibration at the wanted wall decays to 1/e",
         "s",
@@ -179,8 +183,8 @@ _MEASURES: Final = (
         "T / -ln of the spectral radius",
         each=True,
     ),
-    _of(
-        "fidelity",
+    _measure(
+        "wanted_wall",
         "structural_distortion",
         "Share of the motors' motion that deforms the structure",
         "",
@@ -188,8 +192,8 @@ _MEASURES: Final = (
         "structural deformation ratio, Moreyra and Hannaford 1998 (known at second hand)",
         each=True,
     ),
-    _of(
-        "fidelity",
+    _measure(
+        "wanted_wall",
         "felt_stiffness",
         "Stiffness felt at the wanted wall",
         "N/m",
@@ -197,8 +201,8 @@ _MEASURES: Final = (
         "real part of force per displacement at the handle, docs/felt.md",
         each=True,
     ),
-    _of(
-        "fidelity",
+    _measure(
+        "wanted_wall",
         "free_motion_force",
         "Force per velocity felt in free motion",
         "N s/m",
@@ -207,8 +211,8 @@ _MEASURES: Final = (
         each=True,
     ),
     # what its motors and encoders give
-    _of("forces", "peak_force", "Peak force", "N", "higher", "J^T f within the drives' torque limits"),
-    _of(
+    _measure("forces", "peak_force", "Peak force", "N", "higher", "J^T f within the drives' torque limits"),
+    _measure(
         "forces",
         "continuous_force",
         "Continuous force",
@@ -216,7 +220,7 @@ _MEASURES: Final = (
         "higher",
         "J^T f within the drives' continuous torques",
     ),
-    _of(
+    _measure(
         "forces",
         "acceleration_max",
         "Largest acceleration",
@@ -224,7 +228,7 @@ _MEASURES: Final = (
         "higher",
         "M J^+ u a within the drives' torque limits",
     ),
-    _of(
+    _measure(
         "forces",
         "position_resolution",
         "Position resolution",
@@ -232,7 +236,7 @@ _MEASURES: Final = (
         "lower",
         "sum of |u^T J_i| over the encoders' steps",
     ),
-    _of(
+    _measure(
         "forces",
         "friction_force",
         "Dry friction felt along the direction",
@@ -245,18 +249,18 @@ _MEASURES: Final = (
 MEASURES: Final = {measure.name: measure for measure in _MEASURES}
 
 
-def find_measure(name: str, own: Mapping[str, Measure] | None = None) -> Measure:
+def find_measure(name: str, user_measures: Mapping[str, Measure] | None = None) -> Measure:
     """The measure of that name, a user's own or ours; the name may carry its unit.
 
-    own     measures of a user's own, by name (`own.load_measures`)
-    Raises  ValueError  naming the nearest, if there is none
+    user_measures  measures of a user's own, by name (`user_measures.load_measures`)
+    Raises         ValueError  naming the nearest, if there is none
 
     >>> find_measure("stiffness_max").unit, find_measure("stiffness_max_N_per_m").name
     ('N/m', 'stiffness_max')
     """
     if not isinstance(name, str):
-        raise refusal("name", "a measure's name", name)
-    known = {**MEASURES, **(own or {})}
+        raise wrong_type("name", "a measure's name", name)
+    known = {**MEASURES, **(user_measures or {})}
     with_unit = {one.key: one for one in known.values()}
     if name in known or name in with_unit:
         return known.get(name) or with_unit[name]

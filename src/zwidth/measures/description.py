@@ -10,8 +10,8 @@ import numpy as np
 
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.dexterity import dynamic_manipulability, isotropy, manipulability
-from zwidth.model.arguments import require
-from zwidth.model.effective import EffectiveParameters
+from zwidth.model.argument_checks import require
+from zwidth.model.effective_parameters import EffectiveParameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies, real_modes
 from zwidth.model.plant import Plant
@@ -82,7 +82,7 @@ def describe(point: OperatingPoint) -> Description:
     Raises  what `OperatingPoint.plant` raises
     """
     require("point", point, OperatingPoint)
-    plant = point.unheld_plant
+    plant = point.ungripped_plant
     common = point.effective, natural_frequencies(plant), damping_ratios(plant)
     if point.mechanism is None or point.posture is None:
         return Description(*common)

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
-MOVES: Final = 1e-12  # share of the largest entry below which a row of the Jacobian is rounding
+ZERO_ROW: Final = 1e-12  # share of the largest entry below which a row of the Jacobian is rounding
 
 
 def manipulability(jacobian: ArrayLike, freedoms: int | None = None) -> Floats:
@@ -156,8 +156,8 @@ def handle_mass_isotropy(jacobian: ArrayLike, mass_matrix: ArrayLike, freedoms: 
     squared, shapes = np.linalg.eigh(M)
     heavy = squared > 0.0
     with np.errstate(invalid="ignore"):
-        moved = J @ shapes / np.sqrt(np.where(heavy, squared, 1.0))[..., None, :]
-        ratio = isotropy(moved, freedoms) ** 2
+        scaled_jacobian = J @ shapes / np.sqrt(np.where(heavy, squared, 1.0))[..., None, :]
+        ratio = isotropy(scaled_jacobian, freedoms) ** 2
     return np.asarray(np.where(heavy.all(axis=-1) | np.isnan(ratio), ratio, np.inf))
 
 
@@ -179,7 +179,7 @@ def singular_values(jacobian: ArrayLike, freedoms: int | None = None) -> tuple[F
         raise ValueError(f"freedoms must be a whole number from 1 to {count}, got {freedoms}")
     if freedoms is None:
         size = np.abs(J).max(axis=-1)
-        rows = (size > MOVES * size.max(axis=-1, keepdims=True)).sum(axis=-1)
+        rows = (size > ZERO_ROW * size.max(axis=-1, keepdims=True)).sum(axis=-1)
         # two drives move a handle in a plane: one row alone is an arm stretched along an axis
         rows = np.maximum(rows, min(2, count))
     else:

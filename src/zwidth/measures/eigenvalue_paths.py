@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.verdict import BAND
 from zwidth.loop.loop import Loop
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.result import Result
 
 Floats = NDArray[np.float64]
@@ -66,13 +66,13 @@ class EigenvaluePaths(Result):
     """Eigenvalues along a path of one number.
 
     values       (k,)    the values asked for, in their order, and those that were needed between
-    asked        (k,)    which were asked for
+    requested    (k,)    which were asked for
     eigenvalues  (k, N)  each column one path
     crossings    of the unit circle, in the order of the values
     """
 
     values: Floats
-    asked: NDArray[np.bool_]
+    requested: NDArray[np.bool_]
     eigenvalues: Complex
     crossings: tuple[Crossing, ...]
 
@@ -85,7 +85,7 @@ class EigenvaluePaths(Result):
         """Values, eigenvalues by real and imaginary part (k, N), spectral radius and crossings, by key."""
         return {
             "values": self.values,
-            "asked": self.asked,
+            "asked": self.requested,
             "real": self.eigenvalues.real,
             "imag": self.eigenvalues.imag,
             "spectral_radius": self.spectral_radius,
@@ -96,7 +96,12 @@ class EigenvaluePaths(Result):
         """A row for each value; the real and imaginary part of each path, counted from 0."""
         parts = [(f"real_{i}", z.real) for i, z in enumerate(self.eigenvalues.T)]
         parts += [(f"imag_{i}", z.imag) for i, z in enumerate(self.eigenvalues.T)]
-        return {"value": self.values, "asked": self.asked, "spectral_radius": self.spectral_radius, **dict(parts)}
+        return {
+            "value": self.values,
+            "asked": self.requested,
+            "spectral_radius": self.spectral_radius,
+            **dict(parts),
+        }
 
     def __repr__(self) -> str:
         paths = self.eigenvalues.shape[1]
@@ -117,19 +122,19 @@ def eigenvalue_paths(matrix_at: Callable[[float], ArrayLike], values: ArrayLike)
                ValueError  for values that neither rise nor fall
 
     >>> found = eigenvalue_paths(lambda a: [[0.0, 1.0], [-a, 1.0]], [0.0, 1.2])    # z^2 - z + a
-    >>> found.spectral_radius[found.asked].round(6).tolist()
+    >>> found.spectral_radius[found.requested].round(6).tolist()
     [1.0, 1.095445]
     >>> [(round(c.value, 9), c.outwards) for c in found.crossings]                 # both of the pair, at a = 1
     [(1.0, True), (1.0, True)]
     """
-    asked = np.asarray(values, dtype=np.float64)
-    steps = np.diff(asked)
-    if asked.ndim != 1 or len(asked) < 2 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+    requested = np.asarray(values, dtype=np.float64)
+    steps = np.diff(requested)
+    if requested.ndim != 1 or len(requested) < 2 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise ValueError("values must be a row of at least two that rise or fall")
-    walk = _Walk(matrix_at, asked)
+    walk = _PathTracer(matrix_at, requested)
     crossings = [found for path in range(walk.z.shape[1]) for found in walk.crossings(path)]
     crossings.sort(key=lambda found: (found.value, found.path), reverse=bool(steps[0] < 0.0))
-    return EigenvaluePaths(walk.values, np.isin(walk.values, asked), walk.z, tuple(crossings))
+    return EigenvaluePaths(walk.values, np.isin(walk.values, requested), walk.z, tuple(crossings))
 
 
 def loop_paths(
@@ -169,28 +174,28 @@ def wall_paths(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -
     return eigenvalue_paths(lambda value: loop.transition_matrix(value, B), K)
 
 
-class _Walk:
+class _PathTracer:
     """Values and matched eigenvalues, in the making."""
 
-    def __init__(self, matrix_at: Callable[[float], ArrayLike], asked: Floats) -> None:
+    def __init__(self, matrix_at: Callable[[float], ArrayLike], requested: Floats) -> None:
         self.matrix_at = matrix_at
-        first = float(asked[0])
-        self.walked = [(first, self.at(first))]
-        for end in asked[1:].tolist():
-            self.walk_to(end, self.at(end), HALVINGS)
-        self.values = np.array([value for value, _ in self.walked])
-        self.z: Complex = np.array([z for _, z in self.walked])
+        first = float(requested[0])
+        self.steps = [(first, self.eigenvalues_at(first))]
+        for end in requested[1:].tolist():
+            self.trace_to(end, self.eigenvalues_at(end), HALVINGS)
+        self.values = np.array([value for value, _ in self.steps])
+        self.z: Complex = np.array([z for _, z in self.steps])
 
-    def at(self, value: float) -> Complex:
+    def eigenvalues_at(self, value: float) -> Complex:
         """Eigenvalues in any order."""
         matrix = np.asarray(self.matrix_at(value), dtype=np.float64)
         if not np.all(np.isfinite(matrix)):
             raise PathError(f"the transition matrix at {value:g} is not finite")
         return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
 
-    def walk_to(self, end: float, unordered: Complex, halvings: int) -> None:
+    def trace_to(self, end: float, unordered: Complex, halvings: int) -> None:
         """Steps from the last value walked to to `end`."""
-        start, z = self.walked[-1]
+        start, z = self.steps[-1]
         if len(z) != len(unordered):
             raise PathError(
                 f"there are {len(z)} eigenvalues at {start:g} and {len(unordered)} at {end:g}: a motion or a "
@@ -199,10 +204,10 @@ class _Walk:
         matched, plain = _match(z, unordered)
         middle = 0.5 * (start + end)
         if plain or halvings == 0 or middle in (start, end):
-            self.walked.append((end, matched))
+            self.steps.append((end, matched))
             return
-        self.walk_to(middle, self.at(middle), halvings - 1)
-        self.walk_to(end, unordered, halvings - 1)
+        self.trace_to(middle, self.eigenvalues_at(middle), halvings - 1)
+        self.trace_to(end, unordered, halvings - 1)
 
     def crossings(self, path: int) -> list[Crossing]:
         """Where one path goes from inside the circle to its outside or back; what stays near it does neither."""
@@ -224,7 +229,7 @@ class _Walk:
 
         def here(value: float) -> complex:
             # the step is plain: between its ends nothing else is as near to the straight line
-            z = self.at(value)
+            z = self.eigenvalues_at(value)
             line = z_low + (z_high - z_low) * (value - low) / (high - low)
             return complex(z[np.argmin(np.abs(z - line))])
 
@@ -239,9 +244,9 @@ def _match(z: Complex, others: Complex) -> tuple[Complex, bool]:
     from scipy.optimize import linear_sum_assignment
 
     distance = np.abs(z[:, None] - others)
-    own = linear_sum_assignment(distance)
-    moved, rivals = distance[own], distance.copy()
-    rivals[own] = np.inf
-    told = moved <= 0.5 * rivals.min(axis=1, initial=np.inf)
-    plain = (moved <= SHORT) | (told & (moved <= LONG * np.maximum(np.abs(z), 1.0)))
-    return others[own[1]], bool(np.all(plain))
+    assignment = linear_sum_assignment(distance)
+    distance_moved, other_distances = distance[assignment], distance.copy()
+    other_distances[assignment] = np.inf
+    distinct = distance_moved <= 0.5 * other_distances.min(axis=1, initial=np.inf)
+    plain = (distance_moved <= SHORT) | (distinct & (distance_moved <= LONG * np.maximum(np.abs(z), 1.0)))
+    return others[assignment[1]], bool(np.all(plain))

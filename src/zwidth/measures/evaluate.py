@@ -14,28 +14,28 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import NoMechanismError
 from zwidth.loop.sections import HysteresisError, UnmovedError
 from zwidth.measures.catalogue import find_measure
-from zwidth.measures.measure import (
+from zwidth.measures.definition import (
     FAILED,
     NO_VALUE,
     OK,
     UNDECIDED,
     Measure,
-    Measured,
     MeasureError,
+    MeasureValues,
     Note,
     NoValueError,
     WantedWall,
 )
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.model.reduction import ModelError
 
 NUMBERS = "biuf"  # kinds of arrays that are numbers: bool, signed, unsigned, floating
 FAILURES = (Exception, SystemExit)  # a user's own measure that ends the program has failed, and nothing else has
 NO_MECHANISM = "speaks of a mechanism, and the device is given by its plant"
-NONE = (NoValueError, ModelError, UnmovedError, HysteresisError, NonlinearError)
+NO_VALUE_ERRORS = (NoValueError, ModelError, UnmovedError, HysteresisError, NonlinearError)
 
 
-def evaluate(measure: Measure, point: OperatingPoint) -> Measured:
+def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
     """A measure's values at all points, nan with a status where it has none.
 
     What a measure raises, or returns in another shape, at one point is that point's status FAILED with a note: the
@@ -45,7 +45,7 @@ def evaluate(measure: Measure, point: OperatingPoint) -> Measured:
     require("measure", measure, Measure)
     require("point", point, OperatingPoint)
     if measure.each:
-        return one_by_one(measure.compute, point)
+        return evaluate_pointwise(measure.compute, point)
     try:
         found = measure.compute(point)
     except MeasureError:
@@ -53,15 +53,17 @@ def evaluate(measure: Measure, point: OperatingPoint) -> Measured:
     except NoMechanismError:
         raise MeasureError(NO_MECHANISM) from None
     except FAILURES as error:
-        return _everywhere(point, FAILED, _said(error))
-    if isinstance(found, Measured):
+        return _same_status(point, FAILED, _error_text(error))
+    if isinstance(found, MeasureValues):
         return found
     values = np.asarray(found)
     if values.shape != point.shape:
-        return _everywhere(point, FAILED, f"returned an array of shape {values.shape} for points of {point.shape}")
+        return _same_status(
+            point, FAILED, f"returned an array of shape {values.shape} for points of {point.shape}"
+        )
     if values.dtype.kind not in NUMBERS:
-        return _everywhere(point, FAILED, f"returned {values.dtype} instead of numbers")
-    return measured(point, values.astype(np.float64))
+        return _same_status(point, FAILED, f"returned {values.dtype} instead of numbers")
+    return with_status(point, values.astype(np.float64))
 
 
 def measure_at(
@@ -70,7 +72,7 @@ def measure_at(
     stiffness: float | None = None,
     damping: float | None = None,
     frequency: float | None = None,
-) -> Measured:
+) -> MeasureValues:
     """A measure of the catalogue by its name, or one of a user's own, at operating points.
 
     stiffness, damping, frequency  of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures about it
@@ -78,45 +80,49 @@ def measure_at(
             MeasureError  where it cannot be asked of this device, or needs what is not given; text begins with its
                           name
     """
-    asked = find_measure(measure) if isinstance(measure, str) else measure
-    require("measure", asked, Measure)
+    resolved = find_measure(measure) if isinstance(measure, str) else measure
+    require("measure", resolved, Measure)
     try:
-        return evaluate(asked.at_wall(WantedWall(stiffness, damping, frequency)), point)
+        return evaluate(resolved.at_wall(WantedWall(stiffness, damping, frequency)), point)
     except MeasureError as error:
-        raise error.of(asked.name) from None
+        raise error.with_name(resolved.name) from None
 
 
-def measured(point: OperatingPoint, values: NDArray[np.float64], reason: str = "has no value here") -> Measured:
+def with_status(
+    point: OperatingPoint, values: NDArray[np.float64], reason: str = "has no value here"
+) -> MeasureValues:
     """Values with the points' status; NO_VALUE with a reason where they are nan though the point is OK."""
     none: NDArray[np.bool_] = np.asarray((point.status == OK) & np.isnan(values))
     status = np.where(none, NO_VALUE, point.status).astype(np.uint8)
     notes = (_note(none, NO_VALUE, reason),) if none.any() else ()
-    return Measured(np.where(status == OK, values, np.nan), status, notes)
+    return MeasureValues(np.where(status == OK, values, np.nan), status, notes)
 
 
-def _everywhere(point: OperatingPoint, status: int, reason: str) -> Measured:
+def _same_status(point: OperatingPoint, status: int, reason: str) -> MeasureValues:
     failed = point.status == OK
-    told = (_note(failed, status, reason),) if failed.any() else ()
-    return Measured(np.full(point.shape, np.nan), np.where(failed, status, point.status).astype(np.uint8), told)
+    notes = (_note(failed, status, reason),) if failed.any() else ()
+    return MeasureValues(
+        np.full(point.shape, np.nan), np.where(failed, status, point.status).astype(np.uint8), notes
+    )
 
 
 def _note(points: NDArray[np.bool_], status: int, reason: str) -> Note:
     return Note(status, reason, int(points.sum()), tuple(int(i) for i in np.argwhere(points)[0]))
 
 
-def one_by_one(ask: Callable[[OperatingPoint], Any], point: OperatingPoint) -> Measured:
+def evaluate_pointwise(compute: Callable[[OperatingPoint], Any], point: OperatingPoint) -> MeasureValues:
     """What is asked of one point at a time, at all points."""
     values, status = np.full(point.shape, np.nan), point.status.copy()
     why: dict[tuple[int, ...], tuple[int, str]] = {}
     for index in np.ndindex(point.shape):
         if status[index] == OK:
-            values[index], status[index], reason = answered(lambda: ask(point[index]))  # noqa: B023
+            values[index], status[index], reason = evaluate_safely(lambda: compute(point[index]))  # noqa: B023
             if reason:
                 why[index] = (int(status[index]), reason)
-    return Measured(values, status, reasons(why))
+    return MeasureValues(values, status, notes_of_points(why))
 
 
-def reasons(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, ...]:
+def notes_of_points(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, ...]:
     """Notes from the status and reason of each point without value, in the order of the points."""
     seen: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
     for index, key in why.items():
@@ -125,21 +131,21 @@ def reasons(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, ...]:
     return tuple(Note(*key, *rest) for key, rest in seen.items())
 
 
-def answered(ask: Callable[[], Any]) -> tuple[float, int, str]:
+def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
     """Value, status and reason of one question; only a MeasureError is raised."""
     try:
-        found = ask()
+        found = compute()
         value = np.asarray(found)
     except MeasureError:
         raise
     except NoMechanismError:
         raise MeasureError(NO_MECHANISM) from None
-    except NONE as error:
+    except NO_VALUE_ERRORS as error:
         return float("nan"), NO_VALUE, str(error)
     except ChartError as error:
         return float("nan"), UNDECIDED, str(error)
     except FAILURES as error:
-        return float("nan"), FAILED, _said(error)
+        return float("nan"), FAILED, _error_text(error)
     if value.shape != ():
         return float("nan"), FAILED, f"returned an array of shape {value.shape} instead of one number"
     if value.dtype.kind not in NUMBERS:
@@ -149,5 +155,5 @@ def answered(ask: Callable[[], Any]) -> tuple[float, int, str]:
     return float(value), OK, ""
 
 
-def _said(error: BaseException) -> str:
+def _error_text(error: BaseException) -> str:
     return f"raised {type(error).__name__}: {str(error).splitlines()[0] if str(error) else 'without a word'}"

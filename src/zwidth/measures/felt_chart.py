@@ -11,9 +11,9 @@ import shapely
 from numpy.typing import NDArray
 
 from zwidth.chart.chart import StabilityChart
-from zwidth.chart.result import BoundaryArc
-from zwidth.measures.felt import hardest_static_stiffness, static_stiffness
-from zwidth.model.arguments import require
+from zwidth.chart.chart_base import BoundaryArc
+from zwidth.measures.handle_impedance import static_stiffness, static_stiffness_limit
+from zwidth.model.argument_checks import require
 from zwidth.model.plant import Plant
 from zwidth.result import Result
 
@@ -27,15 +27,15 @@ PIECE = 1e-3
 class FeltChart(Result):
     """The stable walls with K >= 0, each at the stiffness that the hand feels at rest.
 
-    regions   closed rings (k, 2) of [felt stiffness, wall damping], counter-clockwise
-    boundary  the arcs of the stable set's edge with K >= 0; `stiffness` is the felt one
-    stiffest  felt stiffness of the stiffest stable wall with B >= 0 [N/m]; nan if there is none
-    limit     felt stiffness that no wall exceeds [N/m]; inf for a rigid device
+    regions        closed rings (k, 2) of [felt stiffness, wall damping], counter-clockwise
+    boundary       the arcs of the stable set's edge with K >= 0; `stiffness` is the felt one
+    stiffness_max  felt stiffness of the stiffest stable wall with B >= 0 [N/m]; nan if there is none
+    limit          felt stiffness that no wall exceeds [N/m]; inf for a rigid device
     """
 
     regions: tuple[Floats, ...]
     boundary: tuple[BoundaryArc, ...]
-    stiffest: float
+    stiffness_max: float
     limit: float
 
     def document(self) -> dict[str, Any]:
@@ -50,7 +50,7 @@ class FeltChart(Result):
                 }
                 for arc in self.boundary
             ],
-            "felt_stiffness_max_N_per_m": self.stiffest,
+            "felt_stiffness_max_N_per_m": self.stiffness_max,
             "felt_stiffness_limit_N_per_m": self.limit,
         }
 
@@ -65,13 +65,18 @@ class FeltChart(Result):
         }
 
     def __repr__(self) -> str:
-        hardest = f"hardest felt contact {self.stiffest:.6g} N/m" if isfinite(self.stiffest) else "no stable wall"
+        hardest = (
+            f"hardest felt contact {self.stiffness_max:.6g} N/m"
+            if isfinite(self.stiffness_max)
+            else "no stable wall"
+        )
         limit = f", no wall is felt above {self.limit:.6g} N/m" if isfinite(self.limit) else ""
         return f"FeltChart: {hardest}{limit}"
 
 
 def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
-    """A chart in felt static stiffness (see `felt.static_stiffness`), for walls with K >= 0 of either sign of B.
+    """A chart in felt static stiffness (see `handle_impedance.static_stiffness`), for walls with K >= 0 of either
+    sign of B.
 
     device  what the hand holds, without the hand; left out: the chart's own plant, which then has no operator
 
@@ -102,10 +107,10 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
     return FeltChart(
         regions=tuple(rings),
         boundary=tuple(arcs),
-        stiffest=float(static_stiffness(plant, chart.stiffness_max))
+        stiffness_max=float(static_stiffness(plant, chart.stiffness_max))
         if chart.stiffness_max > 0.0
         else float("nan"),
-        limit=hardest_static_stiffness(plant),
+        limit=static_stiffness_limit(plant),
     )
 
 

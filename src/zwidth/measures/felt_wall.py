@@ -10,7 +10,7 @@ import numpy as np
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.verdict import judge
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.felt import (
+from zwidth.measures.handle_impedance import (
     Complex,
     Floats,
     commanded_impedance,
@@ -18,10 +18,10 @@ from zwidth.measures.felt import (
     free_motion_impedance,
     free_motion_mass,
     handle_of,
-    hardest_static_stiffness,
     static_stiffness,
+    static_stiffness_limit,
 )
-from zwidth.model.arguments import check_number, require
+from zwidth.model.argument_checks import check_number, require
 from zwidth.result import Result
 
 COUNT: Final = 400  # frequencies, from LOWEST of half the sampling frequency up to HIGHEST of it
@@ -42,9 +42,9 @@ class FeltWall(Result):
     static_stiffness_at_stiffness_max    what that wall is felt with [N/m]; None as before
     static_stiffness_limit               what no wall exceeds [N/m]; inf for a rigid device
     frequency                            (k,)  [Hz]
-    impedance                            (k,)  at the handle [N s/m]; None where the wall is not stable
-    commanded                            (k,)  that of an ideal wall, B + K/(jw) [N s/m]
-    free_motion                          (k,)  at the handle without any wall [N s/m]
+    felt_impedance                       (k,)  at the handle [N s/m]; None where the wall is not stable
+    commanded_impedance                  (k,)  that of an ideal wall, B + K/(jw) [N s/m]
+    free_motion_impedance                (k,)  at the handle without any wall [N s/m]
     """
 
     wall_stiffness: float
@@ -56,9 +56,9 @@ class FeltWall(Result):
     static_stiffness_at_stiffness_max: float | None
     static_stiffness_limit: float
     frequency: Floats
-    impedance: Complex | None
-    commanded: Complex
-    free_motion: Complex
+    felt_impedance: Complex | None
+    commanded_impedance: Complex
+    free_motion_impedance: Complex
 
     @property
     def reason(self) -> str | None:
@@ -69,7 +69,11 @@ class FeltWall(Result):
 
     def document(self) -> dict[str, Any]:
         """Everything by key and unit; None for what is only felt of a stable wall, where this one is not."""
-        unknown = dict.fromkeys(_parts("impedance", self.commanded)) if self.impedance is None else {}
+        unknown = (
+            dict.fromkeys(_impedance_columns("impedance", self.commanded_impedance))
+            if self.felt_impedance is None
+            else {}
+        )
         return {
             "wall_stiffness_N_per_m": self.wall_stiffness,
             "wall_damping_Ns_per_m": self.wall_damping,
@@ -85,12 +89,16 @@ class FeltWall(Result):
 
     def table(self) -> dict[str, Floats]:
         """The impedances as columns, one frequency a row; nan for the felt one where the wall is not stable."""
-        felt = np.full(len(self.frequency), complex(np.nan, np.nan)) if self.impedance is None else self.impedance
+        felt = (
+            np.full(len(self.frequency), complex(np.nan, np.nan))
+            if self.felt_impedance is None
+            else self.felt_impedance
+        )
         return {
             "frequency_Hz": self.frequency,
-            **_parts("impedance", felt),
-            **_parts("commanded", self.commanded),
-            **_parts("free_motion", self.free_motion),
+            **_impedance_columns("impedance", felt),
+            **_impedance_columns("commanded", self.commanded_impedance),
+            **_impedance_columns("free_motion", self.free_motion_impedance),
         }
 
     def __repr__(self) -> str:
@@ -112,7 +120,7 @@ class FeltWall(Result):
         )
 
 
-def _parts(name: str, impedance: Complex) -> dict[str, Floats]:
+def _impedance_columns(name: str, impedance: Complex) -> dict[str, Floats]:
     return {f"{name}_real_Ns_per_m": impedance.real, f"{name}_imag_Ns_per_m": impedance.imag}
 
 
@@ -121,7 +129,7 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
 
     point               the device; its operator decides which walls are stable, and what is felt is without him
     stiffness, damping  of the wall [N/m], [N s/m]
-    Raises  HandleError  (measures.felt) where there is no handle
+    Raises  HandleError  (measures.handle_impedance) where there is no handle
             ValueError   for a wall that is not finite
             what `OperatingPoint.plant` and `chart.chart.largest_stiffness` raise
 
@@ -139,7 +147,7 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
     require("point", point, OperatingPoint)
     check_number("stiffness", stiffness, "N/m")
     check_number("damping", damping, "N s/m")
-    plant, K, B = point.unheld_plant, stiffness, damping
+    plant, K, B = point.ungripped_plant, stiffness, damping
     handle_of(plant)
     verdict = judge(point.loop, [K], [B]).names[0]
     peak = largest_stiffness(point.loop)
@@ -154,9 +162,9 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
         free_motion_mass=free_motion_mass(plant),
         stiffness_max=peak.stiffness if peak else None,
         static_stiffness_at_stiffness_max=float(static_stiffness(plant, peak.stiffness)) if peak else None,
-        static_stiffness_limit=hardest_static_stiffness(plant),
+        static_stiffness_limit=static_stiffness_limit(plant),
         frequency=frequency,
-        impedance=felt_impedance(loop, K, B, frequency) if stable else None,
-        commanded=commanded_impedance(K, B, frequency),
-        free_motion=free_motion_impedance(plant, frequency),
+        felt_impedance=felt_impedance(loop, K, B, frequency) if stable else None,
+        commanded_impedance=commanded_impedance(K, B, frequency),
+        free_motion_impedance=free_motion_impedance(plant, frequency),
     )

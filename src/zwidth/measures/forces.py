@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.model.effective import unit_directions
+from zwidth.model.effective_parameters import unit_directions
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def force_along(jacobian: ArrayLike, direction: ArrayLike, torques: ArrayLike) -
     >>> round(float(force_along([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [0.6, 0.8, 0.0], [1.0, 1.0])), 9)
     3.125
     """
-    h, t = _felt(jacobian, direction), np.asarray(torques, dtype=np.float64)
+    h, t = _torques_per_force(jacobian, direction), np.asarray(torques, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         each = np.where(h == 0.0, np.inf, t / np.abs(h))
     return np.asarray(each.min(axis=-1))
@@ -93,10 +93,10 @@ def acceleration_along(
     10.0
     """
     q, moves = joint_rates(jacobian, direction)
-    taken = (np.asarray(mass_matrix, dtype=np.float64) @ q[..., None])[..., 0]
+    torques_needed = (np.asarray(mass_matrix, dtype=np.float64) @ q[..., None])[..., 0]
     t = np.asarray(torques, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        each = np.where(taken == 0.0, np.inf, t / np.abs(taken))
+        each = np.where(torques_needed == 0.0, np.inf, t / np.abs(torques_needed))
     return np.asarray(np.where(moves | np.isnan(q[..., 0]), each.min(axis=-1), 0.0))
 
 
@@ -116,7 +116,7 @@ def resolution_along(jacobian: ArrayLike, direction: ArrayLike, steps: ArrayLike
     >>> round(float(resolution_along([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [0.6, 0.8, 0.0], [1e-3, 1e-3])), 9)
     0.00044
     """
-    return _total(np.asarray(steps, dtype=np.float64), _felt(jacobian, direction))
+    return _total(np.asarray(steps, dtype=np.float64), _torques_per_force(jacobian, direction))
 
 
 def friction_along(jacobian: ArrayLike, direction: ArrayLike, frictions: ArrayLike) -> Floats:
@@ -126,7 +126,8 @@ def friction_along(jacobian: ArrayLike, direction: ArrayLike, frictions: ArrayLi
 
     by the work of a metre: every drive slips by q_i and takes C_i |q_i|. What the hand has to push across the
     direction to stay on it does no work. The conditions of `zwidth.conditions` ask for the work along the motion
-    that a force makes by itself, M^-1 J^T u, which goes astray and may take less (`dry.ground_friction`).
+    that a force makes by itself, M^-1 J^T u, which goes astray and may take less
+    (`friction_and_resolution.ground_friction`).
 
     jacobian   (..., 3, d)  J [m/rad], of rank d
     direction  (..., 3)     u, unit vectors
@@ -157,11 +158,11 @@ def joint_rates(jacobian: ArrayLike, direction: ArrayLike) -> tuple[Floats, NDAr
     unknown: NDArray[np.bool_] = np.asarray(np.isnan(J).any(axis=(-2, -1)))
     known = np.where(unknown[..., None, None], 0.0, J)
     q = (np.linalg.pinv(known) @ u[..., None])[..., 0]
-    left = np.linalg.norm(u - (known @ q[..., None])[..., 0], axis=-1)
-    return np.where(unknown[..., None], np.nan, q), np.asarray((left <= OFF) & ~unknown)
+    residual = np.linalg.norm(u - (known @ q[..., None])[..., 0], axis=-1)
+    return np.where(unknown[..., None], np.nan, q), np.asarray((residual <= OFF) & ~unknown)
 
 
-def _felt(jacobian: ArrayLike, direction: ArrayLike) -> Floats:
+def _torques_per_force(jacobian: ArrayLike, direction: ArrayLike) -> Floats:
     """h = J^T u (..., d)."""
     J, u = np.asarray(jacobian, dtype=np.float64), unit_directions(direction)
     return np.asarray(np.einsum("...i,...id->...d", u, J))

@@ -88,7 +88,7 @@ def characteristic_length(
     kappa = _condition(J, power, start)
     singular = ~(kappa < 1.0 / (np.finfo(float).eps * max(J.shape[-2:]))) | (values[..., -1] == 0.0)
     J = np.where(singular[..., None, None], np.eye(*J.shape[-2:]), J)
-    x = _least(lambda x: _slope(J, power, x, norm), np.where(singular, 0.0, start))
+    x = _minimise_convex(lambda x: _slope(J, power, x, norm), np.where(singular, 0.0, start))
     return np.asarray(np.where(unknown | singular, np.nan, np.exp(x)))
 
 
@@ -185,7 +185,7 @@ def _slope(J: Floats, power: Floats, x: Floats, norm: str) -> Floats:
     )
 
 
-def _least(slope: Callable[[Floats], Floats], start: Floats) -> Floats:
+def _minimise_convex(slope: Callable[[Floats], Floats], start: Floats) -> Floats:
     """Where convex functions (...) with a slope are least, each by itself; nan where none of the bracket rises.
 
     Kinks and level stretches are treated alike: the place up to which the slope is below -FLAT and the one from

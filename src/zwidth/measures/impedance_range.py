@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.conditions import thesis_delays, thesis_flexible
+from zwidth.conditions import thesis_flexible, thesis_whole_delay
 
 Floats = NDArray[np.float64]
 
@@ -60,12 +60,12 @@ def rigid_range(mass: ArrayLike, sampling_period: ArrayLike, delay_samples: Arra
     >>> rigid_range(0.287, 0.00125, [1.0, 0.5]).stiffness_max.round(1).tolist()
     [26536.1, nan]
     """
-    m, T, l = _together(mass, sampling_period, delay_samples)
+    m, T, l = _broadcast(mass, sampling_period, delay_samples)
     applies = _positive(m) & _positive(T) & np.isfinite(l) & (l >= 0.0) & (l == np.round(l))
     m, T, l = np.where(applies, m, 1.0), np.where(applies, T, 1.0), np.where(applies, l, 0.0)
-    stiffness, damping = thesis_delays.largest(m, T, l)
-    highest, area = thesis_delays.largest_damping(m, T, l), thesis_delays.stable_area(m, T, l)
-    return _where(applies, stiffness, damping, highest, area)
+    stiffness, damping = thesis_whole_delay.largest(m, T, l)
+    highest, area = thesis_whole_delay.largest_damping(m, T, l), thesis_whole_delay.stable_area(m, T, l)
+    return _masked_range(applies, stiffness, damping, highest, area)
 
 
 def sprung_range(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLike) -> ImpedanceRange:
@@ -86,13 +86,13 @@ def sprung_range(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLi
     >>> [round(float(v), 4) for v in (found.stiffness_max, found.damping_at_stiffness_max, found.damping_max)]
     [4325.8941, 10.914, 24.5317]
     """
-    m, k, T = _together(mass, stiffness, sampling_period)
+    m, k, T = _broadcast(mass, stiffness, sampling_period)
     applies = _positive(m) & _positive(T) & np.isfinite(k) & (k >= 0.0)
     m, k, T = (np.where(applies, value, 1.0) for value in (m, k, T))
     largest = thesis_flexible.largest_stiffness(m, k, T)
     damping = thesis_flexible.damping_at_largest_stiffness(m, k, T)
     none = largest == 0.0
-    return _where(
+    return _masked_range(
         applies,
         np.where(none, np.nan, largest),
         np.where(none, np.nan, damping),
@@ -101,7 +101,7 @@ def sprung_range(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLi
     )
 
 
-def _together(*values: ArrayLike) -> tuple[Floats, ...]:
+def _broadcast(*values: ArrayLike) -> tuple[Floats, ...]:
     return tuple(np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in values)))
 
 
@@ -109,5 +109,5 @@ def _positive(values: Floats) -> NDArray[np.bool_]:
     return (values > 0.0) & np.isfinite(values)
 
 
-def _where(applies: NDArray[np.bool_], *numbers: Floats) -> ImpedanceRange:
+def _masked_range(applies: NDArray[np.bool_], *numbers: Floats) -> ImpedanceRange:
     return ImpedanceRange(*(np.where(applies, number, np.nan) for number in numbers))

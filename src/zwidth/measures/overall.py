@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.measures.definition import MISSING, OK, OUT_OF_REACH, SINGULAR, Better
 from zwidth.measures.dexterity import singular_values
-from zwidth.measures.measure import MISSING, OK, OUT_OF_REACH, SINGULAR, Better
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -57,7 +57,8 @@ def overall(
     """Average, worst, best and uniformity of a measure over a workspace.
 
     values   (...)  cell by cell, nan where there is none
-    status   (...)  as in `measures.measure`: only OK counts; None: all that are not nan, and those are all reached
+    status   (...)  as in `measures.definition`: only OK counts; None: all that are not nan, and those are all
+             reached
     weights  (...)  area or volume of each cell, broadcasting with the values; None: all alike
     better   "higher", "lower", or None where it depends
     Raises   ValueError  for weights that are negative, infinite or do not fit, and a status that does not
@@ -67,12 +68,12 @@ def overall(
     (2.6666666666666665, 1.0, 0.25, 0.75)
     """
     x, w, counts, reached = _cells(values, status, weights)
-    whole, kept = float(w.sum()), x[counts]
-    share, within = _part(w[counts], whole), _part(w[reached], whole)
-    if not len(kept):
-        return Overall(np.nan, np.nan, np.nan, np.nan, np.nan, share, within, 0)
-    least, largest = float(kept.min()), float(kept.max())
-    average, spread = _moments(kept, w[counts])
+    total_weight, counted_values = float(w.sum()), x[counts]
+    share, reached_share = _weight_share(w[counts], total_weight), _weight_share(w[reached], total_weight)
+    if not len(counted_values):
+        return Overall(np.nan, np.nan, np.nan, np.nan, np.nan, share, reached_share, 0)
+    least, largest = float(counted_values.min()), float(counted_values.max())
+    average, spread = _moments(counted_values, w[counts])
     worst, best = {"higher": (least, largest), "lower": (largest, least), None: (np.nan, np.nan)}[better]
     return Overall(
         average=average,
@@ -81,8 +82,8 @@ def overall(
         uniformity=_uniformity(least, largest),
         variation=spread / abs(average) if average and np.isfinite(average) else np.nan,
         share=share,
-        reached=within,
-        count=len(kept),
+        reached=reached_share,
+        count=len(counted_values),
     )
 
 
@@ -166,7 +167,7 @@ def _cells(
     return x, w, np.asarray((s == OK) & ~np.isnan(x) & (w > 0.0)), np.asarray(~nowhere)
 
 
-def _part(weights: Floats, whole: float) -> float:
+def _weight_share(weights: Floats, whole: float) -> float:
     return float(weights.sum()) / whole if whole else float("nan")
 
 

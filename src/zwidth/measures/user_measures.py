@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, Final
 from zlib import compress, decompress
 
 from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.measure import Better, Measure, WantedWall
+from zwidth.measures.definition import Better, Measure, WantedWall
 
 if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
@@ -37,7 +37,7 @@ BETTER: Final = ("higher", "lower", None)
 
 
 @dataclass(frozen=True)
-class Own:
+class FileFunction:
     """A function in a user's file, found again in whatever process asks it.
 
     file  path
@@ -56,7 +56,7 @@ class Own:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # a text that speaks of __main__ must not look like a function that only this process has
-        return _unpacked, (self.file, compress(self.text.encode()), self.name)
+        return _unpickled, (self.file, compress(self.text.encode()), self.name)
 
 
 def measure(
@@ -95,15 +95,23 @@ def measure(
     if better not in BETTER:
         raise ValueError(f"a measure's better must be 'higher', 'lower' or None, got {better!r}")
 
-    def made(function: Function) -> Measure:
+    def make_measure(function: Function) -> Measure:
         lines = (function.__doc__ or function.__name__.replace("_", " ")).strip().splitlines()
-        told = title or lines[0].rstrip(".")
+        measure_title = title or lines[0].rstrip(".")
         of_wall = len(signature(function).parameters) > 1
         return Measure(
-            function.__name__, told, unit, better, source or "your own", function, each, along, of_wall=of_wall
+            function.__name__,
+            measure_title,
+            unit,
+            better,
+            source or "your own",
+            function,
+            each,
+            along,
+            of_wall=of_wall,
         )
 
-    return made
+    return make_measure
 
 
 def load_measures(path: str) -> dict[str, Measure]:
@@ -128,13 +136,13 @@ def load_measures(path: str) -> dict[str, Measure]:
     if taken:
         raise ValueError(f"{file.name}: the name {taken[0]} is taken by a measure of ours; rename the function")
     return {
-        name: replace(one, function=Own(str(file.resolve()), text, name), source=f"your own, {file.name}")
+        name: replace(one, function=FileFunction(str(file.resolve()), text, name), source=f"your own, {file.name}")
         for name, one in found.items()
     }
 
 
-def _unpacked(file: str, text: bytes, name: str) -> Own:
-    return Own(file, decompress(text).decode(), name)
+def _unpickled(file: str, text: bytes, name: str) -> FileFunction:
+    return FileFunction(file, decompress(text).decode(), name)
 
 
 @lru_cache(maxsize=8)

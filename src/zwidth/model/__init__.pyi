@@ -1,11 +1,11 @@
 from .damping import GivenDamping as GivenDamping
 from .damping import ModalDamping as ModalDamping
 from .damping import ProportionalDamping as ProportionalDamping
-from .directions import MultiPlant as MultiPlant
-from .directions import reduce_directions as reduce_directions
-from .effective import effective_parameters as effective_parameters
+from .effective_parameters import effective_parameters as effective_parameters
 from .mechanism import Mechanism as Mechanism
 from .modes import natural_frequencies as natural_frequencies
+from .multi_plant import MultiPlant as MultiPlant
+from .multi_plant import reduce_directions as reduce_directions
 from .nonlinear import Brake as Brake
 from .nonlinear import Counter as Counter
 from .nonlinear import Friction as Friction
@@ -28,4 +28,4 @@ from .reduction import reduce_mechanism as reduce_mechanism
 from .reduction import reduce_plant as reduce_plant
 from .response import Response as Response
 from .response import ResponseError as ResponseError
-from .sweep import sweep_response as sweep_response
+from .sweep_response import sweep_response as sweep_response

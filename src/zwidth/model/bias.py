@@ -7,42 +7,51 @@ from typing import NamedTuple
 import numpy as np
 
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.model.arrays import Arrays
-from zwidth.model.closure import equations, loop_step, passive_rates
+from zwidth.model.closure import closure_step, equations, passive_rates
+from zwidth.model.forward_kinematics import WorkingMemory, link_point, place_links, working_memory
 from zwidth.model.inertia import unit_motions
 from zwidth.model.mechanism import Floats, Ints
-from zwidth.model.tree import Work, place, point, workspace
+from zwidth.model.mechanism_arrays import MechanismArrays
 
 
-class Flow(NamedTuple):
+class LinkAccelerations(NamedTuple):
     """Memory for the links' velocities and accelerations at given rates.
 
-    rates, turning       (m,)    q' and q'' of all unknowns
-    spin, spin_up, speed_up  (n, 3)  angular velocity, its derivative, acceleration of the origin less gravity
+    rates, joint_accelerations  (m,)    q' and q'' of all unknowns
+    angular_velocity, angular_acceleration, acceleration  (n, 3)  angular velocity, its derivative, acceleration of
+                                                          the origin less gravity
     """
 
     rates: Floats
-    turning: Floats
-    spin: Floats
-    spin_up: Floats
-    speed_up: Floats
+    joint_accelerations: Floats
+    angular_velocity: Floats
+    angular_acceleration: Floats
+    acceleration: Floats
 
 
 @compiled
-def flow_of(mech: Arrays) -> Flow:
+def new_link_accelerations(mech: MechanismArrays) -> LinkAccelerations:
     """Fresh memory."""
     n, m = mech.parent.size, mech.joint.size
-    return Flow(np.zeros(m), np.zeros(m), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
+    return LinkAccelerations(np.zeros(m), np.zeros(m), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
 
 
 @compiled_lean
-def accelerate(mech: Arrays, work: Work, gravity: Floats, flow: Flow) -> None:
-    """Fill spin, spin_up and speed_up from the rates and their derivatives, parents first.
+def fill_accelerations(
+    mech: MechanismArrays, work: WorkingMemory, gravity: Floats, flow: LinkAccelerations
+) -> None:
+    """Fill velocities and accelerations from the rates and their derivatives, parents first.
 
     w_i = w_p + z_i q',   alpha_i = alpha_p + z_i q'' + w_p x z_i q',
     a_i = a_p + alpha_p x r + w_p x (w_p x r),   r = o_i - o_p;   the base falls upwards, a = -gravity
     """
-    w, alpha, a, rates, turning = flow.spin, flow.spin_up, flow.speed_up, flow.rates, flow.turning
+    w, alpha, a, rates, turning = (
+        flow.angular_velocity,
+        flow.angular_acceleration,
+        flow.acceleration,
+        flow.rates,
+        flow.joint_accelerations,
+    )
     o, z, parent, column = work.origin, work.axis, mech.parent, mech.column
     gx, gy, gz = gravity[0], gravity[1], gravity[2]
     for i in range(parent.size):
@@ -72,13 +81,19 @@ def accelerate(mech: Arrays, work: Work, gravity: Floats, flow: Flow) -> None:
 
 @compiled_lean
 def point_acceleration(
-    work: Work, flow: Flow, gravity: Floats, link: int, local: Floats, design: int, index: int
+    work: WorkingMemory,
+    flow: LinkAccelerations,
+    gravity: Floats,
+    link: int,
+    local: Floats,
+    design: int,
+    index: int,
 ) -> tuple[float, float, float]:
     """Acceleration of the link's point local[design, index], less gravity [m/s^2]."""
     if link < 0:
         return -gravity[0], -gravity[1], -gravity[2]
-    w, b, a, o = flow.spin, flow.spin_up, flow.speed_up, work.origin
-    p = point(work.rotation, o, link, local, design, index)
+    w, b, a, o = flow.angular_velocity, flow.angular_acceleration, flow.acceleration, work.origin
+    p = link_point(work.rotation, o, link, local, design, index)
     wx, wy, wz = w[link, 0], w[link, 1], w[link, 2]
     bx, by, bz = b[link, 0], b[link, 1], b[link, 2]
     rx, ry, rz = p[0] - o[link, 0], p[1] - o[link, 1], p[2] - o[link, 2]
@@ -92,7 +107,13 @@ def point_acceleration(
 
 @compiled_lean
 def bias(
-    mech: Arrays, design: int, work: Work, flow: Flow, driven_rates: Floats, gravity: Floats, out: Floats
+    mech: MechanismArrays,
+    design: int,
+    work: WorkingMemory,
+    flow: LinkAccelerations,
+    driven_rates: Floats,
+    gravity: Floats,
+    out: Floats,
 ) -> None:
     """c(q, p') - B^T g_q in the driven coordinates, (d,) into `out` [N m]: what is left of M p'' at p'' = 0.
 
@@ -103,7 +124,7 @@ def bias(
     A_p q_p'' = -(a_a - a_b); then every link's inertia force and moment is projected on the unit motions of the
     drives. Gravity is the base falling upwards.
     """
-    rates, turning, per_drive = flow.rates, flow.turning, work.rates
+    rates, turning, per_drive = flow.rates, flow.joint_accelerations, work.rates
     m, d, k = rates.size, mech.driven, mech.a.size
     passive = m - d
     for u in range(m):
@@ -112,7 +133,7 @@ def bias(
             total += driven_rates[s] * per_drive[s, u]
         rates[u] = total
         turning[u] = 0.0
-    accelerate(mech, work, gravity, flow)
+    fill_accelerations(mech, work, gravity, flow)
     if k > 0:
         gaps, solution = work.gaps, work.solution
         a, b, point_a, point_b = mech.a, mech.b, mech.point_a, mech.point_b
@@ -121,23 +142,25 @@ def bias(
             pb = point_acceleration(work, flow, gravity, b[c], point_b, design, c)
             for x in range(3):
                 gaps[3 * c + x] = pb[x] - pa[x]
-        loop_step(mech, work)
+        closure_step(mech, work)
         for u in range(passive):
             turning[u] = solution[0, u]
-        accelerate(mech, work, gravity, flow)
+        fill_accelerations(mech, work, gravity, flow)
     _project(mech, design, work, flow, gravity, out)
 
 
 @compiled_lean
-def _project(mech: Arrays, design: int, work: Work, flow: Flow, gravity: Floats, out: Floats) -> None:
+def _project(
+    mech: MechanismArrays, design: int, work: WorkingMemory, flow: LinkAccelerations, gravity: Floats, out: Floats
+) -> None:
     """Each link's inertia force m a and moment I alpha + w x I w on the unit motions of the drives."""
     R, o, spin, speed = work.rotation, work.origin, work.spin, work.speed
-    w, b = flow.spin, flow.spin_up
+    w, b = flow.angular_velocity, flow.angular_acceleration
     mass, center, I, k = mech.mass, mech.center_of_mass, mech.inertia, design
     for s in range(out.size):
         out[s] = 0.0
     for i in range(mass.shape[1]):
-        p = point(R, o, i, center, k, i)
+        p = link_point(R, o, i, center, k, i)
         a = point_acceleration(work, flow, gravity, i, center, k, i)
         rx, ry, rz = p[0] - o[i, 0], p[1] - o[i, 1], p[2] - o[i, 2]
         fx, fy, fz = mass[k, i] * a[0], mass[k, i] * a[1], mass[k, i] * a[2]
@@ -164,12 +187,12 @@ def _project(mech: Arrays, design: int, work: Work, flow: Flow, gravity: Floats,
 
 @compiled
 def bias_batch(
-    mech: Arrays, design: Ints, angles: Floats, driven_rates: Floats, gravity: Floats, out: Floats
+    mech: MechanismArrays, design: Ints, angles: Floats, driven_rates: Floats, gravity: Floats, out: Floats
 ) -> None:
     """`bias` for each posture: design (N,), angles (N, n), driven_rates and out (N, d)."""
-    work, flow = workspace(mech), flow_of(mech)
+    work, flow = working_memory(mech), new_link_accelerations(mech)
     for i in range(design.size):
-        place(mech, design[i], angles[i], work)
+        place_links(mech, design[i], angles[i], work)
         equations(mech, design[i], work.goal, work)
         passive_rates(mech, work)
         unit_motions(mech, work)

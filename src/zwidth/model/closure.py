@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.compiled import compiled_lean
-from zwidth.model.arrays import Arrays
+from zwidth.model.forward_kinematics import WorkingMemory, link_point
 from zwidth.model.mechanism import Floats, Ints
-from zwidth.model.tree import Work, point
+from zwidth.model.mechanism_arrays import MechanismArrays
 
 
 @compiled_lean
@@ -41,7 +41,7 @@ def chain_columns(
 
 
 @compiled_lean
-def equations(mech: Arrays, design: int, goal: Floats, work: Work) -> None:
+def equations(mech: MechanismArrays, design: int, goal: Floats, work: WorkingMemory) -> None:
     """Fill `rows` and `gaps` at the present place of the links: rows^T dq = gaps is Newton's step."""
     R, o, z, rows, gaps = work.rotation, work.origin, work.axis, work.rows, work.gaps
     parent, column, a, b, point_a, point_b = (
@@ -57,12 +57,12 @@ def equations(mech: Arrays, design: int, goal: Floats, work: Work) -> None:
         for r in range(end):
             rows[u, r] = 0.0
     for c in range(k):
-        pa = point(R, o, a[c], point_a, design, c)
-        pb = point(R, o, b[c], point_b, design, c)
+        pa = link_point(R, o, a[c], point_a, design, c)
+        pb = link_point(R, o, b[c], point_b, design, c)
         gaps[3 * c], gaps[3 * c + 1], gaps[3 * c + 2] = pb[0] - pa[0], pb[1] - pa[1], pb[2] - pa[2]
         chain_columns(parent, column, z, o, rows, a[c], pa, 3 * c, 1.0)
         chain_columns(parent, column, z, o, rows, b[c], pb, 3 * c, -1.0)
-    h = point(R, o, mech.handle_link, mech.handle, design, 0)
+    h = link_point(R, o, mech.handle_link, mech.handle, design, 0)
     gaps[3 * k], gaps[3 * k + 1], gaps[3 * k + 2] = goal[0] - h[0], goal[1] - h[1], goal[2] - h[2]
     chain_columns(parent, column, z, o, rows, mech.handle_link, h, 3 * k, 1.0)
 
@@ -113,7 +113,7 @@ def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, row
 
 
 @compiled_lean
-def newton_step(mech: Arrays, work: Work) -> float:
+def newton_step(mech: MechanismArrays, work: WorkingMemory) -> float:
     """The step of all unknowns towards the goal, in `work.solution[0]`; returns the reciprocal condition."""
     basis, rows, sides, gaps = work.basis, work.rows, work.sides, work.gaps
     m, count = rows.shape[0], gaps.size
@@ -126,7 +126,7 @@ def newton_step(mech: Arrays, work: Work) -> float:
 
 
 @compiled_lean
-def passive_rates(mech: Arrays, work: Work) -> float:
+def passive_rates(mech: MechanismArrays, work: WorkingMemory) -> float:
     """Fill `rates`: dq/dp of all unknowns with respect to the drives; returns the reciprocal condition.
 
     A_p q_p' = -A_d p'   with the closure rows A = [A_p | A_d]   (thesis eq. B.6 and B.18, for any loops)
@@ -150,7 +150,7 @@ def passive_rates(mech: Arrays, work: Work) -> float:
 
 
 @compiled_lean
-def loop_step(mech: Arrays, work: Work) -> float:
+def closure_step(mech: MechanismArrays, work: WorkingMemory) -> float:
     """Step of the passive joints alone that closes the loops, from the basis `passive_rates` left; its
     largest turn.
 

@@ -14,10 +14,10 @@ from typing import Final
 import numpy as np
 
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.model.arrays import Arrays
 from zwidth.model.closure import equations, least_squares, newton_step, orientation, passive_rates
+from zwidth.model.forward_kinematics import WorkingMemory, link_point, place_links, working_memory
 from zwidth.model.mechanism import Floats, Ints
-from zwidth.model.tree import Work, place, point, workspace
+from zwidth.model.mechanism_arrays import MechanismArrays
 
 OK: Final = 0
 OUT_OF_REACH: Final = 1
@@ -27,13 +27,13 @@ CONTRACTION: Final = 0.55  # of one correction by the next; on the edge of the w
 LARGEST_TURN: Final = 0.5  # of one joint in one step [rad]
 SMALLEST_STEP: Final = 2.0**-7  # of the straight way to the goal
 SINGULAR_CONDITION: Final = 1e-6  # below it the numbers of a posture lose their last ten digits
-CLOSED: Final = 1e-11  # a gap is closed below this part of the mechanism's size
-ASSEMBLED: Final = 1e-9  # the same, for postures to start from
+CLOSURE_TOLERANCE: Final = 1e-11  # a gap is closed below this part of the mechanism's size
+ASSEMBLY_TOLERANCE: Final = 1e-9  # the same, for postures to start from
 ROUNDING: Final = 1e-15
 
 
 @compiled_lean
-def largest(values: Floats, count: int) -> float:
+def largest_magnitude(values: Floats, count: int) -> float:
     """max |values[:count]|, nan if any is nan."""
     most = 0.0
     for i in range(count):
@@ -44,7 +44,7 @@ def largest(values: Floats, count: int) -> float:
 
 
 @compiled_lean
-def turn(mech: Arrays, angles: Floats, work: Work) -> None:
+def apply_step(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> None:
     """Add the step in `work.solution[0]` to the joint angles."""
     joint, solution = mech.joint, work.solution
     for u in range(joint.size):
@@ -52,7 +52,9 @@ def turn(mech: Arrays, angles: Floats, work: Work) -> None:
 
 
 @compiled_lean
-def correct(mech: Arrays, design: int, goal: Floats, angles: Floats, tolerance: float, work: Work) -> float:
+def correct(
+    mech: MechanismArrays, design: int, goal: Floats, angles: Floats, tolerance: float, work: WorkingMemory
+) -> float:
     """Newton from `angles` (in place) to the goal; the last reciprocal condition, or -1 where it left the
     branch.
 
@@ -63,25 +65,25 @@ def correct(mech: Arrays, design: int, goal: Floats, angles: Floats, tolerance: 
     rounding = ROUNDING * mech.size[design]
     last, moved, condition = 0.0, 0.0, 0.0
     for iteration in range(60):
-        place(mech, design, angles, work)
+        place_links(mech, design, angles, work)
         equations(mech, design, goal, work)
         if iteration == 0:
             for u in range(m):
                 for r in range(count):
                     start[u, r] = rows[u, r]
         condition = newton_step(mech, work)
-        size = largest(solution[0], m)
+        size = largest_magnitude(solution[0], m)
         moved += size
-        settled = largest(gaps, count) < rounding
+        settled = largest_magnitude(gaps, count) < rounding
         if not settled and (not moved < LARGEST_TURN or (iteration > 0 and size > CONTRACTION * last)):
             return -1.0
         if not settled or size < last:
-            turn(mech, angles, work)
+            apply_step(mech, angles, work)
         ratio = size / last if last > 0.0 else 1.0
         if settled or size * ratio * ratio < tolerance:
             break
         last = size
-    place(mech, design, angles, work)
+    place_links(mech, design, angles, work)
     equations(mech, design, goal, work)
     # Newton may pass a singularity without slowing down: it knows nothing of the drives, and an arm that goes
     # straight over its back does not feel the direction it has lost
@@ -93,7 +95,7 @@ def correct(mech: Arrays, design: int, goal: Floats, angles: Floats, tolerance: 
 
 
 @compiled_lean
-def follow(mech: Arrays, design: int, target: Floats, angles: Floats, work: Work) -> int:
+def follow(mech: MechanismArrays, design: int, target: Floats, angles: Floats, work: WorkingMemory) -> int:
     """Take the mechanism from its posture `angles` (in place) straight to the target; OK, OUT_OF_REACH or
     SINGULAR.
 
@@ -114,8 +116,8 @@ def follow(mech: Arrays, design: int, target: Floats, angles: Floats, work: Work
         condition = correct(mech, design, goal, trial, 1e-13 if final else 1e-6, work)
         if condition < 0.0:
             if done == 0.0 and step == 1.0:
-                place(mech, design, angles, work)
-                begin = point(work.rotation, work.origin, mech.handle_link, mech.handle, design, 0)
+                place_links(mech, design, angles, work)
+                begin = link_point(work.rotation, work.origin, mech.handle_link, mech.handle, design, 0)
             step *= 0.5
             if step < SMALLEST_STEP:
                 return OUT_OF_REACH
@@ -124,19 +126,21 @@ def follow(mech: Arrays, design: int, target: Floats, angles: Floats, work: Work
             angles[i] = trial[i]
         done = 1.0 if final else done + step
         step *= 2.0
-    if not largest(work.gaps, work.gaps.size) <= CLOSED * mech.size[design]:
+    if not largest_magnitude(work.gaps, work.gaps.size) <= CLOSURE_TOLERANCE * mech.size[design]:
         return OUT_OF_REACH
     condition = min(condition, passive_rates(mech, work))
     return SINGULAR if condition < SINGULAR_CONDITION else OK
 
 
 @compiled
-def assemble_batch(mech: Arrays, design: Ints, goals: Floats, hold: bool, angles: Floats, gaps: Floats) -> None:
+def assemble_batch(
+    mech: MechanismArrays, design: Ints, goals: Floats, hold: bool, angles: Floats, gaps: Floats
+) -> None:
     """Close the loops of design[i] from rough angles[i] (in place), with the handle at goals[i] if `hold`.
 
     gaps  (N, k)  filled: what remains open of each loop [m]; all inf where the handle cannot be held there
     """
-    work = workspace(mech)
+    work = working_memory(mech)
     present, left = work.angles, work.gaps
     for i in range(design.size):
         for j in range(present.size):
@@ -144,14 +148,16 @@ def assemble_batch(mech: Arrays, design: Ints, goals: Floats, hold: bool, angles
         assemble(mech, design[i], goals[i], hold, present, work)
         for j in range(present.size):
             angles[i, j] = present[j]
-        missed = hold and largest(left, left.size) > ASSEMBLED * mech.size[design[i]]
+        missed = hold and largest_magnitude(left, left.size) > ASSEMBLY_TOLERANCE * mech.size[design[i]]
         for c in range(gaps.shape[1]):
             x, y, z = left[3 * c], left[3 * c + 1], left[3 * c + 2]
             gaps[i, c] = np.inf if missed else np.sqrt(x * x + y * y + z * z)
 
 
 @compiled_lean
-def assemble(mech: Arrays, design: int, goal: Floats, hold: bool, angles: Floats, work: Work) -> None:
+def assemble(
+    mech: MechanismArrays, design: int, goal: Floats, hold: bool, angles: Floats, work: WorkingMemory
+) -> None:
     """Close one design's loops, by Levenberg-Marquardt.
 
     The damping rows keep the step small while the start is rough, and let the handle go where it must when
@@ -164,7 +170,7 @@ def assemble(mech: Arrays, design: int, goal: Floats, hold: bool, angles: Floats
     for j in range(trial.size):
         trial[j] = angles[j]
     for _ in range(300):
-        place(mech, design, trial, work)
+        place_links(mech, design, trial, work)
         equations(mech, design, goal, work)
         trial_error = 0.0
         for r in range(count):
@@ -178,7 +184,7 @@ def assemble(mech: Arrays, design: int, goal: Floats, hold: bool, angles: Floats
             damping *= 10.0
             if damping > 1e3:
                 break
-            place(mech, design, angles, work)
+            place_links(mech, design, angles, work)
             equations(mech, design, goal, work)
         for u in range(m):
             for r in range(count):
@@ -188,10 +194,10 @@ def assemble(mech: Arrays, design: int, goal: Floats, hold: bool, angles: Floats
         for r in range(count + m):
             sides[0, r] = gaps[r] if r < count else 0.0
         least_squares(basis, work.triangle, sides, work.solution, m, count + m, 1)
-        if largest(work.solution[0], m) < 1e-15:
+        if largest_magnitude(work.solution[0], m) < 1e-15:
             break
         for j in range(trial.size):
             trial[j] = angles[j]
-        turn(mech, trial, work)
-    place(mech, design, angles, work)
+        apply_step(mech, trial, work)
+    place_links(mech, design, angles, work)
     equations(mech, design, goal, work)

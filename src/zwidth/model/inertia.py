@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from zwidth.compiled import compiled_lean
-from zwidth.model.arrays import Arrays
+from zwidth.model.forward_kinematics import WorkingMemory, link_point
 from zwidth.model.mechanism import Floats
-from zwidth.model.tree import Work, point
+from zwidth.model.mechanism_arrays import MechanismArrays
 
 
 @compiled_lean
-def unit_motions(mech: Arrays, work: Work) -> None:
+def unit_motions(mech: MechanismArrays, work: WorkingMemory) -> None:
     """Fill spin and speed: angular velocity of each link and velocity of its origin per unit rate of each
     drive.
 
@@ -36,7 +36,7 @@ def unit_motions(mech: Arrays, work: Work) -> None:
 
 
 @compiled_lean
-def handle_jacobian(work: Work, out: Floats, index: int) -> None:
+def handle_jacobian(work: WorkingMemory, out: Floats, index: int) -> None:
     """J = dh/dp, the handle's rows times the rates, into out[index] (3, d)."""
     rows, rates = work.rows, work.rates
     first = work.gaps.size - 3
@@ -49,7 +49,7 @@ def handle_jacobian(work: Work, out: Floats, index: int) -> None:
 
 
 @compiled_lean
-def mass_matrix(mech: Arrays, design: int, work: Work, out: Floats, index: int) -> None:
+def mass_matrix(mech: MechanismArrays, design: int, work: WorkingMemory, out: Floats, index: int) -> None:
     """Mass matrix of the links in the driven coordinates, B^T M B of thesis eq. B.19, into out[index] (d, d).
 
         M_st = sum_i m v_s . v_t + w_s . I w_t         with v at the centre of mass
@@ -64,7 +64,7 @@ def mass_matrix(mech: Arrays, design: int, work: Work, out: Floats, index: int) 
         for t in range(d):
             out[index, s, t] = 0.0
     for i in range(mass.shape[1]):
-        c = point(R, o, i, center, k, i)
+        c = link_point(R, o, i, center, k, i)
         rx, ry, rz = c[0] - o[i, 0], c[1] - o[i, 1], c[2] - o[i, 2]
         for s in range(d):
             wx, wy, wz = w[s, i, 0], w[s, i, 1], w[s, i, 2]

@@ -8,11 +8,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from zwidth.compiled import compiled
-from zwidth.model.arrays import Arrays
 from zwidth.model.closure import equations
-from zwidth.model.continuation import ASSEMBLED, assemble_batch
+from zwidth.model.continuation import ASSEMBLY_TOLERANCE, assemble_batch
+from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.mechanism import Floats, Mechanism
-from zwidth.model.tree import place, workspace
+from zwidth.model.mechanism_arrays import MechanismArrays
 
 NEGLIGIBLE: Final = 1e-6  # singular values below this part of the mechanism's size count as zero
 NEARBY: Final = 0.05  # how far the joints turn to configurations that are not special [rad]
@@ -26,7 +26,7 @@ class Misfit(NamedTuple):
     advice: str
 
 
-def check_mobility(mechanism: Mechanism, mech: Arrays, design: int, reference: Floats) -> str | None:
+def check_mobility(mechanism: Mechanism, mech: MechanismArrays, design: int, reference: Floats) -> str | None:
     """Why the assembly of the reference (n,) is singular throughout; None where its drives control the handle.
 
     A rank is judged at closed configurations near the reference and the largest counts: the reference may be
@@ -38,27 +38,29 @@ def check_mobility(mechanism: Mechanism, mech: Arrays, design: int, reference: F
     """
     rng = np.random.default_rng(0)
     near = reference + NEARBY * rng.uniform(-1.0, 1.0, (2, reference.size))
-    found = _misfit(mechanism, mech, design, [reference, *closed(mech, design, near)])
+    found = _misfit(mechanism, mech, design, [reference, *closed_configurations(mech, design, near)])
     if found is None:
         return None
     far = rng.uniform(-np.pi, np.pi, (ELSEWHERE, reference.size))
-    if all(_misfit(mechanism, mech, design, [angles]) for angles in closed(mech, design, far)):
+    if all(_misfit(mechanism, mech, design, [angles]) for angles in closed_configurations(mech, design, far)):
         raise ValueError(f"{found.reason}; {found.advice}")
     return found.reason
 
 
-def closed(mech: Arrays, design: int, rough: Floats) -> Floats:
+def closed_configurations(mech: MechanismArrays, design: int, rough: Floats) -> Floats:
     """Configurations (k, n) with closed loops from rough angles (N, n), k <= N; the handle goes where it must."""
     angles = np.zeros_like(rough)
     angles[:, mech.joint] = rough[:, mech.joint]
     gaps = np.zeros((len(angles), mech.a.size))
     goals = np.zeros((len(angles), 3))
     assemble_batch(mech, np.full(len(angles), design), goals, False, angles, gaps)
-    found: Floats = angles[gaps.max(axis=1, initial=0.0) <= ASSEMBLED * mech.size[design]]
+    found: Floats = angles[gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size[design]]
     return found
 
 
-def _misfit(mechanism: Mechanism, mech: Arrays, design: int, configurations: Sequence[Floats]) -> Misfit | None:
+def _misfit(
+    mechanism: Mechanism, mech: MechanismArrays, design: int, configurations: Sequence[Floats]
+) -> Misfit | None:
     rows = [constraints(mech, design, angles)[0] for angles in configurations]
     m, d, loops = mech.joint.size, mech.driven, 3 * mech.a.size
     size = float(mech.size[design])
@@ -81,11 +83,11 @@ def _misfit(mechanism: Mechanism, mech: Arrays, design: int, configurations: Seq
 
 
 @compiled
-def constraints(mech: Arrays, design: int, angles: Floats) -> tuple[Floats, Floats]:
+def constraints(mech: MechanismArrays, design: int, angles: Floats) -> tuple[Floats, Floats]:
     """d(closure gaps, handle)/d(unknowns), (m, 3k+3), passive joints first; and the gaps of the loops, then the
     handle's position, both negated, (3k+3,) [m]."""
-    work = workspace(mech)
-    place(mech, design, angles, work)
+    work = working_memory(mech)
+    place_links(mech, design, angles, work)
     equations(mech, design, work.goal, work)
     return work.rows, work.gaps
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -63,7 +63,7 @@ def natural_frequencies(plant: Plant) -> Floats:
     return np.sqrt(np.where(squared < 0.0, np.nan, squared)) / (2.0 * np.pi)
 
 
-def undeformed(plant: Plant) -> Floats:
+def least_deforming_motion(plant: Plant) -> Floats:
     """The motion (n,) of one metre at the sensor that deforms the plant least: the rigid one where the sensor
     reads it, else the static deflection under a force at the sensor."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)

@@ -13,7 +13,7 @@ from typing import Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.model.carried import seen_by
+from zwidth.model.motion_projection import project_onto_motions
 
 Floats = NDArray[np.float64]
 FrictionModel = Literal["coulomb", "dahl", "lugre"]
@@ -104,7 +104,7 @@ class Brake:
     time_constant: float = 0.0
 
 
-Part = TypeVar("Part", Friction, Counter, Spring, Brake)
+NonlinearElement = TypeVar("NonlinearElement", Friction, Counter, Spring, Brake)
 
 
 @dataclass(frozen=True)
@@ -125,14 +125,14 @@ class Nonlinear:
     def __bool__(self) -> bool:
         return bool(self.friction or self.counters or self.springs or self.brakes or isfinite(self.force_limit))
 
-    def seen(self, motions: Floats) -> Nonlinear:
+    def project(self, motions: Floats) -> Nonlinear:
         """As it works on motions (n, m), one in each column: what moves none of them is dropped."""
         return replace(
             self,
-            friction=_seen(self.friction, motions),
-            counters=_seen(self.counters, motions),
-            springs=_seen(self.springs, motions),
-            brakes=_seen(self.brakes, motions),
+            friction=_projected(self.friction, motions),
+            counters=_projected(self.counters, motions),
+            springs=_projected(self.springs, motions),
+            brakes=_projected(self.brakes, motions),
         )
 
     def padded(self, count: int) -> Nonlinear:
@@ -146,7 +146,7 @@ class Nonlinear:
         )
 
     @property
-    def left_out(self) -> tuple[str, ...]:
+    def kinds(self) -> tuple[str, ...]:
         """What a linear answer leaves out, in words."""
         found = {
             "dry friction": any(part.coulomb > 0.0 for part in self.friction),
@@ -159,10 +159,10 @@ class Nonlinear:
         return tuple(name for name, there in found.items() if there)
 
 
-def _seen(parts: tuple[Part, ...], motions: Floats) -> tuple[Part, ...]:
-    carried = [replace(part, along=seen_by(part.along, motions)) for part in parts]
+def _projected(parts: tuple[NonlinearElement, ...], motions: Floats) -> tuple[NonlinearElement, ...]:
+    carried = [replace(part, along=project_onto_motions(part.along, motions)) for part in parts]
     return tuple(part for part in carried if np.any(part.along))
 
 
-def _padded(parts: tuple[Part, ...], count: int) -> tuple[Part, ...]:
+def _padded(parts: tuple[NonlinearElement, ...], count: int) -> tuple[NonlinearElement, ...]:
     return tuple(replace(part, along=np.append(part.along, np.zeros(count))) for part in parts)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from zwidth.model.arguments import check_number, require
+from zwidth.model.argument_checks import check_number, require
 from zwidth.model.plant import Plant
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.model.arguments import check_number
+from zwidth.model.argument_checks import check_number
 from zwidth.model.nonlinear import Nonlinear
 
 Floats = NDArray[np.float64]

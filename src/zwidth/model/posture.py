@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.compiled import compiled
-from zwidth.model.arguments import require
-from zwidth.model.arrays import Arrays, pack, per_design
-from zwidth.model.batch import nowhere, solve
+from zwidth.model.argument_checks import require
 from zwidth.model.bias import bias_batch
-from zwidth.model.continuation import ASSEMBLED, OK, OUT_OF_REACH, SINGULAR, assemble_batch
+from zwidth.model.continuation import ASSEMBLY_TOLERANCE, OK, OUT_OF_REACH, SINGULAR, assemble_batch
+from zwidth.model.forward_kinematics import place_links, working_memory
+from zwidth.model.handle_position import arm_length, nearest_position, position_of_angles
 from zwidth.model.mechanism import Floats, Ints, Mechanism
+from zwidth.model.mechanism_arrays import MechanismArrays, pack, per_design
 from zwidth.model.mobility import check_mobility
-from zwidth.model.projection import arm_length, nearest_position, turned_position
+from zwidth.model.posture_batch import failed_batch, solve_batch
 from zwidth.model.roadmap import roadmap
-from zwidth.model.tree import place, workspace
 
 __all__ = [
     "OK",
@@ -122,7 +122,7 @@ def solve_posture(
     The assembly's approximate joint angles are closed onto the reference position; from there Newton is
     continued to the position without passing a singularity (`continuation`), along the straight line or by
     the roadmap of all postures of the assembly (`roadmap`). A position that the handle cannot have is projected
-    onto the nearest that it has (`projection`).
+    onto the nearest that it has (`handle_position`).
 
     position  (..., 3), or (..., 2) in the plane of the reference position [m]; it broadcasts with the leading
               axes of the mechanism's numbers
@@ -146,19 +146,19 @@ def solve_posture(
     reference, gaps = _references(mechanism, mech, name)
     if not designs:
         _check_loops(mechanism, mech, name, gaps[0])
-    closed = np.flatnonzero(gaps.max(axis=1, initial=0.0) <= ASSEMBLED * mech.size)
+    closed = np.flatnonzero(gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size)
     uncontrolled = check_mobility(mechanism, mech, int(closed[0]), reference[closed[0]]) if len(closed) else None
     if uncontrolled and not shape:
         raise _throughout(name, uncontrolled)
     singular = uncontrolled and not designs  # of several designs another may be in control
-    solved = nowhere(mech, len(goals)) if singular else solve(mech, design, reference, goals)
+    solved = failed_batch(mech, len(goals)) if singular else solve_batch(mech, design, reference, goals)
     near, projected = None, np.where(solved.status == OK, 0.0, np.nan)
     wanted = np.flatnonzero(solved.status == OUT_OF_REACH) if tolerance > 0.0 or not shape else ()
     for i in wanted:
         near = nearest_position(mech, int(design[i]), reference, goals[i])
         if near is None or np.linalg.norm(near - goals[i]) > tolerance * arm_length(mech, int(design[i])):
             continue
-        solved.put(np.array([i]), solve(mech, design[i : i + 1], reference, near[None]))
+        solved.overwrite(np.array([i]), solve_batch(mech, design[i : i + 1], reference, near[None]))
         goals[i], projected[i] = near, np.linalg.norm(near - goals[i])
     n, d = mech.parent.size, mech.driven
     posture = Posture(
@@ -189,7 +189,7 @@ def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Fl
     return roadmap(mech, 0, reference).position
 
 
-def _single(mechanism: Mechanism, name: str, otherwise: str) -> tuple[Arrays, Floats]:
+def _single(mechanism: Mechanism, name: str, otherwise: str) -> tuple[MechanismArrays, Floats]:
     """One design packed, and its reference posture (n,) in an assembly; `otherwise` is said of several designs."""
     if mechanism.design_shape:
         raise ValueError(otherwise)
@@ -215,7 +215,7 @@ def joint_position(mechanism: Mechanism, angles: Mapping[str, float], assembly: 
     if set(angles) != set(driven):
         raise ValueError(f"give the angle of every driven joint, {', '.join(driven)}; got {', '.join(angles)}")
     mech, reference = _single(mechanism, name, "postures are given by their joints for one design at a time")
-    found = turned_position(mech, reference, np.array([angles[joint] for joint in driven]))
+    found = position_of_angles(mech, reference, np.array([angles[joint] for joint in driven]))
     if found is None:
         told = ", ".join(f"{joint} = {angles[joint]:.6g} rad" for joint in driven)
         raise OutOfReach(
@@ -278,15 +278,15 @@ def link_points(mechanism: Mechanism, posture: Posture) -> LinkPoints:
 
 
 @compiled
-def _place_batch(mech: Arrays, design: Ints, angles: Floats, rotation: Floats, origin: Floats) -> None:
-    work = workspace(mech)
+def _place_batch(mech: MechanismArrays, design: Ints, angles: Floats, rotation: Floats, origin: Floats) -> None:
+    work = working_memory(mech)
     for i in range(design.size):
-        place(mech, design[i], angles[i], work)
+        place_links(mech, design[i], angles[i], work)
         rotation[i] = work.rotation
         origin[i] = work.origin
 
 
-def _references(mechanism: Mechanism, mech: Arrays, name: str) -> tuple[Floats, Floats]:
+def _references(mechanism: Mechanism, mech: MechanismArrays, name: str) -> tuple[Floats, Floats]:
     """Reference posture (P, n) of each design, and the gaps (P, k) left in its loops [m]."""
     angles = per_design(mechanism, np.asarray(mechanism.assemblies[name], dtype=np.float64), 1).copy()
     goals = per_design(mechanism, mechanism.reference_position, 1)
@@ -337,8 +337,8 @@ def _in_space(mechanism: Mechanism, position: ArrayLike) -> Floats:
     )
 
 
-def _check_loops(mechanism: Mechanism, mech: Arrays, name: str, gaps: Floats) -> None:
-    if gaps.size and gaps.max() > ASSEMBLED * mech.size[0]:
+def _check_loops(mechanism: Mechanism, mech: MechanismArrays, name: str, gaps: Floats) -> None:
+    if gaps.size and gaps.max() > ASSEMBLY_TOLERANCE * mech.size[0]:
         worst = int(gaps.argmax())
         raise LoopOpen(
             f"loop {mechanism.closures.names[worst]!r} does not close near the joint angles of assembly "

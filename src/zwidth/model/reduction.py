@@ -19,14 +19,14 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from zwidth.model.arguments import require
-from zwidth.model.carried import seen_by
-from zwidth.model.dampers import carried, winding_dampers, with_dampers
+from zwidth.model.argument_checks import require
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
-from zwidth.model.drive_parts import of_drives
-from zwidth.model.effective import EffectiveParameters, effective_parameters, unit_direction
+from zwidth.model.drive_nonlinearity import nonlinear_of_drives
+from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, unit_direction
+from zwidth.model.electrical_damping import add_dampers, project_dampers, winding_dampers
 from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.modes import undamped_modes
+from zwidth.model.motion_projection import project_onto_motions
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.posture import OK, Posture
@@ -34,7 +34,7 @@ from zwidth.model.posture import OK, Posture
 Model = Literal["full", "two-mass", "motor-mass", "rigid"]
 Encoders = Literal["motor", "link"]
 MODELS: Final = get_args(Model)
-TOGETHER: Final = 1e-6  # relative difference of two readings of a rigid motion that still counts as none
+READING_TOLERANCE: Final = 1e-6  # relative difference of two readings of a rigid motion that still counts as none
 
 
 class ModelError(ValueError):
@@ -80,13 +80,13 @@ def reduce_mechanism(
         raise DirectionError(f"the handle cannot move along the direction ({along}); choose one it can move along")
     full, electrical = _full(mechanism, posture.mass_matrix, h, damping, encoders)
     if model == "full":
-        return with_dampers(full, electrical)
+        return add_dampers(full, electrical)
     numbers = effective_parameters(mechanism, posture, u)
     if model == "rigid":
         slip = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0
         reduced = _rigid(float(numbers.rigid_mass), slip * float(numbers.rigid_mass))
     elif np.isfinite(numbers.stiffness):
-        reduced = _two_mass(mechanism.drives, numbers, h, damping, held=model == "motor-mass")
+        reduced = _two_mass(mechanism.drives, numbers, h, damping, link_fixed=model == "motor-mass")
     else:
         raise ModelError(
             f"model {model!r} needs a flexible drive in this direction and all are rigid; use 'rigid'"
@@ -94,8 +94,8 @@ def reduce_mechanism(
     if encoders == "motor" and not electrical and not full.nonlinear:
         return reduced
     motions = _motions(full, model)
-    read = replace(_read(reduced, full, motions), nonlinear=full.nonlinear.seen(motions))
-    return with_dampers(read, carried(electrical, motions))
+    with_sensor = replace(_with_sensor(reduced, full, motions), nonlinear=full.nonlinear.project(motions))
+    return add_dampers(with_sensor, project_dampers(electrical, motions))
 
 
 def reduce_plant(plant: Plant, model: Model) -> Plant:
@@ -126,14 +126,16 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
         mass, motion = _rigid_motion(plant)
         if plant.size == 1:
             return plant
-        return _carried(_held(_rigid(mass, _drag(plant, motion)), plant, motion), plant, model)
+        return _with_sensor_and_elements(
+            _with_handle(_rigid(mass, _drag(plant, motion)), plant, motion), plant, model
+        )
     stiffness, deflection = _spring(plant)
     assert plant.handle is not None  # _spring has checked
     link, motor = _mass_at(plant, plant.handle), _mass_at(plant, plant.actuator)
     pair = replace(_pair(link, motor, 0.0, stiffness), damping=_side_damping(plant, deflection))
     if model == "motor-mass":
         pair = _motor_mass(motor, float(pair.damping[1, 1]), stiffness)
-    return _carried(pair, plant, model)
+    return _with_sensor_and_elements(pair, plant, model)
 
 
 def plant_effective_parameters(plant: Plant) -> EffectiveParameters:
@@ -193,7 +195,7 @@ def _full(
     motors = np.eye(d, d + f)
     motors[flexible] = np.eye(d + f)[d:]
     links = np.eye(d, d + f)
-    parts = of_drives(drives, h, links, motors, motors if encoders == "motor" else links)
+    parts = nonlinear_of_drives(drives, h, links, motors, motors if encoders == "motor" else links)
     plant = Plant(M, B, K, actuator, sensor, handle, tuple(names), nonlinear=parts)
     return plant, winding_dampers(drives, motors)
 
@@ -206,7 +208,9 @@ def _full_damping(M: Floats, K: Floats, D: Floats, damper: Floats, damping: Damp
     return np.asarray(D.T @ (damper[:, None] * D))
 
 
-def _two_mass(drives: Drives, numbers: EffectiveParameters, h: Floats, damping: Damping, *, held: bool) -> Plant:
+def _two_mass(
+    drives: Drives, numbers: EffectiveParameters, h: Floats, damping: Damping, *, link_fixed: bool
+) -> Plant:
     """Two masses and their spring; with the link side held fixed only the motor side, with the same damper.
 
     modal         b = 2 zeta sqrt(k mu),  mu = m1 m2 / (m1 + m2), so that the mode of the pair has the ratio
@@ -222,7 +226,7 @@ def _two_mass(drives: Drives, numbers: EffectiveParameters, h: Floats, damping: 
     else:
         _, spring, damper = _at_joint(drives)
         b = float(np.sum(damper * (k * h / spring) ** 2))
-    plant = _motor_mass(m2, b, k) if held else _pair(m1, m2, b, k)
+    plant = _motor_mass(m2, b, k) if link_fixed else _pair(m1, m2, b, k)
     return replace(plant, damping=plant.damping + slip * plant.mass)
 
 
@@ -276,7 +280,7 @@ def _rigid_motion(plant: Plant) -> tuple[float, Floats]:
     participation = Z.T @ plant.actuator
     mobility = float(participation @ participation)
     whole = float(plant.actuator @ np.linalg.solve(plant.mass, plant.actuator))
-    if not mobility > TOGETHER**2 * whole:
+    if not mobility > READING_TOLERANCE**2 * whole:
         raise ModelError(
             "the plant has no rigid mode that the actuator moves: a spring ties it to the ground; use 'full'"
         )
@@ -324,51 +328,53 @@ def _motions(plant: Plant, model: Model) -> Floats:
     return both[:, 1:] if model == "motor-mass" else both
 
 
-def _carried(reduced: Plant, plant: Plant, model: Model) -> Plant:
+def _with_sensor_and_elements(reduced: Plant, plant: Plant, model: Model) -> Plant:
     """The reduced plant with the sensor, the lagged dampers and what is not linear of the one it stands for."""
     if not plant.lagged_dampers and not plant.nonlinear and np.array_equal(plant.sensor, plant.actuator):
         return reduced
     motions = _motions(plant, model)
-    read = _read(reduced, plant, motions)
-    parts = _parts(read, plant, motions)
-    return with_dampers(replace(read, nonlinear=parts), carried(plant.lagged_dampers, motions))
+    read = _with_sensor(reduced, plant, motions)
+    parts = _reduced_nonlinear(read, plant, motions)
+    return add_dampers(replace(read, nonlinear=parts), project_dampers(plant.lagged_dampers, motions))
 
 
-def _parts(reduced: Plant, plant: Plant, motions: Floats) -> Nonlinear:
+def _reduced_nonlinear(reduced: Plant, plant: Plant, motions: Floats) -> Nonlinear:
     """What is not linear, as the motions move it. A single counter, of the whole reading, counts the reduced
     sensor, which is known where springs tie the plant to the ground, too; what several count there is not."""
-    found, counters = plant.nonlinear.seen(motions), plant.nonlinear.counters
+    found, counters = plant.nonlinear.project(motions), plant.nonlinear.counters
     if len(counters) == 1 and np.array_equal(counters[0].weight * counters[0].along, plant.sensor):
         return replace(found, counters=(replace(counters[0], along=reduced.sensor / counters[0].weight),))
-    told = sum((part.weight * part.along for part in found.counters), np.zeros(reduced.size))
-    if counters and not np.allclose(told, reduced.sensor, rtol=0.0, atol=TOGETHER * np.max(np.abs(told))):
+    summed_reading = sum((part.weight * part.along for part in found.counters), np.zeros(reduced.size))
+    if counters and not np.allclose(
+        summed_reading, reduced.sensor, rtol=0.0, atol=READING_TOLERANCE * np.max(np.abs(summed_reading))
+    ):
         raise ModelError("the plant is tied to the ground, and what encoders count of two masses is not known")
     return found
 
 
-def _held(reduced: Plant, plant: Plant, motion: Floats) -> Plant:
+def _with_handle(reduced: Plant, plant: Plant, motion: Floats) -> Plant:
     """The rigid model held where the plant is: at what its rigid motion moves the handle by."""
     if plant.handle is None:
         return reduced
     share = float(plant.handle @ motion)
-    near = abs(share - 1.0) <= TOGETHER
+    near = abs(share - 1.0) <= READING_TOLERANCE
     return reduced if near else replace(reduced, handle=np.array([share]) if share else None)
 
 
-def _read(reduced: Plant, plant: Plant, motions: Floats) -> Plant:
+def _with_sensor(reduced: Plant, plant: Plant, motions: Floats) -> Plant:
     """The reduced plant's sensor: where the wall acts, where the hand is, or what the motions move it by."""
     if np.array_equal(plant.sensor, plant.actuator):
         return reduced
-    seen = seen_by(plant.sensor, motions)
+    sensor = project_onto_motions(plant.sensor, motions)
     if reduced.size > 1 and plant.handle is not None and np.array_equal(plant.sensor, plant.handle):
-        seen = reduced.handle if reduced.handle is not None else seen
-    elif not abs(plant.actuator @ motions[:, -1] - 1.0) <= TOGETHER:
+        sensor = reduced.handle if reduced.handle is not None else sensor
+    elif not abs(plant.actuator @ motions[:, -1] - 1.0) <= READING_TOLERANCE:
         raise ModelError(
             "the plant is tied to the ground, and what the sensor reads of two masses is not known; use 'full'"
         )
-    if not np.any(seen):
+    if not np.any(sensor):
         raise ModelError("the sensor reads nothing of what moves in this model; use 'full'")
-    return replace(reduced, sensor=seen)
+    return replace(reduced, sensor=sensor)
 
 
 def _spring(plant: Plant) -> tuple[float, Floats]:
@@ -382,12 +388,12 @@ def _spring(plant: Plant) -> tuple[float, Floats]:
     between = shapes.T @ (plant.actuator - plant.handle)
     scale = np.linalg.norm(shapes.T @ plant.actuator)
     rigid = squared == 0.0
-    if np.linalg.norm(between[rigid]) > TOGETHER * scale:
+    if np.linalg.norm(between[rigid]) > READING_TOLERANCE * scale:
         raise ModelError(
             "actuator and handle do not move together when the plant moves without deflection, "
             "so that no spring joins them; check `actuator` and `handle`, or use 'full'"
         )
-    if not np.linalg.norm(between[~rigid]) > TOGETHER * scale:
+    if not np.linalg.norm(between[~rigid]) > READING_TOLERANCE * scale:
         raise ModelError("nothing flexible lies between actuator and handle of the plant; use 'rigid'")
     flexible = between[~rigid] / squared[~rigid]
     compliance = float(between[~rigid] @ flexible)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
-from zwidth.model.effective import EffectiveParameters, effective_parameters, inverse_form
+from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, inverse_form
 from zwidth.model.mechanism import Drives, Mechanism
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import Encoders, Model
@@ -32,13 +32,13 @@ Floats = NDArray[np.float64]
 class RenderedModes:
     """Modes xi'' + 2 a xi' + w^2 xi = input f,  y = sum output xi, as in `modes.RealModes`; N postures, m modes.
 
-    decay    (N, m)  a [1/s]
-    squared  (N, m)  w^2 [1/s^2]; 0 for the free motion
+    decay              (N, m)  a [1/s]
+    frequency_squared  (N, m)  w^2 [1/s^2]; 0 for the free motion
     input, output  (N, m)  [kg^-1/2]; nan where a posture is not OK or the handle cannot move along the direction
     """
 
     decay: Floats
-    squared: Floats
+    frequency_squared: Floats
     input: Floats
     output: Floats
 

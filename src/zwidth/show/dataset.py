@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 HEADER: Final = 116  # bytes of text that a MAT file begins with
-LONGEST: Final = 63  # letters of a name in MATLAB
+LONGEST_NAME: Final = 63  # letters of a name in MATLAB
 
 
 def write_dataset(path: Path, dataset: xr.Dataset) -> None:
@@ -72,9 +72,9 @@ def _netcdf(draft: Path, dataset: xr.Dataset) -> None:
 def _matlab(draft: Path, dataset: xr.Dataset) -> None:
     from scipy.io import savemat
 
-    arrays: dict[str, Any] = {_named(str(name)): _cells(v.values) for name, v in dataset.variables.items()}
+    arrays: dict[str, Any] = {_matlab_name(str(name)): _cells(v.values) for name, v in dataset.variables.items()}
     about = {
-        _named(str(name)): _struct({"axes": " ".join(map(str, v.dims)), **v.attrs})
+        _matlab_name(str(name)): _struct({"axes": " ".join(map(str, v.dims)), **v.attrs})
         for name, v in dataset.variables.items()
     }
     arrays |= {"about": _struct(dataset.attrs), "about_variables": about}
@@ -84,15 +84,15 @@ def _matlab(draft: Path, dataset: xr.Dataset) -> None:
 
 
 def _struct(attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    return {_named(str(key)): value for key, value in attributes.items()}
+    return {_matlab_name(str(key)): value for key, value in attributes.items()}
 
 
-def _named(name: str) -> str:
+def _matlab_name(name: str) -> str:
     """A name that MATLAB takes."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     plain = plain if plain[:1].isalpha() else f"n_{plain}"
-    if len(plain) > LONGEST:
-        raise OutputError(f"{name}: is too long a name for MATLAB, which takes {LONGEST} letters; write .nc")
+    if len(plain) > LONGEST_NAME:
+        raise OutputError(f"{name}: is too long a name for MATLAB, which takes {LONGEST_NAME} letters; write .nc")
     return plain
 
 

@@ -21,26 +21,26 @@ class OutputError(Exception):
     """A file, or standard output, cannot be written; the text says which, why, and what to do."""
 
 
-def plain(value: Any) -> Any:
+def json_value(value: Any) -> Any:
     """The value as JSON's own types: arrays become lists, and what is not finite null.
 
-    >>> plain({"radius": float("nan"), "box": (0.0, 1.0)})
+    >>> json_value({"radius": float("nan"), "box": (0.0, 1.0)})
     {'radius': None, 'box': [0.0, 1.0]}
     """
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): plain(inner) for key, inner in value.items()}
+        return {str(key): json_value(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(inner) for inner in value]
+        return [json_value(inner) for inner in value]
     if hasattr(value, "tolist"):  # a NumPy array or number, known without importing NumPy
-        return plain(value.tolist())
+        return json_value(value.tolist())
     return value
 
 
 def json_text(document: Mapping[str, Any]) -> str:
     """One strict JSON object, each of its keys on a line of its own."""
-    items = plain(document).items()
+    items = json_value(document).items()
     lines = [f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in items]
     return "{\n" + ",\n".join(lines) + "\n}\n" if lines else "{}\n"
 
@@ -50,7 +50,7 @@ def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
 
     columns  name -> values (k,), all of one length
     """
-    rows = zip(*(plain(values) for values in columns.values()), strict=True)
+    rows = zip(*(json_value(values) for values in columns.values()), strict=True)
     return "".join(",".join(map(_cell, row)) + "\n" for row in [tuple(columns), *rows])
 
 
@@ -70,7 +70,7 @@ def destination(file: str | os.PathLike[str], kinds: Collection[str]) -> Path:
     ending = Path(name).suffix.lower()
     if ending not in kinds:
         other = f"{ending} is for maps and sweeps: the name " if ending in ARRAYS else ""
-        raise OutputError(f"{shown(name)}: {other}must end in {' or '.join(kinds)}")
+        raise OutputError(f"{printable(name)}: {other}must end in {' or '.join(kinds)}")
     try:
         path = Path(os.path.realpath(name))
         _check_place(path, name)
@@ -84,15 +84,15 @@ def destination(file: str | os.PathLike[str], kinds: Collection[str]) -> Path:
 
 def _check_place(path: Path, name: str) -> None:
     if path.suffix.lower() in FOLDERS and path.exists():
-        raise OutputError(f"{shown(name)}: is there already; remove it, or name another")
+        raise OutputError(f"{printable(name)}: is there already; remove it, or name another")
     if path.is_dir():
-        raise OutputError(f"{shown(name)}: is a directory; name a file in it")
+        raise OutputError(f"{printable(name)}: is a directory; name a file in it")
     if not path.parent.is_dir():
-        raise OutputError(f"{shown(name)}: there is no folder {shown(str(path.parent))}; make it first")
+        raise OutputError(f"{printable(name)}: there is no folder {printable(str(path.parent))}; make it first")
     if path.exists() and not path.is_file():
-        raise OutputError(f"{shown(name)}: is no ordinary file; name another")
+        raise OutputError(f"{printable(name)}: is no ordinary file; name another")
     if path.exists() and not os.access(path, os.W_OK):
-        raise OutputError(f"{shown(name)}: cannot be written: permission denied; name another file")
+        raise OutputError(f"{printable(name)}: cannot be written: permission denied; name another file")
 
 
 @contextmanager
@@ -124,7 +124,7 @@ def write_data(path: Path, document: Mapping[str, Any], table: Mapping[str, Sequ
     write_text(path, json_text(document) if path.suffix.lower() == ".json" else csv_text(table))
 
 
-def shown(text: str) -> str:
+def printable(text: str) -> str:
     """Text from outside with everything unprintable made visible, so that it stays on its line."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "replace").decode() for c in text)
 
@@ -135,4 +135,6 @@ def _beside(path: Path) -> Path:
 
 def _failed(name: str, error: Exception) -> OutputError:
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return OutputError(f"{shown(name)}: cannot be written: {reason[:1].lower() + reason[1:]}; name another file")
+    return OutputError(
+        f"{printable(name)}: cannot be written: {reason[:1].lower() + reason[1:]}; name another file"
+    )

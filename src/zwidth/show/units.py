@@ -2,8 +2,8 @@
 
 What is computed has four significant digits, rounded to nearest, limits too: whoever renders a wall at its limit
 has no margin, and a pair of stiffness and damping promises nothing however it is rounded. What somebody chose
-stays as it was written (`given`), an error has two digits (`uncertain`), a spectral radius four of its distance
-from 1.
+stays as it was written (`as_written`), an error has two digits (`uncertain`), a spectral radius four of its
+distance from 1.
 
 Figures and reports use `quantity`, `number`, `percent` and `point`; terminals `amount` and `vector`, the same
 notation with blanks and signs that can be typed and searched (`typed`).
@@ -135,10 +135,10 @@ def quantity(value: float, unit: str) -> str:
     return f"{number(rounded / 10.0**exponent)}{SPACE}{PREFIXES[exponent]}{unit}".strip()
 
 
-def given(value: float, unit: str = "") -> str:
+def as_written(value: float, unit: str = "") -> str:
     """A number that somebody chose, as short as it was written: 1.25 ms, 0.03 kg.
 
-    >>> given(0.00125, "s"), given(0.03, "kg"), given(1000.0, "Hz")
+    >>> as_written(0.00125, "s"), as_written(0.03, "kg"), as_written(1000.0, "Hz")
     ('1.25\xa0ms', '0.03\xa0kg', '1\xa0kHz')
     """
     exponent = _prefixed(value, unit)

@@ -1,19 +1,20 @@
 from .common_area import common_area as common_area
 from .experiment import measure_boundary as measure_boundary
 from .experiment_plan import Plan as Plan
+from .map import workspace_map as workspace_map
 from .map_data import map_document as map_document
 from .map_data import map_table as map_table
 from .measured_boundary import Experiment as Experiment
-from .plane import plane_of as plane_of
+from .plane_grid import plane_of as plane_of
 from .points_file import PointsError as PointsError
 from .points_file import read_points as read_points
 from .points_file import read_walls as read_walls
 from .requirement import parse_requirement as parse_requirement
 from .robust import RobustError as RobustError
+from .robust import RobustStudy as RobustStudy
 from .robust import robust_study as robust_study
 from .robust_family import Family as Family
 from .robust_family import Range as Range
-from .robust_study import RobustStudy as RobustStudy
 from .sensitivity import sensitivities as sensitivities
 from .sensitivity_result import Sensitivities as Sensitivities
 from .store import Store as Store
@@ -27,4 +28,3 @@ from .validity import validity as validity
 from .what_if import Variant as Variant
 from .what_if import limiting_change as limiting_change
 from .what_if import what_if as what_if
-from .workspace import workspace_map as workspace_map

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from zwidth.measures.measure import Spelling, as_argument
+from zwidth.measures.definition import Spelling, as_argument
 
 
 @dataclass(frozen=True)

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.device.faults import listed, nearest
+from zwidth.device.faults import comma_list, nearest
 from zwidth.measures.catalogue import find_measure
-from zwidth.measures.measure import FAILED, NO_VALUE, OK, Measure, Measured
+from zwidth.measures.definition import FAILED, NO_VALUE, OK, Measure, MeasureValues
 from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
-from zwidth.model.arguments import refusal
+from zwidth.model.argument_checks import wrong_type
 from zwidth.study.workspace_summary import CONDITIONS
 
 if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
 
 # What is said of it in a figure; does it keep the measure's unit?
-OVER: Final[dict[str, tuple[str, bool]]] = {
+STATISTICS: Final[dict[str, tuple[str, bool]]] = {
     "average": ("average", True),
     "worst": ("worst", True),
     "best": ("best", True),
@@ -39,31 +39,35 @@ OF: Final = {"conditioning_index": CONDITIONS, "isotropy_index": ("isotropy",)} 
 class Column:
     """What a study asks of each design.
 
-    name     as written: "stiffness_max", "worst(isotropy)"
-    measure  the one asked cell by cell
-    over     what is made of its values over the workspace; None: asked at the operating point
+    name       as written: "stiffness_max", "worst(isotropy)"
+    measure    the one asked cell by cell
+    statistic  what is made of its values over the workspace; None: asked at the operating point
     """
 
     name: str
     measure: Measure
-    over: str | None = None
+    statistic: str | None = None
 
     @property
     def unit(self) -> str:
         """Of its values; "" for none."""
-        return self.measure.unit if self.over is None or OVER[self.over][1] else ""
+        return self.measure.unit if self.statistic is None or STATISTICS[self.statistic][1] else ""
 
     @property
     def title(self) -> str:
         """What it is called in a figure."""
-        return self.measure.title if self.over is None else f"{self.measure.title}, {OVER[self.over][0]}"
+        return (
+            self.measure.title
+            if self.statistic is None
+            else f"{self.measure.title}, {STATISTICS[self.statistic][0]}"
+        )
 
     @property
     def better(self) -> str | None:
         """What a designer wants: "higher", "lower", or None where that depends."""
-        if self.over is None or OVER[self.over][1]:
+        if self.statistic is None or STATISTICS[self.statistic][1]:
             return self.measure.better
-        return "lower" if self.over == "variation" else "higher"
+        return "lower" if self.statistic == "variation" else "higher"
 
     @property
     def key(self) -> str:
@@ -72,76 +76,86 @@ class Column:
         >>> column_named("worst(stiffness_max)").key
         'worst_stiffness_max_N_per_m'
         """
-        if self.over is None:
+        if self.statistic is None:
             return self.measure.key
-        return f"{self.over}_{self.measure.key if self.unit or not self.measure.unit else self.measure.name}"
+        return f"{self.statistic}_{self.measure.key if self.unit or not self.measure.unit else self.measure.name}"
 
-    def reduced(
-        self, found: Measured, point: OperatingPoint, weights: NDArray[np.float64] | None = None
+    def reduce(
+        self, found: MeasureValues, point: OperatingPoint, weights: NDArray[np.float64] | None = None
     ) -> tuple[float, int, str]:
         """Value, status and reason of this design, from the measure's values over its workspace.
 
         weights  what each cell stands for; None: all alike
         Cells without a value do not count; where none has one, their commonest status is the design's.
         """
-        assert self.over is not None
+        assert self.statistic is not None
         try:
-            if self.over == "conditioning_index":
+            if self.statistic == "conditioning_index":
                 value = global_conditioning_index(found.values, found.status, weights)
-            elif self.over == "isotropy_index":
+            elif self.statistic == "isotropy_index":
                 value = global_isotropy_index(point.jacobian, found.status, len(point.drives.names))
             else:
                 whole = overall(found.values, found.status, weights, self.measure.better)
-                value = float(getattr(whole, self.over))
+                value = float(getattr(whole, self.statistic))
         except ValueError as error:
             return float("nan"), FAILED, str(error)
         if not np.isnan(value):
             return value, OK, ""
         if (found.status == OK).any():
-            return value, NO_VALUE, f"has no {self.over} here"
+            return value, NO_VALUE, f"has no {self.statistic} here"
         kinds, counts = np.unique(found.status, return_counts=True)
         status = int(kinds[np.argmax(counts)])
         return value, status, next((note.reason for note in found.notes if note.status == status), "")
 
 
-def column_named(name: str, own: Mapping[str, Measure] | None = None) -> Column:
+def column_named(name: str, user_measures: Mapping[str, Measure] | None = None) -> Column:
     """The column of a name, such as "isotropy" or "average(isotropy)".
 
-    own     measures of a user's own, by name
-    Raises  ValueError  naming the nearest, where there is none
+    user_measures  measures of a user's own, by name
+    Raises         ValueError  naming the nearest, where there is none
 
     >>> column_named("average(isotropy)").measure.name
     'isotropy'
     """
     parts = re.fullmatch(r"\s*(\w+)\s*\(\s*([^()]*?)\s*\)\s*", name)
     if parts is None:
-        measure = find_measure(name.strip(), own)
+        measure = find_measure(name.strip(), user_measures)
         return Column(measure.name, measure)
     over, inner = parts.groups()
-    if over not in OVER:
-        near = nearest(over, OVER)
-        hint = f"did you mean {near}({inner})?" if near else f"there are {listed(list(OVER))}"
+    if over not in STATISTICS:
+        near = nearest(over, STATISTICS)
+        hint = f"did you mean {near}({inner})?" if near else f"there are {comma_list(list(STATISTICS))}"
         raise ValueError(f"{over} is nothing that is made of a measure over a workspace; {hint}")
-    measure = find_measure(inner, own)
+    measure = find_measure(inner, user_measures)
     if over in JUDGING and measure.better is None:
         raise ValueError(
             f"{over}({measure.name}): whether more of it is better depends; ask for average({measure.name})"
         )
     if measure.name not in OF.get(over, (measure.name,)):
-        raise ValueError(f"{over}({measure.name}): is of {listed(OF[over])} only; ask for average({measure.name})")
+        raise ValueError(
+            f"{over}({measure.name}): is of {comma_list(OF[over])} only; ask for average({measure.name})"
+        )
     return Column(f"{over}({measure.name})", measure, over)
 
 
-def measures_listed(measures: Any) -> list[str | Measure]:
+def measure_list(measures: Any) -> list[str | Measure]:
     """One measure or several, by name or themselves, as a list. Raises TypeError for anything else.
 
-    >>> measures_listed("isotropy")
+    >>> measure_list("isotropy")
     ['isotropy']
     """
     listed = [measures] if isinstance(measures, str | Measure) else measures
     if not isinstance(listed, list | tuple):
-        raise refusal("measures", "a name, a Measure or a list of them", measures)
+        raise wrong_type("measures", "a name, a Measure or a list of them", measures)
     for one in listed:
         if not isinstance(one, str | Measure):
-            raise refusal("measures", "a name, a Measure or a list of them", one)
+            raise wrong_type("measures", "a name, a Measure or a list of them", one)
     return list(listed)
+
+
+def unit_attributes(unit: str) -> dict[str, str]:
+    """A variable's unit under the names by which datasets state it; no attribute where it has none.
+
+    xarray labels the axes of its plots by either name, and would write [] for an empty one.
+    """
+    return {"unit": unit, "units": unit} if unit else {}

@@ -1,14 +1,15 @@
 """Where several requirements are met at once (thesis Fig. 5.4), and how large that area is.
 
 Between the cells of a map each margin is interpolated linearly, and its zero line cuts the workspace: an error of
-the second order in the step. A cell without a value takes what touches it out of the region, so that the edge of
-reach is followed in steps and half steps of the grid, an error of the first order.
+the second order in the step. Where the links' lengths decide what is reached (`study.reach_outline`), regions end
+at that true edge. Elsewhere, and about cells without a value, a cell takes what touches it out of the region, so
+that the edge is followed in steps and half steps of the grid, an error of the first order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.result import Result
+from zwidth.study.map import measures_of, reachable
+from zwidth.study.reach_outline import continued, reach_outline
 from zwidth.study.requirement import Requirement
-from zwidth.study.workspace import measures_of, reachable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,6 +55,7 @@ class CommonArea(Result):
     reach    what can be reached
     regions  where each requirement is met, in their order
     common   where all are
+    circumstances  what the map states of its device, by the keys of its document
     """
 
     requirements: tuple[Requirement, ...]
@@ -61,6 +64,7 @@ class CommonArea(Result):
     reach: PlaneArea
     regions: tuple[PlaneArea, ...]
     common: PlaneArea
+    circumstances: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         required = ", ".join(one.text for one in self.requirements)
@@ -105,7 +109,7 @@ class CommonArea(Result):
 def common_area(dataset: xr.Dataset, requirements: Sequence[Requirement]) -> CommonArea:
     """The regions of a map in which requirements are met, and the region that they have in common.
 
-    dataset  a map (`study.workspace`) that holds the measure of each requirement
+    dataset  a map (`study.map`) that holds the measure of each requirement
     Raises   ValueError  for no requirement, or one of a measure that the map does not hold
     """
     if not requirements:
@@ -114,35 +118,54 @@ def common_area(dataset: xr.Dataset, requirements: Sequence[Requirement]) -> Com
     if missing:
         raise ValueError(f"the map does not hold {missing[0]}; it holds {', '.join(measures_of(dataset))}")
     x, y = dataset["x_m"].values, dataset["y_m"].values
-    reached = filled(x, y, np.where(reachable(dataset, requirements[0].measure.name), 1.0, np.nan))
-    shapes = [filled(x, y, r.margin(dataset[r.measure.name].values)) for r in requirements]
+    first = requirements[0].measure.name
+    outline = reach_outline(dataset, first)
+    if outline is None:
+        reachable_shape = nonnegative_region(x, y, np.where(reachable(dataset, first), 1.0, np.nan))
+        shapes = [nonnegative_region(x, y, r.margin(dataset[r.measure.name].values)) for r in requirements]
+    else:
+        reachable_shape = outline
+        shapes = [nonnegative_region(x, y, _continued_margin(dataset, r)) & outline for r in requirements]
     common = shapes[0]
     for shape in shapes[1:]:
         common = common.intersection(shape)
-    whole = float(reached.area)
+    reachable_area = float(reachable_shape.area)
 
     def region(shape: Any) -> PlaneArea:
         area = float(shape.area)
-        return PlaneArea(shape, area, area / whole if whole > 0.0 else np.nan)
+        return PlaneArea(shape, area, area / reachable_area if reachable_area > 0.0 else np.nan)
 
     return CommonArea(
         requirements=tuple(requirements),
-        units=tuple(str(dataset[r.measure.name].attrs["unit"]) for r in requirements),
+        units=tuple(str(dataset[r.measure.name].attrs.get("unit", "")) for r in requirements),
         axes=(str(dataset["x_m"].attrs["long_name"]), str(dataset["y_m"].attrs["long_name"])),
-        reach=region(reached),
+        reach=region(reachable_shape),
         regions=tuple(map(region, shapes)),
         common=region(common),
+        circumstances=_circumstances(dataset),
     )
 
 
-def filled(x: Floats, y: Floats, margin: Floats) -> Any:
+def _circumstances(dataset: xr.Dataset) -> dict[str, Any]:
+    """What the map states of its device, plane and computer, for figures to repeat."""
+    keys = ("name", "assembly", "model", "operator", "direction", "plane", "plane_through_m")
+    return {key: dataset.attrs[key] for key in keys if key in dataset.attrs}
+
+
+def _continued_margin(dataset: xr.Dataset, requirement: Requirement) -> Floats:
+    """A requirement's margin (ny, nx), continued beyond the edge of reach."""
+    name = requirement.measure.name
+    return continued(requirement.margin(dataset[name].values), dataset[f"{name}_status"].values)
+
+
+def nonnegative_region(x: Floats, y: Floats, margin: Floats) -> Any:
     """Where an interpolated margin is 0 or more, as a shapely geometry.
 
     x, y    (nx,), (ny,)  ascending
     margin  (ny, nx)      nan: no value, and no part of the region; infinities lie far on their side
 
     >>> grid = np.linspace(-1.0, 1.0, 41)
-    >>> round(filled(grid, grid, 0.25 - grid**2 - grid[:, None] ** 2).area, 2)      # pi/4
+    >>> round(nonnegative_region(grid, grid, 0.25 - grid**2 - grid[:, None] ** 2).area, 2)      # pi/4
     0.78
     """
     import contourpy

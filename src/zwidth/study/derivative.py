@@ -23,7 +23,7 @@ class Derivative:
     error: float
 
 
-def central_derivative(of: Callable[[float], float], at: float, scale: float) -> Derivative:
+def central_derivative(function: Callable[[float], float], at: float, scale: float) -> Derivative:
     """Derivative of a smooth function of order one by central differences, extrapolated to step 0.
 
         D(h) = (f(x + h) - f(x - h)) / 2 h = f' + c2 h^2 + c4 h^4 + ...
@@ -39,7 +39,7 @@ def central_derivative(of: Callable[[float], float], at: float, scale: float) ->
     >>> abs(central_derivative(exp, 0.0, 1.0).value - 1.0) < 1e-11
     True
     """
-    return _extrapolated(lambda h: (of(at + h) - of(at - h)) / (2.0 * h), scale, 4.0)
+    return _extrapolate(lambda h: (function(at + h) - function(at - h)) / (2.0 * h), scale, 4.0)
 
 
 def one_sided_derivative(of: Callable[[float], float], at: float, scale: float, side: int) -> Derivative:
@@ -52,10 +52,10 @@ def one_sided_derivative(of: Callable[[float], float], at: float, scale: float, 
     0.5
     """
     start = of(at)
-    return _extrapolated(lambda h: side * (of(at + side * h) - start) / h, scale, 2.0)
+    return _extrapolate(lambda h: side * (of(at + side * h) - start) / h, scale, 2.0)
 
 
-def _extrapolated(quotient: Callable[[float], float], scale: float, factor: float) -> Derivative:
+def _extrapolate(quotient: Callable[[float], float], scale: float, factor: float) -> Derivative:
     """The best of the tables that begin with each first step, as far as they are needed."""
     best = _table(quotient, FIRST[0] * scale, scale, factor)
     for first in FIRST[1:]:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.definition import OK, Measure, MeasureValues
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.measure import OK, Measure, Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -36,7 +36,7 @@ class DirectionSearch:
     basis: Floats
     one_sided: bool
 
-    def asked(self, which: Ints, components: Floats) -> Measured:
+    def evaluate_along(self, which: Ints, components: Floats) -> MeasureValues:
         """The measure in points `which` (k,), along directions of these components (k, r) in each one's basis."""
         parts = []
         for first in range(0, max(1, len(which)), ROWS):
@@ -45,7 +45,7 @@ class DirectionSearch:
             parts.append(evaluate(self.measure, there.towards(self.directions(which[rows], components[rows]))))
         if len(parts) == 1:
             return parts[0]
-        return Measured(
+        return MeasureValues(
             np.concatenate([part.values for part in parts]),
             np.concatenate([part.status for part in parts]),
             tuple(note for part in parts for note in part.notes),
@@ -65,10 +65,10 @@ def direction_searches(measure: Measure, point: OperatingPoint) -> Iterator[tupl
     left, speeds, _ = np.linalg.svd(point.jacobian[ok])
     freedom = (speeds > STILL * speeds[:, :1]).sum(axis=1)
     for r in np.unique(freedom):
-        mine = np.flatnonzero(freedom == r)
-        some = point[ok[mine]]
-        basis = left[mine][:, :, :r]
-        yield ok[mine], DirectionSearch(measure, some, basis, _one_sided(measure, some, basis))
+        indices = np.flatnonzero(freedom == r)
+        some = point[ok[indices]]
+        basis = left[indices][:, :, :r]
+        yield ok[indices], DirectionSearch(measure, some, basis, _one_sided(measure, some, basis))
 
 
 def _one_sided(measure: Measure, point: OperatingPoint, basis: Floats) -> bool:
@@ -77,8 +77,8 @@ def _one_sided(measure: Measure, point: OperatingPoint, basis: Floats) -> bool:
     which = np.unique(np.linspace(0, n - 1, min(n, TRIED)).astype(np.int64))
     like_no_other = np.broadcast_to(np.array([0.5403, 0.8415, 0.3907])[:r], (len(which), r))
     search = DirectionSearch(measure, point, basis, one_sided=False)
-    there = search.asked(which, like_no_other).values
-    back = search.asked(which, -like_no_other).values
+    there = search.evaluate_along(which, like_no_other).values
+    back = search.evaluate_along(which, -like_no_other).values
     with np.errstate(invalid="ignore"):
         apart = np.abs(there - back) > SAME * np.maximum(np.abs(there), np.abs(back))
     return bool((apart | (np.isnan(there) != np.isnan(back))).any())

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.definition import Measure, MeasureError
 from zwidth.measures.evaluate import NO_MECHANISM
-from zwidth.measures.measure import Measure, MeasureError
 from zwidth.study.direction_search import DirectionSearch, Floats, Ints, direction_searches
 from zwidth.study.requirement import Requirement
 
@@ -29,7 +29,7 @@ CHUNK: Final = 2048  # points at once
 
 
 @dataclass(frozen=True)
-class Share:
+class ShareOfDirections:
     """A function of points: which share of their directions meets a requirement."""
 
     requirement: Requirement
@@ -49,7 +49,7 @@ def share_measure(requirement: Requirement) -> Measure:
         unit="",
         better="higher",
         source=f"{measure.title.lower()} over the directions that the handle can move in; {measure.source}",
-        function=Share(requirement),
+        function=ShareOfDirections(requirement),
         along=False,
         linear=measure.linear,
     )
@@ -78,7 +78,7 @@ def share_of_directions(requirement: Requirement, point: OperatingPoint) -> Floa
 
 def _of_line(requirement: Requirement, search: DirectionSearch, mine: Ints) -> Floats:
     ways = (np.ones((len(mine), 1)), -np.ones((len(mine), 1)))
-    return np.asarray(np.mean([requirement.met(search.asked(mine, way).values) for way in ways], axis=0))
+    return np.asarray(np.mean([requirement.met(search.evaluate_along(mine, way).values) for way in ways], axis=0))
 
 
 def _of_circle(requirement: Requirement, search: DirectionSearch, mine: Ints) -> Floats:
@@ -94,7 +94,7 @@ def _of_sphere(requirement: Requirement, search: DirectionSearch, mine: Ints) ->
 
 
 def _of_latitude(
-    requirement: Requirement, search: DirectionSearch, mine: Ints, height: float, *, whole: bool
+    requirement: Requirement, search: DirectionSearch, indices: Ints, height: float, *, whole: bool
 ) -> Floats:
     """The share of a circle (or of its half, which the other half repeats) that meets the requirement."""
     turn, radius = (2.0 * np.pi if whole else np.pi), np.sqrt(1.0 - height * height)
@@ -104,15 +104,15 @@ def _of_latitude(
 
     def margin(which: Ints, angle: Floats) -> Floats:
         parts = [radius * np.cos(angle), radius * np.sin(angle), *(np.full(len(angle), z) for z in third)]
-        values = search.asked(mine[which], np.stack(parts, axis=-1)).values
+        values = search.evaluate_along(indices[which], np.stack(parts, axis=-1)).values
         return np.where(np.isnan(values), -np.inf, requirement.margin(values))
 
-    n = np.arange(len(mine))
+    n = np.arange(len(indices))
     angles = step * np.arange(count)
     m = margin(np.tile(n, count), np.repeat(angles, len(n))).reshape(count, len(n))
     # two marks for each sample: the sample itself, and what its parabola says lies next to it
     mark, met = np.repeat(angles, 2)[:, None] * np.ones(len(n)), np.repeat(m >= 0.0, 2, axis=0)
-    sample, where, offset = _hidden(m)
+    sample, where, offset = _unsampled_crossings(m)
     hidden = angles[sample] + step * offset
     there = margin(where, hidden) >= 0.0
     before = offset < 0.0
@@ -120,10 +120,10 @@ def _of_latitude(
     slot = np.where(before, (2 * sample - 1) % (2 * count), 2 * sample + 1)
     mark[slot, where] = np.where(before & (sample == 0), hidden + turn, hidden)
     met[slot, where] = there
-    return _measured(margin, mark, met, turn)
+    return _met_share(margin, mark, met, turn)
 
 
-def _hidden(m: Floats) -> tuple[Ints, Ints, Floats]:
+def _unsampled_crossings(m: Floats) -> tuple[Ints, Ints, Floats]:
     """Where three neighbours of one sign lie on a parabola of both: sample, point, offset in steps (+-0.5)."""
     left, right = np.roll(m, 1, axis=0), np.roll(m, -1, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -137,7 +137,7 @@ def _hidden(m: Floats) -> tuple[Ints, Ints, Floats]:
     return sample, where, offset[sample, where]
 
 
-def _measured(margin, mark: Floats, met: Bools, turn: float) -> Floats:  # type: ignore[no-untyped-def]
+def _met_share(margin, mark: Floats, met: Bools, turn: float) -> Floats:  # type: ignore[no-untyped-def]
     """The share of the turn between marks (s, n) that is met; where it ends between two, that is bisected."""
     after, after_met = np.roll(mark, -1, axis=0), np.roll(met, -1, axis=0)
     after[-1] += turn

@@ -8,41 +8,43 @@ import numpy as np
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.verdict import spectral_radius
-from zwidth.contact.experiment import Edge
+from zwidth.contact.boundary_experiment import EdgeKind
 
 
-def exact_edge(chart: StabilityChart, stiffness: float, damping: float, edge: Edge | None = None) -> float:
+def exact_edge(chart: StabilityChart, stiffness: float, damping: float, edge: EdgeKind | None = None) -> float:
     """The damping of the chart's edge at this stiffness that lies nearest to this damping; for a tip, the
     stiffness at this damping nearest to this stiffness. nan where the chart has no edge there.
 
     edge     lower or upper: only edges with stable walls above them, or below
     Returns  [N s/m]; [N/m] for a tip, the stable walls being softer
     """
-    place, at, across = (stiffness, damping, 0) if edge != "tip" else (damping, stiffness, 1)
+    fixed_coordinate, at, across = (stiffness, damping, 0) if edge != "tip" else (damping, stiffness, 1)
     best = nan
     for arc in chart.boundary:
         pair = (arc.stiffness, arc.damping)
         x, y = pair[across], pair[1 - across]
-        k = np.flatnonzero((x[:-1] - place) * (x[1:] - place) <= 0.0)
+        k = np.flatnonzero((x[:-1] - fixed_coordinate) * (x[1:] - fixed_coordinate) <= 0.0)
         k = k[x[k] != x[k + 1]]
-        for value in y[k] + (place - x[k]) * (y[k + 1] - y[k]) / (x[k + 1] - x[k]):
-            if _faces(chart, place, float(value), edge) and not abs(value - at) >= abs(best - at):
+        for value in y[k] + (fixed_coordinate - x[k]) * (y[k + 1] - y[k]) / (x[k + 1] - x[k]):
+            if _stable_side_matches(chart, fixed_coordinate, float(value), edge) and not abs(value - at) >= abs(
+                best - at
+            ):
                 best = float(value)
-    return _refined(chart, place, best, edge)
+    return _refine(chart, fixed_coordinate, best, edge)
 
 
-def _excess(chart: StabilityChart, place: float, value: float, edge: Edge | None) -> float:
+def _excess(chart: StabilityChart, fixed_coordinate: float, value: float, edge: EdgeKind | None) -> float:
     """Spectral radius less 1, a hidden mode's share being cancelled already."""
-    K, B = (place, value) if edge != "tip" else (value, place)
+    K, B = (fixed_coordinate, value) if edge != "tip" else (value, fixed_coordinate)
     return float(spectral_radius(chart.loop, K, B)) - 1.0
 
 
-def _span(chart: StabilityChart, edge: Edge | None) -> float:
+def _span(chart: StabilityChart, edge: EdgeKind | None) -> float:
     K0, K1, B0, B1 = chart.box
     return 1e-3 * (K1 - K0 if edge == "tip" else B1 - B0)
 
 
-def _faces(chart: StabilityChart, place: float, value: float, edge: Edge | None) -> bool:
+def _stable_side_matches(chart: StabilityChart, place: float, value: float, edge: EdgeKind | None) -> bool:
     """Do the stable walls lie on that side?"""
     if edge is None:
         return True
@@ -50,7 +52,7 @@ def _faces(chart: StabilityChart, place: float, value: float, edge: Edge | None)
     return _excess(chart, place, value + step, edge) < _excess(chart, place, value - step, edge)
 
 
-def _refined(chart: StabilityChart, place: float, value: float, edge: Edge | None) -> float:
+def _refine(chart: StabilityChart, place: float, value: float, edge: EdgeKind | None) -> float:
     """The value on the chord, brought to the edge."""
     from scipy.optimize import brentq
 

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from zwidth.contact.room import check_room
-from zwidth.measures.measure import MISSING, Note
-from zwidth.study.job import Cells, Job
-from zwidth.study.workers import Range, Workers, cores, packed
+from zwidth.measures.definition import MISSING, Note
+from zwidth.memory_limit import check_memory
+from zwidth.study.job import CellValues, Job
+from zwidth.study.workers import CellRange, Workers, cores, pack_job
 
 if TYPE_CHECKING:
     from zwidth.study.store import Store
@@ -43,7 +43,7 @@ def run(
     batch: int | None = None,
     stage: str = "computing",
     patience: float = PATIENCE,
-) -> Cells:
+) -> CellValues:
     """All cells of a job.
 
     store     keeps what is done, and knows what was done before
@@ -60,40 +60,40 @@ def run(
     ...     count, measures, question = 3, ("square",), "squares"
     ...     def compute(self, first, last):
     ...         n = np.arange(first, last, dtype=float)[:, None]
-    ...         return Cells(n**2, np.zeros(n.shape, dtype=np.uint8), ((),))
+    ...         return CellValues(n**2, np.zeros(n.shape, dtype=np.uint8), ((),))
     >>> run(Squares()).values.ravel().tolist()
     [0.0, 1.0, 4.0]
     """
-    of = job.count
-    room = 2.0 * of * len(job.measures) * 9 / 8  # values and status, and once more while they are put together
-    check_room(room, f"{of} cells of {len(job.measures)} measures", "ask for fewer")
+    total = job.count
+    room = 2.0 * total * len(job.measures) * 9 / 8  # values and status, and once more while they are put together
+    check_memory(room, f"{total} cells of {len(job.measures)} measures", "ask for fewer")
     number = workers or cores()
-    found = _Found(job)
+    collection = _CellCollection(job)
     if store is not None and store.batch is not None:
         size = store.batch
-        for first, cells in store.kept():
-            found.put(first, cells)
+        for first, cells in store.stored_batches():
+            collection.add(first, cells)
     else:
         size = batch or _batch(job, number)
         if store is not None:
             store.begin(size)
-    whole = [(first, min(first + size, of)) for first in range(0, of, size)]
-    ranges = [piece for piece in whole if found.status[piece[0], 0] == MISSING]
-    done = of - sum(last - first for first, last in ranges)
+    all_ranges = [(first, min(first + size, total)) for first in range(0, total, size)]
+    ranges = [piece for piece in all_ranges if collection.status[piece[0], 0] == MISSING]
+    done = total - sum(last - first for first, last in ranges)
     if progress is not None:
-        progress(stage, done, of)
-    with closing(_computed(job, ranges, number, patience)) as computed:
+        progress(stage, done, total)
+    with closing(_compute_ranges(job, ranges, number, patience)) as computed:
         for (first, last), cells in computed:
             if store is not None:
-                store.keep(first, cells)
-            found.put(first, cells)
+                store.write_batch(first, cells)
+            collection.add(first, cells)
             done += last - first
             if progress is not None:
-                progress(stage, done, of)
-    return found.cells()
+                progress(stage, done, total)
+    return collection.cells()
 
 
-class _Found:
+class _CellCollection:
     """What is known so far, each cell in its place."""
 
     def __init__(self, job: Job) -> None:
@@ -102,34 +102,36 @@ class _Found:
         self.status = np.full(shape, MISSING, dtype=np.uint8)
         self.notes: list[tuple[tuple[Note, ...], ...]] = []
 
-    def put(self, first: int, cells: Cells) -> None:
+    def add(self, first: int, cells: CellValues) -> None:
         last = first + len(cells.values)
         self.values[first:last], self.status[first:last] = cells.values, cells.status
         self.notes.append(cells.notes)
 
-    def cells(self) -> Cells:
-        each = [merged(note for notes in self.notes for note in notes[m]) for m in range(self.values.shape[1])]
-        return Cells(self.values, self.status, tuple(each))
+    def cells(self) -> CellValues:
+        each = [
+            merge_notes(note for notes in self.notes for note in notes[m]) for m in range(self.values.shape[1])
+        ]
+        return CellValues(self.values, self.status, tuple(each))
 
 
-def merged(notes: Iterable[Note], most: int = MOST_NOTES) -> tuple[Note, ...]:
+def merge_notes(notes: Iterable[Note], most: int = MOST_NOTES) -> tuple[Note, ...]:
     """Notes of the same reason as one, in the order of their first cells, whatever order they came in.
 
     most  of them at most; the rest are counted in one more for each status
 
-    >>> merged([Note(5, "no", 2, (7,)), Note(5, "no", 1, (3,))])
+    >>> merge_notes([Note(5, "no", 2, (7,)), Note(5, "no", 1, (3,))])
     (Note(status=5, reason='no', count=3, first=(3,)),)
     """
     found: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
     for note in notes:
         count, first = found.get((note.status, note.reason), (0, note.first))
         found[note.status, note.reason] = (count + note.count, min(first, note.first))
-    told = [Note(*key, *rest) for key, rest in found.items()]
-    told.sort(key=lambda note: (note.first, note.status, note.reason))
-    if len(told) <= most:
-        return tuple(told)
-    rest = [Note(note.status, MORE, note.count, note.first) for note in told[most:]]
-    return (*told[:most], *merged(rest, len(rest)))
+    notes_in_order = [Note(*key, *rest) for key, rest in found.items()]
+    notes_in_order.sort(key=lambda note: (note.first, note.status, note.reason))
+    if len(notes_in_order) <= most:
+        return tuple(notes_in_order)
+    rest = [Note(note.status, MORE, note.count, note.first) for note in notes_in_order[most:]]
+    return (*notes_in_order[:most], *merge_notes(rest, len(rest)))
 
 
 def _batch(job: Job, workers: int) -> int:
@@ -155,9 +157,9 @@ def _batch(job: Job, workers: int) -> int:
     return most
 
 
-def _computed(
-    job: Job, ranges: Sequence[Range], workers: int, patience: float
-) -> Generator[tuple[Range, Cells], None, None]:
+def _compute_ranges(
+    job: Job, ranges: Sequence[CellRange], workers: int, patience: float
+) -> Generator[tuple[CellRange, CellValues], None, None]:
     """Cells of all ranges: those that get done in time here, and then all the rest in processes."""
     left = sum(last - first for first, last in ranges)
     sent: bytes | None = None
@@ -169,7 +171,7 @@ def _computed(
         left -= last - first
         # the first one may have compiled something
         slow = n > 0 and seconds / (last - first) * left > patience
-        if slow and workers > 1 and (sent := packed(job)) is not None:
+        if slow and workers > 1 and (sent := pack_job(job)) is not None:
             rest = ranges[n + 1 :]
             with Workers(sent, min(workers, len(rest))) as pool:
                 yield from pool.compute(rest)

@@ -19,30 +19,30 @@ from numpy.typing import NDArray
 
 from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.conditions.dry import reading_noise, reading_step
-from zwidth.contact.bench import Bench, BenchError
-from zwidth.contact.experiment import (
-    BESIDE,
-    Edge,
+from zwidth.conditions.friction_and_resolution import reading_noise, reading_step
+from zwidth.contact.boundary_experiment import (
+    TIP_SHARE,
+    EdgeKind,
     EdgePoint,
-    Place,
-    find_place,
+    StableExtent,
+    find_stable_walls,
     measure_edges,
     measure_tips,
     tip_dampings,
 )
 from zwidth.contact.hand import Hand, Reflex
+from zwidth.contact.stability_trial import StabilityTrial, TrialError
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.model.operator import Operator, attach
 from zwidth.study.exact_edge import exact_edge
 from zwidth.study.experiment_plan import Plan
 from zwidth.study.journal import Journal, fingerprint
 from zwidth.study.measured_boundary import Cause, Experiment, MeasuredPoint
-from zwidth.study.own_points import OwnPoint, compare_points
+from zwidth.study.user_points import UserPoint, compare_points
 
 Floats = NDArray[np.float64]
 # stage, done, of how many
@@ -62,7 +62,7 @@ def question(loop: Loop, operator: Operator | None, plan: Plan) -> str:
 def measure_boundary(
     point: OperatingPoint,
     plan: Plan | None = None,
-    own_points: Sequence[OwnPoint] = (),
+    user_points: Sequence[UserPoint] = (),
     *,
     file: str | Path | None = None,
     progress: Progress | None = None,
@@ -70,22 +70,22 @@ def measure_boundary(
 ) -> Experiment:
     """A stability boundary as it is measured on a device at one operating point, by the operator who holds it.
 
-    own_points  that somebody measured, to be compared with the same exact chart
-    file        keeps what is done, so that a run that was stopped goes on from there; None: nothing is kept
-    causes      measure again without each part that is not linear
-    Raises      JournalError  for a file that holds something else;  OSError  where it cannot be read or written
-                what `measure` and `OperatingPoint.plant` raise
+    user_points  that somebody measured, to be compared with the same exact chart
+    file         keeps what is done, so that a run that was stopped goes on from there; None: nothing is kept
+    causes       measure again without each part that is not linear
+    Raises       JournalError  for a file that holds something else;  OSError  where it cannot be read or written
+                 what `run_experiment` and `OperatingPoint.plant` raise
     """
     require("point", point, OperatingPoint)
     plan = plan or Plan()
     loop = point.without_operator.loop
     operator = None if loop.plant.handle is None else point.operator
     journal = Journal(None if file is None else Path(file), question(loop, operator, plan))
-    found = measure(loop, operator, plan, journal, progress, causes and bool(loop.nonlinear))
-    return replace(found, own=compare_points(found.chart, own_points)) if own_points else found
+    found = run_experiment(loop, operator, plan, journal, progress, causes and bool(loop.nonlinear))
+    return replace(found, user_points=compare_points(found.chart, user_points)) if user_points else found
 
 
-def measure(
+def run_experiment(
     loop: Loop,
     operator: Operator | None = None,
     plan: Plan | None = None,
@@ -93,20 +93,20 @@ def measure(
     progress: Progress | None = None,
     causes: bool = False,
 ) -> Experiment:
-    """A stability boundary as it is measured: see `contact.experiment` for how.
+    """A stability boundary as it is measured: see `contact.boundary_experiment` for how.
 
     loop      the device by itself, and its computer;   operator  the preset who holds it; None: nobody
     journal   keeps what is done (see `question`); None: nothing is kept
     causes    measure again without each part that is not linear
-    Raises    BenchError      for numbers that cannot be meant
-              NothingStable   where no stable wall was found
+    Raises    TrialError         for numbers that cannot be meant
+              NoStableWallError  where no stable wall was found
               HysteresisError, UnmovedError  as `simulate_batch`
 
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant
     >>> one = np.ones(1)
     >>> mass = Plant(np.array([[0.1]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
-    >>> found = measure(Loop(mass, Controller(0.001)), plan=Plan(stiffnesses=2, tips=1))
+    >>> found = run_experiment(Loop(mass, Controller(0.001)), plan=Plan(stiffnesses=2, tips=1))
     >>> [point.edge for point in found.points]
     ['lower', 'lower', 'upper', 'upper', 'tip']
     >>> bool(abs(found.points[-1].stiffness / 68629.15 - 1) < 1e-4)         # (12 - 8 sqrt 2) m/T^2 (thesis 4.14)
@@ -116,30 +116,32 @@ def measure(
     journal = journal or Journal(None, "")
     tell = progress or (lambda stage, done, of: None)
     subjects = _subjects(operator, plan)
-    first = _bench(loop, operator, plan)
+    first = _stability_trial(loop, operator, plan)
     look = partial(tell, "looking for stable walls")
-    place = Place(*journal.ask("place", lambda: _numbers(find_place(first, plan.box, look))))
+    place = StableExtent(
+        *journal.get_or_compute("place", lambda: _numbers(find_stable_walls(first, plan.box, look)))
+    )
     look(1, 1)
     low = 0.0 if plan.box is None else max(plan.box.stiffness[0], 0.0)
-    top = BESIDE * place.stiffness
+    top = TIP_SHARE * place.stiffness
     grid = low + (top - low) * np.arange(1, plan.stiffnesses + 1) / plan.stiffnesses
-    of, done, runs = plan.subjects * plan.trials, 0, []
+    total_trials, done, runs = plan.subjects * plan.trials, 0, []
     dampings: Floats | None = None
     for s, subject in enumerate(subjects):
         for t in range(plan.trials):
-            tell("measuring the boundary", done, of)
-            bench, name = _trial(loop, subject, plan, s, t), f"subject {s} trial {t}"
-            edges = _asked(journal, f"{name} edges", partial(measure_edges, bench, grid, place, plan.box))
+            tell("measuring the boundary", done, total_trials)
+            trial, name = _trial(loop, subject, plan, s, t), f"subject {s} trial {t}"
+            edges = _edge_points(journal, f"{name} edges", partial(measure_edges, trial, grid, place, plan.box))
             if dampings is None:
                 dampings = tip_dampings(edges, place, plan.tips) if plan.tips else np.empty(0)
-            tips = _asked(journal, f"{name} tips", partial(measure_tips, bench, dampings, place, plan.box))
+            tips = _edge_points(journal, f"{name} tips", partial(measure_tips, trial, dampings, place, plan.box))
             runs.append([*edges, *tips])
             done += 1
-            tell("measuring the boundary", done, of)
+            tell("measuring the boundary", done, total_trials)
     chart = _chart(loop, operator)
-    points, lost = _together(runs, chart, 2 * len(grid) + len(dampings if dampings is not None else ()))
-    why = _causes(loop, operator, plan, place, runs[0], journal, tell) if causes else ()
-    return Experiment(plan, place, points, lost, subjects, chart, why, journal.kept)
+    points, lost = _combine_trials(runs, chart, 2 * len(grid) + len(dampings if dampings is not None else ()))
+    cause_list = _causes(loop, operator, plan, place, runs[0], journal, tell) if causes else ()
+    return Experiment(plan, place, points, lost, subjects, chart, cause_list, journal.entries_read)
 
 
 def _with_visible(loop: Loop, plan: Plan) -> Plan:
@@ -157,7 +159,7 @@ def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, .
         if plan.subjects > 1 or plan.reflex:
             argument, verb = ("subjects", "differ") if plan.subjects > 1 else ("reflex", "is")
             nobody = f"{verb} in the arm that holds the device, and nobody does; give an operator"
-            raise BenchError(argument, nobody)
+            raise TrialError(argument, nobody)
         return (None,)
     if plan.subjects == 1:
         return (operator,)
@@ -178,14 +180,14 @@ def _varied(operator: Operator, random: np.random.Generator, spread: float) -> O
     return replace(operator, **changed)
 
 
-def _bench(
+def _stability_trial(
     loop: Loop,
     operator: Operator | None,
     plan: Plan,
     factors: tuple[float, float, float] = (1.0, 1.0, 1.0),
     seed: int = 0,
-) -> Bench:
-    """The bench of a plan, its disturbance, speed and push times these factors, even beyond what plans allow."""
+) -> StabilityTrial:
+    """The trial of a plan, its disturbance, speed and push times these factors, even beyond what plans allow."""
     disturbance, speed, push = factors[0] * plan.disturbance, factors[1] * plan.speed, factors[2] * plan.push
     reflex = None
     if plan.reflex and operator is not None:
@@ -197,23 +199,25 @@ def _bench(
             grasp_damping=STIFFENED * (operator.grasp_damping or 0.0),
         )
     hand = Hand(operator, push=push, reflex=reflex)
-    return Bench(loop, hand, plan.one_sided, disturbance, speed, plan.visible or 0.0, seed)
+    return StabilityTrial(loop, hand, plan.one_sided, disturbance, speed, plan.visible or 0.0, seed)
 
 
-def _trial(loop: Loop, operator: Operator | None, plan: Plan, subject: int, trial: int) -> Bench:
+def _trial(loop: Loop, operator: Operator | None, plan: Plan, subject: int, trial: int) -> StabilityTrial:
     factors = (1.0, 1.0, 1.0)
     if plan.trials > 1:
         random = np.random.default_rng([plan.seed, subject, trial])
         factors = tuple(np.exp(plan.spread * random.standard_normal(3)).tolist())
-    return _bench(loop, operator, plan, factors, seed=(plan.seed * 1000 + subject) * 1000 + trial)
+    return _stability_trial(loop, operator, plan, factors, seed=(plan.seed * 1000 + subject) * 1000 + trial)
 
 
 def _numbers(found: Any) -> list[Any]:
     return [getattr(found, field.name) for field in fields(found)]
 
 
-def _asked(journal: Journal, name: str, compute: Callable[[], list[EdgePoint]]) -> list[EdgePoint]:
-    return [EdgePoint(*numbers) for numbers in journal.ask(name, lambda: [_numbers(p) for p in compute()])]
+def _edge_points(journal: Journal, name: str, compute: Callable[[], list[EdgePoint]]) -> list[EdgePoint]:
+    return [
+        EdgePoint(*numbers) for numbers in journal.get_or_compute(name, lambda: [_numbers(p) for p in compute()])
+    ]
 
 
 def _chart(loop: Loop, operator: Operator | None) -> StabilityChart | None:
@@ -224,17 +228,17 @@ def _chart(loop: Loop, operator: Operator | None) -> StabilityChart | None:
         return None
 
 
-def _together(
+def _combine_trials(
     runs: list[list[EdgePoint]], chart: StabilityChart | None, sought: int
 ) -> tuple[tuple[MeasuredPoint, ...], int]:
     """Points of all trials by what was chosen, and how many nobody found."""
-    found: dict[tuple[Edge, float], list[EdgePoint]] = {}
+    found: dict[tuple[EdgeKind, float], list[EdgePoint]] = {}
     for points in runs:
         for point in points:
             chosen = point.damping if point.edge == "tip" else point.stiffness
-            own = found.setdefault((point.edge, chosen), [])
-            if point.beyond is not None:
-                own.append(point)
+            edge_points = found.setdefault((point.edge, chosen), [])
+            if point.unstable_behaviour is not None:
+                edge_points.append(point)
     order = {"lower": 0, "upper": 1, "tip": 2}
     made = []
     for (edge, chosen), points in sorted(found.items(), key=lambda item: (order[item[0][0]], item[0][1])):
@@ -245,7 +249,7 @@ def _together(
         K, B = (mean, chosen) if edge == "tip" else (chosen, mean)
         exact = nan if chart is None else exact_edge(chart, K, B, edge)
         first = points[0]
-        seen = (first.beyond, first.amplitude, first.frequency)
+        observation = (first.unstable_behaviour, first.amplitude, first.frequency)
         made.append(
             MeasuredPoint(
                 K,
@@ -256,7 +260,7 @@ def _together(
                 len(values),
                 values,
                 exact,
-                *seen,
+                *observation,
                 any(p.unsure for p in points),
             )
         )
@@ -267,12 +271,12 @@ def _causes(
     loop: Loop,
     operator: Operator | None,
     plan: Plan,
-    place: Place,
+    place: StableExtent,
     points: list[EdgePoint],
     journal: Journal,
     tell: Progress,
 ) -> tuple[Cause, ...]:
-    names = loop.nonlinear.left_out
+    names = loop.nonlinear.kinds
     grid = sorted({p.stiffness for p in points if p.edge == "lower"})
     picked = [grid[i] for i in np.unique(np.linspace(0, len(grid) - 1, min(EXPLAINED + 2, len(grid))).astype(int))]
     picked = picked[1:-1] or picked
@@ -280,9 +284,9 @@ def _causes(
     made = []
     for done, name in enumerate(names):
         tell("measuring without each part", done, len(names))
-        bench = _bench(without(loop, name), operator, plan)
-        again = partial(measure_edges, bench, np.array(picked), place, plan.box)
-        found = _asked(journal, f"without {name}", again)
+        trial = _stability_trial(without(loop, name), operator, plan)
+        again = partial(measure_edges, trial, np.array(picked), place, plan.box)
+        found = _edge_points(journal, f"without {name}", again)
         value = {(p.edge, p.stiffness): p.damping for p in found}
         made.append(Cause(name, tuple(some), tuple(value.get((p.edge, p.stiffness), nan) for p in some)))
     tell("measuring without each part", len(names), len(names))
@@ -291,22 +295,22 @@ def _causes(
 
 def without(loop: Loop, name: str) -> Loop:
     """The loop without one part that is not linear, by its name in `Nonlinear.left_out`."""
-    computer, own = loop.controller, loop.plant.nonlinear
+    computer, nonlinear = loop.controller, loop.plant.nonlinear
     match name:
         case "dry friction":
-            own = replace(own, friction=())
+            nonlinear = replace(nonlinear, friction=())
         case "encoder steps":
-            own = replace(own, counters=tuple(replace(c, step=0.0) for c in own.counters))
+            nonlinear = replace(nonlinear, counters=tuple(replace(c, step=0.0) for c in nonlinear.counters))
         case "noise":
-            own = replace(own, counters=tuple(replace(c, noise=0.0) for c in own.counters))
+            nonlinear = replace(nonlinear, counters=tuple(replace(c, noise=0.0) for c in nonlinear.counters))
         case "nonlinear springs":
-            own = replace(own, springs=())
+            nonlinear = replace(nonlinear, springs=())
         case "programmable brakes":
-            own = replace(own, brakes=())
+            nonlinear = replace(nonlinear, brakes=())
         case "the force limit":
-            own, computer = replace(own, force_limit=inf), replace(computer, saturation=inf)
+            nonlinear, computer = replace(nonlinear, force_limit=inf), replace(computer, force_limit=inf)
         case _:
             raise ValueError(f"{name!r} is no part that is not linear")
-    if all(c.step == 0.0 and c.noise == 0.0 for c in own.counters):
-        own = replace(own, counters=())
-    return Loop(replace(loop.plant, nonlinear=own), computer)
+    if all(c.step == 0.0 and c.noise == 0.0 for c in nonlinear.counters):
+        nonlinear = replace(nonlinear, counters=())
+    return Loop(replace(loop.plant, nonlinear=nonlinear), computer)

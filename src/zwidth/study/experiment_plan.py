@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any, Final
 
-from zwidth.contact.bench import BenchError
-from zwidth.contact.experiment import Box
+from zwidth.contact.boundary_experiment import SearchWindow
+from zwidth.contact.stability_trial import TrialError
 
 FARTHEST, FASTEST = 1.0, 100.0  # m, m/s; no device moves by more, or faster
 PUSH: Final = 2.0  # N, with which a one-sided wall is usually touched
@@ -20,12 +20,12 @@ class Plan:
 
     one_sided    touch a one-sided wall with `push` [N] and `speed` [m/s]; else displace by `disturbance` [m]
     stiffnesses  at which the damping is bisected, twice;   tips  dampings at which the stiffness is
-    visible      see `Bench` [m]; None: three encoder steps and ten standard deviations of the noise
+    visible      see `StabilityTrial` [m]; None: three encoder steps and ten standard deviations of the noise
     reflex       the hand stiffens threefold, 50 ms after half of the push is felt
     subjects, trials  how many operators, and how often each of them tries
     spread, seed      of operators and trials: see `study.experiment`
     box          where to look; None: everywhere
-    Raises       BenchError  for numbers that cannot be meant
+    Raises       TrialError  for numbers that cannot be meant
     """
 
     one_sided: bool = False
@@ -40,19 +40,19 @@ class Plan:
     trials: int = 1
     spread: float = 0.2
     seed: int = 1
-    box: Box | None = None
+    box: SearchWindow | None = None
 
     def __post_init__(self) -> None:
         for name, least in (("stiffnesses", 1), ("tips", 0), ("subjects", 1), ("trials", 1), ("seed", 0)):
             if getattr(self, name) < least:
-                raise BenchError(name, f"must be {least} or more, got {getattr(self, name)}")
+                raise TrialError(name, f"must be {least} or more, got {getattr(self, name)}")
         for name, most, unit in (("disturbance", FARTHEST, "m"), ("speed", FASTEST, "m/s")):
             if isfinite(getattr(self, name)) and abs(getattr(self, name)) > most:
-                raise BenchError(name, f"must be {most:g} {unit} or less, got {getattr(self, name):g}")
+                raise TrialError(name, f"must be {most:g} {unit} or less, got {getattr(self, name):g}")
         if not (isfinite(self.spread) and 0.0 <= self.spread <= 2.0):
-            raise BenchError("spread", f"must be from 0 to 2, got {self.spread!r}; 0.2 is 20 %")
+            raise TrialError("spread", f"must be from 0 to 2, got {self.spread!r}; 0.2 is 20 %")
         if not isfinite(self.push):
-            raise BenchError("push", f"must be finite [N], got {self.push!r}")
+            raise TrialError("push", f"must be finite [N], got {self.push!r}")
 
     @classmethod
     def touching(cls, *, push: float = PUSH, speed: float = SPEED, **more: Any) -> Plan:

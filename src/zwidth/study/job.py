@@ -9,15 +9,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.measures.measure import Note
+from zwidth.measures.definition import Note
 
 
 @dataclass(frozen=True)
-class Cells:
+class CellValues:
     """Measures of consecutive cells.
 
     values  (k, m)  of k cells and m measures; nan where the status is not OK
-    status  (k, m)  as in `measures.measure`
+    status  (k, m)  as in `measures.definition`
     notes   (m,)    per measure: why cells have no value; `first` counts from the first cell of the job
     """
 
@@ -44,6 +44,6 @@ class Job(Protocol):
         """What its results on disk are known by (`journal.fingerprint`): equal for equal questions."""
         ...
 
-    def compute(self, first: int, last: int) -> Cells:
+    def compute(self, first: int, last: int) -> CellValues:
         """Cells first to last - 1. Failures within a cell are data; only what spoils all cells is raised."""
         ...

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from zwidth.device.version import KEPT, newer
+from zwidth.device.format_version import STORE_VERSION, newer_version_message
 
 
 def fingerprint(*parts: object) -> str:
@@ -61,15 +61,17 @@ class Journal:
               OSError       where it cannot be read or written
 
     >>> journal = Journal(None, fingerprint("how much?"))
-    >>> journal.ask("first", lambda: [1.5]), journal.ask("first", lambda: [2.5]), journal.kept
-    ([1.5], [1.5], 0)
+    >>> journal.get_or_compute("first", lambda: [1.5]), journal.get_or_compute("first", lambda: [2.5])
+    ([1.5], [1.5])
+    >>> journal.entries_read
+    0
     """
 
     def __init__(self, path: Path | None, question: str) -> None:
         self.path = path
         self.known: dict[str, Any] = {}
         if path is None:
-            self.kept = 0
+            self.entries_read = 0
             return
         if path.exists() and not path.is_file():
             raise JournalError(f"{path.name or path}: is no plain file; name another")
@@ -78,9 +80,9 @@ class Journal:
         self.known = {entry["name"]: entry["value"] for entry in map(json.loads, whole[1:])}
         if (text := b"".join(line + b"\n" for line in whole)) != data:
             path.write_bytes(text)
-        self.kept = len(self.known)  # how many were found there
+        self.entries_read = len(self.known)  # how many were found there
 
-    def ask(self, name: str, compute: Callable[[], Any]) -> Any:
+    def get_or_compute(self, name: str, compute: Callable[[], Any]) -> Any:
         """The value under this name, computed and kept where it is not yet known.
 
         compute  returns what JSON holds: numbers (inf and nan, too), text, lists, dictionaries with text as keys
@@ -98,10 +100,10 @@ class Journal:
 
 def _read(path: Path, lines: list[bytes], there: bool, question: str) -> list[bytes]:
     """The lines up to the first that is damaged; a first line only where they answer another question."""
-    first = json.dumps({"version": KEPT, "question": question}).encode()
+    first = json.dumps({"version": STORE_VERSION, "question": question}).encode()
     known = _entry(lines[0]) if lines else {}
-    if said := newer(known.get("version"), KEPT):
-        raise JournalError(f"{path.name}: its version {said}, or name another file")
+    if message := newer_version_message(known.get("version"), STORE_VERSION):
+        raise JournalError(f"{path.name}: its version {message}, or name another file")
     if there and not isinstance(known.get("question"), str):
         raise JournalError(f"{path.name}: is not the journal of a run; name another file, or remove it")
     if known.get("question") != question:

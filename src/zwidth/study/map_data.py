@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from zwidth.device.device import Device
-from zwidth.measures.measure import OK, STATUS
-from zwidth.study.workspace import measures_of
+from zwidth.measures.definition import OK, STATUS
+from zwidth.study.map import measures_of
 from zwidth.study.workspace_summary import over_the_workspace, positions
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def map_document(
 ) -> dict[str, Any]:
     """A map by key and unit: its grid, its first measure, and with several all of them under `measures`.
 
-    dataset  as `study.workspace.workspace_map` returns it
+    dataset  as `study.map.workspace_map` returns it
     device   None: what needs postures solved again is left out, as in `over_the_workspace`
     area     of requirements laid over the map; None: none were
     """
@@ -74,7 +74,7 @@ def _measure(dataset: xr.Dataset, name: str, device: Device | None) -> dict[str,
     about = dataset[name].attrs
     found = {
         "title": about["title"],
-        "unit": about["unit"],
+        "unit": about.get("unit", ""),
         "better": about["better"] or None,
         "source": about["source"],
         "values": dataset[name].values,

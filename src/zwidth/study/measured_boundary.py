@@ -1,18 +1,19 @@
-"""What a virtual experiment comes to: points of the boundary, how far they are from the exact one, and why."""
+"""What a virtual experiment comes to: points of the boundary, how far they are from the exact one, and why;
+and which of them contradict each other."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
 from math import isnan, nan
-from typing import Any
+from typing import Any, NamedTuple
 
 from zwidth.chart.chart import StabilityChart
-from zwidth.contact.experiment import Edge, EdgePoint, Place
+from zwidth.contact.boundary_experiment import EdgeKind, EdgePoint, StableExtent
 from zwidth.model.operator import Operator
 from zwidth.result import Result
 from zwidth.study.experiment_plan import Plan
-from zwidth.study.own_points import PointsComparison
+from zwidth.study.user_points import PointsComparison
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class MeasuredPoint:
 
     stiffness: float
     damping: float
-    edge: Edge
+    edge: EdgeKind
     low: float
     high: float
     trials: int
@@ -42,7 +43,7 @@ class MeasuredPoint:
     unsure: bool = False
 
     @property
-    def bisected(self) -> float:
+    def bisected_value(self) -> float:
         """What was bisected: a stiffness at the tip, else a damping."""
         return self.stiffness if self.edge == "tip" else self.damping
 
@@ -80,13 +81,13 @@ class Cause:
     without: tuple[float, ...]
 
     @property
-    def compared(self) -> list[tuple[EdgePoint, float]]:
+    def comparisons(self) -> list[tuple[EdgePoint, float]]:
         """Points at which there is an edge both with the part and without it, and its damping then [N s/m]."""
         both = zip(self.points, self.without, strict=True)
         return [(point, other) for point, other in both if not (isnan(point.damping) or isnan(other))]
 
     @property
-    def vanished(self) -> int:
+    def unpaired_count(self) -> int:
         """At how many points there is an edge with the part or without it, but not both."""
         both = zip(self.points, self.without, strict=True)
         return sum(isnan(point.damping) != isnan(other) for point, other in both)
@@ -96,26 +97,26 @@ class Cause:
 class Experiment(Result):
     """What was measured.
 
-    plan      with the visible amplitude that was used
-    place     where the stable walls are
-    points    lower edges, upper edges, tips; those found by no trial are left out
-    lost      how many were sought and found by no trial
-    subjects  who pushed; (None,) for nobody
-    chart     the exact linear chart, held by the preset; None where the velocity estimate has none
-    causes    of the difference; () for a linear device, and where they were not asked for
-    kept      how many parts of the run were found in the journal
-    own       somebody's own points beside the same chart; None where there are none
+    plan             with the visible amplitude that was used
+    place            where the stable walls are
+    points           lower edges, upper edges, tips; those found by no trial are left out
+    not_found        how many were sought and found by no trial
+    subjects         who pushed; (None,) for nobody
+    chart            the exact linear chart, held by the preset; None where the velocity estimate has none
+    causes           of the difference; () for a linear device, and where they were not asked for
+    journal_entries  how many parts of the run were found in the journal
+    user_points      somebody's own points beside the same chart; None where there are none
     """
 
     plan: Plan
-    place: Place
+    place: StableExtent
     points: tuple[MeasuredPoint, ...]
-    lost: int
+    not_found: int
     subjects: tuple[Operator | None, ...]
     chart: StabilityChart | None
     causes: tuple[Cause, ...]
-    kept: int
-    own: PointsComparison | None = None
+    journal_entries: int
+    user_points: PointsComparison | None = None
 
     @property
     def stiffest(self) -> MeasuredPoint | None:
@@ -133,20 +134,24 @@ class Experiment(Result):
     def deviation(self, point: MeasuredPoint) -> float:
         """Distance from the exact edge as a share of `damping_range`, of a tip's stiffness; nan if unknown."""
         whole = abs(point.exact) if point.edge == "tip" else self.damping_range
-        return abs(point.bisected - point.exact) / whole if whole > 0.0 else nan
+        return abs(point.bisected_value - point.exact) / whole if whole > 0.0 else nan
 
     @property
-    def compared(self) -> list[MeasuredPoint]:
+    def compared_points(self) -> list[MeasuredPoint]:
         """Points whose deviation from the exact edge is known."""
         return [point for point in self.points if not isnan(self.deviation(point))]
 
     def document(self) -> dict[str, Any]:
         """The points and what they come to by key and unit; None where there is no such point, or no chart."""
         best, chart = self.stiffest, self.chart
-        own = {"measured": None, "measured_counts": None} if self.own is None else self.own.document()
+        own = (
+            {"measured": None, "measured_counts": None}
+            if self.user_points is None
+            else self.user_points.document()
+        )
         return {
             "points": [point.document() for point in self.points],
-            "lost": self.lost,
+            "lost": self.not_found,
             "stiffness_max_N_per_m": None if best is None else best.stiffness,
             "damping_at_stiffness_max_Ns_per_m": None if best is None else best.damping,
             "exact_stiffness_max_N_per_m": None if chart is None else chart.stiffness_max,
@@ -161,9 +166,55 @@ class Experiment(Result):
 
     def __repr__(self) -> str:
         tips, best = sum(point.edge == "tip" for point in self.points), self.stiffest
-        lines = [f"{len(self.points) - tips} edges and {tips} tips measured, {self.lost} not found"]
+        lines = [f"{len(self.points) - tips} edges and {tips} tips measured, {self.not_found} not found"]
         if best is not None:
             exact = "" if self.chart is None else f"; exact and linear {self.chart.stiffness_max:.6g} N/m"
             lines.append(f"stiffest {best.stiffness:.6g} N/m at {best.damping:.6g} N s/m{exact}")
         lines.append(f"{len(self.subjects)} subjects with {self.plan.trials} trials each")
         return "Experiment: " + "\n  ".join(lines)
+
+
+class BeyondTip(NamedTuple):
+    """Stable walls that were measured beyond a tip: their stiffness [N/m] and range of damping [N s/m]."""
+
+    tip: MeasuredPoint
+    stiffness: float
+    damping: tuple[float, float]
+
+
+def edges_beyond_tips(found: Experiment) -> list[BeyondTip]:
+    """For each tip that edges lie beyond, the stiffest of them; the tip that lies lowest against its edge first.
+
+    An edge at a stiffness says that the walls on its inner side are stable. A tip says that no stiffer wall is, at
+    its damping. Both cannot be right where the edge is stiffer than the tip and the tip's damping is on its inner
+    side. Nor can the stiffest tip be the stiffest stable wall where an edge is stiffer. On a device that is not
+    linear this happens where verdicts hang on chance.
+
+    Of several trials only what holds in all of them counts: the highest tip, the narrowest range of damping.
+    """
+    ranges = _stable_ranges(found)
+    tips = [point for point in found.points if point.edge == "tip"]
+    stiffest = max(tips, key=lambda tip: tip.high, default=None)
+    pairs = []
+    for tip in tips:
+        beyond = [
+            (K, damping)
+            for K, damping in ranges.items()
+            if tip.high < K and (tip is stiffest or damping[0] < tip.damping < damping[1])
+        ]
+        if beyond:
+            pairs.append(BeyondTip(tip, *max(beyond)))
+    return sorted(pairs, key=lambda pair: pair.tip.high / pair.stiffness)
+
+
+def _stable_ranges(found: Experiment) -> dict[float, tuple[float, float]]:
+    """By stiffness, the dampings that every trial found stable, from the tip's damping to the edges found."""
+    start_damping = found.place.damping
+    ranges: dict[float, tuple[float, float]] = {}
+    for point in found.points:
+        low, high = ranges.get(point.stiffness, (start_damping, start_damping))
+        if point.edge == "lower":
+            ranges[point.stiffness] = min(low, point.high), high
+        elif point.edge == "upper":
+            ranges[point.stiffness] = low, max(high, point.low)
+    return ranges

@@ -16,12 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import pi
+from math import nan, pi
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.chart.chart import StabilityChart
 from zwidth.chart.peak import Peak
 from zwidth.chart.tracer import RealRoot, Tracer
 from zwidth.loop.loop import Loop
@@ -31,6 +32,9 @@ Kind = Literal["smooth maximum", "corner", "edge at B = 0", "end of the curve"]
 
 # A Newton step of K'(angle) longer than this share of the angle means that the wall is no smooth maximum.
 AT_MAXIMUM: Final = 1e-5
+
+# Extreme points closer than this share of the stable set's size are one.
+APART: Final = 1e-3
 
 Piece = tuple[Floats, Callable[[Tracer], float]]
 
@@ -43,16 +47,16 @@ class OptimumError(ValueError):
 class Optimum:
     """The stiffest wall with what holds it.
 
-    peak   the wall, and the angles of its roots
-    kind   a smooth maximum of the edge; a corner of two pieces of edge; an edge that crosses B = 0; or a double
-           real root at an end of the curve
-    moves  loop -> a number whose derivative by anything in the loop is that of the largest stiffness [N/m];
-           at the loop itself it is the largest stiffness
+    peak                      the wall, and the angles of its roots
+    kind                      a smooth maximum of the edge; a corner of two pieces of edge; an edge that crosses B
+                              = 0; or a double real root at an end of the curve
+    stiffness_to_first_order  loop -> a number whose derivative by anything in the loop is that of the largest
+                              stiffness [N/m]; at the loop itself it is the largest stiffness
     """
 
     peak: Peak
     kind: Kind
-    moves: Callable[[Loop], float]
+    stiffness_to_first_order: Callable[[Loop], float]
 
 
 def optimum(loop: Loop, peak: Peak) -> Optimum:
@@ -68,7 +72,8 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
     ...     one, none = np.ones(1), np.zeros((1, 1))
     ...     return Loop(Plant(np.array([[mass]]), none, none, one, one), Controller(0.001))
     >>> held = optimum(wall_of(0.1), largest_stiffness(wall_of(0.1)))
-    >>> held.kind, round((held.moves(wall_of(0.1001)) - held.moves(wall_of(0.0999))) / (0.002 * 68629.15), 6)
+    >>> heavier, lighter = (held.stiffness_to_first_order(wall_of(mass)) for mass in (0.1001, 0.0999))
+    >>> held.kind, round((heavier - lighter) / (0.002 * 68629.15), 6)
     ('smooth maximum', 1.0)
     """
     tracer = Tracer.of(loop)
@@ -141,3 +146,41 @@ def _end(loop: Loop, root: RealRoot) -> float:
     if end is None:
         raise OptimumError("the curve's end goes to infinity")
     return end[0]
+
+
+def second_peak_stiffness(chart: StabilityChart) -> float:
+    """Largest stiffness of the walls with K > 0, B >= 0 that are stiffest among their neighbours on the edge, the
+    stiffest of all left aside [N/m]; nan if there is none. Known as the regions are, to 1e-6 of the set's size.
+
+    One of these walls takes over when the stiffest gives way.
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.loop.loop import Loop
+    >>> from zwidth.model.plant import Plant
+    >>> from zwidth.chart.chart import stability_chart
+    >>> one, none = np.ones(1), np.zeros((1, 1))
+    >>> second_peak_stiffness(stability_chart(Loop(Plant(np.eye(1), none, none, one, one), Controller(0.001))))
+    nan
+    """
+    if not chart.stiffness_max > 0.0:
+        return nan
+    best = nan
+    size = np.array([chart.box[1] - chart.box[0], chart.box[3] - chart.box[2]])
+    top = np.array([chart.stiffness_max, chart.damping_at_stiffness_max])
+    for ring in chart.regions:
+        walls = _cut_at_axis(ring[:-1])
+        height = np.where((walls[:, 1] >= 0.0) & (walls[:, 0] > 1e-9 * size[0]), walls[:, 0], -np.inf)
+        peaks = np.isfinite(height) & (height > np.roll(height, 1)) & (height >= np.roll(height, -1))
+        for wall in walls[peaks]:
+            if np.max(np.abs(wall - top) / size) > APART and not best >= wall[0]:
+                best = float(wall[0])
+    return best
+
+
+def _cut_at_axis(ring: Floats) -> Floats:
+    """The ring's points (k, 2) with those added where it crosses B = 0."""
+    following = np.roll(ring, -1, axis=0)
+    crosses = np.flatnonzero(ring[:, 1] * following[:, 1] < 0.0)
+    share = ring[crosses, 1] / (ring[crosses, 1] - following[crosses, 1])
+    K = ring[crosses, 0] + share * (following[crosses, 0] - ring[crosses, 0])
+    return np.insert(ring, crosses + 1, np.column_stack([K, np.zeros(len(K))]), axis=0)

@@ -10,8 +10,8 @@ from itertools import islice
 from math import isfinite, nan
 from typing import Any, Final
 
-from zwidth.device.text_file import LARGEST_TABLE, Unreadable, filled, header_fault, read_text
-from zwidth.study.own_points import EDGES, VERDICTS, OwnPoint
+from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, header_fault, non_blank_rows, read_text
+from zwidth.study.user_points import EDGES, VERDICTS, UserPoint
 
 COLUMNS: Final = ("stiffness_N_per_m", "damping_Ns_per_m")
 SPREADS: Final = (
@@ -59,7 +59,7 @@ def read_walls(file: File) -> Walls:
     return [(row[COLUMNS[0]], row[COLUMNS[1]]) for row in _read(file, {})]
 
 
-def read_points(file: File) -> list[OwnPoint]:
+def read_points(file: File) -> list[UserPoint]:
     """Measured points: a CSV file as for `read_walls`, with columns that may be left out, and cells left empty.
 
     Raises PointsError  as `read_walls`
@@ -71,7 +71,7 @@ def read_points(file: File) -> list[OwnPoint]:
         "trials": _trials,
     }
     return [
-        OwnPoint(
+        UserPoint(
             stiffness=row["stiffness_N_per_m"],
             damping=row["damping_Ns_per_m"],
             edge=row.get("edge", ""),
@@ -106,10 +106,10 @@ def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
     faults: list[str] = []
     found: list[dict[str, Any]] = []
     try:
-        header = [name.strip() for name in next(filled(rows), [])]
-        places = _places(file, header, optional)
+        header = [name.strip() for name in next(non_blank_rows(rows), [])]
+        places = _column_indices(file, header, optional)
         readers: dict[str, Reader] = {**dict.fromkeys(COLUMNS, wall_number), **optional}
-        for row in filled(rows):
+        for row in non_blank_rows(rows):
             if len(row) > len(header):
                 faults.append(
                     f"{file}: line {rows.line_num}: has {len(row)} cells, but the header names {len(header)} "
@@ -121,7 +121,7 @@ def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
                 cells[name], fault = readers[name](row[place].strip() if place < len(row) else "")
                 if fault:
                     faults.append(f"{file}: line {rows.line_num}: {name}: {fault}")
-            faults += [f"{file}: line {rows.line_num}: {fault}" for fault in _at_odds(cells)]
+            faults += [f"{file}: line {rows.line_num}: {fault}" for fault in _contradictions(cells)]
             found.append(cells)
     except csv.Error as error:
         raise PointsError(f"{file}: line {rows.line_num}: is not CSV: {error}") from None
@@ -133,7 +133,7 @@ def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
     return found
 
 
-def _at_odds(cells: dict[str, Any]) -> Iterator[str]:
+def _contradictions(cells: dict[str, Any]) -> Iterator[str]:
     """Spreads whose low end is above their high one, and a point that is both edge and wall."""
     if cells.get("edge") and cells.get("verdict"):
         yield (
@@ -145,7 +145,7 @@ def _at_odds(cells: dict[str, Any]) -> Iterator[str]:
             yield f"{low}: must be at most {high} = {cells[high]:g}, got {cells[low]:g}"
 
 
-def _places(file: File, header: list[str], optional: Collection[str]) -> dict[str, int]:
+def _column_indices(file: File, header: list[str], optional: Collection[str]) -> dict[str, int]:
     """Index of each column wanted, and of the optional ones that are there."""
     if not header:
         raise PointsError(f"{file}: is empty; its first line must name the columns {', '.join(COLUMNS)}")
@@ -157,5 +157,5 @@ def _places(file: File, header: list[str], optional: Collection[str]) -> dict[st
 def _text(file: File) -> str:
     try:
         return read_text(file, LARGEST_TABLE, pipes=True)
-    except Unreadable as error:
+    except UnreadableFileError as error:
         raise PointsError(f"{file}: {error}; give a CSV file") from None

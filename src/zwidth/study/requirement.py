@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.measures.catalogue import find_measure
-from zwidth.measures.measure import Measure
+from zwidth.measures.definition import Measure
 
 _FORM: Final = re.compile(r"\s*(?P<name>[^<>=\s]*)\s*(?P<sign>[<>=]*)\s*(?P<value>.*?)\s*")
 
@@ -48,11 +48,12 @@ class Requirement:
             return np.asarray(self.margin(values) >= 0.0)
 
 
-def parse_requirement(text: str, own: Mapping[str, Measure] | None = None) -> Requirement:
+def parse_requirement(text: str, user_measures: Mapping[str, Measure] | None = None) -> Requirement:
     """The requirement written as NAME>=VALUE or NAME<=VALUE, in the measure's unit.
 
-    own     measures of a user's own, by name; a name may carry its unit, stiffness_max_N_per_m
-    Raises  ValueError  for another form, a measure that does not exist (the nearest is named), no finite number
+    user_measures  measures of a user's own, by name; a name may carry its unit, stiffness_max_N_per_m
+    Raises         ValueError  for another form, a measure that does not exist (the nearest is named), no finite
+                   number
 
     >>> parse_requirement("isotropy <= 1.5").text
     'isotropy<=1.5'
@@ -67,4 +68,4 @@ def parse_requirement(text: str, own: Mapping[str, Measure] | None = None) -> Re
         value = np.nan
     if not np.isfinite(value):
         raise ValueError(f"{text!r}: the bound must be a finite number, got {number!r}")
-    return Requirement(find_measure(name, own), sign == ">=", value)
+    return Requirement(find_measure(name, user_measures), sign == ">=", value)

@@ -12,6 +12,7 @@ A continuum of members cannot be charted; it is sampled, and the sample is then 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import product
 from typing import Any, Final
 
@@ -20,16 +21,16 @@ import shapely
 from numpy.typing import NDArray
 
 from zwidth.chart.arc_joining import ChartError
-from zwidth.chart.robust.chart import RobustChart, robust_of
+from zwidth.chart.robust.chart import RobustChart, robust_chart_of_members
 from zwidth.chart.robust.instability import softening, unstable
 from zwidth.chart.robust.members import Member, chart_member
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.loop import Loop
-from zwidth.model.arguments import require
-from zwidth.study.robust_family import Family, Point, RangeError
-from zwidth.study.robust_study import RobustStudy, Violation
+from zwidth.model.argument_checks import require
+from zwidth.result import Result
+from zwidth.study.robust_family import Family, FamilyMember, RangeError
 
 Floats = NDArray[np.float64]
 # stage, done, of how many
@@ -46,6 +47,102 @@ DEPTH: Final = 1e-6  # how far inside the edge walls are asked, in shares of the
 
 class RobustError(ValueError):
     """Not one member can be built."""
+
+
+@dataclass(frozen=True)
+class Violation:
+    """What random members nobody had seen say of the robust walls.
+
+    unseen                 how many were asked; those that could not be built are not counted
+    violating              how many of them find one of the walls unstable
+    worst_spectral_radius  over all of them and all walls; at most 1 if nobody violates
+    worst_stiffness_share  the largest share of the largest stiffness by which a robust wall (K > 0, B >= 0) must
+                           be softened, at its damping, to be stable for a member; 0 if nobody violates
+    worst_member           that member's values: path -> value; {} if nobody violates
+    """
+
+    unseen: int
+    violating: int
+    worst_spectral_radius: float
+    worst_stiffness_share: float
+    worst_member: dict[str, Any]
+
+    def document(self) -> dict[str, Any]:
+        """The numbers by key."""
+        return {
+            "unseen": self.unseen,
+            "violating": self.violating,
+            "worst_spectral_radius": self.worst_spectral_radius,
+            "worst_stiffness_share": self.worst_stiffness_share,
+            "worst_member": self.worst_member or None,
+        }
+
+
+@dataclass(frozen=True)
+class RobustStudy(Result):
+    """A robust chart with who its members are and how far it can be trusted.
+
+    chart        of all members
+    members      path -> value of each; those in `chart.failed` could not be built or charted
+    sampled      members before the search; the rest it found
+    rounds       of the search
+    area_change  share of the area by which the last round moved the edge; 0 if it found nobody
+    settled      whether the search ended because nobody it found moves the edge by more than the tolerance
+    violation    None for a list without ranges, all of whose members are in the chart, and where no wall is stable
+    """
+
+    chart: RobustChart
+    members: tuple[dict[str, Any], ...]
+    sampled: int
+    rounds: int
+    area_change: float
+    settled: bool
+    violation: Violation | None
+
+    @property
+    def edge_shares(self) -> dict[int, float]:
+        """Member -> share of the edge's length at which it binds, on the chart as drawn; the largest first."""
+        if not self.chart.boundary:
+            return {}
+        size = np.ptp(np.vstack(self.chart.regions), axis=0)
+        lengths: dict[int, float] = {}
+        for arc in self.chart.boundary:
+            length = float(np.hypot(np.diff(arc.stiffness) / size[0], np.diff(arc.damping) / size[1]).sum())
+            lengths[arc.member] = lengths.get(arc.member, 0.0) + length
+        total = sum(lengths.values())
+        return {
+            member: lengths[member] / total for member in sorted(lengths, key=lambda one: (-lengths[one], one))
+        }
+
+    def document(self) -> dict[str, Any]:
+        """The chart, its members and the search by key and unit."""
+        search = {
+            "sampled": self.sampled,
+            "rounds": self.rounds,
+            "moved_share": self.area_change,
+            "settled": self.settled,
+        }
+        violation = None if self.violation is None else self.violation.document()
+        return self.chart.document() | {"members": list(self.members), "search": search, "violation": violation}
+
+    def table(self) -> dict[str, list[Any]]:
+        """The robust set's edge as columns, its arcs one after another and counted from 0."""
+        return self.chart.table()
+
+    def __repr__(self) -> str:
+        chart, found = self.chart, self.violation
+        lines = [f"{len(self.members)} members, {len(chart.binding)} of which bind"]
+        if chart.members_at_stiffness_max:
+            stiffest = f"{chart.stiffness_max:.6g} N/m at {chart.damping_at_stiffness_max:.6g} N s/m"
+            lines.append(f"largest stiffness stable for all {stiffest}")
+            lines.append(
+                f"{chart.lost_stiffness_share:.2%} less than the best member has, {chart.lost_share:.2%} less area"
+            )
+        else:
+            lines.append("no wall with K > 0 and B >= 0 is stable for all")
+        if found is not None:
+            lines.append(f"{found.violating} of {found.unseen} unseen members find one of the walls unstable")
+        return "RobustStudy: " + "\n  ".join(lines)
 
 
 def robust_study(
@@ -82,27 +179,27 @@ def robust_study(
     points = list(_sample(family, members, seed))
     found.add(points, "members")
     chart = found.chart()
-    rounds, moved, settled = 0, 0.0, not family.free
+    rounds, area_change, settled = 0, 0.0, not family.free
     while not settled and len(found.points) < members and chart.regions:
         found.progress("search", rounds, rounds + 1)
-        bites = _biting(found, chart)[: members - len(found.points)]
-        if not bites:
-            moved, settled = 0.0, True
+        new_members = _violating_members(found, chart)[: members - len(found.points)]
+        if not new_members:
+            area_change, settled = 0.0, True
             break
         rounds += 1
-        found.add(bites, "members")
+        found.add(new_members, "members")
         before, chart = chart, found.chart()
-        moved = _moved(before, chart)
-        settled = moved < tolerance
+        area_change = _area_change(before, chart)
+        settled = area_change < tolerance
     return RobustStudy(
         chart=chart,
         members=tuple(family.values(point) for point in found.points),
         sampled=len(points),
         rounds=rounds,
-        moved=moved,
+        area_change=area_change,
         settled=settled,
         violation=_violation(found, chart, unseen, seed) if family.free and chart.regions else None,
-    )
+    ).about(family.operating_point)
 
 
 class _Members:
@@ -110,12 +207,12 @@ class _Members:
 
     def __init__(self, family: Family, progress: Progress) -> None:
         self.family, self.progress = family, progress
-        self.points: list[Point] = []
+        self.points: list[FamilyMember] = []
         self.charted: dict[int, Member] = {}
         self.failed: dict[int, str] = {}
-        self.seen: dict[Point, Loop | None] = {}
+        self.loops: dict[FamilyMember, Loop | None] = {}
 
-    def add(self, points: list[Point], stage: str) -> None:
+    def add(self, points: list[FamilyMember], stage: str) -> None:
         """Build and chart more members; those for whom that fails are remembered with the reason."""
         for done, point in enumerate(points):
             self.progress(stage, done, len(points))
@@ -134,20 +231,20 @@ class _Members:
         if not self.charted:
             reason = next(iter(self.failed.values()))
             raise RobustError(f"not one of {len(self.points)} members could be charted; the first: {reason}")
-        return robust_of(dict(self.charted), dict(self.failed))
+        return robust_chart_of_members(dict(self.charted), dict(self.failed))
 
-    def radius(self, point: Point, K: float, B: float) -> float:
+    def radius(self, point: FamilyMember, K: float, B: float) -> float:
         """Spectral radius of a wall for a member; -1 for one that cannot be built."""
-        if point not in self.seen:
+        if point not in self.loops:
             try:
-                self.seen[point] = self.family.loop(point)
+                self.loops[point] = self.family.loop(point)
             except (ValueError, np.linalg.LinAlgError):
-                self.seen[point] = None
-        loop = self.seen[point]
+                self.loops[point] = None
+        loop = self.loops[point]
         return -1.0 if loop is None else float(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max())
 
 
-def _sample(family: Family, members: int, seed: int) -> Iterator[Point]:
+def _sample(family: Family, members: int, seed: int) -> Iterator[FamilyMember]:
     """Corners, centre and Sobol's points of the ranges, for every operator."""
     from scipy.stats import qmc
 
@@ -168,18 +265,18 @@ def _sample(family: Family, members: int, seed: int) -> Iterator[Point]:
             yield _point(family, operator, place)
 
 
-def _point(family: Family, operator: int, free: Floats) -> Point:
+def _point(family: Family, operator: int, free: Floats) -> FamilyMember:
     shares = np.zeros(len(family.ranges))
     shares[list(family.free)] = free
-    return Point(operator, tuple(shares.tolist()))
+    return FamilyMember(operator, tuple(shares.tolist()))
 
 
-def _biting(found: _Members, chart: RobustChart) -> list[Point]:
+def _violating_members(found: _Members, chart: RobustChart) -> list[FamilyMember]:
     """Members that the search finds at the edge and that cut it, the deepest cuts first."""
-    family, bites = found.family, dict[Point, float]()
+    family, bites = found.family, dict[FamilyMember, float]()
     for K, B, starts in _searched_walls(chart):
         for start in starts:
-            point, radius = _worst(found, found.points[start], K, B)
+            point, radius = _worst_member(found, found.points[start], K, B)
             if radius > 1.0 + EXCEEDS and point not in found.points:
                 rounded = _point(family, point.operator, np.round([point.shares[k] for k in family.free], 6))
                 bites[rounded] = max(radius, bites.get(rounded, 0.0))
@@ -205,7 +302,7 @@ def _searched_walls(chart: RobustChart) -> list[tuple[float, float, tuple[int, .
     return walls[:SEARCHED]
 
 
-def _worst(found: _Members, start: Point, K: float, B: float) -> tuple[Point, float]:
+def _worst_member(found: _Members, start: FamilyMember, K: float, B: float) -> tuple[FamilyMember, float]:
     """The member of the largest spectral radius at a wall, by pattern search from a member: one range at a time,
     steps halved where nothing is gained."""
     best, radius, step = start, found.radius(start, K, B), FIRST_STEP
@@ -214,7 +311,7 @@ def _worst(found: _Members, start: Point, K: float, B: float) -> tuple[Point, fl
         for k in found.family.free:
             for sign in (-1.0, 1.0):
                 share = min(max(best.shares[k] + sign * step, 0.0), 1.0)
-                tried = Point(best.operator, (*best.shares[:k], share, *best.shares[k + 1 :]))
+                tried = FamilyMember(best.operator, (*best.shares[:k], share, *best.shares[k + 1 :]))
                 reached = found.radius(tried, K, B) if tried != best else -1.0
                 if reached > radius:
                     best, radius, gained = tried, reached, True
@@ -223,7 +320,7 @@ def _worst(found: _Members, start: Point, K: float, B: float) -> tuple[Point, fl
     return best, radius
 
 
-def _moved(before: RobustChart, after: RobustChart) -> float:
+def _area_change(before: RobustChart, after: RobustChart) -> float:
     """Share by which the whole set became smaller."""
     areas = [sum(shapely.Polygon(ring).area for ring in chart.regions) for chart in (before, after)]
     return max(1.0 - areas[1] / areas[0], 0.0) if areas[0] > 0.0 else 0.0
@@ -232,9 +329,9 @@ def _moved(before: RobustChart, after: RobustChart) -> float:
 def _violation(found: _Members, chart: RobustChart, unseen: int, seed: int) -> Violation:
     """What `unseen` random members say of the robust walls."""
     family = found.family
-    walls = promised_walls(chart)
+    walls = sample_walls(chart)
     random = np.random.default_rng([seed, 1])
-    asked, violating, radius, share, worst = 0, 0, -1.0, 0.0, dict[str, Any]()
+    tested_members, violating, radius, share, worst = 0, 0, -1.0, 0.0, dict[str, Any]()
     for done in range(unseen):
         if done % 50 == 0:
             found.progress("unseen members", done, unseen)
@@ -244,7 +341,7 @@ def _violation(found: _Members, chart: RobustChart, unseen: int, seed: int) -> V
             tracer = Tracer.of(family.loop(point))
         except (ValueError, np.linalg.LinAlgError):
             continue
-        asked += 1
+        tested_members += 1
         bad = np.flatnonzero(unstable(tracer.polynomials, walls[:, 0].copy(), walls[:, 1].copy()))
         bad_radius = spectral_radius(tracer.loop, *walls[bad].T) if len(bad) else np.empty(0)
         bad = bad[bad_radius > 1.0 + BAND]
@@ -258,14 +355,14 @@ def _violation(found: _Members, chart: RobustChart, unseen: int, seed: int) -> V
     found.progress("unseen members", unseen, unseen)
     if radius < 0.0:
         radius = float(max(np.max(spectral_radius(chart.members[k], *walls.T)) for k in chart.binding))
-    return Violation(asked, violating, radius, share, worst)
+    return Violation(tested_members, violating, radius, share, worst)
 
 
 def _share(tracer: Tracer, K: float, B: float, stiffness_max: float) -> float:
     return softening(tracer.polynomials, K, B) / stiffness_max if K > 0.0 and B >= 0.0 else 0.0
 
 
-def promised_walls(chart: RobustChart) -> Floats:
+def sample_walls(chart: RobustChart) -> Floats:
     """Walls (k, 2) of [K, B] that stand for a robust set: along its edge, just inside, and a raster over it."""
     if not chart.regions:
         return np.empty((0, 2))

@@ -11,16 +11,16 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from zwidth.device import address, build
+from zwidth.device.consistency import operator_inconsistencies
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, dotted, one_line, quote
 from zwidth.device.load import from_document
-from zwidth.device.operator_choice import held_by
-from zwidth.device.relations import operator_relations
-from zwidth.device.schema import file as schema
+from zwidth.device.operator_choice import document_held_by
+from zwidth.device.schema import device_file as schema
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.measure import Spelling, as_argument
+from zwidth.measures.definition import Spelling, as_argument
 from zwidth.model.plant import Plant
 from zwidth.study.advice import Advice
 
@@ -95,7 +95,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Point:
+class FamilyMember:
     """One member: which operator holds it (0 if only one does), and each range's share 0..1."""
 
     operator: int
@@ -124,21 +124,21 @@ class Family:
 
     @cached_property
     def _documents(self) -> tuple[dict[str, Any], ...]:
-        return tuple(held_by(self.device.document, name) for name in self.operators or (None,))
+        return tuple(document_held_by(self.device.document, name) for name in self.operators or (None,))
 
     @cached_property
-    def _held_alone(self) -> Plant | None:
+    def _ungripped_plant(self) -> Plant | None:
         """The device's plant with nobody at it, where the members differ in the operator alone; else None."""
         operator_only = all(found.path.split(".")[0] == "operator" for found in self.ranges)
-        return self.operating_point.unheld_plant if operator_only else None
+        return self.operating_point.ungripped_plant if operator_only else None
 
-    def values(self, point: Point) -> dict[str, Any]:
+    def values(self, point: FamilyMember) -> dict[str, Any]:
         """Path -> value of a member; the operator's name under "operator" where there are several."""
         held = {"operator": self.operators[point.operator]} if self.operators else {}
         pairs = zip(self.ranges, point.shares, strict=True)
         return held | {found.path: found.at(share) for found, share in pairs}
 
-    def document(self, point: Point) -> dict[str, Any]:
+    def document(self, point: FamilyMember) -> dict[str, Any]:
         """A member's device file; a number off a matrix's diagonal is set together with its mirror image."""
         document = self._documents[point.operator]
         for found, share in zip(self.ranges, point.shares, strict=True):
@@ -149,16 +149,16 @@ class Family:
                 document = address.assign(document, mirror, found.at(share))
         return document
 
-    def loop(self, point: Point) -> Loop:
+    def loop(self, point: FamilyMember) -> Loop:
         """A member's loop. Raises what building it raises: DeviceError, and ValueErrors of the model."""
         document = self.document(point)
-        if self._held_alone is not None:
-            held = self._held(document)
+        if self._ungripped_plant is not None:
+            held = self._point_with_operator(document)
             if held is not None:
-                return Loop(held.hold(self._held_alone), self.device.controller)
-        return from_document(document, self.device.label).like(self.operating_point).loop
+                return Loop(held.attach_operator(self._ungripped_plant), self.device.controller)
+        return from_document(document, self.device.label).at_point(self.operating_point).loop
 
-    def _held(self, document: dict[str, Any]) -> OperatingPoint | None:
+    def _point_with_operator(self, document: dict[str, Any]) -> OperatingPoint | None:
         """The point with a document's operator, without reading the rest again; None where he has faults."""
         table = document.get("operator")
         if table is None:
@@ -167,7 +167,7 @@ class Family:
             section = OperatorSection.model_validate(table)
         except ValidationError:
             return None
-        if list(operator_relations(document)):
+        if list(operator_inconsistencies(document)):
             return None
         return replace(self.operating_point, operator=build.operator(section))
 
@@ -182,7 +182,7 @@ class Family:
         ]
         for document in self._documents:
             for one in self.ranges:
-                found += _no_number(document, one)
+                found += _path_faults(document, one)
         if found:
             return list(dict.fromkeys(found))
         for k in range(len(self.ranges)):
@@ -190,7 +190,7 @@ class Family:
                 for operator in range(len(self._documents)):
                     shares = tuple(end if j == k else 0.5 for j in range(len(self.ranges)))
                     try:
-                        from_document(self.document(Point(operator, shares)), self.device.label)
+                        from_document(self.document(FamilyMember(operator, shares)), self.device.label)
                     except DeviceError as error:
                         value = self.ranges[k].at(end)
                         found += [
@@ -200,13 +200,13 @@ class Family:
         return list(dict.fromkeys(found))
 
 
-def _no_number(document: dict[str, Any], one: Range) -> list[RangeFault]:
+def _path_faults(document: dict[str, Any], one: Range) -> list[RangeFault]:
     """The fault of a path that leads to no real number."""
     try:
         steps = address.resolve(document, one.path)
     except DeviceError as error:
         return [RangeFault(fault.key, fault.message) for fault in error.faults]
-    types = {kind for found in schema.at(steps) for kind in _types(found)}
+    types = {kind for found in schema.subschemas(steps) for kind in _types(found)}
     if "integer" in types and "number" not in types:
         return [RangeFault(one.path, "is a whole number and has no range", BY_VALUE)]
     try:

@@ -19,17 +19,16 @@ import numpy as np
 
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.device import address
+from zwidth.device.build_nonlinear import nonlinear_kind
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Path, dotted
+from zwidth.device.faults import DeviceError, KeyPath, dotted
 from zwidth.device.load import from_document
-from zwidth.device.parts import outside_linear
-from zwidth.device.schema import file as schema
+from zwidth.device.schema import device_file as schema
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.study.derivative import Derivative, central_derivative, one_sided_derivative
-from zwidth.study.local_maxima import rival_stiffness
-from zwidth.study.optimum import Optimum, OptimumError, optimum
+from zwidth.study.optimum import Optimum, OptimumError, optimum, second_peak_stiffness
 from zwidth.study.sensitivity_result import Group, Sensitivities, Sensitivity
 
 # Numbers of a device file that say where it is asked about, or how its posture is found, and not what it is.
@@ -63,7 +62,7 @@ def sensitivities(device: Device, point: OperatingPoint | None = None) -> Sensit
     asked = point or device.at()
 
     def loop_of(changed: Device) -> Loop:
-        return changed.like(asked).loop
+        return changed.at_point(asked).loop
 
     loop = asked.loop
     peak = largest_stiffness(loop)
@@ -74,16 +73,16 @@ def sensitivities(device: Device, point: OperatingPoint | None = None) -> Sensit
         held, obstacle = optimum(loop, peak), ""
     except OptimumError as error:
         held, obstacle = None, str(error)
-    answer = _Answer(device, loop_of, held, obstacle)
-    numbers = [answer.to(*number) for number in _numbers(device.document)]
-    groups = answer.together({number.path: number for number in numbers})
+    answer = _StiffnessDerivatives(device, loop_of, held, obstacle)
+    numbers = [answer.sensitivity(*number) for number in _numbers(device.document)]
+    groups = answer.groups({number.path: number for number in numbers})
     return Sensitivities(
         peak=peak,
         kind=None if held is None else held.kind,
         numbers=tuple(sorted(numbers, key=_rank)),
         groups=tuple(sorted(groups, key=lambda group: -abs(group.logarithmic))),
         left_out=left_out,
-        rival=rival_stiffness(stability_chart(loop, decay=False)),
+        second_peak=second_peak_stiffness(stability_chart(loop, decay=False)),
     )
 
 
@@ -99,18 +98,18 @@ def _rank(number: Sensitivity) -> tuple[bool, float, bool, float]:
 
 
 @dataclass(frozen=True)
-class _Answer:
+class _StiffnessDerivatives:
     """How the stiffest wall answers to changes of the device's document.
 
-    held      None where it has no derivative, for the reason `obstacle`
+    optimum   None where it has no derivative, for the reason `obstacle`
     """
 
     device: Device
     loop_of: Callable[[Device], Loop]
-    held: Optimum | None
+    optimum: Optimum | None
     obstacle: str
 
-    def to(self, path: str, steps: Path, value: float) -> Sensitivity:
+    def sensitivity(self, path: str, steps: KeyPath, value: float) -> Sensitivity:
         """The sensitivity to one number; a number that cannot be varied says why."""
         document = self.device.document
         unit = _unit(steps)
@@ -119,14 +118,14 @@ class _Answer:
         slope, side = Derivative(nan, nan), ""
         if not reason:
             slope, side, reason = self._slope(lambda changed: _with(document, steps, changed), value, scale)
-        if self.held is None or reason:
+        if self.optimum is None or reason:
             return Sensitivity(path, value, unit, nan, nan, nan, "", reason)
-        K = self.held.peak.stiffness
+        K = self.optimum.peak.stiffness
         if value == 0.0:
             return Sensitivity(path, value, unit, nan, slope.value * K, slope.error * K, side, ZERO)
         return Sensitivity(path, value, unit, slope.value * value, slope.value * K, slope.error * scale, side)
 
-    def together(self, found: dict[str, Sensitivity]) -> Iterator[Group]:
+    def groups(self, found: dict[str, Sensitivity]) -> Iterator[Group]:
         """The groups of numbers. A plant's matrices are scaled as a whole: so a free plant stays free."""
         steps_of = {path: steps for path, steps, _ in _numbers(self.device.document)}
         for name, paths in _groups(self.device.document).items():
@@ -139,7 +138,7 @@ class _Answer:
                 total = self._slope(scaled, 1.0, 1.0)[0].value
             yield Group(name, tuple(paths), total)
 
-    def _scaling(self, places: list[tuple[Path, float]]) -> Callable[[float], dict[str, Any]]:
+    def _scaling(self, places: list[tuple[KeyPath, float]]) -> Callable[[float], dict[str, Any]]:
         """Common factor -> the document with these numbers multiplied by it."""
 
         def scaled(factor: float) -> dict[str, Any]:
@@ -158,14 +157,14 @@ class _Answer:
 
         A delay that crosses whole samples changes the form of the loop, and the largest stiffness bends there.
         """
-        if self.held is None:
+        if self.optimum is None:
             return Derivative(nan, nan), "", self.obstacle
-        held, seen = self.held, dict[int, tuple[int, bool]]()
+        held, delays = self.optimum, dict[int, tuple[int, bool]]()
 
         def stiffness(changed: float) -> float:
-            loop = self.loop_of(from_document(change(changed), put_together=True))
-            seen[int(np.sign(changed - at))] = (loop.whole_delay, loop.fractional_delay > 0.0)
-            return held.moves(loop) / held.peak.stiffness
+            loop = self.loop_of(from_document(change(changed), skip_assembly_check=True))
+            delays[int(np.sign(changed - at))] = (loop.whole_delay, loop.fractional_delay > 0.0)
+            return held.stiffness_to_first_order(loop) / held.peak.stiffness
 
         reason = ""
         for side, sign in (("both", 0), ("above", 1), ("below", -1)):
@@ -181,7 +180,7 @@ class _Answer:
             except (ValueError, np.linalg.LinAlgError) as error:
                 reason = reason or str(error)
                 continue
-            if side == "both" and seen[-1] != seen[1]:
+            if side == "both" and delays[-1] != delays[1]:
                 continue
             if slope.error * scale <= WORTHLESS * max(1.0, abs(slope.value) * scale):
                 return slope, side, ""
@@ -189,15 +188,15 @@ class _Answer:
         return Derivative(nan, nan), "", reason
 
 
-def _obstacle(steps: Path, value: float) -> str:
+def _obstacle(steps: KeyPath, value: float) -> str:
     """Why a number has no derivative whatever the device; "" if it may have one."""
     if not isfinite(value):
         return "it is infinite, of which there is no share to change"
-    whole = any(found.get("type") == "integer" for found in schema.at(steps))
+    whole = any(found.get("type") == "integer" for found in schema.subschemas(steps))
     return "it is a whole number, which has no derivative" if whole else ""
 
 
-def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, Path, float]]:
+def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
     """Dotted path, steps and value of each number that is the device's; of a matrix those on and above the
     diagonal."""
     for steps, value in address.numbers(document):
@@ -207,8 +206,8 @@ def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, Path, float]]:
         yield "loop.delay_samples", ("loop", "delay_samples"), 0.0
 
 
-def _no_property(steps: Path) -> str:
-    if what := outside_linear(steps):
+def _no_property(steps: KeyPath) -> str:
+    if what := nonlinear_kind(steps):
         return f"{what}, which the chart leaves out: it is linear"
     return NO_PROPERTY.get(str(steps[1]), "") if steps[0] == "mechanism" and len(steps) > 1 else ""
 
@@ -219,16 +218,16 @@ def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
             yield dotted(steps, document), reason
 
 
-def _mirrored(document: dict[str, Any], steps: Path) -> bool:
+def _mirrored(document: dict[str, Any], steps: KeyPath) -> bool:
     """Is it an element below the diagonal of a matrix?"""
     return _is_matrix(document, steps) and int(steps[-2]) > int(steps[-1])
 
 
-def _is_matrix(document: dict[str, Any], steps: Path) -> bool:
+def _is_matrix(document: dict[str, Any], steps: KeyPath) -> bool:
     return len(steps) > 2 and isinstance(steps[-1], int) and isinstance(steps[-2], int)
 
 
-def _with(document: dict[str, Any], steps: Path, value: float) -> dict[str, Any]:
+def _with(document: dict[str, Any], steps: KeyPath, value: float) -> dict[str, Any]:
     """The document with a number changed, and its mirror image where it stands in a symmetric matrix."""
     changed = address.assign(document, dotted(steps, document), value)
     if _is_matrix(document, steps) and steps[-1] != steps[-2]:
@@ -237,10 +236,10 @@ def _with(document: dict[str, Any], steps: Path, value: float) -> dict[str, Any]
     return changed
 
 
-def _unit(steps: Path) -> str:
+def _unit(steps: KeyPath) -> str:
     """The unit that the schema states for the number, or for the list that it stands in."""
     while steps:
-        if found := re.search(r" \[([^\]]*)\]$", schema.description(steps)):
+        if found := re.search(r" \[([^\]]*)\]$", schema.key_description(steps)):
             return found[1]
         if isinstance(steps[-1], str):
             return ""
@@ -248,7 +247,7 @@ def _unit(steps: Path) -> str:
     return ""
 
 
-def _scale(document: dict[str, Any], steps: Path) -> float:
+def _scale(document: dict[str, Any], steps: KeyPath) -> float:
     """What a number that is 0 is measured by: the largest of its list, or else of its unit in the file, or 1."""
     if steps[-1] == "delay_samples":
         return 1.0
@@ -257,7 +256,7 @@ def _scale(document: dict[str, Any], steps: Path) -> float:
     return max(beside, default=0.0) or max(alike, default=0.0) or 1.0
 
 
-def _key(steps: Path) -> str:
+def _key(steps: KeyPath) -> str:
     return next(str(step) for step in reversed(steps) if isinstance(step, str))
 
 

@@ -67,13 +67,13 @@ class Group:
 class Sensitivities(Result):
     """All of them, with the wall they speak of.
 
-    peak      the stiffest wall; None where no wall is stable, and then nothing else is there
-    kind      what holds it (see `study.optimum`); None where that is not known
-    numbers   largest |logarithmic| first, then those without a logarithm
-    groups    largest first
-    left_out  path -> why the number is none of the device
-    rival     largest stiffness of another, separate extreme point of the edge [N/m]; nan if there is none. It
-              takes over as soon as a change makes it the stiffer one.
+    peak         the stiffest wall; None where no wall is stable, and then nothing else is there
+    kind         what holds it (see `study.optimum`); None where that is not known
+    numbers      largest |logarithmic| first, then those without a logarithm
+    groups       largest first
+    left_out     path -> why the number is none of the device
+    second_peak  largest stiffness of another, separate extreme point of the edge [N/m]; nan if there is none. It
+                 takes over as soon as a change makes it the stiffer one.
     """
 
     peak: Peak | None
@@ -81,7 +81,7 @@ class Sensitivities(Result):
     numbers: tuple[Sensitivity, ...]
     groups: tuple[Group, ...]
     left_out: dict[str, str]
-    rival: float
+    second_peak: float
 
     def document(self) -> dict[str, Any]:
         """The sensitivities by key and unit, with the wall they are about; None where there is none."""
@@ -97,7 +97,7 @@ class Sensitivities(Result):
             "stiffness_max_N_per_m": None if peak is None else peak.stiffness,
             "damping_at_stiffness_max_Ns_per_m": None if peak is None else peak.damping,
             "held_by": self.kind,
-            "rival_stiffness_N_per_m": self.rival,
+            "rival_stiffness_N_per_m": self.second_peak,
             "one_sided": self.tie,
         }
 
@@ -109,7 +109,7 @@ class Sensitivities(Result):
     def __repr__(self) -> str:
         if self.peak is None:
             return "Sensitivities: no stable wall has K > 0 and B >= 0"
-        first = ", ".join(f"{path} {value:+.4g}" for path, value in self.wholes[:3])
+        first = ", ".join(f"{path} {value:+.4g}" for path, value in self.ranking[:3])
         stiffest = f"the largest stiffness, {self.peak.stiffness:.6g} N/m, to {len(self.numbers)} numbers"
         return f"Sensitivities of {stiffest}\n  per cent for one per cent: {first or 'none'}"
 
@@ -131,7 +131,7 @@ class Sensitivities(Result):
         ]
 
     @property
-    def wholes(self) -> tuple[tuple[str, float], ...]:
+    def ranking(self) -> tuple[tuple[str, float], ...]:
         """Path and logarithmic sensitivity with lists and matrices as wholes, as those who build a device think of
         them; largest first, without those that are not known or have no influence."""
         lists = [group for group in self.groups if "*" not in group.path]
@@ -144,4 +144,4 @@ class Sensitivities(Result):
     @property
     def tie(self) -> bool:
         """Are two walls stiffest at once? Then each number's derivative is one-sided: that of this one."""
-        return self.peak is not None and bool(self.rival >= (1.0 - TIE) * self.peak.stiffness)
+        return self.peak is not None and bool(self.second_peak >= (1.0 - TIE) * self.peak.stiffness)

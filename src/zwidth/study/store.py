@@ -22,9 +22,9 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth._version import __version__
-from zwidth.device.version import KEPT, newer
-from zwidth.measures.measure import MISSING, OK, STATUS, Note
-from zwidth.study.job import Cells, Job
+from zwidth.device.format_version import STORE_VERSION, newer_version_message
+from zwidth.measures.definition import MISSING, OK, STATUS, Note
+from zwidth.study.job import CellValues, Job
 from zwidth.study.journal import Journal, JournalError, fingerprint
 
 KIND: Final = "cells"
@@ -76,7 +76,7 @@ class Store:
             group.create_array(
                 "status", shape=shape, chunks=chunks, dtype="uint8", fill_value=MISSING, attributes=about | flags
             )
-            about = {"zwidth": KIND, "version": KEPT, "question": self.question, "batch": batch}
+            about = {"zwidth": KIND, "version": STORE_VERSION, "question": self.question, "batch": batch}
             group.attrs.update(about)
             if self._ours or (self.path.is_dir() and not any(self.path.iterdir())):
                 shutil.rmtree(self.path)
@@ -85,27 +85,27 @@ class Store:
             shutil.rmtree(draft, ignore_errors=True)
         self._open()
 
-    def kept(self) -> Iterator[tuple[int, Cells]]:
+    def stored_batches(self) -> Iterator[tuple[int, CellValues]]:
         """First cell and cells of each batch that is done."""
-        values, status = self._opened()
+        values, status = self._open_arrays()
         assert self.batch is not None
         for first in range(0, self.count, self.batch):
             part = slice(first, min(first + self.batch, self.count))
             with suppress(Exception):  # a file that a crash has damaged: its batch is not done
-                found = Cells(values[part], status[part], self._noted(first))
+                found = CellValues(values[part], status[part], self._batch_notes(first))
                 # zarr does not tell a file that has gone from one that holds nan only
                 lost = (found.status == OK) & np.isnan(found.values)
                 if not (lost | (found.status == MISSING)).any():
                     yield first, found
 
-    def keep(self, first: int, cells: Cells) -> None:
+    def write_batch(self, first: int, cells: CellValues) -> None:
         """Write a batch. Raises OSError where the disk refuses."""
-        values, status = self._opened()
+        values, status = self._open_arrays()
         part = slice(first, first + len(cells.values))
         values[part] = cells.values
         if any(cells.notes):
             told = [[[n.status, n.reason, n.count, list(n.first)] for n in notes] for notes in cells.notes]
-            self._notes.ask(str(first), lambda: told)
+            self._notes.get_or_compute(str(first), lambda: told)
         status[part] = cells.status
 
     def remove(self) -> None:
@@ -113,11 +113,11 @@ class Store:
         if self._ours:
             shutil.rmtree(self.path, ignore_errors=True)
 
-    def _noted(self, first: int) -> tuple[tuple[Note, ...], ...]:
+    def _batch_notes(self, first: int) -> tuple[tuple[Note, ...], ...]:
         told = self._notes.known.get(str(first), [[] for _ in self.measures])
         return tuple(tuple(Note(s, reason, n, tuple(at)) for s, reason, n, at in notes) for notes in told)
 
-    def _opened(self) -> tuple[Any, Any]:
+    def _open_arrays(self) -> tuple[Any, Any]:
         assert self._arrays is not None, "not begun"
         return self._arrays
 
@@ -135,7 +135,7 @@ class Store:
             raise
         except Exception:  # zarr's own, of many kinds
             raise other from None
-        if kind == KIND and (said := newer(version, KEPT)):
+        if kind == KIND and (said := newer_version_message(version, STORE_VERSION)):
             raise StoreError(f"{self.path.name}: its version {said}, or name another folder")
         if kind != KIND or not isinstance(batch, int):
             raise other

@@ -9,16 +9,16 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from zwidth.contact.room import check_room
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError
-from zwidth.device.toml_access import number, table, tables
-from zwidth.device.translate import sentences
-from zwidth.measures.measure import Measure, Spelling, WantedWall
-from zwidth.study.axes import CIRCUMSTANCES, Sampling
+from zwidth.device.toml_access import is_number, table, tables
+from zwidth.device.validation_messages import validation_messages
+from zwidth.measures.definition import Measure, Spelling, WantedWall
+from zwidth.memory_limit import check_memory
+from zwidth.study.axis_tables import Faults, axes_of, circumstance_fault
 from zwidth.study.column import Column, column_named
-from zwidth.study.plane import Plane, PlaneError, plane_of
-from zwidth.study.study_axes import Found, axes_of, circumstance_fault
+from zwidth.study.plane_grid import PlaneError, PlaneGrid, plane_of
+from zwidth.study.sampling import CIRCUMSTANCES, Sampling
 from zwidth.study.study_schema import StudyFile, description, unknown
 
 PER_VALUE: Final = 3  # numbers that a value takes: itself, its status, and once more while they are put together
@@ -71,7 +71,7 @@ class Study:
     assembly: str | None = None
     model: str | None = None
     wall: WantedWall = field(default_factory=WantedWall)
-    plane: Plane | None = None
+    plane: PlaneGrid | None = None
     spelling: Spelling = as_key
 
     def __repr__(self) -> str:
@@ -85,34 +85,34 @@ def check_study(
     label: str,
     device: Device | None,
     operators: dict[str, Any],
-    own: Mapping[str, Measure] | None,
-    found: Found,
+    user_measures: Mapping[str, Measure] | None,
+    faults: Faults,
     *,
-    plane: Plane | None = None,
+    plane: PlaneGrid | None = None,
     spelling: Spelling = as_key,
 ) -> Study | None:
-    """The study that a document describes; None where anything is wrong with it, which is added to `found`.
+    """The study that a document describes; None where anything is wrong with it, which is added to `faults`.
 
-    device     with the changes of `set`; None: it cannot be had, which is told elsewhere
-    operators  as in `Study`
-    own        a user's measures by name; None: they cannot be had, so that no measure is looked up
-    plane      the workspace, in place of the document's
-    Raises     TooLarge  where the designs would not fit into memory
+    device         with the changes of `set`; None: it cannot be had, which is told elsewhere
+    operators      as in `Study`
+    user_measures  a user's measures by name; None: they cannot be had, so that no measure is looked up
+    plane          the workspace, in place of the document's
+    Raises         TooLarge  where the designs would not fit into memory
     """
     checked: StudyFile | None = None
     try:
         checked = StudyFile.model_validate(document)
     except ValidationError as error:
-        found += sentences(error, document, description, unknown)
+        faults += validation_messages(error, document, description, unknown)
     if device is not None and device.response is not None:
-        found.append((("device",), "has a measured [response] and no model, whose numbers a study could vary"))
+        faults.append((("device",), "has a measured [response] and no model, whose numbers a study could vary"))
         device = None
-    columns = () if own is None else _columns(document, own, found)
-    axes = axes_of(document, device, found)
-    _check_sampling(document, found)
-    _check_circumstances(document, device, found)
-    plane = _plane(document, device, columns, plane, found, spelling)
-    if found or checked is None or device is None:
+    columns = () if user_measures is None else _columns(document, user_measures, faults)
+    axes = axes_of(document, device, faults)
+    _check_sampling(document, faults)
+    _check_circumstances(document, device, faults)
+    plane = _plane(document, device, columns, plane, faults, spelling)
+    if faults or checked is None or device is None:
         return None
     hypercube = checked.sampling == "latin-hypercube"
     _check_size(checked, hypercube)
@@ -133,7 +133,7 @@ def check_study(
     )
 
 
-def _columns(document: dict[str, Any], own: Mapping[str, Measure], found: Found) -> tuple[Column, ...]:
+def _columns(document: dict[str, Any], user_measures: Mapping[str, Measure], found: Faults) -> tuple[Column, ...]:
     """The columns as far as their measures are known."""
     names = document.get("measures")
     columns: list[Column] = []
@@ -141,7 +141,7 @@ def _columns(document: dict[str, Any], own: Mapping[str, Measure], found: Found)
         if not isinstance(name, str) or not name:
             continue
         try:
-            column = column_named(name, own)
+            column = column_named(name, user_measures)
         except ValueError as error:
             found.append((("measures", n), str(error)))
             continue
@@ -151,7 +151,7 @@ def _columns(document: dict[str, Any], own: Mapping[str, Measure], found: Found)
     return tuple(columns)
 
 
-def _check_sampling(document: dict[str, Any], found: Found) -> None:
+def _check_sampling(document: dict[str, Any], found: Faults) -> None:
     if document.get("sampling", "grid") == "latin-hypercube":
         if "count" not in document:
             found.append((("sampling",), "'latin-hypercube' needs count, how many designs"))
@@ -161,7 +161,7 @@ def _check_sampling(document: dict[str, Any], found: Found) -> None:
             found.append(((key,), "is read with sampling = 'latin-hypercube' only; remove it, or set that"))
 
 
-def _check_circumstances(document: dict[str, Any], device: Device | None, found: Found) -> None:
+def _check_circumstances(document: dict[str, Any], device: Device | None, found: Faults) -> None:
     """Whether circumstances fit the device, and are set once."""
     varied = {axis.get("key") for _, axis in tables(document, "axis")}
     for key in CIRCUMSTANCES:
@@ -172,8 +172,8 @@ def _check_circumstances(document: dict[str, Any], device: Device | None, found:
         right = isinstance(document[key], list if key in ("at", "direction") else str)
         if key in ("at", "direction", "assembly") and right and document[key]:
             components = document[key] if key != "assembly" else [0.0]
-            if all(map(number, components)) and (said := circumstance_fault(key, document[key], device)):
-                fault = ((key,), said)
+            if all(map(is_number, components)) and (message := circumstance_fault(key, document[key], device)):
+                fault = ((key,), message)
                 # the schema may have said so in its own words
                 found += [fault] if all(path != (key,) for path, _ in found) else []
 
@@ -182,12 +182,12 @@ def _plane(
     document: dict[str, Any],
     device: Device | None,
     columns: Sequence[Column],
-    plane: Plane | None,
-    found: Found,
+    plane: PlaneGrid | None,
+    found: Faults,
     spelling: Spelling,
-) -> Plane | None:
+) -> PlaneGrid | None:
     """The grid over the workspace, the same for all designs; None where nothing is asked over it."""
-    wanted = [column.name for column in columns if column.over]
+    wanted = [column.name for column in columns if column.statistic]
     if not wanted:
         if (plane is not None or "workspace" in document) and columns:
             said = f"is read by measures over it only, such as average({columns[0].measure.name}); remove it"
@@ -227,4 +227,4 @@ def _check_size(checked: StudyFile, hypercube: bool) -> None:
     designs = (checked.count or 0) if hypercube else prod(each)
     ties = sum(len(axis.tie) for axis in checked.axis)
     numbers = designs * (PER_VALUE * len(checked.measures) + PER_AXIS * (len(checked.axis) + ties))
-    check_room(float(numbers), f"{designs} designs of {len(checked.measures)} measures", "lower a count")
+    check_memory(float(numbers), f"{designs} designs of {len(checked.measures)} measures", "lower a count")

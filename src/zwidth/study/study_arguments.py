@@ -8,14 +8,14 @@ from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Fault, Path
-from zwidth.device.toml_access import number
-from zwidth.measures.measure import Measure, as_argument
-from zwidth.model.arguments import refusal, require
-from zwidth.study.column import measures_listed
-from zwidth.study.plane import Plane
+from zwidth.device.faults import DeviceError, Fault, KeyPath
+from zwidth.device.toml_access import is_number
+from zwidth.measures.definition import Measure, as_argument
+from zwidth.model.argument_checks import require, wrong_type
+from zwidth.study.axis_tables import Faults
+from zwidth.study.column import measure_list
+from zwidth.study.plane_grid import PlaneGrid
 from zwidth.study.study import KEYS, Study, check_study
-from zwidth.study.study_axes import Found
 from zwidth.study.study_file import axis_operators
 
 if TYPE_CHECKING:
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 LABEL: Final = "sweep"
 VECTORS: Final = ("at", "direction")  # of which each value is a list
-CIRCUMSTANCES: Final = ("position", "stiffness", "damping", "frequency")  # that a study file calls otherwise
-ARGUMENTS: Final = {KEYS[name]: name for name in CIRCUMSTANCES} | {"axis": "axes", "workspace": "plane"}
+RENAMED_ARGUMENTS: Final = ("position", "stiffness", "damping", "frequency")  # that a study file calls otherwise
+ARGUMENTS: Final = {KEYS[name]: name for name in RENAMED_ARGUMENTS} | {"axis": "axes", "workspace": "plane"}
 
 
 def study_over(
@@ -41,8 +41,8 @@ def study_over(
     stiffness: float | None = None,
     damping: float | None = None,
     frequency: float | None = None,
-    plane: Plane | None = None,
-    own: Mapping[str, Measure] | None = None,
+    plane: PlaneGrid | None = None,
+    user_measures: Mapping[str, Measure] | None = None,
 ) -> Study:
     """The study of a grid over axes of a device; see `study.sweep.sweep` for the arguments.
 
@@ -52,8 +52,8 @@ def study_over(
     """
     require("device", device, Device)
     if plane is not None:
-        require("plane", plane, Plane, f"write plane_of(device, {plane!r})" if isinstance(plane, str) else "")
-    names, mine = _measures(measures, own)
+        require("plane", plane, PlaneGrid, f"write plane_of(device, {plane!r})" if isinstance(plane, str) else "")
+    names, measures_by_name = _measures(measures, user_measures)
     given = {
         "position": None if isinstance(position, Mapping) else position,
         "direction": direction,
@@ -69,40 +69,42 @@ def study_over(
         "axis": [{"key": key, "values": values} for key, values in _axes(axes)],
         **{KEYS.get(name, name): _plain(value) for name, value in given.items() if value is not None},
     }
-    found: Found = []
-    elsewhere: list[Fault] = []
-    operators = axis_operators(document, File(), elsewhere)
-    study = check_study(document, LABEL, device, operators, mine, found, plane=plane, spelling=as_argument)
+    found: Faults = []
+    operator_faults: list[Fault] = []
+    operators = axis_operators(document, File(), operator_faults)
+    study = check_study(
+        document, LABEL, device, operators, measures_by_name, found, plane=plane, spelling=as_argument
+    )
     if isinstance(position, Mapping):
         found += _angle_faults(device, position, axes)
-    if found or elsewhere or study is None:
-        raise DeviceError([*(_fault(path, said, list(axes)) for path, said in found), *elsewhere])
+    if found or operator_faults or study is None:
+        raise DeviceError([*(_fault(path, said, list(axes)) for path, said in found), *operator_faults])
     return replace(study, at=position) if isinstance(position, Mapping) else study
 
 
 def _measures(
-    measures: str | Measure | Sequence[str | Measure], own: Mapping[str, Measure] | None
+    measures: str | Measure | Sequence[str | Measure], user_measures: Mapping[str, Measure] | None
 ) -> tuple[list[str], dict[str, Measure]]:
     """The names of what is asked, and measures of the user's own by name, those given themselves among them."""
-    listed = measures_listed(measures)
+    listed = measure_list(measures)
     given = {one.name: one for one in listed if isinstance(one, Measure)}
-    return [one.name if isinstance(one, Measure) else one for one in listed], {**(own or {}), **given}
+    return [one.name if isinstance(one, Measure) else one for one in listed], {**(user_measures or {}), **given}
 
 
 def _axes(axes: Any) -> Iterator[tuple[str, list[Any]]]:
     """Path and values of each axis, in Python's own numbers. Raises TypeError, ValueError."""
     if not isinstance(axes, Mapping):
-        raise refusal("axes", "a dictionary of paths and values", axes)
+        raise wrong_type("axes", "a dictionary of paths and values", axes)
     if not axes:
         raise ValueError("axes has no path to vary; write such as {'loop.sampling_period_s': [0.0005, 0.001]}")
     for key, values in axes.items():
         if not isinstance(key, str):
-            raise refusal("axes", "a dictionary whose keys are paths", key)
+            raise wrong_type("axes", "a dictionary whose keys are paths", key)
         plain = _plain(values)
         if isinstance(plain, list) and not plain:
             raise ValueError(f"axes[{key!r}] has no values; give at least one")
-        if not isinstance(plain, list) or (key in VECTORS and all(map(number, plain))):
-            raise refusal(f"axes[{key!r}]", "a list of values", values, f"write [{plain!r}]")
+        if not isinstance(plain, list) or (key in VECTORS and all(map(is_number, plain))):
+            raise wrong_type(f"axes[{key!r}]", "a list of values", values, f"write [{plain!r}]")
         yield key, plain
 
 
@@ -113,9 +115,9 @@ def _plain(value: Any) -> Any:
     return [_plain(inner) for inner in value] if isinstance(value, list | tuple | range) else value
 
 
-def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str, Any]) -> Found:
+def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str, Any]) -> Faults:
     """What is wrong with a position given by the angles of the driven joints."""
-    found: Found = [(("at",), "is an axis, too; remove one of them")] if "at" in axes else []
+    found: Faults = [(("at",), "is an axis, too; remove one of them")] if "at" in axes else []
     try:
         device.position(angles)
     except DeviceError as error:
@@ -123,7 +125,7 @@ def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str
     return found
 
 
-def _fault(path: Path, said: str, keys: list[str]) -> Fault:
+def _fault(path: KeyPath, said: str, keys: list[str]) -> Fault:
     """A fault of the document, placed where it was given."""
     argument = ARGUMENTS.get(str(path[0]), str(path[0]))
     if path[0] != "axis" or len(path) < 3:
@@ -131,4 +133,4 @@ def _fault(path: Path, said: str, keys: list[str]) -> Fault:
     key = keys[int(path[1])]
     if path[2] != "key":
         return Fault(argument, key, said)
-    return Fault(argument, "", f"'{key}' as an axis is called '{KEYS[key]}'" if key in CIRCUMSTANCES else said)
+    return Fault(argument, "", f"'{key}' as an axis is called '{KEYS[key]}'" if key in RENAMED_ARGUMENTS else said)

@@ -9,19 +9,19 @@ from typing import Any, Final
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, fail
+from zwidth.device.format_version import refuse_newer
 from zwidth.device.load import from_document, in_order
 from zwidth.device.operator_choice import NOBODY, operator_table, with_operator
-from zwidth.device.plausible import warn_of_implausible
-from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, Shelf, bundled_names, parse, read
-from zwidth.device.text_file import Unreadable, read_text
+from zwidth.device.plausibility import warn_of_implausible
+from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, BundledFiles, bundled_names, parse_document, read
+from zwidth.device.text_file import UnreadableFileError, read_text
 from zwidth.device.toml_access import tables
-from zwidth.device.version import refuse_newer
-from zwidth.measures.measure import Measure
+from zwidth.measures.definition import Measure
 from zwidth.measures.user_measures import load_measures
+from zwidth.study.axis_tables import Faults
 from zwidth.study.study import Study, check_study
-from zwidth.study.study_axes import Found
 
-STUDIES: Final = Shelf("zoo", "study", "a study file", "a study needs a device, measures and an [[axis]]")
+STUDIES: Final = BundledFiles("zoo", "study", "a study file", "a study needs a device, measures and an [[axis]]")
 
 
 def read_study(path: str | os.PathLike[str]) -> Study:
@@ -33,9 +33,9 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     label = os.fspath(path)
     try:
         text = read_text(label, LARGEST_FILE)
-    except Unreadable as error:
+    except UnreadableFileError as error:
         raise fail(label, "", f"{error}; give a study file") from None
-    return study_of(parse(text, label, STUDIES), label)
+    return study_of(parse_document(text, label, STUDIES), label)
 
 
 def study_of(document: dict[str, Any], label: str = "study") -> Study:
@@ -46,7 +46,7 @@ def study_of(document: dict[str, Any], label: str = "study") -> Study:
             TooLarge     where its designs would not fit into memory
     """
     refuse_newer(document, label)
-    found: Found = []
+    found: Faults = []
     elsewhere: list[Fault] = []
     folder = File(label).parent
     device = _device(document, folder, found, elsewhere)
@@ -57,11 +57,11 @@ def study_of(document: dict[str, Any], label: str = "study") -> Study:
     return study
 
 
-def axis_operators(document: dict[str, Any], folder: File, elsewhere: list[Fault]) -> dict[str, Any]:
+def axis_operators(document: dict[str, Any], folder: File, file_faults: list[Fault]) -> dict[str, Any]:
     """The operators that an axis names, by name: their tables, None for nobody.
 
-    folder     that files are looked for in
-    elsewhere  gets the faults of their files
+    folder       that files are looked for in
+    file_faults  gets the faults of their files
     """
     found: dict[str, Any] = {}
     for _, axis in tables(document, "axis"):
@@ -71,17 +71,17 @@ def axis_operators(document: dict[str, Any], folder: File, elsewhere: list[Fault
                 try:
                     found[name] = _operator(name, folder)
                 except DeviceError as error:
-                    elsewhere += error.faults
+                    file_faults += error.faults
     return found
 
 
-def _device(document: dict[str, Any], folder: File, found: Found, elsewhere: list[Fault]) -> Device | None:
+def _device(document: dict[str, Any], folder: File, found: Faults, elsewhere: list[Fault]) -> Device | None:
     """The device with those of the study's changes that can be meant; None where there is none, which is told."""
     name, operator, changes = (document.get(key) for key in ("device", "operator", "set"))
     if not isinstance(name, str) or not name:
         return None
     try:
-        inner, label = read(_beside(name, folder))
+        inner, label = read(_resolve_name(name, folder))
     except DeviceError as error:
         elsewhere += error.faults
         return None
@@ -107,7 +107,7 @@ def _device(document: dict[str, Any], folder: File, found: Found, elsewhere: lis
     return device
 
 
-def _own_measures(document: dict[str, Any], folder: File, found: Found) -> dict[str, Measure] | None:
+def _own_measures(document: dict[str, Any], folder: File, found: Faults) -> dict[str, Measure] | None:
     """The measures of the file that the study names, by name; None where it has faults, which are told."""
     file = document.get("measures_file")
     if not isinstance(file, str) or not file:
@@ -121,9 +121,9 @@ def _own_measures(document: dict[str, Any], folder: File, found: Found) -> dict[
 
 def _operator(name: str, folder: File) -> dict[str, Any] | None:
     """The [operator] table of a name or a file beside the study; None for nobody."""
-    return None if name == NOBODY else operator_table(_beside(name, folder, OPERATORS))
+    return None if name == NOBODY else operator_table(_resolve_name(name, folder, OPERATORS))
 
 
-def _beside(name: str, folder: File, shelf: Shelf = DEVICES) -> str:
+def _resolve_name(name: str, folder: File, shelf: BundledFiles = DEVICES) -> str:
     """A bundled name as it is, any other as a file beside the study."""
     return name if name in bundled_names(shelf) else str(folder / name)

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field
 
-from zwidth.device.faults import Path, quote, suggestion
-from zwidth.device.schema.numbers import (
+from zwidth.device.faults import KeyPath, quote, suggestion
+from zwidth.device.schema.value_types import (
     VERSION,
     Bounds,
     Direction,
@@ -16,9 +16,9 @@ from zwidth.device.schema.numbers import (
     Section,
     Text,
     WholeNumber,
-    quantity,
+    documented_key,
 )
-from zwidth.device.toml_access import number
+from zwidth.device.toml_access import is_number
 from zwidth.model.reduction import Model
 
 MOST: Final = 10**9  # designs along one axis, and altogether: numbers beyond are slips of the keyboard
@@ -33,11 +33,11 @@ def _by_name(value: Any) -> Any:
 
 
 def _one_or_two(value: Any) -> Any:
-    return [value, value] if number(value) else value
+    return [value, value] if is_number(value) else value
 
 
 def _plane(value: Any) -> Any:
-    if isinstance(value, str) or (isinstance(value, list) and len(value) == 6 and all(map(number, value))):
+    if isinstance(value, str) or (isinstance(value, list) and len(value) == 6 and all(map(is_number, value))):
         return value
     raise ValueError(f"must be 'xy', 'xz', 'yz' or six numbers, got {quote(value)}")
 
@@ -45,87 +45,93 @@ def _plane(value: Any) -> Any:
 class TieSection(Section):
     """A number that goes with an axis's."""
 
-    key: Text = quantity("the number that goes with the axis's: a dotted path of the device file")
-    factor: Number | None = quantity("times the axis's value", default=None)
-    power: Number | None = quantity("of the axis's value over that in the file, times its own there", default=None)
+    key: Text = documented_key("the number that goes with the axis's: a dotted path of the device file")
+    factor: Number | None = documented_key("times the axis's value", default=None)
+    power: Number | None = documented_key(
+        "of the axis's value over that in the file, times its own there", default=None
+    )
 
 
-Tie = Annotated[TieSection, BeforeValidator(_by_name)]
+TieEntry = Annotated[TieSection, BeforeValidator(_by_name)]
 
 
 class AxisSection(Section):
     """What is varied: a number of the device file, or a circumstance."""
 
-    key: Text = quantity("what is varied: a dotted path of the device file, or a circumstance such as assembly")
-    range: Bounds | None = quantity("lowest and highest value", default=None)
-    count: WholeNumber | None = quantity("values of the range, its ends among them", ge=1, le=MOST, default=None)
-    values: tuple[Any, ...] | None = quantity("the values", min_length=1, default=None)
-    scale: Literal["linear", "log"] = quantity("how the range is divided", default="linear")
-    tie: tuple[Tie, ...] = quantity("numbers that go with this one", default=())
+    key: Text = documented_key(
+        "what is varied: a dotted path of the device file, or a circumstance such as assembly"
+    )
+    range: Bounds | None = documented_key("lowest and highest value", default=None)
+    count: WholeNumber | None = documented_key(
+        "values of the range, its ends among them", ge=1, le=MOST, default=None
+    )
+    values: tuple[Any, ...] | None = documented_key("the values", min_length=1, default=None)
+    scale: Literal["linear", "log"] = documented_key("how the range is divided", default="linear")
+    tie: tuple[TieEntry, ...] = documented_key("numbers that go with this one", default=())
 
 
-class WorkspaceSection(Section):
+class StudyWorkspaceSection(Section):
     """Where measures over a workspace are asked: a plane with a grid."""
 
-    plane: Annotated[Any, BeforeValidator(_plane)] = quantity("xy, xz, yz or six numbers", default=None)
-    through_m: Position | None = quantity("a point of the plane", "m", default=None)
-    x_m: Bounds | None = quantity("lowest and highest coordinate along its first axis", "m", default=None)
-    y_m: Bounds | None = quantity("lowest and highest coordinate along its second axis", "m", default=None)
+    plane: Annotated[Any, BeforeValidator(_plane)] = documented_key("xy, xz, yz or six numbers", default=None)
+    through_m: Position | None = documented_key("a point of the plane", "m", default=None)
+    x_m: Bounds | None = documented_key("lowest and highest coordinate along its first axis", "m", default=None)
+    y_m: Bounds | None = documented_key("lowest and highest coordinate along its second axis", "m", default=None)
     count: Annotated[
         tuple[Annotated[WholeNumber, Field(ge=2, le=MOST)], ...],
         Field(min_length=2, max_length=2),
         BeforeValidator(_one_or_two),
-    ] = quantity("points along both axes, or along each", default=(15, 15))
+    ] = documented_key("points along both axes, or along each", default=(15, 15))
 
 
 class OptimiseSection(Section):
     """What an optimiser wants of the same file; a sweep does without."""
 
-    objectives: dict[Text, Literal["max", "min"]] = quantity('measure -> "max" or "min"', default={})
-    constraints: dict[Text, Text] = quantity('measure -> such as "<= 0.3"', default={})
-    budget: WholeNumber | None = quantity("designs to try", ge=1, default=None)
-    seed: WholeNumber | None = quantity("of what is random", ge=LEAST_SEED, default=None)
+    objectives: dict[Text, Literal["max", "min"]] = documented_key('measure -> "max" or "min"', default={})
+    constraints: dict[Text, Text] = documented_key('measure -> such as "<= 0.3"', default={})
+    budget: WholeNumber | None = documented_key("designs to try", ge=1, default=None)
+    seed: WholeNumber | None = documented_key("of what is random", ge=LEAST_SEED, default=None)
 
 
 class StudyFile(Section):
     """Many designs of one device, and what is asked of each."""
 
     file_version: WholeNumber = VERSION
-    device: Text = quantity("a bundled name, or a file beside this one")
-    measures: tuple[Text, ...] = quantity("what is asked of each design", min_length=1)
-    measures_file: Text | None = quantity("a file of your own measures, beside this one", default=None)
-    sampling: Literal["grid", "latin-hypercube"] = quantity("how the axes are filled", default="grid")
-    count: WholeNumber | None = quantity("designs of a Latin hypercube", ge=1, le=MOST, default=None)
-    seed: WholeNumber | None = quantity("of a Latin hypercube", ge=LEAST_SEED, default=None)
-    axis: tuple[AxisSection, ...] = quantity("what is varied, one [[axis]] each", min_length=1)
-    at: Position | None = quantity("the handle's position", "m", default=None)
-    direction: Direction | None = quantity("the rendered direction", default=None)
-    assembly: Text | None = quantity("way of assembling the mechanism", default=None)
-    model: Model | None = quantity("how much of the device is modelled", default=None)
-    operator: Text | None = quantity("a bundled operator, a file beside this one, or none", default=None)
-    set: tuple[Text, ...] = quantity('changes of the device file, each "PATH=VALUE"', default=())
-    stiffness_N_per_m: Number | None = quantity("of the wanted wall", "N/m", ge=0, default=None)
-    damping_Ns_per_m: Number | None = quantity("of the wanted wall", "N s/m", ge=0, default=None)
-    frequency_Hz: Number | None = quantity("at which the hand moves", "Hz", gt=0, default=None)
-    workspace: WorkspaceSection | None = quantity("for measures over a workspace", default=None)
-    optimise: OptimiseSection | None = quantity("for an optimiser", default=None)
+    device: Text = documented_key("a bundled name, or a file beside this one")
+    measures: tuple[Text, ...] = documented_key("what is asked of each design", min_length=1)
+    measures_file: Text | None = documented_key("a file of your own measures, beside this one", default=None)
+    sampling: Literal["grid", "latin-hypercube"] = documented_key("how the axes are filled", default="grid")
+    count: WholeNumber | None = documented_key("designs of a Latin hypercube", ge=1, le=MOST, default=None)
+    seed: WholeNumber | None = documented_key("of a Latin hypercube", ge=LEAST_SEED, default=None)
+    axis: tuple[AxisSection, ...] = documented_key("what is varied, one [[axis]] each", min_length=1)
+    at: Position | None = documented_key("the handle's position", "m", default=None)
+    direction: Direction | None = documented_key("the rendered direction", default=None)
+    assembly: Text | None = documented_key("way of assembling the mechanism", default=None)
+    model: Model | None = documented_key("how much of the device is modelled", default=None)
+    operator: Text | None = documented_key("a bundled operator, a file beside this one, or none", default=None)
+    set: tuple[Text, ...] = documented_key('changes of the device file, each "PATH=VALUE"', default=())
+    stiffness_N_per_m: Number | None = documented_key("of the wanted wall", "N/m", ge=0, default=None)
+    damping_Ns_per_m: Number | None = documented_key("of the wanted wall", "N s/m", ge=0, default=None)
+    frequency_Hz: Number | None = documented_key("at which the hand moves", "Hz", gt=0, default=None)
+    workspace: StudyWorkspaceSection | None = documented_key("for measures over a workspace", default=None)
+    optimise: OptimiseSection | None = documented_key("for an optimiser", default=None)
 
 
 _TABLES: Final[dict[str, Any]] = {
     "axis": AxisSection,
     "tie": TieSection,
-    "workspace": WorkspaceSection,
+    "workspace": StudyWorkspaceSection,
     "optimise": OptimiseSection,
 }
 
 
-def _table(path: Path) -> Any:
+def _table(path: KeyPath) -> Any:
     """The section that the last key of a path stands in."""
     names = [part for part in path[:-1] if isinstance(part, str) and part in _TABLES]
     return _TABLES[names[-1]] if names else StudyFile
 
 
-def description(path: Path) -> str:
+def description(path: KeyPath) -> str:
     """What a key of the study file means, with its unit; "" for what stands within one.
 
     >>> description(("workspace", "x_m"))
@@ -139,13 +145,13 @@ def description(path: Path) -> str:
     return f"{found.description} [{unit}]" if unit else str(found.description)
 
 
-def unknown(path: Path) -> str:
+def unknown(path: KeyPath) -> str:
     """The sentence on a key that a study file does not have.
 
     >>> unknown(("axis", 0, "ranges"))
     "is not a key of an [[axis]]; did you mean 'range'?"
     """
     section, key = _table(path), str(path[-1])
-    here = {AxisSection: "an [[axis]]", TieSection: "a tie", WorkspaceSection: "[workspace]"}
+    here = {AxisSection: "an [[axis]]", TieSection: "a tie", StudyWorkspaceSection: "[workspace]"}
     place = here.get(section, "[optimise]" if section is OptimiseSection else "a study file")
     return f"is not a key of {place}; {suggestion(key, list(section.model_fields))}"

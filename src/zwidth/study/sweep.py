@@ -15,18 +15,18 @@ import numpy as np
 
 from zwidth import _verbs
 from zwidth.device.device import Device
-from zwidth.measures.measure import OK, STATUS, Measure
-from zwidth.model.arguments import refusal
+from zwidth.measures.definition import OK, STATUS, Measure
+from zwidth.model.argument_checks import wrong_type
 from zwidth.result import Result
-from zwidth.study.axes import settings
 from zwidth.study.executor import Progress, run
-from zwidth.study.job import Cells
-from zwidth.study.plane import Plane
+from zwidth.study.job import CellValues
+from zwidth.study.plane_grid import PlaneGrid
+from zwidth.study.sampling import settings
 from zwidth.study.store import Store, store_for
 from zwidth.study.study import Study
 from zwidth.study.study_arguments import study_over
 from zwidth.study.study_file import read_study
-from zwidth.study.sweep_data import as_dataset, reasons, sweep_document, sweep_table
+from zwidth.study.sweep_data import as_dataset, note_sentences, sweep_document, sweep_table
 from zwidth.study.sweep_job import SweepJob, sweep_job
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from zwidth.loop.operating_point import Position
 
-NONE: Final = "no design has a value"
+NO_DESIGN: Final = "no design has a value"
 SHOWN: Final = 3  # columns of a repr
 
 
@@ -48,7 +48,7 @@ class Sweep(Result):
 
     study: Study
     job: SweepJob
-    cells: Cells
+    cells: CellValues
 
     def __repr__(self) -> str:
         axes = ", ".join(axis.key for axis in self.job.sampling.axes)
@@ -62,8 +62,10 @@ class Sweep(Result):
         """Why no design has a value: the first reason told, or else what became of them; None where one has."""
         if (self.cells.status == OK).any():
             return None
-        told = [sentence for _, sentence in reasons(self)]
-        return f"{NONE}: {told[0] if told else ', '.join(STATUS[int(k)] for k in np.unique(self.cells.status))}"
+        told = [sentence for _, sentence in note_sentences(self)]
+        return (
+            f"{NO_DESIGN}: {told[0] if told else ', '.join(STATUS[int(k)] for k in np.unique(self.cells.status))}"
+        )
 
     def design(self, number: int) -> dict[str, Any]:
         """Path -> value of all that makes a design."""
@@ -101,8 +103,8 @@ def sweep(
     stiffness: float | None = None,
     damping: float | None = None,
     frequency: float | None = None,
-    plane: Plane | None = None,
-    own: Mapping[str, Measure] | None = None,
+    plane: PlaneGrid | None = None,
+    user_measures: Mapping[str, Measure] | None = None,
     store: Store | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
@@ -111,26 +113,27 @@ def sweep(
 
         sweep(device, {"loop.sampling_period_s": [0.0005, 0.001]}, ["stiffness_max", "isotropy"])
 
-    axes       path -> values, as in `Device.with_`; or a circumstance -> values: at, direction, assembly, model,
-               operator (names, files, "none"), and of the wanted wall stiffness_N_per_m, damping_Ns_per_m and
-               frequency_Hz
-    measures   one or several: names such as "isotropy" or, over the workspace, "average(isotropy)"; or measures
+    axes           path -> values, as in `Device.with_`; or a circumstance -> values: at, direction, assembly,
+                   model, operator (names, files, "none"), and of the wanted wall stiffness_N_per_m,
+                   damping_Ns_per_m and frequency_Hz
+    measures       one or several: names such as "isotropy" or, over the workspace, "average(isotropy)"; or
+                   measures
     position, direction, assembly, model    of all designs, as for `Device.at`
     stiffness, damping, frequency           of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures
-                                            about them
-    plane      the workspace, for measures over it (`study.plane.plane_of`); left out: 15 by 15 points of the
-               device's own
-    own        measures of a user's own, by name (`measures.user_measures.load_measures`)
-    store      a folder that keeps what is done, so that the same call goes on from there after it was stopped
-    progress   is called with what is done now, how many designs are done, and how many there are
-    workers    processes at most; left out: one for each core
-    Returns    a dataset with a dimension for each axis, called as it is: for each measure its values, nan where a
-               design has none, and NAME_status. Why they have none stands in the attribute `notes`
-    Raises     DeviceError   with all faults of what was given
-               MeasureError  for measures that cannot be asked of this device
-               TooLarge      where the designs would not fit into memory
-               TypeError     for arguments of another kind
-               what `executor.run` and `Store` raise
+                                                about them
+    plane          the workspace, for measures over it (`study.plane_grid.plane_of`); left out: 15 by 15 points of
+                   the device's own
+    user_measures  measures of a user's own, by name (`measures.user_measures.load_measures`)
+    store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
+    progress       is called with what is done now, how many designs are done, and how many there are
+    workers        processes at most; left out: one for each core
+    Returns        a dataset with a dimension for each axis, called as it is: for each measure its values, nan
+                   where a design has none, and NAME_status. Why they have none stands in the attribute `notes`
+    Raises         DeviceError   with all faults of what was given
+                   MeasureError  for measures that cannot be asked of this device
+                   TooLarge      where the designs would not fit into memory
+                   TypeError     for arguments of another kind
+                   what `executor.run` and `Store` raise
     """
     if isinstance(device, Study | str | os.PathLike) and not axes:  # what was swept before there were axes
         old: xr.Dataset = _verbs.old_sweep(device, axes, measures)
@@ -147,7 +150,7 @@ def sweep(
         damping=damping,
         frequency=frequency,
         plane=plane,
-        own=own,
+        user_measures=user_measures,
     )
     job = sweep_job(study)
     return compute_designs(study, job, store_for(job, store), progress, workers).dataset()
@@ -169,7 +172,7 @@ def run_study(
     """
     if not isinstance(study, Study | str | os.PathLike):
         hint = "write sweep(device, {path: values}, measures)" if isinstance(study, Device) else ""
-        raise refusal("study", "a Study or the path of a study file", study, hint)
+        raise wrong_type("study", "a Study or the path of a study file", study, hint)
     study = study if isinstance(study, Study) else read_study(study)
     job = sweep_job(study)
     return compute_designs(study, job, store_for(job, store), progress, workers)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from zwidth.measures.measure import STATUS, Note
-from zwidth.study.axes import Axis
-from zwidth.study.study_axes import unit_of
+from zwidth.measures.definition import STATUS, Note
+from zwidth.study.axis_tables import unit_of
+from zwidth.study.column import unit_attributes
+from zwidth.study.sampling import Axis
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,8 +38,7 @@ def as_dataset(found: Sweep) -> xr.Dataset:
     data: dict[str, Any] = {}
     for n, one in enumerate(found.job.columns):
         about = {
-            "unit": one.unit,
-            "units": one.unit,
+            **unit_attributes(one.unit),
             "title": one.title,
             "long_name": one.title,
             "source": one.measure.source,
@@ -54,15 +54,15 @@ def as_dataset(found: Sweep) -> xr.Dataset:
         values = list(axis.values) if rows is None else [row[n] for row in rows]
         dim = axis.key if grid else DESIGN
         coordinates |= {name: (dim, *column) for name, column in _columns(found, axis, values)}
-    return xr.Dataset(data, coordinates, _circumstances(found))
+    return xr.Dataset(data, coordinates, _attributes(found))
 
 
 def _columns(found: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str, tuple[Any, dict[str, str]]]]:
     """The axis's coordinates: itself, and what goes with it."""
-    about = {"units": axis.unit, "long_name": axis.key, "scale": "log" if axis.log else "linear"}
+    about = {**unit_attributes(axis.unit), "long_name": axis.key, "scale": "log" if axis.log else "linear"}
     if values and isinstance(values[0], tuple):
-        texts = {"units": "", "long_name": axis.key, "role": "axis"}
-        yield axis.key, (np.array([label(value) for value in values]), texts)
+        texts = {"long_name": axis.key, "role": "axis"}
+        yield axis.key, (np.array([axis_value_text(value) for value in values]), texts)
         length = max(len(value) for value in values)
         padded = np.array([[*value, *[0.0] * (length - len(value))] for value in values])
         for n in range(length):
@@ -74,17 +74,17 @@ def _columns(found: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str,
         unit = unit_of(found.study.device.document, tie.key)
         for place in np.ndindex(tied.shape[1:]):
             path = ".".join([tie.key, *map(str, place)])
-            yield path, (tied[(slice(None), *place)], {"units": unit, "long_name": path})
+            yield path, (tied[(slice(None), *place)], {**unit_attributes(unit), "long_name": path})
 
 
-def label(value: Any) -> str:
+def axis_value_text(value: Any) -> str:
     """An axis's value as a text.
 
-    >>> label((0.0, 0.25)), label("rigid"), label(0.1 + 0.2)
+    >>> axis_value_text((0.0, 0.25)), axis_value_text("rigid"), axis_value_text(0.1 + 0.2)
     ('0, 0.25', 'rigid', '0.3')
     """
     if isinstance(value, tuple):
-        return ", ".join(label(part) for part in value)
+        return ", ".join(axis_value_text(part) for part in value)
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
@@ -105,7 +105,7 @@ def sweep_document(found: Sweep) -> dict[str, Any]:
         "designs": [found.design(n) for n in range(found.job.count)],
         "values": [dict(zip(names, map(float, row), strict=True)) for row in found.cells.values],
         "status": [dict(zip(names, row, strict=True)) for row in status],
-        "notes": [f"{name}: {sentence}" for name, sentence in reasons(found)],
+        "notes": [f"{name}: {sentence}" for name, sentence in note_sentences(found)],
     }
 
 
@@ -121,7 +121,7 @@ def sweep_table(found: Sweep) -> dict[str, list[Any]]:
     return made | columns | status
 
 
-def reasons(found: Sweep) -> Iterator[tuple[str, str]]:
+def note_sentences(found: Sweep) -> Iterator[tuple[str, str]]:
     """Name of a column, and why designs have no value in it: a sentence for each reason."""
     for name, notes in zip(found.job.measures, found.cells.notes, strict=True):
         yield from ((name, _sentence(found, note)) for note in notes)
@@ -135,7 +135,9 @@ def _sentence(found: Sweep, note: Note) -> str:
     """A reason, how many designs it is of, and the first of them."""
     sampling = found.job.sampling
     values = sampling.values(note.first[0])
-    where = ", ".join(f"{axis.key} = {label(value)}" for axis, value in zip(sampling.axes, values, strict=True))
+    where = ", ".join(
+        f"{axis.key} = {axis_value_text(value)}" for axis, value in zip(sampling.axes, values, strict=True)
+    )
     many = "1 design" if note.count == 1 else f"{note.count} designs"
     return f"{many} {STATUS.get(note.status, 'ok')}: {note.reason}; first at {where}"
 
@@ -145,7 +147,7 @@ def _flags() -> dict[str, Any]:
     return {"flag_values": np.array(list(STATUS), dtype=np.uint8), "flag_meanings": meanings}
 
 
-def _circumstances(found: Sweep) -> dict[str, Any]:
+def _attributes(found: Sweep) -> dict[str, Any]:
     """What was asked, as attributes that any file can hold."""
     from zwidth._version import __version__
 

@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from zwidth.device import address
-from zwidth.device.assembled import moves_mass
+from zwidth.device.compiled_mechanism_check import moves_mass
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document
 from zwidth.device.operator_choice import with_operator
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.evaluate import answered, evaluate
-from zwidth.measures.measure import (
+from zwidth.measures.definition import (
     FAILED,
     NO_VALUE,
     OK,
@@ -33,11 +32,12 @@ from zwidth.measures.measure import (
     Spelling,
     WantedWall,
 )
+from zwidth.measures.evaluate import evaluate, evaluate_safely
 from zwidth.model.posture import OutOfReach, PostureError, Singular
-from zwidth.study.axes import CIRCUMSTANCES, Sampling, settings
 from zwidth.study.column import Column
-from zwidth.study.job import Cells
+from zwidth.study.job import CellValues
 from zwidth.study.journal import fingerprint
+from zwidth.study.sampling import CIRCUMSTANCES, Sampling, settings
 from zwidth.study.study import KEYS, Study, as_key
 from zwidth.study.workspace_summary import areas
 
@@ -58,13 +58,13 @@ class _NoPoint(Exception):
 class SweepJob:
     """The designs of a study as cells.
 
-    document   of the device, the study's changes made
-    label      of the device, for messages
-    operators  as in `Study`
-    columns    what is asked
-    positions  (..., 3) of the workspace [m]; None where nothing is asked over it
-    weights    (...) what each of them stands for [m^2]
-    fixed      circumstances that no axis sets
+    document             of the device, the study's changes made
+    label                of the device, for messages
+    operators            as in `Study`
+    columns              what is asked
+    positions            (..., 3) of the workspace [m]; None where nothing is asked over it
+    weights              (...) what each of them stands for [m^2]
+    fixed_circumstances  circumstances that no axis sets
     """
 
     document: dict[str, Any]
@@ -74,14 +74,14 @@ class SweepJob:
     columns: tuple[Column, ...]
     positions: NDArray[np.float64] | None
     weights: NDArray[np.float64] | None
-    fixed: dict[str, Any]
-    _last: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    fixed_circumstances: dict[str, Any]
+    _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def __repr__(self) -> str:
         return f"SweepJob({self.count} designs of {self.label!r}: {', '.join(self.measures)})"
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_last": {}}
+        return {**self.__dict__, "_cache": {}}
 
     @property
     def count(self) -> int:
@@ -97,21 +97,27 @@ class SweepJob:
     def question(self) -> str:
         """What its results are known by. Raises TypeError for a measure whose function has no name elsewhere."""
         return fingerprint(
-            "sweep", self.document, self.operators, self.sampling, self.columns, self.positions, self.fixed
+            "sweep",
+            self.document,
+            self.operators,
+            self.sampling,
+            self.columns,
+            self.positions,
+            self.fixed_circumstances,
         )
 
-    def compute(self, first: int, last: int) -> Cells:
+    def compute(self, first: int, last: int) -> CellValues:
         """Designs first to last - 1."""
         shape = last - first, len(self.columns)
         values, status = np.full(shape, np.nan), np.empty(shape, dtype=np.uint8)
-        seen: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]
+        designs_by_reason: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]
         for row in range(last - first):
             for column, (value, what, reason) in enumerate(self._row(first + row)):
                 values[row, column], status[row, column] = value, what
                 if reason:
-                    seen[column].setdefault((what, reason), []).append(first + row)
-        notes = [tuple(Note(*key, len(at), (at[0],)) for key, at in kinds.items()) for kinds in seen]
-        return Cells(values, status, tuple(notes))
+                    designs_by_reason[column].setdefault((what, reason), []).append(first + row)
+        notes = [tuple(Note(*key, len(at), (at[0],)) for key, at in kinds.items()) for kinds in designs_by_reason]
+        return CellValues(values, status, tuple(notes))
 
     def design(self, number: int) -> Design:
         """One of the designs, with the operating points that it is asked about."""
@@ -122,11 +128,11 @@ class SweepJob:
         design = self.design(number)
         for one in self.columns:
             try:
-                point = design.point() if one.over is None else design.workspace()
+                point = design.point() if one.statistic is None else design.workspace()
             except _NoPoint as none:
                 yield np.nan, none.status, none.reason
                 continue
-            yield _answer(one, one.measure.at_wall(design.wall), point, self.weights)
+            yield _column_value(one, one.measure.at_wall(design.wall), point, self.weights)
 
     @cached_property
     def _in_mechanism(self) -> frozenset[str]:
@@ -143,14 +149,14 @@ class SweepJob:
         """The device with its axes' values; kept until another is asked for. Raises DeviceError."""
         own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
         key = (chosen.get("operator"), own)
-        if self._last.get("key") != key:
+        if self._cache.get("key") != key:
             document = self.document
             if "operator" in chosen:
                 document = with_operator(document, self.operators[chosen["operator"]])
             document = address.assign_all(document, own)
             # whether it can be put together shows where its posture is solved, which takes a tenth of the time
-            self._last.update(key=key, device=from_document(document, self.label, put_together=True))
-        return self._last["device"]  # type: ignore[no-any-return]
+            self._cache.update(key=key, device=from_document(document, self.label, skip_assembly_check=True))
+        return self._cache["device"]  # type: ignore[no-any-return]
 
 
 class Design:
@@ -158,8 +164,8 @@ class Design:
 
     def __init__(self, job: SweepJob, number: int) -> None:
         self.job = job
-        self.chosen = dict(settings(job.sampling.axes, job.sampling.values(number)))
-        self.known: dict[str, OperatingPoint | _NoPoint] = {}
+        self.settings = dict(settings(job.sampling.axes, job.sampling.values(number)))
+        self.points: dict[str, OperatingPoint | _NoPoint] = {}
 
     @property
     def wall(self) -> WantedWall:
@@ -168,30 +174,30 @@ class Design:
 
     def point(self) -> OperatingPoint:
         """The posture asked about. Raises _NoPoint."""
-        return self._solved("point", self._circumstance("at"))
+        return self._solve_once("point", self._circumstance("at"))
 
     def workspace(self) -> OperatingPoint:
         """All postures of the workspace. Raises _NoPoint."""
-        return self._solved("workspace", self.job.positions)
+        return self._solve_once("workspace", self.job.positions)
 
-    def _solved(self, name: str, positions: Any) -> OperatingPoint:
-        if name not in self.known:
+    def _solve_once(self, name: str, positions: Any) -> OperatingPoint:
+        if name not in self.points:
             try:
-                self.known[name] = self._solve(name, positions)
+                self.points[name] = self._solve(name, positions)
             except _NoPoint as none:
-                self.known[name] = none
-        found = self.known[name]
+                self.points[name] = none
+        found = self.points[name]
         if isinstance(found, _NoPoint):
             raise found
         return found
 
     def _solve(self, name: str, positions: Any) -> OperatingPoint:
         try:
-            device = self.job.device(self.chosen)
+            device = self.job.device(self.settings)
             assembly = self._circumstance("assembly")
             # what changes the computer or the operator alone leaves the posture as it is
-            same = name, self._circumstance("at"), assembly, self.job.of_mechanism(self.chosen)
-            known = self.job._last.get(name, (None, None))
+            same = name, self._circumstance("at"), assembly, self.job.of_mechanism(self.settings)
+            known = self.job._cache.get(name, (None, None))
             point = device.at(
                 known[1] if known[0] == same else positions,
                 self._circumstance("direction"),
@@ -201,37 +207,37 @@ class Design:
             if known[0] != same:
                 if point.posture is not None and not moves_mass(point.posture):
                     from_document(device.document, device.label)  # says what is wrong
-                self.job._last[name] = same, point.posture
+                self.job._cache[name] = same, point.posture
         except OutOfReach as error:
             raise _NoPoint(OUT_OF_REACH) from error
         except Singular as error:
             raise _NoPoint(SINGULAR) from error
         except (PostureError, DeviceError) as error:
-            raise _NoPoint(FAILED, _said(error)) from error
+            raise _NoPoint(FAILED, _error_text(error)) from error
         except ValueError as error:
             raise _NoPoint(FAILED, str(error)) from error
         return point
 
     def _circumstance(self, key: str) -> Any:
-        return self.chosen.get(key, self.job.fixed.get(key))
+        return self.settings.get(key, self.job.fixed_circumstances.get(key))
 
 
-def _said(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     if not isinstance(error, DeviceError):
         return str(error)
     return "; ".join(": ".join(filter(None, (fault.key, fault.message))) for fault in error.faults)
 
 
-def _answer(
+def _column_value(
     one: Column, measure: Measure, point: OperatingPoint, weights: NDArray[np.float64] | None
 ) -> tuple[float, int, str]:
     """Value, status and reason of one column; its measure is about the design's wanted wall."""
     try:
-        if one.over is not None:
-            return one.reduced(evaluate(measure, point), point, weights)
+        if one.statistic is not None:
+            return one.reduce(evaluate(measure, point), point, weights)
         if measure.each:
             status = int(point.status)
-            return (np.nan, status, "") if status != OK else answered(lambda: measure.compute(point))
+            return (np.nan, status, "") if status != OK else evaluate_safely(lambda: measure.compute(point))
         found = evaluate(measure, point)
     except MeasureError as error:
         return np.nan, NO_VALUE, error.spelled(as_key)
@@ -244,8 +250,8 @@ def sweep_job(study: Study) -> SweepJob:
     Raises  MeasureError  for measures that cannot be asked of this device, all of them
     """
     wanted = {KEYS[name]: getattr(study.wall, name) for name in WALL}
-    told = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
-    fixed = {key: value for key, value in told.items() if value is not None}
+    circumstances = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
+    fixed = {key: value for key, value in circumstances.items() if value is not None}
     plane = study.plane
     positions, weights = (None, None) if plane is None else (plane.positions, areas(plane.x, plane.y))
     # what a device's numbers come from is told of the study; it need not be read again for each design

@@ -27,7 +27,7 @@ from zwidth.chart.tracer import Tracer
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import Model, ModelError
@@ -53,32 +53,34 @@ SIMPLER: Final[tuple[tuple[Model, str], ...]] = (
 class Fit:
     """How far one model tells the same as the full one.
 
-    key        "rigid", "motor-mass" or "two-mass", with "-undamped" where its damping was left out
-    label      for people
-    frequency  (k,)  of walls along the full model's edge, ascending [Hz]
-    error      (k,)  e at these walls; inf where the model has no stable wall
-    within     frequency ranges of the edge in which e stays within the tolerance, ascending [Hz]
-    reason     why the model does not apply; "" where it does
+    key           "rigid", "motor-mass" or "two-mass", with "-undamped" where its damping was left out
+    label         for people
+    frequency     (k,)  of walls along the full model's edge, ascending [Hz]
+    error         (k,)  e at these walls; inf where the model has no stable wall
+    valid_ranges  frequency ranges of the edge in which e stays within the tolerance, ascending [Hz]
+    reason        why the model does not apply; "" where it does
     """
 
     key: str
     label: str
     frequency: Floats
     error: Floats
-    within: tuple[Interval, ...]
+    valid_ranges: tuple[Interval, ...]
     reason: str = ""
 
     @property
     def everywhere(self) -> bool:
         """Does it stay within the tolerance along the whole edge?"""
-        return len(self.error) > 0 and self.within == ((float(self.frequency[0]), float(self.frequency[-1])),)
+        return len(self.error) > 0 and self.valid_ranges == (
+            (float(self.frequency[0]), float(self.frequency[-1])),
+        )
 
 
 @dataclass(frozen=True, repr=False)
 class Validity(Result):
     """The models of a device beside its full model.
 
-    tolerance      that `Fit.within` means
+    tolerance      that `Fit.valid_ranges` means
     first_natural  the full model's first flexible natural frequency, nobody holding it [Hz]; nan if it has none
     frequency      (k,)  along the full model's edge, for walls with K > 0 and B > 0, ascending [Hz]
     walls          (k, 3)  their K, B and frequency
@@ -102,7 +104,7 @@ class Validity(Result):
                 {
                     "key": fit.key,
                     "label": fit.label,
-                    "frequency_ranges_Hz": [list(interval) for interval in fit.within],
+                    "frequency_ranges_Hz": [list(interval) for interval in fit.valid_ranges],
                     **({"reason": fit.reason} if fit.reason else {}),
                 }
                 for fit in self.fits
@@ -121,7 +123,7 @@ class Validity(Result):
     def __repr__(self) -> str:
         lines = [f"Validity: models beside the full one, within {100.0 * self.tolerance:g} %"]
         for fit in self.fits:
-            ranges = " and ".join(f"{low:.4g} to {high:.4g} Hz" for low, high in fit.within)
+            ranges = " and ".join(f"{low:.4g} to {high:.4g} Hz" for low, high in fit.valid_ranges)
             lines.append(f"{fit.label}: {fit.reason or ranges or 'nowhere'}")
         return "\n  ".join(lines)
 
@@ -137,7 +139,7 @@ def validity(point: OperatingPoint, tolerance: float = TOLERANCE) -> Validity:
     require("point", point, OperatingPoint)
     full = point.in_model("full")
     chart = stability_chart(full.loop, decay=False)
-    natural = natural_frequencies(full.unheld_plant)
+    natural = natural_frequencies(full.ungripped_plant)
     flexible = natural[natural > 0.0]
     edge = _Edge(chart)
     fits = [_fit(edge, point.controller, *model, tolerance) for model in _models(full)]
@@ -156,7 +158,7 @@ def edge_distance(walls: Floats, chart: StabilityChart) -> Floats:
 
     walls  (k, 3)  K, B and frequency, none of them 0
 
-    >>> from zwidth.chart.result import BoundaryArc
+    >>> from zwidth.chart.chart_base import BoundaryArc
     >>> from types import SimpleNamespace
     >>> chart = SimpleNamespace(boundary=[BoundaryArc(np.array([0, 100]), np.array([2, 2]), np.array([10, 20]))])
     >>> edge_distance(np.array([[50.0, 1.6, 15.0], [200.0, 2.0, 20.0]]), chart).round(9).tolist()
@@ -246,22 +248,22 @@ def _fit(
 
     error = _error(edge.walls, chart, tracer)
     within = [
-        (_turn(edge.frequency, fits, first, first - 1), _turn(edge.frequency, fits, last, last + 1))
+        (_range_end(edge.frequency, fits, first, first - 1), _range_end(edge.frequency, fits, last, last + 1))
         for first, last in _runs(np.asarray(error <= tolerance))
     ]
     return Fit(key, label, edge.frequency, error, tuple(within))
 
 
-def _turn(frequency: Floats, fits: Callable[[float], bool], good: int, bad: int) -> float:
+def _range_end(frequency: Floats, fits: Callable[[float], bool], good: int, bad: int) -> float:
     """The frequency between two neighbours at which a model ceases to fit, by bisection."""
-    on = float(frequency[good])
+    fitting = float(frequency[good])
     if not 0 <= bad < len(frequency):
-        return on
+        return fitting
     off = float(frequency[bad])
     for _ in range(20):
-        middle = 0.5 * (on + off)
-        on, off = (middle, off) if fits(middle) else (on, middle)
-    return on
+        middle = 0.5 * (fitting + off)
+        fitting, off = (middle, off) if fits(middle) else (fitting, middle)
+    return fitting
 
 
 def _runs(good: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
@@ -276,7 +278,7 @@ def _models(full: OperatingPoint) -> Iterator[tuple[str, str, Plant | None, str]
     for key, label in SIMPLER:
         reduced = full.in_model(key)
         try:
-            itself, plant = reduced.unheld_plant is full.unheld_plant, reduced.plant
+            itself, plant = reduced.ungripped_plant is full.ungripped_plant, reduced.plant
         except ModelError as error:
             yield key, label, None, str(error)
             continue

@@ -19,15 +19,15 @@ from zwidth.device.device import Device
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import Model, ModelError
 
 BASE: Final = "as-described"
 # The changes a designer may hope for, of which the one that gains most names what limits the device.
 REMEDIES: Final = ("rigid-drives", "half-period", "no-delay", "no-filter", "twice-damping", "collocated")
-MODELS: Final = ("full", "two-mass", "motor-mass", "motor-mass-undamped", "rigid-undamped")
-WORTH: Final = 1.01  # a change that gains less than 1 % does not count as one that helps
+VARIANT_MODELS: Final = ("full", "two-mass", "motor-mass", "motor-mass-undamped", "rigid-undamped")
+LEAST_GAIN: Final = 1.01  # a change that gains less than 1 % does not count as one that helps
 THESIS_CUTOFF_HZ: Final = 20.0
 
 
@@ -35,7 +35,7 @@ THESIS_CUTOFF_HZ: Final = 20.0
 class Variant:
     """A device with one thing changed.
 
-    key     one of BASE, REMEDIES, "one-sample", "with-filter", or "model-" and one of MODELS
+    key     one of BASE, REMEDIES, "one-sample", "with-filter", or "model-" and one of VARIANT_MODELS
     label   for people
     loop    None where the change does not apply
     chart   its stability chart; None where the change does not apply or the chart cannot be drawn
@@ -85,21 +85,21 @@ def what_if(device: Device, point: OperatingPoint | None = None) -> list[Variant
     point = point or device.at()
     variants = [Variant(BASE, "as described", point.loop, stability_chart(point.loop))]
     steps = [*_changes(device, point), *_models(point)]
-    return variants + [_charted(*step) for step in steps]
+    return variants + [_variant(*step) for step in steps]
 
 
 def limiting_change(variants: Sequence[Variant]) -> Variant | None:
     """The remedy that gains most stiffness; None where none gains at least 1 %."""
-    base = find(variants, BASE)
+    base = find_variant(variants, BASE)
     best = max(
         (v for v in variants if v.key in REMEDIES and v.chart is not None),
         key=lambda variant: variant.stiffness_max,
         default=None,
     )
-    return best if best is not None and best.stiffness_max > WORTH * base.stiffness_max else None
+    return best if best is not None and best.stiffness_max > LEAST_GAIN * base.stiffness_max else None
 
 
-def find(variants: Sequence[Variant], key: str) -> Variant:
+def find_variant(variants: Sequence[Variant], key: str) -> Variant:
     """The variant of that key. Raises KeyError if there is none."""
     for variant in variants:
         if variant.key == key:
@@ -108,10 +108,10 @@ def find(variants: Sequence[Variant], key: str) -> Variant:
 
 
 # key, label, why it does not apply ("" if it may), how to make its loop
-Step = tuple[str, str, str, Callable[[], Loop]]
+Change = tuple[str, str, str, Callable[[], Loop]]
 
 
-def _charted(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> Variant:
+def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> Variant:
     if obstacle:
         return Variant(key, label, None, None, obstacle)
     try:
@@ -121,9 +121,9 @@ def _charted(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
         return Variant(key, label, None, None, str(error))
 
 
-def _changes(device: Device, point: OperatingPoint) -> Iterator[Step]:
+def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     controller, plant = point.controller, point.plant
-    alone = point.unheld_plant  # so that the device's own damping is told from the operator's
+    alone = point.ungripped_plant  # so that the device's own damping is told from the operator's
 
     def computed(**changes: Any) -> Callable[[], Loop]:
         return lambda: Loop(plant, replace(controller, **changes))
@@ -151,7 +151,7 @@ def _changes(device: Device, point: OperatingPoint) -> Iterator[Step]:
     yield "with-filter", through, filtered, computed(velocity_filter=usual)
     twice = replace(alone, damping=2.0 * alone.damping)
     lossless = only(damped, f"the device has no {own}")
-    yield "twice-damping", f"twice the {own}", lossless, lambda: Loop(point.hold(twice), controller)
+    yield "twice-damping", f"twice the {own}", lossless, lambda: Loop(point.attach_operator(twice), controller)
     there = only(not _collocated(plant), "the sensor reads where the wall acts already")
     moved = replace(plant, sensor=plant.actuator)
     yield "collocated", "sensor at the actuator", there, lambda: Loop(moved, controller)
@@ -164,9 +164,9 @@ def _collocated(plant: Plant) -> bool:
     return bool(np.max(np.abs(sensor - along * actuator)) <= 1e-9 * np.max(np.abs(sensor)))
 
 
-def _models(point: OperatingPoint) -> Iterator[Step]:
+def _models(point: OperatingPoint) -> Iterator[Change]:
     """The models of Fig. 4.4: the full one, and what is left of it by and by."""
-    full = point.in_model("full").unheld_plant
+    full = point.in_model("full").ungripped_plant
     damped = " with damping" if full.damping.any() or full.lagged_dampers else ""
     undamped_only = "" if damped else "there is no damping to leave out"
 
@@ -176,7 +176,7 @@ def _models(point: OperatingPoint) -> Iterator[Step]:
 
     def reduces_to_itself(name: Model) -> bool:
         try:
-            return point.in_model(name).unheld_plant is full
+            return point.in_model(name).ungripped_plant is full
         except ModelError:
             return False
 
@@ -185,9 +185,9 @@ def _models(point: OperatingPoint) -> Iterator[Step]:
             reduced = point.in_model(name)
             if not lossless:
                 return reduced.loop
-            plant = reduced.unheld_plant
+            plant = reduced.ungripped_plant
             kept = replace(plant, damping=0.0 * plant.damping, lagged_dampers=())
-            return Loop(point.hold(kept), point.controller)
+            return Loop(point.attach_operator(kept), point.controller)
 
         return make
 

@@ -22,9 +22,9 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from zwidth.study.job import Cells, Job
+    from zwidth.study.job import CellValues, Job
 
-Range = tuple[int, int]
+CellRange = tuple[int, int]
 
 THREADS: Final = ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 START: Final = (
@@ -48,7 +48,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def packed(job: Job) -> bytes | None:
+def pack_job(job: Job) -> bytes | None:
     """The job as it is sent; None where another process would not understand it.
 
     That is so for functions typed into a notebook or the main script: they exist in this process only.
@@ -65,7 +65,7 @@ def packed(job: Job) -> bytes | None:
 class Workers:
     """Processes, from `with` to its end; leaving it ends them, whatever they do.
 
-    job    as `packed` gives it
+    job    as `pack_job` gives it
     count  how many
     """
 
@@ -99,16 +99,16 @@ class Workers:
     ) -> None:
         self._end()
 
-    def compute(self, ranges: Sequence[Range]) -> Iterator[tuple[Range, Cells]]:
+    def compute(self, ranges: Sequence[CellRange]) -> Iterator[tuple[CellRange, CellValues]]:
         """The ranges' cells, in the order in which they get done.
 
         Raises  WorkerLost  where a process ended before it was done
                 whatever the job raises
         """
         tasks, lock = iter(ranges), Lock()
-        replies: queue.SimpleQueue[tuple[Range, Any]] = queue.SimpleQueue()
+        replies: queue.SimpleQueue[tuple[CellRange, Any]] = queue.SimpleQueue()
 
-        def next_task() -> Range | None:
+        def next_task() -> CellRange | None:
             with lock:
                 return next(tasks, None)
 

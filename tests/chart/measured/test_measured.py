@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from tests import systems
-from tests.measured_cases import dense, measured, sampled_response
+from tests.measured_cases import frequency_grid, measured_response, sampled_response
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.measured.boundary import boundary, coarse, nyquist_count
+from zwidth.chart.measured.boundary import coarse_angles, nyquist_count, sample_boundary
 from zwidth.chart.measured.chart import measured_chart
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.verdict import eigenvalues
@@ -21,19 +21,20 @@ from zwidth.loop.estimators import CentralDifference, LeastSquaresSlope, Savitzk
 from zwidth.loop.loop import Loop
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response, ResponseError, integrators_of
-from zwidth.model.sweep import sweep_response
+from zwidth.model.sweep_response import sweep_response
 
 DAMPED = (0.01, 0.05, 0.3, 1.0, 1.5)
 
 
-def own(loop, **more):
-    return measured_chart(*measured(loop, **more))
+def measured_chart_of(loop, **more):
+    return measured_chart(*measured_response(loop, **more))
 
 
 def random_walls(loop, rng, count=300):
     """Walls of both signs over four decades round the middle of the curve."""
     sizes = [
-        np.quantile(np.abs(x), [0.02, 0.9]) for x in (loop.h(loop.inner), loop.h(loop.inner) / loop.w(loop.inner))
+        np.quantile(np.abs(x), [0.02, 0.9])
+        for x in (loop.h(loop.angles_below_pi), loop.h(loop.angles_below_pi) / loop.w(loop.angles_below_pi))
     ]
     return np.column_stack(
         [np.exp(rng.uniform(*np.log(size), count)) * rng.choice([-1.0, 1.0], count) for size in sizes]
@@ -45,7 +46,7 @@ def test_a_plants_own_response_gives_back_its_exact_chart(seed):
     rng = np.random.default_rng(100 + seed)
     loop = systems.random_loop(rng, DAMPED)
     exact = stability_chart(loop, decay=False)
-    chart = own(loop)
+    chart = measured_chart_of(loop)
     assert chart.stiffness_max == pytest.approx(exact.stiffness_max, rel=1e-5)
     assert chart.damping_max == pytest.approx(exact.damping_max, rel=1e-4)
     assert chart.stable_area == pytest.approx(exact.stable_area, rel=2e-4)
@@ -64,8 +65,8 @@ def test_the_count_is_that_of_the_eigenvalues_outside(seed):
     """Both by crossings of the curve and by the turning of 1 + L, for any number of roots outside."""
     rng = np.random.default_rng(seed)
     loop = systems.random_loop(rng, DAMPED)
-    own_loop = MeasuredLoop(*measured(loop))
-    edge = boundary(own_loop, coarse(own_loop))
+    own_loop = MeasuredLoop(*measured_response(loop))
+    edge = sample_boundary(own_loop, coarse_angles(own_loop))
     walls = random_walls(own_loop, rng)
     sizes = np.abs(eigenvalues(loop, *walls.T))
     clear = np.min(np.abs(sizes - 1.0), axis=-1) > 1e-6
@@ -80,7 +81,7 @@ def test_the_count_is_that_of_the_eigenvalues_outside(seed):
 def test_boundary_points_are_the_measured_ones():
     loop = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
     f = np.linspace(0.5, 400.0, 800)
-    chart = own(loop, frequency=f)
+    chart = measured_chart_of(loop, frequency=f)
     arcs = [arc for arc in chart.boundary if 0.0 < arc.frequency[0] < 400.0]
     assert np.all(np.isin(np.round(np.concatenate([arc.frequency for arc in arcs]), 6), np.round(f, 6)))
     for arc in arcs:
@@ -99,7 +100,7 @@ def test_interpolation_has_the_fourth_order():
     errors, told = [], []
     for count in (200, 400, 800):
         f = np.linspace(400.0 / count, 400.0, count)
-        between = MeasuredLoop(*measured(loop, frequency=f)).interpolation
+        between = MeasuredLoop(*measured_response(loop, frequency=f)).interpolation
         middle = np.linspace(20.0, 380.0, 5000)
         P = sampled_response(loop, middle)
         errors.append(np.max(np.abs(P * between.inverse(2.0 * np.pi * middle * loop.period) - 1.0)))
@@ -112,7 +113,7 @@ def test_interpolation_has_the_fourth_order():
 def test_lines_of_real_roots_edge_the_set():
     """A mass on a spring under negative stiffness runs away at K = -k."""
     loop = Loop(systems.mass(0.1, 2.0, 300.0), Controller(0.001))
-    chart, exact = own(loop), stability_chart(loop, decay=False)
+    chart, exact = measured_chart_of(loop), stability_chart(loop, decay=False)
     assert chart.integrators == 0
     (line,) = [arc for arc in chart.boundary if arc.frequency[0] == 0.0]
     assert_allclose(line.stiffness, -300.0, rtol=1e-6)
@@ -123,7 +124,7 @@ def test_lines_of_real_roots_edge_the_set():
 def test_a_force_that_changes_sign_at_every_sample_edges_the_set_of_a_heavily_damped_device():
     """With x = b T/m = 8 and B = 0 the root z = -1 binds, K = (2 b/T) / (1 - tanh(x/2) / (x/2))."""
     loop = Loop(systems.mass(0.02, 80.0), Controller(0.002))
-    chart, exact = own(loop), stability_chart(loop, decay=False)
+    chart, exact = measured_chart_of(loop), stability_chart(loop, decay=False)
     (line,) = [arc for arc in chart.boundary if arc.frequency[0] == 250.0]
     ends = [arc.damping[k] for k in (0, -1) for arc in exact.boundary if arc.frequency[0] > 249.0]
     assert_allclose(sorted(line.damping), [np.min(ends), np.max(ends)], rtol=1e-4)
@@ -135,7 +136,7 @@ def test_a_force_that_changes_sign_at_every_sample_edges_the_set_of_a_heavily_da
 
 def test_software_delay_and_a_filter_of_the_force_are_added_to_what_was_measured():
     loop = systems.published()
-    response, _ = measured(loop)
+    response, _ = measured_response(loop)
     computer = Controller(loop.period, delay=2.0, force_filter=Butterworth(2, 150.0))
     exact = stability_chart(Loop(loop.plant, computer), decay=False)
     assert measured_chart(response, computer).stiffness_max == pytest.approx(exact.stiffness_max, rel=1e-6)
@@ -150,15 +151,15 @@ def test_any_velocity_estimate_serves(velocity):
     loop = systems.random_loop(np.random.default_rng(12), (0.05, 0.3, 1.0))
     computer = replace(loop.controller, velocity=velocity, delay=0.0)
     exact = stability_chart(Loop(loop.plant, replace(computer, delay=loop.controller.delay)), decay=False)
-    chart = measured_chart(measured(loop)[0], computer)
+    chart = measured_chart(measured_response(loop)[0], computer)
     assert chart.stiffness_max == pytest.approx(exact.stiffness_max, rel=1e-5)
     assert chart.stable_area == pytest.approx(exact.stable_area, rel=2e-4)
 
 
 def test_roots_are_counted_however_long_the_delay():
     loop = Loop(systems.mass(0.1, 2.0, 50.0), Controller(0.001, delay=90.0))
-    counted = MeasuredLoop(measured(loop, np.linspace(0.1, 500.0, 4000))[0], Controller(0.001))
-    edge = boundary(counted, coarse(counted))
+    counted = MeasuredLoop(measured_response(loop, np.linspace(0.1, 500.0, 4000))[0], Controller(0.001))
+    edge = sample_boundary(counted, coarse_angles(counted))
     walls = np.column_stack(
         [np.random.default_rng(0).uniform(low, high, 12) for low, high in ((-80, 900), (-5, 20))]
     )
@@ -172,20 +173,20 @@ def test_roots_are_counted_however_long_the_delay():
 )
 def test_integrators_are_read_off_the_phase(damping, stiffness, integrators):
     """A dashpot too weak to be seen at the lowest frequency counts as none."""
-    response, _ = measured(
+    response, _ = measured_response(
         Loop(systems.mass(0.1, damping, stiffness), Controller(0.001)), np.linspace(0.5, 500.0, 999)
     )
     assert integrators_of(response, 0.001) == integrators
 
 
 def test_integrators_that_do_not_fit_and_swapped_columns_are_refused():
-    response, _ = measured(systems.published(), np.linspace(0.5, 400.0, 800))
+    response, _ = measured_response(systems.published(), np.linspace(0.5, 400.0, 800))
     with pytest.raises(ResponseError, match="integrators = 0 does not fit: the phase is 180 degrees"):
         integrators_of(replace(response, integrators=0), 0.00125)
     swapped = replace(response, value=response.value.imag + 1j * response.value.real)
     with pytest.raises(ResponseError, match="are columns swapped"):
         integrators_of(swapped, 0.00125)
-    between = measured(Loop(systems.mass(0.1, 5.0), Controller(0.001)), np.linspace(8.0, 500.0, 800))[0]
+    between = measured_response(Loop(systems.mass(0.1, 5.0), Controller(0.001)), np.linspace(8.0, 500.0, 800))[0]
     with pytest.raises(ResponseError, match="cannot be read off"):
         integrators_of(between, 0.001)
 
@@ -193,7 +194,7 @@ def test_integrators_that_do_not_fit_and_swapped_columns_are_refused():
 # --- what the data cannot tell ----------------------------------------------------------------------------
 
 
-def without(response, low, high):
+def without_band(response, low, high):
     """The response without the frequencies between."""
     kept = (response.frequency < low) | (response.frequency > high)
     return Response(response.frequency[kept], response.value[kept])
@@ -201,11 +202,11 @@ def without(response, low, high):
 
 def test_a_gap_is_named_and_whether_the_edge_runs_through_it():
     loop = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
-    response, computer = measured(loop, np.linspace(0.5, 400.0, 800))
-    (away,) = measured_chart(without(response, 200.0, 300.0), computer).unusable
+    response, computer = measured_response(loop, np.linspace(0.5, 400.0, 800))
+    (away,) = measured_chart(without_band(response, 200.0, 300.0), computer).unusable
     assert (away.low, away.high, away.on_edge) == (199.5, 300.5, False)
     assert "nothing measured" in away.reason
-    (across,) = measured_chart(without(response, 8.0, 15.0), computer).unusable
+    (across,) = measured_chart(without_band(response, 8.0, 15.0), computer).unusable
     assert across.on_edge
 
 
@@ -213,7 +214,7 @@ def test_incoherent_frequencies_are_left_out_and_named():
     loop = systems.published()
     f = np.linspace(0.5, 400.0, 800)
     coherence = np.where((f > 60.0) & (f < 64.0), 0.3, 0.9999)
-    response, computer = measured(loop, f, coherence=coherence, averages=50.0)
+    response, computer = measured_response(loop, f, coherence=coherence, averages=50.0)
     spoilt = replace(response, value=np.where(coherence < 0.5, 1.0, response.value))
     chart = measured_chart(spoilt, computer)
     (stretch,) = chart.unusable
@@ -226,31 +227,31 @@ def test_a_mode_between_two_frequencies_is_followed_and_a_crowd_of_them_is_named
     """One sharp pole or zero among its neighbours is interpolated well; closer together they are not resolved."""
     loop = Loop(systems.two_mass(0.3, 0.03, 20000.0, 0.5), Controller(0.001))
     exact = stability_chart(loop, decay=False)
-    sparse = own(loop, frequency=np.linspace(5.0, 495.0, 99))
+    sparse = measured_chart_of(loop, frequency=np.linspace(5.0, 495.0, 99))
     assert sparse.stiffness_max == pytest.approx(exact.stiffness_max, rel=1e-3)
     assert sparse.unusable == ()
-    (stretch,) = own(loop, frequency=np.linspace(500.0 / 12.0, 500.0, 12)).unusable
+    (stretch,) = measured_chart_of(loop, frequency=np.linspace(500.0 / 12.0, 500.0, 12)).unusable
     assert "measure closer" in stretch.reason
     assert stretch.low < 136.0 < stretch.high
 
 
 def test_data_that_end_below_the_edge_leave_it_open():
     loop = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
-    response, computer = measured(loop, np.linspace(0.5, 400.0, 800))
-    enough = measured_chart(without(response, 150.0, 500.0), computer)  # fails at 11 and 132 Hz
+    response, computer = measured_response(loop, np.linspace(0.5, 400.0, 800))
+    enough = measured_chart(without_band(response, 150.0, 500.0), computer)  # fails at 11 and 132 Hz
     assert "are not seen" in enough.unusable[-1].reason
     assert enough.stiffness_max == pytest.approx(stability_chart(loop, decay=False).stiffness_max, rel=1e-6)
-    missing = measured_chart(without(response, 100.0, 500.0), computer)
+    missing = measured_chart(without_band(response, 100.0, 500.0), computer)
     assert missing.open
     assert np.isnan(missing.stiffness_max)
     assert missing.unusable[-1].on_edge
-    nearly = measured_chart(without(response, 350.0, 500.0), computer)
+    nearly = measured_chart(without_band(response, 350.0, 500.0), computer)
     assert "continued to half the sampling rate" in nearly.unusable[-1].reason
     assert not nearly.open
 
 
 def test_nothing_near_the_boundary_is_one_clear_error():
-    response, computer = measured(systems.published(), np.linspace(300.0, 400.0, 50))
+    response, computer = measured_response(systems.published(), np.linspace(300.0, 400.0, 50))
     with pytest.raises(
         ResponseError, match=r"no frequencies near|cannot be read off|disagree|does not fit|swapped"
     ):
@@ -277,7 +278,7 @@ def noisy(response, coherence, averages, rng):
 def test_the_band_of_the_coherence_holds_the_true_chart():
     loop = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
     exact = stability_chart(loop, decay=False)
-    response, computer = measured(loop, np.linspace(1.0, 400.0, 400))
+    response, computer = measured_response(loop, np.linspace(1.0, 400.0, 400))
     rng, held, decided = np.random.default_rng(3), [], []
     for _ in range(10):
         chart = measured_chart(noisy(response, 0.99, 16.0, rng), computer)
@@ -293,7 +294,7 @@ def test_the_band_of_the_coherence_holds_the_true_chart():
     assert len(decided) > 300
 
 
-def counted_noise(seed, step):
+def quantised_noise(seed, step):
     """20 s of noise on a free mass, read in steps [m], as a response; and the exact chart."""
     T, mass, friction = 0.001, 0.1, 1.0
     force = np.random.default_rng(seed).normal(0.0, 2.0, 20_000)
@@ -309,7 +310,7 @@ def counted_noise(seed, step):
 def test_noise_near_half_the_sampling_rate_makes_no_root_there(seed, step):
     """Beyond the last coherent frequency there is no pole, although the last points alone, by their noise, would
     say so in the first four cases."""
-    response, exact = counted_noise(seed, step)
+    response, exact = quantised_noise(seed, step)
     chart = measured_chart(response, Controller(0.001))
     assert chart.stiffness_max == pytest.approx(exact.stiffness_max, rel=0.03)
     assert chart.band.stiffness_low < 1.02 * exact.stiffness_max
@@ -321,7 +322,7 @@ def test_noise_near_half_the_sampling_rate_makes_no_root_there(seed, step):
 
 def test_repeated_sweeps_span_the_band():
     loop = systems.published(delay=0.5, velocity_filter=Butterworth(2, 100.0))
-    response, computer = measured(loop, np.linspace(1.0, 400.0, 400))
+    response, computer = measured_response(loop, np.linspace(1.0, 400.0, 400))
     rng = np.random.default_rng(4)
     sweeps = np.array([noisy(response, 0.99, 16.0, rng).value for _ in range(3)])
     chart = measured_chart(replace(response, value=sweeps.mean(axis=0), sweeps=sweeps), computer)
@@ -336,7 +337,7 @@ def test_repeated_sweeps_span_the_band():
 
 def test_an_unstable_device_has_no_stable_wall():
     """Three samples of delay and a spring that pushes away: nothing helps."""
-    f = dense(systems.published())
+    f = frequency_grid(systems.published())
     z = np.exp(2j * np.pi * f * 0.00125)
     hopeless = Response(f, -0.001 / (z - 0.5) / z**3, integrators=0)
     with pytest.raises(ResponseError):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.cli.cli_run import found
+from tests.cli.command_runner import document_of
 from zwidth.chart.measured.chart import MeasuredChart
 
 PAGE = (Path(__file__).parents[3] / "docs" / "measured.md").read_text(encoding="utf-8")
@@ -39,8 +39,8 @@ def test_the_device_file_is_charted_and_its_keys_are_explained(tmp_path):
     lines = [f"{a!r},{b.real!r},{b.imag!r}" for a, b in zip(f.tolist(), P.tolist(), strict=True)]
     (tmp_path / file).write_text("\n".join(["frequency_Hz,real_m_per_N,imag_m_per_N", *lines]))
     (tmp_path / "prototype.toml").write_text(block("toml"))
-    document = found("chart", tmp_path / "prototype.toml")
+    document = document_of("chart", tmp_path / "prototype.toml")
     table = PAGE.partition("## Keys of")[2]
     explained = set(re.findall(r"^\| `(\w+)`", table, re.MULTILINE))
     assert explained <= set(document)
-    assert explained == set(document) - set(found("chart", "published-two-mass"))
+    assert explained == set(document) - set(document_of("chart", "published-two-mass"))

@@ -7,19 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from systems import mass, random_loop, second_matrix, two_mass
+from systems import mass, random_loop, reference_transition_matrix, two_mass
 
 from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.robust.chart import robust_chart
-from zwidth.chart.verdict import judge
+from zwidth.chart.robust.instability import softening, unstable
+from zwidth.chart.tracer import Tracer
+from zwidth.chart.verdict import judge, spectral_radius
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.operator import Operator, attach
 from zwidth.model.plant import Plant
 
 
-def free(kilograms, period=0.001, **controller):
+def free_mass_loop(kilograms, period=0.001, **controller):
     return Loop(mass(kilograms), Controller(period, **controller))
 
 
@@ -27,7 +29,7 @@ def union(chart):
     return shapely.union_all([shapely.Polygon(ring) for ring in chart.regions])
 
 
-def relatives(rng, count=None):
+def similar_loops(rng, count=None):
     """A random loop and some like it: masses, damping, stiffness, period and delay off by some tenths."""
     base = random_loop(rng, kind=str(rng.choice(["chain", "dense", "coupled", "apart"])))
     loops = []
@@ -43,12 +45,12 @@ def relatives(rng, count=None):
 
 
 def largest_radius(loops, K, B):
-    return max(float(np.abs(np.linalg.eigvals(second_matrix(loop, K, B))).max()) for loop in loops)
+    return max(float(np.abs(np.linalg.eigvals(reference_transition_matrix(loop, K, B))).max()) for loop in loops)
 
 
 def test_of_free_masses_the_lightest_is_the_limit():
-    chart = robust_chart([free(m) for m in (0.3, 0.1, 0.2, 1.7)])
-    alone = stability_chart(free(0.1))
+    chart = robust_chart([free_mass_loop(m) for m in (0.3, 0.1, 0.2, 1.7)])
+    alone = stability_chart(free_mass_loop(0.1))
     assert chart.binding == (1,)
     # thesis (4.14): K = (12 - 8 sqrt 2) m / T^2; B = 2 m / T
     assert chart.stiffness_max == pytest.approx((12.0 - 8.0 * np.sqrt(2.0)) * 0.1e6, rel=1e-10)
@@ -63,7 +65,7 @@ def test_of_free_masses_the_lightest_is_the_limit():
 
 
 def test_of_sampling_periods_the_longest_is_the_limit():
-    chart = robust_chart([free(0.1, period) for period in (0.0005, 0.002, 0.001)])
+    chart = robust_chart([free_mass_loop(0.1, period) for period in (0.0005, 0.002, 0.001)])
     assert chart.binding == (1,)
     assert chart.stiffness_max == pytest.approx((12.0 - 8.0 * np.sqrt(2.0)) * 0.1 / 0.002**2, rel=1e-10)
 
@@ -89,7 +91,7 @@ def test_the_same_member_twice_changes_nothing():
 
 def crossing_pair():
     """A heavy mass with a delay and a light one without: their curves cross."""
-    return free(0.3, delay=1.0), free(0.1)
+    return free_mass_loop(0.3, delay=1.0), free_mass_loop(0.1)
 
 
 def test_a_corner_between_two_members_is_solved_for():
@@ -142,7 +144,7 @@ def test_a_peak_at_a_corner_names_both_members_and_both_frequencies():
 @pytest.mark.parametrize("seed", range(60))
 def test_walls_inside_are_stable_for_all_and_walls_outside_are_not(seed):
     rng = np.random.default_rng(1000 + seed)
-    loops = relatives(rng)
+    loops = similar_loops(rng)
     try:
         chart = robust_chart(loops)
     except ChartError:
@@ -189,7 +191,7 @@ def test_order_does_not_matter_and_more_members_never_help(seed):
 
 def test_members_that_cannot_be_charted_are_named_and_not_fatal():
     apart = replace(two_mass(1.0, 0.1, 100.0), sensor=np.array([0.0, 0.0]))
-    chart = robust_chart([free(0.2), Loop(apart, Controller(0.001))])
+    chart = robust_chart([free_mass_loop(0.2), Loop(apart, Controller(0.001))])
     assert list(chart.members) == [0]
     assert list(chart.failed) == [1]
     assert "moves nothing" in chart.failed[1]
@@ -207,7 +209,7 @@ def unstable_plant(spring):
 
 def test_members_that_exclude_each_other_are_named():
     stiff = unstable_plant(80_000.0)  # needs K > 80 kN/m, of which the lightest free mass stands 69
-    chart = robust_chart([free(1.0), free(0.05), unstable_plant(40_000.0), stiff])
+    chart = robust_chart([free_mass_loop(1.0), free_mass_loop(0.05), unstable_plant(40_000.0), stiff])
     assert np.isnan(chart.stiffness_max)
     assert chart.members_at_stiffness_max == ()
     assert chart.stable_area == 0.0
@@ -254,3 +256,23 @@ def test_curves_nearer_than_chords_cross_once():
     assert [arc.member for arc in chart.boundary].count(2) == 1
     assert len(chart.boundary) == 5
     assert chart.corner_blur == 0.0
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 5, 7])
+def test_softened_by_less_a_wall_is_unstable_and_by_more_stable(seed):
+    loop = random_loop(np.random.default_rng(seed))
+    chart = stability_chart(loop, decay=False)
+    K, B = (1.0 + 0.5 / (seed + 1)) * chart.stiffness_max, chart.damping_at_stiffness_max
+    polynomials = Tracer.of(loop).polynomials
+    assert unstable(polynomials, np.array([K]), np.array([B])).all()
+    by = softening(polynomials, K, B)
+    assert 0.0 < by < K
+    assert spectral_radius(loop, K - by * (1.0 - 1e-4), B) > 1.0
+    assert spectral_radius(loop, K - by * (1.0 + 1e-4), B) < 1.0
+
+
+def test_a_wall_that_no_softening_helps_is_given_up():
+    loop = random_loop(np.random.default_rng(0))
+    polynomials = Tracer.of(loop).polynomials
+    beyond = 1.5 * stability_chart(loop, decay=False).damping_max
+    assert softening(polynomials, 10.0, beyond) == 10.0

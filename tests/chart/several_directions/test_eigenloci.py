@@ -15,8 +15,8 @@ from zwidth.chart.several_directions.chart import multi_chart
 from zwidth.device.load import load
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
-from zwidth.loop.multi import MultiLoop
-from zwidth.model.directions import MultiPlant, reduce_directions
+from zwidth.loop.multi_loop import MultiLoop
+from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import reduce_mechanism
 
@@ -49,7 +49,7 @@ def random_multi(seed):
     )
 
 
-def brute_matrix(loop, K, B):
+def reference_matrix(loop, K, B):
     """The transition matrix of one wall, from physical states, queued forces and direct-form filters."""
     plant, controller, m = loop.plant, loop.controller, loop.count
     T, n = controller.sampling_period, plant.size
@@ -83,10 +83,10 @@ def brute_matrix(loop, K, B):
     return np.vstack([*rows, *u[:-1], *updates])
 
 
-def brute_radius(loop, walls):
+def reference_radius(loop, walls):
     """Largest |z| of walls (k, 2); the matrix is affine in K and B."""
-    at_rest = brute_matrix(loop, 0.0, 0.0)
-    by_K, by_B = brute_matrix(loop, 1.0, 0.0) - at_rest, brute_matrix(loop, 0.0, 1.0) - at_rest
+    at_rest = reference_matrix(loop, 0.0, 0.0)
+    by_K, by_B = reference_matrix(loop, 1.0, 0.0) - at_rest, reference_matrix(loop, 0.0, 1.0) - at_rest
     K, B = walls.T[..., None, None]
     return np.abs(np.linalg.eigvals(at_rest + K * by_K + B * by_B)).max(axis=-1)
 
@@ -150,7 +150,7 @@ def test_several_directions_agree_with_eigenvalues(seed):
     points = shapely.points(walls / scale)
     clear = shapely.distance(cells.boundary, points) > 1e-5
     inside = shapely.contains(cells, points)
-    radius = brute_radius(loop, walls)
+    radius = reference_radius(loop, walls)
     undecided = np.abs(radius - 1.0) < 1e-7
     free = bool(loop.unobserved_modes)  # roots that no wall moves are in the brute matrix still
     wrong = clear & ~undecided & (inside != (radius < 1.0)) & ~(free & inside)

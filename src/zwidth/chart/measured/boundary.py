@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.cells import Box
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.measured.root_count import curve_segments, roots_outside
+from zwidth.chart.rings import Window
 from zwidth.model.response import ResponseError
 
 Floats = NDArray[np.float64]
@@ -29,10 +29,11 @@ MOST = 200_000  # angles on the curve
 class Boundary:
     """Every wall with a root on the circle, as far as it was measured.
 
-    angles    (n,) theta along the curve, ascending;  walls (n, 2) K, B;  orientation (n,) sign of Im w
-    segments  (k, 4) and jumps (k,): curve, real-root lines and what closes an open end, for `roots_outside`
-    at        (k,) index of the angle where a segment begins; -1, -2: lines of z = 1, z = -1; -3: beyond the data
-    reference, count  a wall far from the boundary and its roots outside
+    angles       (n,) theta along the curve, ascending;  walls (n, 2) K, B;  orientation (n,) sign of Im w
+    segments     (k, 4) and jumps (k,): curve, real-root lines and what closes an open end, for `roots_outside`
+    angle_index  (k,) index of the angle where a segment begins; -1, -2: lines of z = 1, z = -1; -3: beyond the
+                 data
+    reference, reference_count  a wall far from the boundary and its roots outside
     """
 
     angles: Floats
@@ -40,18 +41,20 @@ class Boundary:
     orientation: Floats
     segments: Floats
     jumps: Whole
-    at: Whole
+    angle_index: Whole
     reference: Floats
-    count: int
+    reference_count: int
 
     def outside(self, walls: Floats) -> Whole:
         """Roots outside the circle at walls (n, 2): (n,)."""
-        return roots_outside(self.segments, self.jumps, self.reference, self.count, np.ascontiguousarray(walls))
+        return roots_outside(
+            self.segments, self.jumps, self.reference, self.reference_count, np.ascontiguousarray(walls)
+        )
 
 
 def first_angles(loop: MeasuredLoop) -> Floats:
     """The measured angles, three between each two, and angles that close in on ends and asymptotes."""
-    measured = loop.inner
+    measured = loop.angles_below_pi
     shares = np.arange(4) / 4.0
     inner = (measured[:-1, None] + np.diff(measured)[:, None] * shares).ravel()
     closing = np.geomspace(NEAREST, 0.9, 30)
@@ -59,12 +62,12 @@ def first_angles(loop: MeasuredLoop) -> Floats:
     if loop.interpolation.closed:
         parts.append(np.pi - closing[::-1] * (np.pi - measured[-1]))
     angles = np.unique(np.concatenate(parts))
-    dense = np.union1d(angles, np.linspace(angles[0], loop.last, 4097)[:-1])
+    dense = np.union1d(angles, np.linspace(angles[0], loop.largest_angle, 4097)[:-1])
     for low, high in _sign_changes(loop, dense):
         steps = closing * (high - low + 1e-3 * high)
         angles = np.concatenate([angles, low - steps, high + steps])
     angles = np.unique(angles)
-    return angles[(angles > 0.0) & (angles < np.pi) & (angles <= loop.last)]
+    return angles[(angles > 0.0) & (angles < np.pi) & (angles <= loop.largest_angle)]
 
 
 def _sign_changes(loop: MeasuredLoop, angles: Floats) -> list[tuple[float, float]]:
@@ -79,7 +82,7 @@ def _sign_changes(loop: MeasuredLoop, angles: Floats) -> list[tuple[float, float
     return list(zip(low.tolist(), high.tolist(), strict=True))
 
 
-def refine(loop: MeasuredLoop, angles: Floats, box: Box, tolerance: float) -> Floats:
+def refine_angles(loop: MeasuredLoop, angles: Floats, box: Window, tolerance: float) -> Floats:
     """Angles at which chords within the box keep to the curve, to a share of the box."""
     K0, K1, B0, B1 = box
     scale, low = np.array([K1 - K0, B1 - B0]), np.array([K0, B0])
@@ -94,11 +97,11 @@ def refine(loop: MeasuredLoop, angles: Floats, box: Box, tolerance: float) -> Fl
     return _bisected(loop, angles, low, scales, wanted)
 
 
-def coarse(loop: MeasuredLoop) -> Floats:
+def coarse_angles(loop: MeasuredLoop) -> Floats:
     """Angles at which chords keep to the curve to a share of its own distance from no wall, wherever it runs."""
 
     def scales(theta: Floats) -> Floats:
-        return own_sizes(loop, theta)
+        return wall_scales(loop, theta)
 
     def wanted(a: Floats, b: Floats, middle: Floats) -> Floats:
         return np.asarray(COARSE * np.hypot(*middle.T))
@@ -141,7 +144,7 @@ def _bisected(
     return angles
 
 
-def own_sizes(loop: MeasuredLoop, theta: Floats) -> Floats:
+def wall_scales(loop: MeasuredLoop, theta: Floats) -> Floats:
     """|h| and |h / w| (n, 2) at angles (n,): the sizes of K and of B that count there, since K + B w = h.
 
     Inf where the velocity estimate is blind: no damping matters there.
@@ -151,18 +154,21 @@ def own_sizes(loop: MeasuredLoop, theta: Floats) -> Floats:
         return np.column_stack([h, h / w])
 
 
-def sizes(loop: MeasuredLoop) -> Floats:
+def large_wall_scale(loop: MeasuredLoop) -> Floats:
     """(2,) what is large for |h| and |h / w|: exceeded at a tenth of the measured frequencies."""
-    return np.asarray(np.quantile(own_sizes(loop, loop.inner), 0.9, axis=0))
+    return np.asarray(np.quantile(wall_scales(loop, loop.angles_below_pi), 0.9, axis=0))
 
 
-def boundary(loop: MeasuredLoop, angles: Floats, known: Boundary | None = None) -> Boundary:
-    """The boundary sampled at these angles; reference wall and count are those of `known`, where it is given."""
+def sample_boundary(loop: MeasuredLoop, angles: Floats, reference_boundary: Boundary | None = None) -> Boundary:
+    """The boundary sampled at these angles.
+
+    Reference wall and count are those of `reference_boundary`, where it is given.
+    """
     K, B, orientation = loop.walls(angles)
     segments, jumps = curve_segments(K, B, orientation)
     whole = np.isfinite(K) & np.isfinite(B)
     at = np.flatnonzero(whole[:-1] & whole[1:] & (orientation[:-1] == orientation[1:]))
-    far = FAR * float(sizes(loop)[1])
+    far = FAR * float(large_wall_scale(loop)[1])
     more = [_real_line(loop, angles[0], -1, far)]
     more.append(
         _real_line(loop, angles[-1], -2, far) if loop.interpolation.closed else _open_end(segments, jumps, far)
@@ -171,8 +177,17 @@ def boundary(loop: MeasuredLoop, angles: Floats, known: Boundary | None = None) 
     jumps = np.concatenate([jumps, *(j for _, j, _ in more)])
     at = np.concatenate([at, *(k for _, _, k in more)])
     walls = np.column_stack([K, B])
-    if known is not None:
-        return Boundary(angles, walls, orientation, segments, jumps, at, known.reference, known.count)
+    if reference_boundary is not None:
+        return Boundary(
+            angles,
+            walls,
+            orientation,
+            segments,
+            jumps,
+            at,
+            reference_boundary.reference,
+            reference_boundary.reference_count,
+        )
     return _with_reference(loop, Boundary(angles, walls, orientation, segments, jumps, at, np.zeros(2), 0))
 
 
@@ -244,43 +259,43 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Wh
     return -np.round(turn / np.pi).astype(np.int64), np.asarray(clear)
 
 
-def _with_reference(loop: MeasuredLoop, found: Boundary) -> Boundary:
+def _with_reference(loop: MeasuredLoop, curve: Boundary) -> Boundary:
     """The boundary with the smallest clear one of many walls as its reference, the clearest counted against it.
 
     From a small one, since the way from a wall many powers of ten beyond the stable ones loses their digits; where
     the data end early, the clearest one.
     """
-    h, w = np.abs(loop.h(loop.inner)), np.abs(loop.w(loop.inner))
+    h, w = np.abs(loop.h(loop.angles_below_pi)), np.abs(loop.w(loop.angles_below_pi))
     sizes = np.geomspace(1e-3, 3.0, 9)
     shares = [0.0, 0.05, 0.25, 0.5, 0.75] if loop.interpolation.closed else [0.25, 0.5, 0.75]
     K = np.quantile(h, shares)[:, None] * sizes
     B = np.quantile(h / w, shares)[:, None] * sizes
     walls = np.array([(k, b) for k in K.ravel() for b in B.ravel()])
     # all walls at some angles, and the clear ones at every angle: between few a resonance may turn 1 + L
-    _, clear = nyquist_count(loop, found.angles[:: max(1, len(found.angles) // 4000)], walls)
+    _, clear = nyquist_count(loop, curve.angles[:: max(1, len(curve.angles) // 4000)], walls)
     order, size = np.argsort(-clear), np.max(walls / np.min(walls, axis=0), axis=1)
     small = np.argsort(np.where(clear > CLEAR, size, np.inf), kind="stable")
     chosen = np.union1d(order[:LIKELY], small[:SURE])
     walls, size = walls[chosen], size[chosen]
-    counts, clear = nyquist_count(loop, found.angles, walls)
+    counts, clear = nyquist_count(loop, curve.angles, walls)
     order = np.argsort(-clear)[:SURE]
     least = min(CLEAR, clear[order[0]]) if loop.interpolation.closed else clear[order[0]]
     enough = np.flatnonzero(clear >= least)
     best = enough[np.argmin(size[enough])]
-    made = Boundary(
-        found.angles,
-        found.walls,
-        found.orientation,
-        found.segments,
-        found.jumps,
-        found.at,
+    result = Boundary(
+        curve.angles,
+        curve.walls,
+        curve.orientation,
+        curve.segments,
+        curve.jumps,
+        curve.angle_index,
         walls[best],
         int(counts[best]),
     )
     sure = order[clear[order] > CLEAR]
-    if counts[best] < 0 or 2 * np.count_nonzero(made.outside(walls[sure]) != counts[sure]) > len(sure):
+    if counts[best] < 0 or 2 * np.count_nonzero(result.outside(walls[sure]) != counts[sure]) > len(sure):
         raise ResponseError(
             "does not turn as that of a device would: counts of unstable roots disagree; is it a response from "
             "force to position with all its frequencies, closely enough spaced, and is `integrators` right?"
         )
-    return made
+    return result

@@ -13,19 +13,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.area import quadrant_area
-from zwidth.chart.cells import Box, box_of, cut
-from zwidth.chart.measured.boundary import Boundary, boundary, coarse, real_root
-from zwidth.chart.measured.cells import Cells, cells_within, edges_stable_set, window
-from zwidth.chart.measured.extreme_walls import angles_at, largest_damping, stiffest_wall
+from zwidth.chart.chart_base import BoundaryArc, Chart
+from zwidth.chart.measured.boundary import Boundary, coarse_angles, real_root, sample_boundary
+from zwidth.chart.measured.extreme_walls import angles_at_wall, largest_damping, refine_peak
 from zwidth.chart.measured.loop import MeasuredLoop
-from zwidth.chart.measured.uncertainty_band import Band, uncertainty
-from zwidth.chart.measured.usable_frequencies import Stretch
-from zwidth.chart.measured.verdict import MeasuredVerdicts, NearestEdge, judge_measured
-from zwidth.chart.result import BoundaryArc, Chart
+from zwidth.chart.measured.stable_regions import (
+    StableRegions,
+    has_stable_inner_side,
+    regions_within,
+    window_of_regions,
+)
+from zwidth.chart.measured.uncertainty_band import Band, uncertainty_band
+from zwidth.chart.measured.usable_frequencies import UnusableRange
+from zwidth.chart.measured.verdict import EdgeFrequencies, MeasuredVerdicts, judge_measured
+from zwidth.chart.rings import Window, cut_at_holes, window_of
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.verdict import UNDECIDED
 from zwidth.loop.controller import Controller
-from zwidth.model.arguments import require
+from zwidth.model.argument_checks import require
 from zwidth.model.response import Response, ResponseError
 
 Floats = NDArray[np.float64]
@@ -57,9 +62,9 @@ class MeasuredChart(Chart):
     measured_stiffness_max: float
     band: Band | None
     stiffness_max_of_sweeps: tuple[float, ...]
-    unusable: tuple[Stretch, ...]
+    unusable: tuple[UnusableRange, ...]
     open: bool
-    window: Box
+    window: Window
 
     _edge_columns: ClassVar[dict[str, str]] = {
         **Chart._edge_columns,
@@ -80,16 +85,16 @@ class MeasuredChart(Chart):
         return min([*(low / half for low in beyond), 1.0])
 
     @property
-    def box(self) -> Box:
+    def box(self) -> Window:
         """KMIN, KMAX, BMIN, BMAX of the regions (or the measured points, if they are open) and 5 %."""
         if not (self.regions and self.open):
             return super().box
         inner = [arc for arc in self.boundary if 0.0 < arc.frequency[0] < 0.5 / self.loop.period]
-        return box_of([np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in inner])])
+        return window_of([np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in inner])])
 
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> MeasuredVerdicts:
         """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, by the count of their roots."""
-        return judge_measured(self.loop, self.edge, wall_stiffness, wall_damping, nearest_edge(self))
+        return judge_measured(self.loop, self.edge, wall_stiffness, wall_damping, edge_frequencies(self))
 
     def document(self) -> dict[str, Any]:
         """The chart as numbers and lists, under the keys of `zwidth chart --json`; nan where there is none."""
@@ -134,7 +139,7 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
     require("response", response, Response)
     require("controller", controller, Controller)
     loop = MeasuredLoop(response, controller)
-    cells, closed = _cells(loop)
+    cells, closed = _stable_regions(loop)
     if cells is None:
         return _empty(loop)
     chart = _chart(loop, cells, not closed)
@@ -144,7 +149,7 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
     return replace(chart, stiffness_max_of_sweeps=tuple(each))
 
 
-def nearest_edge(chart: MeasuredChart) -> NearestEdge | None:
+def edge_frequencies(chart: MeasuredChart) -> EdgeFrequencies | None:
     """The stable set's edge in pieces with their frequencies; None where nothing is stable."""
     if not chart.regions:
         return None
@@ -152,15 +157,15 @@ def nearest_edge(chart: MeasuredChart) -> NearestEdge | None:
     low, high = np.array(chart.window).reshape(2, 2).T
     ends = edge.segments.reshape(-1, 2, 2)
     near = np.all((ends.max(axis=1) >= low) & (ends.min(axis=1) <= high), axis=1)
-    curve = np.flatnonzero((edge.at >= 0) & near)
-    curve = curve[edges_stable_set(edge, curve, high - low)]
+    curve = np.flatnonzero((edge.angle_index >= 0) & near)
+    curve = curve[has_stable_inner_side(edge, curve, high - low)]
     pieces = [edge.segments[curve]]
-    frequencies = [edge.angles[edge.at[curve]] / (2.0 * np.pi * chart.loop.period)]
+    frequencies = [edge.angles[edge.angle_index[curve]] / (2.0 * np.pi * chart.loop.period)]
     for arc in chart.boundary:
         if len(arc.frequency) == 2 and arc.frequency[0] == arc.frequency[1]:  # a line of real roots
             pieces.append(np.column_stack([arc.stiffness, arc.damping]).reshape(1, 4))
             frequencies.append(arc.frequency[:1])
-    return NearestEdge(np.vstack(pieces), np.concatenate(frequencies), high - low)
+    return EdgeFrequencies(np.vstack(pieces), np.concatenate(frequencies), high - low)
 
 
 def _single(response: Response, sweep: int) -> Response:
@@ -168,46 +173,46 @@ def _single(response: Response, sweep: int) -> Response:
     return replace(response, value=response.sweeps[sweep], sweeps=None, coherence=None)
 
 
-def _credible(loop: MeasuredLoop, cells: Cells) -> Cells:
+def _credible(loop: MeasuredLoop, cells: StableRegions) -> StableRegions:
     """The cells that are not made by noise: loops of the curve between a few points, or all in doubt."""
     K0, K1, B0, B1 = cells.box
     scale = np.array([K1 - K0, B1 - B0])
     kept = []
     for cell in cells.polygons:
         unit = shapely.transform(cell, lambda xy: xy / scale)
-        on_it = np.count_nonzero(_away(loop, cell, scale) < ON_IT)
+        on_it = np.count_nonzero(_edge_distances(loop, cell, scale) < ON_IT)
         deepest = shapely.get_coordinates(shapely.maximum_inscribed_circle(unit))[0] * scale
         doubtful = judge_measured(loop, cells.edge, *deepest).verdict == UNDECIDED
         kept.append(on_it >= FEWEST_ON_EDGE and not doubtful)
-    return cells.only(np.array(kept, dtype=bool))
+    return cells.select(np.array(kept, dtype=bool))
 
 
-def _away(loop: MeasuredLoop, cell: shapely.Polygon, scale: Floats) -> Floats:
+def _edge_distances(loop: MeasuredLoop, cell: shapely.Polygon, scale: Floats) -> Floats:
     """Distance (n,) of the measured points below pi from a cell's edge, in units of `scale`."""
-    K, B, _ = loop.walls(loop.inner)
+    K, B, _ = loop.walls(loop.angles_below_pi)
     outline = shapely.transform(cell.boundary, lambda xy: xy / scale)
     return np.asarray(shapely.distance(outline, shapely.points(np.column_stack([K, B]) / scale)))
 
 
-def _cells(loop: MeasuredLoop) -> tuple[Cells | None, bool]:
+def _stable_regions(loop: MeasuredLoop) -> tuple[StableRegions | None, bool]:
     """The stable cells, and whether the boundary closes them: if not, they reach the window's edge."""
-    known = boundary(loop, coarse(loop))
-    box = window(loop, known)
+    known = sample_boundary(loop, coarse_angles(loop))
+    box = window_of_regions(loop, known)
     if box is None:
         return None, True
-    cells = cells_within(loop, known, box)
+    cells = regions_within(loop, known, box)
     for _ in range(3):
         if not cells.open:
             break
         K0, K1, B0, B1 = box
         box = (K0 - (K1 - K0), K1 + (K1 - K0), B0 - (B1 - B0), B1 + (B1 - B0))
-        cells = cells_within(loop, known, box)
+        cells = regions_within(loop, known, box)
     credible = _credible(loop, cells)
     if 0 < len(credible.polygons) < len(cells.polygons):
         low_K, low_B, high_K, high_B = shapely.union_all(credible.polygons).bounds
         room_K, room_B = 0.1 * (high_K - low_K), 0.1 * (high_B - low_B)
         near = (low_K - room_K, high_K + room_K, low_B - room_B, high_B + room_B)
-        credible = _credible(loop, cells_within(loop, known, near))
+        credible = _credible(loop, regions_within(loop, known, near))
     if cells.polygons and not credible.polygons:
         raise ResponseError(_nothing_near(loop))
     return (credible if credible.polygons else None), not credible.open
@@ -215,13 +220,13 @@ def _cells(loop: MeasuredLoop) -> tuple[Cells | None, bool]:
 
 def _empty(loop: MeasuredLoop) -> MeasuredChart:
     """The chart of a device without a stable wall. Raises ResponseError where the data cannot tell."""
-    if any(stretch.low == loop.response.frequency[loop.good][-1] for stretch in loop.unusable):
+    if any(stretch.low == loop.response.frequency[loop.usable][-1] for stretch in loop.unusable):
         raise ResponseError(_nothing_near(loop))
     none = TracedEdge.of(Arcs.of(()), ())
     return MeasuredChart(
-        **none.readings(loop.period, lambda K, B: False),
+        **none.chart_fields(loop.period, lambda K, B: False),
         loop=loop,
-        edge=boundary(loop, coarse(loop)),
+        edge=sample_boundary(loop, coarse_angles(loop)),
         interpolation_error=nan,
         measured_stiffness_max=nan,
         band=None,
@@ -233,43 +238,43 @@ def _empty(loop: MeasuredLoop) -> MeasuredChart:
 
 
 def _nothing_near(loop: MeasuredLoop) -> str:
-    f = loop.response.frequency[loop.good]
+    f = loop.response.frequency[loop.usable]
     return (
         f"has no frequencies near the boundary's: {f[0]:.6g} to {f[-1]:.6g} Hz, within which no edge of the "
         f"stable walls is found; measure up to half the sampling rate, {0.5 / loop.period:.6g} Hz"
     )
 
 
-def _chart(loop: MeasuredLoop, cells: Cells, opened: bool) -> MeasuredChart:
+def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredChart:
     """The chart from its cells."""
-    peak, zoomed = ((nan, nan), cells) if opened else stiffest_wall(loop, cells)
+    peak, zoomed = ((nan, nan), cells) if opened else refine_peak(loop, cells)
     arcs = tuple(_arcs(loop, cells))
     points = [(K, B) for arc in arcs for K, B in zip(arc.stiffness, arc.damping, strict=True)]
-    angles = angles_at(zoomed, peak)
+    angles = angles_at_wall(zoomed, peak)
     at_peak = np.array([a for a in angles if 0.0 < a < np.pi])
     h, w = loop.h(at_peak), loop.w(at_peak)
     errors = loop.interpolation.relative_error(at_peak) * np.abs(h * w / w.imag)
     return MeasuredChart(
         loop=loop,
         edge=cells.edge,
-        regions=tuple(np.array(piece.exterior.coords) for cell in cells.polygons for piece in cut(cell)),
+        regions=tuple(np.array(piece.exterior.coords) for cell in cells.polygons for piece in cut_at_holes(cell)),
         boundary=arcs,
         stiffness_max=peak[0],
         damping_at_stiffness_max=peak[1],
         frequencies_at_stiffness_max=tuple(a / (2.0 * np.pi * loop.period) for a in angles),
         damping_max=nan if opened else largest_damping(loop, cells),
-        stable_area=nan if opened else quadrant_area(cells.sides, ()),
+        stable_area=nan if opened else quadrant_area(cells.edge_arcs, ()),
         interpolation_error=float(np.max(errors, initial=0.0) / peak[0]) + ZOOMED,
         measured_stiffness_max=max((K for K, B in points if K > 0.0 and B >= 0.0), default=nan),
-        band=None if opened else _holding(uncertainty(loop, cells), peak[0]),
+        band=None if opened else _widen_to_peak(uncertainty_band(loop, cells), peak[0]),
         stiffness_max_of_sweeps=(),
-        unusable=tuple(_told(loop, cells)),
+        unusable=tuple(_mark_on_edge(loop, cells)),
         open=opened,
         window=cells.box,
     )
 
 
-def _holding(band: Band | None, stiffest: float) -> Band | None:
+def _widen_to_peak(band: Band | None, stiffest: float) -> Band | None:
     """The band with the largest stiffness in it: that is found by a closer look than the band's ellipses."""
     if band is None or isnan(stiffest):
         return band
@@ -278,15 +283,15 @@ def _holding(band: Band | None, stiffest: float) -> Band | None:
     return replace(band, stiffness_low=low, stiffness_high=float(np.fmax(band.stiffness_high, stiffest)))
 
 
-def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[BoundaryArc]:
+def _arcs(loop: MeasuredLoop, cells: StableRegions) -> Iterator[BoundaryArc]:
     """Runs of measured points on the stable set's edge, then its pieces of the lines of real roots."""
     half = 0.5 / loop.period
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
-    measured = loop.inner
-    on = np.any([_away(loop, cell, scale) < ON_IT for cell in cells.polygons], axis=0)
+    measured = loop.angles_below_pi
+    on = np.any([_edge_distances(loop, cell, scale) < ON_IT for cell in cells.polygons], axis=0)
     numbers = np.flatnonzero(on)
     for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else []:
-        theta, given = measured[run], loop.response.frequency[loop.good][run]
+        theta, given = measured[run], loop.response.frequency[loop.usable][run]
         K, B, _ = loop.walls(theta)
         if loop.errors is None:
             yield BoundaryArc(K, B, given)
@@ -300,12 +305,12 @@ def _arcs(loop: MeasuredLoop, cells: Cells) -> Iterator[BoundaryArc]:
         if not np.isfinite(static):
             continue
         for cell in cells.polygons:
-            for low, high in _along(np.array(cell.exterior.coords), static, turned, scale):
+            for low, high in _line_intervals(np.array(cell.exterior.coords), static, turned, scale):
                 ends = np.array([low, high])
                 yield BoundaryArc(static - ends * turned, ends, np.full(2, frequency))
 
 
-def _along(ring: Floats, h: float, w: float, scale: Floats) -> Iterator[tuple[float, float]]:
+def _line_intervals(ring: Floats, h: float, w: float, scale: Floats) -> Iterator[tuple[float, float]]:
     """The pieces of a ring that lie on the line K + B w = h, as intervals of B."""
     on = np.abs(ring[:, 0] + ring[:, 1] * w - h) < 1e-8 * (scale[0] + scale[1] * abs(w))
     pieces = np.flatnonzero(on[:-1] & on[1:])
@@ -315,7 +320,7 @@ def _along(ring: Floats, h: float, w: float, scale: Floats) -> Iterator[tuple[fl
             yield float(B.min()), float(B.max())
 
 
-def _told(loop: MeasuredLoop, cells: Cells) -> Iterator[Stretch]:
+def _mark_on_edge(loop: MeasuredLoop, cells: StableRegions) -> Iterator[UnusableRange]:
     """The unusable stretches, and whether the stable set's edge runs through each."""
     edge = cells.edge
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
@@ -323,7 +328,7 @@ def _told(loop: MeasuredLoop, cells: Cells) -> Iterator[Stretch]:
     for stretch in loop.unusable:
         within = np.zeros(len(f) + 1, dtype=bool)
         within[:-1] = (f >= stretch.low) & (f < stretch.high)
-        which = np.flatnonzero((edge.at >= 0) & within[edge.at])
-        touched = bool(np.any(edges_stable_set(edge, which[:: max(1, len(which) // 200)], scale)))
+        which = np.flatnonzero((edge.angle_index >= 0) & within[edge.angle_index])
+        touched = bool(np.any(has_stable_inner_side(edge, which[:: max(1, len(which) // 200)], scale)))
         beyond = not loop.interpolation.closed and stretch.high >= 0.5 / loop.period * (1.0 - 1e-9)
         yield replace(stretch, on_edge=touched or (beyond and cells.open))

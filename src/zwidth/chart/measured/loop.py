@@ -14,10 +14,10 @@ from zwidth.chart.measured.response_interpolation import (
     around_one,
     interpolate_response,
 )
-from zwidth.chart.measured.usable_frequencies import Stretch, reaches_the_end, stretches, usable
+from zwidth.chart.measured.usable_frequencies import UnusableRange, is_usable, reaches_half_rate, unusable_ranges
 from zwidth.loop.controller import Controller
+from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.filters import force_filter, velocity_estimator
-from zwidth.loop.response import product, window_response
 from zwidth.model.response import Response, ResponseError, integrators_of, relative_error
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ class MeasuredLoop:
 
     response: Response
     controller: Controller
-    good: NDArray[np.bool_] = field(init=False)
+    usable: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
         delay, f = self.controller.delay, self.response.frequency
@@ -52,13 +52,13 @@ class MeasuredLoop:
                 f"has frequencies up to {f[-1]:.6g} Hz, above half the sampling rate, {half:.6g} Hz; leave them "
                 "out, or correct sampling_period_s"
             )
-        good = usable(self.response)
+        good = is_usable(self.response)
         if np.count_nonzero(good) < FEWEST:
             raise ResponseError(
                 f"has {np.count_nonzero(good)} usable frequencies of {len(f)}; a chart needs at least {FEWEST}, "
                 "and some hundreds to be exact"
             )
-        object.__setattr__(self, "good", good)
+        object.__setattr__(self, "usable", good)
 
     @property
     def period(self) -> float:
@@ -73,28 +73,28 @@ class MeasuredLoop:
     @cached_property
     def angles(self) -> Floats:
         """theta of the usable frequencies (n,)."""
-        theta = 2.0 * np.pi * self.response.frequency[self.good] * self.period
+        theta = 2.0 * np.pi * self.response.frequency[self.usable] * self.period
         return np.where(theta > np.pi * (1.0 - 1e-9), np.pi, theta)
 
     @property
-    def inner(self) -> Floats:
+    def angles_below_pi(self) -> Floats:
         """Those below pi, where K and B are defined."""
         return self.angles[self.angles < np.pi]
 
     @cached_property
     def interpolation(self) -> ResponseInterpolation:
         """The response between these angles."""
-        P = self.response.value[self.good]
-        closed, to_end = reaches_the_end(self.angles)
-        return interpolate_response(self.angles, P, self.integrators, closed=closed, to_end=to_end)
+        P = self.response.value[self.usable]
+        closed, to_end = reaches_half_rate(self.angles)
+        return interpolate_response(self.angles, P, self.integrators, closed=closed, measured_to_half_rate=to_end)
 
     @cached_property
-    def unusable(self) -> tuple[Stretch, ...]:
+    def unusable(self) -> tuple[UnusableRange, ...]:
         """Stretches of frequency that cannot be relied on, ascending."""
-        return tuple(stretches(self.response, self.good, self.period, self.interpolation))
+        return tuple(unusable_ranges(self.response, self.usable, self.period, self.interpolation))
 
     @property
-    def last(self) -> float:
+    def largest_angle(self) -> float:
         """The largest angle that the response reaches: pi, or that of the last frequency."""
         return float(np.pi if self.interpolation.closed else self.angles[-1])
 
@@ -102,13 +102,15 @@ class MeasuredLoop:
         """h = -1/P (...) at angles in (0, pi], software delay and force filter in P; inf where P is 0."""
         delay, force = round(self.controller.delay), force_filter(self.controller)
         with np.errstate(divide="ignore", invalid="ignore"):
-            passed = product(force.numerator, force.denominator, around_one(theta))
+            passed = factor_response(force.numerator, force.denominator, around_one(theta))
             return np.asarray(-self.interpolation.inverse(theta) * np.exp(1j * theta * delay) / passed)
 
     def w(self, theta: Floats) -> Complexes:
         """The velocity estimate w (...) at angles in (0, pi]."""
         d, own = around_one(theta), velocity_estimator(self.controller)
-        return np.asarray(product(own.numerator, own.denominator, d) * window_response(own.window, 1.0 + d))
+        return np.asarray(
+            factor_response(own.numerator, own.denominator, d) * window_response(own.window, 1.0 + d)
+        )
 
     def walls(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
         """K, B of the wall that fails at each angle, and the sign of Im w there."""
@@ -123,7 +125,7 @@ class MeasuredLoop:
 
         From coherence: 95 % of the error. From repeated sweeps: the farthest of them.
         """
-        response, good = self.response, self.good
+        response, good = self.response, self.usable
         if response.sweeps is not None:
             return np.asarray(np.max(np.abs(response.value[good] / response.sweeps[:, good] - 1.0), axis=0))
         if response.coherence is not None:

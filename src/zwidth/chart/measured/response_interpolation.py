@@ -79,13 +79,13 @@ def smooth_part(theta: Floats, P: Complexes, integrators: int) -> tuple[Complexe
 
 
 def interpolate_response(
-    theta: Floats, P: Complexes, integrators: int, *, closed: bool, to_end: bool = True
+    theta: Floats, P: Complexes, integrators: int, *, closed: bool, measured_to_half_rate: bool = True
 ) -> ResponseInterpolation:
     """The interpolation through a response P (n,) at ascending angles (n,) in (0, pi].
 
-    closed  whether the last angle is near enough to pi for its mirror image to be the next point
-    to_end  False: nothing was measured in the last stretch up to pi, so that no pole is read into it: noise of the
-            last points alone would say that there is one
+    closed                 whether the last angle is near enough to pi for its mirror image to be the next point
+    measured_to_half_rate  False: nothing was measured in the last stretch up to pi, so that no pole is read into
+                           it: noise of the last points alone would say that there is one
     """
     if len(theta) < FEWEST:
         raise ResponseError(
@@ -106,9 +106,15 @@ def interpolate_response(
     kinds = np.where(np.isfinite(y) & (y != 0.0), np.array([y, 1.0 / np.where(y == 0.0, 1.0, y), log]), 0.0)
     # what is next to nothing at half the sampling rate (a free mass) is measured by its neighbours
     size = np.maximum(np.abs(y), 0.2 * np.mean(np.abs(y[_windows(len(y))[0]]), axis=1))
-    missed = np.array([_missed(x, kinds[0], size), _missed(x, kinds[1], kinds[1]), _missed(x, kinds[2], 1.0)])
+    missed = np.array(
+        [
+            _prediction_error(x, kinds[0], size),
+            _prediction_error(x, kinds[1], kinds[1]),
+            _prediction_error(x, kinds[2], 1.0),
+        ]
+    )
     missed = np.maximum(missed[:, :-1], missed[:, 1:])
-    if closed and not to_end:
+    if closed and not measured_to_half_rate:
         missed[1, MIRRORED + len(theta) - 1] = np.inf
     kind = np.argmin(missed, axis=0)
     slopes, error = np.array([_slopes(x, v) for v in kinds]), np.min(missed, axis=0) / 64.0
@@ -130,7 +136,7 @@ def _slopes(x: Floats, y: Complexes) -> Complexes:
     return np.asarray(np.sum(weights * y[window], axis=1))
 
 
-def _missed(x: Floats, y: Complexes, size: Floats | Complexes | float) -> Floats:
+def _prediction_error(x: Floats, y: Complexes, size: Floats | Complexes | float) -> Floats:
     """How far the cubic through its four neighbours misses each node, relative to `size`."""
     window, here = _windows(len(x))
     scale, _ = _products(x, window, here)

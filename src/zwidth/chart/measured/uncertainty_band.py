@@ -12,9 +12,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.cells import cut
-from zwidth.chart.measured.cells import Cells, edges_stable_set
 from zwidth.chart.measured.loop import MeasuredLoop
+from zwidth.chart.measured.stable_regions import StableRegions, has_stable_inner_side
+from zwidth.chart.rings import cut_at_holes
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -48,7 +48,7 @@ class Band:
         }
 
 
-def uncertainty(loop: MeasuredLoop, cells: Cells) -> Band | None:
+def uncertainty_band(loop: MeasuredLoop, cells: StableRegions) -> Band | None:
     """The band along the stable set's edge; None where nothing is known of the error.
 
     With an error of radius r in h, a wall is in doubt where |K + B w - h| <= r: an ellipse round each point of the
@@ -57,11 +57,11 @@ def uncertainty(loop: MeasuredLoop, cells: Cells) -> Band | None:
     if loop.errors is None:
         return None
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
-    covered = _covered(loop, cells, scale)
+    covered = _doubtful_walls(loop, cells, scale)
     stable = shapely.union_all([shapely.transform(cell, lambda xy: xy / scale) for cell in cells.polygons])
     parts = [part for part in shapely.get_parts(covered) if isinstance(part, shapely.Polygon)]
     return Band(
-        regions=tuple(np.array(piece.exterior.coords) * scale for part in parts for piece in cut(part)),
+        regions=tuple(np.array(piece.exterior.coords) * scale for part in parts for piece in cut_at_holes(part)),
         stiffness_low=_largest(stable.difference(covered), scale),
         stiffness_high=_largest(stable.union(covered), scale),
         meaning="the farthest of the repeated sweeps"
@@ -70,31 +70,31 @@ def uncertainty(loop: MeasuredLoop, cells: Cells) -> Band | None:
     )
 
 
-def _covered(loop: MeasuredLoop, cells: Cells, scale: Floats) -> shapely.Geometry:
+def _doubtful_walls(loop: MeasuredLoop, cells: StableRegions, scale: Floats) -> shapely.Geometry:
     """The ellipses along the stable set's edge, in units of `scale`.
 
     Where two arcs meet, each goes on beyond the corner as far as the other leaves it in doubt: there the edge
     would run if both were as far out as they can be.
     """
     edge = cells.edge
-    curve = np.flatnonzero(edge.at >= 0)
+    curve = np.flatnonzero(edge.angle_index >= 0)
     segments = edge.segments[curve]
     low, high = np.minimum(segments[:, :2], segments[:, 2:]), np.maximum(segments[:, :2], segments[:, 2:])
     K0, K1, B0, B1 = cells.box
     curve = curve[np.all((high >= (K0, B0)) & (low <= (K1, B1)), axis=1)]
-    flags = edges_stable_set(edge, curve, scale)
+    flags = has_stable_inner_side(edge, curve, scale)
     covered = shapely.union_all(list(_ellipses(loop, cells, scale, curve[flags])))
     starts = edge.segments[curve, :2] / scale
     beyond = flags | shapely.contains_xy(covered, starts[:, 0], starts[:, 1])
     return shapely.union_all(list(_ellipses(loop, cells, scale, curve[beyond])))
 
 
-def _ellipses(loop: MeasuredLoop, cells: Cells, scale: Floats, curve: Whole) -> Iterator[shapely.Geometry]:
+def _ellipses(loop: MeasuredLoop, cells: StableRegions, scale: Floats, curve: Whole) -> Iterator[shapely.Geometry]:
     """Convex hulls of each two neighbouring ellipses along these chords."""
     edge = cells.edge
     every = max(1, len(curve) // MOST_ELLIPSES)
     for run in np.split(curve, np.flatnonzero(np.diff(curve) > 1) + 1) if len(curve) else []:
-        at = edge.at[run]
+        at = edge.angle_index[run]
         at = np.unique(np.concatenate([at[::every], at[-1:], at[-1:] + 1]))
         outlines = _outlines(loop, edge.angles[at], edge.walls[at]) / scale
         for one, next_one in pairwise(outlines):

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.chart.measured.boundary import Boundary
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.verdict import STABLE, UNDECIDED, UNSTABLE, WallVerdicts
-from zwidth.model.arguments import walls as broadcast_walls
+from zwidth.model.argument_checks import broadcast_walls as broadcast_walls
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class MeasuredVerdicts(WallVerdicts):
 
 
 @dataclass(frozen=True)
-class NearestEdge:
+class EdgeFrequencies:
     """The stable set's edge: segments (k, 4) of K, B, K, B, their frequencies (k,) [Hz], and its size (2,)."""
 
     segments: Floats
@@ -56,7 +56,7 @@ def judge_measured(
     edge: Boundary,
     wall_stiffness: ArrayLike,
     wall_damping: ArrayLike,
-    nearest: NearestEdge | None = None,
+    nearest: EdgeFrequencies | None = None,
 ) -> MeasuredVerdicts:
     """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast.
 
@@ -69,7 +69,7 @@ def judge_measured(
     finite = np.all(np.isfinite(walls), axis=1)
     safe = np.where(finite[:, None], walls, 0.0)
     outside = edge.outside(safe)
-    theta = loop.inner
+    theta = loop.angles_below_pi
     h, w = loop.h(theta), loop.w(theta)
     error = loop.error(theta)
     doubtful = ~finite

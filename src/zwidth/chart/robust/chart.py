@@ -11,16 +11,16 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arc_joining import ChartError
-from zwidth.chart.arcs import Walk
-from zwidth.chart.curve_pieces import CHORD
-from zwidth.chart.result import Chart
-from zwidth.chart.robust.common_set import Shapes, common, excluding
-from zwidth.chart.robust.edges import common_edge
-from zwidth.chart.robust.members import Member, chart_members, polygons
+from zwidth.chart.arc_kernels import CHORD
+from zwidth.chart.arcs import ArcPoints
+from zwidth.chart.chart_base import Chart
+from zwidth.chart.robust.common_edge import common_edge
+from zwidth.chart.robust.common_set import Shapes, incompatible_members, intersect_members
+from zwidth.chart.robust.members import Member, chart_members, member_polygons
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
-from zwidth.model.arguments import refusal, require
+from zwidth.model.argument_checks import require, wrong_type
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +37,8 @@ class RobustChart(Chart):
     best_by_area, best_by_stiffness  members that would have the most of each if they were the only ones
     lost_share      1 - stable_area / that of the best by area
     lost_stiffness_share  1 - stiffness_max / that of the best by stiffness
-    excluding       members that leave no wall in common (see `common_set.excluding`); () where there is one
+    excluding       members that leave no wall in common (see `common_set.incompatible_members`); () where there is
+                    one
     outlines        index -> the member's own closed walks (k, 2) of [stiffness, damping]
     corner_blur     share of the set's size to which its edge is known: 0 for rounding; more where rounding hides
                     a corner, and 1e-6 where a member cuts off less than chords of the arcs see
@@ -122,32 +123,32 @@ def robust_chart(members: Sequence[Loop]) -> RobustChart:
     ((1,), 68629.15, 0.666667)
     """
     if isinstance(members, Loop):
-        raise refusal("members", "a list of Loops", members, "write [loop]")
+        raise wrong_type("members", "a list of Loops", members, "write [loop]")
     if not members:
         raise ValueError("a robust chart needs at least one member")
     for index, loop in enumerate(members):
         require(f"members[{index}]", loop, Loop)
     charted, failed = chart_members(members)
-    return robust_of(charted, failed)
+    return robust_chart_of_members(charted, failed)
 
 
-def robust_of(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart:
+def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart:
     """The same for members that are charted already. Raises ChartError if there are none."""
     if not charted:
         reason = next(iter(failed.values()), "there is none")
         raise ChartError(f"no member could be charted; the first: {reason}")
     unit = max(member.tracer.period for member in charted.values())
-    shapes = {index: polygons(member, unit) for index, member in charted.items()}
-    shape, cutters = common(list(charted.values()), shapes, unit)
+    shapes = {index: member_polygons(member, unit) for index, member in charted.items()}
+    shape, cutters = intersect_members(list(charted.values()), shapes, unit)
     arcs, blur = common_edge(shape, cutters, unit)
     tracers = {index: member.tracer for index, member in charted.items()}
     edge = TracedEdge.of(arcs, tracers)
-    if _passed_over(edge.walks, list(charted.values()), unit):
+    if _passed_over(edge.arc_points, list(charted.values()), unit):
         blur = max(blur, CHORD)
     by_area, largest_area = _best_by_area(charted, shapes)
     by_stiffness = max(charted, key=lambda index: (_stiffness(charted[index].edge), -index))
     return RobustChart(
-        **edge.readings(
+        **edge.chart_fields(
             {index: tracer.period for index, tracer in tracers.items()},
             lambda K, B: all(tracer.stable(K, B) for tracer in tracers.values()),
         ),
@@ -157,15 +158,15 @@ def robust_of(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart
         members_at_stiffness_max=tuple(sorted(set(edge.peak.members))) if edge.peak else (),
         best_by_area=by_area,
         best_by_stiffness=by_stiffness,
-        lost_share=_lost(edge.area, largest_area),
-        lost_stiffness_share=_lost(_stiffness(edge), _stiffness(charted[by_stiffness].edge)),
-        excluding=() if edge.peak else excluding(charted, shapes, unit),
+        lost_share=_loss_share(edge.area, largest_area),
+        lost_stiffness_share=_loss_share(_stiffness(edge), _stiffness(charted[by_stiffness].edge)),
+        excluding=() if edge.peak else incompatible_members(charted, shapes, unit),
         outlines={index: tuple(member.edge.outlines) for index, member in charted.items()},
         corner_blur=blur,
     )
 
 
-def _passed_over(samples: list[Walk], members: list[Member], unit: float) -> bool:
+def _passed_over(samples: list[ArcPoints], members: list[Member], unit: float) -> bool:
     """Whether a member cuts a piece of edge, asked at its quarters 1e-9 of its length inside, by less than chords
     see."""
     for _, K, B in samples:
@@ -184,7 +185,7 @@ def _stiffness(edge: TracedEdge) -> float:
     return edge.peak.stiffness if edge.peak else 0.0
 
 
-def _lost(left: float, whole: float) -> float:
+def _loss_share(left: float, whole: float) -> float:
     """Share lost; nan where there was nothing to lose. Rounding can make a share negative that is 0."""
     return max(1.0 - left / whole, 0.0) if whole > 0.0 else float("nan")
 

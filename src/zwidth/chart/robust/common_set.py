@@ -12,7 +12,9 @@ from zwidth.chart.robust.members import Member, beyond_lines, curved_edges, poly
 Shapes = Mapping[int, shapely.MultiPolygon]
 
 
-def common(members: Sequence[Member], shapes: Shapes, unit: float) -> tuple[shapely.MultiPolygon, list[Member]]:
+def intersect_members(
+    members: Sequence[Member], shapes: Shapes, unit: float
+) -> tuple[shapely.MultiPolygon, list[Member]]:
     """The walls stable for every member, in [K unit, B], and the members that cut, in the order of their cuts.
 
     shapes  index -> the member's stable set in [K unit, B]
@@ -43,13 +45,13 @@ def _cuts(member: Member, shape: shapely.MultiPolygon, left: shapely.MultiPolygo
     return not bool(np.all(shapely.contains(shape, points)))
 
 
-def excluding(members: Mapping[int, Member], shapes: Shapes, unit: float) -> tuple[int, ...]:
+def incompatible_members(members: Mapping[int, Member], shapes: Shapes, unit: float) -> tuple[int, ...]:
     """Indices of a smallest group found that has no wall with K > 0, B >= 0 in common: one member that has none
     itself, two that exclude each other, or more of which none can be spared."""
     alone = [index for index, member in members.items() if member.edge.peak is None]
     if alone:
         return (alone[0],)
-    _, cutters = common(list(members.values()), shapes, unit)
+    _, cutters = intersect_members(list(members.values()), shapes, unit)
     shapes = {member.index: _quadrant(shapes[member.index]) for member in cutters}
     for place, one in enumerate(cutters):
         for other in cutters[:place]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.hurwitz import is_stable, working_room
+from zwidth.chart.hurwitz import is_stable, work_array
 from zwidth.compiled import compiled
 
 Floats = NDArray[np.float64]
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 def unstable(polynomials: Floats, K: Floats, B: Floats) -> NDArray[np.bool_]:
     """Which walls (k,) are certainly unstable for a loop, given by `Tracer.polynomials`."""
     out = np.empty(len(K), dtype=np.bool_)
-    room = working_room(polynomials.shape[1] - 1)
+    room = work_array(polynomials.shape[1] - 1)
     for i in range(len(K)):
         out[i] = is_stable(polynomials, K[i], B[i], room) < 0
     return out
@@ -28,7 +28,7 @@ def softening(polynomials: Floats, K: float, B: float) -> float:
 
     The next stable stiffness below is looked for in steps that grow by a quarter from 1e-8 of K, then bisected.
     """
-    room = working_room(polynomials.shape[1] - 1)
+    room = work_array(polynomials.shape[1] - 1)
     bad, step = 0.0, 1e-8
     while True:
         good = min(bad + step, 1.0)

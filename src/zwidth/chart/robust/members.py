@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.arcs import MINUS, PLUS
-from zwidth.chart.cells import signed_area
-from zwidth.chart.chart import traced
-from zwidth.chart.hurwitz import is_stable, working_room
+from zwidth.chart.chart import trace_edge
+from zwidth.chart.hurwitz import is_stable, work_array
+from zwidth.chart.rings import signed_area
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import ROOTS, Tracer
 from zwidth.loop.loop import Loop
@@ -44,7 +44,7 @@ class Member:
 
     def unstable(self, K: float, B: float) -> bool:
         """Whether a wall is unstable beyond doubt: by its polynomial, and by its eigenvalues, too."""
-        if is_stable(self.tracer.polynomials, K, B, working_room(self.tracer.degree)) >= 0:
+        if is_stable(self.tracer.polynomials, K, B, work_array(self.tracer.degree)) >= 0:
             return False
         radius = np.abs(np.linalg.eigvals(self.tracer.loop.transition_matrix(K, B))).max()
         return bool(radius > 1.0 + BEYOND_DOUBT)
@@ -65,11 +65,11 @@ def chart_members(loops: Sequence[Loop]) -> tuple[dict[int, Member], dict[int, s
 def chart_member(index: int, loop: Loop) -> Member:
     """One loop with its edge. Raises ChartError."""
     tracer = Tracer.of(loop)
-    edge, _ = traced(tracer, index)
+    edge, _ = trace_edge(tracer, index)
     return Member(index, tracer, edge)
 
 
-def polygons(member: Member, unit: float) -> shapely.MultiPolygon:
+def member_polygons(member: Member, unit: float) -> shapely.MultiPolygon:
     """A loop's stable set as one geometry in [K unit, B], clockwise outlines as holes.
 
     unit  seconds: K T and B have one unit, in which distances between walls are taken
@@ -98,7 +98,7 @@ def polygonal(geometry: shapely.Geometry) -> list[shapely.Polygon]:
 def curved_edges(member: Member, unit: float) -> shapely.MultiLineString:
     """The arcs of complex pairs, and chords over gaps, without their very ends; in [K unit, B]."""
     lines = []
-    for kind, (_, K, B) in zip(member.edge.arcs.kind, member.edge.walks, strict=True):
+    for kind, (_, K, B) in zip(member.edge.arcs.kind, member.edge.arc_points, strict=True):
         if kind in (PLUS, MINUS):
             continue
         points = np.column_stack([K * unit, B])

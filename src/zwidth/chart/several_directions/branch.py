@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from zwidth.chart.arcs import DAMPING, DRAWN_IN, STIFFNESS, Arc
+from zwidth.chart.arcs import DAMPING, END_MARGIN, STIFFNESS, Arc
 from zwidth.chart.area import straight_integrals
 from zwidth.chart.several_directions.eigenloci import Loci
 
@@ -41,8 +41,8 @@ class Branch:
         """Angles on an arc at which K, B or dK/dtheta changes sign, to rounding."""
         thetas = arc.angles
         inside = _inside(thetas)
-        thetas[0] += DRAWN_IN * (thetas[1] - thetas[0])
-        thetas[-1] -= DRAWN_IN * (thetas[-1] - thetas[-2])
+        thetas[0] += END_MARGIN * (thetas[1] - thetas[0])
+        thetas[-1] -= END_MARGIN * (thetas[-1] - thetas[-2])
         thetas = thetas[inside]
         values = self.loci.at(self.number, thetas)[component]
 

@@ -10,16 +10,22 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.polygon import orient
 
 from zwidth.chart.arcs import Arcs
-from zwidth.chart.result import Chart
-from zwidth.chart.several_directions.arcs import ring_arcs
+from zwidth.chart.chart_base import Chart
 from zwidth.chart.several_directions.branch import Branch
-from zwidth.chart.several_directions.cells import Line, cut_lines, reach, real_root_lines, stable_polygons
 from zwidth.chart.several_directions.eigenloci import Loci, refine_loci, trace_loci, with_angles
+from zwidth.chart.several_directions.polygon_arcs import ring_arcs
+from zwidth.chart.several_directions.stable_polygons import (
+    Line,
+    box_half_extents,
+    cut_lines,
+    real_root_lines,
+    stable_polygons,
+)
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.verdict import Verdicts, verdicts
 from zwidth.loop.loop import Loop
-from zwidth.loop.multi import MultiLoop
-from zwidth.model.arguments import require
+from zwidth.loop.multi_loop import MultiLoop
+from zwidth.model.argument_checks import require
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +69,7 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
     Raises  UnmovedError  where the walls move nothing that is read
 
     >>> from zwidth.loop.controller import Controller
-    >>> from zwidth.model.directions import MultiPlant
+    >>> from zwidth.model.multi_plant import MultiPlant
     >>> free = MultiPlant(np.diag([1.0, 2.0]), *np.zeros((2, 2, 2)), np.eye(2), np.eye(2))
     >>> chart = multi_chart(MultiLoop(free, Controller(sampling_period=1.0)))
     >>> round(chart.stiffness_max, 6), round(chart.damping_max, 6)       # the lighter mass's, thesis 4.14
@@ -71,24 +77,24 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
     """
     require("loop", loop, MultiLoop, "stability_chart takes a Loop" if isinstance(loop, Loop) else "")
     loci, lines = trace_loci(loop), real_root_lines(loop)
-    far = reach(loci, lines)
+    far = box_half_extents(loci, lines)
     polygons = stable_polygons(loop, cut_lines(loci, lines, -far, far))
     for look in range(MOST_LOOKS):
         if not polygons:
             break
-        missed = _missed(loop, polygons)
+        missed = _missed_angles(loop, polygons)
         if look >= LOOKS and not len(missed):
             break
         loci = with_angles(loci, missed)
-        found = np.array(shapely.total_bounds(np.array(polygons))).reshape(2, 2)
-        low, high = found + MARGIN * (found[1] - found[0]) * np.array([[-1.0], [1.0]])
+        extent = np.array(shapely.total_bounds(np.array(polygons))).reshape(2, 2)
+        low, high = extent + MARGIN * (extent[1] - extent[0]) * np.array([[-1.0], [1.0]])
         loci = refine_loci(loci, low, high, CLOSE)
         polygons = stable_polygons(loop, cut_lines(loci, lines, low, high))
     edge = _edge(loop, loci, lines, polygons)
-    return MultiChart(loop=loop, **edge.readings(loop.period, lambda K, B: _is_stable(loop, K, B)))
+    return MultiChart(loop=loop, **edge.chart_fields(loop.period, lambda K, B: _is_stable(loop, K, B)))
 
 
-def _missed(loop: MultiLoop, polygons: list[shapely.Polygon]) -> Floats:
+def _missed_angles(loop: MultiLoop, polygons: list[shapely.Polygon]) -> Floats:
     """Angles about roots outside the circle of walls in cells taken as stable: there a branch fell between two.
 
     A mode that walls hardly move draws its whole branch within a sliver of angle.

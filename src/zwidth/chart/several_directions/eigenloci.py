@@ -20,8 +20,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from zwidth.chart.grid import angles
-from zwidth.loop.multi import MultiLoop
+from zwidth.chart.angle_sampling import sample_angles
+from zwidth.loop.multi_loop import MultiLoop
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -136,17 +136,17 @@ def trace_loci(loop: MultiLoop) -> Loci:
     """All branches, sampled so that chords follow them wherever they go."""
     # what is late by n samples turns n times as fast as z
     late = 1 + loop.whole_delay + len(loop.estimator.A)
-    thetas = angles(features(loop), 1.0, SHARE, min(LONGEST, 0.5 / late))
+    thetas = sample_angles(features(loop), 1.0, SHARE, min(LONGEST, 0.5 / late))
     g = eigenvalues_of_plant(loop, thetas)
     for _ in range(ROUNDS):
-        loci = Loci(loop, thetas, _followed(g))
+        loci = Loci(loop, thetas, _match_branches(g))
         middles = 0.5 * (thetas[1:] + thetas[:-1])
         wide = np.diff(thetas) > NARROWEST * middles
         middles = middles[wide & (_ambiguous(loci.g) | _bent(loci))]
         if not len(middles) or len(thetas) > MOST:
             break
         thetas, g = _merged(loci.thetas, loci.g, middles, eigenvalues_of_plant(loop, middles))
-    return Loci(loop, thetas, _followed(g))
+    return Loci(loop, thetas, _match_branches(g))
 
 
 def refine_loci(loci: Loci, low: Floats, high: Floats, tolerance: float) -> Loci:
@@ -161,7 +161,7 @@ def refine_loci(loci: Loci, low: Floats, high: Floats, tolerance: float) -> Loci
         middles = (0.5 * (loci.thetas[1:] + loci.thetas[:-1]))[inside]
         g = eigenvalues_of_plant(loci.loop, middles)
         thetas, every = _merged(loci.thetas, loci.g, middles, g)
-        found = Loci(loci.loop, thetas, _followed(every))
+        found = Loci(loci.loop, thetas, _match_branches(every))
         at = np.searchsorted(thetas, middles)
         points = found.walls
         with np.errstate(invalid="ignore", over="ignore"):
@@ -180,7 +180,7 @@ def with_angles(loci: Loci, more: Floats) -> Loci:
     """More samples, at these angles."""
     more = np.setdiff1d(more[(more > loci.thetas[0]) & (more < loci.thetas[-1])], loci.thetas)
     thetas, g = _merged(loci.thetas, loci.g, more, eigenvalues_of_plant(loci.loop, more))
-    return Loci(loci.loop, thetas, _followed(g))
+    return Loci(loci.loop, thetas, _match_branches(g))
 
 
 def _merged(thetas: Floats, g: Complexes, more: Floats, h: Complexes) -> tuple[Floats, Complexes]:
@@ -189,7 +189,7 @@ def _merged(thetas: Floats, g: Complexes, more: Floats, h: Complexes) -> tuple[F
     return every[order], np.concatenate([g, h])[order]
 
 
-def _followed(g: Complexes) -> Complexes:
+def _match_branches(g: Complexes) -> Complexes:
     """Columns in the order in which each eigenvalue moves least."""
     if g.shape[1] == 1:
         return g
@@ -237,7 +237,7 @@ def _bent(loci: Loci) -> NDArray[np.bool_]:
 
 def features(loop: MultiLoop) -> Complexes:
     """Poles and zeros of P, poles of w, and where w is real on the circle; Im z >= 0."""
-    held, estimator, force = loop.held, loop.estimator, loop.force_filter
+    held, estimator, force = loop.sampled_plant, loop.estimator, loop.force_filter
     m = loop.count
     split = loop.fractional_delay > 0.0
     A = held.step

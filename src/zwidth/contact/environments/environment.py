@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth import _verbs
-from zwidth.contact.function_pointer import address_of, compiled_as, function_at
+from zwidth.compiled import compiled_for
+from zwidth.contact.function_pointer import address_of, function_at
 
 Floats = NDArray[np.float64]
 ForceLaw = Callable[[float, float, float, float, Floats, Floats], float]
@@ -110,7 +111,7 @@ class Environment:
         Raises  ValueError  where numba cannot compile it, with its reason in one sentence
         """
         try:
-            return compiled_as(SIGNATURE, self.function)
+            return compiled_for(SIGNATURE, self.function)
         except Exception as error:  # numba lets those of Python through, such as AttributeError
             raise ValueError(f"{self.where}: {self.name} does not compile: {shortened(str(error))}") from None
 

@@ -8,25 +8,25 @@ import numpy as np
 
 from zwidth.compiled import compiled_lean
 from zwidth.contact.mechanism.system import Memory, System
-from zwidth.model.arrays import Arrays
 from zwidth.model.bias import bias
-from zwidth.model.closure import equations, loop_step, passive_rates
-from zwidth.model.continuation import CONTRACTION, LARGEST_TURN, largest
+from zwidth.model.closure import closure_step, equations, passive_rates
+from zwidth.model.continuation import CONTRACTION, LARGEST_TURN, largest_magnitude
+from zwidth.model.forward_kinematics import WorkingMemory, place_links
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
 from zwidth.model.mechanism import Floats
-from zwidth.model.tree import Work, place
+from zwidth.model.mechanism_arrays import MechanismArrays
 
-LOST: Final = -1.0
+NOT_CLOSED: Final = -1.0
 ROUNDING: Final = 1e-14  # turn of a joint below which Newton has nothing more to gain [rad]
 SURE: Final = 1e-7  # turn whose square is rounding: the next iteration would not move [rad]
 
 
 @compiled_lean
-def close_at(mech: Arrays, driven: Floats, angles: Floats, work: Work) -> float:
+def close_at(mech: MechanismArrays, driven: Floats, angles: Floats, work: WorkingMemory) -> float:
     """Turn the drives to `driven` (d,) and close the loops, angles (links,) in place; their reciprocal condition.
 
-    Newton starts from where the passive joints' rates would take them. LOST where it leaves the branch. Links,
-    `rows` and `rates` belong to the closed posture afterwards.
+    Newton starts from where the passive joints' rates would take them. NOT_CLOSED where it leaves the branch.
+    Links, `rows` and `rates` belong to the closed posture afterwards.
     """
     joint, rates = mech.joint, work.rates
     d, m, loops = mech.driven, mech.joint.size, 3 * mech.a.size
@@ -40,39 +40,39 @@ def close_at(mech: Arrays, driven: Floats, angles: Floats, work: Work) -> float:
         angles[joint[passive + s]] = driven[s]
     last, moved, sure = 0.0, 0.0, loops == 0
     for iteration in range(12):
-        place(mech, 0, angles, work)
+        place_links(mech, 0, angles, work)
         equations(mech, 0, work.goal, work)
         condition = passive_rates(mech, work)
         if sure:
             return condition
-        size = loop_step(mech, work)
+        size = closure_step(mech, work)
         moved += size
         if not moved < LARGEST_TURN or not condition > 0.0:
-            return LOST
+            return NOT_CLOSED
         if size < ROUNDING:
             return condition
         if iteration > 0 and size > CONTRACTION * last:
             # rounding moves it to and fro, or there is no closed posture here
-            return condition if largest(work.gaps, loops) < 1e-13 * mech.size[0] else LOST
+            return condition if largest_magnitude(work.gaps, loops) < 1e-13 * mech.size[0] else NOT_CLOSED
         for u in range(passive):
             angles[joint[u]] += work.solution[0, u]
         sure = size < SURE
         last = size
-    return LOST
+    return NOT_CLOSED
 
 
 @compiled_lean
 def configure(system: System, memory: Memory, x: Floats) -> float:
     """Place the links at the state's joint angles and fill mass, Jacobian and Cholesky's factor of M_phi.
 
-    Returns the reciprocal condition of the loops, LOST where they do not close.
+    Returns the reciprocal condition of the loops, NOT_CLOSED where they do not close.
     """
     mech, work, mass, L = system.mech, memory.work, memory.mass, memory.factor
     motor, rotor = system.motor, system.rotor
     d = mech.driven
     condition = close_at(mech, x, memory.angles, work)
     if not condition >= 0.0:
-        return LOST
+        return NOT_CLOSED
     unit_motions(mech, work)
     mass_matrix(mech, 0, work, mass, 0)
     handle_jacobian(work, memory.jacobian, 0)

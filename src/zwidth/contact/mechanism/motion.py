@@ -138,7 +138,7 @@ class MechanismMotion(Result):
     @property
     def force_limit_share(self) -> float:
         """Share of the samples at which the force was cut to its limit."""
-        return _share(self.force_size >= AT_LIMIT * self.point.controller.saturation)
+        return _share(self.force_size >= AT_LIMIT * self.point.controller.force_limit)
 
     @property
     def energy_book(self) -> dict[str, float]:

@@ -26,7 +26,7 @@ from zwidth.contact.mechanism.acceleration import accelerate, configure, solve
 from zwidth.contact.mechanism.system import BRISTLES, DRY, Memory, System
 from zwidth.model.mechanism import Floats
 
-TURNED: Final = 0.03  # turn of a joint after which A is taken anew [rad]
+LINEARISE_TURN: Final = 0.03  # turn of a joint after which A is taken anew [rad]
 AT_REST: Final = 1e-12  # share of a substep's change of velocity that is rounding
 SWEEPS: Final = 20  # of the drives' frictions against each other
 
@@ -38,7 +38,7 @@ def turned(memory: Memory, x: Floats) -> bool:
     most = 0.0
     for i in range(base.size):
         most = max(most, abs(x[i] - base[i]))
-    return most > TURNED
+    return most > LINEARISE_TURN
 
 
 @compiled_lean
@@ -77,7 +77,7 @@ def linearise(system: System, memory: Memory, x: Floats) -> None:
 
 
 @compiled_lean
-def rate_of(A: Floats, n: int) -> float:
+def balanced_norm(A: Floats, n: int) -> float:
     """A norm of A [1/s] in units that balance it, so that it is as large as the frequencies, not their squares."""
     N = A.shape[0]
     stiff, fast = 0.0, 0.0
@@ -103,7 +103,7 @@ def prepare(system: System, memory: Memory, h: float, part: int) -> None:
     if h <= 0.0:
         return
     E, G, rest, stages = memory.half[part], memory.gain[part], memory.rest, memory.stages
-    exponential(memory.linear, 0.5 * h, rate_of(memory.linear, n) * 0.5 * h, E, G, memory.scratch)
+    exponential(memory.linear, 0.5 * h, balanced_norm(memory.linear, n) * 0.5 * h, E, G, memory.scratch)
     N = E.shape[0]
     for j in range(motor.size):
         for i in range(n):
@@ -121,7 +121,7 @@ def prepare(system: System, memory: Memory, h: float, part: int) -> None:
 
 
 @compiled_lean
-def carry(matrix: Floats, stages: Floats, source: int, target: int) -> None:
+def multiply_stage(matrix: Floats, stages: Floats, source: int, target: int) -> None:
     """stages[target] = matrix stages[source]"""
     for i in range(matrix.shape[0]):
         total = 0.0
@@ -156,7 +156,9 @@ def remainder(
 
 
 @compiled_lean
-def without_its_own(system: System, memory: Memory, x: Floats, part: int, i: int, friction: Floats) -> float:
+def velocity_without_own_friction(
+    system: System, memory: Memory, x: Floats, part: int, i: int, friction: Floats
+) -> float:
     """Velocity of motor i at the end of the substep under all frictions but its own."""
     motor, stages = system.motor, memory.stages
     at = system.damping.shape[0] + motor[i]
@@ -175,7 +177,7 @@ def law_of_bristles(system: System, i: int) -> tuple[float, float, float, float,
 
 
 @compiled
-def resist(
+def solve_friction(
     system: System, memory: Memory, x: Floats, part: int, h: float, resting: Floats, friction: Floats
 ) -> None:
     """The drives' frictions (d,) held over the substep, from the motors' velocities without them at its end.
@@ -194,7 +196,7 @@ def resist(
         for i in range(d):
             if model[i] == 0:
                 continue
-            v0, w = x[n + motor[i]], without_its_own(system, memory, x, part, i, friction)
+            v0, w = x[n + motor[i]], velocity_without_own_friction(system, memory, x, part, i, friction)
             before, m = friction[i], mobility[part, i, i]
             if model[i] == DRY:
                 friction[i] = coulomb_force(numbers[i, 0], v0, w, m)
@@ -206,21 +208,23 @@ def resist(
             break
     for i in range(d):
         if model[i] == BRISTLES:
-            v0, w = x[n + motor[i]], without_its_own(system, memory, x, part, i, friction)
+            v0, w = x[n + motor[i]], velocity_without_own_friction(system, memory, x, part, i, friction)
             law, m = law_of_bristles(system, i), mobility[part, i, i]
             _force, bristles[i] = bristle_force(bristles[i], law, v0, w, m, h)
 
 
 @compiled
-def rub(system: System, memory: Memory, x: Floats, part: int, h: float, resting: Floats, friction: Floats) -> None:
+def add_friction(
+    system: System, memory: Memory, x: Floats, part: int, h: float, resting: Floats, friction: Floats
+) -> None:
     """Find the frictions, let them act over the substep, and add what they do to F in stages[0]."""
     stages, E, G, rest = memory.stages, memory.half[part], memory.gain[part], memory.rest
     motor, n = system.motor, system.damping.shape[0]
-    carry(G, stages, 0, 2)
-    carry(E, stages, 2, 1)
+    multiply_stage(G, stages, 0, 2)
+    multiply_stage(E, stages, 2, 1)
     for i in range(x.size):
         stages[1, i] += stages[2, i]
-    resist(system, memory, x, part, h, resting, friction)
+    solve_friction(system, memory, x, part, h, resting, friction)
     for i in range(n):
         rest[i] = 0.0
     for i in range(motor.size):
@@ -272,9 +276,9 @@ def step(
     for i in range(system.friction_model.size):
         rough = rough or system.friction_model[i] != 0
     if rough:
-        rub(system, memory, x, part, h, resting, friction)
-    carry(G, stages, 0, 1)  # y_2
-    carry(E, stages, 1, 2)
+        add_friction(system, memory, x, part, h, resting, friction)
+    multiply_stage(G, stages, 0, 1)  # y_2
+    multiply_stage(E, stages, 1, 2)
     for i in range(N):
         stages[2, i] += stages[1, i]  # (G + E G) F
     for stage in range(3):
@@ -285,11 +289,11 @@ def step(
                 stages[5, i] = stages[3, i]
                 stages[1, i] += 0.5 * h * stages[3, i]  # y_3
         elif stage == 1:
-            carry(E, stages, 3, 4)
+            multiply_stage(E, stages, 3, 4)
             for i in range(N):
                 stages[5, i] += stages[3, i]
                 stages[1, i] = stages[2, i] + h * stages[4, i]  # y_4
-    carry(E, stages, 5, 4)
+    multiply_stage(E, stages, 5, 4)
     for i in range(N):
         trial[i] = x[i] + stages[2, i] + h / 6.0 * (2.0 * stages[4, i] + stages[3, i])
     work = release(system, memory, x, trial, resting, friction) if rough else 0.0

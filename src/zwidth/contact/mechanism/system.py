@@ -17,11 +17,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from zwidth.compiled import compiled
-from zwidth.model.arrays import Arrays
-from zwidth.model.bias import Flow, flow_of
+from zwidth.model.bias import LinkAccelerations, new_link_accelerations
+from zwidth.model.forward_kinematics import WorkingMemory, working_memory
 from zwidth.model.mechanism import Drives, Floats, Ints
+from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.plant import Plant
-from zwidth.model.tree import Work, workspace
 
 DRY: Final = 1  # friction: Coulomb's
 BRISTLES: Final = 2  # friction: Dahl's or LuGre's
@@ -41,7 +41,7 @@ class System(NamedTuple):
     friction (d, 5)  C, F_s, v_s, sigma_0, sigma_1 at the joint;   friction_model (d,)  0, DRY or BRISTLES
     """
 
-    mech: Arrays
+    mech: MechanismArrays
     motor: Ints
     rotor: Floats
     spring: Floats
@@ -75,8 +75,8 @@ class Memory(NamedTuple):
     bristles          (d,)     deflections [rad]
     """
 
-    work: Work
-    flow: Flow
+    work: WorkingMemory
+    flow: LinkAccelerations
     angles: Floats
     mass: Floats
     jacobian: Floats
@@ -98,7 +98,7 @@ class Memory(NamedTuple):
     bristles: Floats
 
 
-def system_of(mech: Arrays, drives: Drives, plant: Plant, gravity: Floats, actuator_lag: float) -> System:
+def system_of(mech: MechanismArrays, drives: Drives, plant: Plant, gravity: Floats, actuator_lag: float) -> System:
     """The equations of one design.
 
     plant  its full model at the start: damping and lagged dampers are taken from it and kept, in the coordinates
@@ -151,8 +151,8 @@ def memory_of(system: System) -> Memory:
     mech = system.mech
     d, n, N = mech.driven, system.damping.shape[0], 2 * system.damping.shape[0] + system.lag_time.size
     return Memory(
-        workspace(mech),
-        flow_of(mech),
+        working_memory(mech),
+        new_link_accelerations(mech),
         np.zeros(mech.parent.size),
         np.zeros((1, d, d)),
         np.zeros((1, 3, d)),

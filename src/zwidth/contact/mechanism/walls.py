@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.contact.environments import ENVIRONMENTS, Environment
-from zwidth.contact.mechanism.checks import MotionError
+from zwidth.contact.mechanism.motion_inputs import MotionError
 from zwidth.contact.mechanism.surfaces import Plane, Surface
 from zwidth.model.mechanism import Floats
 
@@ -42,10 +42,10 @@ class SurfaceEnvironment:
     values: ArrayLike
 
 
-Wall = SurfaceWall | SurfaceEnvironment
+SurfaceRendering = SurfaceWall | SurfaceEnvironment
 
 
-def rendered_environment(wall: Wall, surface: Surface) -> tuple[Environment, Floats]:
+def rendered_environment(wall: SurfaceRendering, surface: Surface) -> tuple[Environment, Floats]:
     """The environment that renders a wall at this surface, and its parameters. Raises MotionError."""
     if not isinstance(surface, Surface):
         raise MotionError(f"the surface must be a Plane, a Sphere or a Box, got {type(surface).__name__}")

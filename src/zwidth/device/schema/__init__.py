@@ -1,14 +1,14 @@
 """The device file's shape: which keys there are, with their units and what each may hold.
 
-    numbers    the kinds of values: numbers, vectors, matrices that are right by themselves
-    plant      [plant]
-    velocity   [loop.velocity], and the low passes
-    loop       [loop]
-    operator   [operator]
-    friction   [friction] of a plant and of drives
-    mechanism  [mechanism]
-    file       the whole file, and its JSON Schema
+    value_types  the kinds of values: numbers, vectors, matrices that are right by themselves
+    plant        [plant]
+    velocity     [loop.velocity], and the low passes
+    loop         [loop]
+    operator     [operator]
+    friction     [friction] of a plant and of drives
+    mechanism    [mechanism]
+    device_file  the whole file, and its JSON Schema
 
-What needs two keys to be judged (sizes, names that refer to names, either-or) is checked in `relations`,
-so that a fault in one key hides none in another.
+What needs two keys to be judged (sizes, names that refer to names, either-or) is checked in
+`device.consistency`, so that a fault in one key hides none in another.
 """

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BeforeValidator
 
 from zwidth.device.faults import quote
-from zwidth.device.schema.numbers import Number, NumberOrInfinity, Section, Step, quantity
+from zwidth.device.schema.value_types import Number, NumberOrInfinity, Section, Step, documented_key
 from zwidth.device.schema.velocity import BackwardDifferenceSection, LowPass, VelocitySection
 
 SHORTEST_PERIOD: Final = 1e-7  # s; 10 MHz, far beyond any loop round a motor
@@ -33,13 +33,13 @@ def _a_period(value: Any) -> Any:
 class ForceSection(Section):
     """What the computed force passes before it is set."""
 
-    filter: LowPass | None = quantity("low pass on the whole force; omitted: none", default=None)
+    filter: LowPass | None = documented_key("low pass on the whole force; omitted: none", default=None)
 
 
 class ActuatorSection(Section):
     """How the force follows its command."""
 
-    time_constant_s: Number = quantity(
+    time_constant_s: Number = documented_key(
         "time constant tau of the force's first-order lag, tau f' + f = held command; 0: none", "s", ge=0
     )
 
@@ -47,17 +47,17 @@ class ActuatorSection(Section):
 class EncoderSection(Section):
     """Where the encoder sits, and its step."""
 
-    at: Literal["motor", "link", "handle"] | None = quantity(
+    at: Literal["motor", "link", "handle"] | None = documented_key(
         'what the encoders of a mechanism read: "motor" (omitted), or behind the drives the "link" or "handle", '
         "which are the same with rigid links; a [plant] says it by `sensor`",
         default=None,
     )
-    resolution_m: Step | None = quantity(
+    resolution_m: Step | None = documented_key(
         "step of the reading, for a [plant]; 0: as fine as you like; a mechanism gives encoder_counts_per_rev",
         "m",
         default=None,
     )
-    noise_m: Step | None = quantity(
+    noise_m: Step | None = documented_key(
         "standard deviation of the reading before it is rounded, for a [plant]; omitted: 0", "m", default=None
     )
 
@@ -65,31 +65,33 @@ class EncoderSection(Section):
 class SaturationSection(Section):
     """The largest force that the computer commands."""
 
-    force_N: NumberOrInfinity = quantity("largest force that is commanded; inf: no limit", "N", gt=0)
+    force_N: NumberOrInfinity = documented_key("largest force that is commanded; inf: no limit", "N", gt=0)
 
 
 class LoopSection(Section):
     """The sampled wall law, f = -F (K y + B v)."""
 
-    sampling_period_s: Annotated[Number, BeforeValidator(_a_period)] = quantity(
+    sampling_period_s: Annotated[Number, BeforeValidator(_a_period)] = documented_key(
         "sampling period T, 1e-7 <= T <= 1", "s", ge=SHORTEST_PERIOD, le=LONGEST_PERIOD
     )
-    delay_samples: Number | None = quantity(
+    delay_samples: Number | None = documented_key(
         "time from reading the encoder to setting the force, in samples, whole or not; or delay_s",
         "1",
         ge=0,
         default=None,
     )
-    delay_s: Number | None = quantity(
+    delay_s: Number | None = documented_key(
         "time from reading the encoder to setting the force; or delay_samples", "s", ge=0, default=None
     )
-    velocity: VelocitySection = quantity(
+    velocity: VelocitySection = documented_key(
         "how the velocity is estimated",
         default=BackwardDifferenceSection(method="backward-difference", filter=None),
     )
-    force: ForceSection = quantity("what the force passes", default=ForceSection(filter=None))
-    actuator: ActuatorSection = quantity("how the force follows", default=ActuatorSection(time_constant_s=0.0))
-    encoder: EncoderSection = quantity(
+    force: ForceSection = documented_key("what the force passes", default=ForceSection(filter=None))
+    actuator: ActuatorSection = documented_key(
+        "how the force follows", default=ActuatorSection(time_constant_s=0.0)
+    )
+    encoder: EncoderSection = documented_key(
         "where the encoder sits, and its step", default=EncoderSection(at=None, resolution_m=None, noise_m=None)
     )
-    saturation: SaturationSection | None = quantity("the largest force; omitted: no limit", default=None)
+    saturation: SaturationSection | None = documented_key("the largest force; omitted: no limit", default=None)

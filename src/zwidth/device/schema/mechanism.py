@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from zwidth.device.schema.friction import DriveFrictionSection
-from zwidth.device.schema.numbers import (
+from zwidth.device.schema.value_types import (
     Axis,
     Bounds,
     Counts,
@@ -30,36 +30,36 @@ from zwidth.device.schema.numbers import (
     Stiffness,
     Torque,
     Triple,
-    quantity,
+    documented_key,
 )
 
 
 class LinkSection(Section):
     """A rigid link and the joint that carries it."""
 
-    name: Name = quantity("the link's name: letters, digits, - and _")
-    parent: Name = quantity('the link that carries it, or "base"', default="base")
-    joint: Literal["revolute", "fixed"] = quantity('how it moves against its parent: "revolute" or "fixed"')
-    axis: Axis = quantity("joint axis in the link's own frame, any length", "1", default=(0.0, 0.0, 1.0))
-    origin_m: Triple | None = quantity(
+    name: Name = documented_key("the link's name: letters, digits, - and _")
+    parent: Name = documented_key('the link that carries it, or "base"', default="base")
+    joint: Literal["revolute", "fixed"] = documented_key('how it moves against its parent: "revolute" or "fixed"')
+    axis: Axis = documented_key("joint axis in the link's own frame, any length", "1", default=(0.0, 0.0, 1.0))
+    origin_m: Triple | None = documented_key(
         "joint origin in the parent's frame; omitted: the parent's tip (of the base: its origin)",
         "m",
         default=None,
     )
-    orientation_rad: Triple = quantity(
+    orientation_rad: Triple = documented_key(
         "roll, pitch, yaw of the link's axes in the parent's frame at joint angle 0: turned about the "
         "parent's x, then y, then z axis",
         "rad",
         default=(0.0, 0.0, 0.0),
     )
-    length_m: Number = quantity(
+    length_m: Number = documented_key(
         "length along the link's x axis; its tip is at (length, 0, 0)", "m", ge=0, default=0.0
     )
-    mass_kg: Mass = quantity("mass; 0 for a massless link", "kg", ge=0)
-    center_of_mass_m: Offset = quantity(
+    mass_kg: Mass = documented_key("mass; 0 for a massless link", "kg", ge=0)
+    center_of_mass_m: Offset = documented_key(
         "centre of mass in the link's frame, x or x, y or x, y, z", "m", default=(0.0, 0.0, 0.0)
     )
-    inertia_kg_m2: Inertia = quantity(
+    inertia_kg_m2: Inertia = documented_key(
         "moments of inertia about the centre of mass, link axes: one number (about the joint axis; enough "
         "for planar motion), three moments [Ixx, Iyy, Izz], or a 3 x 3 matrix",
         "kg m^2",
@@ -69,9 +69,11 @@ class LinkSection(Section):
 class LoopClosure(Section):
     """A closed loop: a point of one link stays on a point of another."""
 
-    name: Name = quantity("the loop's name: letters, digits, - and _")
-    links: tuple[Name, ...] = quantity('the two links that meet, or a link and "base"', min_length=2, max_length=2)
-    points_m: tuple[Triple, ...] | None = quantity(
+    name: Name = documented_key("the loop's name: letters, digits, - and _")
+    links: tuple[Name, ...] = documented_key(
+        'the two links that meet, or a link and "base"', min_length=2, max_length=2
+    )
+    points_m: tuple[Triple, ...] | None = documented_key(
         "the meeting point in the frame of each of the two; omitted: their tips (of the base: its origin)",
         "m",
         min_length=2,
@@ -83,14 +85,14 @@ class LoopClosure(Section):
 class HandleSection(Section):
     """Where the operator holds the device."""
 
-    link: Name = quantity("the link that carries the handle")
-    point_m: Triple | None = quantity("the handle in that link's frame; omitted: its tip", "m", default=None)
+    link: Name = documented_key("the link that carries the handle")
+    point_m: Triple | None = documented_key("the handle in that link's frame; omitted: its tip", "m", default=None)
 
 
 class AssemblySection(Section):
     """One way of assembling the mechanism at the reference posture."""
 
-    joints_rad: dict[str, Number] = quantity(
+    joints_rad: dict[str, Number] = documented_key(
         "approximate angle of every revolute joint, by link name, at the reference position", "rad"
     )
 
@@ -98,91 +100,95 @@ class AssemblySection(Section):
 class ReferenceSection(Section):
     """The posture and the direction that are meant where none is given."""
 
-    position_m: Position = quantity("position of the handle, x, y or x, y, z", "m")
-    direction: Direction = quantity("rendered direction, any length", "1")
-    assembly: Name | None = quantity("the assembly that is meant; omitted only where one is named", default=None)
+    position_m: Position = documented_key("position of the handle, x, y or x, y, z", "m")
+    direction: Direction = documented_key("rendered direction, any length", "1")
+    assembly: Name | None = documented_key(
+        "the assembly that is meant; omitted only where one is named", default=None
+    )
 
 
 class WorkspaceSection(Section):
     """Bounds of the handle's position, for maps."""
 
-    x_m: Bounds | None = quantity("lower and upper bound of x", "m", default=None)
-    y_m: Bounds | None = quantity("lower and upper bound of y", "m", default=None)
-    z_m: Bounds | None = quantity("lower and upper bound of z", "m", default=None)
+    x_m: Bounds | None = documented_key("lower and upper bound of x", "m", default=None)
+    y_m: Bounds | None = documented_key("lower and upper bound of y", "m", default=None)
+    z_m: Bounds | None = documented_key("lower and upper bound of z", "m", default=None)
 
 
 class DriveSection(Section):
     """A motor and its transmission, on one revolute joint."""
 
-    name: Name = quantity("the drive's name: letters, digits, - and _")
-    joint: Name = quantity("the link whose joint it drives")
-    motor_inertia_kg_m2: RotorInertia = quantity("inertia of the rotor, at the motor", "kg m^2", ge=0)
-    transmission_ratio: Ratio = quantity("motor turns per joint turn", "1", gt=0)
-    stiffness_Nm_per_rad: Spring | None = quantity(
+    name: Name = documented_key("the drive's name: letters, digits, - and _")
+    joint: Name = documented_key("the link whose joint it drives")
+    motor_inertia_kg_m2: RotorInertia = documented_key("inertia of the rotor, at the motor", "kg m^2", ge=0)
+    transmission_ratio: Ratio = documented_key("motor turns per joint turn", "1", gt=0)
+    stiffness_Nm_per_rad: Spring | None = documented_key(
         "stiffness of the transmission at the motor shaft; omitted or inf: rigid",
         "N m/rad",
         gt=0,
         default=None,
     )
-    damping_Nms_per_rad: Damper | None = quantity(
+    damping_Nms_per_rad: Damper | None = documented_key(
         "damping parallel to that stiffness, at the motor shaft; with mechanism.damping.given = true",
         "N m s/rad",
         ge=0,
         default=None,
     )
-    torque_constant_Nm_per_A: Number | None = quantity(
+    torque_constant_Nm_per_A: Number | None = documented_key(
         "torque constant of the motor; omitted: not known", "N m/A", gt=0, default=None
     )
-    winding_resistance_ohm: Resistance | None = quantity(
+    winding_resistance_ohm: Resistance | None = documented_key(
         "resistance of the motor's winding; with damping_resistance_ohm", "ohm", gt=0, default=None
     )
-    winding_inductance_H: Inductance | None = quantity(
+    winding_inductance_H: Inductance | None = documented_key(
         "inductance of the motor's winding; with damping_resistance_ohm; omitted: none", "H", ge=0, default=None
     )
-    damping_resistance_ohm: Resistance | None = quantity(
+    damping_resistance_ohm: Resistance | None = documented_key(
         "resistor through which the winding is closed, so that the motor brakes by its own induction; 0: shorted; "
         "omitted: the winding is open or on a current amplifier, and there is no electrical damping",
         "ohm",
         ge=0,
         default=None,
     )
-    torque_limit_Nm: NumberOrInfinity | None = quantity(
+    torque_limit_Nm: NumberOrInfinity | None = documented_key(
         "largest torque at the motor; omitted or inf: no limit", "N m", gt=0, default=None
     )
-    continuous_torque_Nm: Torque | None = quantity(
+    continuous_torque_Nm: Torque | None = documented_key(
         "torque at the motor that it bears without end, its winding no hotter than allowed; omitted: not known",
         "N m",
         gt=0,
         default=None,
     )
-    encoder_counts_per_rev: Counts | None = quantity(
+    encoder_counts_per_rev: Counts | None = documented_key(
         "encoder counts per motor revolution, after quadrature; omitted: not known", "1", default=None
     )
-    encoder_noise_rad: Step | None = quantity(
+    encoder_noise_rad: Step | None = documented_key(
         "standard deviation of the motor's angle before it is counted; omitted: 0", "rad", default=None
     )
-    coulomb_Nm: DryFriction | None = quantity("dry friction at the motor; omitted: none", "N m", default=None)
-    breakaway_Nm: DryFriction | None = quantity(
+    coulomb_Nm: DryFriction | None = documented_key(
+        "dry friction at the motor; omitted: none", "N m", default=None
+    )
+    breakaway_Nm: DryFriction | None = documented_key(
         'its static level, at least coulomb_Nm; with mechanism.friction.model = "lugre"; omitted: coulomb_Nm',
         "N m",
         default=None,
     )
-    hardening_Nm_per_rad3: Hardening | None = quantity(
+    hardening_Nm_per_rad3: Hardening | None = documented_key(
         "k_3 of the transmission's torque k d + k_3 d^3 at the motor shaft; negative: it softens; omitted: 0",
         "N m/rad^3",
         default=None,
     )
-    backward_stiffness_Nm_per_rad: Stiffness | None = quantity(
+    backward_stiffness_Nm_per_rad: Stiffness | None = documented_key(
         "stiffness of the transmission where the motor lags behind the joint and pulls it back; "
         "stiffness_Nm_per_rad then is that of the other direction; omitted: the same",
         "N m/rad",
         gt=0,
         default=None,
     )
-    brake_damping_max_Nms_per_rad: Damper | None = quantity(
+    brake_damping_max_Nms_per_rad: Damper | None = documented_key(
         "largest damping of a programmable brake on the rotor; omitted: no brake", "N m s/rad", ge=0, default=None
     )
-    brake_time_constant_s: Number | None = quantity(
+    brake_time_constant_s: Number | None = documented_key(
         "lag of the brake's damping; omitted: none", "s", ge=0, default=None
     )
 
@@ -190,34 +196,38 @@ class DriveSection(Section):
 class DampingSection(Section):
     """Structural damping: by mode, proportional, or given at the drives; exactly one."""
 
-    mode_ratio: Number | None = quantity(
+    mode_ratio: Number | None = documented_key(
         "damping ratio of every flexible mode, 0.05 for 5 %; rigid modes have none",
         "1",
         ge=0,
         le=2,
         default=None,
     )
-    mass_coefficient_1_per_s: Number | None = quantity(
+    mass_coefficient_1_per_s: Number | None = documented_key(
         "r_m of the proportional damping r_m M + r_k K", "1/s", ge=0, default=None
     )
-    stiffness_coefficient_s: Number | None = quantity(
+    stiffness_coefficient_s: Number | None = documented_key(
         "r_k of the proportional damping r_m M + r_k K", "s", ge=0, default=None
     )
-    given: Literal[True] | None = quantity("true: the drives' own damping_Nms_per_rad", default=None)
+    given: Literal[True] | None = documented_key("true: the drives' own damping_Nms_per_rad", default=None)
 
 
 class MechanismSection(Section):
     """A mechanism of rigid links, drives and loop closures."""
 
-    links: tuple[LinkSection, ...] = quantity("the moving links", min_length=1)
-    loops: tuple[LoopClosure, ...] = quantity("the loop closures", default=())
-    handle: HandleSection = quantity("where the operator holds the device")
-    assemblies: dict[Name, AssemblySection] = quantity("named ways of assembling it", min_length=1)
-    reference: ReferenceSection = quantity("the posture and direction meant where none is given")
-    workspace: WorkspaceSection | None = quantity("bounds of the handle's position; omitted: none", default=None)
-    drives: tuple[DriveSection, ...] = quantity("the drives, in the order of the driven coordinates", min_length=1)
-    damping: DampingSection = quantity("structural damping, one of the three ways")
-    friction: DriveFrictionSection = quantity(
+    links: tuple[LinkSection, ...] = documented_key("the moving links", min_length=1)
+    loops: tuple[LoopClosure, ...] = documented_key("the loop closures", default=())
+    handle: HandleSection = documented_key("where the operator holds the device")
+    assemblies: dict[Name, AssemblySection] = documented_key("named ways of assembling it", min_length=1)
+    reference: ReferenceSection = documented_key("the posture and direction meant where none is given")
+    workspace: WorkspaceSection | None = documented_key(
+        "bounds of the handle's position; omitted: none", default=None
+    )
+    drives: tuple[DriveSection, ...] = documented_key(
+        "the drives, in the order of the driven coordinates", min_length=1
+    )
+    damping: DampingSection = documented_key("structural damping, one of the three ways")
+    friction: DriveFrictionSection = documented_key(
         "how the dry friction of the drives, coulomb_Nm, grips",
         default=DriveFrictionSection(
             model="coulomb",

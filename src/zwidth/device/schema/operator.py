@@ -4,28 +4,30 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from zwidth.device.schema import bounds
-from zwidth.device.schema.numbers import Damper, Number, Section, Text, quantity
+from zwidth.device.schema import magnitudes
+from zwidth.device.schema.value_types import Damper, Number, Section, Text, documented_key
 
-ArmMass = Annotated[Number, bounds.within(bounds.LIGHTEST, bounds.HEAVIEST, "kg", "0 (massless) or ")]
-Stiffness = Annotated[Number, bounds.within(bounds.SOFTEST, bounds.STIFFEST, "N/m", "0 (none) or ")]
+ArmMass = Annotated[Number, magnitudes.within(magnitudes.LIGHTEST, magnitudes.HEAVIEST, "kg", "0 (massless) or ")]
+Stiffness = Annotated[Number, magnitudes.within(magnitudes.SOFTEST, magnitudes.STIFFEST, "N/m", "0 (none) or ")]
 
 
 class OperatorSection(Section):
     """Five numbers: a mass on a spring and a damper to the ground, held to the handle by another such pair."""
 
-    name: Text | None = quantity("what to call it; omitted: as given", default=None)
-    description: str = quantity("one line on whose arm and which grasp it is", default="")
-    source: str = quantity("one line on where the numbers come from", default="")
-    arm_mass_kg: ArmMass = quantity("mass of hand and arm; 0 only with a rigid grasp", "kg", ge=0)
-    arm_stiffness_N_per_m: Stiffness = quantity("stiffness of the arm to the ground", "N/m", ge=0, default=0.0)
-    arm_damping_Ns_per_m: Damper = quantity("damping of the arm to the ground", "N s/m", ge=0, default=0.0)
-    grasp_stiffness_N_per_m: Stiffness | None = quantity(
+    name: Text | None = documented_key("what to call it; omitted: as given", default=None)
+    description: str = documented_key("one line on whose arm and which grasp it is", default="")
+    source: str = documented_key("one line on where the numbers come from", default="")
+    arm_mass_kg: ArmMass = documented_key("mass of hand and arm; 0 only with a rigid grasp", "kg", ge=0)
+    arm_stiffness_N_per_m: Stiffness = documented_key(
+        "stiffness of the arm to the ground", "N/m", ge=0, default=0.0
+    )
+    arm_damping_Ns_per_m: Damper = documented_key("damping of the arm to the ground", "N s/m", ge=0, default=0.0)
+    grasp_stiffness_N_per_m: Stiffness | None = documented_key(
         'stiffness of the grasp, from arm to handle; or grasp = "rigid"', "N/m", ge=0, default=None
     )
-    grasp_damping_Ns_per_m: Damper | None = quantity(
+    grasp_damping_Ns_per_m: Damper | None = documented_key(
         "damping of the grasp, beside its stiffness; omitted: none", "N s/m", ge=0, default=None
     )
-    grasp: Literal["rigid"] | None = quantity(
+    grasp: Literal["rigid"] | None = documented_key(
         '"rigid": mass, spring and damper of the arm act on the handle itself', default=None
     )

@@ -6,29 +6,29 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Strict, Tag, ValidationInfo, field_validator, model_validator
 
-from zwidth.device.schema.numbers import Number, Section, WholeNumber, quantity
+from zwidth.device.schema.value_types import Number, Section, WholeNumber, documented_key
 from zwidth.loop.estimators import METHODS
 
 HIGHEST_DEGREE: Final = 10  # of a Savitzky-Golay polynomial
 HIGHEST_ORDER: Final = 20  # of a Butterworth filter; each adds a state to the loop
 LONGEST_WINDOW: Final = 100  # samples; each adds a state to the loop, and a chart with more takes minutes
-DEFAULT: Final = "backward-difference"
+DEFAULT_METHOD: Final = "backward-difference"
 
 
 class FirstOrderFilter(Section):
     """First-order low pass by backward Euler, a = tau / (tau + T)."""
 
-    type: Literal["first-order"] = quantity('kind of filter: "first-order" or "butterworth"')
-    time_constant_s: Number = quantity("time constant tau; 0: no filter", "s", ge=0)
+    type: Literal["first-order"] = documented_key('kind of filter: "first-order" or "butterworth"')
+    time_constant_s: Number = documented_key("time constant tau; 0: no filter", "s", ge=0)
 
 
 class ButterworthFilter(Section):
     """Butterworth low pass by the bilinear (Tustin) rule."""
 
-    type: Literal["butterworth"] = quantity('kind of filter: "first-order" or "butterworth"')
-    order: WholeNumber = quantity("order, a whole number from 1 to 20", ge=1, le=HIGHEST_ORDER)
-    cutoff_Hz: Number = quantity("cutoff frequency, below half the sampling frequency", "Hz", gt=0)
-    discretisation: Literal["tustin", "tustin-prewarped"] = quantity(
+    type: Literal["butterworth"] = documented_key('kind of filter: "first-order" or "butterworth"')
+    order: WholeNumber = documented_key("order, a whole number from 1 to 20", ge=1, le=HIGHEST_ORDER)
+    cutoff_Hz: Number = documented_key("cutoff frequency, below half the sampling frequency", "Hz", gt=0)
+    discretisation: Literal["tustin", "tustin-prewarped"] = documented_key(
         "bilinear rule, plain or prewarped at the cutoff", default="tustin"
     )
 
@@ -50,7 +50,7 @@ class _Method(Section):
     """What every method has; two parameters that do not fit each other are told by the estimator itself."""
 
     method: str
-    filter: LowPass | None = quantity("low pass on the velocity; omitted: none", default=None)
+    filter: LowPass | None = documented_key("low pass on the velocity; omitted: none", default=None)
 
     @model_validator(mode="after")
     def _can_be_built(self) -> Self:
@@ -69,38 +69,38 @@ class _Method(Section):
 class BackwardDifferenceSection(_Method):
     """(x_j - x_{j-1}) / T"""
 
-    method: Literal["backward-difference"] = quantity(_METHOD, default=DEFAULT)
+    method: Literal["backward-difference"] = documented_key(_METHOD, default=DEFAULT_METHOD)
 
 
 class WindowedDifferenceSection(_Method):
     """(x_j - x_{j-n}) / (n T)"""
 
-    method: Literal["windowed-difference"] = quantity(_METHOD)
-    samples: WholeNumber = quantity(_SAMPLES, "1", ge=1, le=LONGEST_WINDOW)
+    method: Literal["windowed-difference"] = documented_key(_METHOD)
+    samples: WholeNumber = documented_key(_SAMPLES, "1", ge=1, le=LONGEST_WINDOW)
 
 
 class LeastSquaresSlopeSection(_Method):
     """Slope of the line through the newest n positions."""
 
-    method: Literal["least-squares-slope"] = quantity(_METHOD)
-    samples: WholeNumber = quantity(_SAMPLES, "1", ge=2, le=LONGEST_WINDOW)
+    method: Literal["least-squares-slope"] = documented_key(_METHOD)
+    samples: WholeNumber = documented_key(_SAMPLES, "1", ge=2, le=LONGEST_WINDOW)
 
 
 class CentralDifferenceSection(_Method):
     """(x_j - x_{j-2}) / (2 T)"""
 
-    method: Literal["central-difference"] = quantity(_METHOD)
+    method: Literal["central-difference"] = documented_key(_METHOD)
 
 
 class SavitzkyGolaySection(_Method):
     """Slope of the polynomial through the newest n positions."""
 
-    method: Literal["savitzky-golay"] = quantity(_METHOD)
-    samples: WholeNumber = quantity(_SAMPLES, "1", ge=2, le=LONGEST_WINDOW)
-    order: WholeNumber = quantity(
+    method: Literal["savitzky-golay"] = documented_key(_METHOD)
+    samples: WholeNumber = documented_key(_SAMPLES, "1", ge=2, le=LONGEST_WINDOW)
+    order: WholeNumber = documented_key(
         '"savitzky-golay": degree of the polynomial, a whole number from 1 to 10', "1", ge=1, le=HIGHEST_DEGREE
     )
-    centred: Annotated[bool, Strict()] = quantity(
+    centred: Annotated[bool, Strict()] = documented_key(
         '"savitzky-golay": true for the slope in the middle of the window instead of at its newest position',
         default=False,
     )
@@ -119,9 +119,11 @@ class SavitzkyGolaySection(_Method):
 class AlphaBetaSection(_Method):
     """A tracker that corrects its position and velocity by shares of its error."""
 
-    method: Literal["alpha-beta"] = quantity(_METHOD)
-    alpha: Number = quantity('"alpha-beta": share of the error given to the position, below 2', "1", gt=0, lt=2)
-    beta: Number = quantity(
+    method: Literal["alpha-beta"] = documented_key(_METHOD)
+    alpha: Number = documented_key(
+        '"alpha-beta": share of the error given to the position, below 2', "1", gt=0, lt=2
+    )
+    beta: Number = documented_key(
         '"alpha-beta": share of the error given, over T, to the velocity, below 4 - 2 alpha', "1", gt=0, lt=4
     )
 
@@ -129,20 +131,20 @@ class AlphaBetaSection(_Method):
 class KalmanSection(_Method):
     """The alpha-beta filter with the gains that two noise figures call for."""
 
-    method: Literal["kalman"] = quantity(_METHOD)
-    acceleration_noise_m_per_s2: Number = quantity(
+    method: Literal["kalman"] = documented_key(_METHOD)
+    acceleration_noise_m_per_s2: Number = documented_key(
         '"kalman": standard deviation of the accelerations to expect', "m/s^2", gt=0
     )
-    position_noise_m: Number | None = quantity(_NOISE, "m", gt=0, default=None)
+    position_noise_m: Number | None = documented_key(_NOISE, "m", gt=0, default=None)
 
 
 class FoawSection(_Method):
     """Slope of the longest window that a line fits within the noise; it has no chart."""
 
-    method: Literal["foaw"] = quantity(_METHOD)
-    samples: WholeNumber = quantity(_SAMPLES, "1", ge=1, le=LONGEST_WINDOW)
-    position_noise_m: Number | None = quantity(_NOISE, "m", gt=0, default=None)
-    fit: Literal["end-fit", "best-fit"] = quantity(
+    method: Literal["foaw"] = documented_key(_METHOD)
+    samples: WholeNumber = documented_key(_SAMPLES, "1", ge=1, le=LONGEST_WINDOW)
+    position_noise_m: Number | None = documented_key(_NOISE, "m", gt=0, default=None)
+    fit: Literal["end-fit", "best-fit"] = documented_key(
         '"foaw": "end-fit", the line through the ends of the window, or "best-fit", the least-squares line',
         default="end-fit",
     )
@@ -151,12 +153,16 @@ class FoawSection(_Method):
 class LevantSection(_Method):
     """The tracker that is exact for accelerations up to a bound; it has no chart."""
 
-    method: Literal["levant"] = quantity(_METHOD)
-    acceleration_max_m_per_s2: Number = quantity('"levant": largest acceleration to expect', "m/s^2", gt=0)
+    method: Literal["levant"] = documented_key(_METHOD)
+    acceleration_max_m_per_s2: Number = documented_key('"levant": largest acceleration to expect', "m/s^2", gt=0)
 
 
 def _method(table: Any) -> Any:
-    method = table.get("method", DEFAULT) if isinstance(table, dict) else getattr(table, "method", DEFAULT)
+    method = (
+        table.get("method", DEFAULT_METHOD)
+        if isinstance(table, dict)
+        else getattr(table, "method", DEFAULT_METHOD)
+    )
     return method if isinstance(method, str) else None
 
 

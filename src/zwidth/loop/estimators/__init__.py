@@ -2,10 +2,10 @@
 
 Every linear method has `estimator(period)`, its factors at a sampling period; `delay(period)`, how late it is at
 low frequencies; and `noise_gain(period)`, how much of the position's white noise it passes. None takes or keeps a
-unit but metres and seconds. Their frequency responses are in `zwidth.loop.estimators.response`.
+unit but metres and seconds. Their frequency responses are in `zwidth.loop.estimators.frequency_response`.
 
 Two methods are not linear, `Foaw` and `Levant`: they have no w(z), `estimator` raises NonlinearError, and a loop
-with them is simulated instead. `zwidth.loop.estimators.running` runs any method over recorded positions.
+with them is simulated instead. `zwidth.loop.estimators.run_estimator` runs any method over recorded positions.
 """
 
 from zwidth.loop.estimators.alpha_beta import AlphaBeta

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.estimator import Estimator, NonlinearError
-from zwidth.loop.estimators.bounds import check_period, check_positive, check_whole
+from zwidth.loop.estimators.parameter_checks import check_period, check_positive, check_whole
 
 Floats = NDArray[np.float64]
 Fit = Literal["end-fit", "best-fit"]
@@ -17,7 +17,7 @@ Fit = Literal["end-fit", "best-fit"]
 # Longest window in periods: a best fit over n looks at n^2/2 distances in every sample.
 LONGEST_WINDOW = 100
 # Share of the noise bound left for rounding: counts often lie on the bound itself, half a step from the line.
-ROOM = 1e-9
+ROUNDING_MARGIN = 1e-9
 # Where the memory holds the number of readings, the first of them, and the newest ones in a ring; the ring stands
 # there twice, so that every window is one stretch of it.
 COUNT, ORIGIN, RING = 0, 1, 2
@@ -50,7 +50,7 @@ class Foaw:
     Raises          ValueError      otherwise
                     NonlinearError  from `estimator`: it has no w(z)
 
-    >>> from zwidth.loop.estimators.running import velocity_of
+    >>> from zwidth.loop.estimators.run_estimator import velocity_of
     >>> (velocity_of(Foaw(4, 0.5e-6), [0.0, 0.0, 1e-6, 1e-6, 2e-6, 2e-6], 0.001) * 1e3).round(3)
     array([0.   , 0.   , 0.5  , 0.333, 0.5  , 0.5  ])
     """

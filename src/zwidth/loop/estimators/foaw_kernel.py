@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.compiled import compiled
-from zwidth.loop.estimators.foaw import COUNT, ORIGIN, RING, ROOM
+from zwidth.loop.estimators.foaw import COUNT, ORIGIN, RING, ROUNDING_MARGIN
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ def foaw_estimate(memory: Floats, parameters: Floats, reading: float, period: fl
     period      T [s]
     Returns     [m/s]; 0 at the first reading, over the readings there are as long as they are fewer than N + 1
     """
-    longest, band = int(parameters[0]), parameters[1] * (1.0 + ROOM)
+    longest, band = int(parameters[0]), parameters[1] * (1.0 + ROUNDING_MARGIN)
     count = int(memory[COUNT])
     if count == 0:
         memory[ORIGIN] = reading

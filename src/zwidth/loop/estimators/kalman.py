@@ -7,7 +7,7 @@ from math import sqrt
 
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators.alpha_beta import AlphaBeta
-from zwidth.loop.estimators.bounds import check_period, check_positive, quantisation_noise
+from zwidth.loop.estimators.parameter_checks import check_period, check_positive, quantisation_noise
 
 # Tracking indices that make a usable filter. Below, it is late by eight hundred samples and more; above, it is the
 # trapezoidal rule but for rounding, and never stops ringing.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.estimator import Estimator, NonlinearError
-from zwidth.loop.estimators.bounds import check_period, check_positive
+from zwidth.loop.estimators.parameter_checks import check_period, check_positive
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Levant:
     Raises            ValueError      unless it is positive and finite
                       NonlinearError  from `estimator`: it has no w(z)
 
-    >>> from zwidth.loop.estimators.running import velocity_of
+    >>> from zwidth.loop.estimators.run_estimator import velocity_of
     >>> velocity_of(Levant(50.0), [0.0, 1e-4, 2e-4, 3e-4, 4e-4, 5e-4], 0.001).round(4)
     array([0.   , 0.055, 0.11 , 0.1  , 0.1  , 0.1  ])
     """

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.estimator import Estimator
-from zwidth.loop.estimators.bounds import LONGEST, check_whole
+from zwidth.loop.estimators.parameter_checks import LONGEST, check_whole
 from zwidth.loop.estimators.window import mean_difference
 
 Floats = NDArray[np.float64]

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.estimator import Estimator
-from zwidth.loop.estimators.bounds import check_period
+from zwidth.loop.estimators.parameter_checks import check_period
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from math import sqrt
 import numpy as np
 
 from zwidth.loop.estimator import Estimator
-from zwidth.loop.estimators.bounds import LONGEST, check_whole
+from zwidth.loop.estimators.parameter_checks import LONGEST, check_whole
 from zwidth.loop.estimators.window import mean_difference
 
 

@@ -10,35 +10,35 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from zwidth.conditions.assumptions import AT_ONCE, RIGID, SPRUNG, WHOLE
+from zwidth.conditions.assumptions import RIGID, SPRUNG, UNDELAYED, WHOLE_DELAY
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.bindings.common import computer, meets, reads_motors
-from zwidth.measures.evaluate import measured
+from zwidth.measures.bindings.preconditions import loop_case, require_assumptions, require_motor_encoders
+from zwidth.measures.definition import MeasureError, MeasureValues
+from zwidth.measures.evaluate import with_status
 from zwidth.measures.impedance_range import ImpedanceRange, rigid_range, sprung_range
-from zwidth.measures.measure import Measured, MeasureError
 
 _NONE = "no wall of positive stiffness is stable, or the mass or the spring of the model is not there"
 
 
-def stiffness_max_closed_form(point: OperatingPoint) -> Measured:
+def stiffness_max_closed_form(point: OperatingPoint) -> MeasureValues:
     """Thesis eq. 5.4, 5.6 and 5.7."""
-    return measured(point, _range(point).stiffness_max, _NONE)
+    return with_status(point, _range(point).stiffness_max, _NONE)
 
 
-def damping_max_closed_form(point: OperatingPoint) -> Measured:
+def damping_max_closed_form(point: OperatingPoint) -> MeasureValues:
     """Thesis eq. 5.4, 5.6 and 5.7, for stiffnesses near 0."""
-    return measured(point, _range(point).damping_max, _NONE)
+    return with_status(point, _range(point).damping_max, _NONE)
 
 
-def stable_area_closed_form(point: OperatingPoint) -> Measured:
+def stable_area_closed_form(point: OperatingPoint) -> MeasureValues:
     """Thesis eq. 5.5 and 5.8."""
-    return measured(point, _range(point).stable_area, _NONE)
+    return with_status(point, _range(point).stable_area, _NONE)
 
 
 def _range(point: OperatingPoint) -> ImpedanceRange:
     if point.operator is not None and point.model != "motor-mass":
         raise MeasureError("has a closed form for the device alone", [("operator", "none")])
-    case = computer(point)
+    case = loop_case(point)
     T, late = point.controller.sampling_period, point.controller.whole_delay
     mass: ArrayLike
     motor: ArrayLike
@@ -50,11 +50,11 @@ def _range(point: OperatingPoint) -> ImpedanceRange:
         numbers, rigid, sprung = point.effective, point.model == "rigid", point.model == "motor-mass"
         mass, motor, stiffness = numbers.rigid_mass, numbers.motor_side_mass, numbers.stiffness
     if rigid:
-        meets(case, WHOLE)
+        require_assumptions(case, WHOLE_DELAY)
         return rigid_range(mass, T, late)
     if sprung:
-        reads_motors(point)
-        meets(case, AT_ONCE)
+        require_motor_encoders(point)
+        require_assumptions(case, UNDELAYED)
         return sprung_range(motor, stiffness, T)
     models = [("model", "rigid"), ("model", "motor-mass")]
     raise MeasureError("has a closed form for two models only", models, True)

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from zwidth.conditions.dry import ground_friction, reading_step
+from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures import forces
-from zwidth.measures.measure import MeasureError
+from zwidth.measures.definition import MeasureError
 from zwidth.model.mechanism import Floats
 
 
@@ -33,10 +33,10 @@ def acceleration_max(point: OperatingPoint) -> Floats:
 def position_resolution(point: OperatingPoint) -> Floats:
     """Step of the reading along the rendered direction when all encoders step; of a [plant] its sensor's."""
     if point.given_plant is not None:
-        return _told(
+        return _require_nonzero(
             reading_step(point.given_plant), "needs the step of the encoder; give loop.encoder.resolution_m"
         )
-    counts = _all_told(point, "encoder_counts_per_rev", point.drives.encoder_counts)
+    counts = _require_finite(point, "encoder_counts_per_rev", point.drives.encoder_counts)
     return forces.resolution_along(
         point.jacobian, point.direction, 2.0 * np.pi / (counts * point.drives.transmission)
     )
@@ -45,7 +45,7 @@ def position_resolution(point: OperatingPoint) -> Floats:
 def friction_force(point: OperatingPoint) -> Floats:
     """Dry friction of all drives felt along the rendered direction; of a [plant] where the wall acts."""
     if point.given_plant is not None:
-        return _told(ground_friction(point.given_plant), "needs dry friction; give friction.coulomb_N")
+        return _require_nonzero(ground_friction(point.given_plant), "needs dry friction; give friction.coulomb_N")
     dry = point.drives.nonlinearity
     if dry is None or not np.any(dry.coulomb > 0.0):
         raise MeasureError(f"needs dry friction; give {_key(point, 0, 'coulomb_Nm')}, or that of another drive")
@@ -57,18 +57,18 @@ def _torques(point: OperatingPoint, key: str) -> Floats:
     drives = point.drives
     found = drives.torque_limit if key == "torque_limit_Nm" else drives.continuous_torque
     given = np.full(len(drives.names), np.nan) if found is None else found
-    return np.asarray(drives.transmission * _all_told(point, key, given))
+    return np.asarray(drives.transmission * _require_finite(point, key, given))
 
 
-def _all_told(point: OperatingPoint, key: str, values: Floats) -> Floats:
-    untold = ~np.isfinite(values)
-    if untold.any():
-        first = int(np.argwhere(untold)[0][-1])
+def _require_finite(point: OperatingPoint, key: str, values: Floats) -> Floats:
+    missing = ~np.isfinite(values)
+    if missing.any():
+        first = int(np.argwhere(missing)[0][-1])
         raise MeasureError(f"needs a finite {key} of every drive; give {_key(point, first, key)}")
     return values
 
 
-def _told(value: float, otherwise: str) -> Floats:
+def _require_nonzero(value: float, otherwise: str) -> Floats:
     """A number of a [plant]; what is 0 there was left out, or might as well have been."""
     if value == 0.0:
         raise MeasureError(otherwise)

@@ -5,37 +5,37 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.chart.chart import largest_stiffness, stability_chart
-from zwidth.chart.stiffest_batch import FOUND, Stiffest, stiffest_walls
-from zwidth.loop.evaluate import computer_factors
-from zwidth.loop.modal_rows import modal_rows
+from zwidth.chart.stiffest_batch import FOUND, StiffestWalls, stiffest_walls
+from zwidth.loop.factor_kernels import computer_factors
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.evaluate import answered, one_by_one, reasons
-from zwidth.measures.measure import OK, Measured, NoValueError
+from zwidth.loop.sections_batch import modal_rows_batch
+from zwidth.measures.definition import OK, MeasureValues, NoValueError
+from zwidth.measures.evaluate import evaluate_pointwise, evaluate_safely, notes_of_points
 from zwidth.model.rendered_modes import rendered_modes
 
 NO_WALL = "no wall with K > 0 and B >= 0 is stable"
 
 
-def stiffness_max(point: OperatingPoint) -> Measured:
+def stiffness_max(point: OperatingPoint) -> MeasureValues:
     """Supremum of K over the stable walls with K > 0, B >= 0, of the point's model and loop [N/m].
 
     Postures of classically damped mechanisms go through compiled code together (`chart.stiffest_batch`); what is
     in doubt there, and what has no wall there, is asked by itself, as every other device is.
     """
-    fast = _together(point)
+    fast = _stiffest_walls_of(point)
     if fast is None:
-        return one_by_one(_largest, point)
+        return evaluate_pointwise(_stiffness_max_at, point)
     values, status = fast.stiffness.reshape(point.shape), point.status.copy()
     why = {}
     for index in np.argwhere((status == OK) & (fast.status.reshape(point.shape) != FOUND)):
         at = tuple(int(i) for i in index)
-        values[at], status[at], reason = answered(lambda: _largest(point[at]))  # noqa: B023
+        values[at], status[at], reason = evaluate_safely(lambda: _stiffness_max_at(point[at]))  # noqa: B023
         if reason:
             why[at] = (int(status[at]), reason)
-    return Measured(np.where(status == OK, values, np.nan), status, reasons(why))
+    return MeasureValues(np.where(status == OK, values, np.nan), status, notes_of_points(why))
 
 
-def _together(point: OperatingPoint) -> Stiffest | None:
+def _stiffest_walls_of(point: OperatingPoint) -> StiffestWalls | None:
     """The stiffest walls of all points, flat; None for what has no modes that compiled code knows."""
     controller = point.controller
     if point.mechanism is None or point.posture is None or controller.actuator_time_constant > 0.0:
@@ -46,10 +46,10 @@ def _together(point: OperatingPoint) -> Stiffest | None:
     modes = rendered_modes(point.mechanism, point.posture, point.direction, model, point.damping, point.encoders)
     if modes is None:
         return None
-    return stiffest_walls(computer_factors(controller), *modal_rows(modes, controller))
+    return stiffest_walls(computer_factors(controller), *modal_rows_batch(modes, controller))
 
 
-def _largest(point: OperatingPoint) -> float:
+def _stiffness_max_at(point: OperatingPoint) -> float:
     peak = largest_stiffness(point.loop)
     if peak is None:
         raise NoValueError(NO_WALL)

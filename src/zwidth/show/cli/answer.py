@@ -47,7 +47,7 @@ def put(text: str) -> None:
     sys.stdout.flush()
 
 
-def sheet(rows: Sequence[Row]) -> Any:
+def two_columns(rows: Sequence[Row]) -> Any:
     """Labels and values in two columns."""
     from rich.table import Table
     from rich.text import Text

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import sheet, table
-from zwidth.show.cli.command import Case, Command
+from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite
 from zwidth.show.units import amount, number, typed
 
@@ -32,7 +32,7 @@ LACKED: Final = {
 }
 
 
-class Bounds(Command):
+class BoundsCommand(Command):
     """Compare published conditions on DEVICE with the exact answer, and say which assumptions it does not meet."""
 
     name = "bounds"
@@ -58,13 +58,13 @@ class Bounds(Command):
         "exact_damping_at_largest_Ns_per_m",
     )
     size = (5.6, 4.6)
-    decides = True
+    may_be_undecided = True
 
-    def compute(self, case: Case) -> BoundsComparison:
+    def compute(self, case: CommandLine) -> BoundsComparison:
         return case.point.bounds(case["damping"])
 
-    def pages(self, case: Case, result: BoundsComparison, document: Mapping[str, Any]) -> Iterator[Any]:
-        yield sheet(list(_exact(result)))
+    def pages(self, case: CommandLine, result: BoundsComparison, document: Mapping[str, Any]) -> Iterator[Any]:
+        yield two_columns(list(_exact(result)))
         speaking = [bound for bound in result.bounds if not bound.lacking]
         # the assumptions not met, in the order in which they come up, numbered from 1
         unmet = list(dict.fromkeys(sentence for bound in speaking for sentence in bound.violated))
@@ -79,28 +79,28 @@ class Bounds(Command):
         yield table(headings, [_row(result, bound, unmet) for bound in speaking])
         if unmet:
             yield "not met here:"
-            yield sheet([(f"{n}", sentence) for n, sentence in enumerate(unmet, start=1)])
+            yield two_columns([(f"{n}", sentence) for n, sentence in enumerate(unmet, start=1)])
         silent = [(bound.name, _needs(bound)) for bound in result.bounds if bound.lacking]
         if silent:
             yield "not asked, for the device lacks what they take:"
-            yield sheet(silent)
+            yield two_columns(silent)
 
 
-def _exact(found: BoundsComparison) -> Iterator[tuple[str, str]]:
-    if found.chart is None:
-        yield "exact", f"undecided: {found.undecided}"
+def _exact(comparison: BoundsComparison) -> Iterator[tuple[str, str]]:
+    if comparison.chart is None:
+        yield "exact", f"undecided: {comparison.undecided}"
         return
-    yield f"exact, at {amount(found.damping, 'Ns/m')}", _stiffness(found.exact)
-    at = f" at {amount(found.damping_at_largest, 'Ns/m')}" if found.largest > 0.0 else ""
-    yield "exact, largest", _stiffness(found.largest) + at
+    yield f"exact, at {amount(comparison.damping, 'Ns/m')}", _stiffness(comparison.exact)
+    at = f" at {amount(comparison.damping_at_largest, 'Ns/m')}" if comparison.largest > 0.0 else ""
+    yield "exact, largest", _stiffness(comparison.largest) + at
 
 
-def _row(found: BoundsComparison, bound: Bound, unmet: list[str]) -> tuple[str, ...]:
-    ratio = found.ratio(bound)
+def _row(comparison: BoundsComparison, bound: Bound, unmet: list[str]) -> tuple[str, ...]:
+    ratio = comparison.ratio(bound)
     return (
         bound.name,
         f"{bound.kind}, {bound.claim}",
-        _stiffness(found.stiffness_max(bound)),
+        _stiffness(comparison.stiffness_max(bound)),
         "-" if ratio != ratio else typed(number(ratio)),
         _stiffness(bound.stiffness_max),
         " ".join(str(unmet.index(sentence) + 1) for sentence in bound.violated) or "-",

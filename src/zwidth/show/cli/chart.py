@@ -7,26 +7,33 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import sheet
-from zwidth.show.cli.command import Case, Command
+from zwidth.loop.motion_names import group_names
+from zwidth.show.cli.answer import two_columns
+from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.measured import OPEN, measured_rows, warning
 from zwidth.show.cli.options import Numbers
-from zwidth.show.motions import counted
-from zwidth.show.units import amount, radius, vector
+from zwidth.show.units import amount, percent, radius, typed, vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from zwidth.chart.chart_base import Chart
     from zwidth.chart.decay import FastestDecay
-    from zwidth.chart.result import Chart
+    from zwidth.chart.measured.chart import MeasuredChart
+    from zwidth.chart.measured.usable_frequencies import UnusableRange
 
 NO_WALL: Final = "no stable wall has K > 0 and B >= 0"
+SHOWN_STRETCHES: Final = 6  # stretches named on a terminal
+MOST_UNMEASURED: Final = 0.1  # of the frequencies up to half the sampling rate, before the heading says so
+OPEN_EDGE: Final = (
+    "the measured edge does not close round the stable walls: frequencies are missing; measure up to half the "
+    "sampling rate"
+)
 
 Window = tuple[float, float, float, float]
 
 
-def _ordered(ctx: click.Context, param: click.Parameter, window: Window | None) -> Window | None:
+def _check_window(ctx: click.Context, param: click.Parameter, window: Window | None) -> Window | None:
     if window and not (window[0] < window[1] and window[2] < window[3]):
         raise click.BadParameter("needs KMIN < KMAX and BMIN < BMAX, such as 0,8000,0,30")
     return window
@@ -45,7 +52,7 @@ class ChartCommand(Command):
         click.option(
             "--window",
             type=Numbers("KMIN,KMAX,BMIN,BMAX", (4,), "0,8000,0,30"),
-            callback=_ordered,
+            callback=_check_window,
             help="Part of the chart that a figure shows; results are never clipped.",
         ),
         click.option(
@@ -70,13 +77,13 @@ class ChartCommand(Command):
         "fastest_decay_in_first_quadrant",
         "unobserved_modes",
     )
-    decides = True
-    of_responses = True
+    may_be_undecided = True
+    takes_responses = True
 
-    def asked(self, case: Case) -> dict[str, Any]:
+    def repeated_options(self, case: CommandLine) -> dict[str, Any]:
         return {"directions": _directions(case)} if case["others"] else {}
 
-    def compute(self, case: Case) -> Chart:
+    def compute(self, case: CommandLine) -> Chart:
         question, device = case.question, case.device
         if not case["others"]:
             return case.point.chart()
@@ -84,22 +91,22 @@ class ChartCommand(Command):
             raise BadInput(
                 f"{question.name}: has no [mechanism], and so one direction only; leave out --with-direction"
             )
-        question.of_several_directions(device)
+        question.refuse_unsupported(device)
         circumstances = {"assembly": question.assembly, "model": question.model}
         return device.at(question.at, directions=_directions(case), **circumstances).chart()
 
-    def document(self, case: Case, result: Chart) -> dict[str, Any]:
+    def document(self, case: CommandLine, result: Chart) -> dict[str, Any]:
         from zwidth.chart.measured.chart import MeasuredChart
 
-        told = {"warning": warning(result)} if isinstance(result, MeasuredChart) else {}
+        told = {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
         return result.document() | told
 
-    def reason(self, case: Case, result: Chart) -> str | None:
+    def reason(self, case: CommandLine, result: Chart) -> str | None:
         if result.stiffness_max == result.stiffness_max:
             return None
-        return OPEN if getattr(result, "open", False) else NO_WALL
+        return OPEN_EDGE if getattr(result, "open", False) else NO_WALL
 
-    def pages(self, case: Case, result: Chart, document: Mapping[str, Any]) -> Iterator[Any]:
+    def pages(self, case: CommandLine, result: Chart, document: Mapping[str, Any]) -> Iterator[Any]:
         if document.get("warning"):
             yield f"warning: {document['warning']}"
         from zwidth.chart.measured.chart import MeasuredChart
@@ -107,9 +114,9 @@ class ChartCommand(Command):
         together = " and ".join(map(vector, document.get("directions", ())))
         first = [("under one law", together)] if together else []
         last = measured_rows(result) if isinstance(result, MeasuredChart) else ()
-        yield sheet([*first, *_rows(result), *last])
+        yield two_columns([*first, *_rows(result), *last])
 
-    def draw(self, case: Case, result: Chart) -> Figure:
+    def draw(self, case: CommandLine, result: Chart) -> Figure:
         from zwidth.show.figures.plots import draw_any_chart
         from zwidth.show.figures.style import figure
 
@@ -118,7 +125,7 @@ class ChartCommand(Command):
         return drawing
 
 
-def _directions(case: Case) -> list[Any]:
+def _directions(case: CommandLine) -> list[Any]:
     """All directions rendered together, the first of them that of every question."""
     return [case.device.direction(direction) for direction in (case.question.direction, *case["others"])]
 
@@ -134,7 +141,7 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
         from zwidth.chart.chart import StabilityChart
         from zwidth.loop.unobserved_instability import unobserved_instability
 
-        names = ", ".join(counted(chart.unobserved_modes))
+        names = ", ".join(group_names(chart.unobserved_modes))
         warned = "; WARNING: so that the device runs away, whatever the wall"
         # several directions are those of a mechanism, whose springs and dampers feed no motion
         runs_away = isinstance(chart, StabilityChart) and unobserved_instability(chart.loop)
@@ -166,3 +173,38 @@ def _stiffest(chart: Chart) -> str:
         f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "
         f"there it vibrates at {frequencies}"
     )
+
+
+def unmeasured_warning(chart: MeasuredChart) -> str | None:
+    """What a response cut short leaves unseen; None where it reaches nearly up to half the sampling rate."""
+    share, half = chart.measured_up_to_share, 0.5 / chart.loop.period
+    if share >= 1.0 - MOST_UNMEASURED:
+        return None
+    return (
+        f"measured up to {amount(share * half, 'Hz')}, {typed(percent(share))} of half the sampling rate "
+        f"({amount(half, 'Hz')}); "
+        "walls that fail above are not seen"
+    )
+
+
+def measured_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
+    """Rows for people on a chart by a frequency response, below those of every chart."""
+    if chart.band is not None:
+        low, high = amount(chart.band.stiffness_low, "N/m"), amount(chart.band.stiffness_high, "N/m")
+        yield "largest stiffness from", f"{low} to {high} within {chart.band.meaning}"
+    if chart.stiffness_max_of_sweeps:
+        yield "in the single sweeps", ", ".join(amount(K, "N/m") for K in chart.stiffness_max_of_sweeps)
+    response = chart.loop.response
+    used, given = len(chart.loop.angles), len(response.frequency)
+    measured = f"{used} of {given} frequencies used, {chart.integrators} integrators"
+    yield "response", f"{measured}; {response.note}" if response.note else measured
+    for stretch in chart.unusable[:SHOWN_STRETCHES]:
+        yield "not to be relied on", stretch_text(stretch)
+    if len(chart.unusable) > SHOWN_STRETCHES:
+        yield "", f"and {len(chart.unusable) - SHOWN_STRETCHES} more stretches; --json holds them all"
+
+
+def stretch_text(stretch: UnusableRange) -> str:
+    """A stretch in words."""
+    where = "; the edge of the stable walls runs through it" if stretch.on_edge else ""
+    return f"{amount(stretch.low, 'Hz')} to {amount(stretch.high, 'Hz')}: {stretch.reason}{where}"

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli.answer import table
-from zwidth.show.cli.command import Case, Command
-from zwidth.show.cli.options import Finite, named
+from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.cli.options import Finite, refuse_empty
 from zwidth.show.output import DATA
 from zwidth.show.units import NONE, amount, radius
 from zwidth.study.points_file import Walls, read_walls
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SHOWN: Final = 200  # rows printed for people; --json and --output hold all
 
 
-class Check(Command):
+class CheckCommand(Command):
     """Say of each wall whether DEVICE renders it stably, by the eigenvalues of the loop."""
 
     name = "check"
@@ -33,7 +33,7 @@ class Check(Command):
         click.option(
             "--points",
             metavar="FILE.csv",
-            callback=named,
+            callback=refuse_empty,
             help="Walls: columns stiffness_N_per_m, damping_Ns_per_m.",
         ),
         click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of one wall [N/m]."),
@@ -42,16 +42,16 @@ class Check(Command):
     outputs = DATA
     output_help = "Write the verdicts (.csv .json)."
     keys = ("points",)
-    of_responses = True
+    takes_responses = True
 
-    def parse(self, case: Case) -> dict[str, Any]:
+    def parse(self, case: CommandLine) -> dict[str, Any]:
         return {"walls": _walls(case["points"], case["stiffness"], case["damping"])}
 
-    def compute(self, case: Case) -> WallVerdicts:
+    def compute(self, case: CommandLine) -> WallVerdicts:
         stiffness, damping = zip(*case["walls"], strict=True)
         return case.point.check(stiffness, damping)
 
-    def pages(self, case: Case, result: WallVerdicts, document: Mapping[str, Any]) -> Iterator[Any]:
+    def pages(self, case: CommandLine, result: WallVerdicts, document: Mapping[str, Any]) -> Iterator[Any]:
         points = document["points"]
         rows = [
             (

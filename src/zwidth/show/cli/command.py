@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import click
 
 from zwidth.show.cli.answer import Answer, deliver
-from zwidth.show.cli.failures import NoAnswer, computing
+from zwidth.show.cli.errors import NoAnswer, translate_errors
+from zwidth.show.cli.first_use import announce_compiling
 from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.output import DATA, FIGURES, destination, write_data
@@ -35,7 +36,7 @@ NO_MODEL: Final = (
 
 
 @dataclass
-class Case:
+class CommandLine:
     """What one command line asks for.
 
     question  the device and the circumstances that it is asked about, as typed
@@ -70,15 +71,15 @@ class Command:
 
     Its docstring is the command's help.
 
-    name, summary  as typed, and its line in the list of commands
-    examples       command lines
-    options        click's decorators of its own options
-    outputs        endings that --output takes;   output_help  what they are
-    size           of the figure [inches]
-    keys           of its answer, beside the circumstances: null where there is no answer
-    linear         does the answer leave out what is not linear?
-    decides        may double precision leave it undecided? Then the answer has the key `decided`
-    of_responses   does it answer for a measured response, too?
+    name, summary     as typed, and its line in the list of commands
+    examples          command lines
+    options           click's decorators of its own options
+    outputs           endings that --output takes;   output_help  what they are
+    size              of the figure [inches]
+    keys              of its answer, beside the circumstances: null where there is no answer
+    linear            does the answer leave out what is not linear?
+    may_be_undecided  may double precision leave it undecided? Then the answer has the key `decided`
+    takes_responses   does it answer for a measured response, too?
     """
 
     name: ClassVar[str]
@@ -90,8 +91,8 @@ class Command:
     size: ClassVar[tuple[float, float]] = (5.6, 3.9)
     keys: ClassVar[tuple[str, ...]] = ()
     linear: ClassVar[bool] = True
-    decides: ClassVar[bool] = False
-    of_responses: ClassVar[bool] = False
+    may_be_undecided: ClassVar[bool] = False
+    takes_responses: ClassVar[bool] = False
 
     # --- what a command says of itself ----------------------------------------------------------------
 
@@ -99,10 +100,10 @@ class Command:
         """Decorate it with the arguments and options of what it is about, which make its `Question`."""
         return about_a_device(command)
 
-    def check(self, case: Case) -> None:
+    def check(self, case: CommandLine) -> None:
         """Refuse options that do not go together, before anything is loaded. Raises BadInput."""
 
-    def parse(self, case: Case) -> Mapping[str, Any]:
+    def parse(self, case: CommandLine) -> Mapping[str, Any]:
         """Options in the shape that `compute` takes, in place of what was typed: texts taken apart, files read.
 
         Called before anything is loaded. Raises BadInput.
@@ -113,35 +114,35 @@ class Command:
         """The file that is written where none is named; None: none is."""
         return None
 
-    def asked(self, case: Case) -> dict[str, Any]:
+    def repeated_options(self, case: CommandLine) -> dict[str, Any]:
         """What of the options the answer repeats, whether there is an answer or not."""
         return {}
 
-    def compute(self, case: Case) -> Any:
-        """The result. Raises NoAnswer, BadInput, and what the computation raises (see `computing`)."""
+    def compute(self, case: CommandLine) -> Any:
+        """The result. Raises NoAnswer, BadInput, and what the computation raises (see `translate_errors`)."""
         raise NotImplementedError
 
-    def document(self, case: Case, result: Any) -> dict[str, Any]:
+    def document(self, case: CommandLine, result: Any) -> dict[str, Any]:
         """Keys and values of --json, beside the circumstances."""
         return dict(result.document())
 
-    def table(self, case: Case, result: Any, document: Mapping[str, Any]) -> Mapping[str, Sequence[Any]]:
+    def table(self, case: CommandLine, result: Any, document: Mapping[str, Any]) -> Mapping[str, Sequence[Any]]:
         """Columns of a .csv file."""
         return dict(result.table())
 
-    def reason(self, case: Case, result: Any) -> str | None:
+    def reason(self, case: CommandLine, result: Any) -> str | None:
         """Why the result holds no answer; None where it holds one."""
         return None
 
-    def heading(self, case: Case) -> str:
+    def heading(self, case: CommandLine) -> str:
         """The first lines for people: device, posture and computer."""
         return heading(case.question, case.device, linear=self.linear)
 
-    def pages(self, case: Case, result: Any, document: Mapping[str, Any]) -> Iterable[Any]:
+    def pages(self, case: CommandLine, result: Any, document: Mapping[str, Any]) -> Iterable[Any]:
         """The answer for people, below the heading: texts and tables of rich."""
         raise NotImplementedError
 
-    def draw(self, case: Case, result: Any) -> Figure:
+    def draw(self, case: CommandLine, result: Any) -> Figure:
         """The answer as a figure: as the result draws itself."""
         from zwidth.show.figures.plots import drawing_of
         from zwidth.show.figures.style import figure
@@ -150,50 +151,71 @@ class Command:
         drawing_of(result)(ax, result)
         return made
 
-    def write_others(self, case: Case, result: Any) -> dict[str, Path]:
+    def write_others(self, case: CommandLine, result: Any) -> dict[str, Path]:
         """Write the files that options of the command's own name. Returns each by its key of the answer."""
         return {}
 
     # --- what is done for all -------------------------------------------------------------------------
 
-    def circumstances(self, case: Case) -> dict[str, Any]:
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
         """What the answer states first: device, posture, model, computer, and what it leaves out."""
         question = case.question
-        stated = question.facts(case.device) if self.linear else question.circumstances(case.device)
-        return stated | self.asked(case)
+        stated = question.linear_circumstances(case.device) if self.linear else question.circumstances(case.device)
+        return stated | self.repeated_options(case)
 
-    def write(self, case: Case, result: Any, document: dict[str, Any], reason: str | None) -> str | None:
+    def write(self, case: CommandLine, result: Any, document: dict[str, Any], reason: str | None) -> str | None:
         """Write the file, by its ending. Returns why there is no answer, be it that nothing can be written."""
         assert case.path is not None
         if case.writes(DATA):
             stated = document | ({} if reason is None else {"reason": reason})
             write_data(case.path, stated, self.table(case, result, document) if case.writes([".csv"]) else {})
             return reason
+        self.save_figure(case, lambda: self.draw(case, result), case.path, document)
+        return reason
+
+    def save_figure(
+        self, case: CommandLine, draw: Callable[[], Figure], path: Path, document: Mapping[str, Any]
+    ) -> None:
+        """Draw a figure, write below it what it shows, and save it."""
+        from zwidth.show.figures.caption import write_caption
         from zwidth.show.figures.style import context, save
 
         with context():  # whatever settings of matplotlib the user has
-            save(self.draw(case, result), case.path)
-        return reason
+            made = draw()
+            write_caption(made, self.caption(case, document))
+            save(made, path)
 
-    def unanswered(self, case: Case, none: NoAnswer) -> Answer:
+    def caption(self, case: CommandLine, document: Mapping[str, Any]) -> list[str]:
+        """The lines below a figure."""
+        from zwidth.show.figures.caption import caption_of_facts
+
+        return caption_of_facts(self.caption_facts(case, document), case.device.controller)
+
+    def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
+        """What a figure states of itself: the circumstances, and the wall where the answer is about one."""
+        from zwidth.show.figures.caption import wall_of_document
+
+        return self.circumstances(case) | wall_of_document(document)
+
+    def unanswered(self, case: CommandLine, none: NoAnswer) -> Answer:
         """The answer where there is none: every key null, and why."""
-        decided = {"decided": none.decided} if self.decides else {}
+        decided = {"decided": none.decided} if self.may_be_undecided else {}
         return Answer(self.circumstances(case) | dict.fromkeys(self.keys) | decided, reason=str(none))
 
-    def answer(self, case: Case) -> Answer:
+    def answer(self, case: CommandLine) -> Answer:
         """Compute, and write the file that is asked for. Raises BadInput."""
-        if not self.of_responses and case.device.response is not None:
+        if not self.takes_responses and case.device.response is not None:
             case.question.point(case.device)  # refuses what is asked of a [response] that needs a model
             none = self.unanswered(case, NoAnswer(NO_MODEL))
-            return replace(none, document=case.question.facts(case.device) | none.document)
+            return replace(none, document=case.question.linear_circumstances(case.device) | none.document)
         try:
-            with computing(case.question):
+            with translate_errors(case.question):
                 result = self.compute(case)
         except NoAnswer as none:
             return self.unanswered(case, none)
         reason = self.reason(case, result)
         document = self.circumstances(case) | self.document(case, result)
-        document |= {"decided": True} if self.decides and "decided" not in document else {}
+        document |= {"decided": True} if self.may_be_undecided and "decided" not in document else {}
         if case.path is not None:
             document["file"] = str(case.path)
             reason = self.write(case, result, document, reason)
@@ -211,10 +233,11 @@ class Command:
     def run(self, question: Question, as_json: bool, output: str | None = None, **options: Any) -> int:
         """Carry out one command line; returns the exit code."""
         named = output or self.default_output(question)
-        case = Case(question, options, None if named is None else destination(named, self.outputs))
+        case = CommandLine(question, options, None if named is None else destination(named, self.outputs))
         self.check(case)
         case = replace(case, options={**options, **self.parse(case)})
-        return deliver(self.answer(case), as_json)
+        with announce_compiling(self.name):
+            return deliver(self.answer(case), as_json)
 
     def epilog(self) -> str:
         """What stands below its help."""

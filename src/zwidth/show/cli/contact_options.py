@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.errors import BadInput, as_option
-from zwidth.show.cli.failures import NoAnswer
-from zwidth.show.cli.options import Finite, Numbers, ParamType, named
+from zwidth.show.cli.errors import BadInput, NoAnswer, as_option
+from zwidth.show.cli.options import Finite, Numbers, ParamType, refuse_empty
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,7 +35,7 @@ LARGEST_FORCE: Final = 1e6  # N
 LARGEST_SEED: Final = 2**63 - 1
 
 
-class Bounded(ParamType):
+class BoundedNumber(ParamType):
     """One number within bounds, with its unit for the message."""
 
     name = "number"
@@ -61,7 +60,7 @@ class Bounded(ParamType):
         return number
 
 
-class Setting(ParamType):
+class ParameterType(ParamType):
     """NAME=VALUE, a parameter of an environment."""
 
     name = "setting"
@@ -83,16 +82,16 @@ def check_contact(options: Mapping[str, Any]) -> None:
     """Raise click.UsageError for options that cannot stand together, as far as the device does not decide."""
     wall, environment = options["wall"], options["environment"]
     if wall is not None and environment is not None:
-        raise usage("--wall and --environment exclude each other; leave one out")
+        raise usage_error("--wall and --environment exclude each other; leave one out")
     if environment is not None:
         return
     missing = [f"--{name}" for name in ("stiffness", "damping") if options[name] is None]
     if missing:
-        raise usage(f"a wall needs --stiffness and --damping; missing: {' and '.join(missing)}")
+        raise usage_error(f"a wall needs --stiffness and --damping; missing: {' and '.join(missing)}")
     if options["parameters"]:
-        raise usage("--parameter belongs to --environment; a wall has --stiffness and --damping")
+        raise usage_error("--parameter belongs to --environment; a wall has --stiffness and --damping")
     if options["no_pull"] and wall != "one-sided":
-        raise usage("a two-sided wall pulls by its nature; --no-pull goes with --wall one-sided")
+        raise usage_error("a two-sided wall pulls by its nature; --no-pull goes with --wall one-sided")
 
 
 def contact_arguments(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -101,11 +100,11 @@ def contact_arguments(options: Mapping[str, Any]) -> dict[str, Any]:
 
     parameters = _by_name(options["parameters"])
     tremor, reach, reflex = options["tremor"], options["reach"], options["reflex"]
-    with _named("tremor"):
+    with _name_option("tremor"):
         tremor = tremor and Tremor(*tremor)
-    with _named("reach"):
+    with _name_option("reach"):
         reach = reach and Reach(*reach)
-    with _named("reflex"):
+    with _name_option("reflex"):
         reflex = reflex and Reflex(
             reflex[0],
             arm_stiffness=reflex[1],
@@ -121,7 +120,7 @@ def contact_arguments(options: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def named_environment(
+def environment_from_options(
     name: str,
     parameters: Sequence[tuple[str, float]],
     *,
@@ -136,7 +135,7 @@ def named_environment(
     """
     from zwidth.contact.contact_arguments import environment_with_values
 
-    with contact_faults():
+    with translate_contact_errors():
         return environment_with_values(
             name, _by_name(parameters), stiffness=stiffness, damping=damping, no_pull=no_pull
         )
@@ -152,7 +151,7 @@ def _by_name(parameters: Sequence[tuple[str, float]]) -> dict[str, float]:
 
 
 @contextmanager
-def _named(option: str) -> Iterator[None]:
+def _name_option(option: str) -> Iterator[None]:
     """What is wrong with an option's numbers is said under its name."""
     try:
         yield
@@ -161,15 +160,15 @@ def _named(option: str) -> Iterator[None]:
 
 
 @contextmanager
-def contact_faults() -> Iterator[None]:
+def translate_contact_errors() -> Iterator[None]:
     """Simulate a contact inside this block.
 
     Raises  BadInput  for what `simulate_contact` does not take, under the options' names
             NoAnswer  where the environment gives no force
     """
     from zwidth.contact.contact_arguments import ContactArgumentError
-    from zwidth.contact.room import TooLarge
     from zwidth.contact.simulate_contact import NoForceError
+    from zwidth.memory_limit import TooLarge
 
     try:
         yield
@@ -195,10 +194,10 @@ def wall_options() -> tuple[Callable[..., Any], ...]:
 
 def contact_options() -> tuple[Callable[..., Any], ...]:
     """What is touched, from where and by whom, as options."""
-    return (*_of_what_is_touched(), *_of_the_start(), *_of_the_hand())
+    return (*_wall_and_environment_options(), *_start_options(), *_hand_options())
 
 
-def _of_what_is_touched() -> list[Callable[..., Any]]:
+def _wall_and_environment_options() -> list[Callable[..., Any]]:
     return [
         click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of the wall [N/m]."),
         click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall [Ns/m]."),
@@ -207,33 +206,33 @@ def _of_what_is_touched() -> list[Callable[..., Any]]:
             type=click.Choice(("two-sided", "one-sided")),
             help="Does it act on both sides of its position? Default: two-sided.",
         ),
-        *of_environments(),
+        *environment_options(),
         click.option("--no-pull", is_flag=True, help="The wall never pulls the device inwards."),
     ]
 
 
-def of_environments() -> list[Callable[..., Any]]:
+def environment_options() -> list[Callable[..., Any]]:
     """Options that name an environment and its parameters."""
     return [
         click.option(
             "--environment",
             metavar="NAME|FILE.py:NAME",
-            callback=named,
+            callback=refuse_empty,
             help="Something else to touch: a bundled environment, or one of a file of your own.",
         ),
         click.option(
             "--parameter",
             "parameters",
             metavar="NAME=VALUE",
-            type=Setting(),
+            type=ParameterType(),
             multiple=True,
             help="A parameter of the environment; repeatable.",
         ),
     ]
 
 
-def _of_the_start() -> list[Callable[..., Any]]:
-    place = Bounded("m", -FARTHEST, FARTHEST)
+def _start_options() -> list[Callable[..., Any]]:
+    place = BoundedNumber("m", -FARTHEST, FARTHEST)
     return [
         click.option(
             "--wall-position", metavar="M", type=place, default=0.0, help="Where the wall begins [m]. Default: 0."
@@ -247,26 +246,26 @@ def _of_the_start() -> list[Callable[..., Any]]:
         click.option(
             "--start-velocity",
             metavar="V",
-            type=Bounded("m/s", -FARTHEST, FARTHEST),
+            type=BoundedNumber("m/s", -FARTHEST, FARTHEST),
             default=0.0,
             help="How fast it starts [m/s]. Default: 0.",
         ),
     ]
 
 
-def _of_the_hand() -> list[Callable[..., Any]]:
+def _hand_options() -> list[Callable[..., Any]]:
     return [
         click.option(
             "--push",
             metavar="F",
-            type=Bounded("N", -LARGEST_FORCE, LARGEST_FORCE),
+            type=BoundedNumber("N", -LARGEST_FORCE, LARGEST_FORCE),
             help="The hand's force towards the wall [N]. Default: 2 against a surface, if the hand does not "
             "reach; else 0.",
         ),
         click.option(
             "--ramp",
             metavar="S",
-            type=Bounded("s", 0.0, 1e6),
+            type=BoundedNumber("s", 0.0, 1e6),
             default=0.0,
             help="Time in which the push grows to it [s]. Default: 0.",
         ),
@@ -288,6 +287,6 @@ def _of_the_hand() -> list[Callable[..., Any]]:
     ]
 
 
-def usage(text: str) -> click.UsageError:
+def usage_error(text: str) -> click.UsageError:
     """What is wrong with options of the command that runs."""
     return click.UsageError(text, click.get_current_context())

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import os
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import click
 
 from zwidth.device.faults import SETTINGS, DeviceError, Fault
 from zwidth.show.cli.process import BAD_INPUT, INTERNAL, INTERRUPTED
-from zwidth.show.output import OutputError, shown
+from zwidth.show.output import OutputError, printable
 from zwidth.study.points_file import PointsError
+
+if TYPE_CHECKING:
+    from zwidth.show.cli.options import Question
 
 DEBUG = "ZWIDTH_DEBUG"
 
@@ -24,8 +30,55 @@ class BadInput(Exception):
         super().__init__("\n".join(lines))
 
 
-class Stopped(Exception):
+class UnfinishedRun(Exception):
     """A run that could not be finished, through no fault of what was asked; the text says why."""
+
+
+class NoAnswer(Exception):
+    """The question was understood and has no answer; the text says why.
+
+    decided  False where there is an answer that double precision does not give
+    """
+
+    def __init__(self, reason: str, *, decided: bool = True) -> None:
+        super().__init__(reason)
+        self.decided = decided
+
+
+@contextmanager
+def translate_errors(question: Question) -> Iterator[None]:
+    """Compute inside this block.
+
+    Raises  NoAnswer  where the posture does not exist, or double precision cannot decide
+            BadInput  where the model, or the loop, does not fit the device
+    """
+    from zwidth.chart.arc_joining import ChartError
+    from zwidth.loop.estimator import NonlinearError
+    from zwidth.loop.sections import HysteresisError, UnmovedError
+    from zwidth.model.posture import PostureError
+    from zwidth.model.reduction import DirectionError, ModelError
+    from zwidth.model.response import ResponseError
+
+    try:
+        yield
+    except PostureError as error:
+        raise NoAnswer(str(error)) from None
+    except ChartError as error:
+        raise NoAnswer(f"this is undecided: {error}", decided=False) from None
+    except DirectionError as error:
+        raise BadInput(f"{question.name}: direction: {error}") from None
+    except ModelError as error:
+        model = f"model {question.model}: " if question.model else ""
+        raise BadInput(f"{question.name}: {model}{error}") from None
+    except ResponseError as error:
+        raise BadInput(f"{question.name}: response: {error}") from None
+    except NonlinearError as error:
+        raise BadInput(
+            f"{question.name}: {error.estimate} is not linear: it has no chart; ask zwidth simulate or zwidth "
+            "experiment, or chart another estimate with --set loop.velocity.method=backward-difference"
+        ) from None
+    except (UnmovedError, HysteresisError) as error:
+        raise BadInput(f"{question.name}: {error}") from None
 
 
 def explain(error: Exception) -> tuple[list[str], int]:
@@ -34,8 +87,8 @@ def explain(error: Exception) -> tuple[list[str], int]:
         case DeviceError():
             return [str(_as_typed(fault)) for fault in error.faults], BAD_INPUT
         case BadInput() | PointsError():
-            return [shown(line) for line in error.lines], BAD_INPUT
-        case Stopped():
+            return [printable(line) for line in error.lines], BAD_INPUT
+        case UnfinishedRun():
             return [f"zwidth: {error}"], INTERNAL
         case OutputError():
             return [str(error)], BAD_INPUT
@@ -58,14 +111,14 @@ def _usage(error: click.ClickException) -> str:
     """A usage error on one line, with the command it happened in and the way to its help."""
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "zwidth"
-    text = shown(" ".join(error.format_message().split())).rstrip(".")
+    text = printable(" ".join(error.format_message().split())).rstrip(".")
     return f"{command}: {text[:1].lower() + text[1:]}; `{command} --help` shows what is allowed"
 
 
 def _internal(error: Exception) -> list[str]:
     if os.environ.get(DEBUG):
         return traceback.format_exception(error)
-    text = shown(" ".join(str(error).split()))[:300]
+    text = printable(" ".join(str(error).split()))[:300]
     return [
         f"zwidth: an error in zwidth itself ({type(error).__name__}: {text}); please report it with the "
         f"command and the device file ({DEBUG}=1 shows the traceback)"

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import sheet, table
-from zwidth.show.cli.command import Case, Command
-from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.failures import NoAnswer
-from zwidth.show.cli.options import Numbers, named
+from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.cli.errors import BadInput, NoAnswer
+from zwidth.show.cli.experiment_page import explanation, point_rows, sentences, warning
+from zwidth.show.cli.options import Numbers, refuse_empty
 from zwidth.show.cli.process import say
-from zwidth.show.cli.progress import progress_told
-from zwidth.show.experiment import explanation, point_rows, sentences, warning
+from zwidth.show.cli.progress import show_progress
 from zwidth.study.points_file import read_points
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 MOST: Final = 1000
 # options that are numbers of the plan, under its own names
-OF_THE_PLAN: Final = (
+PLAN_OPTIONS: Final = (
     "stiffnesses",
     "tips",
     "disturbance",
@@ -40,7 +39,7 @@ OF_THE_PLAN: Final = (
 )
 
 
-def _range(ctx: click.Context, param: click.Parameter, span: tuple[float, float] | None) -> Any:
+def _check_range(ctx: click.Context, param: click.Parameter, span: tuple[float, float] | None) -> Any:
     if span and not span[0] < span[1]:
         raise click.BadParameter(f"needs LOW < HIGH, such as 0,8000; got {span[0]:g},{span[1]:g}")
     return span
@@ -79,10 +78,16 @@ class ExperimentCommand(Command):
             help="At how many dampings the stiffness is, near the tip (default 8).",
         ),
         click.option(
-            "--stiffness", type=Numbers("KMIN,KMAX", (2,), "0,8000"), callback=_range, help="Where to look [N/m]."
+            "--stiffness",
+            type=Numbers("KMIN,KMAX", (2,), "0,8000"),
+            callback=_check_range,
+            help="Where to look [N/m].",
         ),
         click.option(
-            "--damping", type=Numbers("BMIN,BMAX", (2,), "0,30"), callback=_range, help="Where to look [Ns/m]."
+            "--damping",
+            type=Numbers("BMIN,BMAX", (2,), "0,30"),
+            callback=_check_range,
+            help="Where to look [Ns/m].",
         ),
         click.option(
             "--disturbance",
@@ -133,13 +138,13 @@ class ExperimentCommand(Command):
         click.option(
             "--measured",
             metavar="FILE.csv",
-            callback=named,
+            callback=refuse_empty,
             help="Your own points: stiffness_N_per_m, damping_Ns_per_m, and edge (lower, upper, tip) or verdict "
             "(stable, unstable) of each; if you like damping_low_Ns_per_m, damping_high_Ns_per_m, "
             "stiffness_low_N_per_m, stiffness_high_N_per_m, trials.",
         ),
         click.option(
-            "--resume", metavar="FILE", callback=named, help="Keep what is done here, and go on from it."
+            "--resume", metavar="FILE", callback=refuse_empty, help="Keep what is done here, and go on from it."
         ),
     )
     output_help = "Write a figure (.png .svg .pdf) or the points (.csv .json)."
@@ -158,54 +163,56 @@ class ExperimentCommand(Command):
     )
     linear = False
 
-    def parse(self, case: Case) -> dict[str, Any]:
+    def parse(self, case: CommandLine) -> dict[str, Any]:
         measured = case["measured"]
         return {"measured": () if measured is None else read_points(measured), "plan": _plan(case)}
 
-    def circumstances(self, case: Case) -> dict[str, Any]:
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
         return super().circumstances(case) | {"left_out": []}
 
-    def compute(self, case: Case) -> Experiment:
-        from zwidth.contact.bench import BenchError
-        from zwidth.contact.experiment import NothingStable
+    def compute(self, case: CommandLine) -> Experiment:
+        from zwidth.contact.boundary_experiment import NoStableWallError
+        from zwidth.contact.stability_trial import TrialError
         from zwidth.study.experiment import measure_boundary
         from zwidth.study.journal import JournalError
 
         file = _journal(case)
         try:
-            with progress_told() as progress, _kept(file):
+            with show_progress() as progress, _report_kept_work(file):
                 return measure_boundary(case.point, case["plan"], case["measured"], file=file, progress=progress)
-        except BenchError as error:
+        except TrialError as error:
             raise BadInput(f"--{error.argument}: {error.reason}") from None
         except JournalError as error:
             raise BadInput(str(error)) from None
-        except NothingStable as none:
+        except NoStableWallError as none:
             raise NoAnswer(str(none)) from None
         except OSError as error:  # of the journal
             raise BadInput(f"{file}: cannot be written: {error.strerror}; name another file") from None
 
-    def document(self, case: Case, result: Experiment) -> dict[str, Any]:
+    def document(self, case: CommandLine, result: Experiment) -> dict[str, Any]:
         return result.document() | {"warning": warning(result), "explanation": explanation(result)}
 
-    def write(self, case: Case, result: Experiment, document: dict[str, Any], reason: str | None) -> str | None:
+    def write(
+        self, case: CommandLine, result: Experiment, document: dict[str, Any], reason: str | None
+    ) -> str | None:
         reason = super().write(case, result, document, reason)
         file = _journal(case)
         if case["resume"] is None and file is not None:
             file.unlink(missing_ok=True)  # now that what it kept is written
         return reason
 
-    def pages(self, case: Case, result: Experiment, document: Mapping[str, Any]) -> Iterator[Any]:
+    def pages(self, case: CommandLine, result: Experiment, document: Mapping[str, Any]) -> Iterator[Any]:
         if document["warning"]:
             yield f"warning: {document['warning']}"
         headings, rows = point_rows(result)
         yield table(headings, rows)
-        yield sheet(list(sentences(result)))
+        yield two_columns(list(sentences(result)))
 
 
-def _plan(case: Case) -> Plan:
+def _plan(case: CommandLine) -> Plan:
     """What is to be measured. Raises BadInput."""
-    from zwidth.contact.bench import BenchError
-    from zwidth.contact.experiment import Box
+    from zwidth.contact.boundary_experiment import SearchWindow
+    from zwidth.contact.stability_trial import TrialError
     from zwidth.study.experiment_plan import Plan
 
     stiffness, damping = case["stiffness"], case["damping"]
@@ -216,15 +223,15 @@ def _plan(case: Case) -> Plan:
         raise BadInput(
             "--disturbance: is of a two-sided wall; the device meets a one-sided one with --push and --speed"
         )
-    given = {name: case[name] for name in OF_THE_PLAN if case[name] is not None}
-    box = None if stiffness is None else Box(stiffness, damping)
+    given = {name: case[name] for name in PLAN_OPTIONS if case[name] is not None}
+    box = None if stiffness is None else SearchWindow(stiffness, damping)
     try:
         return Plan.touching(box=box, **given) if one_sided else Plan(box=box, **given)
-    except BenchError as error:
+    except TrialError as error:
         raise BadInput(f"--{error.argument}: {error.reason}") from None
 
 
-def _journal(case: Case) -> Path | None:
+def _journal(case: CommandLine) -> Path | None:
     """The file that keeps what is done: --resume, or one beside --output; None: nothing is kept."""
     if case["resume"] is not None:
         return Path(case["resume"])
@@ -232,7 +239,7 @@ def _journal(case: Case) -> Path | None:
 
 
 @contextmanager
-def _kept(file: Path | None) -> Iterator[None]:
+def _report_kept_work(file: Path | None) -> Iterator[None]:
     """Says where the work is when it is interrupted."""
     try:
         yield

@@ -9,25 +9,26 @@ from typing import Any
 import click
 
 from zwidth._version import __version__
-from zwidth.show.cli.bounds import Bounds
+from zwidth.show.cli.bounds import BoundsCommand
 from zwidth.show.cli.chart import ChartCommand
-from zwidth.show.cli.check import Check
+from zwidth.show.cli.check import CheckCommand
 from zwidth.show.cli.command import Command
+from zwidth.show.cli.compile import compile_command
 from zwidth.show.cli.devices import devices
 from zwidth.show.cli.experiment import ExperimentCommand
-from zwidth.show.cli.felt import Felt
+from zwidth.show.cli.felt import FeltCommand
 from zwidth.show.cli.guarantees import GuaranteesCommand
-from zwidth.show.cli.limit_cycles import LimitCycles
-from zwidth.show.cli.map import Map
-from zwidth.show.cli.move import Move
-from zwidth.show.cli.new import New
-from zwidth.show.cli.polar import Polar
-from zwidth.show.cli.report import Report
-from zwidth.show.cli.robust import Robust
+from zwidth.show.cli.limit_cycles import LimitCyclesCommand
+from zwidth.show.cli.map import MapCommand
+from zwidth.show.cli.move import MoveCommand
+from zwidth.show.cli.new import NewCommand
+from zwidth.show.cli.polar import PolarCommand
+from zwidth.show.cli.report import ReportCommand
+from zwidth.show.cli.robust import RobustCommand
 from zwidth.show.cli.schema import schema
 from zwidth.show.cli.sensitivity import SensitivityCommand
-from zwidth.show.cli.show import Show
-from zwidth.show.cli.simulate import Simulate
+from zwidth.show.cli.show import ShowCommand
+from zwidth.show.cli.simulate import SimulateCommand
 from zwidth.show.cli.sweep import SweepCommand
 
 EPILOG = """\b
@@ -54,23 +55,24 @@ def zwidth(context: click.Context) -> None:
 COMMANDS = (
     devices,
     schema,
-    New(),
-    Show(),
+    compile_command,
+    NewCommand(),
+    ShowCommand(),
     ChartCommand(),
-    Check(),
-    Polar(),
-    Map(),
+    CheckCommand(),
+    PolarCommand(),
+    MapCommand(),
     SweepCommand(),
-    Report(),
+    ReportCommand(),
     SensitivityCommand(),
-    Felt(),
-    Bounds(),
+    FeltCommand(),
+    BoundsCommand(),
     GuaranteesCommand(),
-    Robust(),
-    Simulate(),
+    RobustCommand(),
+    SimulateCommand(),
     ExperimentCommand(),
-    LimitCycles(),
-    Move(),
+    LimitCyclesCommand(),
+    MoveCommand(),
 )
 for command in COMMANDS:
     zwidth.add_command(command.for_click() if isinstance(command, Command) else command)

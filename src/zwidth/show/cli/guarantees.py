@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli.answer import table
-from zwidth.show.cli.command import Case, Command
+from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite
 from zwidth.show.units import amount
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.guarantees.coupling import Coupling
-    from zwidth.guarantees.nested import Guarantees
+    from zwidth.guarantees.loop_guarantees import Guarantees
     from zwidth.guarantees.region import Region
 
 NOTHING: Final = "no wall has K > 0 and B >= 0 and any of the guarantees"
@@ -44,7 +44,7 @@ class GuaranteesCommand(Command):
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: the outlines, .json)."
     keys = ("guarantees",)
 
-    def check(self, case: Case) -> None:
+    def check(self, case: CommandLine) -> None:
         stiffness = case["stiffness"]
         if stiffness is None and case["damping"] is None:
             return
@@ -54,17 +54,17 @@ class GuaranteesCommand(Command):
         if stiffness is None or stiffness <= 0.0:
             raise click.UsageError("the wall of --coupling needs --stiffness above 0", context)
 
-    def circumstances(self, case: Case) -> dict[str, Any]:
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
         return super().circumstances(case) | {"operator": None}
 
-    def compute(self, case: Case) -> Guarantees:
+    def compute(self, case: CommandLine) -> Guarantees:
         wall = None if case["stiffness"] is None else (case["stiffness"], case["damping"] or 0.0)
         return case.point.guarantees(coupling=case["coupling"], wall=wall)
 
-    def reason(self, case: Case, result: Guarantees) -> str | None:
-        return NOTHING if result.none_left else None
+    def reason(self, case: CommandLine, result: Guarantees) -> str | None:
+        return NOTHING if result.is_empty else None
 
-    def pages(self, case: Case, result: Guarantees, document: Mapping[str, Any]) -> Iterator[Any]:
+    def pages(self, case: CommandLine, result: Guarantees, document: Mapping[str, Any]) -> Iterator[Any]:
         rows = [(one.name, _largest(one.region), one.meaning) for one in result.guarantees]
         yield table(["guarantee", "largest stiffness", "what it means"], rows)
         coupled = result.couplings
@@ -77,7 +77,7 @@ class GuaranteesCommand(Command):
         if coupled.limit is not None:
             yield _limit(coupled.limit)
 
-    def draw(self, case: Case, result: Guarantees) -> Figure:
+    def draw(self, case: CommandLine, result: Guarantees) -> Figure:
         from zwidth.show.figures.guarantees import draw_couplings, draw_guarantees
         from zwidth.show.figures.style import figure
 
@@ -103,5 +103,5 @@ def _limit(limit: Coupling) -> str:
         return "the wall needs no coupling: it is stable with every passive operator"
     return (
         f"the wall needs a coupling no stiffer than {amount(limit.stiffness, 'N/m')}, damped by "
-        f"{amount(limit.damping, 'Ns/m')}; then one feels {amount(limit.felt, 'N/m')}"
+        f"{amount(limit.damping, 'Ns/m')}; then one feels {amount(limit.felt_stiffness, 'N/m')}"
     )

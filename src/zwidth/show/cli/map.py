@@ -11,20 +11,20 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.measures.catalogue import MEASURES
-from zwidth.show.cli.command import Case, Command
+from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
-from zwidth.show.cli.options import Command as Callback
-from zwidth.show.cli.options import Finite, Numbers, ParamType, about_a_workspace, named
-from zwidth.show.cli.progress import progress_told
+from zwidth.show.cli.options import Callback as Callback
+from zwidth.show.cli.options import Finite, Numbers, ParamType, about_a_workspace, refuse_empty
+from zwidth.show.cli.progress import show_progress
 from zwidth.show.output import ARRAYS, DATA, FIGURES
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from zwidth.measures.measure import Measure
+    from zwidth.measures.definition import Measure
     from zwidth.study.common_area import CommonArea
-    from zwidth.study.plane import Plane
+    from zwidth.study.plane_grid import PlaneGrid
     from zwidth.study.requirement import Requirement
 
 PLANES: Final = ("xy", "xz", "yz")
@@ -48,7 +48,7 @@ class PlaneType(Numbers):
         return value if value in PLANES else super().convert(value, param, ctx)
 
 
-class Counts(ParamType):
+class CellsType(ParamType):
     """Two whole numbers."""
 
     name = "counts"
@@ -76,7 +76,7 @@ def _axis_range(name: str) -> Callable[[Callback], Callback]:
     )
 
 
-class Map(Command):
+class MapCommand(Command):
     """Map measures of DEVICE over a plane of its workspace.
 
     Cells out of reach, singular or without a value are told by their status. Requirements are laid over each
@@ -95,7 +95,7 @@ class Map(Command):
         click.option(
             "--measures-file",
             metavar="FILE.py",
-            callback=named,
+            callback=refuse_empty,
             help="Measures of your own, to be named by --measure.",
         ),
         click.option(
@@ -110,7 +110,9 @@ class Map(Command):
         ),
         _axis_range("x"),
         _axis_range("y"),
-        click.option("--cells", type=Counts(), help="Points along both axes. Default: 81 along the longer one."),
+        click.option(
+            "--cells", type=CellsType(), help="Points along both axes. Default: 81 along the longer one."
+        ),
         click.option(
             "--require",
             "requirements",
@@ -136,7 +138,7 @@ class Map(Command):
     outputs = (*FIGURES, *DATA, *ARRAYS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .json .nc .mat)."
     keys = ("plane", "plane_axes", "plane_through_m", "x_m", "y_m", "values", "status", "overall", "notes")
-    of_responses = True  # which it refuses like every device without a mechanism
+    takes_responses = True  # which it refuses like every device without a mechanism
 
     def about(self, command: Callback) -> Callback:
         return about_a_workspace(command)
@@ -149,8 +151,8 @@ class Map(Command):
         ]
         return "\b\nMeasures:\n" + "\n".join(lines) + "\n\n" + super().epilog()
 
-    def parse(self, case: Case) -> dict[str, Any]:
-        from zwidth.measures.measure import WantedWall
+    def parse(self, case: CommandLine) -> dict[str, Any]:
+        from zwidth.measures.definition import WantedWall
 
         measures, required = _measures(case)
         frequency = case["frequency"]
@@ -159,11 +161,11 @@ class Map(Command):
         wall = WantedWall(case["stiffness"], case["damping"], frequency)
         return {"measures": measures, "requirements": required, "wall": wall}
 
-    def asked(self, case: Case) -> dict[str, Any]:
+    def repeated_options(self, case: CommandLine) -> dict[str, Any]:
         first = case["measures"][0]
         return {"measure": first.name, "title": first.title, "unit": first.unit}
 
-    def circumstances(self, case: Case) -> dict[str, Any]:
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
         # no posture is meant more than another; a direction, or which of all of them
         facts = super().circumstances(case)
         del facts["position_m"]
@@ -171,19 +173,19 @@ class Map(Command):
         facts |= {} if linear else {"left_out": []}
         return facts if case["extreme"] is None else facts | {"direction": case["extreme"]}
 
-    def compute(self, case: Case) -> MapResult:
-        from zwidth.contact.room import TooLarge
-        from zwidth.measures.measure import MeasureError
+    def compute(self, case: CommandLine) -> MapResult:
+        from zwidth.measures.definition import MeasureError
+        from zwidth.memory_limit import TooLarge
         from zwidth.study.common_area import common_area
-        from zwidth.study.plane import PlaneError
-        from zwidth.study.workspace import workspace_map
+        from zwidth.study.map import workspace_map
+        from zwidth.study.plane_grid import PlaneError
 
         question, device = case.question, case.device
         if device.mechanism is None:
             raise BadInput(f"{question.name}: has no [mechanism], and so no workspace to map; ask for its chart")
         try:
             plane = _plane(case)
-            with progress_told() as progress:
+            with show_progress() as progress:
                 dataset = workspace_map(
                     device,
                     case["measures"],
@@ -203,30 +205,32 @@ class Map(Command):
         required = case["requirements"]
         return MapResult(dataset, common_area(dataset, required) if required else None)
 
-    def document(self, case: Case, result: MapResult) -> dict[str, Any]:
+    def document(self, case: CommandLine, result: MapResult) -> dict[str, Any]:
         from zwidth.study.map_data import map_document
 
         return map_document(result.dataset, case.device, result.area)
 
-    def table(self, case: Case, result: MapResult, document: Mapping[str, Any]) -> dict[str, Any]:
+    def table(self, case: CommandLine, result: MapResult, document: Mapping[str, Any]) -> dict[str, Any]:
         from zwidth.study.map_data import map_table
 
         return map_table(result.dataset)
 
-    def reason(self, case: Case, result: MapResult) -> str | None:
+    def reason(self, case: CommandLine, result: MapResult) -> str | None:
         from zwidth.study.map_data import why_no_cell
 
         return why_no_cell(result.dataset)
 
-    def heading(self, case: Case) -> str:
+    def heading(self, case: CommandLine) -> str:
         return ""  # the pages begin with the plane and its cells
 
-    def pages(self, case: Case, result: MapResult, document: Mapping[str, Any]) -> Iterator[Any]:
-        from zwidth.show.cli.map_pages import map_pages
+    def pages(self, case: CommandLine, result: MapResult, document: Mapping[str, Any]) -> Iterator[Any]:
+        from zwidth.show.cli.map_page import map_page
 
-        return map_pages(result.dataset, case.device, result.area, document)
+        return map_page(result.dataset, case.device, result.area, document)
 
-    def write(self, case: Case, result: MapResult, document: dict[str, Any], reason: str | None) -> str | None:
+    def write(
+        self, case: CommandLine, result: MapResult, document: dict[str, Any], reason: str | None
+    ) -> str | None:
         if not case.writes(ARRAYS):
             return super().write(case, result, document, reason)
         from zwidth.show.dataset import write_dataset
@@ -236,13 +240,17 @@ class Map(Command):
         write_dataset(case.path, result.dataset.assign_attrs(areas))
         return reason
 
-    def draw(self, case: Case, result: MapResult) -> Figure:
+    def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
+        facts = self.circumstances(case) | {key: document[key] for key in ("plane", "plane_through_m")}
+        return facts if any(measure.along for measure in case["measures"]) else facts | {"direction": None}
+
+    def draw(self, case: CommandLine, result: MapResult) -> Figure:
         from zwidth.show.figures.map import map_figure
 
         return map_figure(result.dataset, case["measures"][0].name, case.device, result.area)
 
 
-def _measures(case: Case) -> tuple[list[Measure], list[Requirement]]:
+def _measures(case: CommandLine) -> tuple[list[Measure], list[Requirement]]:
     """What to map, the first of them shown; and the requirements."""
     from zwidth.measures.catalogue import find_measure
     from zwidth.measures.user_measures import load_measures
@@ -252,20 +260,20 @@ def _measures(case: Case) -> tuple[list[Measure], list[Requirement]]:
     file, names = case["measures_file"], case["measures"]
     option = "--measures-file"
     try:
-        own = {} if file is None else load_measures(file)
-        if NAME in own:
+        user_measures = {} if file is None else load_measures(file)
+        if NAME in user_measures:
             raise ValueError(f"{file}: the name {NAME} is taken by --share; rename the function")
         option = "--share"
-        shares = [share_measure(parse_requirement(text, own)) for text in case["shares"]]
+        shares = [share_measure(parse_requirement(text, user_measures)) for text in case["shares"]]
         if len(shares) > 1:
             raise ValueError(f"a map has one {NAME}, got {len(shares)}; ask for the others in maps of their own")
-        own |= {one.name: one for one in shares}
+        user_measures |= {one.name: one for one in shares}
         option = "--measure"
         if NAME in names and not shares:
             raise ValueError(f"{NAME} needs --share NAME>=VALUE, which says what the directions must meet")
-        found = [find_measure(name, own) for name in names]
+        found = [find_measure(name, user_measures) for name in names]
         option = "--require"
-        required = [parse_requirement(text, own) for text in case["requirements"]]
+        required = [parse_requirement(text, user_measures) for text in case["requirements"]]
     except ValueError as error:
         raise BadInput(f"{option}: {error}") from None
     every = {one.name: one for one in (*found, *shares, *(r.measure for r in required))}
@@ -279,9 +287,9 @@ def _plane_option(name: str, value: str | None) -> str:
     return as_option("plane" if name == "axes" else name, value)
 
 
-def _plane(case: Case) -> Plane:
+def _plane(case: CommandLine) -> PlaneGrid:
     from zwidth.model.posture import PostureError
-    from zwidth.study.plane import plane_of
+    from zwidth.study.plane_grid import plane_of
 
     device, assembly = case.device, case.question.assembly
     with suppress(PostureError):  # an assembly that does not reach the reference position may reach others

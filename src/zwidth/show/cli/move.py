@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.show.cli.command import Case, Command
-from zwidth.show.cli.errors import BadInput, as_option
-from zwidth.show.cli.failures import NoAnswer
-from zwidth.show.cli.surface_options import (
+from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.cli.errors import BadInput, NoAnswer, as_option
+from zwidth.show.cli.move_options import (
     check_motion,
     components,
     motion_options,
@@ -24,10 +23,10 @@ if TYPE_CHECKING:
 
 OPERATOR: Final = "the operator"
 AS_TEXT: Final = 6  # numbers' worth of memory that one takes as text
-SHOWN: Final = (17, 3)  # numbers shown of each sample, and as many more for each drive
+NUMBERS_PER_SAMPLE: Final = (17, 3)  # numbers shown of each sample, and as many more for each drive
 
 
-class Move(Command):
+class MoveCommand(Command):
     """Move the whole mechanism of DEVICE, free or against a surface: large motions, with all that bends, rubs and
     swings. The posture is where it starts; the hand is a push."""
 
@@ -80,20 +79,20 @@ class Move(Command):
         "friction_loss_J",
     )
     linear = False
-    of_responses = True  # which it refuses like every device without a mechanism
+    takes_responses = True  # which it refuses like every device without a mechanism
 
-    def check(self, case: Case) -> None:
+    def check(self, case: CommandLine) -> None:
         check_motion(case.options, case.question)
 
-    def circumstances(self, case: Case) -> dict[str, Any]:
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
         # nobody holds the handle but by the push
         left_out = [OPERATOR] if case.device.operator is not None else []
         return super().circumstances(case) | {"operator": None, "left_out": left_out}
 
-    def compute(self, case: Case) -> MechanismMotion:
-        from zwidth.contact.mechanism.checks import MotionError
-        from zwidth.contact.mechanism.reach import SurfaceOutOfReach
-        from zwidth.contact.room import TooLarge
+    def compute(self, case: CommandLine) -> MechanismMotion:
+        from zwidth.contact.mechanism.motion_inputs import MotionError
+        from zwidth.contact.mechanism.surface_reach import SurfaceOutOfReach
+        from zwidth.memory_limit import TooLarge
 
         device, name = case.device, case.question.name
         if device.mechanism is None:
@@ -103,7 +102,7 @@ class Move(Command):
         surface, wall = surface_of(case.options, device), wall_of(case.options)
         point = case.point
         try:
-            _check_room(case)
+            _check_memory(case)
             motion = point.move(
                 wall,
                 surface,
@@ -129,26 +128,26 @@ class Move(Command):
             raise NoAnswer(f"{motion.reason}; have it return a number there")
         return motion
 
-    def heading(self, case: Case) -> str:
+    def heading(self, case: CommandLine) -> str:
         return ""  # the pages begin with where it starts
 
-    def pages(self, case: Case, result: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Any]:
-        from zwidth.show.cli.move_page import pages
+    def pages(self, case: CommandLine, result: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Any]:
+        from zwidth.show.cli.move_page import move_page
 
-        return pages(case, result, document)
+        return move_page(case, result, document)
 
-    def draw(self, case: Case, result: MechanismMotion) -> Figure:
-        from zwidth.show.figures.path import draw_path, path_figure
+    def draw(self, case: CommandLine, result: MechanismMotion) -> Figure:
+        from zwidth.show.figures.mechanism_motion import draw_mechanism_motion, mechanism_motion_figure
 
-        drawing, axes = path_figure()
-        draw_path(axes, result)
+        drawing, axes = mechanism_motion_figure()
+        draw_mechanism_motion(axes, result)
         return drawing
 
 
-def _check_room(case: Case) -> None:
+def _check_memory(case: CommandLine) -> None:
     """Raise TooLarge for more samples than there is memory for, all that is shown as text included."""
-    from zwidth.contact.room import check_room
+    from zwidth.memory_limit import check_memory
 
     samples = case["duration"] / case.device.controller.sampling_period
-    numbers = SHOWN[0] + SHOWN[1] * len(case.point.drives.names)
-    check_room((1 + AS_TEXT) * samples * numbers, f"{samples:.4g} samples", "move for a shorter time")
+    numbers = NUMBERS_PER_SAMPLE[0] + NUMBERS_PER_SAMPLE[1] * len(case.point.drives.names)
+    check_memory((1 + AS_TEXT) * samples * numbers, f"{samples:.4g} samples", "move for a shorter time")

@@ -6,30 +6,30 @@ from collections.abc import Iterator, Mapping
 from math import isfinite, isnan
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.show.cli.answer import Row, sheet, table
+from zwidth.show.circumstances import computer_text
+from zwidth.show.cli.answer import Row, table, two_columns
 from zwidth.show.cli.energies import HEADINGS, energy_rows
-from zwidth.show.cli.heading import computer
 from zwidth.show.cli.simulation_page import environment_words
-from zwidth.show.output import shown
+from zwidth.show.output import printable
 from zwidth.show.units import amount, percent, typed, vector
 
 if TYPE_CHECKING:
     from zwidth.contact.mechanism.motion import MechanismMotion
-    from zwidth.show.cli.command import Case
+    from zwidth.show.cli.command import CommandLine
 
 FINE: Final = 4  # substeps that friction asks for, which switches within a step
-DUST: Final = 1e-13  # share of the motion's size below which a length is rounding
+ROUNDING_SHARE: Final = 1e-13  # share of the motion's size below which a length is rounding
 NO_WAY: Final = 1e-9  # share of the largest motion below which there is none
-COUNTED: Final = ("encoder steps", "noise")
+ENCODER_EFFECTS: Final = ("encoder steps", "noise")
 
 
-def pages(case: Case, motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Any]:
+def move_page(case: CommandLine, motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Any]:
     """What was asked, how it ended, the numbers, the energies, and what is worth a remark."""
     start = vector(motion.start.position, "m")
-    yield f"{shown(case.device.name)}: the whole mechanism from {start}, assembly {document['assembly']}"
-    yield computer(case.device.controller)
+    yield f"{printable(case.device.name)}: the whole mechanism from {start}, assembly {document['assembly']}"
+    yield computer_text(case.device.controller)
     yield _status(document)
-    yield sheet([*_circumstances(case, motion), *_results(motion, document)])
+    yield two_columns([*_circumstances(case, motion), *_results(motion, document)])
     yield table(HEADINGS, list(_energies(document["energy_book_J"])))
     yield from _remarks(case, motion, document)
 
@@ -40,7 +40,7 @@ def _status(document: Mapping[str, Any]) -> str:
     return f"ended before its time: {document['ended_because']}"
 
 
-def _circumstances(case: Case, motion: MechanismMotion) -> Iterator[Row]:
+def _circumstances(case: CommandLine, motion: MechanismMotion) -> Iterator[Row]:
     yield "surface", _surface(motion, named=case["environment"] is not None)
     moving = f"with {vector(motion.start_velocity, 'm/s')}" if motion.start_velocity.any() else "at rest"
     yield "start", moving
@@ -85,18 +85,18 @@ def _results(motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[R
         yield "largest force", _when(document["largest_force_N"], "N", motion.force_size, motion.time)
         yield "in contact", f"{typed(percent(document['contact_share']))} of the samples"
         yield "torque limits", _limits(motion)
-        if isfinite(motion.point.controller.saturation):
+        if isfinite(motion.point.controller.force_limit):
             yield "force limit", _share(document["force_limit_share"])
     size = float(np.max(np.abs(motion.position)))
-    yield "handle at the end", vector(_without_dust(motion.position[-1], size), "m")
+    yield "handle at the end", vector(_without_rounding(motion.position[-1], size), "m")
     path = float(np.sum(np.linalg.norm(np.diff(motion.position, axis=0), axis=1)))
-    yield "its path", amount(path if path > DUST * size else 0.0, "m")
+    yield "its path", amount(path if path > ROUNDING_SHARE * size else 0.0, "m")
 
 
-def _without_dust(place: Any, size: float) -> Any:
+def _without_rounding(position: Any, size: float) -> Any:
     import numpy as np
 
-    return np.where(np.abs(place) > DUST * size, place, 0.0)
+    return np.where(np.abs(position) > ROUNDING_SHARE * size, position, 0.0)
 
 
 def _when(value: float, unit: str, course: Any, time: Any) -> str:
@@ -108,7 +108,7 @@ def _when(value: float, unit: str, course: Any, time: Any) -> str:
 def _limits(motion: MechanismMotion) -> str:
     limits = motion.mechanism.drives.torque_limit
     told = [
-        f"{shown(name)} {_share(share)}"
+        f"{printable(name)} {_share(share)}"
         for (name, share), limit in zip(motion.torque_limit_share.items(), limits, strict=True)
         if isfinite(limit)
     ]
@@ -132,30 +132,30 @@ def _energies(book: Mapping[str, float]) -> Iterator[tuple[str, str, str]]:
     return energy_rows(own, book["stored"])
 
 
-def _remarks(case: Case, motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[str]:
+def _remarks(case: CommandLine, motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[str]:
     import numpy as np
 
-    moved = float(np.max(np.ptp(motion.position, axis=0)))
-    still = not moved > DUST * float(np.max(np.abs(motion.position)))
+    travel = float(np.max(np.ptp(motion.position, axis=0)))
+    still = not travel > ROUNDING_SHARE * float(np.max(np.abs(motion.position)))
     if motion.surface is not None and motion.started_inside:
         side = f"behind the {document['surface']['kind']}" if motion.two_sided else "inside the wall"
         yield f"starts {amount(float(motion.depth[0]), 'm')} {side}"
-    part = [name for name in case.device.left_out if motion.counted or name not in COUNTED]
-    if part:
-        yield f"with what a chart leaves out: {', '.join(part)}"
-    if "dry friction" in part and motion.substeps < FINE:
+    effects = [name for name in case.device.linear_omissions if motion.counted or name not in ENCODER_EFFECTS]
+    if effects:
+        yield f"with what a chart leaves out: {', '.join(effects)}"
+    if "dry friction" in effects and motion.substeps < FINE:
         yield f"friction switches within a step: take --substeps {FINE} or more"
     if document["left_out"]:
         yield f"leaves out {', '.join(document['left_out'])}: the hand is the push alone"
-    if lost := _lost(motion):
-        yield f"{amount(lost, 'N')} of the push are across all ways the handle can go, and move nothing"
+    if ineffective := _ineffective_push(motion):
+        yield f"{amount(ineffective, 'N')} of the push are across all ways the handle can go, and move nothing"
     if not (motion.push.any() or motion.start_velocity.any() or motion.gravity.any()) and still:
         yield "nothing moves it: give --push, --start-velocity or --gravity"
     elif motion.surface is not None and not document["contact_share"]:
         yield "the handle never touches the surface"
 
 
-def _lost(motion: MechanismMotion) -> float:
+def _ineffective_push(motion: MechanismMotion) -> float:
     """How much of the push lies across all directions in which the handle can go [N]; 0 where none does."""
     import numpy as np
 

@@ -10,17 +10,17 @@ from typing import Any, Final
 
 import click
 
-from zwidth.device.new import KINDS
-from zwidth.show.cli.command import Case, Command
+from zwidth.device.new_device import KINDS
+from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import Command as Callback
-from zwidth.show.cli.options import Question, named
-from zwidth.show.output import shown, write_text
+from zwidth.show.cli.options import Callback as Callback
+from zwidth.show.cli.options import Question, refuse_empty
+from zwidth.show.output import printable, write_text
 
 ENDING: Final = ".toml"
 
 
-class New(Command):
+class NewCommand(Command):
     """Write a device file NAME.toml to start from: exchange its numbers for yours.
 
     It is complete and answers at once. Every number has a comment that says what it is and where one gets it; what
@@ -41,45 +41,45 @@ class New(Command):
     )
     outputs = (ENDING,)
     output_help = "Where to write it (.toml). Default: NAME.toml in this folder."
-    of_responses = True  # there is no device yet
+    takes_responses = True  # there is no device yet
 
     def about(self, command: Callback) -> Callback:
         @wraps(command)
         def told(device: str, **more: Any) -> int:
             return command(Question(device), **more)
 
-        return click.argument("device", metavar="NAME", callback=named)(told)
+        return click.argument("device", metavar="NAME", callback=refuse_empty)(told)
 
     def default_output(self, question: Question) -> str:
         return question.name if question.name.lower().endswith(ENDING) else question.name + ENDING
 
-    def check(self, case: Case) -> None:
+    def check(self, case: CommandLine) -> None:
         assert case.path is not None
         if case.path.exists():
             raise BadInput(f"{case.path}: is there already; remove it, or name another with --output")
 
-    def circumstances(self, case: Case) -> dict[str, Any]:
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
         return {"name": _name(case.question), "kind": case["kind"]}
 
-    def compute(self, case: Case) -> str:
-        from zwidth.device.new import new_device
+    def compute(self, case: CommandLine) -> str:
+        from zwidth.device.new_device import new_device
 
         try:
             return new_device(_name(case.question), case["kind"])
         except ValueError as error:
             raise BadInput(str(error)) from None
 
-    def document(self, case: Case, result: str) -> dict[str, Any]:
+    def document(self, case: CommandLine, result: str) -> dict[str, Any]:
         return {}
 
-    def heading(self, case: Case) -> str:
+    def heading(self, case: CommandLine) -> str:
         return ""
 
-    def pages(self, case: Case, result: str, document: Mapping[str, Any]) -> Iterator[Any]:
-        file = shown(shlex.quote(document["file"]))
+    def pages(self, case: CommandLine, result: str, document: Mapping[str, Any]) -> Iterator[Any]:
+        file = printable(shlex.quote(document["file"]))
         yield f"{document['kind']}: exchange its numbers for yours; it answers already:\n  zwidth chart {file}"
 
-    def write(self, case: Case, result: str, document: dict[str, Any], reason: str | None) -> str | None:
+    def write(self, case: CommandLine, result: str, document: dict[str, Any], reason: str | None) -> str | None:
         assert case.path is not None
         write_text(case.path, result)
         return reason

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.show.circumstances import AS_GIVEN
 from zwidth.study.points_file import wall_number
 
 if TYPE_CHECKING:
@@ -25,10 +26,9 @@ else:
     ParamType = click.ParamType  # generic in newer releases only
 
 MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
-EXTREMES: Final = ("worst", "best", "lowest", "highest")  # as in study.worst
-AS_GIVEN: Final = "as given"
+EXTREMES: Final = ("worst", "best", "lowest", "highest")  # as in study.extreme_direction
 
-Command = Callable[..., int]
+Callback = Callable[..., int]
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Question:
         """Where the device is asked about. Raises what `Device.at` raises."""
         return device.at(self.at, self.direction, assembly=self.assembly, model=self.model)
 
-    def of_several_directions(self, device: Device) -> None:
+    def refuse_unsupported(self, device: Device) -> None:
         """Raises BadInput for what directions computed together leave out."""
         from zwidth.loop.point_errors import SeveralDirectionsError, check_several_directions
         from zwidth.show.cli.errors import BadInput
@@ -81,9 +81,9 @@ class Question:
         """What the operator at the handle is called; None where nobody holds it, or the model holds it fixed."""
         return None if self.model == "motor-mass" else device.operator_name
 
-    def facts(self, device: Device) -> dict[str, Any]:
+    def linear_circumstances(self, device: Device) -> dict[str, Any]:
         """What a linear result states first: its circumstances, and what of the device it leaves out."""
-        return self.circumstances(device) | {"left_out": list(device.left_out)}
+        return self.circumstances(device) | {"left_out": list(device.linear_omissions)}
 
     def _where(self, device: Device) -> tuple[Floats | None, float | None]:
         """Position of the handle [m], and how far it was projected; as asked for, and None, where it cannot be."""
@@ -114,7 +114,7 @@ class Question:
         }
 
 
-class Posture(ParamType):
+class PostureType(ParamType):
     """A handle's position, or the angles of driven joints by name."""
 
     name = "posture"
@@ -183,27 +183,27 @@ def _axis(ctx: click.Context, param: click.Parameter, value: str | None) -> None
         raise click.BadParameter("moments about an axis are not supported yet; use --direction")
 
 
-def named(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+def refuse_empty(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     """A callback that refuses an empty name."""
     if value == "":
         raise click.BadParameter("is empty; give a name (is a variable of the shell not set?)")
     return value
 
 
-class Towards(Numbers):
+class DirectionType(Numbers):
     """A direction, or which of all of them."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         return value if value in EXTREMES else super().convert(value, param, ctx)
 
 
-def about_a_device(command: Command) -> Command:
+def about_a_device(command: Callback) -> Callback:
     """Give a command DEVICE and the options that say what of it is meant, as one `Question`."""
-    return _asking(
+    return _with_device_options(
         command,
         click.option(
             "--at",
-            type=Posture(),
+            type=PostureType(),
             help="Posture: the handle's position [m], or the driven joints' angles [rad].",
         ),
         click.option(
@@ -214,30 +214,30 @@ def about_a_device(command: Command) -> Command:
     )
 
 
-def about_a_workspace(command: Command) -> Command:
+def about_a_workspace(command: Callback) -> Callback:
     """The same for a command about all postures, along one direction or the extreme ones; `extreme` is which."""
 
     @wraps(command)
-    def told(question: Question, **more: Any) -> int:
+    def with_extreme(question: Question, **more: Any) -> int:
         direction: Any = question.direction
         extreme = direction if isinstance(direction, str) else None
         return command(replace(question, direction=None if extreme else direction), extreme=extreme, **more)
 
     choice = "|".join(EXTREMES)
-    return _asking(
-        told,
+    return _with_device_options(
+        with_extreme,
         click.option(
             "--direction",
-            type=Towards(f"DX,DY[,DZ]|{choice}", (2, 3), f"0,1, or one of {', '.join(EXTREMES)}"),
+            type=DirectionType(f"DX,DY[,DZ]|{choice}", (2, 3), f"0,1, or one of {', '.join(EXTREMES)}"),
             help="Rendered direction, of any length; worst: in each cell the one in which the measure is worst.",
         ),
     )
 
 
-def _asking(command: Command, *where: Any) -> Command:
+def _with_device_options(command: Callback, *where: Any) -> Callback:
     """DEVICE, the options `where`, and those that every question about a device has."""
     decorators = [
-        click.argument("device", metavar="DEVICE", callback=named),
+        click.argument("device", metavar="DEVICE", callback=refuse_empty),
         *where,
         click.option("--assembly", metavar="NAME", help="Way of assembling the mechanism."),
         click.option(
@@ -248,7 +248,7 @@ def _asking(command: Command, *where: Any) -> Command:
         click.option(
             "--operator",
             metavar="NAME|FILE|none",
-            callback=named,
+            callback=refuse_empty,
             help="Who holds the handle: a bundled operator, a file with an [operator], or nobody. Default: the "
             "[operator] of DEVICE.",
         ),
@@ -263,7 +263,7 @@ def _asking(command: Command, *where: Any) -> Command:
     ]
 
     @wraps(command)
-    def asked(
+    def with_arguments(
         device: str,
         assembly: Any,
         direction: Any,
@@ -276,13 +276,13 @@ def _asking(command: Command, *where: Any) -> Command:
         return command(Question(device, settings, at, direction, assembly, model, operator), **more)
 
     for decorate in reversed(decorators):
-        asked = decorate(asked)
-    return asked
+        with_arguments = decorate(with_arguments)
+    return with_arguments
 
 
-def output_option(what: str) -> Callable[[Command], Command]:
+def output_option(what: str) -> Callable[[Callback], Callback]:
     """`--output FILE`, with what its ending may be."""
-    return click.option("--output", metavar="FILE", callback=named, help=what)
+    return click.option("--output", metavar="FILE", callback=refuse_empty, help=what)
 
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")

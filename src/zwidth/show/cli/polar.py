@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import sheet
-from zwidth.show.cli.command import Case, Command
+from zwidth.show.cli.answer import two_columns
+from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.output import shown
-from zwidth.show.units import amount, given, typed, vector
+from zwidth.show.output import printable
+from zwidth.show.units import amount, as_written, typed, vector
 
 if TYPE_CHECKING:
     from zwidth.chart.polar import ByDirection
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 PLANES: Final = ("xy", "xz", "yz")  # as in chart.polar
 
 
-class Polar(Command):
+class PolarCommand(Command):
     """Find the largest stiffness that DEVICE renders stably along every direction of a plane."""
 
     name = "polar"
@@ -53,57 +53,60 @@ class Polar(Command):
         "status",
     )
     size = (4.6, 5.2)
-    of_responses = True  # which it refuses like every device without a mechanism
+    takes_responses = True  # which it refuses like every device without a mechanism
 
-    def check(self, case: Case) -> None:
+    def check(self, case: CommandLine) -> None:
         if case.question.direction is not None:
             raise BadInput(
                 "--direction: does not apply to all directions of a plane; leave it out, or use --plane"
             )
 
-    def asked(self, case: Case) -> dict[str, Any]:
+    def repeated_options(self, case: CommandLine) -> dict[str, Any]:
         return {"plane": case["plane"]}
 
-    def circumstances(self, case: Case) -> dict[str, Any]:
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
         # no direction is meant more than another
         return {key: value for key, value in super().circumstances(case).items() if key != "direction"}
 
-    def compute(self, case: Case) -> ByDirection:
+    def compute(self, case: CommandLine) -> ByDirection:
         question = case.question
         if case.device.mechanism is None:
             raise BadInput(f"{question.name}: has no [mechanism], and so one direction only; ask for its chart")
-        question.of_several_directions(case.device)
+        question.refuse_unsupported(case.device)
         return case.point.by_direction(case["plane"], case["count"])
 
-    def reason(self, case: Case, result: ByDirection) -> str | None:
+    def reason(self, case: CommandLine, result: ByDirection) -> str | None:
         return result.reason
 
-    def heading(self, case: Case) -> str:
+    def heading(self, case: CommandLine) -> str:
         facts = self.circumstances(case)
         _, rest = super().heading(case).split("\n", 1)
         where = f"at {vector(facts['position_m'], 'm')}, assembly {facts['assembly']}, model {facts['model']}"
-        return f"{shown(case.device.name)}: {where}\n{rest}"
+        return f"{printable(case.device.name)}: {where}\n{rest}"
 
-    def pages(self, case: Case, result: ByDirection, document: Mapping[str, Any]) -> Iterator[Any]:
-        yield sheet(list(_rows(result)))
+    def pages(self, case: CommandLine, result: ByDirection, document: Mapping[str, Any]) -> Iterator[Any]:
+        yield two_columns(list(_rows(result)))
 
 
-def _rows(found: ByDirection) -> Iterator[tuple[str, str]]:
+def _rows(by_direction: ByDirection) -> Iterator[tuple[str, str]]:
     import numpy as np
 
-    plane, count = found.plane, len(found.stiffness)
-    have = np.isfinite(found.stiffness)
+    plane, count = by_direction.plane, len(by_direction.stiffness)
+    have = np.isfinite(by_direction.stiffness)
     yield "directions", f"{count} of the {plane} plane"
     if have.any():
-        angles = found.angles
+        angles = by_direction.angles
         for name, k in (
-            ("stiffest", int(np.nanargmax(found.stiffness))),
-            ("least stiff", int(np.nanargmin(found.stiffness))),
+            ("stiffest", int(np.nanargmax(by_direction.stiffness))),
+            ("least stiff", int(np.nanargmin(by_direction.stiffness))),
         ):
             yield (
                 name,
-                f"{amount(found.stiffness[k], 'N/m')} at {amount(found.damping[k], 'Ns/m')} of damping, "
-                f"along {typed(given(float(angles[k])))}° from {plane[0]} towards {plane[1]}",
+                f"{amount(by_direction.stiffness[k], 'N/m')} "
+                f"at {amount(by_direction.damping[k], 'Ns/m')} of damping, "
+                f"along {typed(as_written(float(angles[k])))}° from {plane[0]} towards {plane[1]}",
             )
-    for status in sorted({status for status, answered in zip(found.status, have, strict=True) if not answered}):
-        yield "without answer", f"{found.status.count(status)}: {status}"
+    for status in sorted(
+        {status for status, answered in zip(by_direction.status, have, strict=True) if not answered}
+    ):
+        yield "without answer", f"{by_direction.status.count(status)}: {status}"

@@ -17,7 +17,7 @@ PATIENCE: Final = 5.0  # s without a word
 
 
 @contextmanager
-def progress_told() -> Iterator[Progress]:
+def show_progress() -> Iterator[Progress]:
     """A bar on standard error where somebody watches; else a line for each stage of a run that takes its time."""
     with _bar() if sys.stderr is not None and sys.stderr.isatty() else _lines() as progress:
         yield progress
@@ -41,17 +41,17 @@ def _bar() -> Iterator[Progress]:
 
 @contextmanager
 def _lines() -> Iterator[Progress]:
-    began, told, now = monotonic(), set[str](), ["starting"]
+    began, printed_stages, now = monotonic(), set[str](), ["starting"]
 
     def speak() -> None:
-        if now[0] in told:  # the timer and the computation may come here together
+        if now[0] in printed_stages:  # the timer and the computation may come here together
             return
-        told.add(now[0])
+        printed_stages.add(now[0])
         say(f"zwidth: {now[0]}")
 
     def line(stage: str, done: int, of: int) -> None:
         now[0] = stage
-        if done < of and stage not in told and monotonic() - began > PATIENCE:
+        if done < of and stage not in printed_stages and monotonic() - began > PATIENCE:
             speak()
 
     # the first stage may be one long step

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from zwidth.show.cli.command import Case, Command
+from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Question
 from zwidth.show.units import typed
 
 
-class Report(Command):
+class ReportCommand(Command):
     """Write a report on DEVICE: its chart, what limits it, what to change; one HTML file that also prints."""
 
     name = "report"
@@ -20,33 +20,33 @@ class Report(Command):
     outputs = (".html", ".htm")
     output_help = "Where to write it (.html). Default: NAME-report.html in this folder."
     keys = ("file",)
-    decides = True
+    may_be_undecided = True
 
     def default_output(self, question: Question) -> str:
         return default_name(question.name)
 
-    def compute(self, case: Case) -> dict[str, Any]:
+    def compute(self, case: CommandLine) -> dict[str, Any]:
         _ = case.point.plant  # whether it can be meant, before the heavy parts are imported
         from zwidth.show.report.report import write_report
 
         assert case.path is not None
         return write_report(case.device, case.path, case.point)
 
-    def document(self, case: Case, result: dict[str, Any]) -> dict[str, Any]:
+    def document(self, case: CommandLine, result: dict[str, Any]) -> dict[str, Any]:
         # what the command line was asked for is stated as typed
         return result | self.circumstances(case)
 
-    def reason(self, case: Case, result: dict[str, Any]) -> str | None:
+    def reason(self, case: CommandLine, result: dict[str, Any]) -> str | None:
         reason: str | None = result.pop("reason", None)
         return reason
 
-    def write(self, case: Case, result: Any, document: dict[str, Any], reason: str | None) -> str | None:
+    def write(self, case: CommandLine, result: Any, document: dict[str, Any], reason: str | None) -> str | None:
         return reason  # written as it was computed
 
-    def heading(self, case: Case) -> str:
+    def heading(self, case: CommandLine) -> str:
         return ""
 
-    def pages(self, case: Case, result: dict[str, Any], document: Mapping[str, Any]) -> Iterator[Any]:
+    def pages(self, case: CommandLine, result: dict[str, Any], document: Mapping[str, Any]) -> Iterator[Any]:
         yield from (typed(sentence) for sentence in result["summary"])
 
 

@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from zwidth.show.cli.errors import BadInput, Stopped
-from zwidth.show.cli.options import Command, named
+from zwidth.show.cli.errors import BadInput, UnfinishedRun
+from zwidth.show.cli.options import Callback, refuse_empty
 from zwidth.show.cli.process import say, stopped_in_a_kernel
-from zwidth.show.output import shown
+from zwidth.show.output import printable
 
 if TYPE_CHECKING:
     from zwidth.study.job import Job
     from zwidth.study.store import Store
 
 
-def kept_options(command: Command) -> Command:
+def resume_options(command: Callback) -> Callback:
     """Give a command `--resume` and `--workers`."""
     options: list[Callable[[Any], Any]] = [
         click.option(
-            "--resume", metavar="FOLDER", callback=named, help="Keep what is done here, and go on from it."
+            "--resume", metavar="FOLDER", callback=refuse_empty, help="Keep what is done here, and go on from it."
         ),
         click.option(
             "--workers",
@@ -37,7 +37,7 @@ def kept_options(command: Command) -> Command:
     return command
 
 
-def opened(job: Job, beside: Path | None, resume: str | None) -> Store | None:
+def open_store(job: Job, beside: Path | None, resume: str | None) -> Store | None:
     """Where a job's results are kept: in a folder of the user's, or beside the file that is written; else nowhere.
 
     Raises  BadInput  where there is no room, or something else is there
@@ -46,7 +46,7 @@ def opened(job: Job, beside: Path | None, resume: str | None) -> Store | None:
 
     if resume is None and beside is None:
         return None
-    path = Path(resume) if resume is not None else _progress(beside)
+    path = Path(resume) if resume is not None else _default_folder(beside)
     try:
         return Store(path, job)
     except StoreError as error:
@@ -55,13 +55,13 @@ def opened(job: Job, beside: Path | None, resume: str | None) -> Store | None:
         raise BadInput(_unwritable(path, error)) from None
 
 
-def _progress(beside: Path | None) -> Path:
+def _default_folder(beside: Path | None) -> Path:
     assert beside is not None
     return beside.with_name(beside.name + ".progress")
 
 
 @contextmanager
-def keeping(store: Store | None) -> Iterator[None]:
+def report_kept_work(store: Store | None) -> Iterator[None]:
     """Run inside this block; says where the work is if it is stopped.
 
     Raises  Stopped   where a process that computed is lost
@@ -72,7 +72,7 @@ def keeping(store: Store | None) -> Iterator[None]:
     goes_on = (
         ""
         if store is None
-        else f"{shown(str(store.path))} keeps what is done; the same command goes on from there"
+        else f"{printable(str(store.path))} keeps what is done; the same command goes on from there"
     )
     try:
         yield
@@ -82,7 +82,7 @@ def keeping(store: Store | None) -> Iterator[None]:
             say(f"zwidth: {goes_on}")
         raise
     except WorkerLost as error:
-        raise Stopped("; ".join(filter(None, (str(error), goes_on)))) from None
+        raise UnfinishedRun("; ".join(filter(None, (str(error), goes_on)))) from None
     except OSError as error:
         if store is None:
             raise
@@ -91,4 +91,4 @@ def keeping(store: Store | None) -> Iterator[None]:
 
 def _unwritable(path: Path, error: OSError) -> str:
     reason = error.strerror or str(error)
-    return f"{shown(str(path))}: cannot be written: {reason[:1].lower() + reason[1:]}; name another folder"
+    return f"{printable(str(path))}: cannot be written: {reason[:1].lower() + reason[1:]}; name another folder"

@@ -8,28 +8,27 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.device.read import LARGEST_FILE
-from zwidth.device.text_file import Unreadable, read_text
-from zwidth.show.cli.answer import sheet, table
-from zwidth.show.cli.command import Case, Command
-from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.failures import NoAnswer
-from zwidth.show.cli.options import named
-from zwidth.show.cli.progress import progress_told
-from zwidth.show.members import member_text, value_text
-from zwidth.show.motions import counted
-from zwidth.show.output import shown
+from zwidth.device.text_file import UnreadableFileError, read_text
+from zwidth.loop.motion_names import group_names
+from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.cli.errors import BadInput, NoAnswer
+from zwidth.show.cli.options import refuse_empty
+from zwidth.show.cli.progress import show_progress
+from zwidth.show.member_text import member_text, value_text
+from zwidth.show.output import printable
 from zwidth.show.units import amount, percent, radius, typed, uncertain
 
 if TYPE_CHECKING:
+    from zwidth.study.robust import RobustStudy, Violation
     from zwidth.study.robust_family import Range
-    from zwidth.study.robust_study import RobustStudy, Violation
 
 MOST: Final = 100_000  # members, or unseen ones
-TOLD: Final = 12  # binding members in what people read
-SPELLED: Final = {"Device.with_": "--set", "logarithmic": "log"}  # arguments of a range, as typed
+BINDING_ROWS: Final = 12  # binding members in what people read
+ARGUMENT_NAMES: Final = {"Device.with_": "--set", "logarithmic": "log"}  # arguments of a range, as typed
 
 
-class Robust(Command):
+class RobustCommand(Command):
     """Find the walls that DEVICE renders stably for every operator of a list, and every value of numbers known in
     ranges."""
 
@@ -49,10 +48,16 @@ class Robust(Command):
             "spread evenly over its logarithm.",
         ),
         click.option(
-            "--operators", metavar="A,B,C", callback=named, help="Who may hold the handle: names, files, none."
+            "--operators",
+            metavar="A,B,C",
+            callback=refuse_empty,
+            help="Who may hold the handle: names, files, none.",
         ),
         click.option(
-            "--operator-list", metavar="FILE", callback=named, help="The same, one a line; # begins a comment."
+            "--operator-list",
+            metavar="FILE",
+            callback=refuse_empty,
+            help="The same, one a line; # begins a comment.",
         ),
         click.option(
             "--members", type=click.IntRange(2, MOST), default=256, metavar="N", help="Charts (default 256)."
@@ -95,13 +100,13 @@ class Robust(Command):
         "excluding",
     )
     size = (5.6, 4.6)
-    decides = True
+    may_be_undecided = True
 
-    def parse(self, case: Case) -> dict[str, Any]:
+    def parse(self, case: CommandLine) -> dict[str, Any]:
         operators = _operators(case.question.operator, case["operators"], case["operator_list"])
         return {"operators": operators, "ranges": _ranges(case["ranges"])}
 
-    def compute(self, case: Case) -> RobustStudy:
+    def compute(self, case: CommandLine) -> RobustStudy:
         from zwidth.study.robust import RobustError, robust_study
         from zwidth.study.robust_family import Family, RangeError
 
@@ -111,15 +116,20 @@ class Robust(Command):
             )
         family = Family(case.device, case["ranges"], case["operators"], case.point)
         try:
-            with progress_told() as progress:
+            with show_progress() as progress:
                 return robust_study(family, case["members"], case["unseen"], case["seed"], progress=progress)
         except RangeError as error:
-            faults = (fault.spelled(lambda name, _: SPELLED[name]) for fault in error.faults)
+            faults = (fault.spelled(lambda name, _: ARGUMENT_NAMES[name]) for fault in error.faults)
             raise BadInput(*(f"--range: {fault}" for fault in faults)) from None
         except RobustError as error:
             raise NoAnswer(str(error)) from None
 
-    def reason(self, case: Case, result: RobustStudy) -> str | None:
+    def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
+        from zwidth.show.figures.caption import facts_of_members
+
+        return super().caption_facts(case, document) | facts_of_members(document["members"])
+
+    def reason(self, case: CommandLine, result: RobustStudy) -> str | None:
         if result.chart.members_at_stiffness_max:
             return None
         names = [member_text(index, result.members[index]) for index in result.chart.excluding]
@@ -128,19 +138,19 @@ class Robust(Command):
         group = "these two members exclude each other" if len(names) == 2 else "these members have none in common"
         return f"no wall with K > 0 and B >= 0 is stable for every member; {group}: {'; '.join(names)}"
 
-    def pages(self, case: Case, result: RobustStudy, document: Mapping[str, Any]) -> Iterator[Any]:
+    def pages(self, case: CommandLine, result: RobustStudy, document: Mapping[str, Any]) -> Iterator[Any]:
         if not result.chart.members_at_stiffness_max:
             return
-        yield sheet(list(_rows(result)))
+        yield two_columns(list(_rows(result)))
         shares = result.edge_shares
         paths = list(result.members[0])
         rows = [
-            [str(index), *(shown(value_text(result.members[index][p])) for p in paths), typed(percent(share))]
-            for index, share in list(shares.items())[:TOLD]
+            [str(index), *(printable(value_text(result.members[index][p])) for p in paths), typed(percent(share))]
+            for index, share in list(shares.items())[:BINDING_ROWS]
         ]
         yield table(["binds", *paths, "of the edge"], rows)
-        if len(shares) > TOLD:
-            yield f"... and {len(shares) - TOLD} more; --json lists all"
+        if len(shares) > BINDING_ROWS:
+            yield f"... and {len(shares) - BINDING_ROWS} more; --json lists all"
 
 
 def _ranges(texts: tuple[str, ...]) -> tuple[Range, ...]:
@@ -178,7 +188,7 @@ def _operators(single: str | None, names: str | None, file: str | None) -> tuple
     if file is not None:
         try:
             lines = read_text(file, LARGEST_FILE).splitlines()
-        except Unreadable as error:
+        except UnreadableFileError as error:
             raise BadInput(f"--operator-list: {file}: {error}; give a text file, one name a line") from None
         listed = [line.split("#")[0].strip() for line in lines]
         found = tuple(dict.fromkeys(name for name in listed if name))
@@ -189,8 +199,8 @@ def _operators(single: str | None, names: str | None, file: str | None) -> tuple
     return found
 
 
-def _rows(found: RobustStudy) -> Iterator[tuple[str, str]]:
-    chart = found.chart
+def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
+    chart = study.chart
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
     members = " and ".join(map(str, chart.members_at_stiffness_max))
     yield (
@@ -207,31 +217,31 @@ def _rows(found: RobustStudy) -> Iterator[tuple[str, str]]:
     )
     yield "largest damping", amount(chart.damping_max, "Ns/m")
     yield "stable area", amount(chart.stable_area, "N²s/m²")
-    yield "members", _members(found)
+    yield "members", _members_text(study)
     if chart.failed:
         first = next(iter(chart.failed))
         yield (
             "not charted",
             (
                 f"{len(chart.failed)} members, of which nothing is claimed; the first, "
-                f"{member_text(first, found.members[first])}: {shown(chart.failed[first])}"
+                f"{member_text(first, study.members[first])}: {printable(chart.failed[first])}"
             ),
         )
-    if found.violation is not None:
-        yield "unseen members", _violation(found.violation)
+    if study.violation is not None:
+        yield "unseen members", _violation(study.violation)
     if chart.unobserved_modes:
-        yield "moved by no wall", ", ".join(counted(chart.unobserved_modes))
+        yield "moved by no wall", ", ".join(group_names(chart.unobserved_modes))
 
 
-def _members(found: RobustStudy) -> str:
-    count, moved = len(found.members), f"{typed(uncertain(100 * found.moved))} %"
-    if found.violation is None:
+def _members_text(study: RobustStudy) -> str:
+    count, edge_change = len(study.members), f"{typed(uncertain(100 * study.area_change))} %"
+    if study.violation is None:
         return f"{count}, all of the list"
-    if found.settled:
-        end = f"the search settled, its last round moved the edge by {moved} of the area"
+    if study.settled:
+        end = f"the search settled, its last round moved the edge by {edge_change} of the area"
     else:
-        end = f"the search used up --members {count} and had still moved the edge by {moved}"
-    return f"{count}, of which {count - found.sampled} found by searching the ranges for worse ones; {end}"
+        end = f"the search used up --members {count} and had still moved the edge by {edge_change}"
+    return f"{count}, of which {count - study.sampled} found by searching the ranges for worse ones; {end}"
 
 
 def _violation(violation: Violation) -> str:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli.answer import table
-from zwidth.show.cli.command import Case, Command
-from zwidth.show.units import amount, given, signed, typed
+from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.units import amount, as_written, signed, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,26 +43,26 @@ class SensitivityCommand(Command):
         "rival_stiffness_N_per_m",
         "one_sided",
     )
-    decides = True
+    may_be_undecided = True
 
-    def compute(self, case: Case) -> Sensitivities:
+    def compute(self, case: CommandLine) -> Sensitivities:
         return case.device.sensitivities(case.point)
 
-    def reason(self, case: Case, result: Sensitivities) -> str | None:
+    def reason(self, case: CommandLine, result: Sensitivities) -> str | None:
         return None if result.peak is not None else NO_WALL
 
-    def pages(self, case: Case, result: Sensitivities, document: Mapping[str, Any]) -> Iterator[Any]:
+    def pages(self, case: CommandLine, result: Sensitivities, document: Mapping[str, Any]) -> Iterator[Any]:
         peak = result.peak
         if peak is None:
             return
         stiffest = f"{amount(peak.stiffness, 'N/m')} at {amount(peak.damping, 'Ns/m')} of damping"
         yield f"largest stiffness {stiffest}; held by: {result.kind or 'not known'}"
-        told = [number for number in result.numbers if number.logarithmic == number.logarithmic]
-        shown = [number for number in told if number.logarithmic != 0.0][: case["top"]]
+        known = [number for number in result.numbers if number.logarithmic == number.logarithmic]
+        shown = [number for number in known if number.logarithmic != 0.0][: case["top"]]
         yield table(["number", "value", "sensitivity", "+1 % gives"], [_row(result, number) for number in shown])
-        yield from _remarks(result, len(told) - len(shown))
+        yield from _remarks(result, len(known) - len(shown))
 
-    def draw(self, case: Case, result: Sensitivities) -> Figure:
+    def draw(self, case: CommandLine, result: Sensitivities) -> Figure:
         from zwidth.show.figures.sensitivity import draw_sensitivities
         from zwidth.show.figures.style import figure
 
@@ -71,25 +71,26 @@ class SensitivityCommand(Command):
         return drawing
 
 
-def _row(found: Sensitivities, number: Sensitivity) -> tuple[str, str, str, str]:
-    assert found.peak is not None
-    gain = 0.01 * number.logarithmic * found.peak.stiffness
+def _row(sensitivities: Sensitivities, number: Sensitivity) -> tuple[str, str, str, str]:
+    assert sensitivities.peak is not None
+    gain = 0.01 * number.logarithmic * sensitivities.peak.stiffness
     return (
         number.path,
-        f"{typed(given(number.value))} {number.unit}".rstrip(),
+        f"{typed(as_written(number.value))} {number.unit}".rstrip(),
         typed(signed(number.logarithmic)),
         f"{'+' if gain > 0.0 else ''}{amount(gain, 'N/m')}",
     )
 
 
-def _remarks(found: Sensitivities, more: int) -> Iterator[str]:
+def _remarks(sensitivities: Sensitivities, more: int) -> Iterator[str]:
     """What the table does not show."""
-    late = next((n for n in found.numbers if n.path == "loop.delay_samples" and n.value == 0.0), None)
+    late = next((n for n in sensitivities.numbers if n.path == "loop.delay_samples" and n.value == 0.0), None)
     if late is not None and late.derivative == late.derivative:
         yield f"a delay of 0.01 samples gives {amount(0.01 * late.derivative, 'N/m')}"
-    if found.tie:
+    if sensitivities.tie:
         yield "two walls are stiffest at once: these numbers are of one of them, and a change may lower the other"
-    elif found.peak is not None and found.rival > 0.9 * found.peak.stiffness:
-        yield f"another summit stands at {amount(found.rival, 'N/m')}: it takes over once this one falls below it"
+    elif sensitivities.peak is not None and sensitivities.second_peak > 0.9 * sensitivities.peak.stiffness:
+        second = amount(sensitivities.second_peak, "N/m")
+        yield f"another peak stands at {second}: it takes over once this one falls below it"
     if more > 0:
         yield f"and {more} more that matter less or not at all; --top N, --json or --output holds them"

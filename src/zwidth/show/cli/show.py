@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from zwidth.show.cli.answer import sheet, table
-from zwidth.show.cli.command import Case, Command
-from zwidth.show.output import DATA, plain
+from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.output import DATA, json_value
 from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from zwidth.model.mechanism import Floats
 
 
-class Show(Command):
+class ShowCommand(Command):
     """Show DEVICE at a posture: masses and stiffness felt along the direction, frequencies, dexterity."""
 
     name = "show"
@@ -39,20 +39,20 @@ class Show(Command):
         "sources",
     )
 
-    def compute(self, case: Case) -> Description:
+    def compute(self, case: CommandLine) -> Description:
         return case.point.describe()
 
-    def document(self, case: Case, result: Description) -> dict[str, Any]:
+    def document(self, case: CommandLine, result: Description) -> dict[str, Any]:
         return result.document() | {"sources": case.device.sources}
 
-    def table(self, case: Case, result: Description, document: Mapping[str, Any]) -> dict[str, list[Any]]:
+    def table(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> dict[str, list[Any]]:
         from zwidth.measures.description import entries
 
-        return entries(plain(document))
+        return entries(json_value(document))
 
-    def pages(self, case: Case, result: Description, document: Mapping[str, Any]) -> Iterator[Any]:
-        found = plain(document)
-        yield sheet(
+    def pages(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> Iterator[Any]:
+        found = json_value(document)
+        yield two_columns(
             [
                 ("link side", amount(found["link_side_mass_kg"], "kg")),
                 ("motor side", amount(found["motor_side_mass_kg"], "kg")),
@@ -63,7 +63,7 @@ class Show(Command):
         )
         if result.jacobian is not None:
             units = _dexterity_units(result.jacobian)
-            yield sheet(
+            yield two_columns(
                 [
                     ("manipulability", amount(found["manipulability"], units[0])),
                     ("dynamic manipulability", amount(found["dynamic_manipulability"], units[1])),
@@ -83,17 +83,17 @@ def _dexterity_units(jacobian: Floats) -> tuple[str, str]:
     """
     import numpy as np
 
-    from zwidth.measures.dexterity import MOVES
+    from zwidth.measures.dexterity import ZERO_ROW
 
     rows = np.max(np.abs(jacobian), axis=1)
-    r = min(jacobian.shape[1], int(np.sum(rows > MOVES * np.max(rows))))
+    r = min(jacobian.shape[1], int(np.sum(rows > ZERO_ROW * np.max(rows))))
     power = {2: "²", 3: "³"}.get(r, "")
     return f"m{power}", f"1/(kg m){power}"
 
 
-def _modes(found: Mapping[str, Any]) -> Iterator[str]:
-    frequencies = found["natural_frequencies_Hz"]
-    for frequency, ratio in zip(frequencies, found["damping_ratios"] or [None] * len(frequencies), strict=True):
+def _modes(document: Mapping[str, Any]) -> Iterator[str]:
+    frequencies = document["natural_frequencies_Hz"]
+    for frequency, ratio in zip(frequencies, document["damping_ratios"] or [None] * len(frequencies), strict=True):
         if frequency is None:
             yield "unstable"
         else:

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import sheet, table
-from zwidth.show.cli.command import Case, Command
+from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import Command as Callback
-from zwidth.show.cli.options import Question, named
-from zwidth.show.cli.progress import progress_told
-from zwidth.show.cli.resumable import keeping, kept_options, opened
-from zwidth.show.output import ARRAYS, DATA, FIGURES, FOLDERS, shown
+from zwidth.show.cli.options import Callback as Callback
+from zwidth.show.cli.options import Question, refuse_empty
+from zwidth.show.cli.progress import show_progress
+from zwidth.show.cli.resumable import open_store, report_kept_work, resume_options
+from zwidth.show.output import ARRAYS, DATA, FIGURES, FOLDERS, printable
 from zwidth.show.units import number, typed
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from zwidth.study.sweep import Sweep
 
 LISTED: Final = 12  # designs up to which all are listed
-REASONS: Final = 6  # told to people
+SHOWN_REASONS: Final = 6  # told to people
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class StudyQuestion(Question):
     @cached_property
     def study(self) -> Study:
         """The study, read and checked. Raises DeviceError, BadInput."""
-        from zwidth.contact.room import TooLarge
+        from zwidth.memory_limit import TooLarge
         from zwidth.study.study_file import read_study
 
         try:
@@ -58,7 +58,7 @@ def about_a_study(command: Callback) -> Callback:
     def told(study: str, **more: Any) -> int:
         return command(StudyQuestion(study), **more)
 
-    return click.argument("study", metavar="STUDY.toml", callback=named)(told)
+    return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(told)
 
 
 class SweepCommand(Command):
@@ -75,14 +75,14 @@ class SweepCommand(Command):
         "zwidth sweep my-study.toml --output designs.svg",
         "zwidth sweep my-study.toml --resume my-study.cells --workers 4 --output designs.nc",
     )
-    options = (kept_options,)
+    options = (resume_options,)
     outputs = (*FIGURES, *DATA, *ARRAYS, *FOLDERS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .json .nc .mat .zarr)."
 
     def about(self, command: Callback) -> Callback:
         return about_a_study(command)
 
-    def circumstances(self, case: Case) -> dict[str, Any]:
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
         # designs may differ in posture, direction, model and delay
         device = case.device
         return {
@@ -91,12 +91,12 @@ class SweepCommand(Command):
             "study": case.question.name,
             "operator": device.operator_name,
             "sampling_period_s": device.controller.sampling_period,
-            "left_out": list(device.left_out),
+            "left_out": list(device.linear_omissions),
         }
 
-    def compute(self, case: Case) -> Sweep:
-        from zwidth.contact.room import TooLarge
-        from zwidth.measures.measure import MeasureError
+    def compute(self, case: CommandLine) -> Sweep:
+        from zwidth.measures.definition import MeasureError
+        from zwidth.memory_limit import TooLarge
         from zwidth.study.sweep import compute_designs
         from zwidth.study.sweep_job import sweep_job
 
@@ -104,42 +104,44 @@ class SweepCommand(Command):
         assert isinstance(question, StudyQuestion)
         try:
             job = sweep_job(question.study)
-            store = opened(job, case.path, case["resume"])
-            with keeping(store), progress_told() as progress:
+            store = open_store(job, case.path, case["resume"])
+            with report_kept_work(store), show_progress() as progress:
                 return compute_designs(question.study, job, store, progress, case["workers"])
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
         except MeasureError as error:
             raise BadInput(*(f"{question.name}: measures: {line}" for line in str(error).splitlines())) from None
 
-    def reason(self, case: Case, result: Sweep) -> str | None:
+    def reason(self, case: CommandLine, result: Sweep) -> str | None:
         return result.reason
 
-    def heading(self, case: Case) -> str:
+    def heading(self, case: CommandLine) -> str:
         return ""  # the pages begin with how many designs there are
 
-    def pages(self, case: Case, result: Sweep, document: Mapping[str, Any]) -> Iterator[Any]:
-        from zwidth.study.sweep_data import label
+    def pages(self, case: CommandLine, result: Sweep, document: Mapping[str, Any]) -> Iterator[Any]:
+        from zwidth.study.sweep_data import axis_value_text
 
         count, sampling, columns = result.job.count, result.job.sampling, result.job.columns
         over = " x ".join(map(str, sampling.shape)) + " designs" if sampling.size is None else f"{count} designs"
         axes = ", ".join(axis.key for axis in sampling.axes)
-        yield f"{shown(document['name'])}: {over} over {axes}"
+        yield f"{printable(document['name'])}: {over} over {axes}"
         if document["left_out"]:
             yield f"linear: leaves out {', '.join(document['left_out'])}"
         if result.study.document.get("optimise"):
             yield "[optimise] is left aside: a sweep computes the designs that the axes name"
         if count <= LISTED:
             headings = [*(axis.key for axis in sampling.axes), *map(_heading, columns)]
-            designs = [[label(v) for v in sampling.values(n)] + _cells(result, n) for n in range(count)]
+            designs = [
+                [axis_value_text(v) for v in sampling.values(n)] + _design_texts(result, n) for n in range(count)
+            ]
             yield table(headings, designs)
         else:
             for n, one in enumerate(columns):
                 yield f"\n{one.title} ({one.name})"
-                yield sheet(list(_extremes(result, n)))
+                yield two_columns(list(_extremes(result, n)))
         yield from _reasons(result)
 
-    def write(self, case: Case, result: Sweep, document: dict[str, Any], reason: str | None) -> str | None:
+    def write(self, case: CommandLine, result: Sweep, document: dict[str, Any], reason: str | None) -> str | None:
         from zwidth.show.dataset import write_dataset, write_zarr
 
         assert case.path is not None
@@ -147,11 +149,17 @@ class SweepCommand(Command):
             (write_zarr if case.writes(FOLDERS) else write_dataset)(case.path, result.dataset())
         else:
             super().write(case, result, document, reason)
-        if case["resume"] is None and (store := opened(result.job, case.path, None)) is not None:
+        if case["resume"] is None and (store := open_store(result.job, case.path, None)) is not None:
             store.remove()  # now that what it kept is written
         return reason
 
-    def draw(self, case: Case, result: Sweep) -> Figure:
+    def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
+        from zwidth.show.figures.caption import facts_of_study
+
+        assert isinstance(case.question, StudyQuestion)
+        return facts_of_study(case.question.study)
+
+    def draw(self, case: CommandLine, result: Sweep) -> Figure:
         from zwidth.show.figures.study import study_figure
 
         return study_figure(result.dataset())
@@ -161,45 +169,46 @@ def _heading(one: Column) -> str:
     return f"{one.name} [{one.unit}]" if one.unit else one.name
 
 
-def _cells(found: Sweep, design: int) -> list[str]:
+def _design_texts(sweep: Sweep, design: int) -> list[str]:
     """A design's values, or what became of them."""
-    from zwidth.measures.measure import OK, STATUS
+    from zwidth.measures.definition import OK, STATUS
 
-    values, status = found.cells.values[design], found.cells.status[design]
+    values, status = sweep.cells.values[design], sweep.cells.status[design]
     return [typed(number(float(v))) if s == OK else STATUS[int(s)] for v, s in zip(values, status, strict=True)]
 
 
-def _extremes(found: Sweep, column: int) -> Iterator[tuple[str, str]]:
+def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
     """The extremes of one column, with their designs; and how many designs there are of each status."""
     import numpy as np
 
-    from zwidth.measures.measure import OK, STATUS
+    from zwidth.measures.definition import OK, STATUS
     from zwidth.show.units import quantity
-    from zwidth.study.sweep_data import label
+    from zwidth.study.sweep_data import axis_value_text
 
-    one, sampling = found.job.columns[column], found.job.sampling
-    values, status = found.cells.values[:, column], found.cells.status[:, column]
+    one, sampling = sweep.job.columns[column], sweep.job.sampling
+    values, status = sweep.cells.values[:, column], sweep.cells.status[:, column]
     there = np.flatnonzero(status == OK)
     for name, pick in (("lowest", np.argmin), ("highest", np.argmax)):
         if len(there):
             n = int(there[int(pick(values[there]))])
             where = ", ".join(
-                f"{axis.key} = {label(v)}" for axis, v in zip(sampling.axes, sampling.values(n), strict=True)
+                f"{axis.key} = {axis_value_text(v)}"
+                for axis, v in zip(sampling.axes, sampling.values(n), strict=True)
             )
             yield name, f"{typed(quantity(float(values[n]), one.unit))} at {where}"
     kinds, counts = np.unique(status, return_counts=True)
     yield "designs", ", ".join(f"{n} {STATUS[int(kind)]}" for kind, n in zip(kinds, counts, strict=True))
 
 
-def _reasons(found: Sweep) -> Iterator[str]:
+def _reasons(sweep: Sweep) -> Iterator[str]:
     """Why designs have no value, once for all columns that say the same."""
-    from zwidth.study.sweep_data import reasons
+    from zwidth.study.sweep_data import note_sentences
 
     told: dict[str, list[str]] = {}
-    for name, sentence in reasons(found):
+    for name, sentence in note_sentences(sweep):
         told.setdefault(sentence, []).append(name)
-    for sentence, names in list(told.items())[:REASONS]:
-        every = len(names) == len(found.job.measures)
-        yield shown(sentence if every else f"{', '.join(names)}: {sentence}")
-    if len(told) > REASONS:
-        yield f"and {len(told) - REASONS} more reasons; --json or --output holds them"
+    for sentence, names in list(told.items())[:SHOWN_REASONS]:
+        every = len(names) == len(sweep.job.measures)
+        yield printable(sentence if every else f"{', '.join(names)}: {sentence}")
+    if len(told) > SHOWN_REASONS:
+        yield f"and {len(told) - SHOWN_REASONS} more reasons; --json or --output holds them"

@@ -1,94 +1,228 @@
-"""Published conditions over the exact chart."""
+"""Published conditions over the exact chart, each line with the number under which the legend names it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import count
 from textwrap import wrap
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Polygon
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+from numpy.typing import NDArray
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.conditions import Bound
 from zwidth.show.figures.stability import frame
-from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, legend_above
+from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, fitted_columns
+from zwidth.show.units import quantity
 
-WIDEST_TEXT: Final = 72  # letters
+Floats = NDArray[np.float64]
+
+DAMPINGS: Final = 1001  # at which each line is computed
+ALIKE: Final = 0.02  # share of the view by which two lines differ that are drawn as one
+FAR: Final = 0.12  # share of the view from which on a number is clear of other lines and numbers
+EDGE: Final = 0.03  # share of the view along its border that is kept free of numbers
+STEPS: Final = 60  # places along a line that are tried for its number
+BESIDE: Final = (0.22, 0.06)  # where the numbers of small lines stand, as shares of the view
+SMALL: Final = 0.1  # share of the view below which a line's number stands beside it
+TEXT_SIZE: Final = 7.0
+LETTERS: Final = 40  # of a line of the legend
+NOT_MET: Final = "assumptions not met:"
+
+
+@dataclass(frozen=True, eq=False)
+class BoundLine:
+    """The line of one condition, or of several that nearly coincide.
+
+    stiffness  (DAMPINGS,) [N/m]; nan where the condition admits no wall
+    bounds     number in the legend -> condition
+    """
+
+    stiffness: Floats
+    bounds: dict[int, Bound]
+
+    @property
+    def text(self) -> str:
+        """The numbers, as they stand on the line."""
+        return ", ".join(map(str, self.bounds))
 
 
 def draw_bounds(ax: Axes, bounds: Iterable[Bound], chart: StabilityChart | None) -> None:
-    """The stable walls with K, B >= 0, and the line of each condition that has one.
+    """The stable walls with K, B >= 0, and the line of each condition that has one, numbered.
 
-    Conditions whose assumptions hold are drawn in colours. Those that assume what is not so are thin and grey, and
-    one entry of the legend names them all. Conditions that say nearly the same (2 % of the view) are drawn once,
-    under all their names. What has no line in view is named in the legend's last entry. The view is that of the
-    exact chart.
+    Conditions whose assumptions are met are drawn in colours, that with the smallest limit named as the one that
+    binds. The others are thin and grey, and listed apart. Conditions that nearly coincide share a line, which has
+    all their numbers. What has no line in view is listed without a number. The view is that of the exact chart.
 
     chart  None: only the conditions, over the dampings at which they admit stiffness
     """
-    lines = [bound for bound in bounds if not bound.lacking]
-    top = _highest(lines, chart)
-    dampings = np.linspace(0.0, top[1], 1001)
+    known = [bound for bound in bounds if not bound.lacking]
+    top = _highest(known, chart)
+    dampings = np.linspace(0.0, top[1], DAMPINGS)
+    numbers = count(1)
+    met = _lines([bound for bound in known if bound.holds], dampings, top[0], numbers)
+    not_met = _lines([bound for bound in known if not bound.holds], dampings, top[0], numbers)
+    stable: list[Any] = []
     if chart is not None:
-        for n, ring in enumerate(chart.regions):
-            ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label="" if n else "stable, exact"))
+        stable += [Patch(facecolor=STABLE, edgecolor=BLACK, linewidth=0.8, label="stable, exact")]
+        for ring in chart.regions:
+            ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none"))
         for arc in chart.boundary:
             ax.plot(arc.stiffness, arc.damping, color=BLACK, linewidth=0.8)
-    broken = [bound for bound in lines if not bound.holds]
-    grey, unseen = _drawable(broken, dampings, top[0])
-    text = _listed([name for names, _ in grey for name in names], "assumptions broken: ")
-    for n, (_, stiffness) in enumerate(grey):
-        ax.plot(stiffness, dampings, color=GREY, linewidth=0.6, zorder=1.5, label="" if n else text)
-    held, silent = _drawable([bound for bound in lines if bound.holds], dampings, top[0])
-    for n, (names, stiffness) in enumerate(held):
-        colour, dashes = LINES[1:][n % (len(LINES) - 1)]
-        wide = 2.2 if n >= len(LINES) - 1 else 1.4
-        ax.plot(stiffness, dampings, color=colour, linestyle=dashes, linewidth=wide, label=_listed(names))
-    if unseen or silent:
-        ax.plot([], [], color="none", label=_listed([*silent, *unseen], "no line in view: "))
+    looks = [_look(n) for n in range(len(met))] + [{"color": GREY, "linewidth": 0.7}] * len(not_met)
+    for line, look in zip((*met, *not_met), looks, strict=True):
+        ax.plot(line.stiffness, dampings, zorder=2.5 if line in met else 1.5, **look)
+    _number_lines(ax, [*met, *not_met], looks, dampings, top)
+    first = stable + _entries(known, met, looks[: len(met)], met=True)
+    second = _entries(known, not_met, looks[len(met) :], met=False)
+    if len(first) > len(stable):  # a column each
+        rows = max(len(first), len(second))
+        entries = [*_filled(first, rows), *_filled(second, rows)]
+    else:
+        entries = [*first, *second]
     frame(ax, (0.0, top[0], 0.0, top[1]), empty=chart is not None and not chart.regions)
-    legend_above(ax)
+    made = ax.legend(
+        handles=entries,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.01),
+        ncols=fitted_columns(ax, [str(one.get_label()) for one in entries], 2, TEXT_SIZE),
+        borderaxespad=0.0,
+        handlelength=2.2,
+        columnspacing=1.0,
+        labelspacing=0.35,
+        fontsize=TEXT_SIZE,
+        frameon=False,
+        alignment="left",
+    )
+    made.set_zorder(6.0)
 
 
-def _drawable(
-    bounds: list[Bound], dampings: np.ndarray, widest: float
-) -> tuple[list[tuple[list[str], np.ndarray]], list[str]]:
-    """Lines with the names of the conditions that share each, and the names of those without a line in view."""
-    drawn: list[tuple[list[str], np.ndarray]] = []
-    silent = []
+def _look(n: int) -> dict[str, Any]:
+    """Colour, dashes and width of the n-th line of a condition whose assumptions are met."""
+    colour, dashes = LINES[1:][n % (len(LINES) - 1)]
+    return {"color": colour, "linestyle": dashes, "linewidth": 2.2 if n >= len(LINES) - 1 else 1.6}
+
+
+def _lines(bounds: Sequence[Bound], dampings: Floats, widest: float, numbers: Any) -> list[BoundLine]:
+    """The lines in view, each with the conditions that it is of."""
+    lines: list[BoundLine] = []
     for bound in bounds:
         stiffness = bound.stiffness_max_at(dampings)
         # what is out of view leaves it at its border
         stiffness = np.where(stiffness > 0.0, np.minimum(stiffness, 1.01 * widest), np.nan)
         if not np.any(stiffness < 1.005 * widest):
-            silent.append(bound.name)
             continue
-        alike = next((names for names, other in drawn if _same(stiffness, other, widest)), None)
-        if alike is None:
-            drawn.append(([bound.name], stiffness))
-        else:
-            alike.append(bound.name)
-    return drawn, silent
+        line = next((one for one in lines if _alike(stiffness, one.stiffness, widest)), None)
+        if line is None:
+            lines.append(line := BoundLine(stiffness, {}))
+        line.bounds[next(numbers)] = bound
+    return lines
 
 
-def _listed(names: list[str], before: str = "") -> str:
-    """Names with semicolons between them, for they hold commas, in lines that fit over the axes."""
-    return "\n".join(wrap(before + "; ".join(names), WIDEST_TEXT))
+def _alike(one: Floats, other: Floats, scale: float) -> bool:
+    """Would the two lines all but lie over each other?"""
+    both = np.isfinite(one) == np.isfinite(other)
+    return bool(np.all(both) and np.nanmax(np.abs(one - other), initial=0.0) < ALIKE * scale)
 
 
-def _highest(bounds: list[Bound], chart: StabilityChart | None) -> tuple[float, float]:
+def _entries(
+    known: Sequence[Bound], lines: Sequence[BoundLine], looks: Sequence[dict[str, Any]], *, met: bool
+) -> list[Any]:
+    """The legend's lines for conditions whose assumptions are met, or are not; those without a line last."""
+    drawn = [(n, bound, look) for line, look in zip(lines, looks, strict=True) for n, bound in line.bounds.items()]
+    limits = [bound.stiffness_max for _, bound, _ in drawn if met and bound.stiffness_max > 0.0]
+    lowest = min(limits, default=0.0) * (1.0 + 1e-6)
+    entries: list[Any] = []
+    if not met and any(not bound.holds for bound in known):
+        entries.append(_without_line(NOT_MET))
+    for n, bound, look in sorted(drawn, key=lambda one: one[0]):
+        binds = met and 0.0 < bound.stiffness_max <= lowest
+        limit = f", at most {quantity(bound.stiffness_max, 'N/m')}: binds" if binds else ""
+        text = "\n".join(wrap(f"{n}\u00a0 {bound.name}{limit}", LETTERS, break_long_words=False))
+        entries.append(Line2D([], [], label=text, **look))
+    seen = [bound for _, bound, _ in drawn]
+    unseen = (bound for bound in known if bound.holds == met and bound not in seen)
+    texts = (f"{bound.name}: no line in view" for bound in unseen)
+    return entries + [_without_line("\n".join(wrap(text, LETTERS))) for text in texts]
+
+
+def _filled(entries: list[Any], rows: int) -> list[Any]:
+    """As many entries as rows, the last of them empty."""
+    return entries + [_without_line("") for _ in range(rows - len(entries))]
+
+
+def _without_line(text: str) -> Line2D:
+    return Line2D([], [], linestyle="none", label=text)
+
+
+def _number_lines(
+    ax: Axes,
+    lines: Sequence[BoundLine],
+    looks: Sequence[dict[str, Any]],
+    dampings: Floats,
+    top: tuple[float, float],
+) -> None:
+    """Write each line's numbers on it, where it is farthest from the other lines and their numbers."""
+    across = [np.column_stack([line.stiffness / top[0], dampings / top[1]]) for line in lines]
+    small = [k for k, xy in enumerate(across) if np.nanmax(xy[np.isfinite(xy).all(axis=1)]) < SMALL]
+    placed: list[Floats] = []
+    if small:
+        text = ", ".join(lines[k].text for k in small)
+        tip = np.nanmax(np.vstack([across[k] for k in small])[:, 0]), 0.0
+        placed.append(np.array([[BESIDE[0], BESIDE[1]]]))
+        _write_number(ax, text, BESIDE, top, BLACK, tip)
+    for k, line in enumerate(lines):
+        if k in small:
+            continue
+        inside = across[k][np.all((across[k] > EDGE) & (across[k] < 1.0 - EDGE), axis=1)]
+        places = (inside if len(inside) else across[k][np.isfinite(across[k]).all(axis=1)])[::-1]
+        places = places[np.linspace(0, len(places) - 1, min(STEPS, len(places))).astype(int)]
+        others = [other[np.isfinite(other).all(axis=1)] for n, other in enumerate(across) if n != k]
+        clear = np.minimum(_distance(places, np.vstack([*others, np.full((1, 2), 9.0)])), FAR)
+        clear += 2.0 * np.minimum(_distance(places, np.vstack([*placed, np.full((1, 2), 9.0)])), FAR)
+        x, y = places[int(np.argmax(clear))]
+        placed.append(np.array([[x, y]]))
+        _write_number(ax, line.text, (x, y), top, looks[k]["color"])
+
+
+def _write_number(
+    ax: Axes,
+    text: str,
+    place: tuple[float, float],
+    top: tuple[float, float],
+    colour: str,
+    tip: tuple[float, float] | None = None,
+) -> None:
+    """A number at a place, a share of the view; with a tip, a stroke leads from there to what it names."""
+    end = place if tip is None else tip
+    ax.annotate(
+        text,
+        xy=(end[0] * top[0], end[1] * top[1]),
+        xytext=(place[0] * top[0], place[1] * top[1]),
+        color=colour,
+        fontsize=TEXT_SIZE,
+        fontweight="bold",
+        ha="center",
+        va="center",
+        zorder=4.0,
+        bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+        arrowprops=None if tip is None else {"arrowstyle": "-", "color": colour, "linewidth": 0.6},
+    )
+
+
+def _distance(points: Floats, others: Floats) -> Floats:
+    """Of each point (n, 2) from the nearest of others (k, 2)."""
+    return np.asarray(np.linalg.norm(points[:, None] - others[None], axis=2).min(axis=1))
+
+
+def _highest(bounds: Sequence[Bound], chart: StabilityChart | None) -> tuple[float, float]:
     """Stiffness and damping up to which is drawn: 20 % beyond the exact chart, else beyond the conditions."""
     if chart is not None and chart.stiffness_max > 0.0:
         return 1.2 * chart.stiffness_max, 1.2 * max(chart.damping_max, chart.damping_at_stiffness_max)
     largest = [bound.stiffness_max for bound in bounds if bound.stiffness_max > 0.0]
     damping = [bound.damping_at_stiffness_max for bound in bounds if bound.damping_at_stiffness_max > 0.0]
     return 1.2 * max(largest, default=1.0), 3.0 * max(damping, default=1.0)
-
-
-def _same(one: np.ndarray, other: np.ndarray, scale: float) -> bool:
-    """Would the two lines all but lie over each other?"""
-    apart = np.abs(one - other)
-    alike = np.isfinite(one) == np.isfinite(other)
-    return bool(np.all(alike) and np.nanmax(apart, initial=0.0) < 0.02 * scale)

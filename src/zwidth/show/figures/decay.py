@@ -13,7 +13,7 @@ from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.decay import FastestDecay
 from zwidth.loop.loop import Loop
-from zwidth.show.figures.stability import Window, frame
+from zwidth.show.figures.stability import Window, edges_of, frame
 from zwidth.show.figures.style import BLACK, LINES, VERMILION, legend_above
 from zwidth.show.units import quantity
 
@@ -59,7 +59,7 @@ def _star(ax: Axes, wall: FastestDecay | None, name: str, period: float, colour:
 def draw_level(ax: Axes, chart: StabilityChart, text: str, rank: int, count: int) -> None:
     """One contour; the smaller the radius the lighter."""
     colour = colormaps["viridis"](0.75 * rank / max(count - 1, 1)) if rank else BLACK
-    for k, ring in enumerate(chart.regions):
+    for k, ring in enumerate(edges_of(chart.regions)):
         dashes = LINES[rank % len(LINES)][1]
         ax.plot(*ring.T, color=colour, linestyle=dashes, label="" if k else text, linewidth=1.2)
 

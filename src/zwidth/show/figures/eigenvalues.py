@@ -14,21 +14,21 @@ ROOM: Final = 1.08  # radius shown, over that of what is drawn
 CIRCLE: Final = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 361))
 
 
-def draw_eigenvalue_paths(ax: Axes, found: EigenvaluePaths) -> None:
+def draw_eigenvalue_paths(ax: Axes, paths: EigenvaluePaths) -> None:
     """Each path in its own colour from a circle to a square; crosses where it passes through the unit circle."""
     ax.plot(CIRCLE.real, CIRCLE.imag, color=GREY, linewidth=0.8, label="unit circle", zorder=1.0)
-    for n, z in enumerate(found.eigenvalues.T):
+    for n, z in enumerate(paths.eigenvalues.T):
         colour, dashes = LINES[n % len(LINES)]
         ax.plot(z.real, z.imag, color=colour, linestyle=dashes, zorder=2.0)
-    for row, marker, value in ((0, "o", found.values[0]), (-1, "s", found.values[-1])):
-        z = found.eigenvalues[row]
+    for row, marker, value in ((0, "o", paths.values[0]), (-1, "s", paths.values[-1])):
+        z = paths.eigenvalues[row]
         ax.plot(
             z.real, z.imag, marker, color=BLACK, markerfacecolor="white", markersize=4.5, label=f"at {value:g}"
         )
-    if found.crossings:
-        z = np.array([crossing.eigenvalue for crossing in found.crossings])
+    if paths.crossings:
+        z = np.array([crossing.eigenvalue for crossing in paths.crossings])
         ax.plot(z.real, z.imag, "x", color=VERMILION, markersize=7.0, zorder=3.0, label="crosses the unit circle")
-    radius = ROOM * max(1.0, float(np.abs(found.eigenvalues).max()))
+    radius = ROOM * max(1.0, float(np.abs(paths.eigenvalues).max()))
     ax.set_xlim(-radius, radius)
     ax.set_ylim(-radius, radius)
     ax.set_aspect("equal")

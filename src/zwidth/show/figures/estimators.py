@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from zwidth.loop.estimators import VelocityMethod
-from zwidth.loop.estimators.response import phase_delay, relative_response
+from zwidth.loop.estimators.frequency_response import phase_delay, relative_response
 from zwidth.show.figures.style import GREY, LINES, label, legend_above
 
 Floats = NDArray[np.float64]

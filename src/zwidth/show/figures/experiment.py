@@ -13,9 +13,9 @@ from zwidth.chart.chart import StabilityChart
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import BLACK, BLUE, GREEN, STABLE, VERMILION, legend_above
 from zwidth.study.measured_boundary import MeasuredPoint
-from zwidth.study.own_points import OwnPoint
+from zwidth.study.user_points import UserPoint
 
-LOOKS = {"lower": (VERMILION, "o"), "upper": (BLUE, "s"), "tip": (GREEN, "^")}
+EDGE_STYLES = {"lower": (VERMILION, "o"), "upper": (BLUE, "s"), "tip": (GREEN, "^")}
 TITLES = {
     "lower": "lower edge, damping bisected",
     "upper": "upper edge, damping bisected",
@@ -23,14 +23,14 @@ TITLES = {
 }
 
 # of a user's own points: marker and title, of which edges or verdicts, and whether the marker is filled
-OWN_LOOKS = (
+OWN_POINT_STYLES = (
     (("D", "your points"), ("lower", "upper", "tip"), True),
     (("P", "your walls, stable"), ("stable",), True),
     (("X", "your walls, unstable"), ("unstable",), False),
 )
 
 
-class Barred(NamedTuple):
+class ErrorBarPoint(NamedTuple):
     """A point to draw: its wall, and lowest and highest along what was bisected; nan: no bar.
 
     edge     lower, upper or tip; of a wall that was tried the verdict, stable or unstable
@@ -45,49 +45,51 @@ class Barred(NamedTuple):
     unsure: bool = False
 
 
-def measured_bars(points: Iterable[MeasuredPoint]) -> list[Barred]:
+def measured_bars(points: Iterable[MeasuredPoint]) -> list[ErrorBarPoint]:
     """Points of a virtual experiment, with the lowest and highest of their trials."""
-    return [Barred(p.stiffness, p.damping, p.edge, p.low, p.high, p.unsure) for p in points]
+    return [ErrorBarPoint(p.stiffness, p.damping, p.edge, p.low, p.high, p.unsure) for p in points]
 
 
-def own_bars(points: Iterable[OwnPoint]) -> list[Barred]:
+def own_bars(points: Iterable[UserPoint]) -> list[ErrorBarPoint]:
     """Points of somebody's own; one that names neither edge nor verdict is drawn as an edge."""
     return [
-        Barred(p.stiffness, p.damping, p.edge, p.stiffness_low, p.stiffness_high)
+        ErrorBarPoint(p.stiffness, p.damping, p.edge, p.stiffness_low, p.stiffness_high)
         if p.edge == "tip"
-        else Barred(p.stiffness, p.damping, p.edge or p.verdict or "lower", p.damping_low, p.damping_high)
+        else ErrorBarPoint(p.stiffness, p.damping, p.edge or p.verdict or "lower", p.damping_low, p.damping_high)
         for p in points
     ]
 
 
 def draw_experiment(
     ax: Axes,
-    points: Sequence[Barred],
+    points: Sequence[ErrorBarPoint],
     chart: StabilityChart | None,
-    others: Sequence[Barred] = (),
+    own_points: Sequence[ErrorBarPoint] = (),
     window: Window | None = None,
 ) -> None:
     """The exact chart filled, with the measured points and their bars over it.
 
-    points  those that are unsure are crossed
-    others  points of somebody's own, drawn in black
-    window  what to show; None: chart and points for K > 0, and 5 %
+    points      those that are unsure are crossed
+    own_points  points of somebody's own, drawn in black
+    window      what to show; None: chart and points for K > 0, and 5 %
     """
     for n, ring in enumerate(() if chart is None else chart.regions):
         title = "" if n else "stable, exact and linear"
         ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label=title))
     for arc in () if chart is None else chart.boundary:
         ax.plot(arc.stiffness, arc.damping, color=BLACK, linewidth=1.0, solid_capstyle="round")
-    for edge, (colour, marker) in LOOKS.items():
+    for edge, (colour, marker) in EDGE_STYLES.items():
         _draw(ax, [p for p in points if p.edge == edge], colour, marker, TITLES[edge], filled=False)
     _cross(ax, [p for p in points if p.unsure])
-    for looks, kinds, filled in OWN_LOOKS:
-        _draw(ax, [p for p in others if p.edge in kinds], BLACK, *looks, filled=filled)
-    frame(ax, window or _window(points, others, chart), empty=False)
+    for looks, kinds, filled in OWN_POINT_STYLES:
+        _draw(ax, [p for p in own_points if p.edge in kinds], BLACK, *looks, filled=filled)
+    frame(ax, window or _window(points, own_points, chart), empty=False)
     legend_above(ax, columns=2)
 
 
-def _draw(ax: Axes, points: Sequence[Barred], colour: str, marker: str, title: str, *, filled: bool) -> None:
+def _draw(
+    ax: Axes, points: Sequence[ErrorBarPoint], colour: str, marker: str, title: str, *, filled: bool
+) -> None:
     if not points:
         return
     for upright in (True, False):
@@ -113,7 +115,7 @@ def _draw(ax: Axes, points: Sequence[Barred], colour: str, marker: str, title: s
     )
 
 
-def _cross(ax: Axes, unsure: Sequence[Barred]) -> None:
+def _cross(ax: Axes, unsure: Sequence[ErrorBarPoint]) -> None:
     """Crosses over the points whose verdict changes more than once."""
     if unsure:
         K, B = [p.stiffness for p in unsure], [p.damping for p in unsure]
@@ -121,7 +123,9 @@ def _cross(ax: Axes, unsure: Sequence[Barred]) -> None:
         ax.plot(K, B, "x", color=BLACK, markersize=7.0, markeredgewidth=0.9, zorder=6.0, label=title)
 
 
-def _window(points: Sequence[Barred], others: Sequence[Barred], chart: StabilityChart | None) -> Window:
+def _window(
+    points: Sequence[ErrorBarPoint], others: Sequence[ErrorBarPoint], chart: StabilityChart | None
+) -> Window:
     """From K = 0 on: the points with their bars, and what of the chart lies there."""
     K, B = [0.0], [0.0]
     for p in (*points, *others):

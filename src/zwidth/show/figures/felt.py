@@ -10,8 +10,18 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from zwidth.measures.felt_chart import FeltChart
-from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above, tell_empty
-from zwidth.show.units import MINUS, quantity
+from zwidth.show.figures.style import (
+    BLACK,
+    GREY,
+    LINES,
+    STABLE,
+    VERMILION,
+    draw_empty,
+    label,
+    legend_above,
+    number_logarithmic,
+)
+from zwidth.show.units import quantity
 
 
 def draw_impedance(
@@ -34,9 +44,8 @@ def draw_impedance(
     for (name, values), (colour, dashes) in zip(curves, LINES, strict=False):
         ax.loglog(frequency, np.abs(values), color=colour, linestyle=dashes, label=name)
     ax.set_xlim(frequency[0], frequency[-1])
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_formatter(lambda x, _: f"{x:g}".replace("-", MINUS))
-        axis.set_minor_formatter(lambda *_: "")
+    number_logarithmic(ax.xaxis, *ax.get_xlim())
+    number_logarithmic(ax.yaxis, *ax.get_ylim())
     ax.set_xlabel("Frequency [Hz]")
     ax.set_ylabel("Impedance, magnitude [Ns/m]")
     legend_above(ax, columns=2)
@@ -49,9 +58,9 @@ def draw_felt_chart(ax: Axes, chart: FeltChart) -> None:
     for arc in chart.boundary:
         ax.plot(arc.stiffness, arc.damping, color=BLACK, solid_capstyle="round")
     widest = max((float(ring[:, 0].max()) for ring in chart.regions), default=1.0)
-    if isfinite(chart.stiffest):
-        text = f"hardest felt contact: {quantity(chart.stiffest, 'N/m')}"
-        ax.axvline(chart.stiffest, color=VERMILION, linewidth=0.9, linestyle=":", label=text)
+    if isfinite(chart.stiffness_max):
+        text = f"hardest felt contact: {quantity(chart.stiffness_max, 'N/m')}"
+        ax.axvline(chart.stiffness_max, color=VERMILION, linewidth=0.9, linestyle=":", label=text)
     if isfinite(chart.limit) and chart.limit < 4.0 * widest:
         text = f"no wall is felt above {quantity(chart.limit, 'N/m')}"
         ax.axvline(chart.limit, color=GREY, linestyle=(0, (6, 3)), linewidth=0.9, label=text)
@@ -65,5 +74,5 @@ def draw_felt_chart(ax: Axes, chart: FeltChart) -> None:
     label(ax.xaxis, "Stiffness felt at rest", "N/m")
     label(ax.yaxis, "Virtual damping B", "Ns/m")
     if not chart.regions:
-        tell_empty(ax)
+        draw_empty(ax)
     legend_above(ax)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from zwidth.chart.chart import StabilityChart
-from zwidth.chart.result import BoundaryArc
+from zwidth.chart.chart_base import BoundaryArc
 from zwidth.model.modes import natural_frequencies
 from zwidth.show.figures.style import BLUE, GREY, VERMILION, label, legend_above
 from zwidth.show.units import quantity

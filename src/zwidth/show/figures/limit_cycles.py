@@ -5,29 +5,32 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
+from numpy.typing import NDArray
 
-from zwidth.contact.limit_cycles import HarmonicBalance
-from zwidth.contact.plane import DevicePlane
-from zwidth.show.figures.style import BLACK, BLUE, GREY, STABLE, VERMILION, legend_above
-from zwidth.show.units import quantity
+from zwidth.contact.friction_quantisation_plane import DevicePlane
+from zwidth.contact.harmonic_balance import HarmonicBalance
+from zwidth.show.figures.style import BLACK, BLUE, GREY, STABLE, VERMILION, legend_above, number_logarithmic
+from zwidth.show.units import as_written, quantity
 
 AROUND = 100.0  # times, below the smallest limit cycle and above the largest, that is drawn
-BEYOND = 3.0  # times, above the range and above a limit cycle beyond it
+BEYOND = 2.0  # times the range of the device that is drawn
 RESOLVED = 1e-3  # of the largest growth, below which the axis is linear
+LINEAR = 0.03  # of the largest growth: where half of the others are smaller, the axis is logarithmic
 
 
 def draw_balance(ax: Axes, balance: HarmonicBalance) -> None:
     """How fast vibrations grow or die over their amplitude; limit cycles where the line crosses zero.
 
     A full dot is a stable limit cycle, a hollow one the edge of what is recovered from; grey is what lies beyond
-    the range of the device. The growth has a logarithmic axis on both sides of zero.
+    the range of the device, and is drawn as far as twice that. Growth rates that differ much have an axis that is
+    logarithmic on both sides of zero.
     """
     growth = np.where(np.isfinite(balance.growth), balance.growth, np.nan)
     ax.semilogx(balance.amplitude, growth, color=BLACK, label="growth of a vibration")
     ax.axhline(0.0, color=GREY, linewidth=0.6)
     for cycle in balance.cycles:
         kind = "stable limit cycle" if cycle.stable else "larger ones grow, smaller ones die"
-        kind, color = (kind, VERMILION) if cycle.within_range else ("beyond the range", GREY)
+        kind, color = (kind, VERMILION) if cycle.within_range else ("predicted beyond the range", GREY)
         ax.plot(
             cycle.amplitude,
             0.0,
@@ -37,33 +40,47 @@ def draw_balance(ax: Axes, balance: HarmonicBalance) -> None:
             linestyle="none",
             label=f"{kind}: {quantity(cycle.amplitude, 'm')}, {quantity(cycle.frequency_Hz, 'Hz')}",
         )
-    ax.set_xlabel("Amplitude [m]")
     ax.set_ylabel("Growth rate [1/s]")
-    low, high = _around(balance)
+    low, high = _amplitude_range(balance)
     ax.set_xlim(low, high)
+    number_logarithmic(ax.xaxis, low, high, "m")
+    ax.set_xlabel("Amplitude")
     if balance.largest_motion < high:
         text = f"farther than the device moves, {quantity(balance.largest_motion, 'm')}"
         ax.axvspan(max(low, balance.largest_motion), high, color=GREY, alpha=0.2, linewidth=0.0, label=text)
-    seen = growth[(balance.amplitude >= low) & (balance.amplitude <= high) & np.isfinite(growth)]
-    largest = float(np.max(np.abs(seen), initial=0.0)) or 1.0
-    linear = 10.0 ** np.ceil(np.log10(RESOLVED * largest))
-    ax.set_yscale("symlog", linthresh=linear)
-    grows, dies = np.max(seen, initial=0.0), np.min(seen, initial=0.0)
-    ax.set_ylim(1.5 * dies or -linear, 1.5 * grows or linear)
+    visible = growth[(balance.amplitude >= low) & (balance.amplitude <= high) & np.isfinite(growth)]
+    _scale_growth(ax, visible, crossings=bool(balance.cycles))
     if not balance.cycles:
         ax.plot([], [], linestyle="none", label="no limit cycle")
     legend_above(ax)
 
 
-def _around(balance: HarmonicBalance) -> tuple[float, float]:
+def _scale_growth(ax: Axes, visible: NDArray[np.float64], *, crossings: bool) -> None:
+    """Linear where the growth rates that are seen differ little, else logarithmic on both sides of zero.
+
+    crossings  does the line cross zero, near which the rates are small?
+    """
+    sizes = np.abs(visible)
+    largest = float(np.max(sizes, initial=0.0)) or 1.0
+    grows, dies = float(np.max(visible, initial=0.0)), float(np.min(visible, initial=0.0))
+    if crossings or (len(sizes) and float(np.median(sizes)) < LINEAR * largest):
+        linear = 10.0 ** np.ceil(np.log10(RESOLVED * largest))
+        ax.set_yscale("symlog", linthresh=linear)
+        ax.set_ylim(1.6 * dies or -linear, 1.6 * grows or linear)
+    else:
+        ax.set_ylim(min(1.1 * dies, -0.1 * largest), max(1.1 * grows, 0.1 * largest))
+    ax.yaxis.set_major_formatter(lambda value, _: as_written(float(f"{value:.6g}")))
+
+
+def _amplitude_range(balance: HarmonicBalance) -> tuple[float, float]:
     """Amplitudes that are drawn."""
-    at = balance.amplitude
-    if not balance.cycles:
-        swings = at[np.isfinite(balance.growth)]
-        return (float(swings[0]), float(swings[-1])) if len(swings) > 1 else (float(at[0]), float(at[-1]))
-    found = [cycle.amplitude for cycle in balance.cycles]
-    most = max(BEYOND * max(found), min(AROUND * max(found), BEYOND * balance.largest_motion))
-    return max(float(at[0]), min(found) / AROUND), min(float(at[-1]), most)
+    at, farthest = balance.amplitude, BEYOND * balance.largest_motion
+    found = [cycle.amplitude for cycle in balance.cycles if cycle.within_range]
+    swings = at[np.isfinite(balance.growth)]
+    low, high = (float(swings[0]), float(swings[-1])) if len(swings) > 1 else (float(at[0]), float(at[-1]))
+    if found:
+        low, high = max(low, min(found) / AROUND), min(high, AROUND * max(found))
+    return (low, min(high, farthest)) if farthest > 2.0 * low else (low, high)
 
 
 def draw_plane(ax: Axes, device: DevicePlane) -> None:

@@ -14,11 +14,12 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from zwidth.measures.measure import FAILED, NO_VALUE, SINGULAR, UNDECIDED
-from zwidth.show.figures.bands import LARGEST, bands_of, colour_bar
-from zwidth.show.figures.mechanism import link_stroke, pins
+from zwidth.measures.definition import FAILED, NO_VALUE, SINGULAR, UNDECIDED
+from zwidth.show.figures.colour_bands import LARGEST, bands_of, colour_bar
+from zwidth.show.figures.mechanism import joint_points, link_stroke
 from zwidth.show.figures.style import BLACK, GREY, LINES, VERMILION, figure, label
-from zwidth.show.units import area_text, given, percent, printed
+from zwidth.show.units import area_text, as_written, percent, printed
+from zwidth.study.reach_outline import continued, reach_outline
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from zwidth.study.common_area import CommonArea
 
 Floats = NDArray[np.float64]
-Drawn = tuple[list[Floats], Floats, Floats]  # strokes of the links, joints, handle
+ProjectedMechanism = tuple[list[Floats], Floats, Floats]  # strokes of the links, joints, handle
 
 MARKS: Final = {
     SINGULAR: ("singular", "xxxx"),
@@ -36,7 +37,7 @@ MARKS: Final = {
     FAILED: ("failed", "\\\\\\\\"),
 }
 HATCHES: Final = ("\\\\", "//", "||", "--", "xx")
-PALE: Final = "#C8C8C8"
+INFINITE_COLOUR: Final = "#C8C8C8"
 ARROWS: Final = 14  # direction strokes along the longer side
 
 
@@ -69,15 +70,17 @@ def draw_map(
     """
     x, y = dataset["x_m"].values, dataset["y_m"].values
     about = dataset[name].attrs
-    unit = printed(str(about["unit"]))
+    unit = printed(str(about.get("unit", "")))
     handles: list[Any] = []
     values = dataset[name].values
+    outline = reach_outline(dataset, name)
     if (np.abs(values) <= LARGEST).any():
-        _contours(ax, x, y, values, str(about["title"]), unit, faint=area is not None)
+        drawn = values if outline is None else continued(values, dataset[f"{name}_status"].values)
+        _contours(ax, x, y, values, drawn, str(about["title"]), unit, faint=area is not None, outline=outline)
     elif not np.isnan(values).all():
         handles += _infinite(ax, x, y, values, str(about["title"]))
-    handles += _marks(ax, x, y, dataset[f"{name}_status"].values)
-    handles += _strokes(ax, dataset, f"{name}_direction")
+    handles += _status_hatches(ax, x, y, dataset[f"{name}_status"].values)
+    handles += _direction_strokes(ax, dataset, f"{name}_direction")
     if area is not None:
         handles += draw_areas(ax, area)
     mechanism = _mechanism(dataset, device)
@@ -105,24 +108,49 @@ def draw_map(
         made.set_zorder(6.0)
 
 
-def _contours(ax: Axes, x: Floats, y: Floats, values: Floats, title: str, unit: str, *, faint: bool) -> None:
+def _contours(
+    ax: Axes,
+    x: Floats,
+    y: Floats,
+    values: Floats,
+    drawn: Floats,
+    title: str,
+    unit: str,
+    *,
+    faint: bool,
+    outline: Any,
+) -> None:
+    """Bands between round levels of the values, cut at the true edge of reach where that is known.
+
+    drawn    the values, continued beyond that edge
+    outline  what is reached; None: known to a cell
+    """
     levels, norm, colours = bands_of(values, faint=faint)
     extend: Any = norm.extend
     most = 2.0 * max(float(np.abs(values[np.abs(values) <= LARGEST]).max()), *np.abs(levels[[0, -1]]).tolist())
-    z = np.ma.masked_invalid(np.clip(values, -most, most))
-    ax.contourf(x, y, z, levels=levels, cmap=colours, norm=norm, extend=extend, corner_mask=True, zorder=1.0)
-    ax.contour(x, y, z, levels=levels, colors="white", linewidths=0.4, corner_mask=True, zorder=1.1)
+    z = np.ma.masked_invalid(np.clip(drawn, -most, most))
+    bands = ax.contourf(
+        x, y, z, levels=levels, cmap=colours, norm=norm, extend=extend, corner_mask=True, zorder=1.0
+    )
+    lines = ax.contour(x, y, z, levels=levels, colors="white", linewidths=0.4, corner_mask=True, zorder=1.1)
+    if paths := _paths(outline) if outline is not None else []:
+        edge = PathPatch(
+            Path.make_compound_path(*paths), facecolor="none", edgecolor=GREY, linewidth=0.6, zorder=1.2
+        )
+        ax.add_patch(edge)
+        for drawing in (bands, lines):
+            drawing.set_clip_path(edge)
     colour_bar(ax, levels, norm, colours, title, unit)
 
 
 def _infinite(ax: Axes, x: Floats, y: Floats, values: Floats, title: str) -> list[Any]:
     """One colour where no value is finite: there is nothing to make levels of."""
     z = np.ma.masked_array(np.ones(values.shape), np.isnan(values))
-    ax.contourf(x, y, z, levels=[0.0, 2.0], colors=[PALE], corner_mask=True, zorder=1.0)
-    return [Patch(facecolor=PALE, label=f"{title}: infinite")]
+    ax.contourf(x, y, z, levels=[0.0, 2.0], colors=[INFINITE_COLOUR], corner_mask=True, zorder=1.0)
+    return [Patch(facecolor=INFINITE_COLOUR, label=f"{title}: infinite")]
 
 
-def _marks(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -> list[Any]:
+def _status_hatches(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -> list[Any]:
     """Hatched where there is no value, apart from where nothing reaches."""
     handles: list[Any] = []
     with_hatches: dict[str, Any] = {"colors": "none", "zorder": 1.5}
@@ -136,13 +164,13 @@ def _marks(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -> list[An
     return handles
 
 
-def _strokes(ax: Axes, dataset: xr.Dataset, name: str) -> list[Any]:
+def _direction_strokes(ax: Axes, dataset: xr.Dataset, name: str) -> list[Any]:
     """Short lines along each cell's extreme direction, seen on the plane."""
     if name not in dataset:
         return []
     x, y = dataset["x_m"].values, dataset["y_m"].values
     apart = max(float(np.ptp(x)), float(np.ptp(y))) / ARROWS
-    columns, rows = _every(x, apart), _every(y, apart)
+    columns, rows = _spaced_indices(x, apart), _spaced_indices(y, apart)
     u = dataset[name].values[np.ix_(rows, columns)]
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
     seen = u @ axes.T
@@ -159,7 +187,7 @@ def _strokes(ax: Axes, dataset: xr.Dataset, name: str) -> list[Any]:
     return [drawn]
 
 
-def _every(x: Floats, apart: float) -> NDArray[np.int64]:
+def _spaced_indices(x: Floats, apart: float) -> NDArray[np.int64]:
     """Indices of coordinates about so far apart."""
     step = max(1, round(apart / float(x[1] - x[0])))
     return np.arange(min(step // 2, len(x) - 1), len(x), step)
@@ -177,7 +205,7 @@ def draw_areas(ax: Axes, area: CommonArea) -> list[Any]:
         hatch = HATCHES[n % len(HATCHES)]
         measure = requirement.measure
         sign = "\u2265" if requirement.at_least else "\u2264"
-        bound = given(requirement.value, printed(unit))
+        bound = as_written(requirement.value, printed(unit))
         text = f"{measure.title} {sign} {bound}: {area_text(region.area)}"
         style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.3, "linestyle": dashes, "facecolor": "none"}
         for path in _paths(region.shape):
@@ -207,7 +235,7 @@ def _paths(shape: Any) -> list[Path]:
     return found
 
 
-def _mechanism(dataset: xr.Dataset, device: Device | None) -> Drawn | None:
+def _mechanism(dataset: xr.Dataset, device: Device | None) -> ProjectedMechanism | None:
     """Strokes of the links, the joints and the handle in the reference posture, on the plane; None for none."""
     if device is None or device.mechanism is None:
         return None
@@ -222,10 +250,10 @@ def _mechanism(dataset: xr.Dataset, device: Device | None) -> Drawn | None:
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
     placed = link_points(mechanism, posture)
     strokes = [link_stroke(mechanism, placed, i) @ axes.T for i in range(len(mechanism.links.names))]
-    return strokes, pins(mechanism, placed) @ axes.T, posture.position @ axes.T
+    return strokes, joint_points(mechanism, placed) @ axes.T, posture.position @ axes.T
 
 
-def _draw_mechanism(ax: Axes, mechanism: Drawn) -> None:
+def _draw_mechanism(ax: Axes, mechanism: ProjectedMechanism) -> None:
     strokes, joints, handle = mechanism
     halo = [withStroke(linewidth=3.4, foreground="white")]
     for stroke in strokes:
@@ -236,7 +264,7 @@ def _draw_mechanism(ax: Axes, mechanism: Drawn) -> None:
     ax.plot(*handle[:, None], linestyle="none", zorder=3.2, **square)
 
 
-def _arrow(ax: Axes, mechanism: Drawn, dataset: xr.Dataset) -> None:
+def _arrow(ax: Axes, mechanism: ProjectedMechanism, dataset: xr.Dataset) -> None:
     """Along the rendered direction, from the handle; none where it points at the viewer."""
     strokes, _, handle = mechanism
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
@@ -248,7 +276,7 @@ def _arrow(ax: Axes, mechanism: Drawn, dataset: xr.Dataset) -> None:
     ax.annotate("", xy=tuple(handle + size * seen), xytext=tuple(handle), arrowprops=look, zorder=3.3)
 
 
-def _view(x: Floats, y: Floats, mechanism: Drawn | None) -> tuple[float, ...]:
+def _view(x: Floats, y: Floats, mechanism: ProjectedMechanism | None) -> tuple[float, ...]:
     """What is shown: the map and the mechanism."""
     low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
     if mechanism is not None:

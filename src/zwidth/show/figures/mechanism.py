@@ -35,7 +35,7 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
     placed = link_points(mechanism, posture)
     strokes = [link_stroke(mechanism, placed, i) for i in range(len(mechanism.links.names))]
     everything = np.vstack([np.zeros((1, 3)), *strokes, posture.position[None]])
-    flat = flattest(everything)
+    flat = projection_axes(everything)
     size = max(float(np.max(np.ptp(everything[:, flat], axis=0))), 1e-9)
     for n, stroke in enumerate(strokes):
         _link(ax, stroke[:, flat], mechanism.links.names[n], n)
@@ -51,22 +51,22 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
     legend_beside(ax)
 
 
-def flattest(points: Floats) -> list[int]:
+def projection_axes(points: Floats) -> list[int]:
     """The two coordinates in which the points spread most, in the order x, y, z; x and y where it is a tie."""
     spread = np.ptp(points, axis=0) + np.array([2.0, 2.0, 0.0]) * 1e-12
     return sorted(np.argsort(-spread, kind="stable")[:2].tolist())
 
 
-def link_stroke(mechanism: Mechanism, placed: LinkPoints, link: int) -> Floats:
+def link_stroke(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> Floats:
     """The points that a link joins, (k, 3), from its joint to where other things hang on it."""
     links, closures = mechanism.links, mechanism.closures
-    start = placed.origin[link]
-    points = [placed.tip[link]]
-    points += [placed.origin[child] for child in np.flatnonzero(links.parent == link)]
+    start = points_of_links.origin[link]
+    points = [points_of_links.tip[link]]
+    points += [points_of_links.origin[child] for child in np.flatnonzero(links.parent == link)]
     for owners, at in ((closures.a, closures.point_a), (closures.b, closures.point_b)):
-        points += [placed.of(link, at[k]) for k in np.flatnonzero(owners == link)]
+        points += [points_of_links.of(link, at[k]) for k in np.flatnonzero(owners == link)]
     if mechanism.handle_link == link:
-        points.append(placed.of(link, mechanism.handle_point))
+        points.append(points_of_links.of(link, mechanism.handle_point))
     kept = [start]
     for point in points:
         if all(np.linalg.norm(point - other) > SAME_POINT for other in kept):
@@ -82,22 +82,33 @@ def _link(ax: Axes, stroke: Floats, name: str, n: int) -> None:
 
 
 def _joints(
-    ax: Axes, mechanism: Mechanism, placed: LinkPoints, flat: list[int], size: float, strokes: list[Floats]
+    ax: Axes,
+    mechanism: Mechanism,
+    points_of_links: LinkPoints,
+    flat: list[int],
+    size: float,
+    strokes: list[Floats],
 ) -> None:
     """Base, joints and loop closures; driven joints filled, with the names of their drives."""
     links, closures, drives = mechanism.links, mechanism.closures, mechanism.drives
-    base = placed.origin[links.parent < 0][:, flat]
+    base = points_of_links.origin[links.parent < 0][:, flat]
     grounded = [p for a, p in zip(closures.a, closures.point_a, strict=True) if a < 0]
     grounded += [p for b, p in zip(closures.b, closures.point_b, strict=True) if b < 0]
     base = np.vstack([base, np.array(grounded).reshape(-1, 3)[:, flat]])
     below = base - np.array([0.0, 0.035 * size])
     ax.plot(*below.T, marker="^", markersize=13.0, color="#B8B8B8", linestyle="none", zorder=1.5, label="base")
     circle: dict[str, Any] = {"marker": "o", "markersize": 7.0, "linestyle": "none", "markeredgecolor": BLACK}
-    ax.plot(*pins(mechanism, placed)[:, flat].T, markerfacecolor="white", zorder=3.0, label="joint", **circle)
-    driven = placed.origin[drives.joint][:, flat]
+    ax.plot(
+        *joint_points(mechanism, points_of_links)[:, flat].T,
+        markerfacecolor="white",
+        zorder=3.0,
+        label="joint",
+        **circle,
+    )
+    driven = points_of_links.origin[drives.joint][:, flat]
     if len(driven):
         ax.plot(*driven.T, markerfacecolor=BLUE, zorder=3.1, label="driven joint", **circle)
-    for place, names in _together(driven, drives.names, SAME_POINT * max(size, 1.0)):
+    for place, names in _labels_by_position(driven, drives.names, SAME_POINT * max(size, 1.0)):
         aside = _free_side(place, strokes, SAME_POINT * max(size, 1.0))
         room = place + 0.2 * size * aside  # texts do not widen the view
         ax.plot(*room[:, None], linestyle="none", marker=None)
@@ -115,12 +126,14 @@ def _joints(
         )
 
 
-def pins(mechanism: Mechanism, placed: LinkPoints) -> Floats:
+def joint_points(mechanism: Mechanism, points_of_links: LinkPoints) -> Floats:
     """Where joints turn and loops meet, (k, 3)."""
     closures = mechanism.closures
     turning = np.flatnonzero(mechanism.links.joint == REVOLUTE)
-    meeting = [placed.of(int(a), p) if a >= 0 else p for a, p in zip(closures.a, closures.point_a, strict=True)]
-    return np.array([*placed.origin[turning], *meeting]).reshape(-1, 3)
+    meeting = [
+        points_of_links.of(int(a), p) if a >= 0 else p for a, p in zip(closures.a, closures.point_a, strict=True)
+    ]
+    return np.array([*points_of_links.origin[turning], *meeting]).reshape(-1, 3)
 
 
 def _free_side(place: Floats, strokes: list[Floats], near: float) -> Floats:
@@ -140,7 +153,7 @@ def _free_side(place: Floats, strokes: list[Floats], near: float) -> Floats:
     return np.array([np.cos(middle), np.sin(middle)])
 
 
-def _together(points: Floats, names: tuple[str, ...], near: float) -> list[tuple[Floats, list[str]]]:
+def _labels_by_position(points: Floats, names: tuple[str, ...], near: float) -> list[tuple[Floats, list[str]]]:
     """Names gathered by place, so that labels of joints in one place stand under each other."""
     groups: list[tuple[Floats, list[str]]] = []
     for point, name in zip(points, names, strict=True):

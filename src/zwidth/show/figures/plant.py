@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from zwidth.model.plant import Plant
 from zwidth.show.figures.style import BLACK, GREY, VERMILION
-from zwidth.show.units import given
+from zwidth.show.units import as_written
 
 Floats = NDArray[np.float64]
 WIDTH, GAP, HALF = 1.2, 1.6, 0.55  # of a mass, between masses, half the height of a mass
 
 
 @dataclass(frozen=True)
-class Chain:
+class MassChain:
     """Masses in a row.
 
     mass       (n,)     [kg]
@@ -31,7 +31,7 @@ class Chain:
     damping: Floats
 
 
-def as_chain(plant: Plant) -> Chain | None:
+def as_chain(plant: Plant) -> MassChain | None:
     """The plant as a row of masses joined to their neighbours and to the ground at the ends; None if it is not."""
     n = plant.size
     links = []
@@ -49,21 +49,21 @@ def as_chain(plant: Plant) -> Chain | None:
         if to_ground[0] < 0.0 or last < 0.0:
             return None
         links.append(np.concatenate([[to_ground[0]], between, [last]]))
-    return Chain(np.diag(plant.mass), links[0], links[1])
+    return MassChain(np.diag(plant.mass), links[0], links[1])
 
 
-def draw_chain(ax: Axes, plant: Plant, chain: Chain) -> None:
+def draw_chain(ax: Axes, plant: Plant, chain: MassChain) -> None:
     """Masses as boxes with their numbers, springs over dampers, and where the wall acts, reads and is held."""
     n = len(chain.mass)
     left = GAP * (np.arange(n) + 1.0) + WIDTH * np.arange(n)
     for i, x in enumerate(left):
         ax.add_patch(Rectangle((x, -HALF), WIDTH, 2 * HALF, facecolor="#EEEEEE", edgecolor=BLACK))
-        ax.text(x + WIDTH / 2, 0.0, given(float(chain.mass[i]), "kg"), ha="center", va="center", fontsize=8.0)
+        ax.text(x + WIDTH / 2, 0.0, as_written(float(chain.mass[i]), "kg"), ha="center", va="center", fontsize=8.0)
         ax.text(x + WIDTH / 2, -HALF - 0.12, "\n".join(_roles(plant, i)), ha="center", va="top", fontsize=8.0)
     for i in range(n + 1):
         start = left[i] - GAP if i < n else left[-1] + WIDTH
         if chain.stiffness[i] > 0.0 or chain.damping[i] > 0.0:
-            _joined(ax, start, start + GAP, float(chain.stiffness[i]), float(chain.damping[i]))
+            _spring_and_damper(ax, start, start + GAP, float(chain.stiffness[i]), float(chain.damping[i]))
             if i in (0, n):
                 _ground(ax, start if i == 0 else start + GAP)
     ends = chain.stiffness[[0, n]] + chain.damping[[0, n]] > 0.0
@@ -79,14 +79,14 @@ def _roles(plant: Plant, i: int) -> list[str]:
     return [name for name, vector in names if vector[i] != 0.0]
 
 
-def _joined(ax: Axes, start: float, end: float, stiffness: float, damping: float) -> None:
+def _spring_and_damper(ax: Axes, start: float, end: float, stiffness: float, damping: float) -> None:
     both = stiffness > 0.0 and damping > 0.0
     if stiffness > 0.0:
         y = 0.3 if both else 0.0
         x = start + (end - start) * np.array([0.0, 0.2, *np.linspace(0.235, 0.765, 9), 0.8, 1.0])
         zigzag = [0.0, 0.0, *(0.13 * (-1.0) ** k for k in range(9)), 0.0, 0.0]
         ax.plot(x, y + np.array(zigzag), color=VERMILION, linewidth=1.2)
-        ax.text((start + end) / 2, y + 0.18, given(stiffness, "N/m"), ha="center", va="bottom", fontsize=8.0)
+        ax.text((start + end) / 2, y + 0.18, as_written(stiffness, "N/m"), ha="center", va="bottom", fontsize=8.0)
     if damping > 0.0:
         y = -0.3 if both else 0.0
         middle = (start + end) / 2
@@ -96,7 +96,7 @@ def _joined(ax: Axes, start: float, end: float, stiffness: float, damping: float
         cup = [y + 0.18, y + 0.18, y - 0.18, y - 0.18]
         ax.plot(sides, cup, color=GREY, linewidth=1.2)
         ax.plot([middle + 0.22, end], [y, y], color=GREY, linewidth=1.2)
-        ax.text(middle, y - 0.27, given(damping, "Ns/m"), ha="center", va="top", fontsize=8.0)
+        ax.text(middle, y - 0.27, as_written(damping, "Ns/m"), ha="center", va="top", fontsize=8.0)
 
 
 def _ground(ax: Axes, x: float) -> None:

@@ -11,16 +11,17 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 
+from zwidth.show.figures.caption import caption_of_result, write_caption
 from zwidth.show.figures.style import BLACK, GREY, VERMILION, context, figure, inline_svg, label
 
 Window = tuple[float, float, float, float]
 Draw = Callable[[Axes, Any], None]
 
-SHOWN: Final = count(1)  # numbers the figures that notebooks hold: ids in one page must differ
+FIGURE_NUMBERS: Final = count(1)  # numbers the figures that notebooks hold: ids in one page must differ
 
 
 def plot(result: Any, ax: Axes | None = None) -> Axes:
-    """Draw a result into axes, or into those of a new figure of pyplot's; returns the axes.
+    """Draw a result into axes, or into those of a new figure of pyplot's, with its caption; returns the axes.
 
     Raises  TypeError  for what has no drawing
     """
@@ -31,8 +32,9 @@ def plot(result: Any, ax: Axes | None = None) -> Axes:
     from matplotlib import pyplot
 
     with context():
-        _, ax = pyplot.subplots(figsize=(5.6, 3.9), layout="constrained")
+        made, ax = pyplot.subplots(figsize=(5.6, 3.9), layout="constrained")
         draw(ax, result)
+        write_caption(made, caption_of_result(result))
     return ax
 
 
@@ -41,7 +43,8 @@ def notebook(result: Any) -> str:
     made, ax = figure()
     with context():
         drawing_of(result)(ax, result)
-    picture = inline_svg(made, f"zwidth-{next(SHOWN)}", repr(result).splitlines()[0])
+        write_caption(made, caption_of_result(result))
+    picture = inline_svg(made, f"zwidth-{next(FIGURE_NUMBERS)}", repr(result).splitlines()[0])
     return f"<pre>{escape(repr(result))}</pre>\n<div style='max-width: 40em'>{picture}</div>"
 
 
@@ -56,7 +59,7 @@ def drawing_of(result: Any) -> Draw:
 def draw_any_chart(ax: Axes, chart: Any, window: Window | None = None) -> None:
     """The chart of one direction, of several, or by a frequency response."""
     if type(chart).__name__ == "MeasuredChart":
-        from zwidth.show.figures.measured import draw_measured_chart
+        from zwidth.show.figures.measured_chart import draw_measured_chart
 
         draw_measured_chart(ax, chart, window=window)
         return
@@ -77,10 +80,12 @@ def _robust_study(ax: Axes, study: Any) -> None:
     draw_robust(ax, study.chart, study.members)
 
 
-def _polar(ax: Axes, found: Any) -> None:
+def _polar(ax: Axes, by_direction: Any) -> None:
     from zwidth.show.figures.polar import draw_polar
 
-    draw_polar(ax, found, found.angles, (found.plane[:1] or "x", found.plane[1:] or "y"))
+    draw_polar(
+        ax, by_direction, by_direction.angles, (by_direction.plane[:1] or "x", by_direction.plane[1:] or "y")
+    )
 
 
 def _bounds(ax: Axes, found: Any) -> None:
@@ -101,9 +106,9 @@ def _sensitivities(ax: Axes, found: Any) -> None:
     draw_sensitivities(ax, found)
 
 
-def _verdicts(ax: Axes, found: Any) -> None:
+def _verdicts(ax: Axes, verdicts: Any) -> None:
     """The walls as marks: discs where stable, crosses where not, grey squares where undecided."""
-    K, B, names = found.stiffness.ravel(), found.damping.ravel(), np.array(found.names)
+    K, B, names = verdicts.stiffness.ravel(), verdicts.damping.ravel(), np.array(verdicts.names)
     for name, style in (
         ("stable", {"marker": "o", "color": BLACK}),
         ("unstable", {"marker": "x", "color": VERMILION}),
@@ -117,7 +122,7 @@ def _verdicts(ax: Axes, found: Any) -> None:
     ax.legend(frameon=False, fontsize=8.0)
 
 
-def _measured(ax: Axes, found: Any) -> None:
+def _measure_values(ax: Axes, found: Any) -> None:
     """A measure's values: marks in order for one or a row, colours for a plane of points."""
     values = np.asarray(found.values, dtype=float)
     if values.ndim == 2:
@@ -131,14 +136,14 @@ def _measured(ax: Axes, found: Any) -> None:
     ax.set_ylabel("value")
 
 
-def _description(ax: Axes, found: Any) -> None:
+def _description(ax: Axes, description: Any) -> None:
     """Natural frequencies as lines along a frequency axis, with their damping ratios."""
-    frequencies = np.asarray(found.natural_frequencies, dtype=float)
-    ratios = found.damping_ratios or [None] * len(frequencies)
+    frequencies = np.asarray(description.natural_frequencies, dtype=float)
+    ratios = description.damping_ratios or [None] * len(frequencies)
     for frequency, ratio in zip(frequencies, ratios, strict=True):
         ax.axvline(frequency, color=BLACK, linewidth=1.2)
-        told = "rigid motion" if frequency == 0.0 else "" if ratio is None else f"damping ratio {ratio:.3g}"
-        ax.annotate(told, (frequency, 0.5), rotation=90.0, va="center", ha="right", fontsize=8.0)
+        text = "rigid motion" if frequency == 0.0 else "" if ratio is None else f"damping ratio {ratio:.3g}"
+        ax.annotate(text, (frequency, 0.5), rotation=90.0, va="center", ha="right", fontsize=8.0)
     ax.set_ylim(0.0, 1.0)
     ax.set_yticks([])
     label(ax.xaxis, "Natural frequency", "Hz")
@@ -147,15 +152,16 @@ def _description(ax: Axes, found: Any) -> None:
 def _felt(ax: Axes, found: Any) -> None:
     from zwidth.show.figures.felt import draw_impedance
 
-    felt = np.full(len(found.frequency), np.nan + 0j) if found.impedance is None else found.impedance
-    draw_impedance(ax, found.frequency, felt, found.commanded, found.free_motion)
+    felt = np.full(len(found.frequency), np.nan + 0j) if found.felt_impedance is None else found.felt_impedance
+    draw_impedance(ax, found.frequency, felt, found.commanded_impedance, found.free_motion_impedance)
 
 
-def _experiment(ax: Axes, found: Any) -> None:
+def _experiment(ax: Axes, experiment: Any) -> None:
     from zwidth.show.figures.experiment import draw_experiment, measured_bars, own_bars
 
-    own = () if found.own is None else own_bars(compared.point for compared in found.own.points)
-    draw_experiment(ax, measured_bars(found.points), found.chart, own)
+    users = experiment.user_points
+    own = () if users is None else own_bars(compared.point for compared in users.points)
+    draw_experiment(ax, measured_bars(experiment.points), experiment.chart, own)
 
 
 def _limit_cycles(ax: Axes, found: Any) -> None:
@@ -175,12 +181,10 @@ def _contact(ax: Axes, found: Any) -> None:
 
 
 def _response(ax: Axes, response: Any) -> None:
-    """What the encoders read over time, and where the wall begins; `zwidth simulate --output` draws all panels."""
-    ax.plot(response.time, response.reading, color=BLACK, linewidth=1.0, label="counted by the encoders")
-    ax.axhline(response.wall_position, color=GREY, linewidth=0.8, label="wall")
-    label(ax.xaxis, "Time", "s")
-    label(ax.yaxis, "Position", "m")
-    ax.legend(frameon=False, fontsize=8.0)
+    """Position over time; `zwidth simulate --output` draws all panels."""
+    from zwidth.show.figures.contact_response import draw_position
+
+    draw_position(ax, response)
 
 
 def _felt_chart(ax: Axes, chart: Any) -> None:
@@ -225,11 +229,11 @@ def _common_area(ax: Axes, found: Any) -> None:
     ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.02), fontsize=8.0, frameon=False)
 
 
-def _path(ax: Axes, motion: Any) -> None:
+def _mechanism_motion(ax: Axes, motion: Any) -> None:
     """The handle's path at the surface; `zwidth move --output` draws all panels."""
-    from zwidth.show.figures.path import draw_close
+    from zwidth.show.figures.mechanism_motion import draw_close_up
 
-    draw_close(ax, motion)
+    draw_close_up(ax, motion)
 
 
 DRAWINGS: Final[dict[str, Draw]] = {
@@ -241,7 +245,7 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "Guarantees": _guarantees,
     "Sensitivities": _sensitivities,
     "WallVerdicts": _verdicts,
-    "Measured": _measured,
+    "MeasureValues": _measure_values,
     "Description": _description,
     "FeltWall": _felt,
     "Experiment": _experiment,
@@ -249,7 +253,7 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "Couplings": _couplings,
     "ContactSimulation": _contact,
     "TimeResponse": _response,
-    "MechanismMotion": _path,
+    "MechanismMotion": _mechanism_motion,
     "FeltChart": _felt_chart,
     "Region": _region,
     "EigenvaluePaths": _eigenvalue_paths,

@@ -8,10 +8,12 @@ from matplotlib.ticker import MaxNLocator
 
 from zwidth.chart.polar import OK, ByDirection
 from zwidth.show.figures.style import BLACK, GREY, STABLE, VERMILION, label, legend_above
-from zwidth.show.units import given, quantity
+from zwidth.show.units import as_written, quantity
 
 
-def draw_polar(ax: Axes, found: ByDirection, angles_deg: np.ndarray, axes: tuple[str, str] = ("x", "y")) -> None:
+def draw_polar(
+    ax: Axes, by_direction: ByDirection, angles_deg: np.ndarray, axes: tuple[str, str] = ("x", "y")
+) -> None:
     """A closed outline whose distance from the middle is the largest stiffness along each direction.
 
     ax          equal axes of a plane, both in N/m
@@ -19,18 +21,18 @@ def draw_polar(ax: Axes, found: ByDirection, angles_deg: np.ndarray, axes: tuple
     axes        names of the plane's axes
     """
     along = np.deg2rad(np.append(angles_deg, angles_deg[:1]))
-    stiffness = np.append(found.stiffness, found.stiffness[:1])
+    stiffness = np.append(by_direction.stiffness, by_direction.stiffness[:1])
     x, y = stiffness * np.cos(along), stiffness * np.sin(along)
-    have = np.isfinite(found.stiffness)
+    have = np.isfinite(by_direction.stiffness)
     if have.all():
         ax.fill(x, y, facecolor=STABLE, edgecolor="none", zorder=1.0)
     ax.plot(x, y, color=BLACK, solid_joinstyle="round", label="largest stiffness along each direction")
-    reach = 1.1 * float(np.max(found.stiffness[have])) if have.any() else 1.0
-    for name, k, marker in _extremes(found):
+    reach = 1.1 * float(np.max(by_direction.stiffness[have])) if have.any() else 1.0
+    for name, k, marker in _extremes(by_direction):
         angle = np.deg2rad(angles_deg[k])
-        text = f"{name}: {quantity(found.stiffness[k], 'N/m')} along {given(float(angles_deg[k]))}°"
+        text = f"{name}: {quantity(by_direction.stiffness[k], 'N/m')} along {as_written(float(angles_deg[k]))}°"
         ax.plot(
-            *(found.stiffness[k] * np.array([[np.cos(angle)], [np.sin(angle)]])),
+            *(by_direction.stiffness[k] * np.array([[np.cos(angle)], [np.sin(angle)]])),
             marker=marker,
             markersize=6.0,
             markerfacecolor="white",
@@ -40,7 +42,7 @@ def draw_polar(ax: Axes, found: ByDirection, angles_deg: np.ndarray, axes: tuple
             zorder=5.0,
             label=text,
         )
-    missing = np.array([status != OK for status in found.status])
+    missing = np.array([status != OK for status in by_direction.status])
     if missing.any():
         angle = np.deg2rad(angles_deg[missing])
         edge = reach * np.array([np.cos(angle), np.sin(angle)])
@@ -49,12 +51,12 @@ def draw_polar(ax: Axes, found: ByDirection, angles_deg: np.ndarray, axes: tuple
     legend_above(ax)
 
 
-def _extremes(found: ByDirection) -> list[tuple[str, int, str]]:
+def _extremes(by_direction: ByDirection) -> list[tuple[str, int, str]]:
     """The stiffest and the least stiff direction, with a marker each."""
-    have = np.isfinite(found.stiffness)
+    have = np.isfinite(by_direction.stiffness)
     if not have.any():
         return []
-    values = np.where(have, found.stiffness, np.nan)
+    values = np.where(have, by_direction.stiffness, np.nan)
     return [("stiffest", int(np.nanargmax(values)), "o"), ("least stiff", int(np.nanargmin(values)), "s")]
 
 

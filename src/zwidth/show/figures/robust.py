@@ -15,10 +15,10 @@ from matplotlib.patches import Polygon
 from zwidth.chart.robust.chart import RobustChart
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import GREY, LINES, STABLE, legend_above
-from zwidth.show.members import value_text
+from zwidth.show.member_text import value_text
 
 NAMED: Final = len(LINES) - 1  # binding members with a line of their own; the last line is for the rest
-DRAWN: Final = 200  # members' outlines at most
+DRAWN_MEMBERS: Final = 200  # members' outlines at most
 LIGHT: Final = "#B8B8B8"
 LONGEST: Final = 60  # signs in a line of the legend
 SHORTEST: Final = 0.02  # share of the window that a named member binds
@@ -33,8 +33,8 @@ def draw_robust(
     members  path -> value of each, for the legend
     window   what to show; left out: the box of all outlines' part with K >= 0 and B >= 0, and 5 %
     """
-    seen = window or _box(chart)
-    outlines = [outline for index in list(chart.outlines)[:DRAWN] for outline in chart.outlines[index]]
+    view = window or _box(chart)
+    outlines = [outline for index in list(chart.outlines)[:DRAWN_MEMBERS] for outline in chart.outlines[index]]
     ax.add_collection(LineCollection(outlines, colors=LIGHT, linewidths=0.4, zorder=1.2, label="a member's edge"))
     for n, ring in enumerate(chart.regions):
         text = "" if n else "stable for every member"
@@ -42,14 +42,14 @@ def draw_robust(
     for n, outline in enumerate(chart.outlines[chart.best_by_area]):
         text = "" if n else f"best member by area: {_words(members, chart.best_by_area)}"
         ax.plot(*outline.T, color=GREY, linewidth=1.1, linestyle=(0, (3, 2)), label=text, zorder=1.4)
-    _draw_edge(ax, chart, members, seen)
-    frame(ax, seen, empty=not chart.regions)
+    _draw_edge(ax, chart, members, view)
+    frame(ax, view, empty=not chart.regions)
     legend_above(ax)
 
 
-def _draw_edge(ax: Axes, chart: RobustChart, members: Sequence[Mapping[str, Any]], seen: Window) -> None:
+def _draw_edge(ax: Axes, chart: RobustChart, members: Sequence[Mapping[str, Any]], view: Window) -> None:
     """The edge's arcs; those who bind most of what is seen are named."""
-    K0, K1, B0, B1 = seen
+    K0, K1, B0, B1 = view
     lengths: dict[int, float] = {}
     for arc in chart.boundary:
         x, y = (arc.stiffness - K0) / (K1 - K0), (arc.damping - B0) / (B1 - B0)

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 from math import isnan
+from typing import Final
 
 from matplotlib.axes import Axes
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
 
 from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION
 from zwidth.show.units import MINUS, NONE, signed
 from zwidth.study.sensitivity_result import Sensitivities
 
+NUMBER_ROOM: Final = 0.24  # of what the bars span, for the numbers beside them
 
-def draw_sensitivities(ax: Axes, found: Sensitivities, top: int = 12, *, wholes: bool = False) -> None:
+
+def draw_sensitivities(ax: Axes, sensitivities: Sensitivities, top: int = 12, *, grouped: bool = False) -> None:
     """Per cent of largest stiffness that one per cent more of each number gives, the most telling on top.
 
-    top     how many numbers at most; those without influence are left out
-    wholes  lists and matrices as wholes, not their elements
+    top      how many numbers at most; those without influence are left out
+    grouped  lists and matrices as wholes, not their elements
     """
-    single = [(n.path, n.logarithmic) for n in found.numbers if not isnan(n.logarithmic) and n.logarithmic != 0.0]
-    shown = list(found.wholes if wholes else single)[:top]
+    single = [
+        (n.path, n.logarithmic) for n in sensitivities.numbers if not isnan(n.logarithmic) and n.logarithmic != 0.0
+    ]
+    shown = list(sensitivities.ranking if grouped else single)[:top]
     rows = list(range(len(shown), 0, -1))
     values = [value for _, value in shown]
     widest = max((abs(value) for value in values), default=1.0)
@@ -41,18 +48,21 @@ def draw_sensitivities(ax: Axes, found: Sensitivities, top: int = 12, *, wholes:
             ha="left" if value > 0.0 else "right",
             va="center",
             fontsize=7.5,
+            zorder=3.0,
+            path_effects=[withStroke(linewidth=2.0, foreground="white")],
         )
     ax.axvline(0.0, color=BLACK, linewidth=0.8)
     low, high = min([0.0, *values]), max([0.0, *values])
-    ax.set_xlim(
-        low - 0.2 * widest * (low < 0.0) - 0.02 * widest, high + 0.2 * widest * (high > 0.0) + 0.02 * widest
-    )
+    # numbers stand outside of the bars: both sides have room for the longest, whatever the bars span
+    room = NUMBER_ROOM * (high - low or 1.0)
+    ax.set_xlim(low - (room if low < 0.0 else 0.02 * widest), high + (room if high > 0.0 else 0.02 * widest))
     ax.set_ylim(0.4, len(shown) + 0.6)
     ax.set_yticks(rows, [_short(path) for path, _ in shown])
     ax.tick_params(axis="y", length=0.0)
     ax.spines["left"].set_visible(False)
     ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}".replace("-", MINUS))
-    ax.set_xlabel("change of the largest stiffness by 1 % more [%]")
+    ax.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
+    ax.set_xlabel("Change of the largest stiffness for 1 % more [%]")
     if not shown:
         ax.set_yticks([])
         ax.text(0.5, 0.5, NONE, transform=ax.transAxes, ha="center", va="center", color=GREY)

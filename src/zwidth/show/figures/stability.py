@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isnan
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
+from numpy.typing import NDArray
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.measured.chart import MeasuredChart
-from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, label, legend_above, tell_empty
+from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, draw_empty, label, legend_above
 from zwidth.show.units import quantity
+
+Floats = NDArray[np.float64]
 
 # KMIN, KMAX [N/m], BMIN, BMAX [N s/m]
 Window = tuple[float, float, float, float]
@@ -47,10 +50,31 @@ def draw_models(ax: Axes, charts: Mapping[str, StabilityChart], window: Window |
     for n, (name, chart) in enumerate(charts.items()):
         colour, dashes = LINES[n % len(LINES)]
         text = name if chart.regions else f"{name}: nothing stable"
-        for k, ring in enumerate(chart.regions or (np.full((1, 2), np.nan),)):
+        for k, ring in enumerate(edges_of(chart.regions) or (np.full((1, 2), np.nan),)):
             ax.plot(*ring.T, color=colour, linestyle=dashes, label="" if k else text, zorder=4.0 - 0.1 * n)
     frame(ax, window or seen.box, empty=not seen.regions)
     legend_above(ax, columns=2)
+
+
+def edges_of(rings: Sequence[Floats]) -> list[Floats]:
+    """The edges of what several rings cover, (k, 2) with nan between pieces of an edge.
+
+    A cell with a hole is cut into rings: what two of them share is a cut, and no edge.
+    """
+    if not len(rings):
+        return []
+    pieces = [np.hstack([ring[:-1], ring[1:]]) for ring in rings]
+    ends = np.vstack(pieces)
+    backwards = (ends[:, 0] > ends[:, 2]) | ((ends[:, 0] == ends[:, 2]) & (ends[:, 1] > ends[:, 3]))
+    ordered = np.where(backwards[:, None], ends[:, [2, 3, 0, 1]], ends)
+    _, inverse, count = np.unique(ordered, axis=0, return_inverse=True, return_counts=True)
+    shared = np.split(count[inverse.ravel()] > 1, np.cumsum([len(piece) for piece in pieces])[:-1])
+    outlines = []
+    for ring, cut in zip(rings, shared, strict=True):
+        # a point in the middle of each cut, without coordinates, ends the line there
+        at = np.flatnonzero(cut) + 1
+        outlines.append(np.insert(np.asarray(ring, dtype=float), at, np.nan, axis=0))
+    return outlines
 
 
 def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart) -> None:
@@ -82,4 +106,4 @@ def frame(ax: Axes, window: Window, *, empty: bool) -> None:
     label(ax.xaxis, "Virtual stiffness K", "N/m")
     label(ax.yaxis, "Virtual damping B", "Ns/m")
     if empty:
-        tell_empty(ax)
+        draw_empty(ax)

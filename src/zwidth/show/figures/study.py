@@ -13,15 +13,15 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import AutoLocator, FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import AutoLocator, MaxNLocator
 from numpy.typing import NDArray
 
-from zwidth.measures.measure import FAILED, NO_VALUE, OUT_OF_REACH, SINGULAR, STATUS, UNDECIDED
-from zwidth.show.figures.bands import bands_of, colour_bar
+from zwidth.measures.definition import FAILED, NO_VALUE, OUT_OF_REACH, SINGULAR, STATUS, UNDECIDED
+from zwidth.show.figures.colour_bands import bands_of, colour_bar
 from zwidth.show.figures.map import MARKS
-from zwidth.show.figures.parallel import draw_parallel
-from zwidth.show.figures.style import BLACK, GREY, LINES, context, figure, label
-from zwidth.show.units import printed
+from zwidth.show.figures.parallel_coordinates import draw_parallel
+from zwidth.show.figures.style import BLACK, GREY, LINES, context, figure, label, number_logarithmic
+from zwidth.show.units import printed, quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,11 +29,12 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 SYMBOLS: Final = {OUT_OF_REACH: "x", SINGULAR: "+", NO_VALUE: "o", UNDECIDED: "d", FAILED: "v"}
+SAME: Final = 1e-9  # share by which the values of a constant column differ
 MOST_PANELS: Final = 12
 POINTS: Final = ("o", "s", "^", "D", "v", "P")
 MARKED: Final = 40  # points up to which each is marked
-FOOT: Final = 0.045  # of the height of a panel, for each line that has gaps
-SPARSE: Final = 4  # decades above which only each is numbered
+MARK_HEIGHT: Final = 0.045  # of the height of a panel, for each line that has gaps
+MOST_TICKS: Final = 6  # of an axis: numbers such as 0.0005 are long
 LETTERS: Final = 34  # of a label along the height of a panel
 
 
@@ -46,7 +47,7 @@ def study_figure(dataset: xr.Dataset) -> Figure:
     dataset  as `study.sweep_data` makes it
     """
     names = [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
-    numeric, texts = _kinds(dataset, names)
+    numeric, texts = _split_axes(dataset, names)
     for key in numeric:  # values may be listed in any order
         dataset = dataset.sortby(key)
     lines = int(np.prod([dataset.sizes[key] for key in texts]))
@@ -62,7 +63,7 @@ def study_figure(dataset: xr.Dataset) -> Figure:
 def draw_first_column(ax: Axes, dataset: xr.Dataset) -> None:
     """The first column of a study in one panel: curves, a heat map or parallel coordinates, as `study_figure`."""
     name = next(str(name) for name in dataset.data_vars if f"{name}_status" in dataset)
-    numeric, texts = _kinds(dataset, [name])
+    numeric, texts = _split_axes(dataset, [name])
     for key in numeric:
         dataset = dataset.sortby(key)
     if _few_lines(dataset, name, numeric, texts):
@@ -87,7 +88,7 @@ def _few_lines(dataset: xr.Dataset, name: str, numeric: Sequence[str], texts: Se
     return (lines if numeric else lines / dataset.sizes[texts[0]]) <= len(LINES)
 
 
-def _kinds(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], list[str]]:
+def _split_axes(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], list[str]]:
     """The axes of numbers, and those of texts."""
     axes = [str(dim) for dim in dataset[names[0]].dims]
     numeric = [key for key in axes if dataset[key].dtype.kind in "if"] if axes != ["design"] else []
@@ -103,17 +104,17 @@ def _curves(dataset: xr.Dataset, names: Sequence[str], along: str) -> Figure:
     others = [str(dim) for dim in dataset[names[0]].dims if dim != along]
     lines = 1 if not others else int(np.prod([dataset.sizes[key] for key in others]))
     drawing, panels = _panels(5.8, 0.9 + 0.17 * lines + 2.1 * len(names), len(names), 1, len(names))
-    found: dict[int, None] = {}
+    statuses: dict[int, None] = {}
     for panel in panels[:-1]:  # before anything is drawn: what is logarithmic is so for all of them
         panel.sharex(panels[-1])
     for panel, name in zip(panels, names, strict=True):
-        found |= dict.fromkeys(draw_curves(panel, dataset, name, along))
+        statuses |= dict.fromkeys(draw_curves(panel, dataset, name, along))
     for panel in panels[:-1]:
         panel.tick_params(which="both", labelbottom=False)
         panel.set_xlabel("")
     numeric = dataset[along].dtype.kind in "if"
     handles = list(_line_handles(dataset, others, lines=numeric))
-    _legend_above(panels[0], handles, [_symbol(status) for status in sorted(found)])
+    _legend_above(panels[0], handles, [_symbol(status) for status in sorted(statuses)])
     return drawing
 
 
@@ -135,25 +136,37 @@ def draw_curves(ax: Axes, dataset: xr.Dataset, name: str, along: str) -> list[in
     others = [str(dim) for dim in column.dims if dim != along]
     numeric = dataset[along].dtype.kind in "if"
     x = dataset[along].values if numeric else np.arange(dataset.sizes[along])
-    lost: list[tuple[str, NDArray[np.uint8]]] = []
+    missing: list[tuple[str, NDArray[np.uint8]]] = []
     for n, chosen in enumerate(_combinations(dataset, others)):
         y = np.asarray(column.sel(chosen).transpose(along).values, dtype=float)
-        style = _line(n) if numeric else _point(n)
+        style = _line_style(n) if numeric else _marker_style(n)
         if numeric and len(x) <= MARKED:
             style |= {"marker": "o", "markersize": 3.2}
         ax.plot(x, np.where(np.isfinite(y), y, np.nan), zorder=2.0 + 0.01 * n, **style)
         here = status.sel(chosen).transpose(along).values
         if np.isin(here, list(SYMBOLS)).any():
-            lost.append((style["color"], here))
-    _draw_lost(ax, x, lost)
+            missing.append((style["color"], here))
+    _draw_missing(ax, x, missing)
     if not np.isfinite(column.values).any():
         ax.set_yticks([])
+    elif constant := constant_text(column, np.asarray(column.values, dtype=float)):
+        ax.set_yticks([])
+        said = constant.splitlines()[-1]
+        ax.annotate(
+            said,
+            (0.5, 0.5),
+            (0, 5),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+        )
     _name_column(ax, column)
     _name_axis(ax, "x", dataset[along])
-    return [kind for kind in SYMBOLS if any((here == kind).any() for _, here in lost)]
+    return [kind for kind in SYMBOLS if any((here == kind).any() for _, here in missing)]
 
 
-class _From(AutoLocator):
+class TicksAbove(AutoLocator):
     """Ticks from a value upwards: what stands below it is no number."""
 
     def __init__(self, low: float) -> None:
@@ -164,20 +177,20 @@ class _From(AutoLocator):
         return [value for value in super().tick_values(vmin, vmax) if value >= self.low]
 
 
-def _draw_lost(ax: Axes, x: NDArray[Any], lost: Sequence[tuple[str, NDArray[np.uint8]]]) -> None:
+def _draw_missing(ax: Axes, x: NDArray[Any], missing: Sequence[tuple[str, NDArray[np.uint8]]]) -> None:
     """A row of symbols for each line that has gaps, below all lines."""
-    if not lost:
+    if not missing:
         return
     low, high = ax.get_ylim()
-    foot = FOOT * (len(lost) + 0.5)
+    foot = MARK_HEIGHT * (len(missing) + 0.5)
     ax.set_ylim(low - (high - low) * foot / (1.0 - foot), high)
-    ax.yaxis.set_major_locator(_From(low))
+    ax.yaxis.set_major_locator(TicksAbove(low))
     ax.axhline(low, color=GREY, linewidth=0.5)
-    for row, (colour, here) in enumerate(lost):
+    for row, (colour, here) in enumerate(missing):
         for kind, symbol in SYMBOLS.items():
             ax.plot(
                 x[here == kind],
-                np.full(int((here == kind).sum()), FOOT * (row + 0.75)),
+                np.full(int((here == kind).sum()), MARK_HEIGHT * (row + 0.75)),
                 symbol,
                 color=colour,
                 markersize=4.0,
@@ -190,7 +203,7 @@ def _draw_lost(ax: Axes, x: NDArray[Any], lost: Sequence[tuple[str, NDArray[np.u
 
 def _name_column(ax: Axes, column: Any) -> None:
     title = "\n".join(wrap(str(column.attrs["title"]), LETTERS - 6, break_long_words=False))
-    unit = printed(str(column.attrs["unit"]))
+    unit = printed(str(column.attrs.get("unit", "")))
     if unit:
         label(ax.yaxis, title, unit)
     else:
@@ -208,23 +221,15 @@ def _name_axis(ax: Axes, which: str, coordinate: Any) -> None:
         return
     if coordinate.attrs.get("scale") == "log":
         (ax.set_xscale if which == "x" else ax.set_yscale)("log")
-        unit = str(coordinate.attrs["units"])
+        unit = str(coordinate.attrs.get("units", ""))
         axis.set_label_text(f"{key} [{printed(unit)}]" if unit else key)
         values = np.asarray(coordinate.values, dtype=float)
-        _number_logarithmic(axis, float(values.min()), float(values.max()))
-    elif unit := printed(str(coordinate.attrs["units"])):
+        number_logarithmic(axis, float(values.min()), float(values.max()))
+    elif unit := printed(str(coordinate.attrs.get("units", ""))):
         label(axis, key, unit, plain=True)
+        axis.set_major_locator(MaxNLocator(nbins=MOST_TICKS, steps=[1, 2, 2.5, 5, 10]))
     else:
         axis.set_label_text(key)
-
-
-def _number_logarithmic(axis: Any, low: float, high: float) -> None:
-    """Ticks of a logarithmic axis at 1, 2 and 5 of each decade, at 1 of many, at more of less than one."""
-    decades = np.log10(high / low)
-    steps = (1.0,) if decades > SPARSE else (1.0, 2.0, 5.0) if decades > 1.5 else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
-    axis.set_major_locator(LogLocator(subs=steps))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def _combinations(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[dict[str, Any]]:
@@ -234,22 +239,22 @@ def _combinations(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[dict[str
 
 def _line_handles(dataset: xr.Dataset, keys: Sequence[str], *, lines: bool) -> Iterator[Line2D]:
     for n, chosen in enumerate(_combinations(dataset, keys) if keys else ()):
-        yield Line2D([], [], label=_said(chosen), **(_line(n) if lines else _point(n)))
+        yield Line2D([], [], label=_combination_text(chosen), **(_line_style(n) if lines else _marker_style(n)))
 
 
-def _line(n: int) -> dict[str, Any]:
+def _line_style(n: int) -> dict[str, Any]:
     colour, dashes = LINES[n % len(LINES)]
     return {"color": colour, "linestyle": dashes}
 
 
-def _point(n: int) -> dict[str, Any]:
+def _marker_style(n: int) -> dict[str, Any]:
     """A point among texts: larger and larger open ones, so that those that coincide are seen."""
     colour, _ = LINES[n % len(LINES)]
     filled = {} if n == 0 else {"markerfacecolor": "none"}
     return {"color": colour, "linestyle": "none", "marker": POINTS[n], "markersize": 4.0 + 2.0 * n, **filled}
 
 
-def _said(chosen: dict[str, Any]) -> str:
+def _combination_text(chosen: dict[str, Any]) -> str:
     return ", ".join(
         f"{key} {value}" if isinstance(value, str) else f"{key} {value:.4g}" for key, value in chosen.items()
     )
@@ -288,13 +293,13 @@ def _heat_maps(dataset: xr.Dataset, names: Sequence[str], axes: Sequence[str], t
     high = len(names) if len(choices) > 1 else -(-len(names) // wide)
     each = [(name, chosen) for name in names for chosen in choices]
     drawing, panels = _panels(4.3 * wide + (0.9 if wide == 1 else 0.0), 3.1 * high + 0.5, high, wide, len(each))
-    found: dict[int, None] = {}
+    statuses: dict[int, None] = {}
     for panel, (name, chosen) in zip(panels, each, strict=True):
         values = np.asarray(dataset[name].values, dtype=float)
-        found |= dict.fromkeys(draw_heat_map(panel, dataset.sel(chosen), name, axes[0], axes[1], values))
+        statuses |= dict.fromkeys(draw_heat_map(panel, dataset.sel(chosen), name, axes[0], axes[1], values))
         if chosen:
-            panel.set_title(_said(chosen), loc="left")
-    handles = [_patch(status) for status in sorted(found)]
+            panel.set_title(_combination_text(chosen), loc="left")
+    handles = [_patch(status) for status in sorted(statuses)]
     if handles:
         drawing.legend(
             handles=handles, loc="outside upper left", ncols=4, fontsize=8.0, frameon=False, borderaxespad=0.4
@@ -315,11 +320,14 @@ def draw_heat_map(
     values = np.asarray(column.values, dtype=float)
     status = dataset[f"{name}_status"].transpose(second, first).values
     scale = values if scale is None else scale
-    if np.isfinite(scale).any():
+    if (constant := constant_text(column, scale)) and not np.isnan(values).all():
+        ax.pcolormesh(x, y, np.ma.masked_where(np.isnan(values), 0.0 * values), cmap=PAPER, linewidth=0.0)
+        ax.text(0.5, 0.5, constant, transform=ax.transAxes, ha="center", va="center", zorder=4.0)
+    elif np.isfinite(scale).any():
         levels, norm, colours = bands_of(scale)
         cells = np.ma.masked_where(np.isnan(values), values)
         ax.pcolormesh(x, y, cells, norm=norm, cmap=colours, linewidth=0.0, rasterized=True)
-        title, unit = str(column.attrs["title"]), printed(str(column.attrs["unit"]))
+        title, unit = str(column.attrs["title"]), printed(str(column.attrs.get("unit", "")))
         colour_bar(ax, levels, norm, colours, title, unit)
     marked = [kind for kind in _HATCHES if (status == kind).any()]
     for kind in marked:
@@ -331,6 +339,16 @@ def draw_heat_map(
     return marked
 
 
+def constant_text(column: Any, values: Floats) -> str:
+    """What a column says that has the same value in all designs; "" where it has not."""
+    finite = values[np.isfinite(values)]
+    if not len(finite) or np.isinf(values).any() or np.ptp(finite) > SAME * float(np.abs(finite).max()):
+        return ""
+    title = "\n".join(wrap(str(column.attrs["title"]), LETTERS, break_long_words=False))
+    return f"{title}\nconstant: {quantity(float(finite[0]), printed(str(column.attrs.get('unit', ''))))}"
+
+
+PAPER: Final = ListedColormap(["#F2F2F2"])
 _HATCHES: Final = {OUT_OF_REACH: "", **{kind: hatch for kind, (_, hatch) in MARKS.items()}}
 
 

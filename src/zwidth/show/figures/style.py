@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from html import escape
 from io import StringIO
+from itertools import pairwise
+from math import ceil, log10
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,10 +22,12 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import Formatter
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import text_to_path
+from matplotlib.ticker import Formatter, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from zwidth.show.output import replacing
-from zwidth.show.units import MINUS, exponent_of, scaled
+from zwidth.show.units import MINUS, as_written, exponent_of, scaled
 
 BLACK: Final = "#000000"
 BLUE: Final = "#0072B2"
@@ -44,9 +48,19 @@ LINES: Final[tuple[tuple[str, Any], ...]] = (
     (ORANGE, (0, (10, 3))),
 )
 
+FAMILY: Final = "DejaVu Sans"  # comes with matplotlib: the same glyphs on every machine
+LEGEND_SIZE: Final = 8.0
+BESIDE_AXES: Final = 0.7  # inches beside axes that a legend above them cannot use: the labels of the upright axis
+MOST_DECADES: Final = 8  # of a logarithmic axis that are all numbered
+# Decades from which on a logarithmic axis has ticks at these multiples of each power of ten.
+DECADE_STEPS: Final = (
+    (2.5, (1.0,)),
+    (1.2, (1.0, 2.0, 5.0)),
+    (0.3, (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)),
+)
 FORMATS: Final = (".png", ".svg", ".pdf")
 _STYLE: Final[dict[str, Any]] = {
-    "font.family": "DejaVu Sans",  # comes with matplotlib: the same glyphs on every machine
+    "font.family": FAMILY,
     "font.size": 9.0,
     "axes.titlesize": 9.0,
     "axes.labelsize": 9.0,
@@ -78,7 +92,7 @@ def figure(width: float = 5.6, height: float = 3.9) -> tuple[Figure, Axes]:
         return made, made.add_subplot()
 
 
-def tell_empty(ax: Axes, text: str = "no wall is stable") -> None:
+def draw_empty(ax: Axes, text: str = "no wall is stable") -> None:
     """Say in the middle of axes why there is nothing to be drawn; numbers along them would mean nothing."""
     ax.set_xticks([])
     ax.set_yticks([])
@@ -160,7 +174,7 @@ def label(axis: Axis, name: str, unit: str, *, plain: bool = False) -> None:
 
 
 def legend_above(ax: Axes, columns: int = 1, title: str | None = None) -> None:
-    """The legend over the axes, where it hides nothing; texts must fit into so many columns."""
+    """The legend over the axes, where it hides nothing, in so many columns, or as many as the figure holds."""
     _legend(ax, loc="lower left", bbox_to_anchor=(0.0, 1.01), ncols=columns, title=title)
 
 
@@ -169,18 +183,56 @@ def legend_beside(ax: Axes) -> None:
     _legend(ax, loc="center left", bbox_to_anchor=(1.02, 0.5))
 
 
+def number_logarithmic(axis: Axis, low: float, high: float, unit: str = "") -> None:
+    """Number a logarithmic axis from low to high: each decade, 1, 2 and 5 of few, more of less than one.
+
+    unit  written with every number, under the prefix that suits it: 1 mm after 100 µm; "": numbers alone
+    """
+    decades = log10(high / low) if high > low > 0.0 else 1.0
+    steps = next((steps for least, steps in DECADE_STEPS if decades > least), (1.0,))
+    if decades > DECADE_STEPS[-1][0]:
+        every = max(1, ceil(decades / MOST_DECADES))
+        axis.set_major_locator(LogLocator(base=10.0**every, subs=steps, numticks=99))
+    else:  # less than a third of a decade has room for round numbers only
+        axis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: as_written(float(f"{value:.4g}"), unit)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def text_width(text: str, size: float) -> float:
+    """Width of a line in letters of this size [points], the same on every machine."""
+    font = FontProperties(family=FAMILY, size=size)
+    return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0])
+
+
+def fitted_columns(ax: Axes, labels: Sequence[str], columns: int, size: float = LEGEND_SIZE) -> int:
+    """Columns of a legend above axes, at most so many, in which the labels do not leave the figure."""
+    assert ax.figure is not None
+    room = 72.0 * (float(ax.figure.get_figwidth()) - BESIDE_AXES)  # type: ignore[union-attr]
+    widths = [max(text_width(line, size) for line in text.split("\n")) + 3.4 * size for text in labels]
+    for count in range(min(columns, len(labels)), 1, -1):
+        rows, more = divmod(len(labels), count)  # matplotlib makes the first columns longer
+        ends = [n * rows + min(n, more) for n in range(count + 1)]
+        needed = sum(max(widths[start:stop]) for start, stop in pairwise(ends)) + 1.6 * size * (count - 1)
+        if needed <= room:
+            return count
+    return 1
+
+
 def _legend(ax: Axes, **place: Any) -> None:
     handles, labels = ax.get_legend_handles_labels()
     if not handles:
         return
+    if "ncols" in place:
+        place["ncols"] = fitted_columns(ax, labels, place["ncols"])
     made = ax.legend(
         handles,
         labels,
         borderaxespad=0.0,
         handlelength=2.6,
         columnspacing=1.6,
-        fontsize=8.0,
-        title_fontsize=8.0,
+        fontsize=LEGEND_SIZE,
+        title_fontsize=LEGEND_SIZE,
         frameon=False,
         alignment="left",
         **place,

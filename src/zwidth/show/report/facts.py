@@ -14,31 +14,31 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.unobserved_instability import unobserved_instability
 from zwidth.measures.felt_chart import FeltChart, felt_chart
-from zwidth.model.effective import EffectiveParameters
+from zwidth.model.effective_parameters import EffectiveParameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
 from zwidth.study.sensitivity import sensitivities
 from zwidth.study.sensitivity_result import Sensitivities
 from zwidth.study.validity import Validity, validity
-from zwidth.study.what_if import BASE, Variant, find, what_if
+from zwidth.study.what_if import BASE, Variant, find_variant, what_if
 
 
 @dataclass(frozen=True)
 class Facts:
-    """A device in one posture and direction, and all that was found about its walls.
+    """A device in one posture and direction, and all results about its walls.
 
-    point      where it is asked about
-    variants   the device as described first, then what_if's changes and models
-    natural    undamped natural frequencies of the device by itself [Hz]; rigid modes 0
-    bounds     the published conditions on the loop
-    runs_away  a motion that no wall moves grows by itself
+    point                the operating point: posture, direction, model, operator
+    variants             the device as described first, then what_if's changes and models
+    natural_frequencies  undamped, of the ungripped device [Hz]; rigid modes 0
+    bounds               the published conditions on the loop
+    runs_away            a motion that no wall affects is unstable
     """
 
     device: Device
     point: OperatingPoint
     variants: tuple[Variant, ...]
-    natural: Floats
+    natural_frequencies: Floats
     bounds: tuple[Bound, ...]
     runs_away: bool
 
@@ -65,7 +65,7 @@ class Facts:
     @property
     def base(self) -> Variant:
         """The device as described."""
-        return find(self.variants, BASE)
+        return find_variant(self.variants, BASE)
 
     @property
     def loop(self) -> Loop:
@@ -83,7 +83,7 @@ class Facts:
 
     @property
     def operator(self) -> str | None:
-        """Who holds the handle; None where nobody does, or a model that holds the link side fixed."""
+        """The operator; None where the handle is ungripped, and for the model with a fixed link side."""
         return None if self.model == "motor-mass" else self.point.operator_name
 
     @property
@@ -92,13 +92,13 @@ class Facts:
         return self.base.stiffness_max > 0.0
 
     @cached_property
-    def answers(self) -> Sensitivities:
-        """How the largest stiffness answers to each number."""
+    def sensitivities(self) -> Sensitivities:
+        """Sensitivities of the largest stiffness to the numbers of the device file."""
         return sensitivities(self.device, self.point)
 
     @cached_property
-    def fits(self) -> Validity | None:
-        """Which simpler model holds where along the edge of the full one; None if that has no chart."""
+    def validity(self) -> Validity | None:
+        """Where along the edge of the full model each simpler one agrees; None if that has no chart."""
         try:
             return validity(self.point)
         except ChartError:
@@ -106,8 +106,8 @@ class Facts:
 
     @cached_property
     def felt(self) -> FeltChart | None:
-        """The chart at the stiffness that the hand feels; None without a handle."""
-        alone = self.point.unheld_plant
+        """The chart at the static stiffness at the handle; None without a handle."""
+        alone = self.point.ungripped_plant
         return None if alone.handle is None else felt_chart(self.chart, alone)
 
 
@@ -118,7 +118,7 @@ def gather(device: Device, point: OperatingPoint | None = None) -> Facts:
         device=device,
         point=point,
         variants=tuple(what_if(device, point)),
-        natural=natural_frequencies(point.unheld_plant),
+        natural_frequencies=natural_frequencies(point.ungripped_plant),
         bounds=tuple(bounds_of(point)),
         runs_away=unobserved_instability(point.loop),
     )

@@ -1,10 +1,11 @@
-"""The report on one device: a single HTML file that asks for nothing outside itself."""
+"""The report on one device: a single HTML file that loads nothing else."""
 
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -13,9 +14,12 @@ from zwidth._version import __version__
 from zwidth.device.device import Device
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.show.output import write_text
-from zwidth.show.report import answers, sentences, tables
+from zwidth.show.report import sentences, tables
 from zwidth.show.report.facts import Facts, gather
-from zwidth.show.report.pictures import pictures
+from zwidth.show.report.figures import svg_figures
+from zwidth.show.units import SPACE
+
+BLANK_BEFORE_UNIT: Final = re.compile(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Hz|N|J|s|m|g)|Ns|samples?)(?![\w-]))")
 
 
 def write_report(
@@ -23,8 +27,8 @@ def write_report(
 ) -> dict[str, Any]:
     """Write the report on a device, whole or not at all; the numbers in it.
 
-    point    where it is asked about, one point of one direction; left out: the device's reference
-    Returns  a dict under the names of the command line's --json, `file` and `summary` (its first sentences)
+    point    operating point with one position and one direction; left out: the device's reference
+    Returns  the numbers by the keys of the command line's --json, `file` and `summary` (its first sentences)
              among them; with a `reason` where no wall is stable
     Raises   what `Device.at` and `OperatingPoint.plant` raise; ChartError if the device cannot be charted
              OutputError (show.output)  where the file cannot be written
@@ -41,6 +45,7 @@ def page(facts: Facts) -> str:
         loader=PackageLoader("zwidth.show.report", "."),
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=keep_units,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -48,8 +53,17 @@ def page(facts: Facts) -> str:
         facts=facts,
         device=facts.device,
         say=sentences,
-        more=answers,
         tables=tables,
-        picture={name: Markup(svg) for name, svg in pictures(facts).items()},
+        picture={name: Markup(svg) for name, svg in svg_figures(facts).items()},
         version=__version__,
     )
+
+
+def keep_units(value: Any) -> Any:
+    """The value, if it is a text with a no-break space between each number and its unit.
+
+    >>> keep_units("sampled at 1 kHz, held for 2 to 3 s")
+    'sampled at 1\xa0kHz, held for 2 to 3\xa0s'
+    """
+    plain = isinstance(value, str) and not isinstance(value, Markup)
+    return BLANK_BEFORE_UNIT.sub(SPACE, value) if plain else value

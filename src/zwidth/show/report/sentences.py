@@ -1,9 +1,15 @@
-"""The report's sentences, each computed from what was found: another device makes them say another thing."""
+"""The report's sentences, each computed from the results: another device makes them say another thing.
+
+Two of them answer different questions. `limit` asks for the cause: what is lost to one property of the device,
+whether or not a device without it can be built. `first_change` asks for the change: which number of the device
+file gains most. `compare_answers` says where the two differ, and why.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from math import isnan
+from math import isfinite, isnan
 from typing import Final
 
 import numpy as np
@@ -11,43 +17,68 @@ import numpy as np
 from zwidth.chart.decay import FastestDecay
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, BackwardDifference
+from zwidth.loop.motion_names import group_names
 from zwidth.model.mechanism import Floats
 from zwidth.show.figures.decay import tenfold_time
-from zwidth.show.motions import counted
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import MINUS, given, number, percent, point, quantity
-from zwidth.study.what_if import REMEDIES, WORTH, Variant, find, limiting_change
+from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity
+from zwidth.study.validity import Fit, Interval, Validity
+from zwidth.study.what_if import LEAST_GAIN, REMEDIES, Variant, find_variant, limiting_change
 
+# Gains of the actuator and the sensor are scales of the description, not parts to be changed.
+SCALES: Final = ("plant.actuator", "plant.sensor", "plant.handle")
+SECOND_PEAK_SHARE: Final = 0.9  # of the largest stiffness, from which another peak is mentioned
+ONE_PERCENT: Final = f"1{SPACE}%"
+LEAST_SLOPE: Final = 1e-6  # per cent for one per cent, below which a number has no influence
 NO_WALL: Final = "no wall with positive stiffness and without negative damping is stable"
+IDEAL: Final = ("rigid-drives", "no-delay")  # single changes that can be approached, but not built
+# Numbers of the device file that belong to a single change, by path, and the sign of a change towards it.
+NUMBERS_OF_CHANGE: Final = {
+    "rigid-drives": ((r"plant\.stiffness_|mechanism\.drives\..*stiffness_", 1.0),),
+    "half-period": ((r"loop\.sampling_period_s", -1.0),),
+    "no-delay": ((r"loop\.delay_", -1.0),),
+    "no-filter": (
+        (r"loop\.velocity\.filter\.time_constant_s", -1.0),
+        (r"loop\.velocity\.filter\.cutoff_Hz", 1.0),
+    ),
+    "twice-damping": ((r"plant\.damping_|mechanism\.damping\.|mechanism\.drives\..*\.damping_", 1.0),),
+}
 
 
 def summary(facts: Facts) -> list[str]:
-    """What a reader in a hurry wants to know, in at most a handful of sentences."""
-    found = [warning(facts), renders(facts), limit(facts), vibration(facts), next_best(facts), regions(facts)]
+    """The most important results, one sentence each."""
+    found = [
+        warning(facts),
+        largest_stiffness(facts),
+        limit(facts),
+        oscillation(facts),
+        next_best(facts),
+        regions(facts),
+    ]
     found += [unobserved(facts), left_out(facts)]
     return [sentence for sentence in found if sentence]
 
 
 def warning(facts: Facts) -> str:
-    """Said before all else where the device runs away by itself; "" where it does not."""
+    """Which motion is unstable with any wall; "" where none is."""
     if not facts.runs_away:
         return ""
-    names = listed(counted(facts.chart.unobserved_modes))
+    names = join_words(group_names(facts.chart.unobserved_modes))
     return (
-        f"Warning: this device runs away whatever the wall, by a motion that no wall moves: {names}; "
-        "what is said below leaves that motion out."
+        f"Warning: this device is unstable with any wall, by a motion that no wall affects: {names}; "
+        "the numbers below leave that motion out."
     )
 
 
 def where(facts: Facts) -> str:
-    """Along which direction, at which position: "Along y at (0, 0.25) m "; "" for a plant."""
+    """Direction and position: "Along y at (0, 0.25) m "; "" for a plant."""
     if facts.posture is None or facts.direction is None:
         return ""
     return f"Along {direction_name(facts.direction)} at {point(facts.posture.position)} "
 
 
 def direction_name(direction: Floats) -> str:
-    """y, −x, or the vector where it is not an axis."""
+    """A direction as "y" or "−x", as a vector where it is no axis."""
     for axis, unit in zip("xyz", np.eye(3), strict=True):
         for sign, mark in ((1.0, ""), (-1.0, MINUS)):
             if np.allclose(direction, sign * unit, rtol=0.0, atol=1e-9):
@@ -55,8 +86,8 @@ def direction_name(direction: Floats) -> str:
     return point(direction, "")
 
 
-def renders(facts: Facts) -> str:
-    """The largest stiffness, and at which damping."""
+def largest_stiffness(facts: Facts) -> str:
+    """The largest stiffness and its damping."""
     start = f"{where(facts)}this device"
     if facts.model != "full":
         start = f"{where(facts)}the {facts.model} model of this device"
@@ -66,8 +97,8 @@ def renders(facts: Facts) -> str:
     stiffness = quantity(facts.base.stiffness_max, "N/m")
     if facts.base.damping <= 1e-9 * facts.chart.box[3]:
         return (
-            f"{start} renders walls of up to {stiffness}, those without any virtual damping; "
-            "every bit of damping lowers the largest stiffness."
+            f"{start} renders walls of up to {stiffness}, at no virtual damping; "
+            "any damping lowers the largest stiffness."
         )
     return (
         f"{start} renders walls of up to {stiffness}, "
@@ -75,57 +106,59 @@ def renders(facts: Facts) -> str:
     )
 
 
-def vibration(facts: Facts) -> str:
-    """What happens at a wall that is too stiff; "" where none is stable."""
+def oscillation(facts: Facts) -> str:
+    """How the loop becomes unstable at the stiffest wall; "" where no wall is stable."""
     frequencies = facts.base.frequencies
     if not frequencies:
         return ""
     if len(frequencies) > 1:
-        return f"There two vibrations set in at once, at {listed([hertz(f) for f in frequencies])}."
+        return f"At the limit two oscillations begin at once, at {join_words([hertz(f) for f in frequencies])}."
     nyquist = 0.5 / facts.loop.period
     if frequencies[0] <= 1e-9 * nyquist:
-        return "A stiffer wall drifts away without vibrating."
+        return "Beyond the limit the handle drifts away without oscillating."
     if frequencies[0] >= nyquist * (1.0 - 1e-9):
-        return f"A stiffer wall makes the force alternate from sample to sample, at {hertz(nyquist)}."
-    return f"A stiffer wall vibrates at {hertz(frequencies[0])}."
+        return f"At the limit the force alternates from sample to sample, at {hertz(nyquist)}."
+    return f"At the limit it oscillates at {hertz(frequencies[0])}."
 
 
 def limit(facts: Facts) -> str:
-    """Which single change gains most, hence what limits the device; and what one sample of delay would leave."""
+    """The cause: the single change that gains most, built or not; and the effect of one sample of delay."""
     best = limiting_change(facts.variants)
     if best is None:
         text = "None of the single changes tried lets it render a stiffer wall"
     else:
         verb = "limits" if facts.renders else "prevents"
-        text = f"What {verb} it is {_cause(facts, best)}: {_with(facts, best)} it would reach {_reached(best)}"
-    return f"{text}; {late}." if (late := _late(facts)) else f"{text}."
+        text = (
+            f"What {verb} it is {_cause(facts, best)}: {_change_text(facts, best)} it would reach {_reached(best)}"
+        )
+    return f"{text}; {late}." if (late := _one_sample_delay(facts)) else f"{text}."
 
 
 def _cause(facts: Facts, best: Variant) -> str:
     controller = facts.loop.controller
-    flexible = [hertz(f) for f in facts.natural if f > 0.0]
+    flexible = [hertz(f) for f in facts.natural_frequencies if f > 0.0]
     if best.key == "rigid-drives":
         what = "the flexibility of the drives" if facts.device.mechanism is not None else "its flexibility"
-        return f"{what}, at {listed(flexible)}" if flexible else what
+        return f"{what}, at {join_words(flexible)}" if flexible else what
     if best.key == "no-delay":
         return f"the delay of {delay_name(controller)}"
     if best.key == "no-filter":
         return "the filter of the velocity"
     if best.key == "collocated":
-        return "that the sensor does not sit where the wall acts"
+        return "that the sensor is not where the wall acts"
     if best.key == "half-period":
         mass = float(facts.effective.rigid_mass)
         moved = "its mass" if isnan(mass) else f"its mass of {quantity(mass, 'kg')}"
-        return f"{moved}, sampled at {given(1.0 / controller.sampling_period, 'Hz')}"
-    return "how little it damps its own vibrations" if flexible else "how little friction it has"
+        return f"the sampling of {moved} at {as_written(1.0 / controller.sampling_period, 'Hz')}"
+    return "its low structural damping" if flexible else "its low friction"
 
 
-def _with(facts: Facts, best: Variant) -> str:
-    rigid = "with rigid drives" if facts.device.mechanism is not None else "if it were rigid"
+def _change_text(facts: Facts, best: Variant) -> str:
+    rigid = "rigid drives" if facts.device.mechanism is not None else "a rigid structure"
     return {
-        "rigid-drives": rigid,
+        "rigid-drives": f"with {rigid}, which cannot be built,",
         "half-period": "sampled twice as fast",
-        "no-delay": "without this delay",
+        "no-delay": "without any delay, which can only be approached,",
         "no-filter": "without this filter",
         "collocated": "with the sensor at the actuator",
     }.get(best.key, f"with {best.label}")
@@ -135,9 +168,9 @@ def _reached(variant: Variant) -> str:
     return quantity(variant.stiffness_max, "N/m")
 
 
-def _late(facts: Facts) -> str:
+def _one_sample_delay(facts: Facts) -> str:
     """The effect of one sample of delay, for a device that has less."""
-    late = find(facts.variants, "one-sample")
+    late = find_variant(facts.variants, "one-sample")
     if late.chart is None or facts.loop.controller.delay >= 1.0 or not facts.renders:
         return ""
     if not late.stiffness_max > 0.0:
@@ -147,52 +180,68 @@ def _late(facts: Facts) -> str:
 
 
 def next_best(facts: Facts) -> str:
-    """The runner-up among the single changes; "" where it gains nothing."""
+    """The best of the single changes that can be made, or the second best of all where the best is one of them.
+
+    "" where no change gains, and where the best can be made and no other gains.
+    """
     best = limiting_change(facts.variants)
-    rest = [v for v in facts.variants if v.key in REMEDIES and v.chart is not None and v is not best]
-    rest.sort(key=lambda variant: -variant.stiffness_max)
-    if best is None or not rest or not rest[0].stiffness_max > WORTH * facts.base.stiffness_max:
+    if best is None:
         return ""
-    return f"The next best single change, {rest[0].label}, would reach {_reached(rest[0])}."
+    ideal = best.key in IDEAL
+    rest = [v for v in facts.variants if v.key in REMEDIES and v.chart is not None and v is not best]
+    rest = sorted((v for v in rest if not (ideal and v.key in IDEAL)), key=lambda v: -v.stiffness_max)
+    if not rest or not rest[0].stiffness_max > LEAST_GAIN * facts.base.stiffness_max:
+        return f"None of the changes tried that can be made gains {ONE_PERCENT}." if ideal else ""
+    second = rest[0]
+    if ideal:
+        return f"The best of the changes tried that can be made, {second.label}, would reach {_reached(second)}."
+    note = " (which can only be approached)" if second.key in IDEAL else ""
+    return f"The next best single change, {second.label}{note}, would reach {_reached(second)}."
 
 
 def regions(facts: Facts) -> str:
-    """Said only where the stable walls fall apart."""
+    """How many regions the stable set has; "" for one."""
     count = len(facts.chart.regions)
     return f"The stable walls lie in {count} separate regions." if count > 1 else ""
 
 
 def unobserved(facts: Facts) -> str:
-    """Which motions were left out of the stability test; "" where none was."""
-    names = counted(facts.chart.unobserved_modes)
+    """Which motions the stability test leaves out; "" where it leaves out none."""
+    names = group_names(facts.chart.unobserved_modes)
     if not names or facts.runs_away:  # the warning has named them
         return ""
     the = "" if names[0][0].isdigit() else "the "
-    return f"No wall moves {the}{listed(names)}: left out of what is called stable here."
+    many = len(names) > 1 or not the
+    direction = " in this direction" if facts.posture is not None else ""
+    text = f"{the}{join_words(names)} {'are' if many else 'is'} not affected by a wall{direction}"
+    return f"{text[0].upper()}{text[1:]} and left out of the stability test."
 
 
 def left_out(facts: Facts) -> str:
-    """What of the device all of this leaves out; "" where it leaves out nothing."""
-    words = facts.point.left_out
+    """Which nonlinear parts of the device the report leaves out; "" where it has none."""
+    words = facts.point.linear_omissions
     if not words:
         return ""
-    return f"All of this is linear and leaves out {listed(words)}; zwidth simulate has them."
+    return f"All of this is linear and leaves out {join_words(words)}, which zwidth simulate includes."
 
 
 def outside(facts: Facts) -> str:
-    """What happens on either side of the edge, as far as it has such sides."""
+    """What happens inside and outside the edge of the stable set."""
     nyquist = 0.5 / facts.loop.period
     straight = [arc for arc in facts.chart.boundary if np.all(arc.frequency <= 1e-9 * nyquist)]
-    text = "Walls inside the edge come to rest; outside, a vibration builds up"
+    text = "Inside the edge the motion comes to rest; outside, an oscillation builds up"
     if not straight:
         return f"{text}."
     K = float(np.mean(straight[0].stiffness))
-    place = "0" if abs(K) <= 1e-9 * (facts.chart.box[1] - facts.chart.box[0]) else quantity(K, "N/m")
-    return f"{text} or, across the straight edge at K = {place} (0 Hz), the handle drifts away without vibrating."
+    where_straight = "0" if abs(K) <= 1e-9 * (facts.chart.box[1] - facts.chart.box[0]) else quantity(K, "N/m")
+    return (
+        f"{text} or, across the straight edge at K{SPACE}={SPACE}{where_straight} (0{SPACE}Hz), "
+        "the handle drifts away without oscillating."
+    )
 
 
 def models(facts: Facts) -> str:
-    """Which of the simpler models comes nearest to the device as described; "" where there is none."""
+    """Which simpler model's largest stiffness is nearest to the device's; "" where there is none."""
     simpler = [
         v for v in facts.variants if v.key.startswith("model-") and v.key != "model-full" and v.chart is not None
     ]
@@ -216,7 +265,7 @@ def difference(ratio: float) -> str:
 
 
 def decay(facts: Facts) -> str:
-    """The wall that comes to rest fastest, of those with K, B >= 0 first; "" where none is stable."""
+    """The wall on which the motion decays fastest, of those with K, B >= 0 first; "" where none is stable."""
     best, of_all = facts.chart.fastest_decay_in_first_quadrant, facts.chart.fastest_decay
     if of_all is None:
         return ""
@@ -236,37 +285,191 @@ def _comes_to_rest(wall: FastestDecay, facts: Facts) -> str:
 
 
 def conditions(facts: Facts) -> str:
-    """How many of the published conditions may be trusted here."""
-    holding = [bound for bound in facts.bounds if bound.holds]
-    if not holding:
+    """Which published conditions apply: this device meets their assumptions and has the numbers they take."""
+    applying = [bound for bound in facts.bounds if bound.holds]
+    count = len(facts.bounds)
+    if not applying:
+        return f"None of these {count} published conditions applies to this device."
+    names = join_words([f"“{bound.name}”" for bound in applying])
+    verb = "applies" if len(applying) == 1 else "apply"
+    return f"{len(applying)} of these {count} published conditions {verb} to this device: {names}."
+
+
+def conditions_not_met(facts: Facts) -> str:
+    """The line under which the conditions that do not apply are folded; "" where all apply."""
+    count = sum(not bound.holds for bound in facts.bounds)
+    if count == 0:
+        return ""
+    verb, they = ("does", "it") if count == 1 else ("do", "they")
+    return f"{count} of {len(facts.bounds)} {verb} not apply: what {they} would promise, and what is not met"
+
+
+def first_change(facts: Facts) -> str:
+    """Which number of the device file gains most, and the next two; "" where none is known."""
+    candidates = _changeable_numbers(facts)
+    if not candidates:
+        return ""
+    (path, value), *rest = candidates[:3]
+    gain = quantity(0.01 * abs(value) * facts.base.stiffness_max, "N/m")
+    share = f"{percent(0.01 * abs(value))} more stiffness"
+    text = f"What to change first is {path}: {ONE_PERCENT} {_way(value)} of it gives {share}, {gain}"
+    if not rest:
+        return f"{text}."
+    others = [f"{other} ({ONE_PERCENT} {_way(slope)} gives {percent(0.01 * abs(slope))})" for other, slope in rest]
+    return f"{text}; then {join_words(others)}."
+
+
+def _changeable_numbers(facts: Facts) -> list[tuple[str, float]]:
+    """Path and logarithmic sensitivity of the numbers that are parts of the device, largest first."""
+    return [(path, value) for path, value in facts.sensitivities.ranking if not path.startswith(SCALES)]
+
+
+def _way(value: float) -> str:
+    return "more" if value > 0.0 else "less"
+
+
+def compare_answers(facts: Facts) -> str:
+    """Does the number to change first belong to the cause that `limit` names? "" where either is not known."""
+    best, candidates = limiting_change(facts.variants), _changeable_numbers(facts)
+    if best is None or not candidates:
+        return ""
+    if _sign_towards(best.key, candidates[0][0]) * candidates[0][1] > 0.0:
+        return "“What limits it” names the same cause."
+    reasons = [_obstacle(facts, best), _small_step(facts, best)]
+    why = ", and ".join(reason for reason in reasons if reason)
+    text = f"“What limits it” asks for the cause and names another: {_cause(facts, best)}"
+    return f"{text}. {why[0].upper()}{why[1:]}." if why else f"{text}."
+
+
+def _sign_towards(change: str, path: str) -> float:
+    """1 if more of the number leads towards a single change, -1 if less does, 0 if it does not belong to it."""
+    for pattern, sign in NUMBERS_OF_CHANGE.get(change, ()):
+        if re.match(pattern, path):
+            return sign
+    return 0.0
+
+
+def _obstacle(facts: Facts, best: Variant) -> str:
+    """Why the change cannot be made; "" where it can."""
+    if best.key == "no-delay":
+        return "a delay can be shortened but not removed"
+    if best.key == "rigid-drives":
+        return "no drives are rigid" if facts.device.mechanism is not None else "no structure is rigid"
+    return ""
+
+
+def _small_step(facts: Facts, best: Variant) -> str:
+    """What a first step towards the change gains or loses; "" where it is not known."""
+    drives = facts.device.mechanism is not None
+    stiffer = f"{ONE_PERCENT} stiffer drives" if drives else f"a {ONE_PERCENT} stiffer structure"
+    step = {
+        "rigid-drives": stiffer,
+        "half-period": f"a {ONE_PERCENT} shorter sampling period",
+        "no-delay": f"{ONE_PERCENT} less delay",
+        "no-filter": f"a {ONE_PERCENT} faster filter",
+        "twice-damping": f"{ONE_PERCENT} more {best.label.removeprefix('twice the ')}",
+    }.get(best.key)
+    numbers = [(_sign_towards(best.key, n.path), n) for n in facts.sensitivities.numbers if n.value != 0.0]
+    gains = [sign * n.logarithmic for sign, n in numbers if sign]
+    if step is None or not gains or not isfinite(gain := sum(gains)):
+        return ""
+    if abs(gain) < LEAST_SLOPE:
+        return f"with {step} the largest stiffness stays the same"
+    verb = "rises" if gain > 0.0 else "falls"
+    return f"with {step} the largest stiffness {verb} by {percent(0.01 * abs(gain))}"
+
+
+def second_peak(facts: Facts) -> str:
+    """Which other peak of the edge becomes the limit when this one is lowered; "" where none is nearly as high."""
+    sensitivities = facts.sensitivities
+    if sensitivities.tie:
         return (
-            f"This device meets the assumptions of none of these {len(facts.bounds)} conditions: "
-            "what they say is what somebody who applied them all the same would be told."
+            "The edge has two equal peaks: the sensitivities are those of one, and a change may lower the other."
         )
-    names = listed([f"“{bound.name}”" for bound in holding])
-    return f"This device meets the assumptions of {len(holding)} of these {len(facts.bounds)} conditions: {names}."
+    if not sensitivities.second_peak > SECOND_PEAK_SHARE * facts.base.stiffness_max:
+        return ""
+    return (
+        f"Another peak of the edge is at {quantity(sensitivities.second_peak, 'N/m')}: it becomes the limit where "
+        "a change lowers the highest peak below it."
+    )
+
+
+def felt(facts: Facts) -> str:
+    """The stiffest wall's static stiffness at the handle; "" where no wall is rendered or there is no handle."""
+    if facts.felt is None or not facts.renders:
+        return ""
+    stiffest, limit = facts.felt.stiffness_max, facts.felt.limit
+    if not isfinite(limit):
+        return "Nothing between wall and handle is flexible: at rest a wall is felt as stiff as it is commanded."
+    share = percent(stiffest / facts.base.stiffness_max)
+    return (
+        f"At rest the stiffest wall is felt as {quantity(stiffest, 'N/m')}, {share} of its stiffness; "
+        f"whatever is commanded, nothing stiffer than {quantity(limit, 'N/m')} can be felt."
+    )
+
+
+def which_model(facts: Facts) -> str:
+    """At which frequencies of the edge each simpler model agrees; "" where there is none or no edge."""
+    validity = facts.validity
+    fits = [fit for fit in validity.fits if len(fit.error)] if validity is not None else []
+    if validity is None or not fits:
+        return ""
+    highest = float(validity.frequency[-1])
+    text = f"Along its edge the full model oscillates at up to {hertz(highest)}"
+    if isfinite(validity.first_natural):
+        times = number(highest / validity.first_natural)
+        text += f", {times} times its first natural frequency of {hertz(validity.first_natural)}"
+    good = [f"{fit.label} {_where(fit, validity)}" for fit in fits if fit.valid_ranges]
+    bad = [fit.label for fit in fits if not fit.valid_ranges]
+    within = f"within {100.0 * validity.tolerance:g}{SPACE}% in stiffness, damping and frequency"
+    if not good:
+        return f"{text}. None of the simpler models agrees with it {within}, at any frequency."
+    nowhere = [f"{join_words(bad)} nowhere"] if bad else []
+    return f"{text}. Simpler models that agree with it {within}: {'; '.join([*good, *nowhere])}."
+
+
+def _where(fit: Fit, validity: Validity) -> str:
+    """The ranges in which a model agrees: "everywhere", "below 17.60 Hz (17.37 % of that)", ..."""
+    if fit.everywhere:
+        return "everywhere"
+    return join_words([_range(interval, validity) for interval in fit.valid_ranges])
+
+
+def _range(interval: Interval, validity: Validity) -> str:
+    low, high = interval
+    if low <= float(validity.frequency[0]):
+        return f"below {hertz(high)}{_share(high, validity)}"
+    if high >= float(validity.frequency[-1]):
+        return f"above {hertz(low)}{_share(low, validity)}"
+    return f"between {hertz(low)} and {hertz(high)}"
+
+
+def _share(frequency: float, validity: Validity) -> str:
+    if not isfinite(validity.first_natural):
+        return ""
+    return f" ({percent(frequency / validity.first_natural)} of that)"
 
 
 def setting(facts: Facts) -> str:
-    """Assembly and model, who holds it, and how the loop is sampled, delayed and filtered."""
+    """Assembly, model, operator, and how the loop is sampled, delayed and filtered."""
     model = f"{facts.model.capitalize()} model" if facts.model != "full" else "Plant as given"
     if facts.posture is not None:
         model = f"Assembly {facts.posture.assembly}, {facts.model} model"
     controller = facts.loop.controller
     late = f"a delay of {delay_name(controller)}" if controller.delay else "no delay"
-    period = given(controller.sampling_period, "s")
+    period = as_written(controller.sampling_period, "s")
     held = "" if facts.operator is None else f", held by {facts.operator}"
-    return f"{model}{held}; sampled every {period}, {late}, {computing_name(controller)}."
+    return f"{model}{held}; sampled every {period}, {late}, {velocity_and_force_text(controller)}."
 
 
 def delay_name(controller: Controller) -> str:
-    """1 sample (1.25 ms)"""
-    count = f"{given(controller.delay)} sample{'' if controller.delay == 1.0 else 's'}"
-    return f"{count} ({given(controller.delay * controller.sampling_period, 's')})"
+    """A delay in samples and seconds: "1 sample (1.25 ms)"."""
+    count = f"{as_written(controller.delay)} sample{'' if controller.delay == 1.0 else 's'}"
+    return f"{count} ({as_written(controller.delay * controller.sampling_period, 's')})"
 
 
-def computing_name(controller: Controller) -> str:
-    """How the velocity is estimated, and what velocity and force pass through."""
+def velocity_and_force_text(controller: Controller) -> str:
+    """Velocity estimator and filters: "velocity by kalman, force lagging by 2 ms"."""
     plain = isinstance(controller.velocity, BackwardDifference)
     method = next(name for name, kind in METHODS.items() if isinstance(controller.velocity, kind))
     estimate = "velocity" if plain else f"velocity by {method}"
@@ -276,25 +479,25 @@ def computing_name(controller: Controller) -> str:
     if controller.force_filter is not None:
         parts.append(f"force through {filter_name(controller.force_filter)}")
     if controller.actuator_time_constant:
-        parts.append(f"force lagging by {given(controller.actuator_time_constant, 's')}")
+        parts.append(f"force lagging by {as_written(controller.actuator_time_constant, 's')}")
     return ", ".join(parts)
 
 
 def filter_name(low_pass: FirstOrder | Butterworth) -> str:
-    """a first-order filter of 2 ms"""
+    """A filter in words: "a first-order filter of 2 ms"."""
     if isinstance(low_pass, FirstOrder):
-        return f"a first-order filter of {given(low_pass.time_constant, 's')}"
+        return f"a first-order filter of {as_written(low_pass.time_constant, 's')}"
     return (
         f"a Butterworth filter of order {low_pass.order} at "
-        f"{given(low_pass.cutoff_Hz, 'Hz')} ({low_pass.discretisation})"
+        f"{as_written(low_pass.cutoff_Hz, 'Hz')} ({low_pass.discretisation})"
     )
 
 
 def hertz(frequency: float) -> str:
-    """170.5 Hz"""
+    """A frequency in four digits: "170.5 Hz"."""
     return quantity(frequency, "Hz")
 
 
-def listed(words: Sequence[str]) -> str:
-    """a, b and c"""
+def join_words(words: Sequence[str]) -> str:
+    """Words as a list: "a, b and c"."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else list(words))

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isnan
 from typing import Any
 
 from zwidth.conditions import Bound
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import UNKNOWN, number, quantity
+from zwidth.show.units import NONE, SPACE, UNKNOWN, number, quantity
 from zwidth.study.what_if import Variant
 
 Row = tuple[str, ...]
 
 
 def parameters(facts: Facts) -> list[Row]:
-    """Name, symbol, value of what is felt along the direction, as far as it applies."""
+    """Name, symbol and value of each effective parameter that this device has."""
     e = facts.effective
-    flexible = [sentences.hertz(f) for f in facts.natural if f > 0.0]
-    rigid = int((facts.natural == 0.0).sum())
-    modes = ", ".join([*(["0 Hz" if rigid == 1 else f"0 Hz ({rigid} rigid motions)"] if rigid else []), *flexible])
+    flexible = [sentences.hertz(f) for f in facts.natural_frequencies if f > 0.0]
+    zero = f"0{SPACE}Hz"
+    rigid = int((facts.natural_frequencies == 0.0).sum())
+    modes = ", ".join([*([zero if rigid == 1 else f"{zero} ({rigid} rigid motions)"] if rigid else []), *flexible])
     rows = [
         ("link-side mass", "m₁", quantity(float(e.link_side_mass), "kg")),
         ("motor-side mass", "m₂", quantity(float(e.motor_side_mass), "kg")),
@@ -31,13 +33,16 @@ def parameters(facts: Facts) -> list[Row]:
 
 
 def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:
-    """Label, largest stiffness, its ratio to that as described, damping, frequency, area of each variant."""
+    """Label, largest stiffness, its ratio to that as described, damping, frequency and area of each variant.
+
+    A change that can be approached but not built is marked "ideal".
+    """
     base = facts.base.stiffness_max
     return [
         (
-            v.label,
-            quantity(v.stiffness_max, "N/m") if v.stiffness_max > 0.0 else "none",
-            f"{number(v.stiffness_max / base)}\u00a0×" if base > 0.0 else UNKNOWN,
+            f"{v.label} (ideal)" if v.key in sentences.IDEAL else v.label,
+            quantity(v.stiffness_max, "N/m") if v.stiffness_max > 0.0 else NONE,
+            f"{number(v.stiffness_max / base)}{SPACE}×" if base > 0.0 else UNKNOWN,
             quantity(v.damping, "Ns/m"),
             ", ".join(sentences.hertz(f) for f in v.frequencies) or UNKNOWN,
             quantity(v.area, "N²s/m²"),
@@ -47,56 +52,70 @@ def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:
     ]
 
 
-def left_out(variants: tuple[Variant, ...]) -> list[Row]:
+def uncharted_variants(variants: tuple[Variant, ...]) -> list[Row]:
     """Labels and reason of the variants without a chart, those of one reason together."""
     reasons: dict[str, list[str]] = {}
     for v in variants:
         if v.chart is None:
             # what follows a semicolon is advice on asking for this model
             reasons.setdefault(v.reason.split("; ")[0], []).append(v.label)
-    return [(sentences.listed(labels), reason) for reason, labels in reasons.items()]
+    return [(sentences.join_words(labels), reason) for reason, labels in reasons.items()]
 
 
-def changes(facts: Facts) -> tuple[Variant, ...]:
+def single_changes(facts: Facts) -> tuple[Variant, ...]:
     """The device as described and its single changes."""
     return tuple(v for v in facts.variants if not v.key.startswith("model-"))
 
 
-def simpler(facts: Facts) -> tuple[Variant, ...]:
+def simpler_models(facts: Facts) -> tuple[Variant, ...]:
     """The device as described and its models."""
     same = {f"model-{facts.model}"}
     return (facts.base, *(v for v in facts.variants if v.key.startswith("model-") and v.key not in same))
 
 
-def bounds(facts: Facts) -> list[dict[str, Any]]:
-    """Each published condition with its largest stiffness beside the exact one."""
+def bounds(facts: Facts, *, holding: bool) -> list[dict[str, Any]]:
+    """The published conditions that apply, or those that do not, and this report's answer first; [] for none."""
     exact = facts.base.stiffness_max
-    return [
+    chosen = [bound for bound in facts.bounds if bound.holds == holding]
+    report = {
+        "name": "this report",
+        "source": "",
+        "kind": "stability, exact",
+        "stiffness": _wall_text(exact, facts.base.damping),
+        "ratio": f"1{SPACE}×" if facts.renders else UNKNOWN,
+        "unmet": (),
+    }
+    rows = [
         {
             "name": bound.name,
             "source": bound.source,
             "kind": f"{bound.kind}, {bound.claim}",
-            "statement": bound.statement,
-            "stiffness": _told(bound),
-            "ratio": f"{number(bound.stiffness_max / exact)}\u00a0×"
+            "stiffness": _wall_text(bound.stiffness_max, bound.damping_at_stiffness_max),
+            "ratio": f"{number(bound.stiffness_max / exact)}{SPACE}×"
             if exact > 0.0 and bound.stiffness_max > 0.0
             else UNKNOWN,
-            "violated": bound.violated,
+            "unmet": (*bound.violated, *_needs(bound)),
         }
-        for bound in facts.bounds
+        for bound in chosen
     ]
+    return [report, *rows] if rows else []
 
 
-def _told(bound: Bound) -> str:
-    if bound.stiffness_max == 0.0:
-        return "none"
-    if bound.damping_at_stiffness_max != bound.damping_at_stiffness_max:
-        return quantity(bound.stiffness_max, "N/m")
-    return f"{quantity(bound.stiffness_max, 'N/m')} at {quantity(bound.damping_at_stiffness_max, 'Ns/m')}"
+def _needs(bound: Bound) -> list[str]:
+    """A sentence on the numbers that a condition takes and the device does not have."""
+    return [f"It needs {sentences.join_words(bound.lacking)}."] if bound.lacking else []
+
+
+def _wall_text(stiffness: float, damping: float) -> str:
+    """A largest stiffness and its damping, where there are such."""
+    if stiffness == 0.0:
+        return NONE
+    wall = quantity(stiffness, "N/m")
+    return wall if isnan(damping) else f"{wall} at {quantity(damping, 'Ns/m')}"
 
 
 def document(facts: Facts) -> dict[str, Any]:
-    """All numbers of the report, under the names of the command line's --json; what is not known is None."""
+    """All numbers of the report by the keys of the command line's --json; None for what is not known."""
     chart, e = facts.chart, facts.effective
     fastest, buildable = chart.fastest_decay, chart.fastest_decay_in_first_quadrant
     found = {
@@ -110,13 +129,13 @@ def document(facts: Facts) -> dict[str, Any]:
         "motor_side_mass_kg": float(e.motor_side_mass),
         "rigid_mass_kg": float(e.rigid_mass),
         "stiffness_N_per_m": float(e.stiffness),
-        "natural_frequencies_Hz": facts.natural.tolist(),
+        "natural_frequencies_Hz": facts.natural_frequencies.tolist(),
         **_walls(facts.base),
         "damping_max_Ns_per_m": chart.damping_max,
         "fastest_decay": fastest and fastest.document(),
         "fastest_decay_in_first_quadrant": buildable and buildable.document(),
         "unobserved_modes": list(chart.unobserved_modes),
-        "static_stiffness_at_stiffness_max_N_per_m": facts.felt and facts.felt.stiffest,
+        "static_stiffness_at_stiffness_max_N_per_m": facts.felt and facts.felt.stiffness_max,
         "static_stiffness_limit_N_per_m": facts.felt and facts.felt.limit,
         "sensitivities": [
             {
@@ -125,9 +144,9 @@ def document(facts: Facts) -> dict[str, Any]:
                 "d_ln_stiffness_max_d_ln_value": number.logarithmic,
                 **({"reason": number.reason} if number.reason else {}),
             }
-            for number in facts.answers.numbers
+            for number in facts.sensitivities.numbers
         ],
-        "models": facts.fits and facts.fits.document(),
+        "models": facts.validity and facts.validity.document(),
         "what_if": [{"key": v.key, "label": v.label, **_walls(v)} for v in facts.variants],
         "bounds": [
             {
@@ -159,7 +178,7 @@ def _walls(variant: Variant) -> dict[str, Any]:
 
 
 def _known(value: Any) -> Any:
-    """nan as None, all the way down; an infinite stiffness stays infinite."""
+    """The value with None for each nan in it; an infinite stiffness stays infinite."""
     if isinstance(value, Mapping):
         return {key: _known(inner) for key, inner in value.items()}
     if isinstance(value, list):

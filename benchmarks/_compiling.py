@@ -1,0 +1,153 @@
+"""First use: what commands take when no kernel has been compiled yet, and how much is compiled for them.
+
+    python benchmarks/_compiling.py          processor time of some commands, each from nothing, and of all kernels
+    python benchmarks/_compiling.py --check  all kernels only; fails where more is compiled than MOST allows
+    python benchmarks/_compiling.py --write  time every kernel and see which command wants which, for the estimates
+                                            that `zwidth` gives: src/zwidth/show/cli/kernel_times.json
+
+Processor time, so that other work on the machine matters little; beside a busy neighbour a core is still slower.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from time import perf_counter, process_time
+
+from benchmarks._timing import machine, print_table
+from zwidth.compile_events import listening
+from zwidth.show.cli.compile_group import COMMANDS as GROUPS
+from zwidth.show.cli.compile_group import write_devices
+
+TIMES = Path(__file__).parent.parent / "src/zwidth/show/cli/kernel_times.json"
+# Functions compiled for all kernels, numba's own among them, and the combinations of types they are compiled for.
+MOST = (500, 600)
+SECONDS = 30  # of a command
+SECONDS_OF_ALL = 110
+COMMANDS = {
+    "chart": "chart five-bar",
+    "simulate": "simulate published-two-mass --stiffness 4000 --damping 10",
+    "map": "map five-bar --measure stiffness_max",
+    "move": "move five-bar --plane 0,0.28,0,-1 --stiffness 2000 --damping 5 --push 0,2 --duration 0.3",
+}
+OTHERS = {
+    "show": "show five-bar",
+    "check": "check five-bar --stiffness 1000 --damping 5",
+    "polar": "polar five-bar",
+    "report": "report five-bar --output report.html",
+    "sensitivity": "sensitivity five-bar",
+    "felt": "felt five-bar --stiffness 1000 --damping 5",
+    "bounds": "bounds five-bar",
+    "guarantees": "guarantees hapkit-course",
+    "robust": "robust published-two-mass --range loop.delay_samples=0,1",
+    "experiment": "experiment hapkit-course --trials 2",
+    "limit-cycles": "limit-cycles hapkit-course --stiffness 2600 --damping 0 --set loop.saturation.force_N=5",
+}
+
+
+def compile_for(*lines: str) -> None:
+    """In a process of its own: run the command lines, and print as JSON what was compiled for them."""
+    from numba.core import event
+
+    from zwidth.show.cli.main import run
+
+    functions: dict[str, int] = {}
+    kernels: dict[str, float] = {}
+    began: list[float] = []
+
+    class Count(event.Listener):
+        def on_start(self, event):
+            function = event.data["dispatcher"].py_func
+            name = f"{function.__module__}.{function.__qualname__}"
+            functions[name] = functions.get(name, 0) + 1
+
+        def on_end(self, event):
+            pass
+
+    def listen(name: str, ended: bool) -> None:
+        if ended:
+            kernels[name] = kernels.get(name, 0.0) + process_time() - began.pop()
+        else:
+            began.append(process_time())
+
+    event.register("numba:compile", Count())
+    wall = perf_counter()
+    codes = []
+    with tempfile.TemporaryDirectory() as folder, open(os.devnull, "w") as nowhere:
+        os.chdir(folder)
+        write_devices(Path(folder))
+        with listening(listen), redirect_stdout(nowhere), redirect_stderr(nowhere):
+            codes = [run(shlex.split(line)) for line in lines]
+    found = {
+        "codes": codes,
+        "processor": process_time(),
+        "elapsed": perf_counter() - wall,
+        "functions": len(functions),
+        "signatures": sum(functions.values()),
+        "kernels": {name: round(seconds, 2) for name, seconds in sorted(kernels.items())},
+    }
+    print(json.dumps(found))
+
+
+def from_nothing(*lines: str) -> dict:
+    """What `compile_for` prints where no kernel is on disk."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        environment |= {"OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+        command = [sys.executable, __file__, "--child", *lines]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    found = json.loads(done.stdout)
+    assert not any(found["codes"]), f"exit codes {found['codes']} of {lines}"
+    return found
+
+
+def row(name: str, found: dict, limit: int) -> list[str]:
+    """A row of the table."""
+    numbers = (len(found["kernels"]), found["functions"], found["signatures"])
+    return [name, f"{found['processor']:.1f} s", f"{limit} s", *map(str, numbers)]
+
+
+def measure(commands: dict[str, str]) -> None:
+    """Print what each command takes from nothing, and all groups together."""
+    print(machine("numba"))
+    rows = [row(name, from_nothing(line), SECONDS) for name, line in commands.items()]
+    groups = [from_nothing(*group) for group in GROUPS]
+    together = {
+        "processor": sum(found["processor"] for found in groups),
+        "functions": sum(found["functions"] for found in groups),
+        "signatures": sum(found["signatures"] for found in groups),
+        "kernels": {name: 0 for found in groups for name in found["kernels"]},
+    }
+    rows.append(row("all kernels", together, SECONDS_OF_ALL))
+    print_table(["command", "processor time", "at most", "kernels", "functions", "signatures"], rows)
+    if together["functions"] > MOST[0] or together["signatures"] > MOST[1]:
+        sys.exit(f"more is compiled than MOST allows: {together['functions']}, {together['signatures']} > {MOST}")
+
+
+def write() -> None:
+    """Keep the time of each kernel, and which command wants which."""
+    seconds: dict[str, float] = {}
+    of_command = {}
+    for name, line in {**COMMANDS, **OTHERS}.items():
+        kernels = from_nothing(line)["kernels"]
+        of_command[name] = list(kernels)
+        for kernel, taken in kernels.items():
+            seconds[kernel] = max(taken, seconds.get(kernel, 0.0))
+        print(name, len(kernels), f"{sum(kernels.values()):.1f} s", flush=True)
+    times = {"seconds": dict(sorted(seconds.items())), "of_command": of_command}
+    TIMES.write_text(json.dumps(times, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--child"]:
+        compile_for(*sys.argv[2:])
+    elif "--write" in sys.argv:
+        write()
+    else:
+        measure({} if "--check" in sys.argv else COMMANDS)

@@ -1,0 +1,142 @@
+"""What every chart tells: the stable walls, their edge, and the numbers read off them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.chart.decay import FastestDecay
+from zwidth.chart.rings import Window, window_of
+from zwidth.chart.verdict import WallVerdicts
+from zwidth.result import Result
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, repr=False)
+class BoundaryArc:
+    """A piece of the stable set's edge: its walls, and the frequency of the vibration at which each fails.
+
+    stiffness, damping, frequency  (k,)  [N/m], [N s/m], [Hz]; 0 or 1/(2T) for a real root
+    member                         index of the loop that binds there; 0 where there is one only
+    stiffness_low, stiffness_high  (k,)  [N/m] extent of a measured point's band; None where no error is known
+    """
+
+    stiffness: Floats
+    damping: Floats
+    frequency: Floats
+    member: int = 0
+    stiffness_low: Floats | None = None
+    stiffness_high: Floats | None = None
+
+    def __repr__(self) -> str:
+        low, high = np.min(self.frequency), np.max(self.frequency)
+        return f"{type(self).__name__}({len(self.frequency)} walls, {low:.6g} to {high:.6g} Hz)"
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Chart(Result, ABC):
+    """A set of stable walls, both signs of K and B, never clipped.
+
+    regions         closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set
+    boundary        arcs of its edge, with frequency
+    stiffness_max   supremum of K over its walls with K > 0, B >= 0 [N/m]; nan if there is none
+    damping_at_stiffness_max     [N s/m]; nan if there is none
+    frequencies_at_stiffness_max [Hz] one, or two at a corner, ascending; () if there is none
+    damping_max     supremum of B >= 0 stable for all sufficiently small K > 0 [N s/m]; 0 if there is none
+    stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
+    fastest_decay   the wall of smallest spectral radius over the whole set; None if nothing is stable, and where
+                    it is not searched for: over one direction of one modelled loop it is
+    fastest_decay_in_first_quadrant   the same over K >= 0, B >= 0
+    """
+
+    regions: tuple[Floats, ...]
+    boundary: tuple[BoundaryArc, ...]
+    stiffness_max: float
+    damping_at_stiffness_max: float
+    frequencies_at_stiffness_max: tuple[float, ...]
+    damping_max: float
+    stable_area: float
+    fastest_decay: FastestDecay | None = None
+    fastest_decay_in_first_quadrant: FastestDecay | None = None
+
+    # What is told of each wall of the edge: key -> attribute of `BoundaryArc`.
+    _edge_columns: ClassVar[dict[str, str]] = {
+        "stiffness_N_per_m": "stiffness",
+        "damping_Ns_per_m": "damping",
+        "frequency_Hz": "frequency",
+    }
+
+    @property
+    def unobserved_modes(self) -> tuple[str, ...]:
+        """Motions that no wall moves, by name; they were left out and do not count."""
+        return ()
+
+    @property
+    def box(self) -> Window:
+        """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
+        return window_of(self.regions)
+
+    @abstractmethod
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
+        """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, whatever the regions say."""
+
+    def document(self) -> dict[str, Any]:
+        """The chart as numbers and lists, under the keys of `zwidth chart --json`; nan where there is none."""
+        fastest, buildable = self.fastest_decay, self.fastest_decay_in_first_quadrant
+        return {
+            "regions": [ring.tolist() for ring in self.regions],
+            "boundary": [
+                {key: _plain(getattr(arc, name)) for key, name in self._edge_columns.items()}
+                for arc in self.boundary
+            ],
+            "stiffness_max_N_per_m": self.stiffness_max,
+            "damping_at_stiffness_max_Ns_per_m": self.damping_at_stiffness_max,
+            "frequency_at_stiffness_max_Hz": min(self.frequencies_at_stiffness_max, default=None),
+            "frequencies_at_stiffness_max_Hz": list(self.frequencies_at_stiffness_max) or None,
+            "damping_max_Ns_per_m": self.damping_max,
+            "stable_area_N2s_per_m2": self.stable_area,
+            "fastest_decay": fastest and fastest.document(),
+            "fastest_decay_in_first_quadrant": buildable and buildable.document(),
+            "unobserved_modes": list(self.unobserved_modes),
+        }
+
+    def table(self) -> dict[str, list[Any]]:
+        """The edge's walls as columns, its arcs one after another and counted from 0; None where not known."""
+        columns: dict[str, list[Any]] = {"arc": []}
+        columns |= {key: [] for key in self._edge_columns}
+        for number, arc in enumerate(self.boundary):
+            count = len(arc.frequency)
+            columns["arc"] += [number] * count
+            for key, name in self._edge_columns.items():
+                values = _plain(getattr(arc, name))
+                columns[key] += values if isinstance(values, list) else [values] * count
+        return columns
+
+    def __repr__(self) -> str:
+        return "\n  ".join([f"{type(self).__name__}: {self._summary()}", *self._numbers()])
+
+    def _summary(self) -> str:
+        """What the chart is of, in a few words."""
+        return f"{len(self.regions)} stable region{'' if len(self.regions) == 1 else 's'}"
+
+    def _numbers(self) -> list[str]:
+        """At most four lines of numbers."""
+        stiffest = "none: no stable wall has K > 0 and B >= 0"
+        if self.frequencies_at_stiffness_max:
+            frequencies = " and ".join(f"{frequency:.6g}" for frequency in self.frequencies_at_stiffness_max)
+            damping = self.damping_at_stiffness_max
+            stiffest = f"{self.stiffness_max:.6g} N/m at {damping:.6g} N s/m, {frequencies} Hz"
+        return [
+            f"largest stiffness  {stiffest}",
+            f"largest damping    {self.damping_max:.6g} N s/m",
+            f"stable area        {self.stable_area:.6g} N^2 s/m^2",
+        ]
+
+
+def _plain(value: Floats | float | None) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value

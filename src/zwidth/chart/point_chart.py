@@ -1,0 +1,62 @@
+"""The chart of an operating point, whatever it is charted by, and verdicts on single walls there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.argument_checks import require
+
+if TYPE_CHECKING:
+    from zwidth.chart.chart_base import Chart
+    from zwidth.chart.verdict import WallVerdicts
+
+
+def chart_at(point: OperatingPoint, radius: float = 1.0, *, decay: bool = True) -> Chart:
+    """The stable walls at a single operating point.
+
+    A measured response, and a loss factor, are charted by their frequency response; several directions rendered
+    together under one wall law; all else by D-decomposition of the loop.
+
+    radius  less than 1 for the walls whose slowest motion shrinks at least by that factor per sample
+    decay   False skips the search for the fastest-decaying walls, most of the time
+    Returns StabilityChart, MultiChart or MeasuredChart
+    Raises  what `OperatingPoint.loop` raises; ChartError if the edge cannot be closed, ResponseError for what
+            cannot be a device's response, ValueError for another radius than 1 where only 1 is charted
+    """
+    require("point", point, OperatingPoint)
+    plain = radius == 1.0
+    if not plain and (point.charted_by_response or point.direction_count > 1):
+        raise ValueError(f"radius must be 1 for a frequency response and for several directions, got {radius:g}")
+    if point.response is not None:
+        from zwidth.chart.measured.chart import measured_chart
+
+        return measured_chart(point.response, point.controller)
+    if point.charted_by_response:
+        from zwidth.chart.hysteretic import hysteretic_chart
+
+        return hysteretic_chart(point.loop)
+    if point.direction_count > 1:
+        from zwidth.chart.several_directions.chart import multi_chart
+
+        return multi_chart(point.loop_of_directions)
+    from zwidth.chart.chart import stability_chart
+
+    return stability_chart(point.loop, radius, decay)
+
+
+def check_at(point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
+    """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, at a single operating point.
+
+    Returns Verdicts by eigenvalues; MeasuredVerdicts by the count of roots for what has a frequency response only
+    Raises  what `chart_at` raises
+    """
+    require("point", point, OperatingPoint)
+    if point.charted_by_response:
+        return chart_at(point).check(wall_stiffness, wall_damping)
+    from zwidth.chart.verdict import verdicts
+
+    loop = point.loop if point.direction_count == 1 else point.loop_of_directions
+    return verdicts(loop, wall_stiffness, wall_damping)

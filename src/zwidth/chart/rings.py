@@ -1,0 +1,79 @@
+"""From walks along the edge to simple rings: the cells of a stable set."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import accumulate
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.polygon import orient
+
+from zwidth.chart.arcs import ArcPoints
+
+Floats = NDArray[np.float64]
+# Of a ring's extent: corners blurred by more are drawn from one arc's end to the next one's beginning.
+WIDE_CORNER = 1e-6
+
+Window = tuple[float, float, float, float]  # KMIN, KMAX, BMIN, BMAX
+
+
+def window_of(regions: Sequence[Floats]) -> Window:
+    """KMIN, KMAX, BMIN, BMAX of rings and 5 %; (0, 1, 0, 1) where there are none."""
+    if not regions:
+        return 0.0, 1.0, 0.0, 1.0
+    walls = np.vstack(regions)
+    low, high = walls.min(axis=0), walls.max(axis=0)
+    margin = 0.05 * (high - low)
+    (K0, B0), (K1, B1) = low - margin, high + margin
+    return float(K0), float(K1), float(B0), float(B1)
+
+
+def outline(arcs: list[ArcPoints]) -> Floats:
+    """A ring's arcs as one closed walk of points (k, 2).
+
+    An arc's last point is left out where the next one begins, unless they are farther apart than WIDE_CORNER.
+    """
+    K, B = np.concatenate([K for _, K, _ in arcs]), np.concatenate([B for _, _, B in arcs])
+    walls = np.column_stack([K, B])
+    after = np.array([*accumulate(len(K) for _, K, _ in arcs)])
+    gaps = np.abs(walls[after - 1] - walls[after % len(walls)])
+    joined = np.all(gaps <= WIDE_CORNER * np.array([np.ptp(K), np.ptp(B)]), axis=1)
+    points = np.delete(walls, after[joined] - 1, axis=0)
+    return np.vstack([points, points[:1]])
+
+
+def signed_area(ring: Floats) -> float:
+    """Positive where a closed ring runs counter-clockwise."""
+    x, y = ring[:, 0] - ring[0, 0], ring[:, 1] - ring[0, 1]
+    return float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) / 2.0)
+
+
+def simple_rings(outlines: list[Floats]) -> tuple[Floats, ...]:
+    """Outlines as simple counter-clockwise rings; a cell with holes is cut through each of them."""
+    holes = [outline for outline in outlines if signed_area(outline) < 0.0]
+    solid = [outline for outline in outlines if signed_area(outline) > 0.0]
+    rings: list[Floats] = []
+    for outline in solid:
+        inside = [hole for hole in holes if shapely.contains_xy(shapely.Polygon(outline), *hole[0])]
+        cell = shapely.Polygon(outline, inside)
+        if not inside and cell.is_valid:
+            rings.append(outline)
+            continue
+        # Rounding can cross two chords in a corner of many branches: loops of no area, which are dropped
+        parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(cell)))  # a collection may hold collections
+        real = [part for part in parts if isinstance(part, shapely.Polygon) and part.area > 1e-12 * cell.area]
+        rings += [np.array(orient(piece).exterior.coords) for part in real for piece in cut_at_holes(part)]
+    return tuple(rings)
+
+
+def cut_at_holes(cell: shapely.Polygon) -> list[shapely.Polygon]:
+    """A polygon with holes as polygons without, cut upright through each hole's middle."""
+    if not cell.interiors:
+        return [cell]
+    left, low, right, high = cell.bounds
+    middle = shapely.Polygon(cell.interiors[0]).centroid.x
+    halves = (shapely.box(left, low, middle, high), shapely.box(middle, low, right, high))
+    parts = [part for half in halves for part in shapely.get_parts(shapely.intersection(cell, half))]
+    return [piece for part in parts if isinstance(part, shapely.Polygon) for piece in cut_at_holes(part)]

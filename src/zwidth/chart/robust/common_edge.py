@@ -1,0 +1,196 @@
+"""The edge of what many loops have in common, as pieces of their own arcs between exact corners.
+
+The polygons say only which arcs follow each other round the common set. Where two arcs run closer to each other
+than chords follow them, polygons change from one to the other and back; such runs are found out by asking at their
+middle whether the other members are stable there. Where one member's arc gives way to another's, the corner is
+solved for (`member_corner`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from zwidth.chart.arcs import Arc, Arcs
+from zwidth.chart.robust.member_corner import ArcRun, solve_corner
+from zwidth.chart.robust.members import Member
+
+Floats = NDArray[np.float64]
+
+# Distances in shares of the common set's size: two edges this near are one, ...
+SAME = 1e-9
+# ... and a piece of edge shorter than this is the rounding of a corner.
+SHORTEST = 1e-8
+# How far inside its edge a run is tested for stability.
+INSIDE = 1e-9
+
+
+@dataclass(frozen=True)
+class _OutlineChords:
+    """All chords of some members' outlines with where they come from.
+
+    ends    (n, 2, 2)  first and last point [K unit, B]
+    angles  (n, 2)     theta there
+    origin  (n, 2)     place among the members, number of the arc
+    """
+
+    ends: Floats
+    angles: Floats
+    origin: NDArray[np.int64]
+
+
+def common_edge(shape: shapely.MultiPolygon, members: Sequence[Member], unit: float) -> tuple[Arcs, float]:
+    """The edge of a common set as pieces of the members' arcs, and the share of its size to which corners are
+    known: rounding, but more where two arcs all but coincide.
+
+    shape    [K unit, B], see `common_set.intersect_members`
+    members  those that cut it out; where several have the same edge, the first of them gets it
+    """
+    if shape.is_empty:
+        return Arcs.of(()), 0.0
+    low, bottom, right, top = shape.bounds
+    size = max(right - low, top - bottom)
+    segments = _segments(members, unit)
+    rings, blur = [], 0.0
+    for cell in shapely.get_parts(shape):
+        cell = cell.normalize()  # exterior clockwise, holes counter-clockwise
+        for line in (cell.exterior, *cell.interiors):
+            points = shapely.get_coordinates(line)[::-1]
+            runs = _runs(points, members, segments, SAME * size)
+            runs = _merged([run for run in runs if len(runs) < 3 or run.length > SHORTEST * size])
+            runs = _merged(_runs_on_edge(runs, members, unit, INSIDE * size))
+            ring, blurred = _joined(runs, unit, size)
+            rings.append(ring)
+            blur = max(blur, blurred / size)
+    return Arcs.of(rings), blur
+
+
+def _segments(members: Sequence[Member], unit: float) -> _OutlineChords:
+    ends, angles, origin = [], [], []
+    for number, member in enumerate(members):
+        for arc, (thetas, K, B) in enumerate(member.edge.arc_points):
+            points = np.column_stack([K * unit, B])
+            ends.append(np.stack([points[:-1], points[1:]], axis=1))
+            angles.append(np.column_stack([thetas[:-1], thetas[1:]]))
+            origin.append(np.broadcast_to([number, arc], (len(K) - 1, 2)))
+    return _OutlineChords(np.concatenate(ends), np.concatenate(angles), np.concatenate(origin))
+
+
+def _runs(points: Floats, members: Sequence[Member], segments: _OutlineChords, near: float) -> list[ArcRun]:
+    """The walk round a polygon (k, 2), grouped by arc; it begins where one arc gives way to another."""
+    found = _nearest_segments(points, segments, near)
+    origins = segments.origin[found]
+    angles = np.array([[_angle(segments, k, point) for point in points[i : i + 2]] for i, k in enumerate(found)])
+    changes = np.any(origins != np.roll(origins, 1, axis=0), axis=1)
+    for i in np.flatnonzero(~changes):  # an arc that ends where it begins: past its own corner it is another run
+        number, arc = origins[i]
+        changes[i] = _starts_anew(members[number].edge.arcs[arc], angles[i - 1, 1], angles[i, 0])
+    starts = np.flatnonzero(changes) if changes.any() else np.array([0])
+    runs = []
+    for one, following in zip(starts, np.append(starts[1:], starts[0] + len(found)), strict=True):
+        edges = np.arange(one, following) % len(found)
+        number, arc = origins[edges[0]].tolist()
+        first, last = points[edges[0]], points[edges[-1] + 1]
+        ends = (float(angles[edges[0], 0]), float(angles[edges[-1], 1]))
+        runs.append(ArcRun(members[number], arc, members[number].edge.arcs[arc], first, last, ends))
+    return runs
+
+
+def _starts_anew(arc: Arc, before: float, after: float) -> bool:
+    """Whether a walk along an arc has passed from its end to its beginning."""
+    ahead = (after - before) * np.sign(arc.end - arc.start)
+    return bool(ahead < -0.5 * abs(arc.end - arc.start))
+
+
+def _nearest_segments(points: Floats, segments: _OutlineChords, near: float) -> NDArray[np.int64]:
+    """For each edge of a walk the segment that it lies on: the first within `near` of both its ends that runs the
+    same way, and of several the one on the arc of the edge before."""
+    middles = 0.5 * (points[:-1] + points[1:])
+    inside = np.flatnonzero(
+        np.all(segments.ends.max(axis=1) >= points.min(axis=0) - near, axis=1)
+        & np.all(segments.ends.min(axis=1) <= points.max(axis=0) + near, axis=1)
+    )
+    tree = shapely.STRtree(shapely.linestrings(segments.ends[inside]))
+    edge, hit = tree.query(shapely.points(middles), predicate="dwithin", distance=near)
+    hit = inside[hit]
+    along = segments.ends[hit, 1] - segments.ends[hit, 0]
+    ends = _distance(points[edge], segments.ends[hit]), _distance(points[edge + 1], segments.ends[hit])
+    # two edges of a needle are near each other, but run opposite ways
+    ahead = np.sum(along * (points[edge + 1] - points[edge]), axis=1) > 0.0
+    apart = np.where(ahead, np.maximum(*ends), np.inf)
+    out = np.full(len(middles), -1)
+    order = np.lexsort((hit, apart > near, edge))
+    edge, hit, apart = edge[order], hit[order], apart[order]
+    bounds = np.searchsorted(edge, np.arange(len(middles) + 1))
+    before = -1
+    for i in (*range(len(middles)), *range(len(middles))):  # twice: the walk has no first edge
+        choices = hit[bounds[i] : bounds[i + 1]]
+        close = choices[apart[bounds[i] : bounds[i + 1]] <= near]
+        choices = close if len(close) else choices
+        if not len(choices):  # snapped away by more than expected
+            choices = np.array([np.argmin(_distance(middles[i : i + 1], segments.ends))])
+        staying = choices[np.all(segments.origin[choices] == segments.origin[before], axis=1)]
+        before = out[i] = staying[0] if before >= 0 and len(staying) else choices[0]
+    return out
+
+
+def _distance(points: Floats, ends: Floats) -> Floats:
+    """Distances (n,) of points (n, 2) or (1, 2) from segments (n, 2, 2)."""
+    along = ends[:, 1] - ends[:, 0]
+    away = points - ends[:, 0]
+    square = np.maximum(np.sum(along * along, axis=1), 1e-300)
+    share = np.clip(np.sum(away * along, axis=1) / square, 0.0, 1.0)
+    return np.asarray(np.hypot(*(away - share[:, None] * along).T))
+
+
+def _angle(segments: _OutlineChords, k: int, point: Floats) -> float:
+    """theta of a point on a segment, in proportion."""
+    (first, last), (start, end) = segments.ends[k], segments.angles[k]
+    along = last - first
+    share = float(np.clip((point - first) @ along / max(along @ along, 1e-300), 0.0, 1.0))
+    return float(start + share * (end - start))
+
+
+def _runs_on_edge(runs: list[ArcRun], members: Sequence[Member], unit: float, depth: float) -> list[ArcRun]:
+    """Runs without those whose middle is unstable for another member; all of them if none would be left."""
+    on_edge = []
+    for run in runs:
+        K, B = (run.middle(unit) + depth * run.inwards(unit)) / (unit, 1.0)
+        if not any(other is not run.member and other.unstable(float(K), float(B)) for other in members):
+            on_edge.append(run)
+    return on_edge or runs
+
+
+def _continues(one: ArcRun, two: ArcRun) -> bool:
+    return one.same_arc(two) and not _starts_anew(one.arc, one.angles[1], two.angles[0])
+
+
+def _merged(runs: list[ArcRun]) -> list[ArcRun]:
+    """Runs with successive ones on one arc joined."""
+    out = runs[:1]
+    for run in runs[1:]:
+        if _continues(out[-1], run):
+            out[-1] = out[-1].joined(run)
+        else:
+            out.append(run)
+    if len(out) > 1 and _continues(out[-1], out[0]):
+        out[0] = out.pop().joined(out[0])
+    return out
+
+
+def _joined(runs: list[ArcRun], unit: float, size: float) -> tuple[list[Arc], float]:
+    """Runs as arcs between exact corners; and how far a corner that could not be solved for may be off."""
+    if len(runs) == 1:
+        return [runs[0].arc], 0.0
+    corners = [solve_corner(run, runs[(k + 1) % len(runs)], unit, size) for k, run in enumerate(runs)]
+    arcs = []
+    for run, before, after in zip(runs, [corners[-1], *corners[:-1]], corners, strict=True):
+        start, end = before.angles[1], after.angles[0]
+        thetas = run.arc.thetas
+        thetas = thetas[(thetas > min(start, end)) & (thetas < max(start, end))]
+        arcs.append(run.arc._replace(first=before.wall, last=after.wall, start=start, end=end, thetas=thetas))
+    return arcs, max(corner.blur for corner in corners)

@@ -1,0 +1,55 @@
+"""Dry friction and an encoder's step where the wall acts, as conditions take them: one number each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from zwidth.model.modes import undamped_modes
+from zwidth.model.plant import Floats, Plant
+
+
+def ground_friction(plant: Plant) -> float:
+    """f_c: what one metre at the actuator costs in dry friction, sum_i C_i |along_i . x| [N].
+
+    x is the free motion that a force at the actuator makes, of one metre there; without a free motion, where a
+    spring ties the plant to the ground, the motion that a force begins with, M^-1 a/(a^T M^-1 a). For one
+    coordinate driven by itself that is C. It is the energy that moving slowly by a metre takes.
+
+    Returns  0 without dry friction
+
+    >>> from zwidth.model.nonlinear import Friction, Nonlinear
+    >>> one = np.ones(1)
+    >>> rubbing = Nonlinear(friction=(Friction(one, 0.2),))
+    >>> ground_friction(Plant(np.array([[0.1]]), *np.zeros((2, 1, 1)), one, one, nonlinear=rubbing))
+    0.2
+    """
+    frictions = plant.nonlinear.friction
+    if not frictions:
+        return 0.0
+    motion = _motion(plant)
+    return float(sum(part.coulomb * abs(part.along @ motion) for part in frictions))
+
+
+def reading_step(plant: Plant) -> float:
+    """Delta: how far the reading may step when all encoders do, sum_i |weight_i| step_i [m].
+
+    Of a mechanism's motors that is sum_i |u^T J_i| dtheta_i, which varies with direction and posture.
+
+    Returns  0 where the reading is as fine as you like
+    """
+    return float(sum(abs(part.weight) * part.step for part in plant.nonlinear.counters))
+
+
+def reading_noise(plant: Plant) -> float:
+    """Standard deviation of the reading's noise, that of all encoders: sqrt(sum_i (weight_i noise_i)^2) [m]."""
+    return float(np.sqrt(sum((part.weight * part.noise) ** 2 for part in plant.nonlinear.counters)))
+
+
+def _motion(plant: Plant) -> Floats:
+    a = plant.actuator
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    free = shapes[:, squared == 0.0]
+    pushed = free @ (free.T @ a)
+    begun = np.linalg.solve(plant.mass, a)
+    motion = pushed if a @ pushed > 1e-12 * (a @ begun) else begun
+    return np.asarray(motion / (a @ motion))

@@ -1,0 +1,384 @@
+"""A stability boundary measured on the virtual device, the way it is measured on a real one (thesis, 3.2.2, 3.3).
+
+For each stiffness the device is disturbed and watched, and the damping is bisected between a wall that was stable
+and one that was not: a lower and an upper edge. Near the tip it is the stiffness that is bisected, for chosen
+dampings.
+
+Where to look is found in the same way. Walls on a raster of powers of ten are tried, coarsely, on what is linear
+of the device under a two-sided wall; the largest connected patch of stable ones is the place. From inside it the
+trial itself marches outwards in growing steps until something is unstable. So only the cell of stable walls that
+begins at small stiffness is measured, and islands in it and tongues of it narrower than a step are missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.contact.line_search import (
+    Brackets,
+    Lines,
+    bisect,
+    march,
+    nearest_change,
+    stable_beyond,
+    stiffness_lines,
+)
+from zwidth.contact.stability_trial import LEVELS, Observation, StabilityTrial, TrialError, observe
+from zwidth.model.modes import least_deforming_motion
+from zwidth.model.operator import attach
+from zwidth.model.plant import Plant
+
+Floats = NDArray[np.float64]
+EdgeKind = Literal["lower", "upper", "tip"]
+Progress = Callable[[int, int], None]  # done, of how many
+
+PER_DECADE: Final = 3  # of the raster
+SOFTEST, LEAST_DAMPED = 1e-6, 1e-6  # of the raster, relative to its largest
+COARSE: Final = 2  # looks at a wall while only the place is sought
+COLUMNS: Final = 12  # dampings at which the raster's stiffness is measured
+WORTH: Final = 0.2  # columns that reach less of the largest stiffness are left alone, but for those beside others
+ZOOMS, ZOOMED = 4, 7  # rounds that close in on the tip, and dampings in each
+FIRST_ZOOM: Final = 3e-4  # share of the stiffness to which the first round measures it
+TIP_SHARE: Final = 0.93  # share of the largest stiffness from which on the tip is measured
+HALVED: Final = 5  # times the start of a tip is lowered
+ACCURACY: Final = 1e-4  # of the range of stable dampings, or of the stiffness
+
+
+class NoStableWallError(ValueError):
+    """No stable wall was found."""
+
+
+class SearchWindow(NamedTuple):
+    """Where to look: stiffnesses [N/m] and dampings [N s/m]."""
+
+    stiffness: tuple[float, float]
+    damping: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class StableExtent:
+    """Where the stable walls are, as found by trying.
+
+    stiffness, damping  of the tip, the stiffest wall found stable [N/m], [N s/m]
+    largest_damping     the largest damping found stable [N s/m]
+    bounded             False where no unstable stiffness was found above the tip
+    """
+
+    stiffness: float
+    damping: float
+    largest_damping: float
+    bounded: bool
+
+
+@dataclass(frozen=True)
+class EdgePoint:
+    """One point of the boundary, half way between the last stable wall and the first unstable one.
+
+    edge                lower and upper: damping was bisected at this stiffness; tip: stiffness at this damping
+    unstable_behaviour  what the device does at that first unstable wall; None: no unstable wall was found, and the
+                        point has nan for what was bisected
+    amplitude, frequency   of that [m], [Hz]
+    unsure              of what is not linear: the verdict changes more than once along the line; this is the
+                        change nearest to its start
+    """
+
+    stiffness: float
+    damping: float
+    edge: EdgeKind
+    unstable_behaviour: str | None
+    amplitude: float
+    frequency: float
+    unsure: bool = False
+
+
+def find_stable_walls(
+    trial: StabilityTrial, box: SearchWindow | None = None, progress: Progress | None = None
+) -> StableExtent:
+    """Where the stable walls are.
+
+    progress  told how many of the six steps are done
+    box     look here only; None: everywhere between millionths and all of what the device's mass allows
+    Raises  NoStableWallError  where no stable wall with K > 0 is found
+    """
+    _check(box)
+    tell = progress or (lambda done, of: None)
+    tell(0, ZOOMS + 2)
+    patch = _raster_region(trial, box)
+    tell(1, ZOOMS + 2)
+    columns = _columns(trial, patch, box)
+    tell(2, ZOOMS + 2)
+    if not columns:
+        raise NoStableWallError(_none(box))
+    reach = max(B for B, _, _ in columns)
+    best = max(columns, key=lambda column: column[1])
+    within = _within(box)
+    # powers pass a peak between them
+    between = np.linspace(0.0, 1.3 * reach, COLUMNS + 1)[1:] if box is None else np.empty(0)
+    tops = np.interp(between, [B for B, _, _ in columns], [K for _, K, _ in columns])
+    more = _largest_stiffnesses(trial, between, 0.5 * tops, FIRST_ZOOM, within, levels=COARSE)
+    columns = sorted({*columns, *(column for column in more if column[1] > 0.0)})
+    reach, best = max(B for B, _, _ in columns), max(columns, key=lambda column: column[1])
+    zoom = 0
+    while zoom < ZOOMS and best[2]:
+        index = columns.index(best)
+        low, high = columns[max(index - 1, 0)], columns[min(index + 1, len(columns) - 1)]
+        between = np.linspace(low[0], high[0], ZOOMED + 2)[1:-1]
+        B = np.unique(np.append(between, best[0]))
+        start = np.full(len(B), 0.9 * min(column[1] for column in (low, best, high)))
+        # dampings four times as close differ by a sixteenth in stiffness
+        tolerance = max(FIRST_ZOOM / 16.0**zoom, 0.01 * ACCURACY)
+        fresh = [
+            c for c in _largest_stiffnesses(trial, B, start, tolerance, within, best[1] - start) if c[1] > 0.0
+        ]
+        if not fresh:  # seen for longer, nothing there is stable
+            columns.remove(best)
+            if not columns:
+                raise NoStableWallError(_none(box))
+            best = max(columns, key=lambda column: column[1])
+            continue
+        best = max(fresh, key=lambda column: column[1])
+        columns = sorted({low, *fresh, high})
+        zoom += 1
+        tell(zoom + 2, ZOOMS + 2)
+    return StableExtent(best[1], best[0], reach, best[2])
+
+
+# damping, largest stable stiffness, whether an unstable one was found
+_Column = tuple[float, float, bool]
+
+
+def _check(box: SearchWindow | None) -> None:
+    if box is None:
+        return
+    for name, unit, span in zip(("stiffness", "damping"), ("N/m", "N s/m"), box, strict=True):
+        if not all(map(isfinite, span)) or not span[0] < span[1]:
+            raise TrialError(name, f"must be a range LOW < HIGH [{unit}], got {span[0]:g} to {span[1]:g}")
+    if not box.stiffness[1] > 0.0:
+        got = f"got {box.stiffness[0]:g} to {box.stiffness[1]:g}"
+        raise TrialError("stiffness", f"must reach above 0 [N/m], {got}")
+
+
+def _within(box: SearchWindow | None) -> tuple[float, float]:
+    """The softest and the stiffest wall to be looked at [N/m]."""
+    return (0.0, np.inf) if box is None else (max(box.stiffness[0], 0.0), box.stiffness[1])
+
+
+def _none(box: SearchWindow | None) -> str:
+    where = (
+        ""
+        if box is None
+        else (
+            f" with stiffness from {box.stiffness[0]:g} to {box.stiffness[1]:g} N/m and damping from "
+            f"{box.damping[0]:g} to {box.damping[1]:g} N s/m"
+        )
+    )
+    return f"no stable wall was found{where}: the disturbed device did not come to rest inside any of those tried"
+
+
+def _raster_region(trial: StabilityTrial, box: SearchWindow | None) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Stiffnesses (k,), dampings (b,), and which walls (k, b) belong to the largest connected stable patch."""
+    from scipy.ndimage import label
+
+    if box is None:
+        plant = trial.loop.plant if trial.hand.operator is None else attach(trial.loop.plant, trial.hand.operator)
+        light, heavy = _masses(plant)
+        T = trial.loop.period
+        K = _powers(4.0 * heavy / T**2, SOFTEST * light / heavy)
+        B = _powers(4.0 * heavy / T, LEAST_DAMPED * light / heavy)
+    else:
+        low = max(box.stiffness[0], 1e-3 * box.stiffness[1])
+        K = np.geomspace(low, box.stiffness[1], 20)
+        B = np.linspace(*box.damping, 24)
+    walls = np.stack(np.meshgrid(K, B, indexing="ij"), axis=-1).reshape(-1, 2)
+    for levels in range(1, LEVELS + 1):
+        stable = np.array([seen.stable for seen in observe(trial.linearised(), walls, levels)])
+        if stable.any():
+            break
+    else:
+        raise NoStableWallError(_none(box))
+    names, _ = label(stable.reshape(len(K), len(B)))
+    sizes = np.bincount(names.ravel())[1:]
+    return K, B, np.asarray(names == 1 + int(np.argmax(sizes)))
+
+
+def _powers(largest: float, least: float) -> Floats:
+    count = int(np.ceil(-PER_DECADE * np.log10(least)))
+    return np.asarray(largest * 10.0 ** (np.arange(-count, 1) / PER_DECADE))
+
+
+def _masses(plant: Plant) -> tuple[float, float]:
+    """What a sudden force at the wall accelerates, and what a steady one does [kg]."""
+    inverse = np.linalg.inv(plant.mass)
+    a, s, shape = plant.actuator, plant.sensor, least_deforming_motion(plant)
+    light = 1.0 / float(np.sqrt((a @ inverse @ a) * (s @ inverse @ s)))
+    return light, max(float(shape @ plant.mass @ shape), light)
+
+
+def _columns(
+    trial: StabilityTrial, patch: tuple[Floats, Floats, NDArray[np.bool_]], box: SearchWindow | None
+) -> list[_Column]:
+    """The largest stable stiffness at some of the patch's dampings, on the trial itself."""
+    K, B, inside = patch
+    tops = np.array([K[column].max(initial=0.0) for column in inside.T])
+    worth = np.flatnonzero(tops > WORTH * tops.max())
+    filled = np.flatnonzero(tops > 0.0)
+    filled = filled[(filled >= worth[0] - 1) & (filled <= worth[-1] + 1)]
+    some = filled[np.unique(np.linspace(0, len(filled) - 1, min(COLUMNS, len(filled))).astype(int))]
+    top = np.array([K[np.flatnonzero(inside[:, b])[-1]] for b in some])
+    least = np.array([K[np.flatnonzero(inside[:, b])[0]] for b in some])
+    within = _within(box)
+    found = dict[int, _Column]()
+    for start in (0.5 * top, 0.1 * top, least):
+        lanes = [i for i in range(len(some)) if i not in found]
+        columns = _largest_stiffnesses(trial, B[some[lanes]], start[lanes], 0.05, within, levels=COARSE)
+        for i, column in zip(lanes, columns, strict=True):
+            if column[1] > 0.0:
+                found[i] = column
+    return sorted(found.values())
+
+
+def _largest_stiffnesses(
+    trial: StabilityTrial,
+    B: Floats,
+    start: Floats,
+    tolerance: float,
+    within: tuple[float, float],
+    step: Floats | None = None,
+    levels: int | None = None,
+) -> list[_Column]:
+    """The largest stable stiffness at dampings B (m,), from a start that should be stable; 0 where it is not.
+
+    Of what is not linear the lowest change counts, whatever `levels` says.
+    """
+    least, most = within
+    m = len(B)
+    begins = np.array([seen.stable for seen in observe(trial, np.column_stack([start, B]), levels)], dtype=bool)
+    lines = Lines(np.column_stack([start, B]), np.tile([1.0, 0.0], (m, 1)))
+    farthest = np.where(begins, np.minimum(most, 1e6 * start) - start, 0.0)
+    found = march(trial, lines, 0.5 * start if step is None else step, np.maximum(farthest, 0.0), levels)
+    found = bisect(trial, lines, found, tolerance * start, levels)
+    found = Brackets(np.where(begins, start + found.stable, 0.0), start + found.unstable, found.observations)
+    if not trial.linear:
+        found, _ = _recheck(trial, B, found, least, tolerance * np.minimum(start, found.stable))
+    return list(zip(B.tolist(), found.stable.tolist(), np.isfinite(found.unstable).tolist(), strict=True))
+
+
+def _recheck(
+    trial: StabilityTrial, damping: Floats, found: Brackets, least: float, tolerance: Floats
+) -> tuple[Brackets, NDArray[np.bool_]]:
+    """The stiffnesses found at dampings (m,), or else the lowest at which the verdict changes.
+
+    least    no softer wall is looked at [N/m]
+    Returns  as `found` [N/m], stable 0 where no stable wall was met; and at which dampings the verdict changed
+    """
+    ways = stiffness_lines(damping, least)
+    first = Brackets(found.stable - least, found.unstable - least, found.observations)
+    lower = nearest_change(trial, ways, first, tolerance, start_stable=False)
+    stable = np.where(lower.stable > 0.0, least + lower.stable, 0.0)
+    unsure = lower.stable < first.stable
+    return Brackets(stable, least + lower.unstable, lower.observations), unsure
+
+
+def measure_edges(
+    trial: StabilityTrial, stiffness: Floats, place: StableExtent, box: SearchWindow | None = None
+) -> list[EdgePoint]:
+    """Lower and upper edge at each stiffness (k,), from the damping of the tip outwards.
+
+    Of what is not linear: the change of the verdict nearest to that damping.
+    Returns  lower edges first; a stiffness at which that damping is not stable has none
+    """
+    k = len(stiffness)
+    inside = np.full(k, place.damping)
+    begins = np.array([seen.stable for seen in observe(trial, np.column_stack([stiffness, inside]))], dtype=bool)
+    stiffness, inside, k = stiffness[begins], inside[begins], int(begins.sum())
+    if not k:
+        return []
+    starts = np.column_stack([np.tile(stiffness, 2), np.tile(inside, 2)])
+    sign = np.repeat([-1.0, 1.0], k)
+    lines = Lines(starts, np.column_stack([np.zeros(2 * k), sign]))
+    scale = max(abs(place.damping), 0.1 * abs(place.largest_damping))
+    low, high = (-np.inf, np.inf) if box is None else box.damping
+    farthest = np.where(sign < 0.0, starts[:, 1] - low, high - starts[:, 1])
+    farthest = np.minimum(np.maximum(farthest, 0.0), 1e3 * scale)
+    found = march(trial, lines, np.full(2 * k, 0.25 * scale), farthest)
+    width = np.nan_to_num(found.unstable, nan=scale).reshape(2, k).sum(axis=0)
+    tolerance = np.tile(ACCURACY * width, 2)
+    found = bisect(trial, lines, found, tolerance)
+    unsure = np.zeros(2 * k, dtype=bool)
+    if not trial.linear:
+        nearer = nearest_change(trial, lines, found, tolerance, start_stable=True)
+        unsure = (nearer.stable < found.stable) | stable_beyond(trial, lines, nearer.unstable)
+        found = nearer
+    middle = lines.at(0.5 * (found.stable + found.unstable))[:, 1]
+    kinds: tuple[EdgeKind, EdgeKind] = ("lower", "upper")
+    edges = [kind for kind in kinds for _ in range(k)]
+    return [
+        _point(float(K), float(B), edge, seen, bool(doubt))
+        for (K, _), B, edge, seen, doubt in zip(starts, middle, edges, found.observations, unsure, strict=True)
+    ]
+
+
+def measure_tips(
+    trial: StabilityTrial, damping: Floats, place: StableExtent, box: SearchWindow | None = None
+) -> list[EdgePoint]:
+    """The largest stable stiffness at each damping (k,), from a stiffness somewhat below the tip's upwards.
+
+    Of what is not linear: from a lower one where that is not stable, and the lowest change of the verdict.
+    """
+    least, most = _within(box)
+    start = np.full(len(damping), (TIP_SHARE - 0.03) * place.stiffness)
+    start = _lowered(trial, damping, start, least)
+    B, start = damping[start > 0.0], start[start > 0.0]
+    lines = Lines(np.column_stack([start, B]), np.tile([1.0, 0.0], (len(B), 1)))
+    most = min(most, 1e3 * place.stiffness)
+    found = march(trial, lines, (1.0 / (TIP_SHARE - 0.03) - 1.0) * start, np.maximum(most - start, 0.0))
+    tolerance = np.full(len(B), 0.1 * ACCURACY * place.stiffness)
+    found = bisect(trial, lines, found, tolerance)
+    found = Brackets(start + found.stable, start + found.unstable, found.observations)
+    unsure = np.zeros(len(B), dtype=bool)
+    if not trial.linear:
+        found, unsure = _recheck(trial, B, found, least, tolerance)
+        unsure |= stable_beyond(trial, stiffness_lines(B, least), found.unstable - least)
+    middle = np.where(found.stable > 0.0, 0.5 * (found.stable + found.unstable), np.nan)
+    ends = zip(middle.tolist(), B.tolist(), found.observations, unsure.tolist(), strict=True)
+    return [_point(K, b, "tip", seen if isfinite(K) else None, doubt) for K, b, seen, doubt in ends]
+
+
+def _lowered(trial: StabilityTrial, damping: Floats, start: Floats, least: float) -> Floats:
+    """Stiffnesses halved until their walls are stable, for what is not linear; 0 where none is."""
+    start = start.copy()
+    lanes = np.arange(len(damping))
+    for _ in range(1 if trial.linear else HALVED):
+        looks = observe(trial, np.column_stack([start[lanes], damping[lanes]]))
+        lanes = lanes[[not seen.stable for seen in looks]]
+        if not len(lanes):
+            break
+        start[lanes] = least + 0.5 * (start[lanes] - least)
+    start[lanes] = 0.0
+    return start
+
+
+def _point(K: float, B: float, edge: EdgeKind, seen: Observation | None, unsure: bool = False) -> EdgePoint:
+    if seen is None:
+        return EdgePoint(K, B, edge, None, float("nan"), float("nan"), unsure)
+    return EdgePoint(K, B, edge, seen.behaviour, seen.amplitude, seen.frequency, unsure)
+
+
+def tip_dampings(edges: list[EdgePoint], place: StableExtent, count: int) -> Floats:
+    """Dampings at which to measure the tip: the tip's own, and others between the two edges just below it."""
+    at = TIP_SHARE * place.stiffness
+    ends = []
+    for edge in ("lower", "upper"):
+        own = [p for p in edges if p.edge == edge and isfinite(p.damping)]
+        if not own:
+            return np.array([place.damping])[:count]
+        K, B = (np.array(values) for values in zip(*sorted((p.stiffness, p.damping) for p in own), strict=True))
+        ends.append(float(np.interp(at, K, B)))
+    spread = np.linspace(ends[0], ends[1], count + 1)[1:-1]  # none for a count of 1
+    return np.asarray(np.sort(np.append(spread, place.damping)))

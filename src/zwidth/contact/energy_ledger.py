@@ -1,0 +1,157 @@
+"""The energy ledger's book-keeping, run beside the engine.
+
+Over an interval the reading's motion moves by dy. Between what an ideal wall would do and what the actuator does,
+each step of the way is charged with the difference it makes:
+
+    wall                 (F_j + F_{j+1})/2 dy, F the environment's answer to true place and velocity at samples; a
+                         spring gives back what it takes, exactly
+    hold                 F_j held for the interval instead
+    velocity estimate    the estimate from true readings instead of the velocity
+    quantiser            counted readings (and their noise) instead of true ones
+    passivity controller what it adds
+    actuator             delay, filter, limit and lag, and that the actuator is not where the sensor is
+
+Hand, friction, brakes and bent springs hold their force over a substep, so that their work is force times motion;
+what structural dampers take out is a quadratic form of the states. All of them sum up to what the plant stores.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SPRING
+from zwidth.contact.engine_arrays import (
+    ACTUATOR,
+    BRAKES,
+    CONTROLLER,
+    ENTRIES,
+    ESTIMATE,
+    FRICTION,
+    HAND,
+    HOLD,
+    QUANTISER,
+    SPRINGS,
+    STORED,
+    STRUCTURE,
+    WALL,
+    PlantArrays,
+)
+from zwidth.contact.hand import BRAKE
+from zwidth.model.mechanism import Floats
+
+(
+    LAST_TRUTH,
+    LAST_IDEAL_FORCE,
+    LAST_UNQUANTISED_FORCE,
+    LAST_ENVIRONMENT_FORCE,
+    LAST_CONTROLLED_FORCE,
+    ACTUATOR_WORK,
+    BEGUN,
+) = range(7)
+
+
+class Ledger(NamedTuple):
+    """entries (12,) or none: the ledger;   last (7,)  what the previous sample left;   work (M,)  memory"""
+
+    entries: Floats
+    last: Floats
+    work: Floats
+
+
+@compiled
+def new_ledger(devices: PlantArrays, wanted: bool) -> Ledger:
+    """An empty ledger; one without entries where none is wanted."""
+    return Ledger(np.zeros(ENTRIES if wanted else 0), np.zeros(7), np.zeros(devices.loss.shape[2]))
+
+
+@compiled_lean
+def energy_of(devices: PlantArrays, d: int, states: Floats) -> float:
+    """Kinetic and elastic energy of the linear plant [J]."""
+    total = 0.0
+    for i in range(devices.energy.shape[1]):
+        for k in range(devices.energy.shape[1]):
+            total += 0.5 * states[i] * devices.energy[d, i, k] * states[k]
+    return total
+
+
+@compiled_lean
+def form(matrices: Floats, d: int, part: int, x: Floats) -> float:
+    """x . matrices[d, part] x"""
+    total = 0.0
+    for i in range(x.size):
+        for k in range(x.size):
+            total += x[i] * matrices[d, part, i, k] * x[k]
+    return total
+
+
+@compiled_lean
+def enter_substep(
+    devices: PlantArrays,
+    d: int,
+    part: int,
+    before: Floats,
+    after: Floats,
+    command: float,
+    push: float,
+    forces: Floats,
+    book: Ledger,
+) -> None:
+    """Enter the work done over one substep."""
+    N, n, X = devices.energy.shape[1], devices.size[d], book.work
+    for i in range(N):
+        X[i] = before[i]
+    X[N], X[N + 1] = command, push
+    for e in range(forces.size):
+        X[N + 2 + e] = forces[e]
+    entries = book.entries
+    entries[STRUCTURE] -= form(devices.loss, d, part, X)
+    book.last[ACTUATOR_WORK] += form(devices.work, d, part, X)
+    for k in range(n):
+        entries[HAND] += push * devices.push[d, k] * (after[k] - before[k])
+    for e in range(forces.size):
+        kind = devices.kind[d, e]
+        if kind == NOTHING:
+            continue
+        work = forces[e] * (after[N + 2 * e] - before[N + 2 * e])
+        if kind in (COULOMB, BRISTLES):
+            entries[FRICTION] += work
+        elif kind == SPRING:
+            entries[SPRINGS] += work
+        elif devices.numbers[d, e, 0] == BRAKE:
+            entries[BRAKES] += work
+        else:
+            entries[HAND] += work
+
+
+@compiled_lean
+def enter_sample(
+    book: Ledger,
+    truth: float,
+    ideal_force: float,
+    unquantised_force: float,
+    environment_force: float,
+    controlled_force: float,
+    stored: float,
+) -> None:
+    """At a sample: charge the interval that ends, and keep what the next one starts with."""
+    entries, last = book.entries, book.last
+    if last[BEGUN] > 0.0:
+        dy = truth - last[LAST_TRUTH]
+        wall = 0.5 * (last[LAST_IDEAL_FORCE] + ideal_force) * dy
+        entries[WALL] += wall
+        entries[HOLD] += last[LAST_IDEAL_FORCE] * dy - wall
+        entries[ESTIMATE] += (last[LAST_UNQUANTISED_FORCE] - last[LAST_IDEAL_FORCE]) * dy
+        entries[QUANTISER] += (last[LAST_ENVIRONMENT_FORCE] - last[LAST_UNQUANTISED_FORCE]) * dy
+        entries[CONTROLLER] += (last[LAST_CONTROLLED_FORCE] - last[LAST_ENVIRONMENT_FORCE]) * dy
+        entries[ACTUATOR] += last[ACTUATOR_WORK] - last[LAST_CONTROLLED_FORCE] * dy
+    entries[STORED] = stored
+    last[LAST_TRUTH], last[LAST_IDEAL_FORCE], last[LAST_UNQUANTISED_FORCE] = truth, ideal_force, unquantised_force
+    last[LAST_ENVIRONMENT_FORCE], last[LAST_CONTROLLED_FORCE], last[ACTUATOR_WORK], last[BEGUN] = (
+        environment_force,
+        controlled_force,
+        0.0,
+        1.0,
+    )

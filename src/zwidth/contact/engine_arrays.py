@@ -1,0 +1,100 @@
+"""The arrays that the engine works on: devices, and the members of a batch; `computer` has those of the computers.
+
+Leading axis D: devices of the batch, padded to one size with zeros; a member names its device by index.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.model.mechanism import Floats, Ints
+
+# Columns of a trace.
+READING, TRUTH, VELOCITY, FORCE, HANDLE = range(5)
+TRACES = 5
+# Entries of the energy ledger, in this order: what each has put in since the start [J].
+HAND, WALL, HOLD, ESTIMATE, QUANTISER, CONTROLLER, ACTUATOR, FRICTION, BRAKES, SPRINGS, STRUCTURE, STORED = range(
+    12
+)
+ENTRIES = 12
+
+
+class PlantArrays(NamedTuple):
+    """D plants between samples. Part 0 of an interval has the old command, part 1 the new one.
+
+    transition  (D, 2, R, N)    what N states become, and then, for each element, place and speed of its motion
+    inputs      (D, 2, F, R)    what a unit of a held force adds to all R: command, hand, elements
+    substeps    (D, 2)          how many in each part
+    length      (D, 2)          of a substep [s]
+    loss, work  (D, 2, M, M)    quadratic forms of the ledger, M = N + F; size 0 without one
+    energy      (D, N, N)
+    size        (D,)            coordinates n: velocities stand n places after them
+    kind        (D, E)          of each element;   numbers (D, E, 5)
+    along       (D, E, n)       motion each works on
+    sensor      (D, n)          what is read, as it is
+    handle      (D, n)          where the hand is;   push (D, n)  where its push acts
+    channel     (D, C, n)       motions that are counted;   step, weight, noise (D, C)
+    encoder     (D, C)          numbers of the encoders, by which they draw their noise
+    """
+
+    transition: Floats
+    inputs: Floats
+    substeps: Ints
+    length: Floats
+    loss: Floats
+    work: Floats
+    energy: Floats
+    size: Ints
+    kind: Ints
+    numbers: Floats
+    along: Floats
+    sensor: Floats
+    handle: Floats
+    push: Floats
+    channel: Floats
+    step: Floats
+    weight: Floats
+    noise: Floats
+    encoder: Ints
+
+
+class RunArrays(NamedTuple):
+    """m runs.
+
+    device      (m,)     index
+    start       (m, R)   states at time 0, place and speed of each element's motion
+    wall        (m,)     where the wall is [m]
+    values      (m, P)   of the environment
+    push        (m, 9)   the hand's (see `hand`);   reflex (m, 7)
+    observer    (m, Q)   the passivity controller's; nan in the first: none
+    seed        (m,)
+    bound       (m,)     reading from the wall at which a run is given up [m]
+    """
+
+    device: Ints
+    start: Floats
+    wall: Floats
+    values: Floats
+    push: Floats
+    reflex: Floats
+    observer: Floats
+    seed: NDArray[np.uint64]
+    bound: Floats
+
+
+class Records(NamedTuple):
+    """What is kept of m runs of S samples; arrays of size 0 where it is not wanted.
+
+    samples  (m,)           how many were run
+    traces   (m, S, 5)      reading, truth, velocity, force, handle at each sample
+    handle   (m, S, n)      handle after each substep
+    ledger   (m, S, 12)     energies at each sample
+    """
+
+    samples: Ints
+    traces: Floats
+    handle: Floats
+    ledger: Floats

@@ -1,0 +1,191 @@
+"""From loops and hands to the arrays of the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SPRING, VARYING
+from zwidth.contact.engine_arrays import PlantArrays
+from zwidth.contact.hand import ARM, BRAKE, GRASP, Hand
+from zwidth.contact.linear_substep import LinearDynamics, Substep, dynamics, substep
+from zwidth.loop.loop import Loop
+from zwidth.model.modes import least_deforming_motion, undamped_modes
+from zwidth.model.nonlinear import Counter
+from zwidth.model.operator import attach
+from zwidth.model.plant import Plant
+
+Floats = NDArray[np.float64]
+Element = tuple[int, tuple[float, ...], Floats]
+
+
+class HeldDevice:
+    """One device with who holds it: the plant that moves, where the hand pushes, and what is not linear.
+
+    attached_plant  the plant with the operator attached;   shapes (n, n)  its undamped modes
+    modal_plant     the same in the coordinates of these modes
+    push            (n,)  where the push acts: on the arm behind an elastic grasp, else on the handle
+    elements        kind, numbers and motion of each
+    """
+
+    def __init__(self, loop: Loop, hand: Hand) -> None:
+        operator = hand.operator
+        self.loop = loop
+        self.attached_plant = loop.plant if operator is None else attach(loop.plant, operator)
+        squared, self.shapes = undamped_modes(self.attached_plant.mass, self.attached_plant.stiffness)
+        self.modal_plant = in_modes(self.attached_plant, squared, self.shapes)
+        self.handle = self.modal_plant.sensor if self.modal_plant.handle is None else self.modal_plant.handle
+        self.push = self.handle
+        if operator is not None and not operator.rigid_grasp:
+            self.push = self.shapes[-1]
+        self.elements = _own_elements(self.modal_plant)
+        if hand.reflex is not None and operator is not None:
+            self.elements.append((VARYING, (ARM,), self.push))
+            if not operator.rigid_grasp:
+                self.elements.append((VARYING, (GRASP,), self.handle - self.push))
+
+    def modal(self, coordinates: Floats) -> Floats:
+        """Coordinates, or velocities, of the given plant as those of its modes."""
+        return np.asarray(self.shapes.T @ (self.attached_plant.mass @ coordinates))
+
+    @cached_property
+    def undeformed(self) -> Floats:
+        """See the function of this name."""
+        return least_deforming_motion(self.attached_plant)
+
+    @property
+    def counters(self) -> tuple[Counter, ...]:
+        """What is counted; without encoder steps, the sensor as it is."""
+        return self.modal_plant.nonlinear.counters or (Counter(self.modal_plant.sensor, 0.0),)
+
+    @property
+    def limit(self) -> float:
+        """Largest force there is [N]."""
+        return self.loop.nonlinear.force_limit
+
+
+def in_modes(plant: Plant, squared: Floats, shapes: Floats) -> Plant:
+    """The plant in the coordinates of its undamped modes: mass 1, stiffness w^2 on the diagonal.
+
+    A motion without stiffness then has none. In other coordinates rounding would leave it a little of the stiffest
+    spring, which a minute of free motion turns into digits.
+    """
+    return replace(
+        plant,
+        mass=np.eye(plant.size),
+        damping=shapes.T @ plant.damping @ shapes,
+        stiffness=np.diag(squared),
+        actuator=plant.actuator @ shapes,
+        sensor=plant.sensor @ shapes,
+        handle=None if plant.handle is None else plant.handle @ shapes,
+        names=(),
+        lagged_dampers=tuple(
+            replace(damper, along=damper.along @ shapes) for damper in plant.lagged_dampers if damper.damping > 0.0
+        ),
+        nonlinear=plant.nonlinear.project(shapes),
+    )
+
+
+def _own_elements(plant: Plant) -> list[Element]:
+    own, found = plant.nonlinear, list[Element]()
+    for dry in own.friction:
+        bent = dry.bristles
+        if bent is not None and max(bent[:2]) > 0.0:
+            found.append((BRISTLES, bent, dry.along))
+        elif bent is None and dry.coulomb > 0.0:
+            found.append((COULOMB, (dry.coulomb,), dry.along))
+    found += [(SPRING, (spring.cubic, spring.backward_excess), spring.along) for spring in own.springs]
+    found += [(VARYING, (BRAKE, brake.damping, brake.time_constant), brake.along) for brake in own.brakes]
+    return found
+
+
+def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArrays:
+    """The plants between samples; a part of an interval has at least one substep where it has any length."""
+    D, E = len(held_devices), max(len(held_device.elements) for held_device in held_devices)
+    C, n = (
+        max(len(held_device.counters) for held_device in held_devices),
+        max(held_device.modal_plant.size for held_device in held_devices),
+    )
+    own = [_dynamics(held_device) for held_device in held_devices]
+    N = max(len(found.generator) for found in own)
+    F, R = 2 + E, N + 2 * E
+    found = PlantArrays(
+        transition=np.zeros((D, 2, R, N)),
+        inputs=np.zeros((D, 2, F, R)),
+        substeps=np.zeros((D, 2), dtype=np.int64),
+        length=np.zeros((D, 2)),
+        loss=np.zeros((D, 2, N + F, N + F)),
+        work=np.zeros((D, 2, N + F, N + F)),
+        energy=np.zeros((D, N, N)),
+        size=np.array([held_device.modal_plant.size for held_device in held_devices]),
+        kind=np.full((D, E), NOTHING),
+        numbers=np.zeros((D, E, 5)),
+        along=np.zeros((D, E, n)),
+        sensor=np.zeros((D, n)),
+        handle=np.zeros((D, n)),
+        push=np.zeros((D, n)),
+        channel=np.zeros((D, C, n)),
+        step=np.zeros((D, C)),
+        weight=np.zeros((D, C)),
+        noise=np.zeros((D, C)),
+        encoder=np.zeros((D, C), dtype=np.int64),
+    )
+    for d, (held_device, moving) in enumerate(zip(held_devices, own, strict=True)):
+        m = len(moving.generator)
+        found.energy[d, :m, :m] = moving.energy
+        _fill_motions(found, d, held_device)
+        T, f = held_device.loop.period, held_device.loop.fractional_delay
+        early = min(max(1, round(f * substeps)), max(substeps - 1, 1)) if f > 0.0 else 0
+        for part, (share, count) in enumerate(((f, early), (1.0 - f, max(substeps - early, 1)))):
+            if count:
+                found.substeps[d, part], found.length[d, part] = count, share * T / count
+                _fill_part(found, d, part, substep(moving, share * T / count))
+    return found
+
+
+def _dynamics(held_device: HeldDevice) -> LinearDynamics:
+    """With inputs for the command, the push, and its own elements; the exponentials know no padding."""
+    motions = np.array([held_device.push, *(along for _, _, along in held_device.elements)])
+    return dynamics(held_device.modal_plant, held_device.loop.controller.actuator_time_constant, motions)
+
+
+def _fill_motions(found: PlantArrays, d: int, held_device: HeldDevice) -> None:
+    n = held_device.modal_plant.size
+    found.sensor[d, :n], found.handle[d, :n], found.push[d, :n] = (
+        held_device.modal_plant.sensor,
+        held_device.handle,
+        held_device.push,
+    )
+    for e, (kind, numbers, along) in enumerate(held_device.elements):
+        found.kind[d, e], found.along[d, e, :n] = kind, along
+        found.numbers[d, e, : len(numbers)] = numbers
+    for c, counter in enumerate(held_device.counters):
+        found.channel[d, c, :n] = counter.along
+        found.step[d, c], found.weight[d, c], found.noise[d, c] = counter.step, counter.weight, counter.noise
+        found.encoder[d, c] = c if counter.channel is None else counter.channel
+
+
+def _fill_part(found: PlantArrays, d: int, part: int, step: Substep) -> None:
+    """What a substep of this part does; the ledger's forms have the states first, then the forces, as padded."""
+    m, F = step.inputs.shape
+    N = found.transition.shape[-1]
+    at, last = np.concatenate([np.arange(m), np.arange(N, N + F)]), N + 2 * (F - 2)
+    found.transition[d, part, :m, :m] = step.transition
+    found.inputs[d, part, :F, :m] = step.inputs.T
+    found.loss[d, part][np.ix_(at, at)] = step.loss
+    found.work[d, part][np.ix_(at, at)] = step.work
+    seen = motions_of(found, d, m)[: last - N]
+    found.transition[d, part, N:last, :m] = seen @ step.transition
+    found.inputs[d, part, :F, N:last] = (seen @ step.inputs).T
+
+
+def motions_of(found: PlantArrays, d: int, m: int) -> Floats:
+    """Rows (2 E, m) that read place and speed of each element's motion from m states."""
+    E, n = found.kind.shape[1], int(found.size[d])
+    rows = np.zeros((E, 2, m))
+    rows[:, 0, :n] = rows[:, 1, n : 2 * n] = found.along[d, :, :n]
+    return rows.reshape(2 * E, m)

@@ -1,0 +1,347 @@
+"""Limit cycles of the sampled loop by harmonic balance: which vibrations keep themselves up, and are they met?
+
+Dry friction, encoder steps and saturation are replaced by what they do to a sinus of amplitude A
+(`contact.describing_functions`). Where the linear loop so made (`contact.quasi_linear`) has its root on the unit
+circle, a vibration of that amplitude neither grows nor dies. It is stable, and so seen, where smaller ones grow
+and larger ones die; an unstable one is the edge of what the loop recovers from.
+
+This is an approximation, of vibrations that are nearly sinusoidal and not locked to the samples. What it is worth
+is measured in docs/limit-cycles.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.contact.quasi_linear import (
+    EquivalentLoop,
+    SizeFunction,
+    Vibration,
+    amplitude_of,
+    equivalent_loop,
+    friction_velocity_of,
+)
+from zwidth.contact.simulate import LARGEST_MOTION
+from zwidth.loop.loop import Loop
+from zwidth.model.argument_checks import require
+from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+STAGE = "vibrations by amplitude"
+PER_DECADE = 24
+STEPS_RESOLVED = 12  # encoder steps up to which each hump of the quantiser's gain gets points of its own
+# The amplitudes looked at, in units of the smallest and largest of the loop's own; between counts an encoder is
+# a relay, which sees the smallest motions.
+BELOW, BELOW_RELAY, ABOVE = 1e-3, 1e-6, 1e4
+ON_CIRCLE = 1e-7
+ROUGHLY = 1e-6  # agreement of shape and gains while only signs of growth are looked for
+SEEDED, ANGLES = 12, (0.05, 0.3, 0.9)  # every so many amplitudes vibrations are looked for anew, at parts of pi
+FOLDED = 40  # steps by a fifth in velocity
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """A vibration that keeps itself up.
+
+    amplitude            of the sensor's motion, before rounding [m]
+    frequency_Hz
+    stable               do smaller vibrations grow into it, and larger ones shrink?
+    force_amplitude      of the force that is asked for, before saturation [N]
+    velocity_amplitudes  (f,)  at each dry friction [m/s]
+    largest_motion       as far as the device can move to either side [m]
+    """
+
+    amplitude: float
+    frequency_Hz: float
+    stable: bool
+    force_amplitude: float
+    velocity_amplitudes: Floats
+    largest_motion: float = LARGEST_MOTION
+
+    @property
+    def within_range(self) -> bool:
+        """Can the device move so far? Where it cannot, the model says nothing of it, and nobody sees the cycle."""
+        return self.amplitude <= self.largest_motion
+
+
+@dataclass(frozen=True)
+class HarmonicBalance:
+    """What happens to vibrations of each amplitude.
+
+    amplitude     (p,)  of the sensor's motion [m], ascending
+    growth        (p,)  rate at which the fastest growing vibration of that amplitude grows [1/s]; -inf where
+                        nothing swings
+    frequency_Hz  (p,)  its frequency; nan where nothing swings
+    cycles        limit cycles by amplitude
+    largest_motion  as far as the device can move to either side [m]; larger vibrations are those of no device
+    """
+
+    amplitude: Floats
+    growth: Floats
+    frequency_Hz: Floats
+    cycles: tuple[LimitCycle, ...]
+    largest_motion: float = LARGEST_MOTION
+
+    @property
+    def leaves_range(self) -> bool:
+        """Do the largest vibrations within the range grow, so that nothing modelled holds them?"""
+        within = self.growth[self.amplitude <= self.largest_motion]
+        return bool(len(within) and within[-1] > 0.0)
+
+
+def limit_cycles(
+    loop: Loop,
+    wall_stiffness: float,
+    wall_damping: float,
+    *,
+    coulomb_friction: ArrayLike | None = None,
+    resolution: float | None = None,
+    force_limit: float | None = None,
+    offset: float = 0.0,
+    largest_motion: float = LARGEST_MOTION,
+) -> list[LimitCycle]:
+    """Limit cycles on a two-sided wall, by amplitude; see `harmonic_balance` for the arguments.
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> free_mass = Plant(0.1 * one[:, None], 0.1 * one[:, None], np.zeros((1, 1)), one, one)
+    >>> loop = Loop(free_mass, Controller(0.001))
+    >>> limit_cycles(loop, 150.0, 0.0)
+    []
+    >>> [grows] = limit_cycles(loop, 400.0, 0.0, coulomb_friction=0.01)
+    >>> f"{grows.amplitude * 1e3:.2f} mm at {grows.frequency_Hz:.2f} Hz, stable: {grows.stable}"
+    '2.02 mm at 10.06 Hz, stable: False'
+    """
+    require("loop", loop, Loop)
+    found = harmonic_balance(
+        loop,
+        wall_stiffness,
+        wall_damping,
+        coulomb_friction=coulomb_friction,
+        resolution=resolution,
+        force_limit=force_limit,
+        offset=offset,
+        largest_motion=largest_motion,
+    )
+    return list(found.cycles)
+
+
+def harmonic_balance(
+    loop: Loop,
+    wall_stiffness: float,
+    wall_damping: float,
+    *,
+    coulomb_friction: ArrayLike | None = None,
+    resolution: float | None = None,
+    force_limit: float | None = None,
+    offset: float = 0.0,
+    amplitudes: tuple[float, float] | None = None,
+    largest_motion: float = LARGEST_MOTION,
+    progress: Progress | None = None,
+) -> HarmonicBalance:
+    """Growth of vibrations over their amplitude, and where it changes sign: the limit cycles.
+
+    What is not linear is that of the loop's plant and controller; three arguments replace parts of it. Dahl's and
+    LuGre's frictions count as Coulomb's, brakes are left out.
+
+    wall_stiffness, wall_damping  K [N/m] and B [N s/m]
+    coulomb_friction  C [N], along the sensor's motion, or (n,), of each coordinate; None: the plant's frictions
+    resolution        step of the sensor's reading [m]; None: the plant's encoders
+    force_limit        largest force [N]; None: the smaller of the controller's and the actuator's limits
+    offset            middle of the vibration as a share of each encoder's step: 0 on a count, 0.5 between two, the
+                      worst that a constant push can do
+    amplitudes        lowest and highest to look at [m]; None: well beyond what the nonlinear parts suggest
+    largest_motion    as far as the device can move to either side [m], by `model.posture.handle_range` for one; it
+                      bounds what holds of the answer, and not what is looked at
+    progress          called with a stage's name, steps done, steps of all
+    Raises            ValueError   for a wall that is not finite, negative friction or resolution, a saturation
+                                   or a largest motion that is not positive, an empty range of amplitudes
+    """
+    parts, limit = _parts(loop, coulomb_friction, resolution, force_limit)
+    if not (np.isfinite(wall_stiffness) and np.isfinite(wall_damping)):
+        raise ValueError(f"the wall must be finite, got K = {wall_stiffness} N/m, B = {wall_damping} N s/m")
+    if not largest_motion > 0.0:
+        raise ValueError(f"largest_motion must be positive, got {largest_motion} m")
+    own = equivalent_loop(loop, wall_stiffness, wall_damping, parts, force_limit=limit, offset=offset)
+    if not (own.parts.friction or own.parts.counters or own.parts.springs or np.isfinite(limit)):
+        return _nothing(largest_motion)
+    at = _amplitudes(own, amplitudes)
+    if not len(at):
+        return _nothing(largest_motion)
+    tell, steps = progress or (lambda stage, done, of: None), 2 * len(at) + 1
+    swings = _followed(own, at, lambda done: tell(STAGE, done, steps))
+    found = HarmonicBalance(
+        at,
+        np.array([_growth(own, swing) for swing in swings]),
+        np.array([_frequency(own, swing) if swing else np.nan for swing in swings]),
+        tuple(replace(cycle, largest_motion=largest_motion) for cycle in _crossings(own, at, swings)),
+        largest_motion,
+    )
+    tell(STAGE, steps, steps)
+    return found
+
+
+def _nothing(largest_motion: float) -> HarmonicBalance:
+    """Of a loop in which nothing depends on the amplitude."""
+    return HarmonicBalance(np.zeros(0), np.zeros(0), np.zeros(0), (), largest_motion)
+
+
+def _parts(
+    loop: Loop, coulomb_friction: ArrayLike | None, resolution: float | None, force_limit: float | None
+) -> tuple[Nonlinear, float]:
+    """What is not linear of the loop, with what replaces it, and the smallest limit on the force."""
+    plant, parts = loop.plant, loop.plant.nonlinear
+    if coulomb_friction is not None:
+        C = np.asarray(coulomb_friction, dtype=float)
+        if C.ndim and C.shape != (plant.size,):
+            raise ValueError(f"coulomb_friction must be one number or {plant.size}, one per coordinate, got {C}")
+        if not np.all(C >= 0.0):
+            raise ValueError(f"coulomb_friction must not be negative, got {coulomb_friction} N")
+        rows = np.eye(plant.size) if C.ndim else plant.sensor[None]
+        friction = tuple(Friction(row, float(c)) for row, c in zip(rows, np.atleast_1d(C), strict=True))
+        parts = replace(parts, friction=friction)
+    if resolution is not None:
+        if not resolution >= 0.0:
+            raise ValueError(f"resolution must not be negative, got {resolution} m")
+        parts = replace(parts, counters=(Counter(plant.sensor, resolution),))
+    limit = loop.nonlinear.force_limit if force_limit is None else force_limit
+    if not limit > 0.0:
+        raise ValueError(f"force_limit must be positive, got {limit} N; inf means none")
+    return parts, limit
+
+
+def _amplitudes(loop: EquivalentLoop, bounds: tuple[float, float] | None) -> Floats:
+    """Amplitudes to look at: even in the logarithm, and denser where the quantiser's gain has its humps."""
+    T, parts = loop.loop.period, loop.parts
+    stiffness = abs(loop.wall_stiffness) + abs(loop.wall_damping) / T
+    steps = [abs(part.weight) * part.step for part in parts.counters if part.step > 0.0]
+    scales = list(steps)
+    if stiffness > 0.0:
+        scales += [part.coulomb / stiffness for part in parts.friction]
+        scales += [loop.limit / stiffness] if np.isfinite(loop.limit) else []
+    scales += [np.sqrt(stiffness / abs(part.cubic)) for part in parts.springs if part.cubic and stiffness]
+    if not scales and bounds is None:
+        return np.zeros(0)
+    middle = abs(loop.offset - round(loop.offset))
+    below = BELOW_RELAY if steps and middle > 0.0 else BELOW
+    low, high = bounds if bounds else (below * min(scales), ABOVE * max(scales))
+    if not 0.0 < low < high < np.inf:
+        raise ValueError(f"amplitudes must be two positive numbers, the lower first, got {low}, {high} m")
+    grid = np.geomspace(low, high, max(2, int(PER_DECADE * np.log10(high / low)) + 1))
+    for step in steps:
+        for k in range(STEPS_RESOLVED):
+            for edge in (k + 0.5 - middle, k + 0.5 + middle):
+                inside = np.concatenate([[1e-9, 1e-4, 1e-2], np.linspace(0.04, 0.98, 12)])
+                grid = np.append(grid, step * (edge + inside))
+    grid = np.unique(grid)
+    return grid[(grid >= low) & (grid <= high)]
+
+
+def _followed(loop: EquivalentLoop, amplitudes: Floats, tell: Callable[[int], None]) -> list[Vibration | None]:
+    """The fastest growing vibration at each amplitude, followed downwards and upwards.
+
+    More than one kind of vibration may agree with the gains that it makes itself, so both ways count.
+    tell  called with how many amplitudes are done, of both ways
+    """
+    last = loop.first_guess(float(amplitudes[-1]))
+    down: list[Vibration | None] = []
+    for k, amplitude in enumerate(amplitudes[::-1]):
+        tell(k)
+        down.append(loop.fastest_vibration(float(amplitude), last, same=ROUGHLY))
+        last = down[-1] or last
+    swings: list[Vibration | None] = []
+    for k, (amplitude, other) in enumerate(zip(amplitudes, down[::-1], strict=True)):
+        tell(len(amplitudes) + k)
+        starts = [] if other is not None and abs(other.root - last.root) < ROUGHLY else [last]
+        if k % SEEDED == 0:
+            starts += [loop.seed(float(amplitude), angle * np.pi) for angle in ANGLES]
+        for start in starts:
+            other = _faster(other, loop.fastest_vibration(float(amplitude), start, same=ROUGHLY))
+        swings.append(other)
+        last = other or last
+    return swings
+
+
+def _faster(one: Vibration | None, other: Vibration | None) -> Vibration | None:
+    """The one that grows faster."""
+    known = [swing for swing in (one, other) if swing is not None]
+    return max(known, key=lambda swing: abs(swing.root), default=None)
+
+
+def _growth(loop: EquivalentLoop, swing: Vibration | None) -> float:
+    return float(np.log(abs(swing.root)) / loop.loop.period) if swing else -np.inf
+
+
+def _frequency(loop: EquivalentLoop, swing: Vibration) -> float:
+    return float(np.angle(swing.root) / (2.0 * np.pi * loop.loop.period))
+
+
+def _crossings(loop: EquivalentLoop, at: Floats, swings: list[Vibration | None]) -> list[LimitCycle]:
+    """Where growth changes sign, and by which way."""
+    found = []
+    for one, two in pairwise(swings):
+        if two is None or (one is None and abs(two.root) <= 1.0):
+            continue
+        if one is not None and (abs(one.root) > 1.0) == (abs(two.root) > 1.0):
+            continue
+        root = _bisect(loop, one, two, amplitude_of) if one is not None else None
+        if root is None and abs(two.root) > 1.0 and loop.parts.friction:
+            root = _folded(loop, two)
+        if root is not None:
+            stable = one is not None and abs(one.root) > 1.0
+            found.append(LimitCycle(root.amplitude, _frequency(loop, root), stable, root.force, root.velocities))
+    return sorted(found, key=lambda cycle: cycle.amplitude)
+
+
+def _bisect(loop: EquivalentLoop, low: Vibration, high: Vibration, measure: SizeFunction) -> Vibration | None:
+    """The vibration of growth 0 between one that dies and one that grows; None where growth jumps over it."""
+    from scipy.optimize import brentq
+
+    known = [low, high]
+
+    def grown(logarithm: float) -> Vibration | None:
+        size = float(np.exp(logarithm))
+        below = max((swing for swing in known if measure(swing) <= size), key=measure, default=low)
+        above = min((swing for swing in known if measure(swing) > size), key=measure, default=high)
+        found = _faster(loop.fastest_vibration(size, below, measure), loop.fastest_vibration(size, above, measure))
+        known.extend([found] if found else [])
+        return found
+
+    ends = np.log([measure(low), measure(high)])
+    # at its ends a search started from both could find another kind of vibration, and growth would keep its sign
+    at_ends = {float(end): float(np.log(abs(swing.root))) for end, swing in zip(ends, known, strict=True)}
+
+    def growth(logarithm: float) -> float:
+        if logarithm in at_ends:
+            return at_ends[logarithm]
+        found = grown(logarithm)
+        return float(np.log(abs(found.root))) if found else -1.0
+
+    where = brentq(growth, *ends, xtol=1e-13, rtol=1e-13)
+    found = grown(where)
+    return found if found is not None and abs(abs(found.root) - 1.0) < ON_CIRCLE else None
+
+
+def _folded(loop: EquivalentLoop, start: Vibration) -> Vibration | None:
+    """The limit cycle below a vibration that grows, where dry friction lets no smaller amplitude at the sensor be.
+
+    The more a vibration shrinks the more friction holds it, until less velocity goes with more amplitude; there
+    the velocity says how large it is.
+    """
+    high = start
+    for _ in range(FOLDED):
+        low = loop.fastest_vibration(friction_velocity_of(high) * 0.8, high, friction_velocity_of)
+        if low is None:
+            return None
+        if abs(low.root) <= 1.0:
+            return _bisect(loop, low, high, friction_velocity_of)
+        high = low
+    return None

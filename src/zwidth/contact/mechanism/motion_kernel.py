@@ -1,0 +1,238 @@
+"""The loop over the samples of one motion, compiled."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.contact.computer import Computer, Computers, arrived_command, computer_at
+from zwidth.contact.mechanism.acceleration import configure
+from zwidth.contact.mechanism.rendering import RenderingMemory, locate_handle, render, rendering_memory_of
+from zwidth.contact.mechanism.rendering_inputs import RenderingInputs
+from zwidth.contact.mechanism.stepping import linearise, prepare, step, turned
+from zwidth.contact.mechanism.surfaces import penetration
+from zwidth.contact.mechanism.system import Memory, System, memory_of
+from zwidth.model.closure import equations, orientation, passive_rates
+from zwidth.model.forward_kinematics import WorkingMemory, link_point, place_links
+from zwidth.model.mechanism import Floats
+from zwidth.model.mechanism_arrays import MechanismArrays
+
+DONE: Final = 0
+SINGULAR: Final = 1
+LOOP_LOST: Final = 2
+DIVERGED: Final = 3
+NO_FORCE: Final = 4
+NEAR_SINGULAR: Final = (
+    1e-3  # reciprocal condition of the loops below which the drives hardly hold the other joints
+)
+
+
+class Trace(NamedTuple):
+    """What is kept of each sample, k of them.
+
+    state (k, N);   position, seen, velocity, force (k, 3);   torque (k, d) at the joints;   depth (k,)
+    energy (k, 3)  kinetic, elastic, gravitational [J];   work (k, 3)  by the hand, by the motors, against friction
+    """
+
+    state: Floats
+    position: Floats
+    counted_position: Floats
+    velocity: Floats
+    force: Floats
+    torque: Floats
+    depth: Floats
+    energy: Floats
+    work: Floats
+
+
+@compiled
+def run_motion(
+    system: System,
+    law: RenderingInputs,
+    computers: Computers,
+    start: Floats,
+    angles: Floats,
+    push: Floats,
+    fraction: float,
+    substeps: int,
+    trace: Trace,
+) -> tuple[int, int]:
+    """Fill the trace sample by sample; the status, and how many samples were reached.
+
+    computers  the one that renders the law;   fraction  of its delay that is no whole sample
+    start (N,) first state, angles (links,) near its posture;   push (1 or samples, 3) at the handle
+    """
+    computer, memory = computer_at(computers, 0), memory_of(system)
+    own, period = rendering_memory_of(system.mech, computer), computer.period
+    d, samples = system.mech.driven, trace.depth.size - 1
+    x, trial, hand = start.copy(), np.zeros(start.size), np.zeros(3)
+    friction, resting, work = np.zeros(d), np.zeros(d), np.zeros(3)
+    lengths = np.array([fraction * period, (1.0 - fraction) * period])
+    counts = np.array([0, substeps])
+    if fraction > 0.0:
+        counts[0] = max(1, int(np.ceil(fraction * substeps)))
+        counts[1] = max(1, int(np.ceil((1.0 - fraction) * substeps)))
+    for i in range(angles.size):
+        memory.angles[i], own.angles[i] = angles[i], angles[i]
+    ready(system.mech, memory.angles, memory.work)
+    ready(system.mech, own.angles, own.work)
+    for j in range(samples + 1):
+        status = check_state(system, memory, x, configure(system, memory, x))
+        if status != DONE:
+            return status, j
+        record_state(system, memory, law, x, hand, work, trace, j)
+        if not locate_handle(system, law, own, x, j):
+            return LOOP_LOST, j
+        answered = render(law, computer, own, j)
+        record_computer(own, trace, j)
+        if not answered:
+            return NO_FORCE, j + 1
+        if j == samples:
+            break
+        if j == 0 or turned(memory, x):
+            linearise(system, memory, x)
+            for part in range(2):
+                if counts[part] > 0:
+                    prepare(system, memory, lengths[part] / counts[part], part)
+        row = j if push.shape[0] > 1 else 0
+        for k in range(3):
+            hand[k] = push[row, k]
+        configured = True
+        for part in range(2):
+            if counts[part] == 0:
+                continue
+            apply_command(system, memory, computer, own, part)
+            work[1] -= torque_angle_product(system, memory, x)
+            for _ in range(counts[part]):
+                if not configured and configure(system, memory, x) < 0.0:
+                    return LOOP_LOST, j + 1
+                lost = step(system, memory, x, lengths[part] / counts[part], part, hand, trial, friction, resting)
+                if not np.isfinite(lost):
+                    return LOOP_LOST, j + 1
+                work[2] += lost
+                configured = False
+            work[1] += torque_angle_product(system, memory, x)
+    return DONE, samples + 1
+
+
+@compiled_lean
+def ready(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> None:
+    """The passive joints' rates at the first posture, from which Newton starts, and its side of singularities."""
+    place_links(mech, 0, angles, work)
+    equations(mech, 0, work.goal, work)
+    passive_rates(mech, work)
+    _remember(work)
+
+
+@compiled_lean
+def _remember(work: WorkingMemory) -> None:
+    start, rows = work.start, work.rows
+    for u in range(rows.shape[0]):
+        for r in range(rows.shape[1]):
+            start[u, r] = rows[u, r]
+
+
+@compiled_lean
+def check_state(system: System, memory: Memory, x: Floats, condition: float) -> int:
+    """Is the state a posture to go on from? Its loops are compared with those one sample before."""
+    work, mech = memory.work, system.mech
+    for i in range(x.size):
+        if not np.isfinite(x[i]):
+            return DIVERGED
+    if condition < 0.0:
+        return LOOP_LOST
+    if condition < NEAR_SINGULAR:
+        return SINGULAR
+    passive, loops = mech.joint.size - mech.driven, 3 * mech.a.size
+    # in its own memory: the factors of the closures stand in `work` until the accelerations are known
+    if passive > 0 and not orientation(work.start, work.rows, memory.square, passive, loops) > 0.0:
+        return SINGULAR
+    _remember(work)
+    return DONE
+
+
+@compiled_lean
+def record_state(
+    system: System,
+    memory: Memory,
+    law: RenderingInputs,
+    x: Floats,
+    hand: Floats,
+    work: Floats,
+    trace: Trace,
+    j: int,
+) -> None:
+    """Note a configured state, its energy and what the hand has done since the sample before."""
+    mech, links, M = system.mech, memory.work, memory.mass
+    motor, rotor, spring = system.motor, system.rotor, system.spring
+    state, position, energy, done = trace.state, trace.position, trace.energy, trace.work
+    d, n = mech.driven, system.damping.shape[0]
+    for i in range(x.size):
+        state[j, i] = x[i]
+    h = link_point(links.rotation, links.origin, mech.handle_link, mech.handle, 0, 0)
+    for k in range(3):
+        position[j, k] = h[k]
+        if j > 0:
+            work[0] += hand[k] * (h[k] - position[j - 1, k])
+    trace.depth[j] = penetration(law.surface, h[0], h[1], h[2])[0]
+    kinetic, elastic, height = 0.0, 0.0, 0.0
+    for i in range(d):
+        kinetic += 0.5 * rotor[i] * x[n + motor[i]] ** 2
+        for k in range(d):
+            kinetic += 0.5 * x[n + i] * M[0, i, k] * x[n + k]
+        if motor[i] != i:
+            bent = x[motor[i]] - x[i]
+            elastic += 0.5 * spring[i] * bent**2 + 0.25 * system.cubic[i] * bent**4
+            if bent < 0.0:
+                elastic += 0.5 * system.excess[i] * bent**2
+    for i in range(mech.parent.size):
+        c = link_point(links.rotation, links.origin, i, mech.center_of_mass, 0, i)
+        for k in range(3):
+            height -= mech.mass[0, i] * system.gravity[k] * c[k]
+    energy[j, 0], energy[j, 1], energy[j, 2] = kinetic, elastic, height
+    for k in range(3):
+        done[j, k] = work[k]
+
+
+@compiled_lean
+def record_computer(rendering: RenderingMemory, trace: Trace, j: int) -> None:
+    """What the computer sees, estimates and commands."""
+    seen, velocity, force, torque = trace.counted_position, trace.velocity, trace.force, trace.torque
+    for k in range(3):
+        seen[j, k], velocity[j, k], force[j, k] = (
+            rendering.counted_position[k],
+            rendering.speed[k],
+            rendering.force[k],
+        )
+    for i in range(torque.shape[1]):
+        torque[j, i] = rendering.signals.queue[i, 0]
+
+
+@compiled_lean
+def apply_command(
+    system: System, memory: Memory, computer: Computer, rendering: RenderingMemory, part: int
+) -> None:
+    """Let the motors take the command of this part of the interval: at once, or through their lag."""
+    held, follow, motor, lagging = memory.hold, memory.command, system.motor, system.lag_command
+    for i in range(held.size):
+        held[i] = 0.0
+    straight = True
+    for k in range(lagging.size):
+        follow[k] = 0.0
+        if lagging[k] >= 0:
+            follow[k] = arrived_command(computer, rendering.signals, lagging[k], part)
+            straight = False
+    if straight:
+        for i in range(motor.size):
+            held[motor[i]] = arrived_command(computer, rendering.signals, i, part)
+
+
+@compiled_lean
+def torque_angle_product(system: System, memory: Memory, x: Floats) -> float:
+    """Held torques times the motors' angles: its change is the work that the motors do."""
+    held, motor, total = memory.hold, system.motor, 0.0
+    for i in range(motor.size):
+        total += held[motor[i]] * x[motor[i]]
+    return total

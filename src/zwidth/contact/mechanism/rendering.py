@@ -1,0 +1,142 @@
+"""What the computer does in each period of a whole mechanism: place the handle by its counts, render the surface.
+
+Counting, estimating, filtering and delaying one signal are `contact.computer`'s.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.contact.computer import (
+    Computer,
+    Signals,
+    clip,
+    estimate_velocity,
+    filter_force,
+    read_encoder,
+    send,
+    signals_of,
+)
+from zwidth.contact.environments import MEMORY, environment_at
+from zwidth.contact.mechanism.acceleration import close_at
+from zwidth.contact.mechanism.rendering_inputs import RenderingInputs
+from zwidth.contact.mechanism.surfaces import NONE, penetration
+from zwidth.contact.mechanism.system import System
+from zwidth.model.forward_kinematics import WorkingMemory, link_point, working_memory
+from zwidth.model.inertia import handle_jacobian
+from zwidth.model.mechanism import Floats
+from zwidth.model.mechanism_arrays import MechanismArrays
+
+
+class RenderingMemory(NamedTuple):
+    """What the computer of a mechanism works in.
+
+    signals               of the handle's three coordinates, and of the d motors' torques
+    work, angles (links,), counted (d,), jacobian (1, 3, d)  the posture that is counted
+    counted_position, speed, force  (3,)  handle [m], its velocity [m/s], force on it [N]
+    environment (8,)      what the environment remembers
+    """
+
+    signals: Signals
+    work: WorkingMemory
+    angles: Floats
+    counted_angles: Floats
+    jacobian: Floats
+    counted_position: Floats
+    speed: Floats
+    force: Floats
+    environment: Floats
+
+
+@compiled
+def rendering_memory_of(mech: MechanismArrays, computer: Computer) -> RenderingMemory:
+    """That of a computer that has just been switched on."""
+    return RenderingMemory(
+        signals_of(computer, 3, mech.driven),
+        working_memory(mech),
+        np.zeros(mech.parent.size),
+        np.zeros(mech.driven),
+        np.zeros((1, 3, mech.driven)),
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros(MEMORY),
+    )
+
+
+@compiled_lean
+def locate_handle(
+    system: System, law: RenderingInputs, rendering: RenderingMemory, x: Floats, sample: int
+) -> bool:
+    """Count the motors and place the handle where the counts say; False where their loops do not close."""
+    mech, counted, seen, read = (
+        system.mech,
+        rendering.counted_angles,
+        rendering.counted_position,
+        law.encoder_coordinates,
+    )
+    for i in range(counted.size):
+        counted[i] = read_encoder(x[read[i]], law.step[i], law.noise[i], law.seed, sample, i)
+    if close_at(mech, counted, rendering.angles, rendering.work) < 0.0:
+        return False
+    seen[0], seen[1], seen[2] = link_point(
+        rendering.work.rotation, rendering.work.origin, mech.handle_link, mech.handle, 0, 0
+    )
+    handle_jacobian(rendering.work, rendering.jacobian, 0)
+    return True
+
+
+@compiled_lean
+def render(law: RenderingInputs, computer: Computer, rendering: RenderingMemory, sample: int) -> bool:
+    """The environment's force on the handle as it is seen, and the torques that render it, J^T f, within limits.
+
+    f = -F(depth, depth') normal,   depth' = -normal . v,   F the environment's force along the way in
+
+    False where the environment answers finite numbers with one that is not.
+    """
+    seen, speed, force = rendering.counted_position, rendering.speed, rendering.force
+    for k in range(3):
+        speed[k] = estimate_velocity(computer, rendering.signals, k, seen[k], sample)
+    depth, nx, ny, nz = penetration(law.surface, seen[0], seen[1], seen[2])
+    push, answered = 0.0, True
+    if law.surface[0] != NONE:
+        rate, period = -(nx * speed[0] + ny * speed[1] + nz * speed[2]), computer.period
+        environment = environment_at(law.address)
+        # from 0, so that no force is 0 and not -0
+        push = 0.0 - environment(depth, rate, sample * period, period, law.values, rendering.environment)
+        answered = np.isfinite(push) or not (np.isfinite(depth) and np.isfinite(rate))
+    force[0], force[1], force[2] = push * nx, push * ny, push * nz
+    for k in range(3):
+        force[k] = filter_force(computer, rendering.signals, k, force[k])
+    scale = share_within(np.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2), computer.limit)
+    for k in range(3):
+        force[k] *= scale
+    command(law, rendering)
+    return bool(answered)
+
+
+@compiled_lean
+def command(law: RenderingInputs, rendering: RenderingMemory) -> None:
+    """Send the motors the torques J^T f, each cut at its limit or all scaled alike."""
+    force, J, limit, scale = rendering.force, rendering.jacobian, law.limit, 1.0
+    if law.together:
+        for i in range(limit.size):
+            scale = min(scale, share_within(abs(torque_at(J, force, i)), limit[i]))
+    for i in range(limit.size):
+        torque = torque_at(J, force, i)
+        send(rendering.signals, i, scale * torque if law.together else clip(torque, limit[i]))
+
+
+@compiled_lean
+def torque_at(jacobian: Floats, force: Floats, i: int) -> float:
+    """Torque (J^T f)_i at joint i for a force (3,) at the handle."""
+    return float(jacobian[0, 0, i] * force[0] + jacobian[0, 1, i] * force[1] + jacobian[0, 2, i] * force[2])
+
+
+@compiled_lean
+def share_within(size: float, limit: float) -> float:
+    """By what a signal of this size has to be multiplied to stay within its limit."""
+    return limit / size if size > limit else 1.0

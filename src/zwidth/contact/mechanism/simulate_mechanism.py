@@ -1,0 +1,218 @@
+"""The motion of a whole mechanism held by a computer at a surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from zwidth.contact.computer import computers
+from zwidth.contact.environments import Environment
+from zwidth.contact.mechanism import motion_kernel as kernel
+from zwidth.contact.mechanism.motion import MechanismMotion
+from zwidth.contact.mechanism.motion_inputs import MotionError, motion_inputs, start_rates
+from zwidth.contact.mechanism.rendering_inputs import rendering_inputs
+from zwidth.contact.mechanism.surface_reach import check_reach
+from zwidth.contact.mechanism.surfaces import Surface, depth_and_normal, packed
+from zwidth.contact.mechanism.system import System, system_of
+from zwidth.contact.mechanism.walls import SurfaceRendering, rendered_environment
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_errors import NoMechanismError
+from zwidth.model.argument_checks import check_choice, require
+from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism_arrays import pack
+from zwidth.model.posture import OK, Posture
+from zwidth.model.reduction import reduce_mechanism
+
+REASONS: Final = {
+    kernel.DONE: ("done", ""),
+    kernel.SINGULAR: ("singular", "the drives no longer hold the other joints: it is a singularity"),
+    kernel.LOOP_LOST: (
+        "loop lost",
+        "the loops no longer close: a singularity is passed, or the steps are too long",
+    ),
+    kernel.DIVERGED: ("diverged", "the motion has grown beyond all numbers"),
+    kernel.NO_FORCE: ("no force", "the environment gave no finite force"),
+}
+
+
+def simulate_mechanism(
+    point: OperatingPoint,
+    wall: SurfaceRendering | None = None,
+    surface: Surface | None = None,
+    *,
+    duration: float = 1.0,
+    start_velocity: ArrayLike | None = None,
+    push: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    substeps: int = 4,
+    counted: bool = True,
+    torque_limits: Literal["each", "together"] = "each",
+    seed: int = 0,
+) -> MechanismMotion:
+    """Simulate how a mechanism moves on its flexible drives at a surface of any shape, or free.
+
+    In each period the computer reads the encoders, places the handle by the kinematics of the counted angles,
+    estimates its velocity, and sends to the motors the torques J^T f of the wall's force. Between samples the
+    links' inertia, velocity forces and gravity act in full; the loops are closed exactly at every evaluation.
+
+    point           the device in the posture from which the motion starts, with no drive bent. The damping matrix
+                    is that of its full linear model there, kept in the coordinates of joints and motors; its
+                    direction, model and operator take no part
+    wall, surface   what is rendered, a `SurfaceWall` or a `SurfaceEnvironment`, and where; both or neither:
+                    without them the motors stay without current
+    duration        [s]
+    start_velocity  (2,) or (3,)  of the handle [m/s]; joints and motors move with it
+    push            (3,) force at the handle [N], or (samples, 3), each held for one period
+    gravity         (3,) [m/s^2]; None: none
+    substeps        steps per sampling period; each is of fourth order
+    counted         False: the encoders are read as finely as you like
+    torque_limits   "each": every motor's torque is cut at its own limit; "together": all are scaled alike, so that
+                    the force keeps its direction
+    seed            of the encoders' noise
+    Returns  MechanismMotion; a motion that meets a singularity ends there, and says so
+    Raises   SurfaceOutOfReach  (a ValueError) for a surface that the handle never touches in this assembly
+             MotionError  (a ValueError) for inputs that cannot be meant
+             NoMechanismError    (loop.point_errors) for a device without a mechanism
+             ValueError          for another word for torque_limits
+             TooLarge     (a ValueError) for more samples than the machine has memory for
+
+    >>> import zwidth
+    >>> from zwidth.contact.mechanism.surfaces import Sphere
+    >>> from zwidth.contact.mechanism.walls import SurfaceWall
+    >>> devices = (zwidth.load(name) for name, *_ in zwidth.bundled())
+    >>> device = next(device for device in devices if device.mechanism)
+    >>> hollow = Sphere(device.reference_position, radius=0.01, hollow=True)
+    >>> wall = SurfaceWall(500.0, 2.0)
+    >>> simulate_mechanism(device.at(), wall, hollow, duration=0.1, start_velocity=device.direction()).status
+    'done'
+    """
+    require("point", point, OperatingPoint)
+    mechanism, posture = point.mechanism, point.posture
+    if mechanism is None or posture is None:
+        raise NoMechanismError
+    if point.shape:
+        raise MotionError(f"one posture is moved at a time, got {point.shape}; take one of them by its index")
+    if posture.status != OK:
+        raise MotionError("the posture is out of reach or singular and no motion can start there; ask for another")
+    if mechanism.design_shape:
+        raise MotionError(f"one design is simulated at a time, got a set of shape {mechanism.design_shape}")
+    check_choice("torque_limits", torque_limits, ("each", "together"))
+    if seed < 0:
+        raise MotionError(f"seed must be zero or positive, got {seed}", "seed")
+    if (wall is None) != (surface is None):
+        raise MotionError("a wall needs a surface and a surface a wall; give both, or neither for a free device")
+    environment, values = None, np.zeros(0)
+    if wall is not None and surface is not None:
+        environment, values = rendered_environment(wall, surface)
+    controller = point.controller
+    inputs = motion_inputs(mechanism, controller, duration, push, gravity, substeps, len(posture.jacobian[0]))
+    velocity, rates = start_rates(posture, start_velocity)
+    shape, mech = packed(surface), pack(mechanism)
+    if surface is not None:
+        check_reach(mechanism, mech, posture, surface)
+    # any direction that the handle can move along will do: matrices and drives are the same for all
+    along = np.linalg.svd(posture.jacobian)[0][:, 0]
+    plant = reduce_mechanism(mechanism, posture, along, "full", point.damping, point.encoders)
+    system = system_of(mech, mechanism.drives, plant, inputs.gravity, controller.actuator_time_constant)
+    start = _start(mechanism, posture, system, rates)
+    trace = _empty_trace(inputs.samples + 1, len(start), len(system.motor))
+    read = system.motor if point.encoders == "motor" else np.arange(len(system.motor))
+    address = 0 if environment is None else environment.address
+    law = rendering_inputs(
+        mechanism.drives, shape, address, values, read, counted, seed, torque_limits == "together"
+    )
+    status, reached = kernel.run_motion(
+        system, law, computers([controller], [controller.force_limit]), start, posture.angles.copy(), inputs.push,
+        controller.fractional_delay, substeps, trace,
+    )  # fmt: skip
+    motion = MechanismMotion(
+        point=point,
+        surface=surface,
+        environment=environment,
+        values=values,
+        start_velocity=velocity,
+        push=inputs.push,
+        gravity=inputs.gravity,
+        duration=duration,
+        substeps=substeps,
+        seed=seed,
+        counted=counted,
+        torque_limits=torque_limits,
+        status=REASONS[status][0],
+        reason=_reason(status, mechanism, max(reached - 1, 0) * controller.sampling_period),
+        **_course(system, trace, reached, controller.sampling_period),
+    )
+    if status == kernel.NO_FORCE and environment is not None and surface is not None:
+        return replace(motion, reason=_unanswered(motion, environment, surface))
+    return motion
+
+
+def _start(mechanism: Mechanism, posture: Posture, system: System, rates: Floats) -> Floats:
+    """The first state: joints and motors together, no drive bent."""
+    d, n = len(system.motor), len(system.damping)
+    start = np.zeros(2 * n + len(system.lag_time))
+    start[:d], start[n : n + d] = posture.angles[mechanism.drives.joint], rates
+    start[system.motor], start[n + system.motor] = start[:d], rates
+    return start
+
+
+def _empty_trace(samples: int, states: int, drives: int) -> kernel.Trace:
+    k = samples
+    return kernel.Trace(
+        state=np.empty((k, states)),
+        position=np.empty((k, 3)),
+        counted_position=np.empty((k, 3)),
+        velocity=np.empty((k, 3)),
+        force=np.empty((k, 3)),
+        torque=np.empty((k, drives)),
+        depth=np.empty(k),
+        energy=np.empty((k, 3)),
+        work=np.empty((k, 3)),
+    )
+
+
+def _course(system: System, trace: kernel.Trace, reached: int, period: float) -> dict[str, Floats]:
+    """What is known of each sample, by its name in `MechanismMotion`."""
+    d, n, motor = len(system.motor), len(system.damping), system.motor
+    state, energy, work = trace.state[:reached], trace.energy[:reached], trace.work[:reached]
+    lagging = np.any(system.lag_command >= 0)
+    return {
+        "time": np.arange(reached, dtype=np.float64) * period,
+        "position": trace.position[:reached],
+        "counted_position": trace.counted_position[:reached],
+        "velocity": trace.velocity[:reached],
+        "depth": trace.depth[:reached],
+        "joints": state[:, :d].copy(),
+        "motors": state[:, motor].copy(),
+        "joint_rates": state[:, n : n + d].copy(),
+        "motor_rates": state[:, n + motor].copy(),
+        "force": trace.force[:reached],
+        "torque": trace.torque[:reached],
+        "kinetic": energy[:, 0],
+        "elastic": energy[:, 1],
+        "gravitational": energy[:, 2],
+        "hand_work": work[:, 0],
+        "motor_work": np.full(reached, np.nan) if lagging else work[:, 1],
+        "friction_loss": work[:, 2],
+    }
+
+
+def _reason(status: int, mechanism: Mechanism, seconds: float) -> str:
+    """Why a motion ends before its time; "" where it does not."""
+    reason = REASONS[status][1]
+    if status == kernel.LOOP_LOST and not len(mechanism.closures.names):  # an open chain has no loops to close
+        reason = "it moves farther between two steps than can be followed; push less hard, or take more substeps"
+    return reason and f"after {seconds:.6g} s {reason}"
+
+
+def _unanswered(motion: MechanismMotion, environment: Environment, surface: Surface) -> str:
+    """What the environment was told at the last sample, to which it gave no finite force."""
+    depth, normal = depth_and_normal(surface, motion.counted_position[-1])
+    rate = -float(normal @ motion.velocity[-1])
+    return (
+        f"after {motion.time[-1]:.6g} s {environment.name} gave no finite force, where it was told a depth of "
+        f"{float(depth):.6g} m and {rate:.6g} m/s"
+    )

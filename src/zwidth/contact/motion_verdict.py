@@ -1,0 +1,167 @@
+"""What a run says: does the motion die away, grow, go round, bounce, or leave?
+
+Judged is the second half of the run, by its third and its last quarter. Growth is told by the differences from
+sample to sample, which know nothing of where the device comes to rest: with d_j = y_{j+1} - y_j,
+
+    growth = ln( rms(d, last quarter) / rms(d, third quarter) ) / (samples between them)     per sample
+
+Each motion rho^j gives ln rho, in the end that of the slowest decay or the fastest growth: the logarithm of the
+spectral radius. The quarters are weighted by a Hann window, so that a started period does not count. Nothing here
+speaks of other starts: without a hand the wall may hold a small motion and lose a large one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.contact.time_response import TimeResponse
+from zwidth.model.argument_checks import require
+
+Floats = NDArray[np.float64]
+
+Behaviour = Literal["converged", "decaying", "growing", "limit cycle", "bouncing", "lost contact", "undecided"]
+
+QUIET: Final = 1e-9  # share of the largest motion of a run that counts as none
+LINEAR_TREND: Final = (
+    1e-3  # change of the logarithm between quarters that decides, where nothing but growth can be
+)
+TREND: Final = 0.2  # the same where a limit cycle may be: 20 % between quarters
+STEADY: Final = 0.05  # below it, the motion goes round
+FEWEST: Final = 16  # samples
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What a run says.
+
+    behaviour     converged: at rest inside; decaying; growing; limit cycle: keeps its size without losing contact;
+                  bouncing: in and out without an end; lost contact: out, and not back; undecided
+    stable        True for converged and decaying, None for undecided
+    growth        of the motion per sample, ln rho; nan where nothing moves
+    amplitude     half of peak to peak of the handle in the last quarter [m]
+    frequency     dominant in the second half [Hz]; nan where nothing moves
+    contact       share of the second half with a force
+    """
+
+    behaviour: Behaviour
+    growth: float
+    amplitude: float
+    frequency: float
+    contact: float
+
+    @property
+    def stable(self) -> bool | None:
+        """Does the motion die away inside the wall?"""
+        if self.behaviour == "undecided":
+            return None
+        return self.behaviour in ("converged", "decaying")
+
+
+def judge_response(response: TimeResponse) -> Judgement:
+    """What a run says; one with fewer than 16 samples says nothing, unless it has left its bounds.
+
+    A motion below half the encoder's step that the encoder does not see is at rest; so is one that noise alone
+    keeps up, below half a step and three standard deviations. One that the encoder sees goes round, however small.
+
+    >>> from zwidth.contact.environments import wall
+    >>> from zwidth.contact.simulate import simulate
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.loop.loop import Loop
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> loop = Loop(Plant(0.1 * one[:, None], *np.zeros((2, 1, 1)), one, one), Controller(0.001))
+    >>> values = wall.values(stiffness=1000.0, damping=0.4)    # B < K T/2
+    >>> judge_response(simulate(loop, wall, values, duration=2.0, start_position=1e-3)).behaviour
+    'growing'
+    """
+    require("response", response, TimeResponse)
+    S = len(response.time)
+    touching = response.force != 0.0
+    if S < FEWEST:
+        judged: Behaviour = "growing" if response.given_up else "undecided"
+        return Judgement(
+            judged, float("nan"), _half_peak_to_peak(response.handle), float("nan"), float(touching.mean())
+        )
+    third, last, half = slice(S // 2, S // 4 * 3), slice(S // 4 * 3, S), slice(S // 2, S)
+    d = np.diff(response.truth)
+    size = float(np.abs(d[np.isfinite(d)]).max(initial=0.0))
+    before, after = _rms(d[S // 2 : S // 4 * 3]), _rms(d[S // 4 * 3 :])
+    floor = max(QUIET * size, 1e-300)
+    moving = after > floor or response.given_up
+    growth = float(np.log(after / before)) if moving and before > 0.0 else float("nan")
+    contact = float(touching[half].mean())
+    judged = _behaviour(response, touching, third, last, growth, moving)
+    per_sample = growth / (S // 4) if moving else float("nan")
+    tone = dominant_frequency(response.truth[half], response.period) if moving else float("nan")
+    return Judgement(judged, per_sample, _half_peak_to_peak(response.handle[last]), tone, contact)
+
+
+def _behaviour(
+    response: TimeResponse, touching: NDArray[np.bool_], third: slice, last: slice, growth: float, moving: bool
+) -> Behaviour:
+    if response.given_up or not np.all(np.isfinite(response.truth)):
+        return "growing"
+    inside = float(touching[last].mean())
+    if response.surface and inside == 0.0 and not touching[third].any():
+        return "lost contact" if touching.any() or not response.held else "undecided"
+    if inside < 1.0 and response.surface:
+        return "bouncing" if growth > -TREND else "undecided"
+    if not moving or _at_rest(response, last):
+        return "converged"
+    trend = LINEAR_TREND if response.linear else TREND
+    if growth < -trend:
+        return "decaying"
+    if growth > trend:
+        return "growing"
+    return "limit cycle" if abs(growth) < STEADY and not response.linear else "undecided"
+
+
+def _at_rest(response: TimeResponse, last: slice) -> bool:
+    """Is what is left of the motion below what the encoders tell?"""
+    swing = _half_peak_to_peak(response.truth[last])
+    if response.noise > 0.0:
+        return swing < 0.5 * response.quantum + 3.0 * response.noise
+    return swing < 0.5 * response.quantum and np.ptp(response.reading[last]) == 0.0
+
+
+def _rms(signal: Floats) -> float:
+    """Root mean square under a Hann window."""
+    weight, size = np.hanning(len(signal) + 2)[1:-1], float(np.abs(signal).max(initial=0.0))
+    if not 0.0 < size < np.inf:
+        return size
+    return size * float(np.sqrt(np.sum(weight * (signal / size) ** 2) / np.sum(weight)))
+
+
+def _half_peak_to_peak(signal: Floats) -> float:
+    """Half of peak to peak."""
+    return float(np.ptp(signal) / 2.0) if len(signal) else float("nan")
+
+
+def dominant_frequency(signal: Floats, period: float) -> float:
+    """Frequency with the most of a signal's motion [Hz], from 0 to 1/(2T); nan for one that does not move.
+
+    The peak of the spectrum of a Hann-windowed signal less its straight line, between bins by a parabola through
+    the logarithms. For a steady tone it is right to about a hundredth of 1/(length).
+
+    >>> round(dominant_frequency(np.sin(2 * np.pi * 50.0 * np.arange(800) * 0.001), 0.001), 3)
+    50.0
+    """
+    k = len(signal)
+    if k < FEWEST or not np.all(np.isfinite(signal)):
+        return float("nan")
+    j = np.arange(k) - (k - 1) / 2.0
+    straight = signal.mean() + j * (j @ signal) / (j @ j)
+    rest = (signal - straight) * np.hanning(k)
+    size = float(np.abs(rest).max())
+    if not size > 0.0:
+        return float("nan")
+    spectrum = np.abs(np.fft.rfft(rest / size, 4 * k))
+    at = int(np.argmax(spectrum[1:-1])) + 1
+    a, b, c = np.log(np.maximum(spectrum[at - 1 : at + 2], 1e-300))
+    bend = a - 2.0 * b + c
+    shift = 0.5 * (a - c) / bend if bend < 0.0 else 0.0
+    return float((at + np.clip(shift, -0.5, 0.5)) / (4 * k * period))

@@ -1,0 +1,298 @@
+"""What two keys must agree on: either-or, sizes, names that refer to names.
+
+These checks read the plain document and pass over whatever is not as it should be by itself, so that they run
+beside the checks of single keys and no fault hides another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final
+
+from zwidth.device.address import exists, in_schema
+from zwidth.device.faults import KeyPath, comma_list, quote, suggestion
+from zwidth.device.loop_consistency import electrical_inconsistencies, loop_inconsistencies
+from zwidth.device.nonlinear_consistency import nonlinear_inconsistencies
+from zwidth.device.schema.device_file import flat_sources
+from zwidth.device.toml_access import is_number, row_count, table, tables
+
+KeyMessages = Iterator[tuple[KeyPath, str]]
+
+KINDS: Final = ("mechanism", "plant", "response")
+
+
+def inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMessages:
+    """Path and sentence of every disagreement; `original` still has the sections not supported yet."""
+    yield from _one_kind(original)
+    yield from _sources(document)
+    yield from _plant(table(document, "plant"))
+    yield from loop_inconsistencies(document)
+    yield from nonlinear_inconsistencies(document)
+    yield from _response(original)
+    yield from electrical_inconsistencies(document)
+    yield from operator_inconsistencies(document)
+    mechanism = table(document, "mechanism")
+    if mechanism:
+        yield from _tree(mechanism)
+        if _joints(mechanism):
+            yield from _references(mechanism)
+            yield from _assemblies(mechanism)
+        yield from _workspace(mechanism)
+        yield from _damping(mechanism)
+
+
+def _one_kind(document: dict[str, Any]) -> KeyMessages:
+    given = [f"[{kind}]" for kind in KINDS if kind in document]
+    if not given:
+        yield (), "has neither [mechanism] nor [plant] nor [response]; give one of them"
+    elif len(given) > 1:
+        yield (), f"has {' and '.join(given)}; only one of them is allowed: remove the other"
+
+
+def _sources(document: dict[str, Any]) -> KeyMessages:
+    sources = flat_sources(table(document, "sources"))
+    for key in sources:
+        if not exists(document, key) and not in_schema(key):
+            yield ("sources", key), "names no key of this file; give a dotted path, with * for any step"
+
+
+def _plant(plant: dict[str, Any]) -> KeyMessages:
+    loss = plant.get("loss_factor")
+    if is_number(loss) and loss > 0 and _springless(plant.get("stiffness_N_per_m")):
+        yield (
+            ("plant", "loss_factor"),
+            "is a share of the stiffness, and there is none; give stiffness_N_per_m, or remove this",
+        )
+    size = row_count(plant.get("mass_kg"))
+    if size is None:
+        return
+    for key in ("damping_Ns_per_m", "stiffness_N_per_m"):
+        count = row_count(plant.get(key))
+        if count is not None and count != size:
+            yield ("plant", key), f"has {count} rows, but mass_kg has {size}; give a {size} x {size} matrix"
+    for key in ("actuator", "sensor", "handle"):
+        value = plant.get(key)
+        length = 1 if is_number(value) else len(value) if isinstance(value, list) else None
+        if length is not None and length != size:
+            yield ("plant", key), f"has {length} numbers, but mass_kg has {size} rows; give {size} numbers"
+        elif value is None and size > 1 and key != "handle":
+            yield ("plant", key), f"is missing; with {size} coordinates give {size} numbers"
+
+
+def _springless(stiffness: Any) -> bool:
+    """Is a stiffness left out, or zero throughout?"""
+    if isinstance(stiffness, list):
+        return all(map(_springless, stiffness))
+    return stiffness is None or (is_number(stiffness) and stiffness == 0)
+
+
+def operator_inconsistencies(document: dict[str, Any]) -> KeyMessages:
+    """A handle to hold, one way of holding it, and a mass where the grasp is elastic."""
+    operator, plant = table(document, "operator"), table(document, "plant")
+    size = row_count(plant.get("mass_kg"))
+    if "operator" in document and size is not None and size > 1 and "handle" not in plant:
+        yield ("operator",), f"needs a handle; give plant.handle, {size} numbers, or leave the operator out"
+    elastic = [key for key in ("grasp_stiffness_N_per_m", "grasp_damping_Ns_per_m") if key in operator]
+    if "grasp" in operator and elastic:
+        yield ("operator", "grasp"), f"stands beside {' and '.join(elastic)}; only one way is allowed: remove one"
+    if operator and "grasp" not in operator and "grasp_stiffness_N_per_m" not in operator:
+        yield (
+            ("operator",),
+            'does not say how the handle is held; give grasp_stiffness_N_per_m, or grasp = "rigid"',
+        )
+    mass = operator.get("arm_mass_kg")
+    if elastic and "grasp" not in operator and is_number(mass) and mass == 0:
+        yield (
+            ("operator", "arm_mass_kg"),
+            'must be greater than 0 behind an elastic grasp, got 0; give a mass, or grasp = "rigid"',
+        )
+
+
+def _response(document: dict[str, Any]) -> KeyMessages:
+    """A measured response: one way of naming its files, and nothing beside it that it holds already."""
+    if "response" not in document:
+        return
+    response, loop = table(document, "response"), table(document, "loop")
+    if isinstance(document["response"], dict) and ("file" in response) == ("files" in response):
+        told = "names both file and files" if "file" in response else "names no file"
+        yield ("response",), f"{told}; give file for one measurement, or files for repetitions of it"
+    if "operator" in document:
+        yield ("operator",), "cannot be attached to a measured [response], which knows no handle; leave it out"
+    if "actuator" in loop:
+        yield ("loop", "actuator"), "is part of a measured [response] already; leave it out"
+    period = loop.get("sampling_period_s")
+    T = period if is_number(period) and 0 < period <= 1 else math.nan
+    for key, unit in (("delay_samples", 1.0), ("delay_s", T)):
+        delay = loop.get(key)
+        if is_number(delay) and abs(delay / unit - round(delay / unit if delay / unit < 1e9 else 0)) > 1e-6:
+            yield (
+                ("loop", key),
+                f"must be a whole number of samples with a [response], got {delay:.10g}: the response holds the "
+                "device's own delay, and only what software adds stands here; leave it out",
+            )
+
+
+def _tree(mechanism: dict[str, Any]) -> KeyMessages:
+    """Links: unique names, parents that exist, no link its own ancestor."""
+    parents: dict[str, Any] = {}
+    for index, link in tables(mechanism, "links"):
+        name = link.get("name")
+        if name == "base":
+            yield (
+                ("mechanism", "links", index, "name"),
+                "is 'base', which stands for the ground; choose another",
+            )
+        elif isinstance(name, str):
+            parents.setdefault(name, link.get("parent", "base"))
+    for index, link in tables(mechanism, "links"):
+        parent = link.get("parent")
+        if isinstance(parent, str) and parent not in parents and parent != "base":
+            yield (
+                ("mechanism", "links", index, "parent"),
+                f"names no link, got '{parent}'; {suggestion(parent, {*parents, 'base'}, 'links')}",
+            )
+    reported: set[str] = set()
+    for index, link in tables(mechanism, "links"):
+        circle = _circle(link.get("name"), parents)
+        if circle and not reported & set(circle):
+            reported |= set(circle)
+            yield (
+                ("mechanism", "links", index, "parent"),
+                f"goes round in a circle, {comma_list([*circle, circle[0]])}; one of them must start at 'base' "
+                "(close loops by [[mechanism.loops]])",
+            )
+    for group in ("links", "loops", "drives"):
+        yield from _twice(mechanism, group)
+
+
+def _circle(name: Any, parents: dict[str, Any]) -> list[str]:
+    """The links from this one back to itself, [] if it leads to the base."""
+    if not isinstance(name, str):
+        return []
+    way, parent = [name], parents.get(name)
+    while isinstance(parent, str) and parent in parents and parent not in way:
+        way.append(parent)
+        parent = parents[parent]
+    return way if parent == name else []
+
+
+def _twice(mechanism: dict[str, Any], group: str) -> KeyMessages:
+    seen: set[str] = set()
+    for index, entry in tables(mechanism, group):
+        name = entry.get("name")
+        if isinstance(name, str) and name in seen:
+            yield ("mechanism", group, index, "name"), f"'{name}' is given twice; names must differ"
+        elif isinstance(name, str):
+            seen.add(name)
+
+
+def _references(mechanism: dict[str, Any]) -> KeyMessages:
+    """Loops, handle and drives speak of links that exist; drives of revolute joints, one each."""
+    links = _joints(mechanism)
+    for index, loop in tables(mechanism, "loops"):
+        names = loop.get("links")
+        names = names if isinstance(names, list) else []
+        for place, name in enumerate(names):
+            if isinstance(name, str) and name not in links and name != "base":
+                yield (
+                    ("mechanism", "loops", index, "links", place),
+                    f"names no link, got '{name}'; {suggestion(name, {*links, 'base'}, 'links')}",
+                )
+        if len(names) == 2 and names[0] == names[1]:
+            yield (
+                ("mechanism", "loops", index, "links"),
+                f"joins '{names[0]}' to itself; name two different links",
+            )
+    link = table(mechanism, "handle").get("link")
+    if isinstance(link, str) and link not in links:
+        yield (
+            ("mechanism", "handle", "link"),
+            f"names no link, got '{link}'; {suggestion(link, links, 'links')}",
+        )
+    driven: set[str] = set()
+    for index, drive in tables(mechanism, "drives"):
+        joint, path = drive.get("joint"), ("mechanism", "drives", index, "joint")
+        if not isinstance(joint, str):
+            continue
+        if joint not in links:
+            yield path, f"names no link, got '{joint}'; {suggestion(joint, links, 'links')}"
+        elif links[joint] == "fixed":
+            yield path, f"'{joint}' is fixed to its parent; a drive needs a revolute joint"
+        elif joint in driven:
+            yield path, f"'{joint}' has a drive already; one joint takes one drive"
+        driven.add(joint)
+
+
+def _assemblies(mechanism: dict[str, Any]) -> KeyMessages:
+    turning = {name for name, joint in _joints(mechanism).items() if joint != "fixed"}
+    assemblies = table(mechanism, "assemblies")
+    for name, assembly in assemblies.items():
+        angles = assembly.get("joints_rad") if isinstance(assembly, dict) else None
+        if not isinstance(angles, dict):
+            continue
+        path = ("mechanism", "assemblies", name, "joints_rad")
+        for joint in angles:
+            if joint not in turning:
+                yield (*path, joint), f"names no revolute joint; {suggestion(joint, turning, 'joints')}"
+        for joint in sorted(turning - set(angles)):
+            yield (*path, joint), "is missing; give an approximate angle for every revolute joint"
+    reference = table(mechanism, "reference")
+    wanted, place = reference.get("assembly"), ("mechanism", "reference", "assembly")
+    if isinstance(wanted, str) and assemblies and wanted not in assemblies:
+        yield place, f"names no assembly, got '{wanted}'; {suggestion(wanted, set(assemblies), 'assemblies')}"
+    elif wanted is None and reference and len(assemblies) > 1:
+        yield place, f"is missing; choose one of {comma_list(sorted(assemblies))}"
+
+
+def _workspace(mechanism: dict[str, Any]) -> KeyMessages:
+    position = table(mechanism, "reference").get("position_m")
+    workspace = table(mechanism, "workspace")
+    for axis, value in zip("xyz", position if isinstance(position, list) else [], strict=False):
+        bounds = workspace.get(f"{axis}_m")
+        if (
+            isinstance(bounds, list)
+            and len(bounds) == 2
+            and all(map(is_number, [value, *bounds]))
+            and bounds[0] < bounds[1]
+            and not bounds[0] <= value <= bounds[1]
+        ):
+            yield (
+                ("mechanism", "workspace", f"{axis}_m"),
+                f"{quote(bounds)} leaves out the reference position, {axis} = {value:.10g}; widen it",
+            )
+
+
+def _damping(mechanism: dict[str, Any]) -> KeyMessages:
+    damping, path = mechanism.get("damping"), ("mechanism", "damping")
+    if isinstance(damping, dict):
+        proportional = {"mass_coefficient_1_per_s", "stiffness_coefficient_s"} & damping.keys()
+        ways = ["mode_ratio"] * ("mode_ratio" in damping)
+        ways += [" and ".join(sorted(proportional))] * bool(proportional) + ["given"] * ("given" in damping)
+        choice = "mode_ratio, or mass_coefficient_1_per_s and stiffness_coefficient_s, or given = true"
+        if not ways:
+            yield path, f"says nothing; give {choice}"
+        elif len(ways) > 1:
+            yield path, f"has {', '.join(ways)}; exactly one way is allowed: {choice}"
+    given = isinstance(damping, dict) and "given" in damping
+    for index, drive in tables(mechanism, "drives"):
+        if "damping_Nms_per_rad" in drive and not given:
+            yield (
+                ("mechanism", "drives", index, "damping_Nms_per_rad"),
+                "is used only with mechanism.damping.given = true; set that or remove this",
+            )
+        stiffness, inertia = drive.get("stiffness_Nm_per_rad", math.inf), drive.get("motor_inertia_kg_m2")
+        if is_number(inertia) and inertia == 0 and is_number(stiffness) and math.isfinite(stiffness):
+            yield (
+                ("mechanism", "drives", index, "motor_inertia_kg_m2"),
+                "must be greater than 0 behind a flexible transmission, got 0; "
+                "give the rotor's inertia, or leave stiffness_Nm_per_rad out",
+            )
+
+
+def _joints(mechanism: dict[str, Any]) -> dict[str, Any]:
+    return {
+        link["name"]: link.get("joint")
+        for _, link in tables(mechanism, "links")
+        if isinstance(link.get("name"), str)
+    }

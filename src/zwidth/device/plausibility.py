@@ -1,0 +1,258 @@
+"""Numbers that are allowed and look wrong: a unit has probably slipped.
+
+Nothing is changed and nothing refused; whoever loads the device is warned. A number is named where it lies far
+outside what haptic devices have, by more than design can explain and by less than the usual slips: grams for
+kilograms and millimetres for metres (1000), degrees for radians (57.3), g cm^2 for kg m^2 (1e7), milliseconds for
+seconds. Lengths are judged by themselves; masses, inertias and torques by the size of the device that has them.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from zwidth.device.faults import Fault, KeyPath, dotted
+from zwidth.device.toml_access import table, tables
+
+if TYPE_CHECKING:
+    from zwidth.device.device import Device
+    from zwidth.model.response import Response
+
+KeyMessages = Iterator[tuple[KeyPath, str]]
+
+LONGEST: Final = 5.0  # m, of a link or a position
+FULL_TURN: Final = 2.0 * math.pi
+DENSEST: Final = 23_000.0  # kg/m^3; osmium has 22 590
+HEAVY: Final = 1.0  # kg, from which a mass is held against its inertia: lighter ones stand for points
+SOLID: Final = 8000.0 / 4.0  # kg/m^3, of a quarter of a cube of steel as large as the device
+MASSIVE: Final = 3.0  # kg, from which a link is held against that cube
+HEAVIEST: Final = 1000.0  # kg, of a plant's coordinate
+HEAVIEST_ARM: Final = 50.0  # kg, of an operator
+GYRATION: Final = 3.0  # times the size of the device
+HEAVIEST_ROTOR: Final = 0.5  # kg m^2
+STEP_UP: Final = 0.1  # motor turns per joint turn
+STRONGEST: Final = 5000.0  # N at the handle, of a drive
+STICKIEST: Final = 500.0  # N at the handle, of a drive's dry friction
+LARGEST_TORQUE_CONSTANT: Final = 20.0  # N m/A
+FEWEST_COUNTS: Final = 10.0  # per revolution
+COARSEST: Final = 2e-3  # m, of an encoder at the handle
+SLOWEST: Final = 0.1  # s, between samples
+LIGHTEST: Final = 1e-3  # kg, that a measured response shows at a tenth of its frequencies
+UNITS: Final = (("kg cm^2", 1e-4), ("kg mm^2", 1e-6), ("g cm^2", 1e-7), ("g mm^2", 1e-9))
+
+
+class ImplausibleNumber(UserWarning):
+    """A number of a device file that is allowed and looks wrong."""
+
+
+def warn_of_implausible(device: Device, stacklevel: int = 2) -> None:
+    """Warn (`ImplausibleNumber`) of each number of a device that looks wrong, on one line each."""
+    for fault in implausible(device):
+        warnings.warn(str(fault), ImplausibleNumber, stacklevel=stacklevel + 1)
+
+
+def implausible(device: Device) -> list[Fault]:
+    """The numbers of a device that look wrong: which, why, and what to type if a unit has slipped."""
+    document = device.document
+    found = [*_loop(table(document, "loop")), *_plant(table(document, "plant"))]
+    found += _operator(table(document, "operator"))
+    mechanism = table(document, "mechanism")
+    if mechanism:
+        size = _size(mechanism)
+        found += [*_lengths(mechanism), *_angles(mechanism), *_links(mechanism, size), *_drives(mechanism, size)]
+    if device.response is not None:
+        found += _response(device.response)
+    return [Fault(device.label, dotted(path, document), message) for path, message in found]
+
+
+def _loop(loop: dict[str, Any]) -> KeyMessages:
+    period, step = loop.get("sampling_period_s", 0.0), table(loop, "encoder").get("resolution_m", 0.0)
+    if period > SLOWEST:
+        yield (
+            ("loop", "sampling_period_s"),
+            f"{period:g} s looks wrong, {1.0 / period:.3g} samples a second; {_thousandth(period, 'ms')}",
+        )
+    if step > COARSEST:
+        yield (
+            ("loop", "encoder", "resolution_m"),
+            f"{step:g} m looks wrong, a step of {1e3 * step:g} mm; {_thousandth(step, 'mm')}",
+        )
+
+
+def _plant(plant: dict[str, Any]) -> KeyMessages:
+    heaviest = np.max(np.diag(np.atleast_2d(plant.get("mass_kg", 0.0))))
+    if heaviest > HEAVIEST:
+        yield (
+            ("plant", "mass_kg"),
+            f"{heaviest:g} kg looks wrong for a haptic device; {_thousandth(heaviest, 'g')}",
+        )
+
+
+def _operator(operator: dict[str, Any]) -> KeyMessages:
+    mass = operator.get("arm_mass_kg", 0.0)
+    if mass > HEAVIEST_ARM:
+        yield ("operator", "arm_mass_kg"), f"{mass:g} kg looks wrong for an arm; {_thousandth(mass, 'g')}"
+
+
+def _lengths(mechanism: dict[str, Any]) -> KeyMessages:
+    """Lengths and positions, those of the reference and the workspace included."""
+    for path, value in _length_keys(mechanism):
+        longest = max((abs(x) for x in _flat(value)), default=0.0)
+        if longest > LONGEST:
+            yield ("mechanism", *path), f"{longest:g} m looks wrong for a device; {_thousandth(longest, 'mm')}"
+
+
+def _length_keys(mechanism: dict[str, Any]) -> Iterator[tuple[KeyPath, Any]]:
+    for n, link in tables(mechanism, "links"):
+        for key in ("length_m", "origin_m", "center_of_mass_m"):
+            yield ("links", n, key), link.get(key)
+    for n, loop in tables(mechanism, "loops"):
+        yield ("loops", n, "points_m"), loop.get("points_m")
+    yield ("handle", "point_m"), table(mechanism, "handle").get("point_m")
+    yield ("reference", "position_m"), table(mechanism, "reference").get("position_m")
+    for key, value in table(mechanism, "workspace").items():
+        yield ("workspace", key), value
+
+
+def _flat(value: Any) -> list[float]:
+    return [] if value is None else [float(x) for x in np.ravel(np.array(value, dtype=float))]
+
+
+def _size(mechanism: dict[str, Any]) -> float:
+    """How large the device is: the longest of its lengths, and how far its handle is from the origin [m]."""
+    given = [(path, _flat(value)) for path, value in _length_keys(mechanism) if path[0] != "workspace"]
+    sizes = [math.hypot(*numbers) if path[0] != "loops" else max(numbers) for path, numbers in given if numbers]
+    return max(sizes, default=0.0)
+
+
+def _angles(mechanism: dict[str, Any]) -> KeyMessages:
+    turned: list[tuple[KeyPath, Any]] = [
+        (("mechanism", "links", n, "orientation_rad"), link.get("orientation_rad"))
+        for n, link in tables(mechanism, "links")
+    ]
+    for name, assembly in table(mechanism, "assemblies").items():
+        path = ("mechanism", "assemblies", name, "joints_rad")
+        turned += [((*path, joint), angle) for joint, angle in assembly["joints_rad"].items()]
+    for place, value in turned:
+        largest = max(_flat(value), key=abs, default=0.0)
+        if abs(largest) > FULL_TURN:
+            yield (
+                place,
+                f"{largest:g} rad looks wrong, more than a full turn; if it is in degrees, write "
+                f"{math.radians(largest):.4g}",
+            )
+
+
+def _links(mechanism: dict[str, Any], size: float) -> KeyMessages:
+    """A mass too large for the device or for its own inertia, an inertia too large for the device."""
+    for n, link in tables(mechanism, "links"):
+        mass, inertia = float(link["mass_kg"]), _largest_moment(link["inertia_kg_m2"])
+        gyration = math.sqrt(inertia / mass) if mass > 0.0 else 0.0
+        dense = mass > HEAVY and _least_density(mass, gyration) > DENSEST
+        if dense:
+            yield (
+                ("mechanism", "links", n, "mass_kg"),
+                f"{mass:g} kg looks wrong beside a moment of inertia of {inertia:g} kg m^2, a radius of gyration "
+                f"of {_length(gyration)}: no metal is so dense; {_thousandth(mass, 'g')}",
+            )
+        too_heavy = mass > max(MASSIVE, SOLID * size**3)
+        if too_heavy and not dense:
+            yield (
+                ("mechanism", "links", n, "mass_kg"),
+                f"{mass:g} kg looks wrong for a link of a device of {_length(size)}; {_thousandth(mass, 'g')}",
+            )
+        if size > 0.0 and gyration > GYRATION * size:
+            yield (
+                ("mechanism", "links", n, "inertia_kg_m2"),
+                f"{inertia:g} kg m^2 looks wrong for {mass:g} kg, a radius of gyration of {_length(gyration)} on "
+                f"a device of {_length(size)}; {_inertia_units(inertia, mass / 1e3 if too_heavy else mass, size)}",
+            )
+
+
+def _largest_moment(inertia: Any) -> float:
+    moments = np.array(inertia, dtype=float)
+    return float(np.linalg.eigvalsh(moments)[-1] if moments.ndim == 2 else moments.max())
+
+
+def _least_density(mass: float, gyration: float) -> float:
+    """Of all bodies with this mass and largest radius of gyration a ball is the largest; its density [kg/m^3].
+
+    0 for a point: its inertia was left out.
+    """
+    radius = gyration / math.sqrt(0.4)
+    return mass / (4.0 / 3.0 * math.pi * radius**3) if radius > 0.0 else 0.0
+
+
+def _inertia_units(inertia: float, mass: float, size: float) -> str:
+    """In which unit the inertia would be that of a body as large as the device."""
+    for name, unit in UNITS:
+        if 0.05 * size < math.sqrt(inertia * unit / mass) < size:
+            return f"if it is in {name}, write {inertia * unit:.4g}"
+    return "1 kg cm^2 is 1e-4 kg m^2, 1 g cm^2 is 1e-7"
+
+
+def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
+    for n, drive in tables(mechanism, "drives"):
+        path = ("mechanism", "drives", n)
+        ratio, rotor = float(drive["transmission_ratio"]), float(drive["motor_inertia_kg_m2"])
+        if rotor > HEAVIEST_ROTOR:
+            yield (
+                (*path, "motor_inertia_kg_m2"),
+                f"{rotor:g} kg m^2 looks wrong for a rotor; if it is in g cm^2, write {1e-7 * rotor:.4g}",
+            )
+        if ratio < STEP_UP:
+            yield (
+                (*path, "transmission_ratio"),
+                f"{ratio:g} looks wrong, motor turns per joint turn; if it is joint turns per motor turn, write "
+                f"{1.0 / ratio:.4g}",
+            )
+        per_ampere = drive.get("torque_constant_Nm_per_A") or 0.0
+        if per_ampere > LARGEST_TORQUE_CONSTANT:
+            yield (
+                (*path, "torque_constant_Nm_per_A"),
+                f"{per_ampere:g} N m/A looks wrong for a motor; {_thousandth(per_ampere, 'mN m/A')}",
+            )
+        counts = drive.get("encoder_counts_per_rev") or math.inf
+        if counts < FEWEST_COUNTS:
+            yield (
+                (*path, "encoder_counts_per_rev"),
+                f"{counts:g} looks wrong, counts per revolution; if it is the angle of a count, write "
+                f"{2.0 * math.pi / counts:.4g} (of radians) or {360.0 / counts:.4g} (of degrees)",
+            )
+        for key, strongest in (
+            ("continuous_torque_Nm", STRONGEST),
+            ("torque_limit_Nm", STRONGEST),
+            ("coulomb_Nm", STICKIEST),
+        ):
+            torque = drive.get(key) or 0.0
+            force = torque * ratio / size if size > 0.0 else 0.0
+            if math.isfinite(force) and force > strongest:
+                yield (
+                    (*path, key),
+                    f"{torque:g} N m looks wrong, some {force:.2g} N at the handle; {_thousandth(torque, 'mN m')}",
+                )
+
+
+def _response(response: Response) -> KeyMessages:
+    """The mass that the response shows, 1/(w^2 |P|), at the frequencies where it shows most of it."""
+    mass = 1.0 / ((2.0 * math.pi * response.frequency) ** 2 * np.maximum(np.abs(response.value), 1e-300))
+    shown = float(np.quantile(mass, 0.9))
+    if shown < LIGHTEST:
+        yield (
+            ("response",),
+            f"looks wrong: nine tenths of it show less than {1e3 * shown:.2g} g of mass, 1/(w^2 |P|); it must be "
+            "in m/N: if it is in mm/N, divide by 1000, if in um/N, by 1e6",
+        )
+
+
+def _thousandth(value: float, unit: str) -> str:
+    return f"if it is in {unit}, write {value / 1e3:.4g}"
+
+
+def _length(metres: float) -> str:
+    """A length for people."""
+    return f"{metres:.3g} m" if metres >= 1.0 else f"{1e3 * metres:.3g} mm"

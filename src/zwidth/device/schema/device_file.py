@@ -1,0 +1,121 @@
+"""The whole device file, its JSON Schema, and a way to walk it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Annotated, Any, Final
+
+from pydantic import BeforeValidator, ConfigDict
+
+from zwidth.device.schema.friction import FrictionSection
+from zwidth.device.schema.loop import LoopSection
+from zwidth.device.schema.mechanism import MechanismSection
+from zwidth.device.schema.operator import OperatorSection
+from zwidth.device.schema.plant import PlantSection
+from zwidth.device.schema.response import ResponseSection
+from zwidth.device.schema.value_types import VERSION, Section, Text, WholeNumber, documented_key
+
+TAGS: Final = ("type", "method")  # of a filter, of a velocity's estimate
+
+
+def flat_sources(value: Any) -> Any:
+    """[sources] with dotted keys written bare (nested tables for TOML) or quoted: one level either way."""
+    if not isinstance(value, dict):
+        return value
+    flat: dict[str, Any] = {}
+    for key, inner in value.items():
+        if isinstance(inner, dict) and inner:
+            flat |= {f"{key}.{rest}": text for rest, text in flat_sources(inner).items()}
+        else:
+            flat[key] = inner
+    return flat
+
+
+class DeviceFile(Section):
+    """A haptic device: its [mechanism], its rendered direction's [plant] or a [response]; and its [loop]."""
+
+    model_config = ConfigDict(
+        title="zwidth device file",
+        json_schema_extra={
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "oneOf": [{"required": ["mechanism"]}, {"required": ["plant"]}, {"required": ["response"]}],
+        },
+    )
+
+    file_version: WholeNumber = VERSION
+    name: Text = documented_key("the device's name, for people")
+    description: str = documented_key("one line on what the device is", default="")
+    source: str = documented_key("one line on where the numbers come from", default="")
+    sources: Annotated[dict[str, Text], BeforeValidator(flat_sources)] = documented_key(
+        "where each group of numbers comes from: dotted path (* for any step) -> text", default={}
+    )
+    mechanism: MechanismSection | None = documented_key("the mechanism; or [plant]", default=None)
+    plant: PlantSection | None = documented_key("the rendered direction's dynamics; or [mechanism]", default=None)
+    response: ResponseSection | None = documented_key("a measured response, in place of either", default=None)
+    loop: LoopSection = documented_key("what the computer does")
+    friction: FrictionSection | None = documented_key("dry friction of a [plant]; omitted: none", default=None)
+    operator: OperatorSection | None = documented_key(
+        "the arm and grasp at the handle; omitted: nobody", default=None
+    )
+
+
+@lru_cache(maxsize=1)
+def schema() -> dict[str, Any]:
+    """JSON Schema (2020-12) of the device file, with a description and a unit for every key."""
+    return DeviceFile.model_json_schema()
+
+
+def subschemas(path: tuple[str | int, ...]) -> list[dict[str, Any]]:
+    """Every subschema that may describe the value at a path of keys and indices; none: no such key."""
+    found = list(_alternatives(schema()))
+    for part in path:
+        found = [inner for outer in found for step in _step(outer, part) for inner in _alternatives(step)]
+    return found
+
+
+def keys(path: tuple[str | int, ...]) -> set[str]:
+    """The keys that the table at a path may hold."""
+    return {key for found in subschemas(path) for key in found.get("properties", {})}
+
+
+def kinds(path: tuple[str | int, ...]) -> tuple[str, dict[str, set[str]]]:
+    """For a table that comes in kinds: the key that tells them apart, and the keys of each kind; "", {} for any
+    other."""
+    tables = [found.get("properties", {}) for found in subschemas(path)]
+    for tag in TAGS:
+        found = {table[tag]["const"]: set(table) for table in tables if "const" in table.get(tag, {})}
+        if len(found) > 1:
+            return tag, found
+    return "", {}
+
+
+def key_description(path: tuple[str | int, ...]) -> str:
+    """What the key at a path means, with its unit; "" if the schema says nothing."""
+    outer = [step for found in subschemas(path[:-1]) for step in _step(found, path[-1])]
+    for found in outer:
+        if "description" in found:
+            unit = found.get("unit")
+            return f"{found['description']} [{unit}]" if unit and unit != "1" else str(found["description"])
+    return ""
+
+
+def _step(found: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
+    if isinstance(part, int):
+        if isinstance(found.get("items"), dict):
+            yield found["items"]
+    elif part in found.get("properties", {}):
+        yield found["properties"][part]
+    elif isinstance(found.get("additionalProperties"), dict):
+        yield found["additionalProperties"]
+
+
+def _alternatives(found: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    if "$ref" in found:
+        yield from _alternatives(schema()["$defs"][found["$ref"].removeprefix("#/$defs/")])
+        return
+    branches = found.get("anyOf", []) + [b for b in found.get("oneOf", []) if "required" not in b]
+    if not branches or "properties" in found:
+        yield found
+    for branch in branches:
+        yield from _alternatives(branch)

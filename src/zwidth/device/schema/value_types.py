@@ -1,0 +1,266 @@
+"""The kinds of values in a device file, each right by itself.
+
+Numbers are strict (no text, no true or false) and finite unless said otherwise. Where a shorter form may
+stand for a vector or a matrix (one number for n = 1, three moments for an inertia), it is written out here.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    AllowInfNan,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    Strict,
+    WithJsonSchema,
+)
+
+from zwidth.device.faults import quote
+from zwidth.device.format_version import FILE_VERSION
+from zwidth.device.schema import magnitudes
+
+SYMMETRY_TOLERANCE: Final = 1e-9  # relative to the largest element
+LARGEST: Final = 1e30  # SI units; the squares of such numbers can still be multiplied
+NAME_PATTERN: Final = r"^[^\W\d][\w-]*$"  # no dots and no leading digit: names are steps of dotted paths
+
+INERTIA_FORMS: Final = "one number, three moments [Ixx, Iyy, Izz] or 3 rows of 3 numbers"
+
+Rows = magnitudes.Rows
+
+
+class Section(BaseModel):
+    """A table of the file: frozen, and no key beyond those declared."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def documented_key(description: str, unit: str | None = None, **limits: Any) -> Any:
+    """A documented key with its unit; `limits` are pydantic's gt, ge, lt, le, default and the like."""
+    return Field(description=description, json_schema_extra={"unit": unit} if unit else None, **limits)
+
+
+VERSION: Final[Any] = documented_key(
+    "version of the format that the file is written in", ge=1, le=FILE_VERSION, default=FILE_VERSION
+)
+
+
+def _not_nan(value: float) -> float:
+    if np.isnan(value):
+        raise ValueError("must be a number or inf, got nan")
+    return value
+
+
+def _thinkable(value: float) -> float:
+    if LARGEST < abs(value) < np.inf:
+        raise ValueError(f"must be between -{LARGEST:g} and {LARGEST:g}, got {value:.6g}; is the unit right?")
+    return value
+
+
+def _not_zero(vector: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(vector):
+        raise ValueError(f"must not be all zeros, got {quote(list(vector))}")
+    return vector
+
+
+def _has_length(vector: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(vector):
+        raise ValueError(
+            f"has zero length, got {quote(list(vector))}; give any vector along it, such as [0, 1, 0]"
+        )
+    return vector
+
+
+def _rising(bounds: tuple[float, ...]) -> tuple[float, ...]:
+    low, high = bounds
+    if not low < high:
+        raise ValueError(f"must be [lower, upper] with lower < upper, got {quote(list(bounds))}")
+    return bounds
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _as_vector(value: Any) -> Any:
+    if not isinstance(value, list | tuple) and not _is_number(value):
+        raise ValueError(f"must be a number or a list of numbers, got {quote(value)}")
+    return [value] if _is_number(value) else value
+
+
+def _few(value: Any) -> Any:
+    """One number or a list of them, as a list that may hold zeros."""
+    value = _as_vector(value)
+    if not value:
+        raise ValueError("must not be empty; give a number for each coordinate")
+    return value
+
+
+def _as_matrix(value: Any) -> Any:
+    if isinstance(value, list) and value and all(map(_is_number, value)):
+        raise ValueError(f"must be a list of rows, got {quote(value)}; write [[...], [...]]")
+    if not isinstance(value, list | tuple) and not _is_number(value):
+        raise ValueError(f"must be a number or a matrix (a list of rows), got {quote(value)}")
+    return [[value]] if _is_number(value) else value
+
+
+def _as_inertia(value: Any) -> Any:
+    """Three moments become the rows of a diagonal matrix; one number stays apart, as a matrix of one."""
+    if isinstance(value, list) and len(value) == 3 and not any(isinstance(v, list | dict) for v in value):
+        return [[v if i == j else 0.0 for j in range(3)] for i, v in enumerate(value)]
+    numbers = isinstance(value, list) and value and all(map(_is_number, value))
+    if numbers or (not isinstance(value, list | tuple) and not _is_number(value)):
+        raise ValueError(f"must be {INERTIA_FORMS}, got {quote(value)}")
+    return _as_matrix(value)
+
+
+def _square(rows: Rows) -> Rows:
+    lengths = [len(row) for row in rows]
+    if not rows or any(length != len(rows) for length in lengths):
+        got = f"{len(rows)} rows of {', '.join(map(str, lengths[:8]))} numbers" if rows else "an empty list"
+        raise ValueError(f"must be a square matrix, got {got}; give n rows of n numbers")
+    return rows
+
+
+def _symmetric(rows: Rows) -> Rows:
+    matrix = np.array(rows)
+    with np.errstate(over="ignore"):
+        gap = np.abs(matrix - matrix.T)
+    if gap.max() > SYMMETRY_TOLERANCE * np.abs(matrix).max():
+        i, j = (int(k) for k in np.unravel_index(int(gap.argmax()), gap.shape))
+        raise ValueError(
+            f"must be symmetric, but row {i} column {j} holds {rows[i][j]:.10g} "
+            f"and row {j} column {i} holds {rows[j][i]:.10g} (counted from 0); make them equal"
+        )
+    return rows
+
+
+def _positive_definite(rows: Rows) -> Rows:
+    size = len(rows)
+    with np.errstate(all="ignore"):
+        eigenvalues = np.linalg.eigvalsh(np.array(rows))
+    if not eigenvalues[0] > size * np.finfo(float).eps * abs(eigenvalues[-1]):
+        if size == 1:
+            raise ValueError(f"must be greater than 0, got {rows[0][0]:.10g}")
+        raise ValueError(
+            f"must be positive definite, but its least eigenvalue is {eigenvalues[0]:.4g}; "
+            "every motion needs a mass: check the off-diagonal terms, or leave a massless coordinate out"
+        )
+    return rows
+
+
+def _possible_body(rows: Rows) -> Rows:
+    """Principal moments of a body: none negative, none larger than the sum of the other two."""
+    if len(rows) == 1:
+        if rows[0][0] < 0:
+            raise ValueError(f"must be at least 0, got {rows[0][0]:.10g}")
+        return rows
+    if len(rows) != 3:
+        raise ValueError(f"must be {INERTIA_FORMS}, got {len(rows)} rows")
+    moments = np.linalg.eigvalsh(np.array(rows))
+    slack = SYMMETRY_TOLERANCE * float(np.abs(moments).max())
+    said = ", ".join(f"{moment:.6g}" for moment in moments)
+    if moments[0] < -slack:
+        raise ValueError(f"must have no negative principal moment, got {said}; no body has one")
+    if moments[2] > moments[0] + moments[1] + slack:
+        raise ValueError(
+            f"must have no principal moment above the sum of the other two, got {said}; no body has such "
+            "moments: check the units, or give one number, the moment about the joint axis"
+        )
+    return rows
+
+
+_NUMBER: Final[dict[str, Any]] = {"type": "number"}
+_LIST: Final[dict[str, Any]] = {"type": "array", "items": _NUMBER, "minItems": 1}
+_MATRIX: Final[dict[str, Any]] = {"type": "array", "items": _LIST, "minItems": 1}
+_THREE: Final[dict[str, Any]] = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
+_THREE_BY_THREE: Final[dict[str, Any]] = {"type": "array", "items": _THREE, "minItems": 3, "maxItems": 3}
+
+Number = Annotated[float, Strict(), AllowInfNan(False), AfterValidator(_thinkable)]
+Mass = Annotated[Number, magnitudes.within(magnitudes.LIGHTEST, magnitudes.HEAVIEST, "kg", "0 (massless) or ")]
+RotorInertia = Annotated[
+    Number, magnitudes.within(magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m^2", "0 (no inertia) or ")
+]
+Ratio = Annotated[
+    Number, magnitudes.within(magnitudes.LEAST_RATIO, magnitudes.LARGEST_RATIO, "motor turns per joint turn")
+]
+Damper = Annotated[Number, magnitudes.within(0.0, magnitudes.STRONGEST_DAMPING, "N m s/rad")]
+Resistance = Annotated[
+    Number, magnitudes.within(magnitudes.LEAST_RESISTANCE, magnitudes.LARGEST_RESISTANCE, "ohm", "0 or ")
+]
+LossFactor = Annotated[
+    Number,
+    Field(ge=0.0, le=magnitudes.LARGEST_LOSS),
+    magnitudes.within(magnitudes.LEAST_LOSS, magnitudes.LARGEST_LOSS, "of the stiffness", "0 (none) or "),
+]
+Inductance = Annotated[
+    Number, magnitudes.within(magnitudes.LEAST_INDUCTANCE, magnitudes.LARGEST_INDUCTANCE, "H", "0 or ")
+]
+NumberOrInfinity = Annotated[float, Strict(), AfterValidator(_not_nan), AfterValidator(_thinkable)]
+Spring = Annotated[
+    NumberOrInfinity, magnitudes.within(magnitudes.SOFTEST, magnitudes.STIFFEST, "N m/rad", "inf (rigid) or ")
+]
+Stiffness = Annotated[Number, magnitudes.within(magnitudes.SOFTEST, magnitudes.STIFFEST, "N m/rad")]
+DryFriction = Annotated[
+    Number,
+    Field(ge=0.0),
+    magnitudes.within(magnitudes.LEAST_FRICTION, magnitudes.LARGEST_FRICTION, "", "0 (none) or "),
+]
+StribeckVelocity = Annotated[Number, Field(gt=0.0), magnitudes.within(magnitudes.SLOWEST, magnitudes.FASTEST, "")]
+Bristle = Annotated[Number, Field(gt=0.0), magnitudes.within(magnitudes.SOFTEST, magnitudes.STIFFEST, "")]
+BristleDamper = Annotated[Number, Field(ge=0.0), magnitudes.within(0.0, magnitudes.STRONGEST_DAMPING, "")]
+Torque = Annotated[Number, magnitudes.within(magnitudes.LEAST_TORQUE, magnitudes.LARGEST_TORQUE, "N m")]
+Step = Annotated[
+    Number, Field(ge=0.0), magnitudes.within(magnitudes.FINEST, magnitudes.COARSEST, "", "0 (none) or ")
+]
+Hardening = Annotated[Number, Field(ge=-magnitudes.HARDEST, le=magnitudes.HARDEST)]
+Excess = Annotated[Number, Field(ge=-magnitudes.STIFFEST, le=magnitudes.STIFFEST)]
+Counts = Annotated[Number, Field(gt=0.0), magnitudes.within(1e-3, magnitudes.MOST_COUNTS, "per revolution")]
+WholeNumber = Annotated[int, Strict()]
+Text = Annotated[str, Field(min_length=1)]
+Name = Annotated[str, Field(min_length=1, max_length=64, pattern=NAME_PATTERN)]
+
+Triple = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
+Position = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
+Offset = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3)]
+Direction = Annotated[Position, AfterValidator(_has_length)]
+Axis = Annotated[Triple, AfterValidator(_has_length)]
+Bounds = Annotated[tuple[Number, ...], Field(min_length=2, max_length=2), AfterValidator(_rising)]
+
+Vector = Annotated[
+    tuple[Number, ...],
+    BeforeValidator(_as_vector),
+    AfterValidator(_not_zero),
+    magnitudes.largest_share_within(magnitudes.LEAST_SHARE, magnitudes.LARGEST_SHARE),
+    WithJsonSchema({"anyOf": [_NUMBER, _LIST]}),
+]
+Frictions = Annotated[tuple[DryFriction, ...], BeforeValidator(_few), WithJsonSchema({"anyOf": [_NUMBER, _LIST]})]
+SymmetricMatrix = Annotated[
+    tuple[tuple[Number, ...], ...],
+    BeforeValidator(_as_matrix),
+    AfterValidator(_square),
+    AfterValidator(_symmetric),
+    WithJsonSchema({"anyOf": [_NUMBER, _MATRIX]}),
+]
+MassMatrix = Annotated[
+    SymmetricMatrix,
+    AfterValidator(_positive_definite),
+    magnitudes.principal_within(magnitudes.LIGHTEST, magnitudes.HEAVIEST, "kg"),
+]
+DampingMatrix = Annotated[SymmetricMatrix, magnitudes.elements_up_to(magnitudes.STRONGEST_DAMPING, "N s/m")]
+StiffnessMatrix = Annotated[SymmetricMatrix, magnitudes.elements_up_to(magnitudes.STIFFEST, "N/m")]
+Inertia = Annotated[
+    tuple[tuple[Number, ...], ...],
+    BeforeValidator(_as_inertia),
+    AfterValidator(_square),
+    AfterValidator(_symmetric),
+    AfterValidator(_possible_body),
+    magnitudes.largest_within(
+        magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m^2", "0 (no inertia) or "
+    ),
+    WithJsonSchema({"anyOf": [_NUMBER, _THREE, _THREE_BY_THREE]}),
+]

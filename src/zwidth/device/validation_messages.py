@@ -1,0 +1,159 @@
+"""From what pydantic found to sentences for people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from zwidth.device.faults import KeyPath, nearest, quote, suggestion
+from zwidth.device.schema import device_file as schema
+from zwidth.device.schema.velocity import DEFAULT_METHOD
+
+
+def validation_messages(
+    error: ValidationError,
+    document: dict[str, Any],
+    description: Callable[[KeyPath], str] = schema.key_description,
+    unknown: Callable[[KeyPath], str] | None = None,
+) -> Iterator[tuple[KeyPath, str]]:
+    """Path and sentence of each fault; a key missing only because it is misspelt is told once.
+
+    description, unknown  of files that are no device files: what the key at a path means, "" for nothing; and the
+                          sentence on a key that there is not
+    """
+    details = error.errors(include_url=False)
+    located = [(_where(detail, document), detail) for detail in details]
+    missing = {path for path, detail in located if detail["type"] == "missing"}
+    meant = {
+        (*path[:-1], near)
+        for path, detail in located
+        if detail["type"] == "extra_forbidden"
+        and (near := nearest(str(path[-1]), [str(p[-1]) for p in missing if p[:-1] == path[:-1]]))
+    }
+    for path, detail in located:
+        is_misspelt = detail["type"] == "missing" and path in meant
+        if not is_misspelt and not _long_enough(detail):
+            if detail["type"] == "extra_forbidden":
+                yield path, unknown(path) if unknown else _unknown(path, document)
+            else:
+                meaning = description(path) if path else ""
+                yield path, _sentence(detail, path, f" ({meaning})" if meaning else "")
+
+
+def _long_enough(detail: ErrorDetails) -> bool:
+    """Whether a list is called too short only because elements at fault, told themselves, are not counted."""
+    limits = detail.get("ctx", {})
+    return detail["type"] == "too_short" and len(detail["input"]) >= limits["min_length"]
+
+
+def _where(detail: ErrorDetails, document: Any) -> KeyPath:
+    """The location as a path of the document: steps that pydantic adds (tags, lifted numbers) left out."""
+    path: list[str | int] = []
+    *outer, last = detail["loc"] or ("",)
+    for part in (*outer, last) if detail["type"] != "missing" else outer:
+        if part == "[key]":
+            continue
+        if isinstance(document, dict) and part in document:
+            document = document[str(part)]
+        elif isinstance(document, list) and isinstance(part, int) and part < len(document):
+            document = document[part]
+        else:
+            continue
+        path.append(part)
+    if detail["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        return (*path, schema.kinds(tuple(path))[0])
+    return (*path, last) if detail["type"] == "missing" else tuple(path)
+
+
+def _sentence(detail: ErrorDetails, path: KeyPath, about: str) -> str:
+    kind, got = detail["type"], detail["input"]
+    limits: Mapping[str, Any] = detail.get("ctx", {})
+    match kind:
+        case "missing":
+            return f"is missing; add it{about}"
+        case "float_type" if isinstance(got, int) and not isinstance(got, bool):
+            return f"must be a finite number, got {quote(got)}{about}"
+        case "float_type":
+            return f"must be a number, got {quote(got)}{about}"
+        case "int_type" | "int_from_float":
+            return f"must be a whole number, got {quote(got)}{about}"
+        case "finite_number":
+            return f"must be finite, got {quote(got)}{about}"
+        case "greater_than":
+            return f"must be greater than {limits['gt']:.10g}, got {quote(got)}{about}"
+        case "greater_than_equal":
+            return f"must be at least {limits['ge']:.10g}, got {quote(got)}{about}"
+        case "less_than":
+            return f"must be less than {limits['lt']:.10g}, got {quote(got)}{about}"
+        case "less_than_equal":
+            return f"must be at most {limits['le']:.10g}, got {quote(got)}{about}"
+        case "too_short" | "too_long":
+            return _length(limits, got, about)
+        case "string_type":
+            return f"must be text, got {quote(got)}{about}"
+        case "string_too_short":
+            return f"must not be empty{about}"
+        case "string_too_long":
+            return f"must have at most {limits['max_length']} characters, got {quote(got)}"
+        case "string_pattern_mismatch":
+            return f"must be a name of letters, digits, - and _ that begins with a letter, got {quote(got)}"
+        case "literal_error":
+            return _literal(limits["expected"], got, about)
+        case "union_tag_invalid":
+            kinds = [tag.strip("'") for tag in limits["expected_tags"].split(", ")]
+            near = nearest(str(limits["tag"]), kinds)
+            hint = f"; did you mean '{near}'?" if near else ""
+            return f"must be {limits['expected_tags'].replace(', ', ' or ')}, got {limits['tag']!r}{hint}"
+        case "union_tag_not_found":
+            kinds = sorted(schema.kinds(path[:-1])[1])
+            return f"is missing or no text; give {' or '.join(map(repr, kinds))}"
+        case "tuple_type" | "list_type":
+            return f"must be a list, got {quote(got)}{about}"
+        case "model_type" | "model_attributes_type" | "dict_type":
+            return f"must be a table, got {quote(got)}{about}"
+        case _:
+            return detail["msg"].removeprefix("Value error, ")
+
+
+def _unknown(path: KeyPath, document: dict[str, Any]) -> str:
+    key, table = str(path[-1]), path[:-1]
+    tag, kinds = schema.kinds(table)
+    kind = _value(document, table).get(tag, DEFAULT_METHOD) if kinds else None
+    allowed = kinds[kind] if kind in kinds else schema.keys(table)
+    readers = [other for other, keys in kinds.items() if key in keys]
+    if readers:
+        others = " or ".join(f'"{reader}"' for reader in readers)
+        return f'is not read with {tag} = "{kind}"; remove it, or set {tag} = {others}'
+    if nearest(key, allowed) is None:
+        elsewhere = [
+            section
+            for section in ("loop", "plant", "mechanism", "operator", "friction")
+            if key in schema.keys((section,))
+        ]
+        if elsewhere and table != (elsewhere[0],):
+            return f"is not a key here; it belongs into [{elsewhere[0]}]"
+    return f"is not a key of a device file; {suggestion(key, allowed)}"
+
+
+def _value(document: Any, path: KeyPath) -> Any:
+    """The value at a path that leads through tables and lists there are."""
+    for step in path:
+        document = document[step]
+    return document
+
+
+def _length(limits: Mapping[str, Any], got: Any, about: str) -> str:
+    if "max_length" in limits:
+        return f"must have at most {limits['max_length']} elements, got {limits['actual_length']}{about}"
+    least = limits["min_length"]
+    return f"must have at least {least} element{'s' * (least != 1)}, got {limits['actual_length']}{about}"
+
+
+def _literal(expected: str, got: Any, about: str) -> str:
+    words = [word.strip("'") for word in expected.replace(" or ", ", ").split(", ")]
+    if isinstance(got, str) and (near := nearest(got, words)):
+        return f"must be {expected}, got {quote(got)}; did you mean '{near}'?"
+    return f"must be {expected.replace('True', 'true')}, got {quote(got)}{about}"

@@ -1,0 +1,141 @@
+"""What the springs between those charted sweep over, along the edge of the charted ones' common set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from zwidth.chart.arcs import Arc
+from zwidth.guarantees.envelope import TouchingPoint, envelope_between, nearest_touching_point, touching_points
+from zwidth.guarantees.port import Floats
+from zwidth.guarantees.spring_family import SpringFamily, polygons_of
+
+# In shares of the set's size: touching points further away do not matter, nor do sweeps wider than this.
+NEAR, WIDEST = 0.05, 0.05
+# From its touching points an envelope is followed to the next spring charted by these parts of the way (nothing is
+# known at first of how the angle moves), ...
+STEPS = (0.02, 0.15, 0.5, 1.0)
+# ... and there it is an envelope found already if its touching point is this near.
+SAME = 1e-6
+# Springs of a stretch, its ends' among them, of which one must make what it cuts off unstable.
+PROBES = 7
+
+
+@dataclass(frozen=True)
+class EnvelopeCuts:
+    """What has been found swept so far; walls are [K unit, B].
+
+    touching_points  touching points of each spring
+    strips           what is between the envelope and the arcs that it touches, of the shapes cut
+    lost_shares      springs between which an envelope was lost
+    visited_pairs    stretches and ways that have been looked at
+    """
+
+    springs: SpringFamily
+    touching_points: dict[float, list[TouchingPoint]] = field(default_factory=dict)
+    strips: list[shapely.Polygon] = field(default_factory=list)
+    lost_shares: list[float] = field(default_factory=list)
+    visited_pairs: set[tuple[float, float, float, float]] = field(default_factory=set)
+
+    def cut(self, shape: shapely.Geometry, edge: list[tuple[float, Arc]], shares: Floats) -> shapely.Geometry:
+        """A shape without what springs between sweep over.
+
+        edge    of the shape, each arc with the share of its spring
+        shares  (n,) of the springs charted, ascending
+        """
+        low, bottom, right, top = shape.bounds
+        size = max(right - low, top - bottom)
+        shapely.prepare(shape)
+        for share in dict.fromkeys(share for share, _ in edge):
+            if share not in self.touching_points:
+                self.touching_points[share] = self._touching(share)
+        binding = {share for share, _ in edge}
+        for one, other in self._neighbours(binding, shares, shape, NEAR * size):
+            self.strips.extend(_strips(self.springs, one, other, shape, size, self.lost_shares))
+        return shapely.difference(shape, shapely.union_all(self.strips))
+
+    def _touching(self, share: float) -> list[TouchingPoint]:
+        """Touching points on the edge of one spring's chart."""
+        member, found = self.springs.member(share), []
+        for arc in member.edge.arcs if member else ():
+            if arc.curved:
+                found += touching_points(self.springs, share, arc.start, arc.end)
+        return found
+
+    def _neighbours(
+        self, binding: set[float], shares: Floats, shape: shapely.Geometry, near: float
+    ) -> Iterator[tuple[TouchingPoint, TouchingPoint]]:
+        """Touching points of neighbouring springs on one envelope, each couple once."""
+        for share in sorted(binding):
+            at = int(np.searchsorted(shares, share))
+            for touch in self.touching_points[share]:
+                if shapely.distance(shape, shapely.Point(touch.wall)) > near:
+                    continue
+                for place in (at - 1, at + 1):
+                    if not 0 <= place < len(shares):
+                        continue
+                    way = (share, touch.theta, float(shares[place]), 0.0)
+                    if way in self.visited_pairs:
+                        continue
+                    self.visited_pairs.add(way)
+                    other = self._followed(touch, float(shares[place]))
+                    first, last = sorted((touch, other), key=lambda end: end.share)
+                    key = (first.share, round(first.theta, 6), last.share, round(last.theta, 6))
+                    if first.share < last.share and key not in self.visited_pairs:
+                        self.visited_pairs.add(key)
+                        yield first, last
+
+    def _followed(self, start: TouchingPoint, share: float) -> TouchingPoint:
+        """The envelope's touching point towards another spring: with it, or as near to it as the envelope goes."""
+        before, now = start, start
+        for part in STEPS:
+            at = start.share + (share - start.share) * part if part < 1.0 else share
+            drift = 0.0
+            if now.share != before.share:
+                drift = (now.theta - before.theta) / (now.share - before.share) * (at - now.share)
+            after = nearest_touching_point(self.springs, at, now.theta + drift, max(abs(drift), 0.05))
+            if after is None:
+                break
+            before, now = now, after
+        known = [
+            t
+            for t in self.touching_points.get(share, [])
+            if now.share == share and abs(t.theta - now.theta) < SAME
+        ]
+        return known[0] if known else now
+
+
+def _strips(
+    springs: SpringFamily,
+    one: TouchingPoint,
+    other: TouchingPoint,
+    shape: shapely.Geometry,
+    size: float,
+    lost: list[float],
+) -> list[shapely.Polygon]:
+    """What strips outside the envelope between two touching points take from a shape.
+
+    They are wide enough for all that the arcs of the two leave. Where the envelope is outside the shape and its
+    stable side turned away, strips reach over what is swept: parts whose middle is stable with the springs of
+    their own stretch are left out.
+    """
+    gap = other.wall - one.wall
+    length = float(np.hypot(*gap))
+    if length == 0.0:
+        return []
+    aside = max(abs(end.tangent[0] * gap[1] - end.tangent[1] * gap[0]) for end in (one, other))
+    wide = min(2.0 * aside + 1e-4 * length, WIDEST * size)
+    strips = []
+    for walk, first, last in envelope_between(springs, one, other, shape, size, lost):
+        along = np.gradient(walk, axis=0)
+        along /= np.maximum(np.hypot(*along.T), 1e-300)[:, None]
+        outwards = np.column_stack([along[:, 1], -along[:, 0]])
+        strip = shapely.make_valid(shapely.Polygon(np.vstack([walk, (walk + wide * outwards)[::-1]])))
+        for part in polygons_of(shapely.intersection(shape, strip)):
+            middle = np.array(part.representative_point().coords)
+            if springs.unstable(middle, np.linspace(first, last, PROBES)).any():
+                strips.append(part)
+    return strips

@@ -1,0 +1,197 @@
+"""All guarantees of one loop, or of a device at one operating point, side by side, the strongest first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from zwidth.chart.arc_joining import ChartError
+from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.guarantees.coupling import Couplings, couplings, without_handle
+from zwidth.guarantees.passive import passive_region
+from zwidth.guarantees.port import Floats
+from zwidth.guarantees.region import Region, empty_region, outline_columns, stiffest_corner, stiffness_text
+from zwidth.guarantees.spring_stable import nyquist_region, spring_stable_region
+from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.argument_checks import check_number, require, wrong_type
+from zwidth.result import Result
+
+COLGATE = (
+    "Colgate and Schenkel 1997, read in Weir and Colgate's chapter of 2008; here for any device by alias disks"
+)
+SPRINGS = "spring stability after Colgate and Schenkel 1997, known at second hand (thesis 1.1.3)"
+EXACT = "exact chart (D-decomposition)"
+NO_HANDLE = "the plant has no handle, so that nobody can hold it there"
+NO_STABLE = "no stable wall has K > 0 and B >= 0"
+
+
+@dataclass(frozen=True)
+class Guarantee:
+    """One guarantee: its short name, what it promises, its walls, and where the condition comes from."""
+
+    name: str
+    meaning: str
+    region: Region
+    source: str
+
+
+@dataclass(frozen=True)
+class Guarantees(Result):
+    """The guarantees of a loop, from the strongest to plain stability, and the chart that holds them all.
+
+    couplings  virtual couplings through which walls are stable with every passive operator; None: not asked for
+    """
+
+    loop: Loop
+    guarantees: tuple[Guarantee, ...]
+    chart: StabilityChart
+    couplings: Couplings | None = None
+
+    def __getitem__(self, name: str) -> Guarantee:
+        """The guarantee of that name. Raises KeyError."""
+        for guarantee in self.guarantees:
+            if guarantee.name == name:
+                return guarantee
+        raise KeyError(name)
+
+    @property
+    def is_empty(self) -> bool:
+        """Has no wall with K > 0 and B >= 0 any of the guarantees?"""
+        return all(guarantee.region.reason is not None for guarantee in self.guarantees)
+
+    def document(self) -> dict[str, Any]:
+        """The guarantees by key and unit, and the couplings if they were asked for."""
+        entries = [
+            {"name": one.name, "meaning": one.meaning} | one.region.document() | {"source": one.source}
+            for one in self.guarantees
+        ]
+        coupling = {} if self.couplings is None else {"coupling": self.couplings.document()}
+        return {"guarantees": entries} | coupling
+
+    def table(self) -> dict[str, list[Any]]:
+        """The outlines as columns, region after region."""
+        return outline_columns({guarantee.name: guarantee.region for guarantee in self.guarantees}, "guarantee")
+
+    def __repr__(self) -> str:
+        stiffest = ", ".join(f"{one.name} {stiffness_text(one.region)}" for one in self.guarantees)
+        coupled = [] if self.couplings is None else repr(self.couplings).splitlines()
+        return "\n  ".join([f"Guarantees: {stiffest}", *coupled])
+
+
+def find_guarantees(loop: Loop, robust: Sequence[Floats] | None = None) -> Guarantees:
+    """Every guarantee of a loop.
+
+    loop    the bare device; a plant with an operator attached is asked about with him as a part of it
+    robust  rings (k, 2) of [K, B] that are stable for a range of operators, from elsewhere; drawn between springs
+            and stability
+
+    Names: `passive-at-actuator` (where the handle is elsewhere), `passive`, `spring-stable`, `nyquist-spring`,
+    `robust` (if given), `stable`. Without a handle only the first and the last are known.
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> paddle = Plant(np.array([[0.03]]), np.array([[1.0]]), np.zeros((1, 1)), one, one, one)
+    >>> found = find_guarantees(Loop(paddle, Controller(sampling_period=0.001)))
+    >>> [guarantee.name for guarantee in found.guarantees]
+    ['passive', 'spring-stable', 'nyquist-spring', 'stable']
+    """
+    require("loop", loop, Loop)
+    plant = loop.plant
+    found = []
+    apart = plant.handle is None or not _same_place(plant.actuator, plant.handle)
+    if apart:
+        found.append(
+            Guarantee(
+                "passive-at-actuator",
+                "stable whatever passive linear operator holds the actuator",
+                passive_region(loop, plant.actuator),
+                COLGATE,
+            )
+        )
+    held = plant.handle is not None
+    found.append(
+        Guarantee(
+            "passive",
+            "stable whatever passive linear operator holds the handle",
+            passive_region(loop) if held else empty_region(NO_HANDLE),
+            COLGATE,
+        )
+    )
+    found.append(
+        Guarantee(
+            "spring-stable",
+            "stable whatever spring holds the handle, from none to one that holds it fixed",
+            _region_or_undecided(spring_stable_region, loop) if held else empty_region(NO_HANDLE),
+            SPRINGS,
+        )
+    )
+    found.append(
+        Guarantee(
+            "nyquist-spring",
+            "stable with the one spring that puts a mode at the Nyquist frequency",
+            _region_or_undecided(nyquist_region, loop) if held else empty_region(NO_HANDLE),
+            SPRINGS,
+        )
+    )
+    if robust is not None:
+        found.append(
+            Guarantee("robust", "stable for a whole range of operators", region_of(robust), "robust chart")
+        )
+    chart = stability_chart(loop, decay=False)
+    peak = chart.stiffness_max
+    stable = Region(chart.regions, peak, chart.damping_at_stiffness_max, None if np.isfinite(peak) else NO_STABLE)
+    found.append(Guarantee("stable", "stable with the device as described", stable, EXACT))
+    return Guarantees(loop, tuple(found), chart)
+
+
+def guarantees_of(
+    point: OperatingPoint, coupling: bool = False, wall: tuple[float, float] | None = None
+) -> Guarantees:
+    """Every guarantee of a device at one operating point, without its operator: he is one of those allowed.
+
+    coupling  also virtual couplings after Llewellyn and Raisbeck, and of the sampled device, as `couplings`
+    wall      K [N/m] > 0 and B [N s/m] of a wall: also the stiffest coupling through which it may be rendered
+    Raises    ValueError  for a wall that is none
+              what `OperatingPoint.loop` raises, and ChartError where the chart of the bare device is undecided
+    """
+    require("point", point, OperatingPoint)
+    if wall is not None:
+        _check_wall(wall)
+    loop = point.without_operator.loop
+    found = find_guarantees(loop)
+    if not coupling and wall is None:
+        return found
+    handle = loop.plant.handle
+    return replace(found, couplings=without_handle() if handle is None else couplings(loop, handle, wall))
+
+
+def _check_wall(wall: object) -> None:
+    if not isinstance(wall, tuple | list) or len(wall) != 2:
+        raise wrong_type("wall", "a pair of stiffness [N/m] and damping [N s/m]", wall)
+    check_number("the wall's stiffness", wall[0], "N/m", above=0.0)
+    check_number("the wall's damping", wall[1], "N s/m")
+
+
+def _region_or_undecided(find_region: Callable[[Loop], Region], loop: Loop) -> Region:
+    """A region made of charts; empty, and undecided, where one of them cannot be closed."""
+    try:
+        return find_region(loop)
+    except ChartError as error:
+        return empty_region(f"this is undecided: {error}")
+
+
+def region_of(rings: Sequence[Floats]) -> Region:
+    """Rings from elsewhere as a region."""
+    K, B = stiffest_corner(rings)
+    return Region(tuple(rings), K, B, None if K > 0.0 else NO_STABLE)
+
+
+def _same_place(first: Floats, second: Floats) -> bool:
+    """Whether two ends are one up to scale: the same motion, geared."""
+    size = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return abs(abs(float(first @ second)) - size) <= 1e-12 * size

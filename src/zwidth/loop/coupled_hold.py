@@ -1,0 +1,135 @@
+"""A first-order form between samples: exact hold, as one chain of second-order factors and as states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.loop.hold import lag_share
+from zwidth.model.first_order_form import FirstOrderForm, invariant_subspace
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Ratio of rates from which what rounding leaves of fast motions can spoil the slow ones.
+MUCH_SLOWER = 0.3
+SLOW = 0.03  # rates below this share of the sampling rate creep all alike
+
+
+@dataclass(frozen=True)
+class SampledForm:
+    """X_{j+1} = X_j + growth X_j + new u + old u_before,   y = output . X + direct_new u + direct_old u_before
+
+    growth      (k, k)  E = exp(A T) - 1
+    new, old    (k,)    what this interval's force, and the one before it, leave; with an actuator lag u is
+                        the force after the factor 1/(d + s) of `loop.hold`
+    output      (k,)
+    direct_new, direct_old   0 without lag
+    """
+
+    growth: Floats
+    new: Floats
+    old: Floats
+    output: Floats
+    direct_new: float
+    direct_old: float
+
+
+def sample_form(form: FirstOrderForm, period: float, fraction: float = 0.0, lag: float = 0.0) -> SampledForm:
+    """The form sampled: exact hold, split by the fractional delay f, through an actuator lag [s].
+
+    With lag the states also feel the force left from before, P a, and with Q what a command leaves
+
+        (d + s) y = output Q + output (d - E)^-1 [ s_in P + (s + E) Q ]
+    """
+    T, rest = period, (1.0 - fraction) * period
+    E, P, Q = _step(form, T, lag)
+    Q_new = _step(form, rest, lag)[2] if fraction > 0.0 else Q
+    s, s_new = lag_share(T, lag), lag_share(rest, lag)
+    if lag > 0.0:
+        new = s_new * P + s * Q_new + E @ Q_new
+        old = (s - s_new) * P + s * (Q - Q_new) + E @ (Q - Q_new)
+        return SampledForm(E, new, old, form.output, float(form.output @ Q_new), float(form.output @ (Q - Q_new)))
+    return SampledForm(E, Q_new, Q - Q_new, form.output, 0.0, 0.0)
+
+
+def form_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floats:
+    """The chain as rows (m, 8), each but the first divided by the denominators of those before it too.
+
+    With quadratics D_i of its sampled poles less 1 two by two
+
+        c (d - E)^-1 G = sum_i [ c G_i d + c (E + d1_i) G_i ] / (D_1 ... D_i),     G_1 = G,  G_{i+1} = D_i(E) G_i
+
+    (Newton's form: D(d) - D(E) = (d - E)(d + E + d1), and the product of all D_i(E) is zero). Nothing cancels
+    where poles coincide; fast poles come first, so that each row adds what is slower. Hidden poles would come
+    last, with rows that nothing reaches. D_i(E) shrinks slow motions, while rounding leaves something of the fast
+    ones that it should have removed: where the rest is much slower, G is cleared of them.
+    """
+    E, c = sampled.growth, sampled.output
+    parts = [(sampled.direct_new, sampled.new), (sampled.direct_old, sampled.old)]
+    rows = []
+    pairs, fastest = _pairs(form.poles, period), np.inf
+    for i, pair in enumerate(pairs):
+        rate = float(np.max(np.abs(pair)))
+        if rate < MUCH_SLOWER * fastest:
+            if i:
+                fast = invariant_subspace(form, np.concatenate(pairs[:i]))
+                parts = [(direct, _cleared(G, *fast)) for direct, G in parts]
+            fastest = rate
+        e = sampled_poles(pair, period)
+        d1, d0 = float(-np.sum(e).real), float(np.prod(e).real)
+        if len(pair) == 1:  # joined by a pole at z = 0, which no wall moves
+            d1, d0 = d1 + 1.0, d1
+        row = [d1, d0]
+        for direct, G in parts:
+            row += [direct, float(c @ G) + direct * d1, float(c @ (E @ G + d1 * G)) + direct * d0]
+        rows.append(row)
+        parts = [(0.0, E @ (E @ G + d1 * G) + d0 * G) for _, G in parts]
+    return np.array(rows).reshape(-1, 8)
+
+
+def _cleared(G: Floats, right: Floats, left: Floats) -> Floats:
+    """G without its part in a subspace, wherever that part is more than the rounding of this product."""
+    part = right @ (left.T @ G)
+    rounding = 1e-15 * (np.abs(right) @ (np.abs(left.T) @ np.abs(G)))
+    return G - np.where(np.abs(part) > rounding, part, 0.0)
+
+
+def _step(form: FirstOrderForm, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
+    """exp(A t) - 1 without cancellation, and the states from a unit lagged force and from a unit command."""
+    from scipy.linalg import expm
+
+    A, b, k = form.dynamics * time, form.input * time, len(form.input)
+    r = time / lag if lag > 0.0 else 0.0
+    M = np.zeros((2 * k + 2, 2 * k + 2))
+    M[:k, :k] = A
+    M[:k, k : 2 * k] = np.eye(k)
+    if lag > 0.0:
+        M[:k, 2 * k], M[2 * k, 2 * k], M[2 * k, 2 * k + 1] = b, -r, r
+    else:
+        M[:k, 2 * k + 1] = b
+    F = expm(M)
+    return A @ F[:k, k : 2 * k], F[:k, 2 * k], F[:k, 2 * k + 1]
+
+
+def _pairs(poles: Complexes, period: float) -> list[Complexes]:
+    """Poles two by two, fast ones first: conjugates together, a real one with its neighbour unless that is much
+    faster."""
+    pairs = [np.array([value, value.conjugate()]) for value in poles[poles.imag > 0.0]]
+    real = list(poles[poles.imag == 0.0][np.argsort(np.abs(poles[poles.imag == 0.0]))])
+    while real:
+        count = 1
+        if len(real) > 1 and MUCH_SLOWER * abs(real[1]) <= max(abs(real[0]), SLOW / period):
+            count = 2
+        pairs.append(np.array(real[:count]))
+        del real[:count]
+    return sorted(pairs, key=lambda pair: -float(np.max(np.abs(pair))))
+
+
+def sampled_poles(poles: Complexes, period: float) -> Complexes:
+    """exp(s T) - 1 without cancellation near 0."""
+    x = poles * period
+    real = np.expm1(x.real) * np.cos(x.imag) - 2.0 * np.sin(x.imag / 2.0) ** 2
+    return real + 1j * np.exp(x.real) * np.sin(x.imag)

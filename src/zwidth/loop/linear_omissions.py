@@ -1,0 +1,25 @@
+"""What of a device is not linear, and so left out of every linear answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from zwidth.loop.controller import Controller
+from zwidth.model.drive_nonlinearity import nonlinear_of_drives
+from zwidth.model.mechanism import Mechanism
+from zwidth.model.nonlinear import Nonlinear
+from zwidth.model.plant import Plant
+
+
+def linear_omissions(mechanism: Mechanism | None, plant: Plant | None, controller: Controller) -> tuple[str, ...]:
+    """Names of the nonlinear parts of a mechanism's drives, or of a plant, and of the computer; () for none.
+
+    mechanism, plant  of the device; None where it has none
+    """
+    parts = Nonlinear() if plant is None else plant.nonlinear
+    if mechanism is not None:
+        each = np.eye(len(mechanism.drives.names))
+        parts = nonlinear_of_drives(mechanism.drives, np.ones(len(each)), 0.0 * each, each, each)
+    return replace(parts, force_limit=min(parts.force_limit, controller.force_limit)).kinds

@@ -1,0 +1,39 @@
+"""Names for people of motions that no wall moves."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from math import pi, sqrt
+
+
+def motion_name(squared: float, decay: float) -> str:
+    """A motion's name for people."""
+    if squared <= 0.0:
+        return "rigid motion (0 Hz)" if squared == 0.0 else "unstable motion (negative stiffness)"
+    rate = sqrt(squared)
+    return f"mode at {rate / (2.0 * pi):.4g} Hz (damping ratio {decay / rate:.4g})"
+
+
+def pole_name(pole: complex) -> str:
+    """The same for a motion with a pole of its own; a braked free motion stays where it is left, at 0 Hz."""
+    if pole == 0.0:
+        return motion_name(0.0, 0.0)
+    if pole.imag != 0.0:
+        return f"mode at {abs(pole) / (2.0 * pi):.4g} Hz (coupled damping)"
+    return "overdamped motion"
+
+
+def group_names(names: Sequence[str]) -> list[str]:
+    """Names of motions, equal ones together under their number.
+
+    >>> group_names(["rigid motion (0 Hz)", "mode at 101 Hz", "rigid motion (0 Hz)"])
+    ['2 rigid motions (0 Hz)', 'mode at 101 Hz']
+    """
+    return [_many(name, count) if count > 1 else name for name, count in Counter(names).items()]
+
+
+def _many(name: str, count: int) -> str:
+    for noun in ("motion", "mode"):
+        name = name.replace(noun, f"{noun}s", 1)
+    return f"{count} {name}"

@@ -1,0 +1,179 @@
+"""The sampled loop of m rendered directions under one wall law:  det(1 + P(z) (K + B w(z))) = 0, P (m, m)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.loop.controller import Controller
+from zwidth.loop.filter_states import FilterStates, filter_states
+from zwidth.loop.filters import force_filter, velocity_estimator
+from zwidth.loop.multi_hold import ContinuousPlant, SampledPlant, continuous_plant, sample_plant
+from zwidth.loop.sections import UnmovedError
+from zwidth.model.argument_checks import require
+from zwidth.model.multi_plant import MultiPlant
+from zwidth.model.plant import Plant
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class MultiLoop:
+    """A plant with m rendered directions under f_i = -(K y_i + B v_i), the same K and B along each.
+
+    >>> free = MultiPlant(np.diag([0.3, 0.1]), *np.zeros((2, 2, 2)), np.eye(2), np.eye(2))
+    >>> MultiLoop(free, Controller(sampling_period=0.001)).transition_matrix(1000.0, 1.0).shape
+    (6, 6)
+    """
+
+    plant: MultiPlant
+    controller: Controller
+
+    def __post_init__(self) -> None:
+        """Raise TypeError for what is no plant of several directions, or no controller."""
+        hint = "write Loop(plant, controller) for one direction" if isinstance(self.plant, Plant) else ""
+        require("plant", self.plant, MultiPlant, hint)
+        require("controller", self.controller, Controller)
+
+    @property
+    def period(self) -> float:
+        """Sampling period T [s]."""
+        return self.controller.sampling_period
+
+    @property
+    def count(self) -> int:
+        """Number of rendered directions m."""
+        return self.plant.count
+
+    @property
+    def whole_delay(self) -> int:
+        """Whole samples l of the delay."""
+        return self.controller.whole_delay
+
+    @property
+    def fractional_delay(self) -> float:
+        """Remaining part f of the delay, 0 <= f < 1 [samples]."""
+        return self.controller.fractional_delay
+
+    @cached_property
+    def continuous_plant(self) -> ContinuousPlant:
+        """What the walls move of the plant, in continuous time. Raises UnmovedError where that is nothing."""
+        found = continuous_plant(self.plant, self.period, self.fractional_delay)
+        if not len(found.A):
+            raise UnmovedError("the wall forces move nothing that the sensors read; check actuators and sensors")
+        return found
+
+    @property
+    def unobserved_modes(self) -> tuple[str, ...]:
+        """Motions that no wall moves, by name; they are left out and do not count for stability."""
+        return self.continuous_plant.unobserved
+
+    @cached_property
+    def sampled_plant(self) -> SampledPlant:
+        """The plant from sample to sample."""
+        lag = self.controller.actuator_time_constant
+        return sample_plant(self.continuous_plant, self.period, self.fractional_delay, lag)
+
+    @cached_property
+    def estimator(self) -> FilterStates:
+        """The velocity estimate w(z), the same along each direction."""
+        own = velocity_estimator(self.controller)
+        return filter_states(own.numerator, own.denominator, own.window)
+
+    @cached_property
+    def force_filter(self) -> FilterStates:
+        """F(z), what the force of each direction passes before the hold."""
+        own = force_filter(self.controller)
+        return filter_states(own.numerator, own.denominator, np.ones(1))
+
+    def plant_response(self, z: ArrayLike) -> Complexes:
+        """P(z) (..., m, m) from force commands to readings at complex z (...), hold to filter included."""
+        return self.plant_slope(z)[0]
+
+    def velocity_response(self, z: ArrayLike) -> Complexes:
+        """w(z) (...), the velocity estimate per reading, at complex z (...)."""
+        return self.estimator.response(z)[0]
+
+    def plant_slope(self, z: ArrayLike, d: ArrayLike | None = None) -> tuple[Complexes, Complexes]:
+        """P(z) and dP/dz, (..., m, m); d is z - 1 where that is known to more digits than z has."""
+        z = np.asarray(z, dtype=complex)
+        away = z - 1.0 if d is None else np.asarray(d, dtype=complex)
+        held, at = self.sampled_plant, z[..., None, None]
+        resolvent = away[..., None, None] * np.eye(len(held.step)) - held.step
+        try:
+            inner = np.linalg.solve(resolvent, held.new + held.old / at)
+        except np.linalg.LinAlgError:  # on an undamped pole: step aside by a rounding
+            return self.plant_slope(z * (1.0 + 1e-15j), away + 1e-15j * z)
+        slope = -np.linalg.solve(resolvent, inner + held.old / at**2)
+        F, dF = self.force_filter.response(z, away)
+        gain = (F / z**self.whole_delay)[..., None, None]
+        dgain = (dF / z**self.whole_delay)[..., None, None] - self.whole_delay * gain / at
+        P, dP = held.reading @ inner, held.reading @ slope
+        return gain * P, gain * dP + dgain * P
+
+    def inverse_slope(self, z: Complexes, d: Complexes) -> tuple[Complexes, Complexes]:
+        """P^-1 and its derivative, (..., m, m), without forming P: near z = 1 a free motion's 1/d^2 hides others.
+
+        The forces f that give the readings y solve  [d - A, -G; C, 0] [x; f] = [0; y].
+        Raises LinAlgError where the readings are not independent.
+        """
+        held, at, m = self.sampled_plant, z[..., None, None], self.count
+        N = len(held.step)
+        whole = np.zeros((*z.shape, N + m, N + m), dtype=complex)
+        whole[..., :N, :N] = d[..., None, None] * np.eye(N) - held.step
+        whole[..., :N, N:] = -(held.new + held.old / at)
+        whole[..., N:, :N] = held.reading
+        wanted = np.zeros((*z.shape, N + m, m), dtype=complex)
+        wanted[..., N:, :] = np.eye(m)
+        found = np.linalg.solve(whole, wanted)
+        change = np.zeros_like(wanted)
+        change[..., :N, :] = -found[..., :N, :] - (held.old / at**2) @ found[..., N:, :]
+        slope = np.linalg.solve(whole, change)[..., N:, :]
+        F, dF = self.force_filter.response(z, d)
+        lead = (z**self.whole_delay / F)[..., None, None]
+        dlead = lead * (self.whole_delay / z - dF / F)[..., None, None]
+        return lead * found[..., N:, :], lead * slope + dlead * found[..., N:, :]
+
+    @cached_property
+    def affine(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """L = open - input (K position + B velocity): (N, N), (N, m), (m, N), (m, N)."""
+        held, w, F = self.sampled_plant, self.estimator, self.force_filter
+        m, l = self.count, self.whole_delay
+        queue = l + (self.fractional_delay > 0.0)
+        sizes = np.cumsum([0, len(held.step), m * queue, m * len(w.A), m * len(F.A)])
+        x, q, e, f = (slice(a, b) for a, b in pairwise(sizes))
+        N, one = int(sizes[-1]), np.eye(m)
+        states = np.eye(N)
+        position = held.reading @ states[x]
+        velocity = w.direct * position + np.kron(w.output[None], one) @ states[e]
+        # the command: `direct` times the wall's own force, and what the filter holds of its past
+        past = np.kron(F.output[None], one) @ states[f]
+        open_, enters = np.zeros((N, N)), np.zeros((N, m))
+        open_[x] = states[x] + held.step @ states[x]
+        open_[e] = states[e] + np.kron(w.A, one) @ states[e] + np.kron(w.input[:, None], one) @ position
+        open_[f] = states[f] + np.kron(F.A, one) @ states[f]
+        enters[f] = np.kron(F.input[:, None], one)
+        late = [past, *(states[q][m * k : m * (k + 1)] for k in range(queue))]
+        for gain, at in ((held.new, l), (held.old, l + 1)):
+            if at < len(late):
+                open_[x] += gain @ late[at]
+                enters[x] += gain * F.direct * (at == 0)
+        if queue:
+            open_[q] = np.vstack(late[:-1])
+            enters[q][:m] = F.direct * one
+        return open_, enters, position, velocity
+
+    def transition_matrix(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
+        """The map Z_{j+1} = L Z_j (thesis eq. 2.38) for walls K, B of any shape (...): (..., N, N).
+
+        N = moved states + m (delayed forces + states of estimator and filter). Unobserved motions are left out.
+        """
+        K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
+        open_, enters, position, velocity = self.affine
+        feedback = K[..., None, None] * position + B[..., None, None] * velocity
+        return np.asarray(open_ - enters @ feedback)

@@ -1,0 +1,81 @@
+"""Rows of `loop.sections` for many classically damped plants at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.compiled import compiled
+from zwidth.loop.controller import Controller
+from zwidth.loop.hold import held_row
+from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED
+from zwidth.model.rendered_modes import RenderedModes
+
+Floats = NDArray[np.float64]
+
+
+def modal_rows_batch(modes: RenderedModes, controller: Controller) -> tuple[Floats, NDArray[np.int64]]:
+    """The rows (N, m, 9) of each plant, and how many of them are used (N,): 0 where the modes are nan.
+
+    As `sections.sampled_sections` makes them of one plant; an actuator that lags is not known here.
+    """
+    rows = np.zeros((*modes.frequency_squared.shape, 9))
+    used = np.empty(len(rows), dtype=np.int64)
+    _rows(
+        modes.decay,
+        modes.frequency_squared,
+        modes.input,
+        modes.output,
+        controller.sampling_period,
+        controller.fractional_delay,
+        rows,
+        used,
+    )
+    return rows, used
+
+
+@compiled
+def _rows(
+    decay: Floats,
+    squared: Floats,
+    enter: Floats,
+    leave: Floats,
+    period: float,
+    fraction: float,
+    rows: Floats,
+    used: NDArray[np.int64],
+) -> None:
+    N, m = squared.shape
+    residue, taken = np.empty(m), np.empty(m, dtype=np.bool_)
+    for i in range(N):
+        used[i] = 0
+        entering, leaving, stiffest, fastest = 0.0, 0.0, 0.0, 0.0
+        for k in range(m):
+            residue[k], taken[k] = enter[i, k] * leave[i, k], False
+            entering, leaving = entering + abs(enter[i, k]), leaving + abs(leave[i, k])
+            stiffest, fastest = max(stiffest, abs(squared[i, k])), max(fastest, abs(decay[i, k]))
+        total = entering * leaving
+        if not np.isfinite(total):
+            continue
+        for k in range(m):
+            if taken[k]:
+                continue
+            weight = residue[k]
+            for j in range(k + 1, m):
+                apart = abs(squared[i, j] - squared[i, k])
+                if apart <= REPEATED * stiffest and abs(decay[i, j] - decay[i, k]) <= REPEATED * fastest:
+                    taken[j] = True
+                    weight += residue[j]
+            row = held_row(decay[i, k], squared[i, k], period, fraction)
+            still = abs(decay[i, k]) * period < 1e-9
+            level = total * period**2 * (UNOBSERVED_UNDAMPED if still else UNOBSERVED)
+            size = 0.0
+            for c in range(2, 8):
+                size = max(size, abs(weight * row[c]))
+            if not size > level:
+                continue
+            out = rows[i, used[i]]
+            out[0], out[1], out[8] = row[0], row[1], 0.0
+            for c in range(2, 8):
+                out[c] = weight * row[c]
+            used[i] += 1

@@ -1,0 +1,75 @@
+"""What several measures ask of a point: the wanted wall and frequency, and what its loop is like."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from zwidth.conditions.assumptions import COLLOCATED, PLAIN, ConditionCase, case_of
+from zwidth.loop.estimator import NonlinearError
+from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.definition import MeasureError, WantedWall
+from zwidth.measures.handle_impedance import HandleError, handle_of
+from zwidth.model.plant import Plant
+from zwidth.model.reduction import ModelError
+
+# One mass that stands for a mechanism where only its computer is in question.
+UNIT: Final = Plant(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1), np.ones(1))
+
+
+def wall_of(wanted: WantedWall) -> tuple[float, float]:
+    """Stiffness and damping of the wanted wall. Raises MeasureError where they were not told."""
+    K, B = wanted.stiffness, wanted.damping
+    if K is None or B is None:
+        raise MeasureError("needs a wanted wall", [("stiffness", None), ("damping", None)])
+    return K, B
+
+
+def frequency_of(wanted: WantedWall) -> float:
+    """At which the hand moves [Hz]. Raises MeasureError where it was not told."""
+    if wanted.frequency is None:
+        raise MeasureError("needs a frequency at which the hand moves", [("frequency", None)])
+    if not 0.0 < wanted.frequency < np.inf:
+        raise MeasureError(f"needs a frequency above 0 Hz, got {wanted.frequency:g} Hz")
+    return wanted.frequency
+
+
+def plant_with_handle(point: OperatingPoint) -> Plant:
+    """The device alone at one point, whose handle is known. Raises MeasureError where there is no handle."""
+    plant = point.ungripped_plant
+    try:
+        handle_of(plant)
+    except HandleError:
+        where = f"the model {point.model} has" if point.model else "the device has"
+        raise MeasureError(f"needs a handle, and {where} none; give `handle`, or use another model") from None
+    return plant
+
+
+def loop_case(point: OperatingPoint) -> ConditionCase:
+    """The point's loop in the words of the published conditions; of a mechanism the computer's part only.
+
+    Raises  MeasureError  where the loop is not linear, or the model does not apply to a given plant
+    """
+    try:
+        plant = UNIT if point.mechanism is not None else point.ungripped_plant
+        return case_of(Loop(plant, point.controller))
+    except (ModelError, NonlinearError) as error:
+        raise MeasureError(f"has no closed form here: {error}") from None
+
+
+def require_assumptions(case: ConditionCase, *more: str) -> None:
+    """Raises MeasureError, with the assumptions in words, where a loop does not meet those of the closed forms.
+
+    They take the velocity as the backward difference and apply the force as computed; that of damping is left out.
+    """
+    broken = [sentence for sentence in (COLLOCATED, *more, *PLAIN) if sentence in case.unmet]
+    if broken:
+        raise MeasureError(f"has no closed form for this loop, which breaks what it assumes: {' '.join(broken)}")
+
+
+def require_motor_encoders(point: OperatingPoint) -> None:
+    """Raises MeasureError for encoders behind the drives, which a model with its link side held cannot read."""
+    if point.mechanism is not None and point.encoders == "link":
+        raise MeasureError("speaks of motors that are read at the motors, and these encoders read the links")

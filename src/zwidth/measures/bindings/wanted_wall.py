@@ -1,0 +1,98 @@
+"""The catalogue's measures of how a wanted wall feels, asked of operating points.
+
+See `measures.vibration_decay`, `measures.deformation` and `measures.handle_impedance` for the formulas. An
+operator decides with the device whether the wall is stable; what is felt, and what deforms, is the device without
+him.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from zwidth.chart.verdict import STABLE, Verdicts, judge
+from zwidth.conditions.assumptions import SPRUNG, UNDELAYED
+from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures import deformation, handle_impedance, vibration_decay
+from zwidth.measures.bindings.preconditions import (
+    frequency_of,
+    loop_case,
+    plant_with_handle,
+    require_assumptions,
+    require_motor_encoders,
+    wall_of,
+)
+from zwidth.measures.definition import MeasureError, MeasureValues, NoValueError, WantedWall
+from zwidth.measures.evaluate import with_status
+
+_NOT_REACHED = (
+    "no motor-side mass reaches (5.15) at this wall: it needs B > K T/2 and a remaining real root that is not "
+    "slower; or the drives are rigid here"
+)
+
+
+def optimal_spectral_radius(point: OperatingPoint, wanted: WantedWall) -> MeasureValues:
+    """Thesis eq. 5.15, of the motor side on the structure's spring; the masses of the device do not count."""
+    return with_status(point, _optimal(point, wanted).spectral_radius, _NOT_REACHED)
+
+
+def optimal_motor_side_mass(point: OperatingPoint, wanted: WantedWall) -> MeasureValues:
+    """Thesis eq. 5.14 with 5.15."""
+    return with_status(point, _optimal(point, wanted).mass, _NOT_REACHED)
+
+
+def spectral_radius(point: OperatingPoint, wanted: WantedWall) -> float:
+    """Of the wanted wall, by eigenvalues, for whatever model and loop."""
+    return float(_wall_verdicts(point, wanted).spectral_radius[0])
+
+
+def decay_time(point: OperatingPoint, wanted: WantedWall) -> float:
+    """In which the slowest vibration at the wanted wall shrinks to 1/e."""
+    found = _wall_verdicts(point, wanted)
+    if found.verdict[0] != STABLE:
+        raise NoValueError(f"the wanted wall is {found.names[0]} here, so that vibration does not decay")
+    return float(vibration_decay.decay_time(found.spectral_radius[0], point.controller.sampling_period))
+
+
+def structural_distortion(point: OperatingPoint, wanted: WantedWall) -> float:
+    """Largest share of the motors' motion that deforms the structure, up to the wanted frequency."""
+    return deformation.structural_distortion(plant_with_handle(point), frequency_of(wanted))
+
+
+def felt_stiffness(point: OperatingPoint, wanted: WantedWall) -> float:
+    """Real part of force per displacement at the handle, at the wanted wall and frequency."""
+    wall, frequency = wall_of(wanted), frequency_of(wanted)
+    nyquist = 0.5 / point.controller.sampling_period
+    if frequency >= nyquist:
+        raise MeasureError(
+            f"needs a frequency below half the sampling frequency, {nyquist:g} Hz, got {frequency:g} Hz"
+        )
+    plant, found = plant_with_handle(point), _wall_verdicts(point, wanted)
+    if found.verdict[0] != STABLE:
+        raise NoValueError(f"the wanted wall is {found.names[0]} here, so that there is no steady motion to feel")
+    Z = handle_impedance.felt_impedance(Loop(plant, point.controller), *wall, frequency)
+    return float((2j * np.pi * frequency * Z).real)
+
+
+def free_motion_force(point: OperatingPoint, wanted: WantedWall) -> float:
+    """Size of force per velocity at the handle without any wall, at the wanted frequency."""
+    frequency = frequency_of(wanted)
+    return float(np.abs(handle_impedance.free_motion_impedance(plant_with_handle(point), frequency)))
+
+
+def _wall_verdicts(point: OperatingPoint, wanted: WantedWall) -> Verdicts:
+    K, B = wall_of(wanted)
+    return judge(point.loop, [K], [B])
+
+
+def _optimal(point: OperatingPoint, wanted: WantedWall) -> vibration_decay.OptimalMass:
+    K, B = wall_of(wanted)
+    case = loop_case(point)
+    require_assumptions(case, UNDELAYED)
+    require_motor_encoders(point)
+    stiffness = point.effective.stiffness
+    if point.mechanism is None and np.isnan(stiffness):
+        if SPRUNG in case.unmet:
+            raise MeasureError("needs the stiffness between motors and handle, which the device does not have")
+        stiffness = np.asarray(case.traits.side_stiffness)
+    return vibration_decay.optimal_mass(K, B, stiffness, point.controller.sampling_period)

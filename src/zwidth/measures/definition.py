@@ -1,0 +1,211 @@
+"""A measure: one number for a device at an operating point, its unit, its source, and whether more is better."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from zwidth.result import Result
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from zwidth.loop.operating_point import OperatingPoint
+
+Better = Literal["higher", "lower"]
+
+# What became of a place. The first three are those of a posture.
+OK: Final = 0
+OUT_OF_REACH: Final = 1
+SINGULAR: Final = 2
+NO_VALUE: Final = 3
+UNDECIDED: Final = 4
+FAILED: Final = 5
+MISSING: Final = 255
+STATUS: Final = {
+    OK: "ok",
+    OUT_OF_REACH: "out of reach",
+    SINGULAR: "singular",
+    NO_VALUE: "no value",
+    UNDECIDED: "undecided",
+    FAILED: "failed",
+    MISSING: "not computed",
+}
+
+
+Spelling = Callable[[str, str | None], str]
+
+
+def as_argument(name: str, value: str | None) -> str:
+    """An argument as Python spells it.
+
+    >>> as_argument("stiffness", None), as_argument("model", "rigid")
+    ('stiffness', "model='rigid'")
+    """
+    return name if value is None else f"{name}={value!r}"
+
+
+class MeasureError(ValueError):
+    """A measure that cannot be asked of this device, wherever it is; the text follows the measure's name.
+
+    reason        why not
+    arguments     what to give instead: name and value, None for any value
+    alternatives  is one of the arguments enough?
+    """
+
+    def __init__(
+        self, reason: str, arguments: Sequence[tuple[str, str | None]] = (), alternatives: bool = False
+    ) -> None:
+        super().__init__(reason, arguments, alternatives)
+        self.reason, self.arguments, self.alternatives = reason, tuple(arguments), alternatives
+
+    def __str__(self) -> str:
+        return self.spelled(as_argument)
+
+    def spelled(self, spelling: Spelling) -> str:
+        """The sentence, with arguments spelled as the asker gives them: in Python, as options, as keys of a file.
+
+        >>> MeasureError("needs a wanted wall", [("stiffness", None), ("damping", None)]).spelled(as_argument)
+        'needs a wanted wall; give stiffness and damping'
+        """
+        if not self.arguments:
+            return self.reason
+        joined = " or " if self.alternatives else " and "
+        return f"{self.reason}; give {joined.join(spelling(*argument) for argument in self.arguments)}"
+
+    def with_name(self, measure: str) -> MeasureError:
+        """The same with the measure's name before it."""
+        return MeasureError(f"{measure} {self.reason}", self.arguments, self.alternatives)
+
+
+class NoValueError(ValueError):
+    """A place in which a measure has no value; the text says why."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """Why some places have no value.
+
+    status  theirs
+    reason  one sentence
+    count   how many there are
+    first   index of the first, one number per leading axis
+    """
+
+    status: int
+    reason: str
+    count: int
+    first: tuple[int, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class MeasureValues(Result):
+    """A measure's values over places, all with the places' leading axes.
+
+    values  (...)  nan where the status is not OK
+    status  (...)  OK, OUT_OF_REACH, SINGULAR, NO_VALUE, UNDECIDED or FAILED
+    notes   reasons of NO_VALUE, UNDECIDED and FAILED
+    """
+
+    values: NDArray[np.float64]
+    status: NDArray[np.uint8]
+    notes: tuple[Note, ...] = ()
+
+    def __float__(self) -> float:
+        """The value of a single point. Raises TypeError for several."""
+        return float(self.values)
+
+    def document(self) -> dict[str, Any]:
+        """Values, nan where there is none, what became of each point in words, and why some have no value."""
+        words = [STATUS[int(one)] for one in self.status.ravel()]
+        notes = [
+            {"status": STATUS[note.status], "reason": note.reason, "count": note.count, "first": list(note.first)}
+            for note in self.notes
+        ]
+        return {"values": self.values.tolist(), "status": words, "shape": list(self.values.shape), "notes": notes}
+
+    def table(self) -> dict[str, list[Any]]:
+        """The values as columns, one point a row, the last axis fastest."""
+        return {"value": self.values.ravel().tolist(), "status": [STATUS[int(one)] for one in self.status.ravel()]}
+
+    def __repr__(self) -> str:
+        words = [STATUS[int(one)] for one in self.status.ravel()]
+        if len(words) == 1:
+            reason = f": {self.notes[0].reason}" if self.notes else ""
+            value = f"{float(self.values.ravel()[0]):.6g}" if words[0] == STATUS[OK] else words[0] + reason
+            return f"Measured: {value}"
+        counted = ", ".join(f"{words.count(word)} {word}" for word in STATUS.values() if word in words)
+        finite = self.values.ravel()[self.status.ravel() == OK]
+        span = f", {finite.min():.6g} to {finite.max():.6g}" if len(finite) else ""
+        return f"Measured: {len(words)} points, {counted}{span}"
+
+
+@dataclass(frozen=True)
+class WantedWall:
+    """The wall that is to be rendered, which some measures are about; None where it is not told.
+
+    stiffness, damping  [N/m], [N s/m]
+    frequency           at which the hand moves on it [Hz]
+    """
+
+    stiffness: float | None = None
+    damping: float | None = None
+    frequency: float | None = None
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One number for a device at an operating point.
+
+    name      as in commands and study files
+    title     what it is called in a figure
+    unit      "" for none
+    better    what a designer wants; None where it depends
+    source    where its formula stands
+    function  of an `OperatingPoint`; as text, "module:name", imported when it is first asked
+    each      True: asked of one point at a time; False: of all at once, returning an array or a `MeasureValues`
+    along     whether it depends on the rendered direction
+    linear    whether it is read off the linear loop, which leaves out friction, encoder steps and limits
+    of_wall   whether it is about a wanted wall, which its function takes as a second argument
+    wall      the wanted wall
+    """
+
+    name: str
+    title: str
+    unit: str
+    better: Better | None
+    source: str
+    function: Callable[..., Any] | str
+    each: bool = False
+    along: bool = True
+    linear: bool = True
+    of_wall: bool = False
+    wall: WantedWall = WantedWall()
+
+    @property
+    def key(self) -> str:
+        """The name with its unit, as the columns of a table carry it; units with a variable power are left out.
+
+        >>> Measure("stable_area", "", "N^2 s/m^2", None, "", "").key
+        'stable_area_N2s_per_m2'
+        """
+        over, _, under = self.unit.replace(" ", "").replace("^", "").partition("/")
+        written = over + (f"_per_{under}" if under else "")
+        plain = re.fullmatch(r"[A-Za-z0-9_]+", written) and "^r" not in self.unit
+        return f"{self.name}_{written}" if plain else self.name
+
+    def at_wall(self, wall: WantedWall) -> Measure:
+        """The same measure about a wanted wall; itself if it is about none."""
+        return replace(self, wall=wall) if self.of_wall else self
+
+    def compute(self, point: OperatingPoint) -> Any:
+        """What the function says; see `evaluate` for values with status."""
+        function = self.function
+        if isinstance(function, str):
+            module, _, name = function.partition(":")
+            function = getattr(import_module(module), name)
+        return function(point, self.wall) if self.of_wall else function(point)

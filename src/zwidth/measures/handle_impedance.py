@@ -1,0 +1,214 @@
+"""What the hand feels: the impedance at the handle, against that of the wall that was commanded.
+
+The handle h is one end of the device and the wall acts at the other, a, read at s. A hand force f e^{jwt} makes
+the samples of the sensor move by Y e^{jwkT}, and the loop answers with commands
+
+    U = -C Y,      C = K + B w(z),      z = e^{jwT}
+
+Filtered by F(z), held for T after the delay they are a staircase, which the actuator follows with its lag tau; its
+part at w itself is U times
+
+    H = F(z) e^{-jw delay} (1 - e^{-jwT})/(jwT) / (1 + jw tau)
+
+Its other parts, at w + 2 pi n/T, move the sensor too, and the samples cannot tell:
+
+    Y = s^T x + S U,      S = P(z) - H s^T D^-1 a,      D = -w^2 M + jw B + K + lagged dampers
+
+with P the sampled plant, in which all of the staircase is. So the motion x at w obeys
+
+    [ D + H C/(1 + S C) a s^T ] x = h f,      Z = f / (jw h^T x)
+
+which is exact. The motion at w + 2 pi n/T that goes with it is not part of an impedance and is not told; a plant
+with mass hardly follows so fast.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.loop.factor_kernels import factor_arrays, plant_response, velocity_response
+from zwidth.loop.factor_response import factor_response
+from zwidth.loop.filters import low_pass_factors
+from zwidth.loop.loop import Loop
+from zwidth.model.argument_checks import broadcast_walls, require
+from zwidth.model.modes import undamped_modes
+from zwidth.model.plant import Plant
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Relative size below which a singular value, or a component along a free motion, is rounding of 0.
+FREE = 1e-12
+
+
+class HandleError(ValueError):
+    """A plant without a handle: nobody can feel it."""
+
+
+def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complex:
+    """Force over velocity at the handle, Z = f/(jw x_h) (see the derivation above).
+
+    wall_stiffness, wall_damping  of a stable wall [N/m], [N s/m]; an unstable one has no steady answer, and what
+                                  is computed then means nothing
+    frequency  (...)  above 0 and below half the sampling frequency [Hz]
+    Returns    (...)  complex [N s/m]
+    Raises     HandleError  where the plant has no handle
+               ValueError   for a frequency out of range
+
+    A mass of 0.1 kg at 1 Hz feels like its wall, of 1000 N/m and 1 N s/m, but for its inertia (and the sample that
+    hold and difference are late by):
+
+    >>> from zwidth.loop.controller import Controller
+    >>> one, none = np.ones(1), np.zeros((1, 1))
+    >>> loop = Loop(Plant(np.array([[0.1]]), none, none, one, one, one), Controller(0.001))
+    >>> Z = felt_impedance(loop, 1000.0, 1.0, 1.0)
+    >>> round(float(-Z.imag * 2 * np.pi), 2), round(1000.0 - 0.1 * (2 * np.pi) ** 2, 2)
+    (996.09, 996.05)
+    """
+    require("loop", loop, Loop)
+    broadcast_walls(wall_stiffness, wall_damping)
+    f = np.asarray(frequency, dtype=float)
+    nyquist = 0.5 / loop.period
+    if not np.all((f > 0.0) & (f < nyquist)):
+        raise ValueError(f"frequencies must lie between 0 and half the sampling frequency, {nyquist:.6g} Hz")
+    plant, T = loop.plant, loop.period
+    s = 2j * np.pi * f
+    dynamic, act, read, h = _dynamic_stiffness(plant, s)
+    hold = _hold_response(loop, s)
+    P, w = _sampled(loop, s * T)
+    C = wall_stiffness + wall_damping * w
+    alias_response = P - hold * (_solve(dynamic, act) @ read)
+    wall = hold * C / (1.0 + alias_response * C)
+    closed = dynamic + wall[..., None, None] * np.outer(act, read)
+    return np.asarray(1.0 / (s * (_solve(closed, h) @ h)))
+
+
+def free_motion_impedance(plant: Plant, frequency: ArrayLike) -> Complex:
+    """Force over velocity at the handle with no wall at all, 1/(jw G_hh) [N s/m].
+
+    The ideal is 0: of a device in free motion nothing is felt (transparency, after Tavakoli and Howe 2009, known
+    at second hand). What is left is the device's own mass, friction and resonances.
+    """
+    s = 2j * np.pi * np.asarray(frequency, dtype=float)
+    dynamic, _, _, h = _dynamic_stiffness(plant, s)
+    return np.asarray(1.0 / (s * (_solve(dynamic, h) @ h)))
+
+
+def commanded_impedance(wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complex:
+    """K/(jw) + B, what the hand would feel of an ideal wall [N s/m]."""
+    return np.asarray(wall_stiffness / (2j * np.pi * np.asarray(frequency, dtype=float)) + wall_damping)
+
+
+def static_stiffness(plant: Plant, wall_stiffness: ArrayLike) -> Floats:
+    """Stiffness at the handle that a wall is felt with at rest.
+
+        1 / (h^T (K_plant + K a s^T)^-1 h)          two masses and a spring k: K k/(K + k)
+
+    The velocity estimate of what stands still is 0 and the hold keeps a constant force, so that neither sampling
+    nor delay nor damping counts.
+
+    wall_stiffness  (...)  K [N/m]
+    Returns         (...)  [N/m]; 0 where the handle is free to move away, inf where it cannot move
+    Raises          HandleError  where the plant has no handle
+
+    >>> link = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    >>> motor, hand = np.array([0.0, 1.0]), np.array([1.0, 0.0])
+    >>> pair = Plant(np.eye(2), 0 * link, 3000.0 * link, motor, motor, hand)
+    >>> static_stiffness(pair, [0.0, 3000.0, 6000.0]).round(6).tolist()
+    [0.0, 1500.0, 2000.0]
+    """
+    require("plant", plant, Plant)
+    K = np.asarray(wall_stiffness, dtype=float)
+    plant_stiffness, act, read, h = _dynamic_stiffness(plant, np.zeros(()))
+    return _stiffness(plant_stiffness + K[..., None, None] * np.outer(act, read), h)
+
+
+def static_stiffness_limit(plant: Plant) -> float:
+    """What the stiffest wall imaginable is felt with: the limit of `static_stiffness` for K to infinity [N/m].
+
+    The wall then holds the sensor still, and what gives is the structure between it and the hand: k of the
+    two-mass plant, inf for a rigid one. The limit of a hard contact by flexibility (after Tavakoli and Howe 2009,
+    known at second hand).
+    """
+    own, act, read, h = _dynamic_stiffness(plant, np.zeros(()))
+    size = max(float(np.abs(own).max()), np.finfo(float).tiny)
+    constrained = np.block([[own / size, act[:, None]], [read[None, :], np.zeros((1, 1))]])
+    return float(_stiffness(constrained, np.append(h, 0.0))) * size
+
+
+def free_motion_mass(plant: Plant) -> float:
+    """Mass felt at the handle in slow free motion: 1/(h^T Z Z^T h) of the mass-normalised rigid modes Z [kg].
+
+    nan where a spring ties the handle to the ground: then it is a stiffness that is felt.
+    """
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    moved = shapes.T @ handle_of(plant)
+    mobility = float(np.sum(moved[squared == 0.0] ** 2))
+    return 1.0 / mobility if mobility > FREE * float(moved @ moved) else float("nan")
+
+
+def handle_of(plant: Plant) -> Floats:
+    """The plant's handle. Raises HandleError if it has none."""
+    if plant.handle is None:
+        raise HandleError(
+            "the plant has no handle at which a hand could feel it; give `handle`, or use another model"
+        )
+    return plant.handle
+
+
+def _dynamic_stiffness(plant: Plant, s: Complex | Floats) -> tuple[Any, Floats, Floats, Floats]:
+    """D(s) (..., n, n) with actuator, sensor and handle in modal coordinates, where the rigid modes have no
+    stiffness at all: at low frequency nothing else is left of them."""
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    own = s[..., None, None] ** 2 * np.eye(plant.size) + np.diag(squared)
+    dynamic = own + s[..., None, None] * (shapes.T @ plant.damping @ shapes)
+    for damper in plant.lagged_dampers:
+        along = shapes.T @ damper.along
+        lagged = damper.damping * s / (1.0 + s * damper.time_constant)
+        dynamic = dynamic + lagged[..., None, None] * np.outer(along, along)
+    return dynamic, shapes.T @ plant.actuator, shapes.T @ plant.sensor, shapes.T @ handle_of(plant)
+
+
+def _solve(matrices: Complex, right: Floats) -> Complex:
+    """Solutions (..., n) for matrices (..., n, n) and one right-hand side (n,)."""
+    column = np.broadcast_to(right.astype(complex)[:, None], (*matrices.shape[:-1], 1))
+    return np.asarray(np.linalg.solve(matrices, column)[..., 0])
+
+
+def _hold_response(loop: Loop, s: Complex) -> Complex:
+    """H, from commands to the part of the force at s itself."""
+    controller, T = loop.controller, loop.period
+    numerator, denominator = (
+        np.array(rows, dtype=float).reshape(-1, 3) for rows in low_pass_factors(controller.force_filter, T)
+    )
+    filtered = factor_response(numerator, denominator, np.expm1(s * T))
+    stairs = -np.expm1(-s * T) / (s * T) * np.exp(-s * T * controller.delay)
+    return np.asarray(filtered * stairs / (1.0 + s * controller.actuator_time_constant))
+
+
+def _sampled(loop: Loop, log_z: Complex) -> tuple[Complex, Complex]:
+    """P and w at z = exp(log_z)."""
+    factors = factor_arrays(loop)
+    at = list(zip(np.exp(log_z).ravel(), np.expm1(log_z).ravel(), strict=True))
+    P = [plant_response(factors, z, d)[0] for z, d in at]
+    w = [velocity_response(factors, z, d)[0] for z, d in at]
+    return np.array(P).reshape(log_z.shape), np.array(w).reshape(log_z.shape)
+
+
+def _stiffness(A: Floats, h: Floats) -> Floats:
+    """1/(h^T A^-1 h) for A (..., n, n), also where A is singular along motions that do not concern h."""
+    left, size, right = np.linalg.svd(A)
+    small = size <= FREE * np.maximum(size[..., :1], np.finfo(float).tiny)
+    into = np.einsum("...ij,i->...j", left, h)  # components of h along the left singular vectors
+    out = np.einsum("...ji,i->...j", right, h)
+    scale = np.linalg.norm(h)
+    is_free = np.any(small & ((np.abs(into) > 1e-6 * scale) | (np.abs(out) > 1e-6 * scale)), axis=-1)
+    compliance = np.sum(np.where(small, 0.0, into * out / np.where(small, 1.0, size)), axis=-1)
+    # what is left of h held still is rounding
+    whole = np.sum(np.where(small, 0.0, np.abs(into * out) / np.where(small, 1.0, size)), axis=-1)
+    compliance = np.where(np.abs(compliance) <= 1e-14 * whole, 0.0, compliance)
+    with np.errstate(divide="ignore"):
+        return np.where(is_free, 0.0, 1.0 / compliance)

@@ -1,0 +1,181 @@
+"""A plant's first-order form, where damping couples the undamped modes or lags behind the velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.model.modes import UNOBSERVED_UNDAMPED, undamped_modes
+from zwidth.model.plant import Plant
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# A pole whose left and right vectors are this near to orthogonal shares its motion with a neighbour.
+SHARED = 1e-3
+ZERO = 1e-13  # a pole below this share of the largest is a rounded zero
+UNREAD = 1e-12  # share of a sensor's reading that is rounding
+ROUNDING = 1e-13  # of a residue, in shares of the terms that it is summed from
+
+
+@dataclass(frozen=True)
+class FirstOrderForm:
+    """y/f = free/s^2 + output (s - A)^-1 input
+
+    dynamics      (k, k)  A [1/s]
+    input         (k,)
+    output        (k,)
+    poles         (p,)    eigenvalues of A [1/s], conjugates both, but for
+    hidden_poles  (h,)    those that the force does not move or the sensor does not read
+    free_residue  residue of the rigid, undamped motion [1/kg]; 0 where the force does not move it or the sensor
+                  does not read it
+    free_count    how many such motions there are
+    """
+
+    dynamics: Floats
+    input: Floats
+    output: Floats
+    poles: Complexes
+    hidden_poles: Complexes
+    free_residue: float
+    free_count: int
+
+
+def first_order_form(plant: Plant, period: float) -> FirstOrderForm:
+    """The plant's first-order form on coordinates, velocities [m per period] and forces of lagged dampers.
+
+    Motions with neither stiffness nor damping are split off: they are M-orthogonal to the rest, and their double
+    pole at 0 is known exactly. Where motions that are braked only have come to is told by what of it the sensor
+    reads, one state for all of them. Hidden is a pole that moves the reading within a period T [s] by no more than
+    rounding.
+    """
+    free, braked, elastic = _motions(plant)
+    damped_or_elastic = np.hstack([braked, elastic])
+    A, source, reading = _state_matrices(plant, braked, damped_or_elastic, period)
+    ends = np.abs(np.hstack([free, damped_or_elastic]).T @ np.stack([plant.actuator, plant.sensor], axis=1))
+    together = float(np.prod(ends.sum(axis=0)))
+    poles, hidden = _poles(A, source, reading, period, together * period**2)
+    inertia = float((free.T @ plant.sensor) @ (free.T @ plant.actuator))
+    if abs(inertia) <= UNOBSERVED_UNDAMPED * together:
+        inertia = 0.0
+    unread = np.zeros(2 * damped_or_elastic.shape[1] + len(plant.lagged_dampers) - len(A), dtype=complex)
+    hidden_poles = np.concatenate([poles[hidden], unread])
+    return FirstOrderForm(A, source, reading, poles[~hidden], hidden_poles, inertia, int(free.shape[1]))
+
+
+def _drag(plant: Plant) -> Floats:
+    """All damping as if no damper lagged, (n, n)."""
+    lagged = [damper.damping * np.outer(damper.along, damper.along) for damper in plant.lagged_dampers]
+    return np.asarray(plant.damping + sum(lagged, np.zeros_like(plant.damping)))
+
+
+def _motions(plant: Plant) -> tuple[Floats, Floats, Floats]:
+    """Mass-normalised motions: free of stiffness and damping (n, f), braked but free of stiffness (n, b), and
+    elastic (n, e)."""
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    drag = _drag(plant)
+    rigid, elastic = shapes[:, squared == 0.0], shapes[:, squared != 0.0]
+    brakes, axes = np.linalg.eigh(rigid.T @ drag @ rigid)
+    level = 1e-13 * max(float(np.max(np.abs(shapes.T @ drag @ shapes))), np.finfo(float).tiny)
+    slides = np.abs(brakes) <= level
+    return rigid @ axes[:, slides], rigid @ axes[:, ~slides], elastic
+
+
+def _state_matrices(plant: Plant, braked: Floats, kept: Floats, period: float) -> tuple[Floats, Floats, Floats]:
+    """A, input and output on [what is read of the braked motions, elastic coordinates, velocities of both, forces
+    of the lagged dampers]."""
+    k, b, lags = kept.shape[1], braked.shape[1], plant.lagged_dampers
+    elastic = kept[:, b:]
+    read = braked.T @ plant.sensor
+    size = float(np.linalg.norm(read))
+    if size <= UNREAD * float(np.linalg.norm(kept.T @ plant.sensor)):
+        read, size = read[:0], 0.0
+    x = int(size > 0.0) + k - b  # coordinates come first, then k velocities
+    n = x + k + len(lags)
+    A, source, reading = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    if size > 0.0:
+        A[0, x : x + b], reading[0] = read / size / period, size
+    at = slice(x - (k - b), x)
+    A[at, x + b : x + k] = np.eye(k - b) / period
+    A[x : x + k, at] = -(kept.T @ plant.stiffness @ elastic) * period
+    A[x : x + k, x : x + k] = -(kept.T @ plant.damping @ kept)
+    for i, damper in enumerate(lags):
+        along, own = kept.T @ damper.along, x + k + i
+        A[x : x + k, own] = -damper.damping * along
+        A[own, x : x + k] = along / damper.time_constant
+        A[own, own] = -1.0 / damper.time_constant
+    source[x : x + k] = kept.T @ plant.actuator * period
+    reading[at] = elastic.T @ plant.sensor
+    return A, source, reading
+
+
+def _poles(
+    A: Floats, source: Floats, reading: Floats, period: float, alone_gain: float
+) -> tuple[Complexes, NDArray[np.bool_]]:
+    """All poles, and which of them the force does not move or the sensor does not read.
+
+    alone_gain  what a unit force held for T would leave in the reading if no motion held another back [m/N]
+
+    Balancing first gives each motion units of its own, in which a slow pair of poles stays apart.
+    """
+    from scipy.linalg import eig, matrix_balance
+
+    if not len(A):
+        return np.zeros(0, dtype=complex), np.zeros(0, dtype=bool)
+    balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    poles, left, right = eig(balanced, left=True)
+    poles[np.abs(poles) <= ZERO * np.max(np.abs(poles))] = 0.0
+    overlap = np.sum(left.conj() * right, axis=0)
+    alone = np.abs(overlap) > SHARED
+    source, reading = source / scale, reading * scale
+    still = poles == 0.0
+    # |(exp(s T) - 1)/s|: what a unit force held for T leaves
+    reach = np.where(still, period, np.abs(np.expm1(poles * period)) / np.where(still, 1.0, np.abs(poles)))
+    reach = reach / np.where(alone, np.abs(overlap), 1.0)
+    gain = np.abs((left.conj().T @ source) * (reading @ right)) * reach
+    rounding = ROUNDING * (np.abs(left.T) @ np.abs(source)) * (np.abs(reading) @ np.abs(right)) * reach
+    # an undamped motion that the wall hardly moves could only hide the stability of the rest
+    least = np.where(np.abs(poles.real) * period < 1e-9, UNOBSERVED_UNDAMPED * alone_gain, 0.0)
+    hidden = alone & (gain <= np.maximum(least, rounding))
+    return poles, hidden & hidden[_partners(poles)]
+
+
+def _partners(poles: Complexes) -> NDArray[np.int64]:
+    """The index of each pole's conjugate."""
+    return np.asarray(np.argmin(np.abs(poles[:, None] - poles.conj()), axis=1))
+
+
+def without_hidden_poles(form: FirstOrderForm) -> FirstOrderForm:
+    """The form without its hidden poles, on the invariant subspace of the others."""
+    if not len(form.hidden_poles):
+        return form
+    right, left = invariant_subspace(form, form.poles)
+    return replace(
+        form,
+        dynamics=left.T @ form.dynamics @ right,
+        input=left.T @ form.input,
+        output=form.output @ right,
+        hidden_poles=form.hidden_poles[:0],
+    )
+
+
+def invariant_subspace(form: FirstOrderForm, poles: Complexes) -> tuple[Floats, Floats]:
+    """Bases (k, p) of the right and the left invariant subspace of some of the poles, left^T right = 1."""
+    from scipy.linalg import matrix_balance, schur
+
+    every = np.concatenate([form.poles, form.hidden_poles])
+    wanted = np.min(np.abs(every[:, None] - poles), axis=1, initial=np.inf) == 0.0
+
+    def chosen(value: complex) -> bool:
+        return bool(wanted[np.argmin(np.abs(value - every))])
+
+    def basis(A: Floats) -> Floats:
+        _, vectors, count = schur(A, output="complex", sort=chosen)
+        U, _, _ = np.linalg.svd(np.hstack([vectors[:, :count].real, vectors[:, :count].imag]))
+        return np.asarray(U[:, :count])
+
+    balanced, (scale, _) = matrix_balance(form.dynamics, permute=False, separate=True)
+    right, left = basis(balanced), basis(balanced.T)
+    return scale[:, None] * right, np.linalg.solve(left.T @ right, left.T).T / scale[:, None]

@@ -1,0 +1,160 @@
+"""Batches of postures: where each one starts, and the compiled loop that solves them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.compiled import compiled
+from zwidth.model.continuation import OK, OUT_OF_REACH, SINGULAR, follow, largest_magnitude
+from zwidth.model.forward_kinematics import working_memory
+from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
+from zwidth.model.mechanism import Floats, Ints
+from zwidth.model.mechanism_arrays import MechanismArrays
+from zwidth.model.reach_shells import outside_shells
+from zwidth.model.roadmap import roadmap
+from zwidth.threads import in_chunks
+
+SERIAL_MOST: Final = 8  # postures up to which threads cost more than they bring
+ROADMAP_LEAST: Final = 64  # postures of one design, from which on a roadmap pays
+
+
+@dataclass(frozen=True)
+class PostureBatch:
+    """Flat results of a batch of N postures."""
+
+    status: NDArray[np.uint8]
+    angles: Floats
+    mass: Floats
+    jacobian: Floats
+    residual: Floats
+
+    def overwrite(self, where: NDArray[np.bool_] | Ints, other: PostureBatch) -> None:
+        """Write another batch's results over some of this one's."""
+        for mine, new in zip(vars(self).values(), vars(other).values(), strict=True):
+            mine[where] = new
+
+
+def solve_batch(mech: MechanismArrays, design: Ints, reference: Floats, goals: Floats) -> PostureBatch:
+    """Every posture from the start that suits: many of one design by its roadmap, others straight."""
+    designs = len(reference)
+    if len(goals) >= ROADMAP_LEAST * designs:
+        if designs == 1:
+            return by_roadmap(mech, 0, reference[0], goals)
+        solved = empty_batch(mech, len(goals))
+        for p in range(designs):
+            mine = np.flatnonzero(design == p)
+            solved.overwrite(mine, by_roadmap(mech, p, reference[p], goals[mine]))
+        return solved
+    solved = solve_from_starts(mech, design, reference, design, goals)
+    failed = np.flatnonzero(solved.status != OK)
+    if len(failed) == 0:
+        return solved
+    if designs == 1:
+        solved.overwrite(failed, by_roadmap(mech, 0, reference[0], goals[failed]))
+        return solved
+    # the way round, where there is one, is taken by the first design; the others start from its postures
+    first = by_roadmap(mech, 0, reference[0], goals[failed])
+    found = first.status == OK
+    retry = failed[found]
+    starts = np.ascontiguousarray(first.angles[found])
+    solved.overwrite(retry, solve_from_starts(mech, design[retry], starts, np.arange(len(retry)), goals[retry]))
+    return solved
+
+
+def by_roadmap(mech: MechanismArrays, design: int, reference: Floats, goals: Floats) -> PostureBatch:
+    """Start each posture at the roadmap's node of its cell; where that fails, at the nearest nodes.
+
+    What no chain of links can span is not tried.
+    """
+    far = outside_shells(mech, design, goals)
+    if far.any():
+        solved = failed_batch(mech, len(goals), OUT_OF_REACH)
+        solved.overwrite(~far, by_roadmap(mech, design, reference, goals[~far]))
+        return solved
+    road = roadmap(mech, design, reference)
+    designs = np.full(len(goals), design, dtype=np.int64)
+    solved = solve_from_starts(mech, designs, road.angles, road.node_of_cell(goals), goals)
+    missed = np.flatnonzero(solved.status != OK)
+    if len(missed):
+        for nodes in road.nearest_nodes(goals[missed], 4).T:
+            retry = solve_from_starts(mech, designs[missed], road.angles, nodes, goals[missed])
+            better = (retry.status == OK) | ((retry.status == SINGULAR) & (solved.status[missed] == OUT_OF_REACH))
+            solved.overwrite(missed[better], PostureBatch(*(values[better] for values in vars(retry).values())))
+    return solved
+
+
+def empty_batch(mech: MechanismArrays, count: int) -> PostureBatch:
+    n, d = mech.parent.size, mech.driven
+    return PostureBatch(
+        np.empty(count, np.uint8),
+        np.empty((count, n)),
+        np.empty((count, d, d)),
+        np.empty((count, 3, d)),
+        np.empty(count),
+    )
+
+
+def failed_batch(mech: MechanismArrays, count: int, status: int = SINGULAR) -> PostureBatch:
+    """No posture at all; left out: the answer of an assembly that is singular throughout."""
+    solved = empty_batch(mech, count)
+    for numbers in vars(solved).values():
+        numbers.fill(np.nan if numbers.dtype == np.float64 else status)
+    return solved
+
+
+def solve_from_starts(
+    mech: MechanismArrays, design: Ints, starts: Floats, which: Ints, goals: Floats
+) -> PostureBatch:
+    solved = empty_batch(mech, len(goals))
+    kernel: Callable[[int, int], None] = partial(
+        _postures, mech, design, starts, which, goals, *vars(solved).values()
+    )
+    if len(goals) <= SERIAL_MOST:
+        kernel(0, len(goals))
+    else:
+        in_chunks(kernel, len(goals))
+    return solved
+
+
+@compiled
+def _postures(
+    mech: MechanismArrays,
+    design: Ints,
+    starts: Floats,
+    which: Ints,
+    goals: Floats,
+    status: NDArray[np.uint8],
+    angles: Floats,
+    mass: Floats,
+    jacobian: Floats,
+    residual: Floats,
+    first: int,
+    last: int,
+) -> None:
+    """Postures first to last - 1 of a batch, one after the other in one working memory."""
+    work = working_memory(mech)
+    present, gaps = work.angles, work.gaps
+    n, loops = present.size, gaps.size - 3
+    for i in range(first, last):
+        for j in range(n):
+            present[j] = starts[which[i], j]
+        status[i] = follow(mech, design[i], goals[i], present, work)
+        if status[i] != OK:
+            angles[i] = np.nan
+            mass[i] = np.nan
+            jacobian[i] = np.nan
+            residual[i] = np.nan
+            continue
+        for j in range(n):
+            # one turn more or less is the same posture
+            angles[i, j] = present[j] - 2.0 * np.pi * np.floor(present[j] / (2.0 * np.pi) + 0.5)
+        residual[i] = largest_magnitude(gaps, loops)
+        handle_jacobian(work, jacobian, i)
+        unit_motions(mech, work)
+        mass_matrix(mech, design[i], work, mass, i)

@@ -1,0 +1,208 @@
+"""The caption below a figure: a saved figure alone tells which device it shows, where, and how it is sampled.
+
+Every figure of a command, a report, `result.plot()` and a notebook passes `write_caption`, which knows only the
+facts that a result states under the keys of `--json`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont, get_font
+
+from zwidth.show.circumstances import AS_GIVEN, computer_text, omission_text, operator_text
+from zwidth.show.figures.style import FAMILY, context, text_width
+from zwidth.show.output import printable
+from zwidth.show.units import as_written, point
+
+if TYPE_CHECKING:
+    from zwidth.loop.controller import Controller
+    from zwidth.loop.operating_point import OperatingPoint
+
+SIZE: Final = 6.5
+FONT: Final = FontProperties(family=FAMILY, size=SIZE)
+COLOUR: Final = "#404040"
+LEADING: Final = 1.25  # of a line, in heights of its letters
+MARGIN: Final = 0.08  # inches to the left and right of the caption, and above it
+PLANES: Final = ("xy", "xz", "yz")
+WALL_UNITS: Final = {"stiffness": "N_per_m", "damping": "Ns_per_m"}
+ROUND_A_PLANE: Final = ("ByDirection",)  # results in which no direction is meant more than another
+# Results whose answer holds what is not linear.
+NONLINEAR: Final = ("ContactSimulation", "TimeResponse", "MechanismMotion", "LimitCyclePrediction", "Experiment")
+
+
+def write_caption(made: Figure, paragraphs: Sequence[str]) -> None:
+    """Write paragraphs below a figure in small letters, wrapped to its width; the figure grows by their height.
+
+    Sizes of letters are those of the font that comes with matplotlib, so that lines break alike everywhere.
+    """
+    width, height = made.get_size_inches()
+    room = 72.0 * (width - 2.0 * MARGIN)
+    lines = [line for paragraph in paragraphs for line in wrapped(paragraph, room)]
+    if not lines:
+        return
+    added = len(lines) * LEADING * SIZE / 72.0 + MARGIN
+    with context():
+        made.set_size_inches(width, height + added)
+        made.supxlabel(
+            "\n".join(lines),
+            x=MARGIN / width,
+            ha="left",
+            linespacing=LEADING,
+            color=COLOUR,
+            fontproperties=FONT,
+            parse_math=False,
+        )
+
+
+def wrapped(text: str, room: float) -> list[str]:
+    """The text in lines no wider than room [points], broken at blanks, and within a word that is wider itself."""
+    lines = [""]
+    for word in _with_known_letters(text).split(" "):
+        longer = f"{lines[-1]} {word}" if lines[-1] else word
+        if text_width(longer, SIZE) <= room:
+            lines[-1] = longer
+            continue
+        lines += [word] if lines[-1] else []
+        lines[-1] = lines[-1] or word
+        while text_width(lines[-1], SIZE) > room:
+            last = lines[-1]
+            fits = next((n for n in range(len(last) - 1, 1, -1) if text_width(last[:n], SIZE) <= room), 1)
+            lines[-1:] = [last[:fits], last[fits:]]
+    return [line for line in lines if line]
+
+
+def caption_of_facts(facts: Mapping[str, Any], controller: Controller | None) -> list[str]:
+    """The paragraphs of a caption: the device and its posture; the computer, and what a linear answer leaves out.
+
+    facts  under the keys with which a result states its circumstances; a key that is missing or None is left out
+    """
+    first = [part for part in _place(facts) if part]
+    name = printable(str(facts.get("name") or ""))
+    about = f"{name}: {', '.join(first)}" if name and first else name or ", ".join(first)
+    last = [] if controller is None else [computer_text(controller)]
+    if varied := facts.get("varied"):
+        last.append(f"but for what is varied: {', '.join(map(printable, varied))}")
+    if left_out := facts.get("left_out"):
+        last.append(omission_text(left_out))
+    return [paragraph for paragraph in (about, "; ".join(last)) if paragraph]
+
+
+def caption_of_result(result: Any) -> list[str]:
+    """The paragraphs of a result's caption: of its operating point, its loop or its study; [] of a bare number."""
+    at = result.operating_point or getattr(result, "point", None)
+    linear = type(result).__name__ not in NONLINEAR
+    if at is not None:
+        facts = facts_of_point(at, linear=linear) | facts_of_wall(result)
+        facts |= {"directions": None} if type(result).__name__ in ROUND_A_PLANE else {}
+        facts |= facts_of_members(getattr(result, "members", ()))
+        return caption_of_facts(facts, at.controller)
+    if (study := getattr(result, "study", None)) is not None:
+        return caption_of_facts(facts_of_study(study), study.device.controller)
+    if (circumstances := getattr(result, "circumstances", None)) is not None:
+        return caption_of_facts(circumstances, None)
+    loop = getattr(result, "loop", None) or getattr(getattr(result, "chart", None), "loop", None)
+    if loop is None:
+        return []
+    nonlinear = getattr(loop, "nonlinear", None)
+    left_out = nonlinear.kinds if linear and nonlinear is not None else ()
+    return caption_of_facts({"left_out": left_out} | facts_of_wall(result), loop.controller)
+
+
+def facts_of_point(at: OperatingPoint, *, linear: bool = True) -> dict[str, Any]:
+    """What an operating point states of itself; nothing of where it is, for many of them."""
+    facts: dict[str, Any] = {"name": at.name, "model": at.model, "left_out": at.linear_omissions if linear else ()}
+    if at.model != "motor-mass" and at.operator is not None:
+        facts["operator"] = at.operator_name or AS_GIVEN
+    if at.posture is not None and at.directions is not None:
+        facts["assembly"] = at.posture.assembly
+        if not at.shape:
+            facts |= {"position_m": at.posture.position, "directions": at.directions}
+    return facts
+
+
+def facts_of_members(members: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The numbers in which the members of a family differ; nothing of who holds the handle, if that is one."""
+    varied = list(dict.fromkeys(path for member in members for path in member))
+    return {"varied": varied} | ({"operator": None} if "operator" in varied else {})
+
+
+def facts_of_study(study: Any) -> dict[str, Any]:
+    """What all designs of a study have in common, and the numbers in which they differ."""
+    device, keys = study.device, [axis.key for axis in study.sampling.axes]
+    facts: dict[str, Any] = {"name": device.name, "model": study.model, "operator": device.operator_name}
+    if device.mechanism is not None:
+        facts["assembly"] = study.assembly or device.reference_assembly
+        facts["direction"] = device.direction(study.direction)
+        facts["position_m"] = None if isinstance(study.at, Mapping) else device.position(study.at)
+    varied_facts = {"at": "position_m"}
+    fixed = {key: value for key, value in facts.items() if key not in {varied_facts.get(k, k) for k in keys}}
+    return fixed | {"varied": keys, "left_out": device.linear_omissions}
+
+
+def wall_of_document(document: Mapping[str, Any]) -> dict[str, Any]:
+    """The same of a result's document."""
+    if document.get("environment") is not None:
+        return {key: document.get(key) for key in ("environment", "parameters")}
+    values = {name: document.get(f"wall_{name}_{unit}") for name, unit in WALL_UNITS.items()}
+    return {} if values["stiffness"] is None else {"environment": "wall", "parameters": values}
+
+
+def facts_of_wall(result: Any) -> dict[str, Any]:
+    """The wall that a result is about, where it is about one."""
+    environment = getattr(result, "environment", None)
+    if environment is not None and hasattr(result, "parameters"):
+        return {"environment": environment.name, "parameters": result.parameters}
+    values = {name: getattr(result, f"wall_{name}", None) for name in WALL_UNITS}
+    return {} if values["stiffness"] is None else {"environment": "wall", "parameters": values}
+
+
+def _place(facts: Mapping[str, Any]) -> Iterator[str]:
+    """Posture, direction, model, operator and wall, in that order, each as far as it is stated."""
+    if facts.get("position_m") is not None:
+        yield f"handle at {point(facts['position_m'])}"
+    # a polar chart names the plane of its directions, which passes through the handle
+    if "plane_through_m" in facts and (facts["plane"] not in PLANES or np.any(facts["plane_through_m"])):
+        yield f"plane {facts['plane']} through {point(facts['plane_through_m'])}"
+    if facts.get("assembly"):
+        yield f"assembly {printable(facts['assembly'])}"
+    yield _direction(facts)
+    if facts.get("model") not in (None, "full", AS_GIVEN):
+        yield f"{facts['model']} model"
+    if facts.get("operator") not in (None, "none"):
+        yield f"held by {operator_text(facts['operator'])}"
+    yield _environment(facts)
+
+
+def _direction(facts: Mapping[str, Any]) -> str:
+    direction = facts.get("direction")
+    if isinstance(direction, str):
+        return f"along the {direction} direction of each cell"
+    together = facts.get("directions")
+    if together is None and direction is not None:
+        together = [direction]
+    if together is None:
+        return ""
+    law = ", under one wall law" if len(together) > 1 else ""
+    return f"along {' and '.join(point(one, '') for one in together)}{law}"
+
+
+def _environment(facts: Mapping[str, Any]) -> str:
+    environment, values = facts.get("environment"), facts.get("parameters") or {}
+    if environment in (None, "none"):
+        return ""
+    words = printable(str(environment))
+    if {"stiffness", "damping"} <= set(values):
+        words += f" of {as_written(values['stiffness'], 'N/m')} and {as_written(values['damping'], 'Ns/m')}"
+        values = {name: values[name] for name in values if name not in ("stiffness", "damping", "no_pull")}
+    given = ", ".join(f"{name} {as_written(float(value))}" for name, value in values.items())
+    return f"{words} ({given})" if given else words
+
+
+def _with_known_letters(text: str) -> str:
+    """The text with a question mark in place of each letter that the font lacks."""
+    font = get_font(findfont(FONT))
+    return "".join(letter if font.get_char_index(ord(letter)) else "?" for letter in text)

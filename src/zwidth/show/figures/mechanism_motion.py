@@ -1,0 +1,237 @@
+"""A whole mechanism in motion: its postures, the handle's path at the surface, and what happens in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import wrap
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from zwidth.contact.mechanism.motion import MechanismMotion
+from zwidth.contact.mechanism.surfaces import Box, Sphere, Surface, depth_and_normal
+from zwidth.model.mechanism import Mechanism
+from zwidth.model.posture import Posture, PostureError, link_points, solve_posture
+from zwidth.show.figures.contact_response import LONGEST_LINE, draw_envelope, draw_line
+from zwidth.show.figures.mechanism import AXES, joint_points, link_stroke, projection_axes
+from zwidth.show.figures.style import BLACK, BLUE, GREY, LINES, VERMILION, context, figure, label, legend_above
+from zwidth.show.units import quantity
+
+Floats = NDArray[np.float64]
+
+WALL: Final = "#E3E3E3"
+GRID: Final = 801  # points across a drawing at which a surface's depth is asked
+FILLED: Final = 1.0  # widths of the view that a wall is drawn beyond it: equal scales show more of one axis
+NEAR: Final = 1e-6  # rad, by which a posture found again may differ; share of a place that is no motion
+LEAST: Final = 1e-3  # share of the mechanism's size that a close-up shows at least
+WORTH: Final = 1e-3  # share of the largest energy below which an entry is no line
+ROOM: Final = 0.12
+TITLE: Final = 60  # letters of a line
+LINK_COLOURS: Final = tuple(colour for colour, _ in LINES if colour != VERMILION)  # which is the path's
+
+
+def mechanism_motion_figure() -> tuple[Figure, list[Axes]]:
+    """A figure with the five panels of `draw_mechanism_motion`: two drawings, and three courses beside them."""
+    made, first = figure(9.6, 7.6)
+    with context():
+        grid = made.add_gridspec(6, 2, width_ratios=(1.0, 1.1))
+        first.set_subplotspec(grid[:3, 0])
+        close = made.add_subplot(grid[3:, 0])
+        depth = made.add_subplot(grid[:2, 1])
+        rest = [made.add_subplot(grid[row : row + 2, 1], sharex=depth) for row in (2, 4)]
+    return made, [first, close, depth, *rest]
+
+
+def draw_mechanism_motion(axes: Sequence[Axes], motion: MechanismMotion) -> None:
+    """The mechanism at the start and, lighter, at the end; the path close up; depth, force and energies in time.
+
+    axes  as `mechanism_motion_figure` gives them
+    """
+    overall, close, depth, force, energy = axes
+    _draw_overall(overall, motion)
+    draw_close_up(close, motion)
+    draw = draw_envelope if len(motion.time) > LONGEST_LINE else draw_line
+    _draw_contact(depth, force, motion, draw)
+    _draw_energies(energy, motion, draw)
+    for ax in (depth, force, energy) if motion.surface is not None else (energy,):
+        legend_above(ax, columns=4)
+        ax.margins(x=0.0, y=0.08)
+        ax.tick_params(labelbottom=ax is energy)
+    label(energy.xaxis, "Time", "s")
+    depth.figure.align_ylabels([depth, force, energy])
+
+
+def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
+    mechanism, posture = motion.mechanism, motion.start
+    last = _last(motion)
+    poses = [posture] if last is None else [posture, last]
+    strokes = [_strokes(mechanism, pose) for pose in poses]
+    flat = projection_axes(np.vstack([np.zeros((1, 3)), *strokes[0], motion.position]))
+    for faint, pose, lines in zip((False, True), poses, strokes, strict=False):
+        _draw_posture(ax, mechanism, pose, lines, flat, faint)
+    ax.plot(*motion.position[:, flat].T, color=VERMILION, linewidth=1.3, zorder=4.0, label="path")
+    points = np.vstack([np.zeros((1, 3)), *(stroke for lines in strokes for stroke in lines), motion.position])
+    seen = points[:, flat]
+    size = max(float(np.max(np.ptp(seen, axis=0))), 1e-9)
+    own = _bounds(motion.surface, size)
+    view = _view(seen if own is None else np.vstack([seen, own[:, flat]]), size * LEAST)
+    _draw_surface(ax, view, flat, motion)
+    _frame(ax, view, flat)
+    legend_above(ax, columns=4)
+
+
+def draw_close_up(ax: Axes, motion: MechanismMotion) -> None:
+    """The path alone, with where the computer sees the handle; or why there is none."""
+    strokes = _strokes(motion.mechanism, motion.start)
+    flat = projection_axes(np.vstack([np.zeros((1, 3)), *strokes, motion.position]))
+    size = float(np.max(np.ptp(np.vstack(strokes), axis=0)))
+    mark: dict[str, Any] = {"linestyle": "none", "markersize": 7.0, "markeredgecolor": BLACK, "zorder": 5.0}
+    if not len(motion.time):
+        place = motion.start.position[None, flat]
+        ax.plot(*place.T, marker="o", markerfacecolor="white", label="start", **mark)
+        ax.set_title("\n".join(wrap(motion.reason, TITLE)), fontsize=8.0, loc="left")
+        _frame(ax, _view(place, size), flat)
+        return
+    true, seen = motion.position[:, flat], motion.counted_position[:, flat]
+    if np.max(np.abs(true - seen)) > 2e-3 * max(float(np.max(np.ptp(true, axis=0))), 1e-12):
+        ax.plot(*seen.T, color=BLUE, linewidth=0.8, alpha=0.8, label="as read", zorder=3.0)
+    ax.plot(*true.T, color=VERMILION, linewidth=1.3, label="path", zorder=4.0)
+    ax.plot(*true[0][:, None], marker="o", markerfacecolor="white", label="start", **mark)
+    ax.plot(*true[-1][:, None], marker="s", markerfacecolor=BLACK, label="end", **mark)
+    view = _view(true, size * LEAST)
+    _draw_surface(ax, view, flat, motion)
+    _frame(ax, view, flat)
+    legend_above(ax, columns=5)
+
+
+def _last(motion: MechanismMotion) -> Posture | None:
+    """The posture at the end; None where it is not found again, as next to a singularity."""
+    mechanism = motion.mechanism
+    try:
+        found = solve_posture(mechanism, motion.position[-1], motion.start.assembly)
+    except PostureError:
+        return None
+    turned = found.angles[mechanism.drives.joint] - motion.joints[-1]
+    off = np.abs(turned - 2.0 * np.pi * np.round(turned / (2.0 * np.pi)))
+    return found if np.max(off) < NEAR else None
+
+
+def _strokes(mechanism: Mechanism, posture: Posture) -> list[Floats]:
+    placed = link_points(mechanism, posture)
+    return [link_stroke(mechanism, placed, i) for i in range(len(mechanism.links.names))]
+
+
+def _draw_posture(
+    ax: Axes, mechanism: Mechanism, posture: Posture, strokes: list[Floats], flat: list[int], faint: bool
+) -> None:
+    strength = 0.35 if faint else 1.0
+    named = "end" if faint else "start"
+    for n, stroke in enumerate(strokes):
+        colour = LINK_COLOURS[n % len(LINK_COLOURS)]
+        width = 3.0 if faint else 5.0
+        ax.plot(*stroke[:, flat].T, color=colour, linewidth=width, alpha=0.35 * strength, zorder=2.0 - faint)
+        style: dict[str, Any] = {"color": colour, "linewidth": 1.2, "alpha": strength, "zorder": 2.1 - faint}
+        ax.plot(*stroke[:, flat].T, label=named if n == 0 else "", **style)
+    at = joint_points(mechanism, link_points(mechanism, posture))[:, flat]
+    circle: dict[str, Any] = {"marker": "o", "markersize": 5.0, "linestyle": "none", "markeredgecolor": BLACK}
+    ax.plot(*at.T, markerfacecolor="white", alpha=strength, zorder=3.0 - faint, **circle)
+
+
+def _cut(motion: MechanismMotion, flat: list[int]) -> tuple[int, float]:
+    """The axis that is looked along, and where on it the surface is cut: where the handle is deepest."""
+    across = ({0, 1, 2} - set(flat)).pop()
+    return across, float(motion.position[int(np.argmax(motion.depth)), across])
+
+
+def _where(motion: MechanismMotion, cut: tuple[int, float]) -> str:
+    """Where the surface is cut, for a path that does not stay there."""
+    across, place = cut
+    moves = np.ptp(motion.position[:, across]) > NEAR * max(float(np.max(np.abs(motion.position))), 1e-12)
+    return f" at {AXES[across]} = {quantity(place, 'm')}" if moves else ""
+
+
+def _bounds(surface: Surface | None, size: float) -> Floats | None:
+    """Two opposite corners of a surface small enough to be shown whole."""
+    match surface:
+        case Sphere():
+            center, half = surface.center, np.full(3, surface.radius)
+        case Box():
+            center, half = surface.center, np.array([*surface.half_sizes, 0.0][:3])
+        case _:
+            return None
+    middle = np.array([*center, 0.0][:3])
+    half = np.where(np.isfinite(half), half, 0.0)
+    return np.array([middle - half, middle + half]) if np.max(half) < size else None
+
+
+def _view(points: Floats, least: float) -> Floats:
+    """Corners (2, 2) of a rectangle round the points, with some room."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.5 * np.maximum(high - low, least)
+    half = half + ROOM * half.max()
+    return np.array([middle - half, middle + half])
+
+
+def _frame(ax: Axes, view: Floats, flat: list[int]) -> None:
+    """Show the view, at equal scales; the panel's shape decides which axis shows more than it."""
+    ax.set_xlim(*view[:, 0], auto=True)
+    ax.set_ylim(*view[:, 1], auto=True)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.grid(color="#D4D4D4", linewidth=0.5)
+    ax.set_axisbelow(True)
+    for axis, k in zip((ax.xaxis, ax.yaxis), flat, strict=True):
+        label(axis, AXES[k], "m", plain=True)
+
+
+def _draw_surface(ax: Axes, view: Floats, flat: list[int], motion: MechanismMotion) -> None:
+    """Where the wall is, cut at one height: shaded, with its edge."""
+    if motion.surface is None:
+        return
+    cut = _cut(motion, flat)
+    more = FILLED * np.max(view[1] - view[0])
+    x, y = np.linspace(view[0] - more, view[1] + more, GRID).T
+    points = np.empty((GRID, GRID, 3))
+    points[..., flat[0]], points[..., flat[1]], points[..., cut[0]] = x[None, :], y[:, None], cut[1]
+    depth = depth_and_normal(motion.surface, points)[0]
+    if motion.two_sided:
+        name = "two-sided wall"
+    else:
+        name = "wall"
+        ax.contourf(x, y, depth, levels=[0.0, np.inf], colors=[WALL], zorder=0.5)
+    if depth.min() < 0.0 < depth.max():
+        ax.contour(x, y, depth, levels=[0.0], colors=[GREY], linewidths=1.2, zorder=0.7)
+    ax.plot([], [], color=GREY, linewidth=1.2, label=name + _where(motion, cut))
+
+
+def _draw_contact(depth: Axes, force: Axes, motion: MechanismMotion, draw: Any) -> None:
+    label(depth.yaxis, "Depth", "m")
+    label(force.yaxis, "Force", "N")
+    if motion.surface is None:
+        for ax in (depth, force):
+            ax.set_visible(False)
+        return
+    draw(depth, motion.time, motion.depth, BLUE, "depth")
+    depth.axhline(0.0, color=GREY, linewidth=0.7, linestyle=":", zorder=1.5, label="surface")
+    draw(force, motion.time, motion.force_size, BLUE, "force on the handle, as commanded", held=True)
+
+
+def _draw_energies(ax: Axes, motion: MechanismMotion, draw: Any) -> None:
+    """Of the motion and of bent drives; what the others have put in since, where it is worth a line."""
+    courses = {
+        "kinetic": motion.kinetic,
+        "drives bent": motion.elastic,
+        "gravity": motion.gravitational[0] - motion.gravitational,
+        "hand": motion.hand_work,
+        "motors": motion.motor_work,
+        "dry friction": -motion.friction_loss,
+    }
+    sizes = {name: float(np.max(np.abs(values))) for name, values in courses.items()}
+    largest = max(size for size in sizes.values() if size == size)
+    for (name, values), (colour, dashes) in zip(courses.items(), LINES, strict=True):
+        if sizes[name] > WORTH * largest:
+            draw(ax, motion.time, values, colour, name, dashes=dashes)
+    ax.axhline(0.0, color=GREY, linewidth=0.7, linestyle=":", zorder=1.5)
+    label(ax.yaxis, "Energy", "J")

@@ -1,0 +1,107 @@
+"""The report's figures, each as an <svg> element."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+
+from matplotlib.axes import Axes
+
+from zwidth.chart.chart import StabilityChart
+from zwidth.measures.felt_chart import FeltChart
+from zwidth.show.figures.caption import caption_of_facts, facts_of_point, write_caption
+from zwidth.show.figures.decay import draw_decay_contours
+from zwidth.show.figures.felt import draw_felt_chart
+from zwidth.show.figures.frequency import draw_frequency
+from zwidth.show.figures.mechanism import draw_mechanism
+from zwidth.show.figures.plant import as_chain, draw_chain
+from zwidth.show.figures.sensitivity import draw_sensitivities
+from zwidth.show.figures.stability import draw_chart, draw_models
+from zwidth.show.figures.style import context, figure, inline_svg
+from zwidth.show.figures.validity import draw_validity
+from zwidth.show.report.facts import Facts
+from zwidth.study.validity import Validity
+
+TOP = 10  # bars of sensitivities
+
+
+def svg_figures(facts: Facts) -> dict[str, str]:
+    """Name -> SVG; "" for a figure that does not apply to this device."""
+    device, chart, plant = facts.device, facts.chart, facts.loop.plant
+    drawn = {
+        "chart": _svg(facts, "chart", "Stability chart: stable walls", lambda ax: draw_chart(ax, chart))
+        if chart.regions
+        else "",
+        "models": _svg(
+            facts, "models", "Stability charts of simpler models", lambda ax: draw_models(ax, _models(facts))
+        ),
+        "frequency": _svg(
+            facts, "frequency", "Frequency along the edge of stability", lambda ax: draw_frequency(ax, chart), 3.2
+        )
+        if facts.renders
+        else "",
+        "decay": _svg(
+            facts, "decay", "Contours of equal decay", lambda ax: draw_decay_contours(ax, facts.loop, chart=chart)
+        )
+        if chart.regions
+        else "",
+        "device": "",
+        "felt": _felt(facts, facts.felt) if facts.renders else "",
+        "sensitivities": _sensitivities(facts),
+        "validity": _validity(facts, facts.validity),
+    }
+    if facts.posture is not None and facts.direction is not None:
+        posture, direction = facts.posture, facts.direction
+        drawn["device"] = _svg(
+            facts,
+            "device",
+            "The mechanism in its posture",
+            lambda ax: draw_mechanism(ax, device, posture, direction),
+            4.4,
+        )
+    elif (chain := as_chain(plant)) is not None:
+        drawn["device"] = _svg(facts, "device", "The plant", lambda ax: draw_chain(ax, plant, chain), 2.0)
+    return drawn
+
+
+def _felt(facts: Facts, felt: FeltChart | None) -> str:
+    """Only where what is felt differs from what is commanded."""
+    if felt is None or not isfinite(felt.limit) or not felt.regions:
+        return ""
+    return _svg(facts, "felt", "Stable walls at the stiffness that is felt", lambda ax: draw_felt_chart(ax, felt))
+
+
+def _sensitivities(facts: Facts) -> str:
+    rows = len(facts.sensitivities.ranking[:TOP])
+    if not rows:
+        return ""
+    height = 0.8 + 0.24 * max(rows, 2)
+    return _svg(
+        facts,
+        "sensitivities",
+        "Sensitivity of the largest stiffness to each number",
+        lambda ax: draw_sensitivities(ax, facts.sensitivities, TOP, grouped=True),
+        height,
+    )
+
+
+def _validity(facts: Facts, fits: Validity | None) -> str:
+    if fits is None or not len(fits.frequency) or not any(len(fit.error) for fit in fits.fits):
+        return ""
+    return _svg(facts, "validity", "Error of simpler models by frequency", lambda ax: draw_validity(ax, fits))
+
+
+def _models(facts: Facts) -> dict[str, StabilityChart]:
+    """The device as described, then its models."""
+    given = "as described" if facts.model == "full" else f"as described: {facts.model} model"
+    same = f"model-{facts.model}"
+    others = [v for v in facts.variants if v.key.startswith("model-") and v.key != same]
+    return {given: facts.chart, **{v.label: v.chart for v in others if v.chart is not None}}
+
+
+def _svg(facts: Facts, name: str, description: str, draw: Callable[[Axes], None], height: float = 3.7) -> str:
+    with context():
+        made, ax = figure(6.2, height)
+        draw(ax)
+        write_caption(made, caption_of_facts(facts_of_point(facts.point), facts.point.controller))
+        return inline_svg(made, name, description)

@@ -1,0 +1,147 @@
+"""Axes of a study, the numbers tied to them, and the designs they span."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import exp, log, prod
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+WANTED: Final = ("stiffness_N_per_m", "damping_Ns_per_m", "frequency_Hz")
+CIRCUMSTANCES: Final = ("at", "direction", "assembly", "model", "operator", *WANTED)
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A number, or a list of numbers, of the device file that goes with an axis's value v.
+
+        factor * v                          without a power
+        its own value there * (v / v0)^power   with one, v0 being what the file has for the axis
+
+    So a link's mass goes with its length by the power 1, its moment of inertia by 3, where its section stays.
+
+    key              its path
+    file_value       what the file has there; None where that does not matter
+    axis_file_value  v0
+    """
+
+    key: str
+    factor: float = 1.0
+    power: float | None = None
+    file_value: Any = None
+    axis_file_value: float = 1.0
+
+    def value(self, axis_value: Any) -> Any:
+        """What the axis's value makes of it.
+
+        >>> Tie("links.arm.inertia_kg_m2", power=3.0, file_value=[1.0, 2.0], axis_file_value=0.1).value(0.2)
+        [8.0, 16.0]
+        """
+        if self.power is not None:
+            return _times(self.file_value, float((axis_value / self.axis_file_value) ** self.power))
+        return axis_value if self.factor == 1.0 else self.factor * axis_value
+
+
+def _times(value: Any, factor: float) -> Any:
+    return [_times(inner, factor) for inner in value] if isinstance(value, list) else factor * value
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What is varied.
+
+    key     a path of the device file, or one of CIRCUMSTANCES
+    values  those of a grid; of a Latin hypercube those it chooses from, () where it has a range
+    span    lowest and highest; None: only the values
+    log     divided evenly in the logarithm
+    unit    "" for none
+    """
+
+    key: str
+    values: tuple[Any, ...]
+    span: tuple[float, float] | None = None
+    log: bool = False
+    ties: tuple[Tie, ...] = ()
+    unit: str = ""
+
+    @property
+    def numeric(self) -> bool:
+        """Are its values numbers?"""
+        return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.values)
+
+    def at(self, share: float) -> Any:
+        """The value so far along the axis, 0 <= share < 1."""
+        if self.span is None:
+            return self.values[int(share * len(self.values))]
+        low, high = self.span
+        if self.log:
+            return float(min(max(exp(log(low) + share * (log(high) - log(low))), low), high))
+        return float(min(low + share * (high - low), high))
+
+
+def spread(span: tuple[float, float], count: int, *, logarithmic: bool = False) -> tuple[float, ...]:
+    """So many values of a range, its ends exactly among them; of one value the lower end.
+
+    >>> spread((1.0, 100.0), 3, logarithmic=True)
+    (1.0, 10.0, 100.0)
+    """
+    found = np.geomspace(*span, count) if logarithmic else np.linspace(*span, count)
+    return tuple(float(value) for value in found)
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Which designs there are, numbered.
+
+    A grid has every combination, the last axis going round fastest. A Latin hypercube of n designs has in each
+    axis one of them in each n-th of the range, anywhere in it (McKay, Beckman and Conover 1979, read second-hand):
+    the parts of the axes are paired at random, the same for the same seed.
+
+    size  of the Latin hypercube; None: a grid
+    """
+
+    axes: tuple[Axis, ...]
+    size: int | None = None
+    seed: int = 1
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Values along each axis of a grid; of a Latin hypercube its designs."""
+        return tuple(len(axis.values) for axis in self.axes) if self.size is None else (self.size,)
+
+    @property
+    def count(self) -> int:
+        """Number of designs."""
+        return prod(self.shape)
+
+    def values(self, design: int) -> tuple[Any, ...]:
+        """A design's value along each axis.
+
+        >>> Sampling((Axis("a", (1, 2)), Axis("b", ("x", "y", "z")))).values(4)
+        (2, 'y')
+        """
+        if self.size is not None:
+            return tuple(axis.at(share) for axis, share in zip(self.axes, self._shares[design], strict=True))
+        places = np.unravel_index(design, self.shape)
+        return tuple(axis.values[int(place)] for axis, place in zip(self.axes, places, strict=True))
+
+    @cached_property
+    def _shares(self) -> NDArray[np.float64]:
+        """How far along each axis each design lies, (size, axes)."""
+        assert self.size is not None
+        random = np.random.default_rng(self.seed)
+        columns = [(random.permutation(self.size) + random.random(self.size)) / self.size for _ in self.axes]
+        # the division may round up to 1
+        return np.minimum(np.stack(columns, axis=1), np.nextafter(1.0, 0.0))
+
+
+def settings(axes: tuple[Axis, ...], values: tuple[Any, ...]) -> Iterator[tuple[str, Any]]:
+    """Path and value of all that makes a design, tied numbers after those they are tied to."""
+    for axis, value in zip(axes, values, strict=True):
+        yield axis.key, value
+        for tie in axis.ties:
+            yield tie.key, tie.value(value)

@@ -1,0 +1,198 @@
+"""Compiling at first use: what is kept on disk, when it is compiled anew, and that whoever waits is told."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from zwidth.compile_events import compiling, listening
+from zwidth.compiled import can_be_taken_apart
+from zwidth.show.cli.first_use import KernelTimes, Progress, announce_compiling, time_text
+from zwidth.threads import in_chunks
+
+KERNELS = '''
+from typing import NamedTuple
+import numpy as np
+from zwidth.compiled import compiled, compiled_inline, compiled_lean
+
+FACTOR = 3.0
+
+class Pair(NamedTuple):
+    first: np.ndarray
+    second: np.ndarray
+
+@compiled_inline
+def scaled(x: float) -> float:
+    """Text."""
+    return FACTOR * x
+
+@compiled_lean
+def twice(x: float) -> float:
+    return 2.0 * scaled(x)
+
+@compiled
+def total(pair: Pair) -> float:
+    sum = 0.0
+    for x in pair.first:
+        sum += twice(x)
+    return sum
+'''
+CALL = """
+import numpy as np, kernels
+from zwidth.compile_events import listening
+names = []
+with listening(lambda name, ended: ended and names.append(name)):
+    print(kernels.total(kernels.Pair(np.ones(4), np.zeros(4))), names)
+"""
+needs_parts = pytest.mark.skipif(
+    not can_be_taken_apart(), reason="another release of numba: its own cache is used"
+)
+
+
+@pytest.fixture
+def call(tmp_path):
+    """Runs CALL in a process of its own, on the kernels with texts exchanged; returns what it prints."""
+
+    def run(*exchanged: tuple[str, str]) -> str:
+        text = KERNELS
+        for old, new in exchanged:
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "kernels.py").write_text(text)
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+        done = subprocess.run(
+            [sys.executable, "-c", CALL], cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.strip()
+
+    return run
+
+
+@needs_parts
+def test_a_kernel_is_compiled_once_and_only_what_python_calls(call, tmp_path):
+    assert call() == "24.0 ['kernels.total']"
+    assert call() == "24.0 []"
+    (kept,) = (tmp_path / "zwidth" / "kernels").iterdir()
+    assert kept.name.startswith("kernels.total-")
+
+
+@needs_parts
+@pytest.mark.parametrize(
+    ("exchange", "value"),
+    [
+        (("FACTOR = 3.0", "FACTOR = 4.0"), 32.0),
+        (("return 2.0 * scaled", "return 1.0 * scaled"), 12.0),
+        (("first: np.ndarray\n    second: np.ndarray", "second: np.ndarray\n    first: np.ndarray"), 0.0),
+    ],
+    ids=["a constant", "a callee", "the order of a tuple's fields"],
+)
+def test_an_edit_that_matters_is_compiled_anew(call, exchange, value):
+    call()
+    assert call(exchange) == f"{value} ['kernels.total']"
+    assert call() == "24.0 []"
+
+
+@needs_parts
+def test_an_edit_that_does_not_matter_leaves_machine_code_as_it_is(call):
+    call()
+    assert call(("Text.", "Other text."), ("@compiled\n", "# a comment\n\n@compiled\n")) == "24.0 []"
+
+
+@needs_parts
+def test_a_damaged_file_is_compiled_anew(call, tmp_path):
+    call()
+    (kept,) = (tmp_path / "zwidth" / "kernels").iterdir()
+    kept.write_bytes(kept.read_bytes()[:100])
+    assert call() == "24.0 ['kernels.total']"
+    assert call() == "24.0 []"
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 7, 100, 1001])
+def test_chunks_cover_every_item_once(count):
+    visits = np.zeros(count, dtype=int)
+
+    def kernel(first: int, last: int) -> None:
+        visits[first:last] += 1
+
+    in_chunks(kernel, count)
+    assert np.all(visits == 1)
+
+
+def test_an_error_in_a_chunk_is_raised():
+    def kernel(first: int, last: int) -> None:
+        if first <= 5 < last:
+            raise ValueError("the sixth")
+
+    with pytest.raises(ValueError, match="the sixth"):
+        in_chunks(kernel, 50)
+
+
+def test_a_script_is_told_once_and_a_listener_instead_of_the_log(caplog):
+    names: list[tuple[str, bool]] = []
+    with listening(partial(_note, names)), compiling("zwidth.chart.curve.walls"):
+        pass
+    assert names == [("zwidth.chart.curve.walls", False), ("zwidth.chart.curve.walls", True)]
+    assert not caplog.records
+    for _ in range(2):
+        with compiling("zwidth.chart.curve.walls"):
+            pass
+    assert [record.message for record in caplog.records if "first use" in record.message] != []
+    assert len(caplog.records) == 1
+
+
+def _note(names: list[tuple[str, bool]], name: str, ended: bool) -> None:
+    names.append((name, ended))
+
+
+def test_a_command_says_what_it_waits_for(monkeypatch, capsys):
+    times = KernelTimes({"zwidth.a": 20.0, "zwidth.b": 40.0}, {"chart": ["zwidth.a", "zwidth.b"]})
+    monkeypatch.setattr(KernelTimes, "read", lambda: times)
+    with announce_compiling("chart"):
+        for name in ("users.law", "zwidth.a", "zwidth.b"):
+            with compiling(name):
+                pass
+    assert capsys.readouterr().err == "zwidth: first use: compiling 2 kernels for this processor, about 60 s\n"
+
+
+def test_what_remains_is_told_as_it_goes(monkeypatch, capsys):
+    clock = iter([0.0, 6.0, 6.0, 6.0, 7.0])
+    monkeypatch.setattr("zwidth.show.cli.first_use.monotonic", lambda: next(clock))
+    progress = Progress({"a": 3.0, "b": 30.0, "c": 3.0}, 1)
+    progress.finish("a")
+    assert capsys.readouterr().err == "zwidth: 1 compiled, 2 to go, about 35 s left\n"
+    progress.finish("b")
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.2, "5 s"), (12.4, "10 s"), (58.0, "60 s"), (100.0, "2 min")])
+def test_a_span_of_time_is_rounded(seconds, text):
+    assert time_text(seconds) == text
+
+
+def test_the_times_are_those_of_kernels_that_exist():
+    times = KernelTimes.read()
+    assert times.seconds
+    assert times.of_command
+    for name in times.seconds:
+        module, _, function = name.rpartition(".")
+        assert hasattr(import_module(module), function), name
+    assert {name for names in times.of_command.values() for name in names} <= set(times.seconds)
+
+
+def test_compile_finds_nothing_to_do_after_the_set_up():
+    """The set-up has compiled all kernels: what `zwidth compile` wants is there."""
+    command = [str(Path(sys.executable).with_name("zwidth")), "compile", "--json"]
+    first = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert json.loads(again.stdout)["kernels"] == 0
+    assert again.stderr == ""
+    assert Path(first["folder"]).is_dir()
