@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import nullcontext
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -33,9 +34,11 @@ def one_thread() -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def no_progress_messages() -> Iterator[None]:
-    """A command line on a slow machine says no more than on a fast one, also where tests share what it said."""
+    """A command line on a slow machine, or one that has to compile, says no more than another, also where tests
+    share what it said. That no command compiles after the set-up is for `make compile-check`."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("zwidth.show.cli.progress.PATIENCE", 1e6)
+        patch.setattr("zwidth.show.cli.command.announce_compiling", lambda command: nullcontext())
         yield
 
 

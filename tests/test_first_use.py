@@ -13,9 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from zwidth import compile_events
 from zwidth.compile_events import compiling, listening
 from zwidth.compiled import can_be_taken_apart
-from zwidth.show.cli.first_use import KernelTimes, Progress, announce_compiling, time_text
+from zwidth.show.cli.first_use import KernelTimes, Progress, announce_compiling
+from zwidth.show.cli.process import time_text
 from zwidth.threads import in_chunks
 
 KERNELS = '''
@@ -137,6 +139,7 @@ def test_an_error_in_a_chunk_is_raised():
 
 
 def test_a_script_is_told_once_and_a_listener_instead_of_the_log(caplog):
+    compile_events._log_first_use.cache_clear()  # another test may have compiled
     names: list[tuple[str, bool]] = []
     with listening(partial(_note, names)), compiling("zwidth.chart.curve.walls"):
         pass

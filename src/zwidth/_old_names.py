@@ -1,6 +1,6 @@
-"""Names of the release 0.1.0 that still work for one release, with a warning that tells what to write instead.
+"""Names of the release 0.1.0 that still work for one release, with a warning that says what to write instead.
 
-This is the one place where two ways to say a thing stand side by side; it goes with the release after the next.
+No other module has two names for one thing. To be removed with the release after the next.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ MOVED: Final = {
 
 
 def old_name(name: str) -> Any:
-    """What a name that once stood at the top means today.
+    """The object that an old name of the top module means today.
 
     Warns   DeprecationWarning  with the name to write instead
-    Raises  AttributeError      for a name that never stood there
+    Raises  AttributeError      for a name that the top module never had
     """
     package = _package_of(name)
     if package is not None:

@@ -1,4 +1,4 @@
-"""Forwards from the objects' verbs to what carries them out: the one module that may import upwards.
+"""The functions behind the methods of `Device` and `OperatingPoint`: the one module that may import upwards.
 
 `point.chart()` reads better than `chart_at(point)`, but an operating point knows nothing of charts. Each function
 here imports what it forwards to when it is called, and does nothing else.
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from zwidth.measures.felt_wall import FeltWall
     from zwidth.model.plant import Plant
     from zwidth.model.posture import Posture
+    from zwidth.progress import Progress
     from zwidth.result import Result
     from zwidth.study.experiment_plan import Plan
     from zwidth.study.measured_boundary import Experiment
@@ -100,10 +101,12 @@ def bounds(point: OperatingPoint, damping: float | None) -> BoundsComparison:
     return compare_bounds(point, damping)
 
 
-def guarantees(point: OperatingPoint, coupling: bool, wall: tuple[float, float] | None) -> Guarantees:
+def guarantees(
+    point: OperatingPoint, coupling: bool, wall: tuple[float, float] | None, progress: Progress | None
+) -> Guarantees:
     from zwidth.guarantees.loop_guarantees import guarantees_of
 
-    return guarantees_of(point, coupling, wall)
+    return guarantees_of(point, coupling, wall, progress)
 
 
 def felt(point: OperatingPoint, stiffness: float, damping: float) -> FeltWall:

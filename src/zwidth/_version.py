@@ -1,3 +1,3 @@
-"""The version, for those that only want to state it."""
+"""The version number, in a module that imports nothing."""
 
 __version__ = "0.1.0"

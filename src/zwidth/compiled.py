@@ -6,14 +6,16 @@ compiled for other targets.
 A kernel is compiled in one of two ways, by who calls it. Called by another kernel it is only translated:
 optimising and emitting machine code are left to the kernel that Python calls, which does both once for all that it
 holds. Numba by itself does both at every level of calls, which takes twice the time (the kernels of
-`zwidth move`: 84 s against 38 s of processor time). Called by Python it becomes machine code, which `machine_code`
+`zwidth move`: 84 s against 31 s of processor time). Called by Python it becomes machine code, which `machine_code`
 keeps on disk; the interpreter's lock is released while it runs, so that `threads.in_chunks` can spread a loop over
 the cores.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Final, TypeVar, cast
 
 import numba
@@ -32,6 +34,7 @@ INLINED: Final[dict[str, Any]] = {**NO_REFERENCE_COUNTS, "forceinline": True}
 # Numba's releases whose compiler is known to work as it is taken apart below; with others kernels are compiled by
 # `numba.njit` as it is: the same answers, a longer wait at first use.
 TAKEN_APART: Final = ((0, 61), (0, 68))
+COMPILING_THRESHOLDS: Final = (100_000, 1000, 1000)  # of Python's garbage collector, see gc.set_threshold
 
 
 def compiled(function: Function) -> Function:
@@ -86,7 +89,8 @@ def _kernel(function: Function, options: dict[str, Any]) -> Function:
 
 
 class _PartLibrary(JITCodeLibrary):
-    """Translated code of a kernel that other kernels call: neither optimised nor loaded by itself."""
+    """Translated code of a kernel that other kernels call: simplified function by function, neither optimised as a
+    whole nor loaded."""
 
     class _Unloaded:
         def set_env(self, name: str, environment: Any) -> None:
@@ -96,9 +100,6 @@ class _PartLibrary(JITCodeLibrary):
     def codegen(self) -> Any:
         """What numba asks to register the loaded code; nothing was."""
         return self._Unloaded()
-
-    def _optimize_functions(self, module: Any) -> None:
-        module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
         """Left to the kernel that Python calls."""
@@ -117,8 +118,11 @@ class _PartLibrary(JITCodeLibrary):
 class _EntryLibrary(JITCodeLibrary):
     """Machine code of a kernel that Python calls, with all that it calls in turn, optimised once."""
 
-    def _optimize_functions(self, module: Any) -> None:
-        module.data_layout = self._codegen._data_layout
+    def _optimize_final_module(self) -> None:
+        """Once, where numba optimises twice; without the passes that look for vectors: the loops here run over the
+        few bodies of a mechanism or the few poles of a loop, and gain nothing from them."""
+        passes, builder = self._codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=False)
+        passes.run(self._final_module, builder)
 
 
 class _PartCompiler(compiler.CompilerBase):
@@ -163,8 +167,20 @@ class _AnnouncedCompiler:
         return getattr(self._inner, name)
 
     def compile(self, *arguments: Any) -> Any:
-        with compiling(self._name):
+        with compiling(self._name), rare_garbage_collection():
             return self._inner.compile(*arguments)
+
+
+@contextmanager
+def rare_garbage_collection() -> Iterator[None]:
+    """Around a compilation, which makes millions of objects that live until its end: looking through all of them
+    again and again takes a tenth of the time."""
+    thresholds = gc.get_threshold()
+    gc.set_threshold(*COMPILING_THRESHOLDS)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*thresholds)
 
 
 class _Kernel(registry.CPUDispatcher):

@@ -1,12 +1,12 @@
-"""Refusing what the machine's memory cannot hold, before it is asked for."""
+"""Refuse a computation whose result would not fit into the machine's memory, before it begins."""
 
 from __future__ import annotations
 
 import os
 from typing import Final
 
-SHARE: Final = 0.5  # of the memory there is
-UNKNOWN: Final = 4e9  # bytes taken to be there where the system does not say
+SHARE: Final = 0.5  # of the machine's memory
+UNKNOWN: Final = 4e9  # bytes of memory assumed where the system does not state them
 
 
 class TooLarge(ValueError):
@@ -14,9 +14,10 @@ class TooLarge(ValueError):
 
 
 def check_memory(numbers: float, what: str, advice: str) -> None:
-    """Raises TooLarge where so many floating-point numbers would take more than half of the memory.
+    """Raise TooLarge if floating-point numbers of 8 bytes would take more than half of the machine's memory.
 
-    what    what they are, for the sentence;   advice  what to do instead
+    numbers  how many there would be
+    what     what they are, which begins the message;   advice  what to do instead, which ends it
     """
     try:
         memory = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
@@ -24,4 +25,7 @@ def check_memory(numbers: float, what: str, advice: str) -> None:
         memory = UNKNOWN
     wanted = 8.0 * numbers
     if not wanted <= SHARE * memory:
-        raise TooLarge(f"{what} would take {wanted / 1e9:.3g} GB, of {memory / 1e9:.3g} GB there are; {advice}")
+        raise TooLarge(
+            f"{what} would take {wanted / 1e9:.3g} GB of memory, "
+            f"and this machine has {memory / 1e9:.3g} GB; {advice}"
+        )

@@ -1,4 +1,4 @@
-"""What every result can do: tell its keys and its columns, show itself in a few lines, and draw itself."""
+"""`Result`: the methods of every result: a document, a table, a short repr and a figure."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 class Result:
-    """A result: numbers with the way to a document, a table, a figure and a notebook.
+    """A result: numbers that can be read as a document, a table, a figure or in a notebook.
 
     `document()` holds every number under its key, the unit in the name, as `--json` prints it; `table()` holds
     columns of equal length, as a .csv file has them. `repr` is a few lines; arrays are not spelled out. Nothing of
     files or figures is loaded until `plot`, or a notebook, asks for it.
 
-    operating_point  what it is about, which its figure states; None: a result of numbers that know no device
+    operating_point  operating point of the result, which its figure states; None: a result without a device
     """
 
     operating_point: OperatingPoint | None = None

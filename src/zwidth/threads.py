@@ -1,4 +1,4 @@
-"""Kernels over the cores: threads that each take chunks of a loop.
+"""Run a kernel on all cores: threads that each compute chunks of a loop.
 
 Kernels release the interpreter's lock, so that threads of Python's own suffice. Numba's parallel loops do the same
 work, but take ten seconds of compiling each, for a loop that holds nothing but a call.
@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numba
 
-CHUNKS_PER_THREAD = 8  # so that no thread waits long for one that drew the slow items
+CHUNKS_PER_THREAD = 8  # so that no thread waits long for one whose items are slow
 
 
 def in_chunks(kernel: Callable[[int, int], None], count: int) -> None:

@@ -170,7 +170,7 @@ def test_a_wrong_command_line_is_refused_on_one_line_each(words, says):
 NO_OUTPUT = [
     ("missing/chart.svg", "there is no folder"),
     ("folder.svg", "is a directory"),
-    ("pipe.svg", "is no ordinary file"),
+    ("pipe.svg", "is not an ordinary file"),
     ("chart.txt", "must end in .png or .svg"),
     ("chart", "must end in .png or .svg"),
     ("", "'--output': is empty; give a name"),

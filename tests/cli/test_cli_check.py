@@ -90,6 +90,7 @@ def test_verdicts_are_written_as_data(tmp_path):
             ],
         ),
         (HEAD.strip() + ",damping_Ns_per_m\n1,2,3\n", ["damping_Ns_per_m is there more than once"]),
+        (HEAD + "5000;10\n", ["line 2: the cells are separated by ';'; use commas"]),
         (HEAD + "1,soft\n", ["line 2: damping_Ns_per_m: must be a finite number, got 'soft'"]),
         (HEAD + "1,2\n\n3,\n", ["line 4: damping_Ns_per_m: must be a finite number, but it is missing"]),
         (HEAD + "1\n", ["line 2: damping_Ns_per_m: must be a finite number, but it is missing"]),

@@ -270,7 +270,7 @@ def test_a_measured_response_has_nothing_to_disturb(folder):
         (("--push", "inf"), "--push: must be finite"),
         (("--output", "points.txt"), "must end in"),
         (("--resume", "notes.txt"), "is not the journal of a run"),
-        (("--resume", "."), ".: is no plain file"),
+        (("--resume", "."), ".: is not an ordinary file"),
         (("--resume", "nowhere/run.progress"), "cannot be written"),
     ],
 )

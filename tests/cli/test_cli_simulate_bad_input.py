@@ -55,7 +55,7 @@ BAD = [
     (("--environment", "slot", "--parameter", "width"), "NAME=NUMBER"),
     (("--environment", "slot", "--parameter", "width=1", "--parameter", "width=2"), "given twice"),
     (("--environment", "texture", "--stiffness", 3), "no such parameter"),
-    ((*WALL, "--ramp", 0.5), "nobody pushes; add --push"),
+    ((*WALL, "--ramp", 0.5), "no push is given; add --push"),
     ((*WALL, "--tremor", "1"), "2 finite numbers"),
     ((*WALL, "--tremor=-1,10"), "--tremor: amplitude"),
     ((*WALL, "--reach", "0.01"), "--reach: needs an arm"),

@@ -226,7 +226,8 @@ def test_a_start_of_the_wrong_shape_is_refused():
 
 def test_days_are_refused_with_the_memory_they_would_take():
     with pytest.raises(
-        TooLarge, match=r"1 run of .* samples would take .* GB, of .* GB there are; simulate a shorter"
+        TooLarge,
+        match=r"1 run of .* samples would take .* GB of memory, and this .* has .* GB; simulate a shorter",
     ):
         run(two_mass_loop(), 100.0, 1.0, 30 * 86400.0)
     with pytest.raises(TooLarge, match="fewer runs at once"):

@@ -195,7 +195,7 @@ WRONG = [
     ({"environment": "slott"}, "environment", "did you mean slot?"),
     ({"environment": "slot", "wall": "one-sided"}, "wall", "leave one out"),
     ({"environment": "texture", "stiffness": 3.0}, "stiffness", "texture has no such parameter"),
-    ({"stiffness": 1.0, "ramp": 0.5}, "ramp", "nobody pushes; give push"),
+    ({"stiffness": 1.0, "ramp": 0.5}, "ramp", "no push is given; give push"),
     ({"stiffness": 1.0, "reach": Reach(0.1)}, "reach", "nobody holds the device; give operator"),
     ({"stiffness": 1.0, "reflex": Reflex(1.0)}, "reflex", "nobody holds the device; give operator"),
 ]

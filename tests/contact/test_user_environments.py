@@ -139,7 +139,7 @@ def test_a_parameter_without_default_must_be_given(write_environment):
         ("\nraise SystemExit(3)", r"own\.py:2 does not run: SystemExit: 3"),
         (GOOD.replace("push(", "pusch("), r"own\.py has no environment push; did you mean pusch\?"),
         ("", r"own\.py has no environment push; it has none"),
-        ("def push(x): return 0.0", r"push in own\.py is no environment: put @environment"),
+        ("def push(x): return 0.0", r"push in own\.py is not an environment; put @environment"),
         (
             GOOD.replace("T, p, m", "p, m"),
             r"push must take \(position, velocity, time, period, parameters, memory\)",

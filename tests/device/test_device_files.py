@@ -94,7 +94,7 @@ def test_a_refusal_repeats_nothing_of_a_file_that_is_no_sweep(folder, file):
 def test_a_pipe_for_a_response_is_refused(folder):
     os.mkfifo(folder / "pipe.csv")
     (line,) = faults(folder, "pipe.csv")
-    assert line.endswith("pipe.csv: is a pipe, no plain file; give a CSV file")
+    assert line.endswith("pipe.csv: is a pipe, not an ordinary file; give a CSV file")
 
 
 @pytest.mark.usefixtures("no_waiting")
@@ -113,7 +113,7 @@ def test_a_pipe_for_a_file_that_is_read_again_is_one_line(tmp_path, words):
     pipe = tmp_path / "pipe.py"
     os.mkfifo(pipe)
     (line,) = refusal_lines(*(word.format(pipe) for word in words))
-    assert "no plain file" in line
+    assert "not an ordinary file" in line
 
 
 @pytest.mark.usefixtures("no_waiting")

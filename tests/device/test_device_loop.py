@@ -198,7 +198,11 @@ FAULTS = [
     ),
     (with_velocity("savitzky-golay", samples=4), "loop.velocity.order", "is missing"),
     (with_velocity("savitzky-golay", samples=4.5, order=2), "loop.velocity.samples", "must be a whole number"),
-    (with_velocity("savitzky-golay", samples=5, order=2, centred=1), "loop.velocity.centred", "valid boolean"),
+    (
+        with_velocity("savitzky-golay", samples=5, order=2, centred=1),
+        "loop.velocity.centred",
+        "true or false, got 1",
+    ),
     (with_velocity("windowed-difference", samples=5000), "loop.velocity.samples", "must be at most 100, got 5000"),
     (with_velocity("windowed-difference", samples=0), "loop.velocity.samples", "must be at least 1"),
     (with_velocity("windowed-difference"), "loop.velocity.samples", "is missing"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -21,7 +22,7 @@ from zwidth.guarantees.coupling import coupling_angles, coupling_region, couplin
 from zwidth.guarantees.loop_guarantees import find_guarantees
 from zwidth.guarantees.spring_family import SpringFamily
 from zwidth.guarantees.spring_stable import nyquist_spring, spring_stable_region
-from zwidth.guarantees.two_port import allows, llewellyn_demand, sampled_demand
+from zwidth.guarantees.two_port import allows, coupling_impedance, llewellyn_demand, sampled_demand
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 
@@ -176,6 +177,28 @@ def test_a_region_holds_the_couplings_that_meet_the_demand(paddle):
     assert np.mean(allows(demand, k, b, T) == region.contains(k, b)) > 0.99
 
 
+@pytest.mark.parametrize("lowest_angle", [3e-3, 3e-4, 3e-5])
+def test_a_device_damped_only_inside_has_no_coupling(lowest_angle, monkeypatch):
+    """Without the limit at low frequencies the stiffest one is 3.5e-7 N/m at 3e-4, and falls with its square."""
+    monkeypatch.setattr("zwidth.guarantees.coupling.LOWEST", lowest_angle)
+    loop = published()
+    found = couplings(loop, loop.plant.handle)
+    for region in found.regions.values():
+        assert not region.rings
+        assert "dissipates too little" in region.reason
+    assert repr(found) == "Couplings: llewellyn none, raisbeck none, sampled none"
+
+
+@pytest.mark.parametrize(("ground_damping", "stiffest"), [(0.01, 98.94973), (1.0, 1753.93879)])
+@pytest.mark.parametrize("lowest_angle", [3e-3, 3e-4, 3e-5])
+def test_couplings_of_a_grounded_device_are_not_of_the_grid(lowest_angle, ground_damping, stiffest, monkeypatch):
+    monkeypatch.setattr("zwidth.guarantees.coupling.LOWEST", lowest_angle)
+    loop = published()
+    damping = loop.plant.damping + np.diag([ground_damping, 0.0])
+    grounded = replace(loop, plant=replace(loop.plant, damping=damping))
+    assert_allclose(couplings(grounded, loop.plant.handle).sampled.stiffness_max, stiffest, rtol=1e-5)
+
+
 def test_a_stiff_wall_is_softened_to_what_is_passive(paddle):
     demand = sampled_demand(paddle, coupling_angles(paddle, ONE), ONE)
     limit = softest_limit(demand, 5000.0, 0.0, T)
@@ -185,9 +208,24 @@ def test_a_stiff_wall_is_softened_to_what_is_passive(paddle):
     assert np.isinf(softest_limit(demand, 1500.0, 0.0, T).stiffness)
 
 
-def test_without_a_handle_only_the_actuator_can_be_asked(paddle):
-    from dataclasses import replace
+@pytest.mark.parametrize("lowest_angle", [3e-3, 3e-4, 3e-5])
+def test_a_walls_coupling_is_not_of_the_grid(lowest_angle, monkeypatch):
+    """Centre and radius are 1e11 times what is left of them at low angles; above 0.05 rad nothing cancels."""
+    monkeypatch.setattr("zwidth.guarantees.coupling.LOWEST", lowest_angle)
+    loop = published()
+    limit = couplings(loop, loop.plant.handle, (8000.0, 11.0)).limit
+    angles = np.linspace(0.05, np.pi * (1.0 - 1e-9), 20001)
+    demand = sampled_demand(loop, angles, loop.plant.handle)
+    seen = demand.centre + 1.0 / coupling_impedance(8000.0, 11.0, angles, loop.period)
+    margins = [
+        np.min(np.abs(seen + 1.0 / coupling_impedance(k, limit.damping, angles, loop.period)) / demand.radius)
+        for k in (0.999 * limit.stiffness, 1.001 * limit.stiffness)
+    ]
+    assert margins[0] > 1.0 > margins[1]
+    assert_allclose(limit.stiffness, 52364.275, rtol=1e-6)
 
+
+def test_without_a_handle_only_the_actuator_can_be_asked(paddle):
     bare = Loop(replace(paddle.plant, handle=None), paddle.controller)
     found = find_guarantees(bare)
     assert_allclose(found["passive-at-actuator"].region.stiffness_max, 2000.0, rtol=1e-9)

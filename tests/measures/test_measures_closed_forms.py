@@ -113,7 +113,7 @@ def test_whatever_else_breaks_an_assumption_is_refused(change, reason):
 def test_what_only_one_of_them_refuses():
     motors = five_bar("motor-mass")
     check_refusal(CLOSED[0], replace(motors, controller=replace(motors.controller, delay=1.0)), "without delay")
-    check_refusal(CLOSED[0], replace(motors, encoders="link"), "encoders read the links")
+    check_refusal(CLOSED[0], replace(motors, encoders="link"), "those of this device read the links")
     hand = Operator(0.8, 580.0, 5.5, 1e4, 5.0)
     check_refusal(CLOSED[0], replace(five_bar("rigid"), operator=hand), "operator='none'")
     check_refusal(CLOSED[0], point_of(replace(mass(0.287), sensor=np.array([-1.0]))), "where the encoder reads")
@@ -166,7 +166,7 @@ def test_the_optimum_of_a_given_plant():
         assert float(measure_value(OPTIMAL[1], point_of(plant)).values) == pytest.approx(0.0510576, abs=5e-8)
     check_refusal(OPTIMAL[0], point_of(mass(0.287)), "stiffness between motors and handle")
     check_refusal(OPTIMAL[0], point_of(published().plant, delay=1.0), "without delay")
-    check_refusal(OPTIMAL[0], replace(five_bar(), encoders="link"), "encoders read the links")
+    check_refusal(OPTIMAL[0], replace(five_bar(), encoders="link"), "those of this device read the links")
 
 
 def test_the_radius_and_decay_of_any_loop():

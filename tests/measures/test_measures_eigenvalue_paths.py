@@ -142,7 +142,7 @@ def test_what_cannot_be_followed():
     with pytest.raises(ValueError, match="finite"):
         wall_paths(loop, 100.0, [0.0, np.inf])
     for values in ([1.0], [0.0, 1.0, 1.0], [[0.0, 1.0]]):
-        with pytest.raises(ValueError, match="rise or fall"):
+        with pytest.raises(ValueError, match="rising or falling"):
             eigenvalue_paths(lambda a: [[a]], values)
     with pytest.raises(ValueError, match="one of stiffness and damping"):
         wall_paths(loop, [1.0, 2.0], [1.0, 2.0])

@@ -163,12 +163,12 @@ def test_a_requirement_is_read(text, name, at_least, value):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("stiffness_max", "is no requirement: write NAME>=VALUE"),
-        ("stiffness_max=5000", "is no requirement"),
-        ("stiffness_max>5000", "is no requirement"),
-        ("stiffness_max>==5000", "is no requirement"),
-        (">=5000", "is no requirement"),
-        ("", "is no requirement"),
+        ("stiffness_max", "is not a requirement; write NAME>=VALUE"),
+        ("stiffness_max=5000", "is not a requirement"),
+        ("stiffness_max>5000", "is not a requirement"),
+        ("stiffness_max>==5000", "is not a requirement"),
+        (">=5000", "is not a requirement"),
+        ("", "is not a requirement"),
         ("stiffness_max>=much", "must be a finite number, got 'much'"),
         ("stiffness_max>=", "must be a finite number, got ''"),
         ("stiffness_max>=inf", "must be a finite number"),

@@ -159,7 +159,9 @@ def test_ctrl_c_stops_and_leaves_no_process(tmp_path):
 
 def test_what_does_not_fit_into_memory_is_refused_with_its_size():
     job = RootsJob(10**13)
-    with pytest.raises(TooLarge, match=r"10000000000000 cells of 2 measures would take 3\.6e\+05 GB, of .* ask"):
+    with pytest.raises(
+        TooLarge, match=r"10000000000000 cells of 2 measures would take 3\.6e\+05 GB of memory, .* ask"
+    ):
         run(job)
     assert job.computed_ranges == []
 

@@ -163,13 +163,13 @@ def test_what_is_reached_is_reached(spatial):
     [
         ({"axes": "xz"}, r"cannot leave the plane z = 0 m, .* ask for axes='xy'"),
         ({"axes": (1, 0, 0, -3, 0, 0)}, "are parallel"),
-        ({"axes": (1, 0, 0, 0, 0, 0)}, "has no length"),
+        ({"axes": (1, 0, 0, 0, 0, 0)}, "has length 0"),
         ({"axes": (1, 0, 0)}, "six finite numbers"),
         ({"axes": "zx"}, "must be xy, xz, yz or six numbers"),
         ({"through": (0, 0.25, 0.1)}, r"lies 0\.1 m beside it; it reaches x from -0\.346 to 0\.346 m"),
         ({"x": (0.1, 0.1)}, "range along x must be LOW,HIGH"),
         ({"y": (0.2, float("inf"))}, "range along y"),
-        ({"cells": (1, 9)}, "at least two points"),
+        ({"cells": (1, 9)}, "at least 2 points"),
         ({"cells": (10**5, 10**5)}, "at most"),
     ],
 )

@@ -30,10 +30,13 @@ WRONG = [
         {"measures": ["stiffnes_max"]},
         "measures.0: no measure is named 'stiffnes_max'; did you mean stiffness_max?",
     ),
-    ({"measures": ["isotropy", "isotropy"]}, "measures.1: isotropy is asked for twice"),
-    ({"measures": ["worst(rigid_mass)"]}, "measures.0: worst(rigid_mass): whether more of it is better depends"),
-    ({"measures": ["mean(isotropy)"]}, "measures.0: mean is nothing that is made of a measure over a workspace"),
-    ({"measures": ["isotropy_index(rigid_mass)"]}, "measures.0: isotropy_index(rigid_mass): is of isotropy only"),
+    ({"measures": ["isotropy", "isotropy"]}, "measures.1: isotropy is listed twice"),
+    ({"measures": ["worst(rigid_mass)"]}, "measures.0: worst(rigid_mass): whether more or less is better depends"),
+    ({"measures": ["mean(isotropy)"]}, "measures.0: mean is not a statistic over the workspace"),
+    (
+        {"measures": ["isotropy_index(rigid_mass)"]},
+        "measures.0: isotropy_index(rigid_mass): isotropy_index applies to isotropy only",
+    ),
     ({"measures_file": "none.py"}, "measures_file: no such file"),
     ({"samplin": "grid"}, "samplin: is not a key of a study file; did you mean 'sampling'?"),
     ({"sampling": "random"}, "sampling: must be 'grid' or 'latin-hypercube', got the text 'random'"),
@@ -45,14 +48,14 @@ WRONG = [
     ({"axis": []}, "axis: must have at least 1 element"),
     ({"axis": 7}, "axis: must be a list, got 7"),
     ({"direction": [0.0, 0.0]}, "direction: has zero length"),
-    ({"assembly": "elbows-up"}, "assembly: names no assembly, got 'elbows-up'; did you mean 'elbows-"),
+    ({"assembly": "elbows-up"}, "assembly: 'elbows-up' is not an assembly of this device; did you mean 'elbows-"),
     ({"model": "stiff"}, "model: must be 'full', 'two-mass', 'motor-mass' or 'rigid', got the text 'stiff'"),
     ({"operator": "no-one"}, "no-one: is neither a file nor a bundled operator"),
     ({"set": 3}, 'set: must be a list, got 3 (changes of the device file, each "PATH=VALUE")'),
     ({"set": ["loop.delay=1"]}, "set.0: loop.delay: is no key of a device file; did you mean 'loop.delay_s'?"),
     ({"set": ["loop.sampling_period_s=-1"]}, "loop.sampling_period_s: must be"),
     ({"frequency_Hz": 0.0}, "frequency_Hz: must be greater than 0, got 0"),
-    ({"workspace": {}}, "workspace: is read by measures over it only, such as average(rigid_mass)"),
+    ({"workspace": {}}, "workspace: is used only by measures over the workspace, such as average(rigid_mass)"),
     (
         {"measures": ["average(isotropy)"], "workspace": {"count": 1}},
         "workspace.count: must be at least 2, got 1",
@@ -62,7 +65,10 @@ WRONG = [
         "workspace: the handle cannot leave the plane z = 0 m, and meets the plane asked for in a line; "
         'ask for plane = "xy"',
     ),
-    ({"measures": ["average(stiffness_max)"], "device": TWO_MASS}, "measures: average(stiffness_max) is over a"),
+    (
+        {"measures": ["average(stiffness_max)"], "device": TWO_MASS},
+        "measures: average(stiffness_max) needs the workspace of a [mechanism]",
+    ),
     ({"optimise": {"objectives": {"isotropy": "low"}}}, "optimise.objectives.isotropy: must be 'max' or 'min'"),
 ]
 
@@ -83,10 +89,10 @@ R = {"range": [0.1, 0.2]}
 WRONG_AXES = [
     ({}, "axis.0.key: is missing"),
     ({"key": RIGHT_LENGTH}, "axis.0: has no values; give range = [low, high] and count, or values"),
-    ({"key": RIGHT_LENGTH, **R}, "axis.0: has no count"),
+    ({"key": RIGHT_LENGTH, **R}, "axis.0: has a range and no count; add the number of its values"),
     ({"key": RIGHT_LENGTH, **R, "count": 0}, "axis.0.count: must be at least 1, got 0"),
     ({"key": RIGHT_LENGTH, **R, "count": 2.5}, "axis.0.count: must be a whole number, got 2.5"),
-    ({"key": RIGHT_LENGTH, **R, "values": [1.0]}, "axis.0.values: stands beside a range"),
+    ({"key": RIGHT_LENGTH, **R, "values": [1.0]}, "axis.0.values: and range exclude each other"),
     ({"key": RIGHT_LENGTH, "values": [0.1], "count": 3}, "axis.0.count: is read with a range only"),
     ({"key": RIGHT_LENGTH, "values": [0.1, 0.2, 0.1]}, "axis.0.values.2: 0.1 is listed already"),
     ({"key": RIGHT_LENGTH, "values": []}, "axis.0.values: must have at least 1 element"),
@@ -101,16 +107,16 @@ WRONG_AXES = [
     ({"key": RIGHT_LENGTH, "range": [0.1], "count": 3}, "axis.0.range: must have at least 2 elements, got 1"),
     (
         {"key": RIGHT_LENGTH, "range": [0.0, 1.0], "count": 3, "scale": "log"},
-        "axis.0.range: must be above 0 to be divided",
+        "axis.0.range: must begin above 0 where scale",
     ),
     ({"key": RIGHT_LENGTH, **R, "count": 3, "scale": "ln"}, "axis.0.scale: must be 'linear' or 'log'"),
     ({"key": "links.uper-right.length_m", "values": [1]}, "axis.0.key: 'links.uper-right.length_m' is no key"),
     (
         {"key": "links.upper-right", "values": [1]},
-        "axis.0.key: 'links.upper-right' names no number; numbers in it",
+        "axis.0.key: 'links.upper-right' is not a single number; the numbers in it are",
     ),
-    ({"key": "loop", "values": [1]}, "axis.0.key: 'loop' names no number"),
-    ({"key": "assemblies", "values": ["elbows-in"]}, "axis.0.key: 'assemblies' names no number"),
+    ({"key": "loop", "values": [1]}, "axis.0.key: 'loop' is not a single number"),
+    ({"key": "assemblies", "values": ["elbows-in"]}, "axis.0.key: 'assemblies' is not a single number"),
     ({"key": "asembly", "values": ["elbows-in"]}, "axis.0.key: 'asembly' is no key of a device file"),
     (
         {"key": RIGHT_LENGTH, "values": [0.1, "long"]},
@@ -118,14 +124,17 @@ WRONG_AXES = [
     ),
     ({"key": RIGHT_LENGTH, "values": [True]}, "axis.0.values.0: must be no true or false"),
     ({"key": RIGHT_LENGTH, "values": [[0.1]]}, "axis.0.values.0: must be a number"),
-    ({"key": "loop.velocity.samples", "range": [1, 5], "count": 5}, "axis.0.range: cannot be divided"),
+    (
+        {"key": "loop.velocity.samples", "range": [1, 5], "count": 5},
+        "axis.0.range: cannot be used: 'loop.velocity.samples' takes whole numbers",
+    ),
     ({"key": "loop.velocity.samples", "values": [1.5]}, "axis.0.values.0: must be a whole number"),
-    ({"key": "loop.velocity.method", "range": [0, 1], "count": 2}, "axis.0.range: needs a number, but 'loop.vel"),
+    ({"key": "loop.velocity.method", "range": [0, 1], "count": 2}, "axis.0.range: cannot be used: 'loop.vel"),
     (
         {"key": "assembly", "values": ["elbow-in"]},
-        "axis.0.values.0: names no assembly, got 'elbow-in'; did you mean",
+        "axis.0.values.0: 'elbow-in' is not an assembly of this device; did you mean",
     ),
-    ({"key": "assembly", **R, "count": 3}, "axis.0.range: is of numbers; assembly needs values"),
+    ({"key": "assembly", **R, "count": 3}, "axis.0.range: cannot be used: assembly is not a number; write values"),
     ({"key": "model", "values": ["full", "stiff"]}, "axis.0.values.1: must be one of full, two-mass, motor-mass"),
     ({"key": "direction", "values": [[0, 0]]}, "axis.0.values.0: has zero length"),
     ({"key": "at", "values": [[0.1], 3]}, "axis.0.values.1: must be 2 or 3 numbers, got 3"),
@@ -141,7 +150,7 @@ WRONG_AXES = [
     ),
     (
         {"key": RIGHT_LENGTH, "values": [0.1], "tie": ["links.upper-left"]},
-        "axis.0.tie.0: 'links.upper-left' names no",
+        "axis.0.tie.0: 'links.upper-left' is not a single number",
     ),
     ({"key": RIGHT_LENGTH, "values": [0.1], "tie": [{"power": 1}]}, "axis.0.tie.0.key: is missing"),
     (
@@ -150,7 +159,7 @@ WRONG_AXES = [
     ),
     (
         {"key": RIGHT_LENGTH, "values": [0.1], "tie": [{"key": LEFT_LENGTH, "power": 1, "factor": 2}]},
-        "axis.0.tie.0.factor: stands beside a power",
+        "axis.0.tie.0.factor: and power exclude each other",
     ),
     (
         {"key": "loop.delay_samples", "values": [1.0], "tie": [{"key": LEFT_LENGTH, "power": 1}]},
@@ -166,7 +175,7 @@ WRONG_AXES = [
     ),
     (
         {"key": "operator.arm_mass_kg", "values": [1.0], "tie": [{"key": RIGHT_LENGTH, "power": 1}]},
-        "axis.0.tie.0.power: needs a value of 'operator.arm_mass_kg' other than 0 in the device file, which gives",
+        "axis.0.tie.0.power: needs a value of 'operator.arm_mass_kg' other than 0 in the device file, and it has",
     ),
     (
         {"key": RIGHT_LENGTH, "values": [0.1], "tie": [3]},
@@ -190,7 +199,7 @@ def test_a_fault_of_an_axis_is_told(table, line):
 def test_what_goes_with_two_axes_is_told():
     told = faults(study_document(axis(RIGHT_LENGTH, 0.1, tie=[LEFT_LENGTH]), axis(LEFT_LENGTH, 0.1)))
     assert told == [
-        f"axis.1.key: '{LEFT_LENGTH}' goes with the axis '{RIGHT_LENGTH}' already; each number may be set once"
+        f"axis.1.key: '{LEFT_LENGTH}' goes with the axis '{RIGHT_LENGTH}' already; remove one of the two"
     ]
 
 
@@ -199,8 +208,8 @@ def test_what_is_set_twice_is_told():
     told = faults(study_document(*twice, model="rigid"))
     assert told == [
         f"axis.1.key: 'mechanism.{RIGHT_LENGTH}' is set by the axis '{RIGHT_LENGTH}' already; "
-        "each number may be set once",
-        "model: is an axis, too; remove one of them",
+        "remove one of the two",
+        "model: is an axis as well; remove one of the two",
     ]
 
 
@@ -230,7 +239,7 @@ def test_numbers_of_an_operator_may_be_varied_beside_whose_they_are():
 def test_a_hypercube_has_one_count():
     told = faults(study_document(axis(RIGHT_LENGTH, **R, count=3), sampling="latin-hypercube", count=10))
     assert told == [
-        "axis.0.count: is that of a grid; a Latin hypercube has one count for all axes: move it to the top"
+        "axis.0.count: is for a grid; a Latin hypercube has one count for all axes: move it to the top"
     ]
 
 
@@ -268,7 +277,7 @@ def test_a_measured_device_has_no_numbers_to_vary(tmp_path):
         'name = "m"\n[response]\nfile = "sweep.csv"\nintegrators = 2\n[loop]\nsampling_period_s = 0.001\n'
     )
     told = faults(study_document(axis("loop.sampling_period_s", 0.001), device=str(tmp_path / "m.toml")))
-    assert any("has a measured [response] and no model" in one for one in told), told
+    assert any("is a measured [response], which has no numbers" in one for one in told), told
 
 
 @pytest.mark.parametrize(
@@ -294,5 +303,7 @@ def test_a_study_that_would_not_fit_is_refused_with_its_size(hypercube):
     span = {"range": [0.1, 0.2]} | ({} if hypercube else {"count": 10**6})
     more = {"sampling": "latin-hypercube", "count": 10**9} if hypercube else {}
     designs = "1000000000" if hypercube else "1000000000000"
-    with pytest.raises(TooLarge, match=rf"^{designs} designs of 1 measures would take .* GB, of .* lower a count"):
+    with pytest.raises(
+        TooLarge, match=rf"^{designs} designs of 1 measures would take .* GB of memory, .* lower a count"
+    ):
         study(axis(RIGHT_LENGTH, **span), axis(LEFT_LENGTH, **span), **more)

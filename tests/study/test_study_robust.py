@@ -173,16 +173,16 @@ def test_a_number_off_the_diagonal_moves_with_its_mirror_image():
 @pytest.mark.parametrize(
     ("ranges", "expected"),
     [
-        ([Range("plant.mass_kg", 0.3, 0.1)], "plant.mass_kg: is upside down, got 0.3,0.1"),
+        ([Range("plant.mass_kg", 0.3, 0.1)], "plant.mass_kg: must be LOW,HIGH with LOW below HIGH, got 0.3,0.1"),
         ([Range("plant.mass_kg", 0.1, float("nan"))], "finite"),
         ([Range("plant.mass_kg", 0.1, float("inf"))], "finite"),
         ([Range("plant.mass_kg", 0.0, 0.1, True)], "cannot be logarithmic from 0"),
         ([Range("plant.mas_kg", 0.1, 0.2)], "did you mean 'plant.mass_kg'?"),
-        ([Range("name", 0.1, 0.2)], "holds the text 'm', which is no number"),
+        ([Range("name", 0.1, 0.2)], "is not a number but the text 'm'"),
         ([Range("plant", 0.1, 0.2)], "did you mean 'plant.mass_kg'?"),
-        ([Range("plant.mass_kg", -0.1, 0.2)], "-0.1 makes no device: m"),
+        ([Range("plant.mass_kg", -0.1, 0.2)], "with -0.1 the device is not valid: m"),
         ([Range("plant.mass_kg", 0.1, 0.2), Range("plant.mass_kg", 0.1, 0.3)], "is given twice"),
-        ([Range("operator.arm_mass_kg", 0.1, 0.2)], "0.1 makes no device"),
+        ([Range("operator.arm_mass_kg", 0.1, 0.2)], "0.1 the device is not valid"),
     ],
 )
 def test_ranges_that_cannot_be_meant_are_refused_in_one_line(ranges, expected):
@@ -231,7 +231,7 @@ def test_members_that_cannot_be_built_are_counted_and_named():
 def test_nobody_to_chart_is_an_error(monkeypatch):
     fam = family(one_mass_device(), Range("plant.mass_kg", 0.1, 0.2))
     monkeypatch.setattr(Family, "loop", lambda self, point: (_ for _ in ()).throw(ValueError("no such thing")))
-    with pytest.raises(RobustError, match="not one of 3 members could be charted; the first: no such thing"):
+    with pytest.raises(RobustError, match="none of 3 members could be charted; the first: no such thing"):
         robust_study(fam, 4, 4)
 
 

@@ -220,7 +220,7 @@ def test_a_measure_that_this_device_cannot_be_asked_is_refused_before_anything_i
         run_study(study(periods, device=TWO_MASS, measures=["manipulability", "stiffness_max", "isotropy"]))
     lines = str(caught.value).splitlines()
     assert [line.split()[0] for line in lines] == ["manipulability", "isotropy"]
-    assert "speaks of a mechanism" in lines[0]
+    assert "needs a [mechanism]" in lines[0]
 
 
 @pytest.mark.parametrize(

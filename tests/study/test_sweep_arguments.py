@@ -134,24 +134,36 @@ WRONG = [
     ({"axes": {"asembly": ["elbows-in"]}}, "axes: 'asembly' is no key of a device file", "or is it 'assembly'"),
     ({"axes": {"position": [(0.0, 0.25)]}}, "axes: 'position' as an axis is called 'at'", ""),
     ({"axes": {"stiffness": [1.0]}}, "axes: 'stiffness' as an axis is called 'stiffness_N_per_m'", ""),
-    ({"axes": {"links": [1.0]}}, "axes: 'links' names no number; numbers in it", ""),
+    ({"axes": {"links": [1.0]}}, "axes: 'links' is not a single number; the numbers in it are", ""),
     ({"axes": {DELAY: [0.0, "late"]}}, f"axes: {DELAY}: must be a number", "got the text 'late'"),
     ({"axes": {DELAY: [0.0, nan]}}, f"axes: {DELAY}: must be a number", "got nan"),
     ({"axes": {DELAY: [0.0, 0.0]}}, f"axes: {DELAY}: 0 is listed already; remove it", ""),
     ({"axes": {DELAY: [0.0], "loop.delay_s": [0.0]}}, "axes: 'loop.delay_s' excludes 'loop.delay_samples'", ""),
-    ({"axes": {"assembly": ["elbow-in"]}}, "axes: assembly: names no assembly, got 'elbow-in'", "'elbows-in'?"),
+    (
+        {"axes": {"assembly": ["elbow-in"]}},
+        "axes: assembly: 'elbow-in' is not an assembly of this device",
+        "'elbows-in'?",
+    ),
     ({"axes": {"operator": ["nobody"]}}, "nobody: is neither a file nor a bundled operator", ""),
     ({"axes": {"frequency_Hz": [0.0]}}, "axes: frequency_Hz: must be a finite number, above 0, got 0", ""),
     ({"measures": "stifness_max"}, "measures: no measure is named 'stifness_max'", "did you mean stiffness_max?"),
-    ({"measures": ["isotropy", "isotropy"]}, "measures: isotropy is asked for twice", ""),
-    ({"measures": "mean(isotropy)"}, "measures: mean is nothing that is made of a measure", ""),
+    ({"measures": ["isotropy", "isotropy"]}, "measures: isotropy is listed twice", ""),
+    ({"measures": "mean(isotropy)"}, "measures: mean is not a statistic over the workspace", ""),
     ({"measures": []}, "measures: must have at least 1 element", ""),
     ({"direction": (0.0, 0.0)}, "direction: has zero length", ""),
     ({"position": (0.1,)}, "position: must have at least 2 elements, got 1", ""),
     ({"position": {"upper-right": 0.6}}, "position: must be the angle of every driven joint", ""),
-    ({"assembly": "elbow-in"}, "assembly: names no assembly, got 'elbow-in'", ""),
-    ({"axes": {"assembly": ["elbows-in"]}, "assembly": "elbows-in"}, "assembly: is an axis, too; remove one", ""),
-    ({"axes": {"at": [(0, 0.2)]}, "position": (0, 0.2)}, "position: is an axis, too; remove one of them", ""),
+    ({"assembly": "elbow-in"}, "assembly: 'elbow-in' is not an assembly of this device", ""),
+    (
+        {"axes": {"assembly": ["elbows-in"]}, "assembly": "elbows-in"},
+        "assembly: is an axis as well; remove one",
+        "",
+    ),
+    (
+        {"axes": {"at": [(0, 0.2)]}, "position": (0, 0.2)},
+        "position: is an axis as well; remove one of the two",
+        "",
+    ),
     ({"model": "stiff"}, "model: must be 'full', 'two-mass', 'motor-mass' or 'rigid'", ""),
     ({"stiffness": -1.0}, "stiffness: must be at least 0, got -1", ""),
     ({"frequency": 0.0}, "frequency: must be greater than 0, got 0", ""),
@@ -212,13 +224,15 @@ def test_nothing_to_vary(device, axes, said):
 
 def test_a_plane_is_for_measures_over_it(device):
     with pytest.raises(
-        DeviceError, match=r"^plane: is read by measures over it only, such as average\(isotropy\)"
+        DeviceError, match=r"^plane: is used only by measures over the workspace, such as average\(isotropy\)"
     ):
         sweep_delays(device, plane=plane_of(device, cells=(3, 3)))
 
 
 def test_a_plant_has_no_workspace_and_a_response_no_numbers(tmp_path):
-    with pytest.raises(DeviceError, match=r"^measures: average\(stiffness_max\) is over a workspace"):
+    with pytest.raises(
+        DeviceError, match=r"^measures: average\(stiffness_max\) needs the workspace of a \[mechanism\]"
+    ):
         sweep_delays(load(TWO_MASS), measures="average(stiffness_max)")
     (tmp_path / "sweep.csv").write_text(
         "frequency_Hz,real_m_per_N,imag_m_per_N\n" + "".join(f"{f},{-1.0 / f**2},-1e-9\n" for f in range(1, 40))
@@ -226,7 +240,7 @@ def test_a_plant_has_no_workspace_and_a_response_no_numbers(tmp_path):
     (tmp_path / "measured.toml").write_text(
         'name = "m"\n[response]\nfile = "sweep.csv"\nintegrators = 2\n[loop]\nsampling_period_s = 0.001\n'
     )
-    with pytest.raises(DeviceError, match=r"^device: has a measured \[response\] and no model"):
+    with pytest.raises(DeviceError, match=r"^device: is a measured \[response\], which has no numbers"):
         sweep_delays(load(tmp_path / "measured.toml"))
 
 

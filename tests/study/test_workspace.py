@@ -227,7 +227,7 @@ def test_many_cells_cost_little():
         ({"measures": ["isotropy", "isotropy"]}, ValueError, "different names"),
         ({"measures": []}, ValueError, "got none"),
         ({"direction": "worse"}, ValueError, "worst, best, lowest, highest"),
-        ({"measures": ["rigid_mass"], "direction": "worst"}, MeasureError, "^rigid_mass is neither"),
+        ({"measures": ["rigid_mass"], "direction": "worst"}, MeasureError, "^rigid_mass has no better side"),
         ({"direction": (0.0, 0.0)}, DeviceError, "zero length"),
         ({"measures": ["peak_force"]}, MeasureError, "^peak_force needs"),
     ],

@@ -20,14 +20,14 @@ def stiffness_limit(
 
         K <= min(2 b/T, 2 f_c/Delta)                     (Abbott and Okamura 2005, known here at second hand)
 
-    Viscous friction must pay for the hold, dry friction for what the encoder does not see; both must. Not a
-    statement on the linear loop: quantisation and dry friction are not in its chart.
+    Viscous friction must dissipate the energy that the hold adds, dry friction that of the encoder's steps; both
+    are needed. It does not apply to the linear loop, whose chart leaves out quantisation and dry friction.
 
     device_damping    (...)  b of the mass against the ground [N s/m]
     coulomb_friction  (...)  f_c [N]
     sampling_period   (...)  T [s], positive
-    resolution        (...)  Delta, the encoder's step [m]; 0: as fine as you like
-    Returns           (...)  [N/m], all broadcast; nan where a number is
+    resolution        (...)  Delta, the encoder's step [m]; 0: no quantisation
+    Returns           (...)  [N/m], all broadcast; nan where an argument is nan
 
     >>> float(stiffness_limit(0.1, 0.002, 0.001, 1e-4))
     40.0

@@ -1,4 +1,4 @@
-"""What published conditions assume, in sentences, and which of them a loop does not meet."""
+"""The assumptions of the published conditions as sentences, and a check which of them a loop does not meet."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
 
-# b T/m and B T/m below which conditions of first order in them are trusted.
+# Largest b T/m and B T/m for which conditions of first order in them count as accurate.
 LIGHT_FRICTION: Final = 0.1
-# W = sqrt(k/m) T below which conditions of second order in it are trusted.
+# Largest W = sqrt(k/m) T for which conditions of second order in it count as accurate.
 SLOW_SPRING: Final = 0.3
 
 RIGID: Final = "The device moves along the wall as one rigid mass, tied to nothing."
@@ -40,19 +40,19 @@ LIGHT: Final = f"Friction is light: b T/m is at most {LIGHT_FRICTION:g}."
 LIGHT_WALL: Final = f"The wall's damping is light: B T/m is at most {LIGHT_FRICTION:g}."
 SLOW: Final = f"The spring is slow against the sampling: W is at most {SLOW_SPRING:g}."
 
-# The computer that most sources have in mind, but for its delay: for springs, and for walls with damping.
+# Assumptions of most sources on the computer, without its delay: for springs, and for walls with damping.
 DIRECT: Final = (FORCE_UNFILTERED, PROMPT)
 PLAIN: Final = (DIFFERENCE, VELOCITY_UNFILTERED, *DIRECT)
 
 
 @dataclass(frozen=True)
 class ConditionCase:
-    """A loop as the conditions see it.
+    """The properties of a loop that the conditions use.
 
-    wall_damping      B of the walls asked about [N s/m]; nan: any
+    wall_damping      B of the walls [N s/m]; nan: any
     coulomb_friction  f_c, dry friction against the ground where the wall acts [N]; nan: not known
     resolution        Delta, the encoder's step there [m]; nan: not known
-    unmet             the assumptions that it does not meet
+    unmet             the assumptions that the loop does not meet
     """
 
     loop: Loop
@@ -75,9 +75,9 @@ class ConditionCase:
         limit: Callable[[Floats], Floats],
         largest: tuple[float, float] = (nan, nan),
     ) -> Bound:
-        """One condition on this loop; silent where a number that it takes is not there.
+        """The `Bound` of one condition on this loop; without a limit where a number that it needs is missing.
 
-        largest  largest stiffness over B >= 0 and its damping; nan: it names none
+        largest  largest stiffness over B >= 0 and its damping; nan: the condition names none
         """
         lacking = tuple(key for key, value in taken.items() if isnan(value))
         stiffness, damping = (nan, nan) if lacking else (float(largest[0]), float(largest[1]))
@@ -100,7 +100,7 @@ class ConditionCase:
 def case_of(
     loop: Loop, wall_damping: float = nan, coulomb_friction: float = nan, resolution: float = nan
 ) -> ConditionCase:
-    """Measure a loop once for all conditions."""
+    """Determine the properties of a loop once for all conditions."""
     found = traits(loop)
     return ConditionCase(
         loop, found, wall_damping, coulomb_friction, resolution, _unmet(loop, found, wall_damping)
@@ -108,7 +108,7 @@ def case_of(
 
 
 def _silent(wall_damping: Floats) -> Floats:
-    """The limit of a condition that lacks a number."""
+    """The limit of a condition for which a number of the device is missing: nan."""
     return np.full(wall_damping.shape, nan)
 
 
@@ -136,7 +136,7 @@ def _unmet(loop: Loop, found: Traits, wall_damping: float) -> frozenset[str]:
         PROMPT: not found.actuator_lags,
         RESISTIVE: not found.corner_frequencies,
         NYQUIST_BELOW_CORNER: all(corner * T >= np.pi for corner in found.corner_frequencies),
-        # a number that is not there breaks nothing
+        # a missing number violates no assumption
         LIGHT: not drag * T > LIGHT_FRICTION * mass,
         LIGHT_WALL: not abs(wall_damping) * T > LIGHT_FRICTION * mass,
         SLOW: not spring * T**2 > SLOW_SPRING**2 * sprung,

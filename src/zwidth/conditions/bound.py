@@ -1,4 +1,4 @@
-"""What one published condition says about one loop."""
+"""`Bound`: one published condition evaluated for one loop."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ Claim = Literal["exact", "sufficient", "approximate"]
 class Bound:
     """A condition with its numbers for one loop.
 
-    name, source       what it is called, and where it stands, with the equation's number
-    kind               "stability", or "passivity", which is stability with whatever passive operator
-    claim              what it promises where all assumptions hold: "exact", "sufficient" (inside, the wall is
-                       stable; outside, nothing is said), or "approximate"
+    name, source       name, and publication with the equation's number
+    kind               "stability", or "passivity", which is stability with every passive operator
+    claim              what holds where all assumptions are met: "exact", "sufficient" (inside, the wall is
+                       stable; outside, it may be either), or "approximate"
     statement          the condition in symbols
     stiffness_max      largest stiffness over B >= 0 [N/m]; 0: it admits no wall with K > 0, B >= 0; nan: it names
-                       no largest stiffness, or the device lacks a number that it takes
-    damping_at_stiffness_max  [N s/m]; nan where stiffness_max is nan, or 0 for want of a wall
+                       no largest stiffness, or a number of the device is missing
+    damping_at_stiffness_max  [N s/m]; nan where stiffness_max is nan or 0
     assumptions        one sentence each
-    violated           those of them that the loop does not meet, measured on its plant and controller
-    taken              the numbers that it takes from the loop, by names that end in their unit; nan: not there
-    lacking            the names of those that are not there; with any, the condition is silent
+    violated           those of them that the loop does not meet, by its plant and controller
+    taken              numbers of the loop that it uses, by names that end in their unit; nan: missing
+    lacking            names of the missing ones; if there are any, the condition gives no limit
     limit              B (...) to the largest stiffness there (...); use `stiffness_max_at`
     """
 
@@ -50,11 +50,11 @@ class Bound:
     def stiffness_max_at(self, wall_damping: ArrayLike) -> Floats:
         """Largest stiffness that the condition admits at dampings B (...) [N/m].
 
-        0 where it admits no K > 0; nan where it says nothing about this B or this loop.
+        0 where it admits no K > 0; nan where it does not apply to this B or this loop.
         """
         return self.limit(np.asarray(wall_damping, dtype=float))
 
     @property
     def holds(self) -> bool:
-        """Does the loop meet all assumptions, and have all numbers, so that the condition's claim stands?"""
+        """Whether the loop meets all assumptions and has all numbers, so that the condition's claim holds."""
         return not self.violated and not self.lacking

@@ -4,7 +4,7 @@ A mass with viscous friction b under a sampled, held feedback H(z) is passive at
 
     b > (T/2) / (1 - cos wT) Re{ (1 - e^{-jwT}) H(e^{jwT}) },      0 < w <= pi/T
 
-so that no passive operator can be made to vibrate by it. `passivity` evaluates it for any H; here are the walls
+so that it does not vibrate with any passive operator. `passivity` evaluates it for any H; here are the walls
 for which the worst frequency is known.
 """
 
@@ -59,8 +59,8 @@ def stiffness_limit_filtered(
 
         b > K T/2 + B (1 - a)/(1 + a)   for B >= 0,      b > K T/2 + |B|   for B < 0,       a = tau/(tau + T)
 
-    The theorem's worst case for v_j = a v_{j-1} + (1 - a)(x_j - x_{j-1})/T: the filter helps where the Nyquist
-    frequency binds and is of no use where zero frequency does.
+    The theorem's worst case for v_j = a v_{j-1} + (1 - a)(x_j - x_{j-1})/T: the filter helps where the worst
+    frequency is the Nyquist frequency, and not where it is zero.
 
     time_constant  (...)  tau of the filter [s], not negative; the rest as in `stiffness_limit`
     Returns        (...)  [N/m], all broadcast; 0 where no K > 0 is passive

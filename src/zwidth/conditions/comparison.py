@@ -1,4 +1,4 @@
-"""Published conditions on a device beside its exact stability limit, at one operating point."""
+"""Published conditions compared with the exact stability limit of a device at one operating point."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_number, require
 from zwidth.result import Result
 
-# Keys of a bound that are no columns of a table: one is the same for every device, the other a table itself.
+# Keys of a bound that are left out of tables: one is the same for every device, the other is itself a table.
 NO_COLUMNS = ("assumptions", "taken")
 
 
 @dataclass(frozen=True)
 class BoundsComparison(Result):
-    """What every published condition admits at one damping, and what is exactly stable there.
+    """Largest stiffness at one damping by every published condition, and the exact one.
 
     bounds     all conditions, always in the same order
     damping    B of the walls compared [N s/m]
     exact      largest stable stiffness at that damping [N/m]: 0 where no wall is stable, nan without a chart
-    chart      the exact chart; None where double precision does not decide it
+    chart      the exact chart; None where rounding leaves it undecided
     undecided  why there is no chart; "" where there is one
     """
 
@@ -42,7 +42,7 @@ class BoundsComparison(Result):
 
     @property
     def largest(self) -> float:
-        """Largest stable stiffness at whatever damping [N/m]: 0 if no wall is stable, nan without a chart."""
+        """Largest stable stiffness over all B >= 0 [N/m]: 0 if no wall is stable, nan without a chart."""
         if self.chart is None:
             return nan
         return self.chart.stiffness_max if self.chart.stiffness_max > 0.0 else 0.0
@@ -53,11 +53,11 @@ class BoundsComparison(Result):
         return nan if self.chart is None else self.chart.damping_at_stiffness_max
 
     def stiffness_max(self, bound: Bound) -> float:
-        """Largest stiffness that a condition admits at the damping compared [N/m], as `Bound.stiffness_max_at`."""
+        """Largest stiffness that a condition admits at `damping` [N/m], as `Bound.stiffness_max_at`."""
         return float(bound.stiffness_max_at(self.damping))
 
     def ratio(self, bound: Bound) -> float:
-        """What a condition admits at the damping compared, over the exact limit there; nan where that is 0."""
+        """Largest stiffness by a condition at `damping` over the exact one; nan where that is 0."""
         return _ratio(self.stiffness_max(bound), self.exact)
 
     def document(self) -> dict[str, Any]:
@@ -74,7 +74,7 @@ class BoundsComparison(Result):
         }
 
     def table(self) -> dict[str, list[Any]]:
-        """The conditions as columns, one condition a row; sentences stand one after another in their cell."""
+        """The conditions as columns, one condition a row; several sentences are joined in one cell."""
         rows = [self._entry(bound) for bound in self.bounds]
         columns = [key for key in (rows[0] if rows else ()) if key not in NO_COLUMNS]
         return {
@@ -114,7 +114,7 @@ class BoundsComparison(Result):
 
 
 def compare_bounds(point: OperatingPoint, damping: float | None = None) -> BoundsComparison:
-    """Every published condition on a device at one operating point, beside the exact stability limit.
+    """Compare every published condition with the exact stability limit at one operating point.
 
     damping  B of the walls compared [N s/m]; left out: that of the stiffest stable wall, 0 if there is none
     Raises   ValueError  for a damping that is not finite
@@ -147,7 +147,7 @@ def compare_bounds(point: OperatingPoint, damping: float | None = None) -> Bound
 def bounds_of(point: OperatingPoint, wall_damping: float = nan) -> list[Bound]:
     """Every condition on a device at one operating point, with its dry friction and its encoder's step.
 
-    wall_damping  B of the walls asked about, for assumptions on it [N s/m]; nan: they count as met
+    wall_damping  B of the walls, for the assumptions on it [N s/m]; nan: these count as met
     Raises        what `OperatingPoint.loop` raises
     """
     plant = point.plant
@@ -162,7 +162,7 @@ def bounds_of(point: OperatingPoint, wall_damping: float = nan) -> list[Bound]:
 def exact_stiffness_limit(chart: StabilityChart, wall_damping: float) -> float:
     """Supremum of the stable stiffnesses K > 0 at a damping B [N s/m], all cells together [N/m].
 
-    0 where no wall with K > 0 is stable. The chart's edge says where; eigenvalues close in on it.
+    0 where no wall with K > 0 is stable. The chart's edge gives the place, and eigenvalues refine it.
 
     >>> import numpy as np
     >>> from zwidth.chart.chart import stability_chart
@@ -203,7 +203,7 @@ def _refined(chart: StabilityChart, stiffness: float, wall_damping: float, width
     def excess(K: float) -> float:
         return float(spectral_radius(chart.loop, K, wall_damping)) - chart.radius
 
-    # chords lie beside the curve by no more than the chart's tolerance
+    # the chords of the drawn edge deviate from the curve by the chart's tolerance at most
     for reach in (1e-6, 1e-5, 1e-4, 1e-3):
         low, high = max(stiffness - reach * width, 0.0), stiffness + reach * width
         if excess(low) < 0.0 < excess(high):

@@ -1,7 +1,8 @@
 """The plane of viscous and dry friction, after Diolaiti, Niemeyer, Barbagli and Salisbury 2006.
 
-Both frictions are measured by what they must pay for: beta = b/(K T) by the hold, sigma = f_c/(K Delta) by the
-encoder's step. Known here at second hand: the axes, their names and the condition with delay.
+Both frictions are divided by the effect that they must overcome: beta = b/(K T) by that of the hold, sigma =
+f_c/(K Delta) by that of the encoder's step. Known here at second hand: the axes, their names and the condition
+with delay.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ def viscous_stiffness_limit(
 
         b >= K T (l + 1/2)                        (Diolaiti et al. 2006, eq. 19, known here at second hand)
 
-    Colgate and Schenkel's theorem says the same for whole l, and the tests hold them together.
+    Colgate and Schenkel's theorem gives the same for whole l; a test compares them.
 
     device_damping   (...)  b of the mass against the ground [N s/m]
     sampling_period  (...)  T [s], positive
@@ -55,10 +56,10 @@ def viscous_stiffness_limit(
 
 
 def is_passive(beta: ArrayLike, sigma: ArrayLike, delay_samples: ArrayLike = 0) -> NDArray[np.bool_]:
-    """Does a wall lie in the plane's passive quadrant, beta >= l + 1/2 and sigma >= 1/2? (...).
+    """Whether walls (...) lie in the plane's passive quadrant, beta >= l + 1/2 and sigma >= 1/2.
 
-    Both frictions pay for themselves there, whatever the speed and the hand. With beta alone, the encoder's steps
-    may keep up a small vibration; with sigma alone, small motions die and large ones may grow.
+    There the wall is passive at every speed and with every hand. With beta alone large enough, the encoder's steps
+    may sustain a small vibration; with sigma alone, small motions decay and large ones may grow.
 
     >>> is_passive([0.6, 0.6, 0.4], [0.5, 0.4, 0.5]).tolist()
     [True, False, False]

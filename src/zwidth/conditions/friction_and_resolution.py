@@ -1,4 +1,4 @@
-"""Dry friction and an encoder's step where the wall acts, as conditions take them: one number each."""
+"""Dry friction and encoder step along the wall's direction, one number each, for the published conditions."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from zwidth.model.plant import Floats, Plant
 
 
 def ground_friction(plant: Plant) -> float:
-    """f_c: what one metre at the actuator costs in dry friction, sum_i C_i |along_i . x| [N].
+    """f_c: energy that dry friction takes per metre at the actuator, sum_i C_i |along_i . x| [N].
 
     x is the free motion that a force at the actuator makes, of one metre there; without a free motion, where a
     spring ties the plant to the ground, the motion that a force begins with, M^-1 a/(a^T M^-1 a). For one
-    coordinate driven by itself that is C. It is the energy that moving slowly by a metre takes.
+    coordinate that is driven directly it is C.
 
     Returns  0 without dry friction
 
@@ -31,17 +31,17 @@ def ground_friction(plant: Plant) -> float:
 
 
 def reading_step(plant: Plant) -> float:
-    """Delta: how far the reading may step when all encoders do, sum_i |weight_i| step_i [m].
+    """Delta: step of the reading when all encoders step at once, sum_i |weight_i| step_i [m].
 
     Of a mechanism's motors that is sum_i |u^T J_i| dtheta_i, which varies with direction and posture.
 
-    Returns  0 where the reading is as fine as you like
+    Returns  0 for encoders without quantisation
     """
     return float(sum(abs(part.weight) * part.step for part in plant.nonlinear.counters))
 
 
 def reading_noise(plant: Plant) -> float:
-    """Standard deviation of the reading's noise, that of all encoders: sqrt(sum_i (weight_i noise_i)^2) [m]."""
+    """Standard deviation of the reading's noise from all encoders, sqrt(sum_i (weight_i noise_i)^2) [m]."""
     return float(np.sqrt(sum((part.weight * part.noise) ** 2 for part in plant.nonlinear.counters)))
 
 

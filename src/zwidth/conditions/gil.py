@@ -16,14 +16,15 @@ Floats = NDArray[np.float64]
 def stiffness_limit(
     wall_damping: ArrayLike, device_damping: ArrayLike, sampling_period: ArrayLike, delay: ArrayLike = 0.0
 ) -> Floats:
-    """Stiffness that a damping B balances.
+    """Largest stiffness at a damping B by the linear condition.
 
         K < (b + B) / (T/2 + t_d)           (Gil et al. 2004, with delay 2009; thesis eq. 4.17 for t_d = 0)
 
-    The tangent of the stable edge at K = B = 0, b = 0: half a sample of the hold and the delay t_d let a spring
-    push late, and damping must make up for the energy. An approximation, with an error of first order in
-    (b + B) T/m that grows with the delay. Misprint of sense: the thesis calls it conservative; without physical
-    damping it promises too much, with b alone too little, with both either. It names no largest stiffness.
+    The tangent of the stable edge at K = B = 0, b = 0: half a sample of the hold and the delay t_d make a spring
+    push late, and damping must dissipate the added energy. An approximation, with an error of first order in
+    (b + B) T/m that grows with the delay. The thesis calls it conservative, which does not always hold: without
+    physical damping it allows too much, with b alone too little, with both it may do either. It names no largest
+    stiffness.
 
     wall_damping     (...)  B [N s/m], any sign
     device_damping   (...)  b of the mass against the ground [N s/m]

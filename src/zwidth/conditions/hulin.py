@@ -29,13 +29,13 @@ def stiffness_limit(
     sampling_period: ArrayLike,
     delay: ArrayLike = 0.0,
 ) -> Floats:
-    """Stiffness that the dampings of wall, device and hand balance together.
+    """Largest stiffness by the linear condition, with the dampings of wall, device and hand.
 
         K < (b + b_h + B) / (T/2 + t_d)
 
-    for a hand that is a mass, a spring and a damper to the ground, held fast. It works through its damping alone:
-    its mass and, to first order, its spring leave the tangent at the origin where it is. Known at second hand; the
-    tests hold it against the exact region (`one_mode`). An approximation with an error of first order in
+    for a hand that is a mass, a spring and a damper to the ground, rigidly attached. Only its damping enters: its
+    mass and, to first order, its spring do not change the tangent at the origin. Known at second hand; the
+    tests compare it with the exact region (`one_mode`). An approximation with an error of first order in
     (b + b_h + B) T/m and of second order in W.
 
     wall_damping      (...)  B [N s/m], any sign

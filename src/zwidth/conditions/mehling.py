@@ -17,11 +17,11 @@ Floats = NDArray[np.float64]
 def effective_damping(
     angular_frequency: ArrayLike, device_damping: ArrayLike, electrical_damping: ArrayLike, corner: ArrayLike
 ) -> Floats:
-    """Friction that a vibration feels: b + b_e/(1 + (w L/R)^2) [N s/m], (...).
+    """Effective damping of a vibration at w: b + b_e/(1 + (w L/R)^2) [N s/m], (...).
 
     A motor shorted through R and L brakes with b_e/(1 + s L/R), b_e = k_t^2/R at the handle; this is its real
-    part. Full below the corner frequency R/L, nothing far above. (It follows from the circuit; of the source only
-    its abstract is known here, which says as much.)
+    part. It is b_e below the corner frequency R/L and falls to 0 far above. (Derived from the circuit; of the
+    source only the abstract was read, which agrees.)
 
     angular_frequency   (...)  w [rad/s]
     device_damping      (...)  b [N s/m]
@@ -42,8 +42,8 @@ def stiffness_limit(
 ) -> Floats:
     """Largest passive stiffness with electrical damping counted as friction, b + b_e > K T/2 + |B| [N/m], (...).
 
-    An approximation for corner frequencies well above half the sampling rate; too much otherwise, and nothing is
-    left of it for b = 0: what moves between the samples is faster than any corner (`passivity`).
+    An approximation for corner frequencies well above half the sampling rate; too large otherwise. For b = 0 no
+    stiffness is exactly passive: aliases of the vibration lie above any corner frequency (`passivity`).
     """
     b, e = np.asarray(device_damping, dtype=float), np.asarray(electrical_damping, dtype=float)
     return colgate_schenkel.stiffness_limit(wall_damping, b + e, sampling_period)

@@ -1,6 +1,6 @@
 """A mass on a spring to the ground, without friction or delay: the thesis's section 4.2.
 
-The mass is the motor side's, the spring the structure's, and the link side stands still. With W = sqrt(k/m) T,
+The mass is the motor side's, the spring the structure's, and the link side is fixed. With W = sqrt(k/m) T,
 c = cos W and s = (1 - c)/W^2 the thesis's formulas (4.43)-(4.46) read
 
     p < 2 d (c - s d)/(1 + s d),     p = K T^2/m,  d = B T/m

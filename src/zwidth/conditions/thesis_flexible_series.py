@@ -1,7 +1,7 @@
 """A mass on a slow spring, without friction or delay: the thesis's series of (4.43) for small W.
 
-With cos W = 1 - W^2/2 the edge (4.43) becomes (4.47), and that for small d the line (4.48). Both say how a spring
-takes from what the rigid mass could render: W^2 is subtracted from 2.
+With cos W = 1 - W^2/2 the edge (4.43) becomes (4.47), and that for small d the line (4.48). In both a spring
+lowers the stiffness that the rigid mass allows: W^2 is subtracted from 2.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def largest(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLike) -
 def linear_stiffness_limit(
     wall_damping: ArrayLike, mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLike
 ) -> Floats:
-    """Stiffness that a small damping B balances on a slow spring.
+    """Largest stiffness at a small damping B on a slow spring.
 
         d > p/(2 - W^2)                                                                (thesis eq. 4.48)
 

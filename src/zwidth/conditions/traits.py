@@ -1,4 +1,4 @@
-"""What the published conditions ask of a device, measured on its plant."""
+"""Traits: the properties of a loop that the published conditions use, computed from its plant and controller."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from zwidth.model.modes import REPEATED, clusters, undamped_modes
 from zwidth.model.plant import Floats, LaggedDamper, Plant
 from zwidth.model.reduction import plant_effective_parameters
 
-# A motion whose share in the wall's compliance is less is one that no wall moves.
+# A motion with a smaller share in the wall's compliance counts as one that no wall moves.
 UNSEEN = 1e-9
-# Damping below this share of the largest in the plant is rounding.
+# Damping below this share of the largest in the plant is rounding of 0.
 UNDAMPED = 1e-12
 
 
 @dataclass(frozen=True)
 class Traits:
-    """A loop in the words of the published conditions; a number that the plant does not have is nan.
+    """Properties of a loop for the published conditions; nan for a number that the plant does not have.
 
     rigid_mass                1/(a^T Z (Z^T M Z)^-1 Z^T a), Z the free motions and a the actuator [kg]
     ground_damping            x^T B x of the free motion x that one metre at the actuator makes: friction against
@@ -67,12 +67,12 @@ class Traits:
 
     @property
     def has_one_mode(self) -> bool:
-        """Does the wall move one mass only, on at most one spring and one damper to the ground?"""
+        """Whether the wall moves one mass only, on at most one spring and one damper to the ground."""
         return not isnan(self.mode_mass)
 
 
 def traits(loop: Loop) -> Traits:
-    """Measure a loop's plant; see `Traits`."""
+    """Compute the `Traits` of a loop."""
     plant = loop.plant
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     push, read = shapes.T @ plant.actuator, shapes.T @ plant.sensor
@@ -119,7 +119,7 @@ def _moved_modes(squared: Floats, push: Floats, read: Floats) -> list[slice]:
 
 
 def _by_itself(plant: Plant, shapes: Floats, run: slice, push: Floats) -> bool:
-    """Does the motion that the wall makes in one group of modes stay there, damping included?"""
+    """Whether the motion that the wall makes in one group of modes stays in it, damping included."""
     motion = np.zeros(len(push))
     motion[run] = push[run]
     modal = shapes.T @ plant.damping @ shapes
@@ -139,21 +139,21 @@ def _mode(plant: Plant, shapes: Floats, run: slice, push: Floats, rate: float) -
 
 
 def _is_damped(plant: Plant, shapes: Floats, moved: list[slice]) -> bool:
-    """Does damping act on a motion that the wall moves, by itself or through another?"""
+    """Whether damping acts on a motion that the wall makes, directly or through another motion."""
     modal = np.abs(shapes.T @ plant.damping @ shapes)
     worst = max((float(np.max(modal[run])) for run in moved), default=0.0)
     return worst > UNDAMPED * float(np.max(modal))
 
 
 def _brakes(damper: LaggedDamper, shapes: Floats, moved: list[slice]) -> bool:
-    """Does a lagged damper act on what the wall moves?"""
+    """Whether a lagged damper acts on a motion that the wall makes."""
     reach = np.abs(damper.along @ shapes)
     worst = max((float(np.max(reach[run])) for run in moved), default=0.0)
     return damper.damping > 0.0 and worst > UNSEEN * float(np.max(reach))
 
 
 def _differences(loop: Loop) -> bool:
-    """Is the velocity the backward difference, by whatever name, before its filter?"""
+    """Whether the velocity before its filter is the backward difference, under any name."""
     T = loop.period
     z = np.exp(1j * np.linspace(0.1, np.pi, 7))
     plain = Loop(loop.plant, replace(loop.controller, velocity_filter=None)).velocity_response(z)

@@ -107,6 +107,6 @@ def active_hand(
     if push is None:
         push = PUSH if surface and reach is None else 0.0
     if ramp and not push:
-        why = "is the time in which the push grows, and nobody pushes"
+        why = "is the time in which a push grows, and no push is given"
         raise ContactArgumentError("ramp", why, missing="push")
     return Hand(operator, push, ramp, reach, tremor, reflex)

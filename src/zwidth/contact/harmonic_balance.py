@@ -30,9 +30,9 @@ from zwidth.contact.simulate import LARGEST_MOTION
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+from zwidth.progress import Progress
 
 Floats = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 STAGE = "vibrations by amplitude"
 PER_DECADE = 24

@@ -11,7 +11,7 @@ from zwidth.chart.verdict import judge
 from zwidth.conditions.friction_and_resolution import reading_step
 from zwidth.contact.environments.wall import wall
 from zwidth.contact.friction_quantisation_plane import device_plane
-from zwidth.contact.harmonic_balance import Floats, LimitCycle, Progress, harmonic_balance
+from zwidth.contact.harmonic_balance import Floats, LimitCycle, harmonic_balance
 from zwidth.contact.harmonics import with_harmonics
 from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction, SimulatedVibration
 from zwidth.contact.motion_verdict import judge_response
@@ -20,6 +20,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_number, require
 from zwidth.model.modes import least_deforming_motion
+from zwidth.progress import Progress
 
 NOT_PREDICTED: Final = ("noise", "programmable brakes")
 STARTS: Final = (0.7, 1.4)  # of the predicted amplitude; the run that ends nearer to it is told

@@ -56,7 +56,7 @@ def _no_plain_file(mode: int, pipes: bool) -> str:
     if stat.S_ISDIR(mode):
         return "is a directory"
     kind = next((kind for test, kind in _KINDS if test(mode)), "device")
-    return f"is a {kind}, no plain file"
+    return f"is a {kind}, not an ordinary file"
 
 
 def read_text(path: str | os.PathLike[str], largest: int, *, pipes: bool = False) -> str:

@@ -114,6 +114,8 @@ def _sentence(detail: ErrorDetails, path: KeyPath, about: str) -> str:
             return f"must be a list, got {quote(got)}{about}"
         case "model_type" | "model_attributes_type" | "dict_type":
             return f"must be a table, got {quote(got)}{about}"
+        case "bool_type" | "bool_parsing":
+            return f"must be true or false, got {quote(got)}{about}"
         case _:
             return detail["msg"].removeprefix("Value error, ")
 

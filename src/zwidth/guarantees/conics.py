@@ -1,4 +1,4 @@
-"""What each angle asks of a wall, as polynomials in the angle's logarithm.
+"""The condition of each angle on a wall, as polynomials in the angle's logarithm.
 
 The disk |P - C| <= R of an angle keeps clear of -1/H, H = K + B w, if and only if  1 + 2 a + b > 0  with
 
@@ -34,7 +34,7 @@ POINTS, PIECES, QUARTIC = 11, 8, 5
 TOLERANCE, NOISE = 1e-9, 2e-13
 # Within a resonance rounding counts more by this share of its quality.
 LIGHT = 0.1
-# A panel is halved at most so often; where panels become so many times as many as at first, rounding limits them.
+# Largest number of halvings of a panel; and largest growth of their number, beyond which rounding limits them.
 HALVINGS, MOST = 24, 4
 # Disks are wide from the first share of their centre's size on; a panel of wide disks has none below the second.
 WIDE, THIN = 0.3, 0.03
@@ -77,7 +77,7 @@ class Conics:
 
 
 def conics(loop: Loop, held: Floats) -> Conics | None:
-    """The conics of a loop held along `held` (n,); None where nothing is dissipated at some angle."""
+    """The conics of a loop held along `held` (n,); None where the port dissipates nothing at some angle."""
     at = port(loop.plant, held)
     aliases = Aliases.of(loop, at)
     singular = _singularities(loop, at)
@@ -147,14 +147,17 @@ def _singularities(loop: Loop, held_port: Port) -> tuple[Floats, Floats, Floats]
 
 
 def _noise(singular: tuple[Floats, Floats, Floats], angles: Floats) -> Floats:
-    """What rounding leaves of functions at angles (...), in shares: more within light resonances."""
+    """Relative rounding error of the functions at angles (...): larger within lightly damped resonances."""
     centre, width, turns = singular
     near = turns / np.hypot(angles[..., None] - centre, width)
     return np.asarray(NOISE * np.maximum(1.0, LIGHT * np.max(near, axis=-1, initial=0.0)))
 
 
 def _functions(loop: Loop, aliases: Aliases, angles: Floats) -> Floats:
-    """The ten functions at angles (k,), and the sizes of what is rounded: (2, 10, k); inf where disks are."""
+    """The ten functions at angles (k,), and the size of the terms that are rounded: (2, 10, k).
+
+    inf where a disk has an infinite radius.
+    """
     disks, w, T = aliases.disks(angles), velocity_estimate(loop, angles), loop.period
     C, X, V = disks.centre, disks.power, w * disks.centre
     R2 = np.maximum(disks.radius, LEAST * np.abs(C)) ** 2
@@ -179,7 +182,7 @@ def velocity_estimate(loop: Loop, angles: Floats) -> Complexes:
 
 
 def _resolved(values: Floats, rounding: Floats) -> tuple[Flags, Flags]:
-    """Which panels (n,) of values (n, 10, POINTS) are wide, and which are followed by their polynomials.
+    """Which panels (n,) of values (n, 10, POINTS) have wide disks, and which their polynomials represent exactly.
 
     rounding  (n, 10) of the values
     """
@@ -204,7 +207,7 @@ def _resolved(values: Floats, rounding: Floats) -> tuple[Flags, Flags]:
 
 
 def _cutting(nodes: Floats) -> Floats:
-    """From values at a panel's points to powers of s in each of its pieces (PIECES, QUARTIC, POINTS)."""
+    """Matrix from values at a panel's points to powers of s in each of its pieces (PIECES, QUARTIC, POINTS)."""
     basis = np.linalg.inv(chebyshev.chebvander(2.0 * nodes - 1.0, POINTS - 1))
     inner = np.linspace(0.0, 1.0, QUARTIC)
     at = (np.arange(PIECES)[:, None] + inner) / PIECES

@@ -20,14 +20,17 @@ from zwidth.guarantees.two_port import (
 from zwidth.loop.loop import Loop
 from zwidth.result import Result
 
-# Ratios of damping to stiffness tried, and steps of golden section between them.
+# Number of ratios of damping to stiffness tried, and steps of golden section between them.
 DIRECTIONS, STEPS = 721, 60
-# Stiffnesses closer than this are equal.
+# Relative difference below which two stiffnesses count as equal.
 LEVEL = 1e-7
 NOTHING = "no coupling meets the condition at all frequencies: the device dissipates too little at the handle"
 NO_HANDLE = "a coupling is judged at the handle, and the plant has none; give plant.handle"
-# Lowest angle.
+# Lowest angle wT that is looked at [rad].
 LOWEST = 3e-4
+# A demand proportional to a lower power of the angle than this, towards 0, excludes every spring: springs need the
+# power 2, and the other powers that devices have are 0 and -2.
+LEAST_ORDER = 1.0
 # Steps across a resonance, in units of its width, on both sides.
 ACROSS = np.sinh(np.linspace(-6.0, 6.0, 41)) / 4.0
 
@@ -36,7 +39,7 @@ ACROSS = np.sinh(np.linspace(-6.0, 6.0, 41)) / 4.0
 class Coupling:
     """The stiffest coupling that a wall may be rendered through.
 
-    stiffness, damping  k_c [N/m], b_c [N s/m]; inf and 0 where the wall needs none, 0 where none is soft enough
+    stiffness, damping  k_c [N/m], b_c [N s/m]; inf and 0 where the wall needs none, 0 and 0 where none suffices
     felt_stiffness      stiffness of wall and coupling in series, k_c K/(k_c + K) [N/m]
     """
 
@@ -46,16 +49,16 @@ class Coupling:
 
     @property
     def needed(self) -> bool:
-        """Does the wall need a coupling at all?"""
+        """Whether the wall needs a coupling."""
         return self.stiffness != float("inf")
 
 
 @dataclass(frozen=True)
 class Couplings(Result):
-    """Couplings (k_c, b_c) as regions: after Llewellyn, after Raisbeck, and of the sampled device itself.
+    """Regions of couplings (k_c, b_c): after Llewellyn, after Raisbeck, and of the sampled device itself.
 
-    limit   of the wall asked about, on the sampled device; None if none was
-    reason  why none of this could be judged; None where it could
+    limit   stiffest coupling for one wall, on the sampled device; None if no wall was given
+    reason  why there are no regions; None where there are
     """
 
     llewellyn: Region
@@ -70,7 +73,7 @@ class Couplings(Result):
         return {"llewellyn": self.llewellyn, "raisbeck": self.raisbeck, "sampled": self.sampled}
 
     def document(self) -> dict[str, Any]:
-        """The couplings by key and unit; nothing but the reason where they could not be judged."""
+        """The couplings by key and unit; only the reason where there are none."""
         if self.reason is not None:
             return {"reason": self.reason}
         limit = self.limit
@@ -99,7 +102,10 @@ class Couplings(Result):
 
 
 def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None) -> Couplings:
-    """All that is known of a loop's couplings, held along `held` (n,); wall K, B: the limit that it needs."""
+    """The regions of couplings of a loop whose operator holds it along `held` (n,).
+
+    wall  K [N/m] and B [N s/m] of a wall: also the stiffest coupling that it needs
+    """
     angles = coupling_angles(loop, held)
     sampled = sampled_demand(loop, angles, held)
     return Couplings(
@@ -111,13 +117,13 @@ def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None)
 
 
 def without_handle() -> Couplings:
-    """The couplings of a plant that nobody can hold: none, and why."""
+    """The result for a plant without a handle: no couplings, and the reason."""
     none = empty_region(NO_HANDLE)
     return Couplings(none, none, none, None, NO_HANDLE)
 
 
 def coupling_angles(loop: Loop, held: Floats) -> Floats:
-    """Angles in (0, pi): the last, at which a hold passes nothing, is left out by a rounding."""
+    """Angles in (0, pi), ascending; the last lies just below pi, at which Tustin's hold passes nothing."""
     angles = angle_grid(loop, held)
     even = np.linspace(0.0, np.pi, 2001)[1:]
     return np.minimum(np.union1d(angles, even), np.pi * (1.0 - 1e-9))
@@ -129,7 +135,7 @@ def coupling_region(demand: Demand, period: float) -> Region:
     Along a ray from 0 couplings meet it up to  min over angles of Re(1/Z_c)/conductance;  each angle asks for an
     ellipse, so that the set is convex.
     """
-    if not np.all(np.isfinite(demand.conductance)):
+    if not np.all(np.isfinite(demand.conductance)) or _excludes_springs(demand):
         return empty_region(NOTHING)
 
     def reach(direction: Floats) -> Floats:
@@ -150,6 +156,19 @@ def coupling_region(demand: Demand, period: float) -> Region:
     return Region((ring,), top * float(np.cos(best)) / period, top * float(np.sin(best)))
 
 
+def _excludes_springs(demand: Demand) -> bool:
+    """Whether no coupling with a spring meets the demand in the limit of the angle to 0.
+
+    Re(1/Z_c) of every coupling with k_c != 0 falls there as theta^2. So does the demand of a device that
+    dissipates against the ground. The demand of one that dissipates only within its structure grows as theta^-2:
+    each spring fails below some angle. The couplings that pass on a grid of angles are then as small as the square
+    of its lowest angle; they belong to the grid and not to the device.
+    """
+    angles, asked = demand.angles, demand.conductance
+    n = int(np.searchsorted(angles, 2.0 * angles[0]))
+    return bool(asked[0] > 0.0 and asked[n] < asked[0] * (angles[n] / angles[0]) ** LEAST_ORDER)
+
+
 def _stiffest(reach: Callable[[Floats], Floats], near: float) -> float:
     """The direction of the largest k_c with b_c >= 0, by golden section round a sampled one."""
     step = np.pi / (DIRECTIONS - 1)
@@ -167,7 +186,7 @@ def _stiffest(reach: Callable[[Floats], Floats], near: float) -> float:
         else:
             high = b
     top = max((*ends, (low + high) / 2.0), key=stiffness)
-    # of equal ones the least damped
+    # of equally stiff ones the least damped
     return ends[0] if stiffness(ends[0]) >= (1.0 - LEVEL) * stiffness(top) else top
 
 
@@ -178,19 +197,28 @@ def softest_limit(demand: Demand, wall_stiffness: float, wall_damping: float, pe
 
         |1/Z_c + 1/Z_w + q| >= r
 
-    Along a ray of couplings from 0 that is a quadratic at each angle; the best ratio b_c/k_c is searched for.
+    Along a ray of couplings, 1/Z_c = mu a, that is a quadratic in mu at each angle,
+
+        |a|^2 mu^2 + 2 Re(a* (x + q)) mu + |x|^2 + 2 Re(x* q) + |q|^2 - r^2 >= 0,     x = 1/Z_w
+
+    and the best ratio b_c/k_c is searched for. At low angles |q| and r are many orders larger than what is left of
+    them, so that the power |q|^2 - r^2 is taken as it comes, and the root of a rising quadratic in the form that
+    subtracts nothing.
     """
     angles = demand.angles
-    wall = coupling_impedance(wall_stiffness, wall_damping, angles, period)
-    shown = demand.centre + 1.0 / wall
+    wall = 1.0 / coupling_impedance(wall_stiffness, wall_damping, angles, period)
+    shown = demand.centre + wall
+    power = np.abs(wall) ** 2 + 2.0 * np.real(wall.conj() * demand.centre) + demand.power
     direction = np.linspace(0.0, np.pi / 2.0, DIRECTIONS)[:-1]
 
     def reach(direction: Floats) -> Floats:
         a = 1.0 / coupling_impedance(np.cos(direction) / period, np.sin(direction), angles, period)
         lean, size = np.real(a.conj() * shown), np.abs(a) ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
-            under = lean**2 - size * (np.abs(shown) ** 2 - demand.radius**2)
-            mu = np.where(under >= 0.0, (np.sqrt(np.maximum(under, 0.0)) - lean) / size, 0.0)
+            under = lean**2 - size * power
+            root = np.sqrt(np.maximum(under, 0.0))
+            mu = np.where(lean > 0.0, -power / (lean + root), (root - lean) / size)
+            mu = np.where(under >= 0.0, mu, 0.0)
             return np.asarray(1.0 / np.maximum(np.max(mu, axis=-1), 0.0))
 
     if not np.all(np.isfinite(demand.radius)):
@@ -205,8 +233,8 @@ def softest_limit(demand: Demand, wall_stiffness: float, wall_damping: float, pe
 
 
 def angle_grid(loop: Loop, held: Floats) -> Floats:
-    """Ascending angles (k,) in (0, pi] to look at a loop at: even, geometric towards zero, and across every
-    resonance, where its response varies fast.
+    """Ascending angles (k,) in (0, pi] that resolve a loop's response: even, geometric towards zero, and dense
+    across every resonance.
 
     Resonances are the plant's, free, held fixed, and with its actuator held fixed (where it dissipates little seen
     from outside), folded into (0, pi).

@@ -31,7 +31,7 @@ from zwidth.loop.loop import Loop
 
 Complexes = NDArray[np.complex128]
 
-# Terms of the expansion in 1/w that the far aliases are summed by, and where they begin beyond the fastest pole.
+# Number of terms of the expansion in 1/w for the far aliases, and how far beyond the fastest pole it begins.
 TERMS, REACH = 9, 16
 # Nodes in theta at which the aliases beyond the nearest are summed; they vary little over one period.
 NODES = 13
@@ -46,9 +46,9 @@ MISSED, FALLS, MOVES = 1e-11, 1e-6, 4
 
 @dataclass(frozen=True)
 class Disks:
-    """Where the sampled response can be at angles (k,): |P - centre| <= radius.
+    """The disks |P - centre| <= radius of the sampled response at angles (k,).
 
-    radius  inf where the device dissipates nothing at one of the frequencies that look like this one
+    radius  inf where the device dissipates nothing at one of the aliases
     power   |centre|^2 - radius^2, the power of the point 0: negative where the disk holds it, exactly 0 where it
             goes through it
     """
@@ -66,7 +66,7 @@ def response_disks(loop: Loop, held_port: Port, angles: Floats) -> Disks:
 
 @dataclass(frozen=True)
 class Aliases:
-    """The sums over all frequencies that look alike, prepared for one loop.
+    """The sums over all aliases of a frequency, prepared for one loop.
 
     The nearest aliases are summed one by one at each angle; the rest is a smooth function of the angle, summed at
     Chebyshev nodes and, far out, by its expansion in 1/w (Hurwitz's zeta function, Laguerre's rule where a delay

@@ -1,4 +1,4 @@
-"""The edge that a continuum of springs leaves: the envelope of their curves.
+"""The envelope of the curves of a continuum of springs, which bounds the walls stable with all of them.
 
 The curve of walls with a root on the circle, W(theta, s), moves as the spring s does. What it sweeps over is not
 stable with every spring. Where the sweep ends, the curve of one spring turns back: its motion runs along itself,
@@ -24,14 +24,14 @@ from zwidth.loop.factor_kernels import Factors, velocity_response
 # Largest distance of a touching point from the cubic through its neighbours, and of chords from the cubic, in
 # shares of the set's size.
 CUBIC, CHORD = 2e-7, 1e-8
-# A stretch is halved at most so often; one this short needs no look.
+# Largest number of halvings of a stretch, and the length below which a stretch is not examined.
 HALVINGS, SHORT = 9, 1e-7
 # A tangent steeper than this against the chord is too far away to join to.
 STEEPEST = 0.7
 # Halves of a stretch are this alike in length at least: where touching points jump to another envelope one of them
 # is all of it, and a cubic across the jump would pass the point in the middle.
 ALIKE = 0.05
-# Pieces of curve between which its turning is looked for.
+# Number of pieces of a curve between whose ends a sign change of its turning is looked for.
 PIECES = 24
 # The touching point nearest to an angle is looked for within these parts of the reach, one after the other: light
 # modes have several close together.
@@ -55,7 +55,7 @@ class TouchingPoint:
 
 @compiled
 def _turning(own: Factors, beside: Factors, theta: float) -> float:
-    """Determinant of the derivatives by theta and by the spring, its scale aside."""
+    """Determinant of the derivatives by theta and by the spring, up to a positive factor."""
     K, B, dK, dB = wall_at(own, 1.0, theta)
     K1, B1, _, _ = wall_at(beside, 1.0, theta)
     turning: float = dK * (B1 - B) - dB * (K1 - K)

@@ -1,4 +1,4 @@
-"""What the springs between those charted sweep over, along the edge of the charted ones' common set."""
+"""Cut from the charts' common set what the curves of the springs between those charted sweep over."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ PROBES = 7
 
 @dataclass(frozen=True)
 class EnvelopeCuts:
-    """What has been found swept so far; walls are [K unit, B].
+    """The parts swept over that have been found so far; walls are [K unit, B].
 
     touching_points  touching points of each spring
-    strips           what is between the envelope and the arcs that it touches, of the shapes cut
+    strips           parts of the shapes between the envelope and the arcs that it touches
     lost_shares      springs between which an envelope was lost
-    visited_pairs    stretches and ways that have been looked at
+    visited_pairs    pairs of springs and angles that have been examined
     """
 
     springs: SpringFamily
@@ -41,9 +41,9 @@ class EnvelopeCuts:
     visited_pairs: set[tuple[float, float, float, float]] = field(default_factory=set)
 
     def cut(self, shape: shapely.Geometry, edge: list[tuple[float, Arc]], shares: Floats) -> shapely.Geometry:
-        """A shape without what springs between sweep over.
+        """The shape without the parts that springs between the charted ones sweep over.
 
-        edge    of the shape, each arc with the share of its spring
+        edge    arcs of the shape's edge, each with the share of its spring
         shares  (n,) of the springs charted, ascending
         """
         low, bottom, right, top = shape.bounds
@@ -116,7 +116,7 @@ def _strips(
     size: float,
     lost: list[float],
 ) -> list[shapely.Polygon]:
-    """What strips outside the envelope between two touching points take from a shape.
+    """Parts of a shape in strips outside the envelope between two touching points.
 
     They are wide enough for all that the arcs of the two leave. Where the envelope is outside the shape and its
     stable side turned away, strips reach over what is swept: parts whose middle is stable with the springs of

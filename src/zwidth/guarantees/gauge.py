@@ -1,4 +1,4 @@
-"""How far a wall can be scaled up before some passive operator makes it vibrate.
+"""The gauge mu of a wall: scaled by more than 1/mu, some passive operator makes it vibrate.
 
 At each angle the sampled response fills a disk |P - C| <= R (see `disks`). A wall with H = K + B w(z) keeps clear
 of vibration with every passive operator if and only if no P of the disk makes 1 + P H vanish,
@@ -31,18 +31,18 @@ from zwidth.guarantees.conics import A_B, A_K, B_KK, C_B, C_K, QUARTIC, R_KK, Co
 from zwidth.guarantees.port import Floats, static_compliances
 from zwidth.loop.loop import Loop
 
-# mu is found to this share; stretches are halved at most so often.
+# Relative accuracy of mu, and largest number of halvings of a stretch.
 SHARE, DEPTH = 1e-10, 48
-# Below this share of |H C| is rounding.
+# A part of H C below this share of |H C| is rounding.
 ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
 class Gauge:
-    """The sampled response under every passive operator, as walls meet it.
+    """Conditions of all passive operators on the walls of one loop.
 
-    conics   what each angle asks of a wall; None where nothing is dissipated
-    static   compliances that springs can make of the reading at z = 1 [m/N]
+    conics   condition of each angle; None where the device dissipates nothing
+    static   ends of the range of static compliances of the reading with springs at the port, at z = 1 [m/N]
     """
 
     conics: Conics | None
@@ -81,7 +81,7 @@ def _at_zero(K: Floats, B: Floats, limit: Floats) -> Floats:
 
 @compiled
 def _mu(a: float, b: float, D: float) -> float:
-    """The larger root of mu^2 + 2 a mu + b, D = a^2 - b; 0 where there is none above."""
+    """The larger root of mu^2 + 2 a mu + b, D = a^2 - b; 0 where no root is positive."""
     if not D >= 0.0 or (a >= 0.0 and b >= 0.0):
         return 0.0
     root: float = np.sqrt(D)
@@ -90,8 +90,8 @@ def _mu(a: float, b: float, D: float) -> float:
 
 @compiled
 def _state(K: float, B: float, piece: Floats, wide: bool, s: float) -> tuple[float, float, float, float]:
-    """a, b, D and |H C| of a wall at a part s of the way through a piece, D without the cancellation that b has in
-    narrow disks: D = |H|^2 R^2 - Im(H C)^2."""
+    """a, b, D and |H C| of a wall at the share s of the way through a piece. For narrow disks D is computed as
+    |H|^2 R^2 - Im(H C)^2, since a^2 - b cancels."""
     KK, KB, BB = K * K, K * B, B * B
     a = across = square = 0.0
     first = B_KK if wide else R_KK
@@ -118,7 +118,7 @@ def _sag(x2: float, x3: float, x4: float, s: float, h: float) -> float:
 
 @compiled
 def _sags(K: float, B: float, piece: Floats, s: float, h: float) -> tuple[float, float]:
-    """The same of a and b of a wall."""
+    """How far a and b of a wall can lie below their chords from s - h/2 to s + h/2."""
     KK, KB, BB = K * K, K * B, B * B
     x, y, i = piece[A_K], piece[A_B], B_KK
     ea = _sag(K * x[2] + B * y[2], K * x[3] + B * y[3], K * x[4] + B * y[4], s, h)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from zwidth.guarantees.spring_stable import nyquist_region, spring_stable_region
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_number, require, wrong_type
+from zwidth.progress import Progress
 from zwidth.result import Result
 
 COLGATE = (
@@ -25,7 +27,7 @@ COLGATE = (
 )
 SPRINGS = "spring stability after Colgate and Schenkel 1997, known at second hand (thesis 1.1.3)"
 EXACT = "exact chart (D-decomposition)"
-NO_HANDLE = "the plant has no handle, so that nobody can hold it there"
+NO_HANDLE = "the plant has no handle at which an operator could hold it; give plant.handle"
 NO_STABLE = "no stable wall has K > 0 and B >= 0"
 
 
@@ -43,7 +45,7 @@ class Guarantee:
 class Guarantees(Result):
     """The guarantees of a loop, from the strongest to plain stability, and the chart that holds them all.
 
-    couplings  virtual couplings through which walls are stable with every passive operator; None: not asked for
+    couplings  virtual couplings through which walls are stable with every passive operator; None: not computed
     """
 
     loop: Loop
@@ -60,11 +62,11 @@ class Guarantees(Result):
 
     @property
     def is_empty(self) -> bool:
-        """Has no wall with K > 0 and B >= 0 any of the guarantees?"""
+        """Whether no wall with K > 0 and B >= 0 has any of the guarantees."""
         return all(guarantee.region.reason is not None for guarantee in self.guarantees)
 
     def document(self) -> dict[str, Any]:
-        """The guarantees by key and unit, and the couplings if they were asked for."""
+        """The guarantees by key and unit, and the couplings if they were computed."""
         entries = [
             {"name": one.name, "meaning": one.meaning} | one.region.document() | {"source": one.source}
             for one in self.guarantees
@@ -82,12 +84,14 @@ class Guarantees(Result):
         return "\n  ".join([f"Guarantees: {stiffest}", *coupled])
 
 
-def find_guarantees(loop: Loop, robust: Sequence[Floats] | None = None) -> Guarantees:
+def find_guarantees(
+    loop: Loop, robust: Sequence[Floats] | None = None, progress: Progress | None = None
+) -> Guarantees:
     """Every guarantee of a loop.
 
-    loop    the bare device; a plant with an operator attached is asked about with him as a part of it
-    robust  rings (k, 2) of [K, B] that are stable for a range of operators, from elsewhere; drawn between springs
-            and stability
+    loop    the device without operator; an operator attached to the plant counts as a part of the device
+    robust  rings (k, 2) of [K, B] of a robust chart, stable for a range of operators; listed before `stable`
+    progress  as in `spring_stable_region`, which takes most of the time
 
     Names: `passive-at-actuator` (where the handle is elsewhere), `passive`, `spring-stable`, `nyquist-spring`,
     `robust` (if given), `stable`. Without a handle only the first and the last are known.
@@ -126,7 +130,9 @@ def find_guarantees(loop: Loop, robust: Sequence[Floats] | None = None) -> Guara
         Guarantee(
             "spring-stable",
             "stable whatever spring holds the handle, from none to one that holds it fixed",
-            _region_or_undecided(spring_stable_region, loop) if held else empty_region(NO_HANDLE),
+            _region_or_undecided(partial(spring_stable_region, progress=progress), loop)
+            if held
+            else empty_region(NO_HANDLE),
             SPRINGS,
         )
     )
@@ -150,20 +156,24 @@ def find_guarantees(loop: Loop, robust: Sequence[Floats] | None = None) -> Guara
 
 
 def guarantees_of(
-    point: OperatingPoint, coupling: bool = False, wall: tuple[float, float] | None = None
+    point: OperatingPoint,
+    coupling: bool = False,
+    wall: tuple[float, float] | None = None,
+    progress: Progress | None = None,
 ) -> Guarantees:
-    """Every guarantee of a device at one operating point, without its operator: he is one of those allowed.
+    """Every guarantee of a device at one operating point, without its operator, who is one of the passive ones.
 
     coupling  also virtual couplings after Llewellyn and Raisbeck, and of the sampled device, as `couplings`
     wall      K [N/m] > 0 and B [N s/m] of a wall: also the stiffest coupling through which it may be rendered
-    Raises    ValueError  for a wall that is none
+    progress  as in `spring_stable_region`, which takes most of the time
+    Raises    ValueError  for a wall whose numbers are not valid
               what `OperatingPoint.loop` raises, and ChartError where the chart of the bare device is undecided
     """
     require("point", point, OperatingPoint)
     if wall is not None:
         _check_wall(wall)
     loop = point.without_operator.loop
-    found = find_guarantees(loop)
+    found = find_guarantees(loop, progress=progress)
     if not coupling and wall is None:
         return found
     handle = loop.plant.handle
@@ -186,12 +196,12 @@ def _region_or_undecided(find_region: Callable[[Loop], Region], loop: Loop) -> R
 
 
 def region_of(rings: Sequence[Floats]) -> Region:
-    """Rings from elsewhere as a region."""
+    """Rings of a robust chart as a region."""
     K, B = stiffest_corner(rings)
     return Region(tuple(rings), K, B, None if K > 0.0 else NO_STABLE)
 
 
 def _same_place(first: Floats, second: Floats) -> bool:
-    """Whether two ends are one up to scale: the same motion, geared."""
+    """Whether two coordinates are the same motion up to a factor."""
     size = float(np.linalg.norm(first) * np.linalg.norm(second))
     return abs(abs(float(first @ second)) - size) <= 1e-12 * size

@@ -23,15 +23,16 @@ from zwidth.model.argument_checks import require
 
 Complexes = NDArray[np.complex128]
 
-# Chords deviate from the outline by this share of the wall, outwards less; directions are bisected so often.
+# Largest deviation of chords from the outline, in shares of the wall, inwards and outwards; and largest number of
+# bisections of a direction.
 CHORD, OUTSIDE, BISECTIONS = 1e-6, 1e-7, 26
-# Directions at which bites are found join so often, if they are not as close to others as this.
+# Rounds in which directions of narrow notches are added, and the least distance to a known direction.
 ROUNDS, NARROW = 6, 1e-7
-# Rays with a mu this small go on for ever.
+# Rays with a smaller mu count as unlimited.
 UNLIMITED = 1e-100
-# Stiffnesses closer than this are equal.
+# Relative difference below which two stiffnesses count as equal.
 LEVEL = 1e-12
-# A stiffness this small, beside the largest, is none.
+# A stiffness below this share of the largest counts as 0.
 SHORT = 1e-9
 NOTHING = "no wall at all is stable with every passive operator"
 NO_SPRING = "no wall with K > 0 and B >= 0 is stable with every passive operator"
@@ -40,7 +41,7 @@ NO_SPRING = "no wall with K > 0 and B >= 0 is stable with every passive operator
 def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     """The walls that are stable whatever passive linear operator holds the device.
 
-    loop  the bare device; an operator attached to the plant counts as a part of it
+    loop  the device without operator; an operator attached to the plant counts as a part of the device
     held  (n,) where the operator holds it; left out: the plant's handle
 
     >>> from zwidth.loop.controller import Controller
@@ -71,12 +72,12 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
 
 
 def _walls(directions: Floats, reach: Floats, period: float) -> tuple[Floats, Floats]:
-    """Walls at some reach along directions (k,), in which K T and B are of one size."""
+    """K and B of walls at a reach along directions (k,) in the plane of K T and B [N s/m]."""
     return reach * np.cos(directions) / period, reach * np.sin(directions)
 
 
 def _mu(found: Gauge, directions: Floats, period: float) -> Floats:
-    """mu of walls at reach 1 along directions (k,): the inverse of how far rays go [1/(N s/m)]."""
+    """mu of walls at reach 1 along directions (k,): 1 over the length of each ray [1/(N s/m)]."""
     return found.largest(*_walls(directions, np.ones(len(directions)), period))[0]
 
 
@@ -88,7 +89,7 @@ def _ends(found: Gauge, directions: Floats, period: float) -> Complexes:
 def _outline(found: Gauge, period: float) -> tuple[Floats, Complexes]:
     """Directions (k,) once round and where rays end, K T + j B (k,), bisected until chords follow the outline.
 
-    Light modes bite narrow pieces out: directions in which an angle forbids walls of a chord join too.
+    Lightly damped modes cut narrow notches: directions in which an angle forbids walls of a chord are added.
     """
     directions = np.linspace(-np.pi, np.pi, 241)
     ends = _ends(found, directions, period)
@@ -115,7 +116,7 @@ def _outline(found: Gauge, period: float) -> tuple[Floats, Complexes]:
 
 
 def _missed_directions(found: Gauge, directions: Floats, ends: Complexes, period: float) -> Floats:
-    """Directions in which some angle's disk reaches into the outline's chords, where it reaches farthest."""
+    """Directions in which an angle forbids walls inside the outline's chords, where they lie deepest inside."""
     if found.conics is None:
         return np.zeros(0)
     tip = found.conics.tips(period)

@@ -14,9 +14,9 @@ from zwidth.model.plant import LaggedDamper, Plant
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-# Modal damping below this share of the largest is rounding of an exact zero.
+# Modal damping below this share of the largest is rounding of 0.
 UNDAMPED = 1e-13
-# A mode with less than this share in a force, a reading or a coupling has none.
+# A motion with less than this share in a force, a reading or the damping counts as uncoupled.
 IDLE = 1e-11
 
 
@@ -39,7 +39,7 @@ class Port:
 
     @property
     def generator(self) -> Floats:
-        """A of the states: positions, velocities, forces of lagged dampers."""
+        """State matrix A (N, N) of x' = A x + b f; states are positions, velocities, forces of lagged dampers."""
         n, m = len(self.squared), len(self.lagged)
         A = np.zeros((2 * n + m, 2 * n + m))
         A[:n, n : 2 * n] = np.eye(n)
@@ -57,7 +57,7 @@ class Port:
 
     @property
     def spectral_zeros(self) -> Complexes:
-        """Where the port takes in no power, Y(s) + Y(-s) = 0 for its mobility Y = s G_hh [1/s]; those at hand.
+        """Finite s [1/s] at which the port takes in no power, Y(s) + Y(-s) = 0 for its mobility Y = s G_hh.
 
         With Y = c (s - A)^-1 b they are generalised eigenvalues s of
 
@@ -94,7 +94,7 @@ def port(plant: Plant, held: Floats) -> Port:
 
 @dataclass(frozen=True)
 class PortResponse:
-    """At angular frequencies w (...): compliances [m/N] and what the port takes in.
+    """At angular frequencies w (...): compliances [m/N] and power taken in by the port.
 
     direct                             G_ya  from the actuator's force to the reading
     port_to_reading, actuator_to_port  G_yh, G_ha  from the port's force to the reading, from the actuator's force
@@ -119,7 +119,7 @@ def port_response(held: Port, frequency: Floats) -> PortResponse:
     """
     w = np.asarray(frequency, dtype=float)
     stiff = held.squared - w[..., None] ** 2
-    # a rounding beside the frequency of an undamped mode, where it would respond without end
+    # exactly at an undamped mode the response is infinite: it is taken a rounding error beside it
     stiff = np.where(stiff == 0.0, 1e-16 * w[..., None] ** 2, stiff)
     damping: Complexes = np.broadcast_to(held.damping, (*w.shape, *held.damping.shape)).astype(complex)
     for damper in held.lagged:
@@ -145,9 +145,10 @@ def port_response(held: Port, frequency: Floats) -> PortResponse:
 
 
 def static_compliances(plant: Plant, held: Floats) -> tuple[float, float]:
-    """What the reading gives way to a steady wall force [m/N], the port free and the port held fixed.
+    """Static compliance from the wall's force to the reading [m/N], the port free and the port fixed.
 
-    inf (with its sign) where a rigid motion gives way without end; the two are the ends of what springs make.
+    inf (with its sign) where a rigid motion moves without limit. A spring at the port gives a compliance between
+    the two.
     """
     return _static(plant), _static(hold_fixed(plant, held))
 
@@ -166,15 +167,14 @@ def _static(plant: Plant) -> float:
 
 
 def hold_fixed(plant: Plant, held: Floats) -> Plant:
-    """The plant with the coordinate `held` . x held fixed, in coordinates of what is left."""
+    """The plant with the coordinate `held` . x fixed, in coordinates of the motions that remain."""
     return _within(plant, np.linalg.svd(held[None, :])[2][1:].T, None)
 
 
 def without_idle_motions(plant: Plant) -> Plant:
-    """The plant without the free motions that no wall, no reading and no operator has to do with.
+    """The plant without free motions that no wall, reading, operator or damper couples to.
 
-    A mechanism that slides along the wall keeps its sliding out of what an operator at the handle couples.
-    Coordinates become modal where there is such a motion.
+    Example: sliding along the wall. Coordinates become modal where there is such a motion.
     """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     free = shapes[:, squared == 0.0]

@@ -1,4 +1,4 @@
-"""A set of walls as polygons, with the numbers read off it."""
+"""`Region`: a set of walls as polygons, with its largest stiffness."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False)
 class Region(Result):
-    """Walls that have one guarantee.
+    """The set of walls that have one guarantee.
 
     rings          closed rings (k, 2) of [K, B], counter-clockwise; their union is the set, () if it is empty
     stiffness_max  supremum of K over its walls with K > 0, B >= 0 [N/m]; nan if there is none
     damping_at_stiffness_max  [N s/m]; nan if there is none
     reason         why there is no wall with K > 0, B >= 0; None if there is one
-    warning        what the guarantee lacks; None if nothing
+    warning        limitation of the result; None if there is none
     """
 
     rings: tuple[Floats, ...]
@@ -49,7 +49,7 @@ class Region(Result):
         return inside
 
     def document(self) -> dict[str, Any]:
-        """The set by key and unit, with what it lacks."""
+        """The set by key and unit, with its reason and warning."""
         notes = {"reason": self.reason, "warning": self.warning}
         return {
             "regions": list(self.rings),
@@ -68,7 +68,7 @@ class Region(Result):
 
 
 def stiffness_text(region: Region) -> str:
-    """A region's largest stiffness in words.
+    """A region's largest stiffness as text.
 
     >>> stiffness_text(Region((), 2000.0, 0.5)), stiffness_text(empty_region("for want of friction"))
     ('2000 N/m', 'none')
@@ -79,7 +79,7 @@ def stiffness_text(region: Region) -> str:
 def outline_columns(regions: Mapping[str, Region], name_column: str) -> dict[str, list[Any]]:
     """The rings of several regions as columns, one corner a row, region after region.
 
-    name_column  what the column of their names is called; the column `region` counts the rings of each from 0
+    name_column  heading of the column with their names; the column `region` counts the rings of each from 0
     """
     rows = [
         (name, n, float(K), float(B))
@@ -92,7 +92,7 @@ def outline_columns(regions: Mapping[str, Region], name_column: str) -> dict[str
 
 
 def empty_region(reason: str) -> Region:
-    """No wall at all, and why."""
+    """A region without walls, for a reason."""
     return Region((), float("nan"), float("nan"), reason)
 
 

@@ -59,7 +59,7 @@ def spring_for(plant: Plant, frequency: Floats) -> Floats:
 class SpringFamily:
     """All springs of one loop, by their share  s = k/(k + k0),  0 for none and 1 for a fixed handle.
 
-    loop                 without motions that nobody reaches
+    loop                 the loop without motions that neither wall nor operator couples to
     reference_stiffness  a spring whose mode is near the Nyquist frequency [N/m]
     """
 
@@ -78,7 +78,7 @@ class SpringFamily:
 
     @cached_property
     def unit(self) -> float:
-        """Seconds by which K is multiplied to be of the size of B over the walls in question, for distances."""
+        """Time [s] by which K is multiplied, so that K unit and B have similar size in distances."""
         T = self.loop.period
         some = [member_polygons(m, T) for share in (0.0, 0.45, 1.0) if (m := self.member(share)) is not None]
         left, low, right, high = shapely.intersection_all(some).bounds if some else (np.nan,) * 4
@@ -118,7 +118,7 @@ class SpringFamily:
         return None if one is None or other is None else (one, other)
 
     def member(self, share: float) -> Member | None:
-        """Its chart; None where every wall is stable. Raises ChartError."""
+        """Chart of the loop with one spring; None where every wall is stable. Raises ChartError."""
         tracer = self.tracer(share)
         if tracer is None:
             return None

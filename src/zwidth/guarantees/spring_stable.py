@@ -18,6 +18,7 @@ from zwidth.guarantees.region import Region, empty_region, rings_of, stiffest_co
 from zwidth.guarantees.spring_family import SpringFamily, handle_of, polygons_of, spring_for
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
+from zwidth.progress import Progress
 
 # Springs charted first, by the frequency of the mode they make: so many, up to so many times Nyquist's.
 SPRINGS, BEYOND = 27, 6.0
@@ -78,7 +79,7 @@ def nyquist_region(loop: Loop) -> Region:
     return _region(rings, springs.unit, NO_NYQUIST)
 
 
-def spring_stable_region(loop: Loop) -> Region:
+def spring_stable_region(loop: Loop, progress: Progress | None = None) -> Region:
     """The walls that are stable with every spring 0 <= k <= inf at the handle.
 
     The charts of some springs are intersected, and what the springs between them sweep over is cut off along its
@@ -87,8 +88,9 @@ def spring_stable_region(loop: Loop) -> Region:
     their neighbours' sweep is cut off, until none fails. The edge is known to about 1e-5 of the set's size, with
     light modes to 5e-5; where springs fail to the last the region has a warning.
 
-    Raises  ValueError  if the plant has no handle
-            ChartError  if the chart of one of the springs cannot be closed
+    progress  called with "springs", the rounds that are done, and the most that there can be; fewer are usual
+    Raises    ValueError  if the plant has no handle
+              ChartError  if the chart of one of the springs cannot be closed
 
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant
@@ -106,6 +108,8 @@ def spring_stable_region(loop: Loop) -> Region:
     sweep = EnvelopeCuts(springs)
     clean = 0
     for turn in range(ROUNDS):
+        if progress is not None:
+            progress("springs at the handle", turn, ROUNDS)
         left = _common_shape(springs, new, members)
         if left.is_empty:
             return empty_region(NOTHING)

@@ -1,8 +1,8 @@
 """Llewellyn and Raisbeck: a device and a coupling between any passive operator and any passive environment.
 
-Adams and Hannaford (1999, 2002) make the device discrete by Tustin's rule and the hold (z + 1)/(2 z), and look at
+Adams and Hannaford (1999, 2002) make the device discrete by Tustin's rule and the hold (z + 1)/(2 z), and treat
 it as a two-port between the operator (f_h, v_h) and the environment (f_e, v_e), in hybrid form (known at second
-hand, and the numbers of their equations not at all):
+hand; the numbers of their equations are not known):
 
     [ f_h ]   [ h11  h12 ] [ v_h ]        h11 = 1/Y_hh,          h12 =  D Y_ha/Y_hh
     [-v_e ] = [ h21  h22 ] [ f_e ]        h21 = -Y_yh/Y_hh,      h22 =  D (Y_ya - Y_yh Y_ha/Y_hh) + 1/Z_c
@@ -37,15 +37,17 @@ Complexes = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Demand:
-    """What a device asks of whatever it is coupled to, at angles (k,).
+    """What a device demands of the coupling at each of the angles (k,).
 
     centre, radius  of the disk of admittances it shows, held by any passive operator [m/(N s)]
+    power           |centre|^2 - radius^2 without the cancellation of the two [(m/(N s))^2]
     conductance     least Re(1/Z_c) for a passive environment behind the coupling [m/(N s)]
     """
 
     angles: Floats
     centre: Complexes
     radius: Floats
+    power: Floats
     conductance: Floats
 
 
@@ -79,8 +81,8 @@ def llewellyn_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
     h11, h12, h21, h22 = hybrid_matrix(loop, angles, held)
     with np.errstate(divide="ignore", invalid="ignore"):
         swing = h12 * h21 / (2.0 * h11.real)
-        centre, radius = h22 - swing, np.abs(swing)
-    return _demand(angles, centre, radius, np.maximum(radius - centre.real, -h22.real), h11.real)
+        need = np.maximum(np.abs(swing) - (h22 - swing).real, -h22.real)
+    return _demand(angles, h22, swing, need, h11.real)
 
 
 def raisbeck_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
@@ -89,7 +91,7 @@ def raisbeck_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
     with np.errstate(divide="ignore", invalid="ignore"):
         swing = h12 * h21 / (2.0 * h11.real)
         need = np.abs(h12 + h21.conj()) ** 2 / (4.0 * h11.real) - h22.real
-    return _demand(angles, h22 - swing, np.abs(swing), need, h11.real)
+    return _demand(angles, h22, swing, need, h11.real)
 
 
 def sampled_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
@@ -97,15 +99,16 @@ def sampled_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
     disks = response_disks(loop, port(loop.plant, held), angles)
     difference = 2j * np.sin(angles / 2.0) * np.exp(-0.5j * angles) / loop.period
     centre, radius = disks.centre * difference, disks.radius * np.abs(difference)
-    return Demand(angles, centre, radius, radius - centre.real)
+    return Demand(angles, centre, radius, disks.power * np.abs(difference) ** 2, radius - centre.real)
 
 
-def _demand(angles: Floats, centre: Complexes, radius: Floats, need: Floats, resistance: Floats) -> Demand:
-    """inf where the device itself dissipates nothing."""
+def _demand(angles: Floats, fixed: Complexes, swing: Complexes, need: Floats, resistance: Floats) -> Demand:
+    """The demand of a device that shows the admittance `fixed` where it is held fixed, and up to the swing more or
+    less; inf where it dissipates nothing at the handle."""
     dead = ~(resistance > 0.0)
-    return Demand(
-        angles, np.where(dead, 0.0, centre), np.where(dead, np.inf, radius), np.where(dead, np.inf, need)
-    )
+    centre, radius = np.where(dead, 0.0, fixed - swing), np.where(dead, np.inf, np.abs(swing))
+    power = np.abs(fixed) ** 2 - 2.0 * np.real(fixed * swing.conj())
+    return Demand(angles, centre, radius, np.where(dead, -np.inf, power), np.where(dead, np.inf, need))
 
 
 def allows(demand: Demand, stiffness: ArrayLike, damping: ArrayLike, period: float) -> NDArray[np.bool_]:

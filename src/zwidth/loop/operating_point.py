@@ -44,13 +44,13 @@ if TYPE_CHECKING:
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
     from zwidth.measures.felt_wall import FeltWall
+    from zwidth.progress import Progress
     from zwidth.study.experiment_plan import Plan
     from zwidth.study.measured_boundary import Experiment
     from zwidth.study.validity import Validity
 
 # Where the handle is: x, y or x, y, z [m], or the angle of every driven joint by the name of its link [rad].
 Position: TypeAlias = Sequence[float] | Mapping[str, float]
-Progress: TypeAlias = Callable[[str, int, int], None]
 
 # Share of the arm's length within which a single position is projected onto the nearest that the handle has.
 PROJECTION_TOLERANCE: Final = 0.01
@@ -383,13 +383,19 @@ class OperatingPoint:
         """
         return _verbs.bounds(self, damping).about(self)
 
-    def guarantees(self, *, coupling: bool = False, wall: tuple[float, float] | None = None) -> Guarantees:
+    def guarantees(
+        self,
+        *,
+        coupling: bool = False,
+        wall: tuple[float, float] | None = None,
+        progress: Progress | None = None,
+    ) -> Guarantees:
         """The walls that are stable with every passive operator, every spring, and as they are; see
         `guarantees.loop_guarantees.guarantees_of`.
 
         coupling  also virtual couplings;   wall  K, B that one of them is to render [N/m], [N s/m]
         """
-        return _verbs.guarantees(self, coupling, wall).about(self.without_operator)
+        return _verbs.guarantees(self, coupling, wall, progress).about(self.without_operator)
 
     def felt(self, stiffness: float, damping: float) -> FeltWall:
         """What the hand feels of a wall [N/m], [N s/m]; see `measures.felt_wall`."""

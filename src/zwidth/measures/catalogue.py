@@ -1,4 +1,4 @@
-"""All measures by name. What computes them is imported when it is first asked."""
+"""The catalogue of measures by name; the function of each is imported at its first use."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from zwidth.measures.definition import Better, Measure
 from zwidth.model.argument_checks import wrong_type
 
 _BINDINGS: Final = "zwidth.measures.bindings"
-_OF_THE_MECHANISM: Final = ("dexterity", "forces")  # in these files nothing is asked of a loop
-_WALL_FILE: Final = "wanted_wall"  # in this file every measure is about a wanted wall
+_OF_THE_MECHANISM: Final = ("dexterity", "forces")  # files whose measures need no loop
+_WALL_FILE: Final = "wanted_wall"  # file whose measures are all about a wanted wall
 
 
 def _measure(
@@ -32,7 +32,7 @@ def _measure(
 
 _YOSHIKAWA = "Yoshikawa 1985"
 _MEASURES: Final = (
-    # what the mechanism is
+    # properties of the mechanism
     _measure(
         "dexterity",
         "manipulability",
@@ -93,7 +93,7 @@ _MEASURES: Final = (
         "dexterity", "rigid_mass", "Rigid mass of links and rotors", "kg", None, "Khatib 1987; thesis eq. 2.18"
     ),
     _measure("dexterity", "stiffness", "Structural stiffness", "N/m", "higher", "thesis eq. 2.34"),
-    # which walls it can render
+    # walls that it can render
     _measure(
         "impedance", "stiffness_max", "Largest virtual stiffness", "N/m", "higher", "exact, by D-decomposition"
     ),
@@ -148,7 +148,7 @@ _MEASURES: Final = (
         "higher",
         "thesis eq. 5.5, 5.8; structural damping left out",
     ),
-    # how a wanted wall feels
+    # feel of a wanted wall
     _measure(
         "wanted_wall",
         "optimal_spectral_radius",
@@ -210,7 +210,7 @@ _MEASURES: Final = (
         "size of the impedance without a wall, docs/felt.md",
         each=True,
     ),
-    # what its motors and encoders give
+    # forces, accelerations and steps of its motors and encoders
     _measure("forces", "peak_force", "Peak force", "N", "higher", "J^T f within the drives' torque limits"),
     _measure(
         "forces",
@@ -250,10 +250,10 @@ MEASURES: Final = {measure.name: measure for measure in _MEASURES}
 
 
 def find_measure(name: str, user_measures: Mapping[str, Measure] | None = None) -> Measure:
-    """The measure of that name, a user's own or ours; the name may carry its unit.
+    """The measure of a name, from the catalogue or a user's own; the name may end in its unit.
 
     user_measures  measures of a user's own, by name (`user_measures.load_measures`)
-    Raises         ValueError  naming the nearest, if there is none
+    Raises         ValueError  for an unknown name, with the nearest known one
 
     >>> find_measure("stiffness_max").unit, find_measure("stiffness_max_N_per_m").name
     ('N/m', 'stiffness_max')

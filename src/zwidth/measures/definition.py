@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Better = Literal["higher", "lower"]
 
-# What became of a place. The first three are those of a posture.
+# Status of an operating point. The first three are those of a posture.
 OK: Final = 0
 OUT_OF_REACH: Final = 1
 SINGULAR: Final = 2
@@ -50,11 +50,11 @@ def as_argument(name: str, value: str | None) -> str:
 
 
 class MeasureError(ValueError):
-    """A measure that cannot be asked of this device, wherever it is; the text follows the measure's name.
+    """A measure that this device does not have in any posture; the text follows the measure's name.
 
     reason        why not
-    arguments     what to give instead: name and value, None for any value
-    alternatives  is one of the arguments enough?
+    arguments     what to give instead: name and value of each, None for any value
+    alternatives  whether one of the arguments is enough
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class MeasureError(ValueError):
         return self.spelled(as_argument)
 
     def spelled(self, spelling: Spelling) -> str:
-        """The sentence, with arguments spelled as the asker gives them: in Python, as options, as keys of a file.
+        """The message, with arguments spelled as in Python, as options or as keys of a file.
 
         >>> MeasureError("needs a wanted wall", [("stiffness", None), ("damping", None)]).spelled(as_argument)
         'needs a wanted wall; give stiffness and damping'
@@ -78,21 +78,21 @@ class MeasureError(ValueError):
         return f"{self.reason}; give {joined.join(spelling(*argument) for argument in self.arguments)}"
 
     def with_name(self, measure: str) -> MeasureError:
-        """The same with the measure's name before it."""
+        """The same error with the measure's name before its text."""
         return MeasureError(f"{measure} {self.reason}", self.arguments, self.alternatives)
 
 
 class NoValueError(ValueError):
-    """A place in which a measure has no value; the text says why."""
+    """A measure has no value at this operating point; the text says why."""
 
 
 @dataclass(frozen=True)
 class Note:
-    """Why some places have no value.
+    """Reason why some operating points have no value.
 
-    status  theirs
+    status  status of these points
     reason  one sentence
-    count   how many there are
+    count   number of these points
     first   index of the first, one number per leading axis
     """
 
@@ -104,7 +104,7 @@ class Note:
 
 @dataclass(frozen=True, repr=False)
 class MeasureValues(Result):
-    """A measure's values over places, all with the places' leading axes.
+    """A measure's values at operating points of shape (...).
 
     values  (...)  nan where the status is not OK
     status  (...)  OK, OUT_OF_REACH, SINGULAR, NO_VALUE, UNDECIDED or FAILED
@@ -120,7 +120,7 @@ class MeasureValues(Result):
         return float(self.values)
 
     def document(self) -> dict[str, Any]:
-        """Values, nan where there is none, what became of each point in words, and why some have no value."""
+        """Values (nan where there is none), the status of each point in words, and the notes, by key."""
         words = [STATUS[int(one)] for one in self.status.ravel()]
         notes = [
             {"status": STATUS[note.status], "reason": note.reason, "count": note.count, "first": list(note.first)}
@@ -146,7 +146,7 @@ class MeasureValues(Result):
 
 @dataclass(frozen=True)
 class WantedWall:
-    """The wall that is to be rendered, which some measures are about; None where it is not told.
+    """The wall to be rendered, which some measures need; None where a number is not given.
 
     stiffness, damping  [N/m], [N s/m]
     frequency           at which the hand moves on it [Hz]
@@ -162,14 +162,14 @@ class Measure:
     """One number for a device at an operating point.
 
     name      as in commands and study files
-    title     what it is called in a figure
+    title     label in a figure
     unit      "" for none
-    better    what a designer wants; None where it depends
-    source    where its formula stands
-    function  of an `OperatingPoint`; as text, "module:name", imported when it is first asked
-    each      True: asked of one point at a time; False: of all at once, returning an array or a `MeasureValues`
+    better    "higher" or "lower"; None where that depends on the purpose
+    source    publication or section of the formula
+    function  of an `OperatingPoint`; or a text "module:name", imported at first use
+    each      True: called with one point at a time; False: with all at once, returning an array or `MeasureValues`
     along     whether it depends on the rendered direction
-    linear    whether it is read off the linear loop, which leaves out friction, encoder steps and limits
+    linear    whether it is computed from the linear loop, without friction, encoder steps and limits
     of_wall   whether it is about a wanted wall, which its function takes as a second argument
     wall      the wanted wall
     """
@@ -199,11 +199,11 @@ class Measure:
         return f"{self.name}_{written}" if plain else self.name
 
     def at_wall(self, wall: WantedWall) -> Measure:
-        """The same measure about a wanted wall; itself if it is about none."""
+        """The same measure for a wanted wall; itself if it needs none."""
         return replace(self, wall=wall) if self.of_wall else self
 
     def compute(self, point: OperatingPoint) -> Any:
-        """What the function says; see `evaluate` for values with status."""
+        """Result of the measure's function; see `evaluate` for values with status."""
         function = self.function
         if isinstance(function, str):
             module, _, name = function.partition(":")

@@ -1,7 +1,7 @@
 """How faithfully the handle follows the actuator: the structure's own distortion over frequency.
 
-Drive the actuator's coordinate a . x as x_a e^{jwt} and leave the handle free. What comes out there, against what
-was put in, is the structural deformation ratio
+Let the actuator's coordinate a . x move as x_a e^{jwt}, and leave the handle free. The motion of the handle over
+that of the actuator is the structural deformation ratio
 
     S(w) = x_h/x_a = (h^T D^-1 a)/(a^T D^-1 a),      D = -w^2 M + jw B + K + lagged dampers
 
@@ -89,7 +89,7 @@ def structural_distortion(plant: Plant, frequency: float) -> float:
     sizes = np.abs(fixed_plant.deformation(frequencies))
     best = float(sizes.max())
     left, here, right = sizes[:-2], sizes[1:-1], sizes[2:]
-    # a plateau's ripple is rounding
+    # the ripple of a plateau is rounding
     tops = (here >= left) & (here >= right) & (here > (1.0 + 1e-9) * np.minimum(left, right))
     for i in np.flatnonzero(tops & (here >= 0.5 * best)) + 1:
         found = minimize_scalar(
@@ -104,14 +104,14 @@ def structural_distortion(plant: Plant, frequency: float) -> float:
 
 @dataclass(frozen=True)
 class _FixedActuatorPlant:
-    """A plant whose actuator is moved by hand: what is left free, in its undamped modes with the actuator still.
+    """A plant with its actuator's motion prescribed: the other motions, in undamped modes with the actuator fixed.
 
     squared_frequencies  (m,)    squared frequencies of these modes
     damping              (m, m)
     loss                 (m, m)  imaginary part of the stiffness
     dampers              along (m,), damping, time constant, and along . x_0 of each lagged damper
-    push                 (3, m)  what x_0, the start, drives them with: by its acceleration, speed and position
-    loss_push            (m,)    and by its loss
+    push                 (3, m)  excitation of the modes by x_0: by its acceleration, speed and position
+    loss_push            (m,)    excitation by its hysteretic loss
     static               (a - h) . x_0
     mode_deformations    (m,)    deformation per mode
     """
@@ -139,7 +139,7 @@ class _FixedActuatorPlant:
 
     @property
     def poles(self) -> Complex:
-        """Roots of the motion with the actuator still, the loss apart [1/s]."""
+        """Poles of the motion with the actuator fixed, without the hysteretic loss [1/s]."""
         m, n = len(self.squared_frequencies), len(self.dampers)
         A = np.zeros((2 * m + n, 2 * m + n))
         A[:m, m : 2 * m] = np.eye(m)
@@ -151,10 +151,10 @@ class _FixedActuatorPlant:
 
 
 def _fix_actuator(plant: Plant) -> _FixedActuatorPlant:
-    """x = x_0 + N y, with a . x_0 = 1 and N the motions that leave the actuator still: N^T D x = 0.
+    """Split the motion: x = x_0 + N y with a . x_0 = 1, N the motions with the actuator fixed, and N^T D x = 0.
 
     N are these motions' undamped modes, and x_0 the start that deforms least: the device's free motion if it has
-    one. So 1 is not subtracted from 1 where the structure hardly gives.
+    one. Thus 1 - S keeps its digits for a nearly rigid structure.
     """
     a, h = plant.actuator, handle_of(plant)
     fixed_motions = np.linalg.svd(a[None, :])[2][1:].T

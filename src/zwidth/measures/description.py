@@ -1,4 +1,4 @@
-"""A device at one operating point in numbers: what moves, how stiffly, at which frequencies, how freely."""
+"""Description of a device at one operating point: masses, stiffness, natural frequencies and dexterity."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Description(Result):
     """Masses and stiffness felt along the direction, frequencies, and the mechanism's dexterity.
 
     effective            masses [kg] and stiffness [N/m]; nan where inapplicable
-    natural_frequencies  (n,)  of the device by itself [Hz]; rigid modes exactly 0
+    natural_frequencies  (n,)  of the device without its operator [Hz]; rigid modes exactly 0
     damping_ratios       of each frequency, None for rigid ones; None where damping couples the modes
     joints               angle of each joint by its link [rad]; None for a device without a mechanism, as all below
     jacobian             (3, d)  [m/rad];   mass_matrix  (d, d)  of the links [kg m^2]
@@ -77,7 +77,7 @@ class Description(Result):
 
 
 def describe(point: OperatingPoint) -> Description:
-    """The device by itself at one operating point, without its operator.
+    """Describe the device at one operating point, without its operator.
 
     Raises  what `OperatingPoint.plant` raises
     """
@@ -101,7 +101,7 @@ def describe(point: OperatingPoint) -> Description:
 def damping_ratios(plant: Plant) -> list[float | None] | None:
     """Damping ratio a/w of each natural frequency, None for rigid ones; None where damping couples modes.
 
-    Hysteresis L adds what it loses per cycle at that frequency: x^T L x / (2 w^2), half the loss factor.
+    A hysteretic loss L adds its loss per cycle at that frequency: x^T L x / (2 w^2), half the loss factor.
     """
     modes = real_modes(plant)
     if modes is None:

@@ -1,12 +1,12 @@
 """How freely a mechanism moves and accelerates its handle in one posture (thesis section 5.1).
 
 All take the translational Jacobian of the handle in the driven coordinates. Only directions in which the handle
-can move count: a planar mechanism is judged within its plane. How many there are is told by `freedoms`, for a
-mechanism of this package the number of its drives; left out, it is read off the rows of the Jacobian that are
-not all zero.
+can move count: a planar mechanism is judged within its plane. `freedoms` is their number, for a mechanism of this
+package the number of its drives; left out, it is the number of rows of the Jacobian that are not all zero.
 
-What changes nothing: turning or shifting the base frame, the order of the drives (for all of them), another unit
-of length or all lengths larger, another unit of mass, and other coordinates in place of the joints' angles:
+Invariances (yes: the measure does not change): turning or shifting the base frame, the order of the drives (for
+all of them), another unit of length or all lengths larger, another unit of mass, and other coordinates in place
+of the joints' angles:
 
 | measure                | frame, order | lengths, unit of mass   | coordinates |
 | manipulability         | yes          | no                      | no          |
@@ -15,8 +15,8 @@ of length or all lengths larger, another unit of mass, and other coordinates in 
 | dynamic_isotropy       | yes          | yes, inertias alike     | no          |
 | handle_mass_isotropy   | yes          | yes, inertias alike     | yes         |
 
-The frame may be turned where `freedoms` is told, and else where the rows count themselves right: at a singular
-posture, and for a planar mechanism with more than two drives, the rows that are zero depend on the frame. Other
+"Frame" holds where `freedoms` is given. Without it the number of rows that are zero depends on the frame at a
+singular posture, and for a planar mechanism with more than two drives. Other
 coordinates are, for instance, the motors' angles, or absolute angles of links in place of those between them.
 """
 
@@ -189,7 +189,7 @@ def singular_values(jacobian: ArrayLike, freedoms: int | None = None) -> tuple[F
 
 
 def _without_nan(matrix: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
-    """A matrix (..., m, n) with zeros where any of it is nan, which LAPACK would not survive, and where (...)."""
+    """A matrix (..., m, n) set to 0 where it has a nan, on which LAPACK fails, and a mark (...) of where."""
     A = np.asarray(matrix, dtype=np.float64)
     unknown: NDArray[np.bool_] = np.asarray(np.isnan(A).any(axis=(-2, -1)))
     return np.where(unknown[..., None, None], 0.0, A), unknown

@@ -1,12 +1,12 @@
-"""How a loop's eigenvalues move as one number changes: a wall's damping, a mass (thesis Figs. 5.10 to 5.14).
+"""Paths of a loop's eigenvalues as one number changes: a wall's damping, a mass (thesis Figs. 5.10 to 5.14).
 
-Eigenvalue solvers return them in any order. Neighbouring steps are matched so that all together move least (an
-assignment problem), and a step is halved until the match is plain: each eigenvalue moves little, and lands nearer
-to its match than to any other, by a factor of two.
+Eigenvalue solvers return them in any order. Neighbouring steps are matched so that the sum of all motions is least
+(an assignment problem), and a step is halved until the match is certain: each eigenvalue moves little, and is
+nearer to its match than to any other by a factor of two.
 
-Two real eigenvalues that meet and go on as a conjugate pair move with the square root of the number, and which of
-them is which afterwards is a matter of taste. There halving ends once nothing visible depends on it. Two that pass
-through each other untouched, as only those of uncoupled motions do, may exchange their names.
+Two real eigenvalues that meet and go on as a conjugate pair move with the square root of the number, and they
+can be matched either way afterwards. There halving ends once the difference is too small to see. Two that pass
+through each other, as only those of uncoupled motions do, may be exchanged.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 # A step along a path longer than this share of its |z|, or of 1, is halved; one shorter than the second length is
-# not, whatever its neighbours do: nobody sees it.
+# not, whatever its neighbours do: it is too small to see.
 LONG: Final = 0.1
 SHORT: Final = 1e-3
 # Halvings of one step at most, where eigenvalues jump.
@@ -46,7 +46,7 @@ class Crossing:
 
     value       of the number
     eigenvalue  z there, |z| = 1 to rounding
-    path        which of the paths
+    path        index of the path
     outwards    whether z leaves the circle's inside as the number grows along the path
     """
 
@@ -65,8 +65,8 @@ class Crossing:
 class EigenvaluePaths(Result):
     """Eigenvalues along a path of one number.
 
-    values       (k,)    the values asked for, in their order, and those that were needed between
-    requested    (k,)    which were asked for
+    values       (k,)    the values given, in their order, and those added between them
+    requested    (k,)    whether the value was given
     eigenvalues  (k, N)  each column one path
     crossings    of the unit circle, in the order of the values
     """
@@ -130,7 +130,7 @@ def eigenvalue_paths(matrix_at: Callable[[float], ArrayLike], values: ArrayLike)
     requested = np.asarray(values, dtype=np.float64)
     steps = np.diff(requested)
     if requested.ndim != 1 or len(requested) < 2 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
-        raise ValueError("values must be a row of at least two that rise or fall")
+        raise ValueError("values must be at least two numbers in rising or falling order")
     walk = _PathTracer(matrix_at, requested)
     crossings = [found for path in range(walk.z.shape[1]) for found in walk.crossings(path)]
     crossings.sort(key=lambda found: (found.value, found.path), reverse=bool(steps[0] < 0.0))
@@ -166,7 +166,7 @@ def wall_paths(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -
     require("loop", loop, Loop)
     K, B = np.asarray(wall_stiffness, dtype=np.float64), np.asarray(wall_damping, dtype=np.float64)
     if K.ndim + B.ndim != 1:
-        raise ValueError("one of stiffness and damping must be a row of values and the other one number")
+        raise ValueError("one of stiffness and damping must be a list of values and the other a single number")
     if not (np.all(np.isfinite(K)) and np.all(np.isfinite(B))):
         raise ValueError("walls must be finite")
     if B.ndim:
@@ -175,7 +175,7 @@ def wall_paths(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -
 
 
 class _PathTracer:
-    """Values and matched eigenvalues, in the making."""
+    """Values and matched eigenvalues so far."""
 
     def __init__(self, matrix_at: Callable[[float], ArrayLike], requested: Floats) -> None:
         self.matrix_at = matrix_at
@@ -194,7 +194,7 @@ class _PathTracer:
         return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
 
     def trace_to(self, end: float, unordered: Complex, halvings: int) -> None:
-        """Steps from the last value walked to to `end`."""
+        """Step from the last value to `end`."""
         start, z = self.steps[-1]
         if len(z) != len(unordered):
             raise PathError(
@@ -210,7 +210,7 @@ class _PathTracer:
         self.trace_to(end, unordered, halvings - 1)
 
     def crossings(self, path: int) -> list[Crossing]:
-        """Where one path goes from inside the circle to its outside or back; what stays near it does neither."""
+        """Crossings of the unit circle by one path; a path that only comes near the circle has none."""
         height = np.abs(self.z[:, path]) - 1.0
         off = np.flatnonzero(np.abs(height) > BAND)
         found = []
@@ -228,7 +228,7 @@ class _PathTracer:
         (low, high), (z_low, z_high) = self.values[at : at + 2].tolist(), self.z[at : at + 2, path].tolist()
 
         def here(value: float) -> complex:
-            # the step is plain: between its ends nothing else is as near to the straight line
+            # the match is certain: between its ends nothing else is as near to the straight line
             z = self.eigenvalues_at(value)
             line = z_low + (z_high - z_low) * (value - low) / (high - low)
             return complex(z[np.argmin(np.abs(z - line))])
@@ -240,7 +240,7 @@ class _PathTracer:
 
 
 def _match(z: Complex, others: Complex) -> tuple[Complex, bool]:
-    """`others` in the order of z, and whether the match is plain."""
+    """`others` in the order of z, and whether the match is certain."""
     from scipy.optimize import linear_sum_assignment
 
     distance = np.abs(z[:, None] - others)

@@ -1,4 +1,4 @@
-"""Measures at operating points: values where there are any, and what became of the rest."""
+"""Evaluate measures at operating points: values, and a status and a reason where there is none."""
 
 from __future__ import annotations
 
@@ -30,8 +30,11 @@ from zwidth.model.argument_checks import require
 from zwidth.model.reduction import ModelError
 
 NUMBERS = "biuf"  # kinds of arrays that are numbers: bool, signed, unsigned, floating
-FAILURES = (Exception, SystemExit)  # a user's own measure that ends the program has failed, and nothing else has
-NO_MECHANISM = "speaks of a mechanism, and the device is given by its plant"
+FAILURES = (
+    Exception,
+    SystemExit,
+)  # a user's measure that calls exit() counts as failed, like any other error in it
+NO_MECHANISM = "needs a [mechanism]; this device gives its [plant] only"
 NO_VALUE_ERRORS = (NoValueError, ModelError, UnmovedError, HysteresisError, NonlinearError)
 
 
@@ -40,7 +43,7 @@ def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
 
     What a measure raises, or returns in another shape, at one point is that point's status FAILED with a note: the
     others keep their values.
-    Raises  MeasureError  where it cannot be asked of this device at all
+    Raises  MeasureError  where this device does not have the measure at any point
     """
     require("measure", measure, Measure)
     require("point", point, OperatingPoint)
@@ -73,12 +76,12 @@ def measure_at(
     damping: float | None = None,
     frequency: float | None = None,
 ) -> MeasureValues:
-    """A measure of the catalogue by its name, or one of a user's own, at operating points.
+    """Evaluate a measure, of the catalogue by its name or a user's own, at operating points.
 
     stiffness, damping, frequency  of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures about it
-    Raises  ValueError    for a name that is no measure's
-            MeasureError  where it cannot be asked of this device, or needs what is not given; text begins with its
-                          name
+    Raises  ValueError    for an unknown name
+            MeasureError  where this device does not have the measure, or an argument that it needs is missing; the
+                          text begins with its name
     """
     resolved = find_measure(measure) if isinstance(measure, str) else measure
     require("measure", resolved, Measure)
@@ -111,7 +114,7 @@ def _note(points: NDArray[np.bool_], status: int, reason: str) -> Note:
 
 
 def evaluate_pointwise(compute: Callable[[OperatingPoint], Any], point: OperatingPoint) -> MeasureValues:
-    """What is asked of one point at a time, at all points."""
+    """Call a function with one point at a time, for all points."""
     values, status = np.full(point.shape, np.nan), point.status.copy()
     why: dict[tuple[int, ...], tuple[int, str]] = {}
     for index in np.ndindex(point.shape):
@@ -132,7 +135,7 @@ def notes_of_points(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, 
 
 
 def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
-    """Value, status and reason of one question; only a MeasureError is raised."""
+    """Value, status and reason of one call; only a MeasureError is raised."""
     try:
         found = compute()
         value = np.asarray(found)

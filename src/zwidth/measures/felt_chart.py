@@ -1,4 +1,4 @@
-"""The stability chart as the hand reads it: felt static stiffness in the place of the commanded one."""
+"""The stability chart over the static stiffness that the hand feels, in place of the commanded one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from zwidth.result import Result
 
 Floats = NDArray[np.float64]
 
-# A straight side of the chart bends on the way; it is cut into pieces of this share of the largest stiffness.
+# A straight side of the chart becomes a curve; it is cut into pieces of this share of the largest stiffness first.
 PIECE = 1e-3
 
 
@@ -115,6 +115,6 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
 
 
 def _runs(inside: NDArray[np.bool_]) -> list[slice]:
-    """Stretches of True of at least two."""
+    """Runs of at least two True values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 1]

@@ -1,4 +1,4 @@
-"""What the hand feels of one wall that a device renders: the impedance over frequency, the stiffness at rest."""
+"""What the hand feels of one rendered wall: impedance over frequency, and stiffness at rest."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class FeltWall(Result):
     free_motion_mass                     felt in slow free motion [kg]; nan where a spring ties the handle to the
                                          ground
     stiffness_max                        of the stiffest stable wall [N/m]; None: none has K > 0 and B >= 0
-    static_stiffness_at_stiffness_max    what that wall is felt with [N/m]; None as before
-    static_stiffness_limit               what no wall exceeds [N/m]; inf for a rigid device
+    static_stiffness_at_stiffness_max    felt stiffness of that wall [N/m]; None as before
+    static_stiffness_limit               felt stiffness that no wall exceeds [N/m]; inf for a rigid device
     frequency                            (k,)  [Hz]
     felt_impedance                       (k,)  at the handle [N s/m]; None where the wall is not stable
     commanded_impedance                  (k,)  that of an ideal wall, B + K/(jw) [N s/m]
@@ -62,13 +62,13 @@ class FeltWall(Result):
 
     @property
     def reason(self) -> str | None:
-        """Why nothing is felt of this wall; None where it is stable."""
+        """Why there is no felt impedance; None where the wall is stable."""
         if self.verdict == "stable":
             return None
         return f"this wall is {self.verdict}, so that there is no steady motion to feel"
 
     def document(self) -> dict[str, Any]:
-        """Everything by key and unit; None for what is only felt of a stable wall, where this one is not."""
+        """All numbers by key and unit; the felt ones are None where the wall is not stable."""
         unknown = (
             dict.fromkeys(_impedance_columns("impedance", self.commanded_impedance))
             if self.felt_impedance is None
@@ -127,7 +127,7 @@ def _impedance_columns(name: str, impedance: Complex) -> dict[str, Floats]:
 def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWall:
     """What the hand feels of a wall.
 
-    point               the device; its operator decides which walls are stable, and what is felt is without him
+    point               the device; stability includes its operator, the felt impedance does not
     stiffness, damping  of the wall [N/m], [N s/m]
     Raises  HandleError  (measures.handle_impedance) where there is no handle
             ValueError   for a wall that is not finite

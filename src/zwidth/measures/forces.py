@@ -1,4 +1,4 @@
-"""What motors and encoders give the hand: forces, accelerations, steps and friction along a direction.
+"""Forces, accelerations, position steps and friction along a direction, from the motors and encoders.
 
 In the driven coordinates p with the handle's velocity v = J p', a force f at the handle is the torques J^T f of
 the drives, in whatever posture, at rest, without gravity. Numbers of the drives are taken at the joint: a torque
@@ -20,7 +20,9 @@ from zwidth.model.effective_parameters import unit_directions
 
 Floats = NDArray[np.float64]
 
-OFF: Final = 1e-6  # share of a direction outside what the handle can do, above which it cannot move along it
+OFF: Final = (
+    1e-6  # largest part of a unit direction outside the handle's motions; above it the handle cannot move along it
+)
 
 
 def force_along(jacobian: ArrayLike, direction: ArrayLike, torques: ArrayLike) -> Floats:
@@ -52,14 +54,14 @@ def force_component(jacobian: ArrayLike, direction: ArrayLike, torques: ArrayLik
 
         max { u^T f : |J^T f|_i <= t_i }  =  sum_i t_i |q_i|,    q = J^+ u
 
-    q are the drives' rates when the handle moves along u with unit speed: every drive pushes with all it has. It
+    q are the drives' rates when the handle moves along u with unit speed: every drive pushes at its limit. It
     is the support function of the polygon (zonotope) of forces, of which `force_along` is the radius: never less
     than that, and equal where the corner that lies farthest along u lies on u itself.
 
     jacobian   (..., 3, d)  J [m/rad], of rank d: no more drives than directions to move in
     direction  (..., 3)     u, unit vectors
     torques    (..., d)     t, each drive's limit at the joint [N m]
-    Returns    (...)        [N]; inf where the handle cannot move along u, for bearings add what you like; nan
+    Returns    (...)        [N]; inf where the handle cannot move along u, since bearings then bear any force; nan
                             where J is nan
     Raises     ValueError   if a direction is not of unit length
 
@@ -101,7 +103,7 @@ def acceleration_along(
 
 
 def resolution_along(jacobian: ArrayLike, direction: ArrayLike, steps: ArrayLike) -> Floats:
-    """How far the reading of the handle's position along a direction steps when all encoders step at once.
+    """Step of the handle's reading along a direction when all encoders step at once.
 
         sum_i |u^T J_i| dp_i
 
@@ -124,8 +126,8 @@ def friction_along(jacobian: ArrayLike, direction: ArrayLike, frictions: ArrayLi
 
         sum_i C_i |q_i|,    q = J^+ u
 
-    by the work of a metre: every drive slips by q_i and takes C_i |q_i|. What the hand has to push across the
-    direction to stay on it does no work. The conditions of `zwidth.conditions` ask for the work along the motion
+    the work per metre: every drive turns by q_i and takes C_i |q_i|. The force across the direction that keeps the
+    hand on it does no work. The conditions of `zwidth.conditions` ask for the work along the motion
     that a force makes by itself, M^-1 J^T u, which goes astray and may take less
     (`friction_and_resolution.ground_friction`).
 
@@ -169,6 +171,6 @@ def _torques_per_force(jacobian: ArrayLike, direction: ArrayLike) -> Floats:
 
 
 def _total(each: Floats, rates: Floats) -> Floats:
-    """Sum of each times |rate|, where 0 times inf is 0: a drive that stands still takes no part."""
+    """Sum of each number times |rate|, where inf times 0 is 0: a drive that stands still does no work."""
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(rates == 0.0, 0.0, each * np.abs(rates)).sum(axis=-1))

@@ -1,4 +1,4 @@
-"""What the hand feels: the impedance at the handle, against that of the wall that was commanded.
+"""Impedance at the handle, which the hand feels, and that of the commanded wall.
 
 The handle h is one end of the device and the wall acts at the other, a, read at s. A hand force f e^{jwt} makes
 the samples of the sensor move by Y e^{jwkT}, and the loop answers with commands
@@ -18,8 +18,8 @@ with P the sampled plant, in which all of the staircase is. So the motion x at w
 
     [ D + H C/(1 + S C) a s^T ] x = h f,      Z = f / (jw h^T x)
 
-which is exact. The motion at w + 2 pi n/T that goes with it is not part of an impedance and is not told; a plant
-with mass hardly follows so fast.
+which is exact. The motion at w + 2 pi n/T that goes with it is not part of an impedance and is not computed; a
+plant with mass hardly follows at these frequencies.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ FREE = 1e-12
 
 
 class HandleError(ValueError):
-    """A plant without a handle: nobody can feel it."""
+    """The plant has no handle at which an impedance could be felt."""
 
 
 def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complex:
     """Force over velocity at the handle, Z = f/(jw x_h) (see the derivation above).
 
-    wall_stiffness, wall_damping  of a stable wall [N/m], [N s/m]; an unstable one has no steady answer, and what
-                                  is computed then means nothing
+    wall_stiffness, wall_damping  of a stable wall [N/m], [N s/m]; an unstable one has no steady motion, and the
+                                  result then has no meaning
     frequency  (...)  above 0 and below half the sampling frequency [Hz]
     Returns    (...)  complex [N s/m]
     Raises     HandleError  where the plant has no handle
@@ -87,10 +87,10 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
 
 
 def free_motion_impedance(plant: Plant, frequency: ArrayLike) -> Complex:
-    """Force over velocity at the handle with no wall at all, 1/(jw G_hh) [N s/m].
+    """Force over velocity at the handle without a wall, 1/(jw G_hh) [N s/m].
 
     The ideal is 0: of a device in free motion nothing is felt (transparency, after Tavakoli and Howe 2009, known
-    at second hand). What is left is the device's own mass, friction and resonances.
+    at second hand). The device's own mass, friction and resonances remain.
     """
     s = 2j * np.pi * np.asarray(frequency, dtype=float)
     dynamic, _, _, h = _dynamic_stiffness(plant, s)
@@ -103,11 +103,11 @@ def commanded_impedance(wall_stiffness: float, wall_damping: float, frequency: A
 
 
 def static_stiffness(plant: Plant, wall_stiffness: ArrayLike) -> Floats:
-    """Stiffness at the handle that a wall is felt with at rest.
+    """Stiffness of a wall as felt at the handle at rest.
 
         1 / (h^T (K_plant + K a s^T)^-1 h)          two masses and a spring k: K k/(K + k)
 
-    The velocity estimate of what stands still is 0 and the hold keeps a constant force, so that neither sampling
+    At rest the velocity estimate is 0 and the hold keeps a constant force, so that neither sampling
     nor delay nor damping counts.
 
     wall_stiffness  (...)  K [N/m]
@@ -127,9 +127,9 @@ def static_stiffness(plant: Plant, wall_stiffness: ArrayLike) -> Floats:
 
 
 def static_stiffness_limit(plant: Plant) -> float:
-    """What the stiffest wall imaginable is felt with: the limit of `static_stiffness` for K to infinity [N/m].
+    """Felt stiffness of an infinitely stiff wall: the limit of `static_stiffness` for K to infinity [N/m].
 
-    The wall then holds the sensor still, and what gives is the structure between it and the hand: k of the
+    The wall then holds the sensor fixed, and the structure between it and the hand deflects: k of the
     two-mass plant, inf for a rigid one. The limit of a hard contact by flexibility (after Tavakoli and Howe 2009,
     known at second hand).
     """
@@ -142,7 +142,7 @@ def static_stiffness_limit(plant: Plant) -> float:
 def free_motion_mass(plant: Plant) -> float:
     """Mass felt at the handle in slow free motion: 1/(h^T Z Z^T h) of the mass-normalised rigid modes Z [kg].
 
-    nan where a spring ties the handle to the ground: then it is a stiffness that is felt.
+    nan where a spring ties the handle to the ground, since a stiffness is felt then.
     """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     moved = shapes.T @ handle_of(plant)

@@ -1,4 +1,4 @@
-"""Lengths made homogeneous: Jacobians whose rows or columns have different units, before they are judged.
+"""Homogeneous Jacobians: matrices whose rows or columns have different units, made dimensionless.
 
 A handle that is turned as well as moved has rows in m/rad and in 1; prismatic drives beside revolute ones have
 columns in 1 and 1/m beside m/rad and 1. Singular values of such a matrix add metres to radians, and its
@@ -16,15 +16,15 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
-HALVINGS: Final = 60  # of the bracket: it shrinks to 1e-18 of itself
-FLAT: Final = 1e-10  # a slope of log kappa against log L that counts as none: well above its rounding
-WIDEST: Final = 64.0  # of the bracket, in natural logarithms of a length: far beyond what double precision holds
+HALVINGS: Final = 60  # number of halvings of the bracket, which shrinks to 1e-18 of itself
+FLAT: Final = 1e-10  # a smaller slope of log kappa against log L counts as 0; well above its rounding
+WIDEST: Final = 64.0  # largest half width of the bracket, in natural logarithms of a length
 
 
 def homogeneous_jacobian(
     jacobian: ArrayLike, length: ArrayLike, rotations: Sequence[int] = (), prismatic: Sequence[int] = ()
 ) -> Floats:
-    """The Jacobian without units: translations divided by a length, strokes of prismatic drives too.
+    """The dimensionless Jacobian: translations, and strokes of prismatic drives, divided by a length.
 
         H = D J E,   D_i = 1/L for translations, 1 for rotations;  E_j = L for prismatic drives, 1 for others
 
@@ -93,16 +93,16 @@ def characteristic_length(
 
 
 def scaled_jacobian(jacobian: ArrayLike, largest_velocities: ArrayLike, largest_rates: ArrayLike) -> Floats:
-    """The Jacobian in shares of what is wanted of each coordinate of the handle and what each drive can do.
+    """The Jacobian scaled by the largest velocity of each handle coordinate and the largest rate of each drive.
 
         S_T^-1 J S_J,   S_T = diag(largest velocities), S_J = diag(largest rates)
 
-    Stocco, Salcudean and Sassani 1998 scale design matrices so on both sides, by the ranges of the coordinates; of
-    their text only the beginning could be read.
+    Stocco, Salcudean and Sassani 1998 scale design matrices in this way on both sides, by the ranges of the
+    coordinates; of their text only the beginning could be read.
 
-    Singular values above 1 mean that the drives, all at once, do more than is wanted. Invariant to every unit,
-    and to the coordinates of the drives as far as each is scaled by itself (a gear ratio). Forces, mass matrices
-    and other design matrices are scaled in the same way, each side by the largest values of its coordinates.
+    Singular values above 1 mean that the drives together reach more than the wanted velocity. Invariant to every
+    unit, and to the coordinates of the drives as far as each is scaled by itself (a gear ratio). Forces, mass
+    matrices and other design matrices are scaled in the same way, each side by its coordinates' largest values.
 
     jacobian            (..., m, n)  in any units
     largest_velocities  (..., m)     wanted of each coordinate of the handle, in the units of J's rows times rates
@@ -122,7 +122,7 @@ def scaled_jacobian(jacobian: ArrayLike, largest_velocities: ArrayLike, largest_
 
 
 def _powers(J: Floats, rotations: Sequence[int], prismatic: Sequence[int]) -> Floats:
-    """Which power of the length each entry is multiplied by, (m, n)."""
+    """Power of the length by which each entry is multiplied, (m, n)."""
     if J.ndim < 2:
         raise ValueError(f"a Jacobian is a matrix, got an array of shape {J.shape}")
     for name, given, count in (("rotations", rotations, J.shape[-2]), ("prismatic", prismatic, J.shape[-1])):
@@ -137,7 +137,7 @@ def _powers(J: Floats, rotations: Sequence[int], prismatic: Sequence[int]) -> Fl
 
 
 def _check(J: Floats, power: Floats) -> None:
-    """Raises ValueError where no length makes a difference, or the least value may not be the only one."""
+    """Raise ValueError where the length has no effect, or where the minimum may not be unique."""
     m, n = power.shape
     rows, columns = bool(np.ptp(power[:, 0])), bool(np.ptp(power[0]))
     if not rows and not columns:
@@ -152,7 +152,7 @@ def _check(J: Floats, power: Floats) -> None:
 
 
 def _start(J: Floats, power: Floats) -> Floats:
-    """Logarithm of a length that changes with the unit as it should: where two kinds of entries weigh alike."""
+    """Logarithm of a first length: the one at which two kinds of entries have equal norms."""
     with np.errstate(divide="ignore", invalid="ignore"):
         size = [
             np.log(np.sqrt(np.sum(np.where(power == k, J, 0.0) ** 2, axis=(-2, -1)))) for k in (-1.0, 0.0, 1.0)
@@ -186,7 +186,7 @@ def _slope(J: Floats, power: Floats, x: Floats, norm: str) -> Floats:
 
 
 def _minimise_convex(slope: Callable[[Floats], Floats], start: Floats) -> Floats:
-    """Where convex functions (...) with a slope are least, each by itself; nan where none of the bracket rises.
+    """Minima of convex functions (...), found by their slopes; nan where a function does not rise in the bracket.
 
     Kinks and level stretches are treated alike: the place up to which the slope is below -FLAT and the one from
     which it exceeds FLAT are bisected for, and the answer lies in their middle. So rounding of a slope that is all

@@ -1,4 +1,4 @@
-"""Which walls a device renders stably, in closed form: largest stiffness, largest damping, area (thesis 5.2.1).
+"""Closed forms of the stable walls: largest stiffness, largest damping, stable area (thesis 5.2.1).
 
 Two models have closed forms, both without physical damping, the velocity being the backward difference of two
 readings, unfiltered:
@@ -10,7 +10,7 @@ Everything else (damping, several masses, filters, other estimators, part of a s
 only. Both are exact within what they assume: no W = sqrt(k/m) T is too large, aliasing included. (5.5), whose
 coefficient the scan has lost, is (12 - 16 ln 2) m^2/T^3; (5.7) is extended beyond W = pi; (5.8), damaged in the
 scan, is read with ln(1 + c). (4.46), the largest damping of all stable K, at K = -k, is not used: here it is that
-of K -> 0. The numbers below (4.32) are a misprint, those without delay.
+of K -> 0. The numbers below (4.32) in the thesis are a misprint: they are those without delay.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ImpedanceRange:
-    """The stable walls in numbers, as `StabilityChart` has them; nan where the closed form does not apply.
+    """The extent of the stable walls, as in `StabilityChart`; nan where the closed form does not apply.
 
     stiffness_max             (...)  supremum of K over stable walls with K > 0, B >= 0 [N/m]; nan if there is none
     damping_at_stiffness_max  (...)  its damping [N s/m]; nan if there is none
@@ -69,7 +69,7 @@ def rigid_range(mass: ArrayLike, sampling_period: ArrayLike, delay_samples: Arra
 
 
 def sprung_range(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLike) -> ImpedanceRange:
-    """A mass on a spring to what stands still, without friction and delay (thesis eq. 5.7 and 5.8).
+    """A mass on a spring to the ground, without friction and delay (thesis eq. 5.7 and 5.8).
 
         K_max = 2 k (sqrt(1 + c) - 1)^2/(1 - c),   B_max = k T c/(1 - c),   c = cos W,   W = sqrt(k/m) T
         area  = (m^2/T^3) 2 W^4/(1 - c)^2 (c^2/2 + c - (1 + c) ln(1 + c))

@@ -1,8 +1,7 @@
-"""A measure over a workspace: from values cell by cell to a few numbers.
+"""Summary of a measure over a workspace: average, extremes, uniformity.
 
-Cells in which a measure has no value do not count, and how much of the workspace counts is told beside the
-numbers: an average over what is left is worth as much as what is left. Cells that stand for more or less of the
-workspace than others have weights, their areas or volumes.
+Cells without a value are left out, and `Overall.share` says how much of the workspace remains: an average over a
+small part says little about the whole. Cells of unequal size are weighted by their areas or volumes.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from zwidth.measures.dexterity import singular_values
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-ROUNDING: Final = 1e-9  # by which a condition number may lie below 1
+ROUNDING: Final = 1e-9  # amount by which a condition number may lie below 1
 
 
 @dataclass(frozen=True)
@@ -29,13 +28,13 @@ class Overall:
     average     weighted mean of the cells that count
     worst       the least where higher is better, the largest where lower is better; nan where that depends
     best        the other way round
-    uniformity  least over largest, 1 where all are equal: worst/best where higher is better, best/worst where
-                lower is; nan where a value is negative
+    uniformity  least over largest value, 1 where all are equal: worst/best where higher is better, best/worst
+                where lower is; nan where a value is negative
     variation   standard deviation over the size of the average, weighted: 0 where all are equal; nan where the
                 average is 0 or a value infinite
-    share       of the whole weight, the cells that count: those with a value
-    reached     of the whole weight, the cells that have a posture, with or without a value
-    count       how many cells count
+    share       share of the whole weight in cells that count: those with a value
+    reached     share of the whole weight in cells that have a posture, with or without a value
+    count       number of cells that count
     """
 
     average: float

@@ -1,4 +1,4 @@
-"""Where users' own measures were imported from before 0.2; goes with the next release."""
+"""Old name of `zwidth.measures.user_measures`, used before 0.2; to be removed with the next release."""
 
 from __future__ import annotations
 

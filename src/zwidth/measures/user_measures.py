@@ -1,4 +1,4 @@
-"""Measures of a user's own, from a file.
+"""A user's own measures: functions in a Python file, marked with `measure`.
 
     from zwidth import measure
 
@@ -6,8 +6,9 @@
     def inertial_force(point):
         return 10.0 * point.effective.rigid_mass
 
-A function is asked of one `OperatingPoint` at a time and returns a number; with each=False it is asked of many at
-once and returns an array of their shape. One with a second argument gets the wanted wall there (`WantedWall`).
+A function is called with one `OperatingPoint` at a time and returns a number; with each=False it is called with
+many at once and returns an array of their shape. A second argument of the function receives the wanted wall
+(`WantedWall`).
 """
 
 from __future__ import annotations
@@ -38,11 +39,11 @@ BETTER: Final = ("higher", "lower", None)
 
 @dataclass(frozen=True)
 class FileFunction:
-    """A function in a user's file, found again in whatever process asks it.
+    """A function in a user's file, which any process can load again.
 
     file  path
-    text  what the file says: another text is another measure
-    name  the function's
+    text  content of the file: with another content it is another measure
+    name  name of the function
     """
 
     file: str
@@ -55,7 +56,7 @@ class FileFunction:
             return (own if wall is None else own.at_wall(wall)).compute(point)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # a text that speaks of __main__ must not look like a function that only this process has
+        # a content that mentions __main__ must not be taken for a function that exists in this process only
         return _unpickled, (self.file, compress(self.text.encode()), self.name)
 
 
@@ -72,13 +73,13 @@ def measure(
 
     unit    "" for none
     title   what it is called in figures; left out: the first line of the function's docstring, or its name
-    better  "higher", "lower", or None where it depends
+    better  "higher", "lower", or None where that depends on the purpose
     along   False: it does not depend on the rendered direction
-    each    True: asked of one point at a time; False: of many at once, returning an array of their shape
-    source  where its formula stands
-    Raises  ValueError  for another `better`, and for texts that are none, or of more than one line
+    each    True: called with one point at a time; False: of many at once, returning an array of their shape
+    source  publication or section of the formula
+    Raises  ValueError  for another `better`, and for arguments that are not a text of one line
 
-    What it prints goes to standard error, as that of the file does: standard output is the answer's.
+    What the function or its file prints goes to standard error: standard output holds the answer only.
 
     >>> @measure(unit="kg")
     ... def moved_mass(point):
@@ -115,14 +116,14 @@ def measure(
 
 
 def load_measures(path: str) -> dict[str, Measure]:
-    """All measures in a file of one's own, by name; the file is run for it.
+    """Run a user's file and return its measures by name.
 
     Raises  ValueError  with one sentence: a missing file, one that does not run, one without a measure, a name
             that is taken
     """
     file = Path(path)
     if not file.is_file():
-        raise ValueError(f"{path} is no plain file" if file.exists() else f"no such file: {path}")
+        raise ValueError(f"{path} is not an ordinary file" if file.exists() else f"no such file: {path}")
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -134,7 +135,7 @@ def load_measures(path: str) -> dict[str, Measure]:
         )
     taken = sorted(MEASURES.keys() & found.keys())
     if taken:
-        raise ValueError(f"{file.name}: the name {taken[0]} is taken by a measure of ours; rename the function")
+        raise ValueError(f"{file.name}: the name {taken[0]} is taken by a measure of zwidth; rename the function")
     return {
         name: replace(one, function=FileFunction(str(file.resolve()), text, name), source=f"your own, {file.name}")
         for name, one in found.items()
@@ -147,7 +148,7 @@ def _unpickled(file: str, text: bytes, name: str) -> FileFunction:
 
 @lru_cache(maxsize=8)
 def _measures(file: str, text: str) -> dict[str, Measure]:
-    """The measures of a file that says this, run once in each process."""
+    """The measures of a file with this content, which is run once in each process."""
     module = _run(Path(file), text)
     return {one.name: one for one in vars(module).values() if isinstance(one, Measure) and callable(one.function)}
 
@@ -171,7 +172,7 @@ def _run(file: Path, text: str) -> ModuleType:
 
 
 def _line(error: BaseException, file: Path) -> int:
-    """The last line of that file that an error came through; 0 for none."""
+    """The last line of that file in an error's traceback; 0 for none."""
     line, frame = 0, error.__traceback__
     while frame is not None:
         if frame.tb_frame.f_code.co_filename == str(file):

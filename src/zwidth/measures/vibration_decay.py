@@ -1,4 +1,4 @@
-"""How fast vibration at a wanted wall decays, and with which motor-side mass fastest (thesis section 5.2.2).
+"""Decay of vibration at a wanted wall, and the motor-side mass of fastest decay (thesis section 5.2.2).
 
 The motor side's mass m on the structure's spring k_e, the link side held still, no damping, no delay. With
 g = 1 - cos W, W = sqrt(k_e/m) T, P = K/k_e, D = B/(k_e T) the transition matrix of a wall K, B has the roots of
@@ -15,7 +15,7 @@ A real g needs a discriminant that is not negative, which is R >= rho^2 with
     rho^2 = 8 D (1 + P)/((2 D + P)^2 + 8 D)                                                   (thesis eq. 5.15)
     g     = rho^2 (2 D - P rho^2)/(2 D (rho^2 (2 + P + D) + D))                               (thesis eq. 5.14)
 
-So rho is a lower bound: with no mass at all does this wall's slowest root decay faster. It is reached, with the
+So rho is a lower bound: with no mass does this wall's slowest root decay faster. It is reached, with the
 mass of that g, if the two roots are conjugate, the third, g D/rho^2, is not slower, and 0 < g < 2. For K >= 0 that
 is B > K T/2 and a third root of at most rho: the rest follows. Where it is not reached the least spectral radius
 is larger and with another mass (`fastest_mass` finds it, for any model). The scan damages the last
@@ -36,7 +36,7 @@ from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
 
-# Masses tried per factor of ten before the best are refined, and how near the best one has to be for that.
+# Masses tried per factor of ten, and how near to the best spectral radius one must be to be refined.
 TRIED: Final = 60
 NEAR: Final = 1e-2
 
@@ -103,7 +103,7 @@ def fastest_mass(
     loop             whose plant has its motor-side mass changed (`with_motor_side_mass`)
     lowest, highest  masses between which it is looked for [kg], 0 < lowest < highest; an end may be the answer
     Returns          mass, to about 1e-7 of itself, and spectral radius there; above 1 if no mass is stable
-    Raises           ValueError  for masses that are not meant, or a wall that is not finite
+    Raises           ValueError  for masses out of order or not positive, or a wall that is not finite
     """
     if not 0.0 < lowest < highest < np.inf:
         raise ValueError(f"masses must satisfy 0 < lowest < highest, got {lowest:g} and {highest:g}")

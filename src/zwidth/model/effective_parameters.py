@@ -45,10 +45,11 @@ def effective_parameters(mechanism: Mechanism, posture: Posture, direction: Arra
     shape = np.broadcast_shapes(posture.status.shape, u.shape[:-1])
     design = np.broadcast_to(np.arange(len(rotor)).reshape(mechanism.design_shape), shape).ravel().astype(np.int64)
     d = rotor.shape[1]
-    M = np.broadcast_to(posture.mass_matrix, (*shape, d, d)).reshape(-1, d, d)
-    J = np.broadcast_to(posture.jacobian, (*shape, 3, d)).reshape(-1, 3, d)
+    M = np.array(np.broadcast_to(posture.mass_matrix, (*shape, d, d)).reshape(-1, d, d), order="C")
+    J = np.array(np.broadcast_to(posture.jacobian, (*shape, 3, d)).reshape(-1, 3, d), order="C")
+    along = np.array(np.broadcast_to(u, (*shape, 3)).reshape(-1, 3), order="C")
     out = np.empty((4, len(M)))
-    _effective_batch(design, M, J, np.array(np.broadcast_to(u, (*shape, 3)).reshape(-1, 3)), rotor, spring, out)
+    _effective_batch(design, M, J, along, np.ascontiguousarray(rotor), np.ascontiguousarray(spring), out)
     return EffectiveParameters(*(row.reshape(shape) for row in out))
 
 

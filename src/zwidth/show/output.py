@@ -90,7 +90,7 @@ def _check_place(path: Path, name: str) -> None:
     if not path.parent.is_dir():
         raise OutputError(f"{printable(name)}: there is no folder {printable(str(path.parent))}; make it first")
     if path.exists() and not path.is_file():
-        raise OutputError(f"{printable(name)}: is no ordinary file; name another")
+        raise OutputError(f"{printable(name)}: is not an ordinary file; name another")
     if path.exists() and not os.access(path, os.W_OK):
         raise OutputError(f"{printable(name)}: cannot be written: permission denied; name another file")
 

@@ -1,4 +1,4 @@
-"""What somebody who asked for the impossible can ask for instead, in the words in which he asks."""
+"""The advice that ends an error message, with arguments spelled as in Python, as options or as keys of a file."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from zwidth.measures.definition import Spelling, as_argument
 
 @dataclass(frozen=True)
 class Advice:
-    """What to do instead, about one argument.
+    """What to type instead, about one argument.
 
-    text   with {} where the argument stands
-    name   of the argument, as Python has it
-    value  that it should have; None: any
+    text   the advice, with {} in place of the argument
+    name   the argument's name in Python
+    value  the value that it should have; None: any
     """
 
     text: str
@@ -21,7 +21,7 @@ class Advice:
     value: str | None = None
 
     def spelled(self, spelling: Spelling = as_argument) -> str:
-        """The advice, with the argument spelled as the asker gives it: in Python, as an option, as a file's key.
+        """The advice, with the argument spelled by `spelling`: as in Python, as an option, or as a key of a file.
 
         >>> Advice("ask for {}", "axes", "xy").spelled()
         "ask for axes='xy'"

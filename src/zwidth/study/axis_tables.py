@@ -23,10 +23,10 @@ SetNumbers = dict[KeyPath, tuple[str, str]]  # what is set: as it is written, an
 
 
 def axes_of(document: dict[str, Any], device: Device | None, found: Faults) -> tuple[Axis, ...]:
-    """The axes as far as they can be meant; what is wrong with them is added to `found`.
+    """The axes of a study that have no fault; the faults of the others are added to `found`.
 
-    document  of the study, as read: what is of the wrong type is told elsewhere and passed over here
-    device    None: it cannot be loaded, so that paths are not looked up
+    document  the study as read. Values of the wrong type are left out here: `study_schema` reports them
+    device    None if it could not be loaded; paths are then not looked up
     """
     hypercube = document.get("sampling", "grid") == "latin-hypercube"
     axes, taken = [], SetNumbers()
@@ -69,12 +69,12 @@ def unit_of(document: dict[str, Any], key: str) -> str:
 
 
 def _values_faults(table: dict[str, Any], hypercube: bool) -> Iterator[Fault]:
-    """Whether it is said once, and once only, which values there are."""
+    """Faults of an axis that has no values, gives them twice (range and values), or has a key too many."""
     span, values = table.get("range"), table.get("values")
     if span is None and values is None:
         yield ((), "has no values; give range = [low, high] and count, or values = [...]")
     if span is not None and values is not None:
-        yield (("values",), "stands beside a range; keep one of them")
+        yield (("values",), "and range exclude each other; remove one of them")
     elif values is not None:
         said = [repr(value) for value in values] if isinstance(values, list) else []
         yield from (
@@ -86,15 +86,18 @@ def _values_faults(table: dict[str, Any], hypercube: bool) -> Iterator[Fault]:
             if key in table:
                 yield ((key,), "is read with a range only; remove it")
     elif span is not None and hypercube and "count" in table:
-        yield (("count",), "is that of a grid; a Latin hypercube has one count for all axes: move it to the top")
+        yield (
+            ("count",),
+            "is for a grid; a Latin hypercube has one count for all axes: move it to the top",
+        )
     elif span is not None and not hypercube and "count" not in table:
-        yield ((), "has no count; a grid needs one for each range")
+        yield ((), "has a range and no count; add the number of its values, such as count = 11")
     if table.get("scale") == "log" and isinstance(span, list) and span and is_number(span[0]) and not span[0] > 0:
-        yield (("range",), f"must be above 0 to be divided in the logarithm, got {quote(span)}")
+        yield (("range",), f'must begin above 0 where scale = "log", got {quote(span)}')
 
 
 def _values(table: dict[str, Any]) -> list[tuple[KeyPath, Any]]:
-    """Everything that is said of the axis's values, with its place."""
+    """The entries of the axis's range and values, each with its key path."""
     return [
         ((key, n), value)
         for key in ("range", "values")
@@ -103,7 +106,7 @@ def _values(table: dict[str, Any]) -> list[tuple[KeyPath, Any]]:
 
 
 def _axis(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> Axis | None:
-    """The axis; None where its values are told to be wrong elsewhere."""
+    """The axis; None where its values have a fault, which `study_schema` or `_values_faults` reports."""
     span, values, count = table.get("range"), table.get("values"), table.get("count")
     logarithmic = table.get("scale") == "log"
     if isinstance(values, list) and values and span is None:
@@ -113,7 +116,7 @@ def _axis(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> 
     low, high = float(span[0]), float(span[1])
     if not (isfinite(low) and isfinite(high)) or (logarithmic and low <= 0.0):
         return None
-    # what is too many is refused before it is spread out
+    # a count too large for memory is refused by `study.check_study`; its values are not made here
     inner = (
         spread((low, high), count, logarithmic=logarithmic) if type(count) is int and 0 < count <= 10**6 else ()
     )
@@ -123,9 +126,11 @@ def _axis(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> 
 def _overlap_faults(
     key: str, where: KeyPath, axis: str, device: Device | None, taken: SetNumbers
 ) -> Iterator[Fault]:
-    """Whether another axis, or a tie, sets the same, a part of it, or what excludes it.
+    """Faults of a key that another axis or tie sets too, as a whole or in part, or that excludes such a key.
 
-    axis  the one that sets the key, which is itself or a number tied to it
+    key    of the axis itself, or of a number tied to it
+    axis   key of the axis that sets it
+    taken  what axes before this one set; the key is added
     """
     steps: KeyPath = ("", key)  # no path of the file: the axis `operator` chooses whose numbers others change
     if key not in CIRCUMSTANCES:
@@ -134,13 +139,13 @@ def _overlap_faults(
         try:
             steps = address.resolve(device.document, key)
         except DeviceError:
-            return  # told where it is looked up
+            return  # `_key_faults` and `_tie_faults` report it
     for other, (shown, setter) in taken.items():
         by = f"is set by the axis '{setter}'" if shown == setter else f"goes with the axis '{setter}'"
         if other == steps:
-            yield (where, f"'{key}' {by} already; each number may be set once")
+            yield (where, f"'{key}' {by} already; remove one of the two")
         elif steps[: len(other)] == other or other[: len(steps)] == steps:
-            yield (where, f"'{key}' overlaps '{shown}', which {by} already; each number may be set once")
+            yield (where, f"'{key}' overlaps '{shown}', which {by} already; remove one of the two")
         elif _exclude(steps, other):
             yield (where, f"'{key}' excludes '{shown}', which {by} already; remove one of them")
     taken.setdefault(steps, (key, axis))
@@ -156,7 +161,7 @@ def _exclude(one: KeyPath, other: KeyPath) -> bool:
 
 
 def _key_faults(document: dict[str, Any], key: str, values: list[tuple[KeyPath, Any]]) -> Iterator[Fault]:
-    """Whether the key leads to something that takes these values: numbers, or the texts that the schema knows."""
+    """Faults of a key that no device file has, or of values of a kind that the schema does not allow there."""
     try:
         steps = address.resolve(document, key)
         now = address.get(document, key) if address.exists(document, key) else None
@@ -168,16 +173,20 @@ def _key_faults(document: dict[str, Any], key: str, values: list[tuple[KeyPath, 
     kinds = {kind.get("type") for kind in schema.subschemas(steps)} - {"null", "array", "object"}
     if isinstance(now, dict | list) or not kinds:
         inside = [path for path in address.numeric_addresses(document) if path.startswith(dotted(steps, document))]
-        hint = f"; numbers in it: {', '.join(inside[:6])}{', ...' if len(inside) > 6 else ''}" if inside else ""
-        yield (("key",), f"'{key}' names no number{hint}")
+        hint = (
+            f"; the numbers in it are {', '.join(inside[:6])}{', ...' if len(inside) > 6 else ''}"
+            if inside
+            else ""
+        )
+        yield (("key",), f"'{key}' is not a single number{hint}")
         return
     if isinstance(now, int | float) and not isinstance(now, bool):
         kinds &= {*NUMBER}
     spanned = any(where[0] == "range" for where, _ in values)
     if spanned and not kinds & {*NUMBER}:
-        yield (("range",), f"needs a number, but '{key}' takes text; give values = [...]")
+        yield (("range",), f"cannot be used: '{key}' takes text; write values = [...] with the texts")
     elif spanned and "number" not in kinds:
-        yield (("range",), f"cannot be divided: '{key}' takes whole numbers; give values = [...]")
+        yield (("range",), f"cannot be used: '{key}' takes whole numbers; write values = [1, 2, 3]")
     else:
         texts = _texts(steps)
         yield from (
@@ -186,7 +195,7 @@ def _key_faults(document: dict[str, Any], key: str, values: list[tuple[KeyPath, 
 
 
 def _texts(steps: KeyPath) -> list[str]:
-    """The texts that the schema knows at a path; none where any will do."""
+    """The texts that the schema allows at a path; [] where any text is allowed."""
     kinds = [kind for kind in schema.subschemas(steps) if kind.get("type") == "string"]
     return (
         list(dict.fromkeys(str(kind.get("const")) for kind in kinds)) if all("const" in k for k in kinds) else []
@@ -194,7 +203,10 @@ def _texts(steps: KeyPath) -> list[str]:
 
 
 def _value_fault(value: Any, kinds: set[Any], key: str, texts: list[str]) -> str:
-    """What is wrong with a value of these kinds, or these texts, "" for nothing."""
+    """What is wrong with a value; "" for nothing.
+
+    kinds  JSON types that the schema allows;   texts  texts that it allows, [] for any
+    """
     if isinstance(value, bool):
         fits, wanted = "boolean" in kinds, "no true or false"
     elif isinstance(value, str):
@@ -213,7 +225,7 @@ def _value_fault(value: Any, kinds: set[Any], key: str, texts: list[str]) -> str
 
 
 def _ties(table: dict[str, Any], key: str, device: Device, taken: SetNumbers, found: Faults) -> Iterator[Tie]:
-    """The ties that can be meant; faults are added to `found`."""
+    """The ties without a fault, and a matrix element's tie to its mirror image; faults are added to `found`."""
     document, given = device.document, table.get("tie")
     for n, tied in enumerate(given if isinstance(given, list) else []):
         tie: dict[str, Any] = {"key": tied} if isinstance(tied, str) else tied if isinstance(tied, dict) else {}
@@ -263,18 +275,21 @@ def _tie_faults(
         yield ((), f"'{to}' {error.faults[0].message}")
         return
     if factor is not None and power is not None:
-        yield (("factor",), "stands beside a power; keep one of them")
+        yield (("factor",), "and power exclude each other; remove one of them")
     elif power is None:
         values: list[tuple[KeyPath, Any]] = [(("key",), value) for _, value in _values(table)[:1]]
         yield from (((), said.replace(f"'{key}'", f"'{to}'")) for _, said in _key_faults(document, to, values))
         if factor is not None and any(isinstance(value, str) for _, value in _values(table)):
-            yield (("factor",), "is of numbers; the axis has texts")
+            yield (("factor",), "cannot multiply texts, and the values of this axis are texts; remove it")
     else:
         base = address.get(document, key) if address.exists(document, key) else None
         if not _numbers(own):
-            yield ((), f"'{to}' has no number in the device file that a power could scale; use factor, or set it")
+            yield (
+                (),
+                f"'{to}' has no value in the device file, which power needs; use factor, or set it first",
+            )
         if not is_number(base) or base == 0:
-            given = f"got {quote(base)}" if base is not None else "which gives none; set it first"
+            given = f"got {quote(base)}" if base is not None else "and it has none; set it first"
             yield (("power",), f"needs a value of '{key}' other than 0 in the device file, {given}")
         elif not all(is_number(value) and value / base > 0 for _, value in _values(table)):
             yield (("power",), f"needs values of the sign that '{key}' has in the device file, {quote(base)}")
@@ -285,7 +300,7 @@ def _numbers(value: Any) -> bool:
 
 
 def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None) -> Iterator[Fault]:
-    """Whether the values of a circumstance can be meant for this device."""
+    """Faults of the values of a circumstance, such as a position or an assembly, for this device."""
     if key in WANTED:
         least = "above 0" if key == "frequency_Hz" else "at least 0"
         for where, value in _values(table):
@@ -293,7 +308,7 @@ def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None)
                 yield (where, f"must be a finite number, {least}, got {quote(value)}")
         return
     if "range" in table:
-        yield (("range",), f"is of numbers; {key} needs values = [...]")
+        yield (("range",), f"cannot be used: {key} is not a number; write values = [...]")
     for where, value in _values(table):
         if where[0] == "values" and (said := circumstance_fault(key, value, device)):
             yield (where, said)
@@ -324,7 +339,7 @@ def circumstance_fault(key: str, value: Any, device: Device | None) -> str:
 
 def _assembly(device: Device, name: str) -> None:
     if device.mechanism is None:
-        device.at(assembly=name)  # raises that it does not apply
+        device.at(assembly=name)  # raises the fault that a [plant] has no assemblies
     elif name not in device.mechanism.assemblies:
-        near = suggestion(name, set(device.mechanism.assemblies))
-        raise fail(device.label, "assembly", f"names no assembly, got '{name}'; {near}")
+        near = suggestion(name, set(device.mechanism.assemblies), "there are")
+        raise fail(device.label, "assembly", f"'{name}' is not an assembly of this device; {near}")

@@ -1,4 +1,4 @@
-"""Columns of a study: a measure of each design at its operating point, or over its workspace."""
+"""Columns of a study: a measure at each design's operating point, or a statistic of it over the workspace."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from zwidth.study.workspace_summary import CONDITIONS
 if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
 
-# What is said of it in a figure; does it keep the measure's unit?
+# Statistics over a workspace -> name in a figure, and whether the result has the measure's unit.
 STATISTICS: Final[dict[str, tuple[str, bool]]] = {
     "average": ("average", True),
     "worst": ("worst", True),
@@ -31,17 +31,17 @@ STATISTICS: Final[dict[str, tuple[str, bool]]] = {
     "conditioning_index": ("mean of the reciprocal", False),
     "isotropy_index": ("global isotropy index", False),
 }
-JUDGING: Final = ("worst", "best")
-OF: Final = {"conditioning_index": CONDITIONS, "isotropy_index": ("isotropy",)}  # others are of any measure
+JUDGING: Final = ("worst", "best")  # need to know whether more of the measure is better
+OF: Final = {"conditioning_index": CONDITIONS, "isotropy_index": ("isotropy",)}  # the others take any measure
 
 
 @dataclass(frozen=True)
 class Column:
-    """What a study asks of each design.
+    """One number to compute for each design of a study.
 
-    name       as written: "stiffness_max", "worst(isotropy)"
-    measure    the one asked cell by cell
-    statistic  what is made of its values over the workspace; None: asked at the operating point
+    name       as written in the study: "stiffness_max", "worst(isotropy)"
+    measure    the measure that is computed
+    statistic  statistic of its values over the workspace; None: the measure at the operating point
     """
 
     name: str
@@ -50,12 +50,12 @@ class Column:
 
     @property
     def unit(self) -> str:
-        """Of its values; "" for none."""
+        """Unit of the values; "" for none."""
         return self.measure.unit if self.statistic is None or STATISTICS[self.statistic][1] else ""
 
     @property
     def title(self) -> str:
-        """What it is called in a figure."""
+        """Label in a figure."""
         return (
             self.measure.title
             if self.statistic is None
@@ -64,14 +64,14 @@ class Column:
 
     @property
     def better(self) -> str | None:
-        """What a designer wants: "higher", "lower", or None where that depends."""
+        """Which values are better: "higher", "lower", or None where that depends on the purpose."""
         if self.statistic is None or STATISTICS[self.statistic][1]:
             return self.measure.better
         return "lower" if self.statistic == "variation" else "higher"
 
     @property
     def key(self) -> str:
-        """The name with its unit, as a table's column carries it.
+        """Name of the table's column, with the unit.
 
         >>> column_named("worst(stiffness_max)").key
         'worst_stiffness_max_N_per_m'
@@ -83,10 +83,11 @@ class Column:
     def reduce(
         self, found: MeasureValues, point: OperatingPoint, weights: NDArray[np.float64] | None = None
     ) -> tuple[float, int, str]:
-        """Value, status and reason of this design, from the measure's values over its workspace.
+        """Value, status and reason of a design, from the measure's values over its workspace.
 
-        weights  what each cell stands for; None: all alike
-        Cells without a value do not count; where none has one, their commonest status is the design's.
+        found    the measure at each cell;   point  the operating point of all cells
+        weights  area of each cell [m^2]; None: all equal
+        Returns  the statistic of the cells that have a value; nan with the commonest status where none has one
         """
         assert self.statistic is not None
         try:
@@ -112,7 +113,7 @@ def column_named(name: str, user_measures: Mapping[str, Measure] | None = None) 
     """The column of a name, such as "isotropy" or "average(isotropy)".
 
     user_measures  measures of a user's own, by name
-    Raises         ValueError  naming the nearest, where there is none
+    Raises         ValueError  for an unknown name, with the nearest known one
 
     >>> column_named("average(isotropy)").measure.name
     'isotropy'
@@ -125,21 +126,22 @@ def column_named(name: str, user_measures: Mapping[str, Measure] | None = None) 
     if over not in STATISTICS:
         near = nearest(over, STATISTICS)
         hint = f"did you mean {near}({inner})?" if near else f"there are {comma_list(list(STATISTICS))}"
-        raise ValueError(f"{over} is nothing that is made of a measure over a workspace; {hint}")
+        raise ValueError(f"{over} is not a statistic over the workspace; {hint}")
     measure = find_measure(inner, user_measures)
     if over in JUDGING and measure.better is None:
         raise ValueError(
-            f"{over}({measure.name}): whether more of it is better depends; ask for average({measure.name})"
+            f"{over}({measure.name}): whether more or less is better depends on the purpose; "
+            f"write average({measure.name})"
         )
     if measure.name not in OF.get(over, (measure.name,)):
         raise ValueError(
-            f"{over}({measure.name}): is of {comma_list(OF[over])} only; ask for average({measure.name})"
+            f"{over}({measure.name}): {over} applies to {comma_list(OF[over])} only; write average({measure.name})"
         )
     return Column(f"{over}({measure.name})", measure, over)
 
 
 def measure_list(measures: Any) -> list[str | Measure]:
-    """One measure or several, by name or themselves, as a list. Raises TypeError for anything else.
+    """Measures given one by one or in a list, as names or `Measure`s, as a list. Raises TypeError for others.
 
     >>> measure_list("isotropy")
     ['isotropy']
@@ -154,8 +156,8 @@ def measure_list(measures: Any) -> list[str | Measure]:
 
 
 def unit_attributes(unit: str) -> dict[str, str]:
-    """A variable's unit under the names by which datasets state it; no attribute where it has none.
+    """Attributes that state the unit of a dataset's variable; none where it has no unit.
 
-    xarray labels the axes of its plots by either name, and would write [] for an empty one.
+    xarray labels the axes of its plots by either attribute, and would write [] for an empty one.
     """
     return {"unit": unit, "units": unit} if unit else {}

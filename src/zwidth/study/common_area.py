@@ -1,9 +1,9 @@
-"""Where several requirements are met at once (thesis Fig. 5.4), and how large that area is.
+"""The common area of a map: where several requirements are met at once (thesis Fig. 5.4).
 
 Between the cells of a map each margin is interpolated linearly, and its zero line cuts the workspace: an error of
-the second order in the step. Where the links' lengths decide what is reached (`study.reach_outline`), regions end
-at that true edge. Elsewhere, and about cells without a value, a cell takes what touches it out of the region, so
-that the edge is followed in steps and half steps of the grid, an error of the first order.
+the second order in the step. Where the links' lengths alone bound what is reached (`study.reach_outline`), regions
+end at that exact edge. Elsewhere, and beside cells without a value, the squares of the grid that touch such a cell
+are left out of the region, an error of the first order in the step.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-ROUNDING: Final = 1e-9  # share of the largest margin that still counts as 0: a bound that is just met is met
+ROUNDING: Final = (
+    1e-9  # share of the largest margin; a smaller margin counts as 0, so that a bound met exactly is met
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,14 +50,14 @@ class PlaneArea:
 
 @dataclass(frozen=True, repr=False)
 class CommonArea(Result):
-    """Requirements laid over each other.
+    """The regions in which requirements of one map are met, and their intersection.
 
     units    of the requirements' values, in their order
-    axes     what the plane's axes are called
-    reach    what can be reached
+    axes     names of the plane's axes
+    reach    the reachable part of the plane
     regions  where each requirement is met, in their order
-    common   where all are
-    circumstances  what the map states of its device, by the keys of its document
+    common   where all requirements are met
+    circumstances  device, plane and computer of the map, by the keys of its document
     """
 
     requirements: tuple[Requirement, ...]
@@ -113,7 +115,7 @@ def common_area(dataset: xr.Dataset, requirements: Sequence[Requirement]) -> Com
     Raises   ValueError  for no requirement, or one of a measure that the map does not hold
     """
     if not requirements:
-        raise ValueError("a common area needs at least one requirement")
+        raise ValueError("a common area needs at least one requirement, such as 'stiffness_max>=5000'")
     missing = [r.measure.name for r in requirements if r.measure.name not in dataset]
     if missing:
         raise ValueError(f"the map does not hold {missing[0]}; it holds {', '.join(measures_of(dataset))}")
@@ -162,7 +164,7 @@ def nonnegative_region(x: Floats, y: Floats, margin: Floats) -> Any:
     """Where an interpolated margin is 0 or more, as a shapely geometry.
 
     x, y    (nx,), (ny,)  ascending
-    margin  (ny, nx)      nan: no value, and no part of the region; infinities lie far on their side
+    margin  (ny, nx)      nan: no value, left out of the region; an infinity counts as a large margin of its sign
 
     >>> grid = np.linspace(-1.0, 1.0, 41)
     >>> round(nonnegative_region(grid, grid, 0.25 - grid**2 - grid[:, None] ** 2).area, 2)      # pi/4

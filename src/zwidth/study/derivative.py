@@ -1,4 +1,4 @@
-"""Derivatives of computed numbers by extrapolated differences, with an estimate of what they are worth."""
+"""Derivatives of computed numbers by extrapolated differences, with an estimate of their error."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
-# First steps, of the scale: smaller where the function changes within a step, larger where rounding hides it.
+# First steps in shares of the scale: smaller where the function changes within a step, larger against rounding.
 FIRST: Final = (2e-3, 1e-4, 5e-6, 1e-2, 5e-2)
-LEVELS: Final = 3  # halvings that are always made
-MOST: Final = 9  # and at most, where the number changes fast
-ENOUGH: Final = 1e-10  # error of the derivative times the scale that asks for no more halvings
-POOR: Final = 1e-8  # and above which other first steps are tried
+LEVELS: Final = 3  # least number of halvings
+MOST: Final = 9  # largest number of halvings, where the function changes fast
+ENOUGH: Final = 1e-10  # error of the derivative times the scale below which no more halvings are made
+POOR: Final = 1e-8  # the same error; above it other first steps are tried
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Derivative:
 
 
 def central_derivative(function: Callable[[float], float], at: float, scale: float) -> Derivative:
-    """Derivative of a smooth function of order one by central differences, extrapolated to step 0.
+    """First derivative of a smooth function by central differences, extrapolated to step 0.
 
         D(h) = (f(x + h) - f(x - h)) / 2 h = f' + c2 h^2 + c4 h^4 + ...
 
@@ -32,7 +32,7 @@ def central_derivative(function: Callable[[float], float], at: float, scale: flo
     least from its two parents is taken, and this difference is the error (Ridders 1982, known at second hand from
     its use in numerical libraries).
 
-    scale   what the argument is measured by: the first step is 1/500 of it
+    scale   typical size of the argument; the first step is 1/500 of it
     Raises  what the function raises at the first step
 
     >>> from math import exp
@@ -43,7 +43,9 @@ def central_derivative(function: Callable[[float], float], at: float, scale: flo
 
 
 def one_sided_derivative(of: Callable[[float], float], at: float, scale: float, side: int) -> Derivative:
-    """The same from one side, +1 above or -1 below; for arguments at the end of their range, or at a bend.
+    """First derivative by one-sided differences, side +1 above or -1 below.
+
+    For an argument at the end of its range, or where the function has a bend.
 
         D(h) = (f(x + h) - f(x)) / h = f' + c1 h + c2 h^2 + ...
 
@@ -56,7 +58,7 @@ def one_sided_derivative(of: Callable[[float], float], at: float, scale: float, 
 
 
 def _extrapolate(quotient: Callable[[float], float], scale: float, factor: float) -> Derivative:
-    """The best of the tables that begin with each first step, as far as they are needed."""
+    """The best result over the first steps; tried in turn until one is accurate enough."""
     best = _table(quotient, FIRST[0] * scale, scale, factor)
     for first in FIRST[1:]:
         if best.error * scale <= POOR:

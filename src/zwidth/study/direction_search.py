@@ -1,4 +1,4 @@
-"""The directions in which a handle can move, and a measure asked along many of them."""
+"""The directions in which a handle can move, and a measure computed along many of them."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from zwidth.measures.evaluate import evaluate
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-STILL: Final = 1e-9  # share of the fastest motion below which a direction is none of the handle's
-TRIED: Final = 16  # points in which a direction is asked against its opposite
-SAME: Final = 1e-9  # relative difference that rounding makes
-ROWS: Final = 100_000  # questions asked at once
+STILL: Final = 1e-9  # share of the fastest motion; along slower directions the handle counts as fixed
+TRIED: Final = 16  # number of points at which a direction is compared with its opposite
+SAME: Final = 1e-9  # relative difference of values that is rounding
+ROWS: Final = 100_000  # directions computed at once
 
 
 @dataclass(frozen=True)
 class DirectionSearch:
-    """A measure to be asked along many directions of points that are OK, all of one freedom to move.
+    """A measure to compute along many directions, at points whose handle moves in the same number of dimensions.
 
     point     flat, of shape (n,), all OK
     basis     (n, 3, r)  orthonormal, spanning the directions in which the handle can move, r = 1, 2 or 3
-    one_sided along a direction and its opposite the measure says two things
+    one_sided whether the measure along a direction and along its opposite can differ
     """
 
     measure: Measure
@@ -58,7 +58,8 @@ class DirectionSearch:
 
 
 def direction_searches(measure: Measure, point: OperatingPoint) -> Iterator[tuple[Ints, DirectionSearch]]:
-    """Those points of a flat one that are OK, by their freedom to move: which they are, and how to ask there."""
+    """For each number of dimensions in which the handle can move: the indices of the points that are OK, and their
+    `DirectionSearch`."""
     ok = np.flatnonzero(point.status == OK)
     if not len(ok):
         return
@@ -72,7 +73,7 @@ def direction_searches(measure: Measure, point: OperatingPoint) -> Iterator[tupl
 
 
 def _one_sided(measure: Measure, point: OperatingPoint, basis: Floats) -> bool:
-    """Does the opposite direction have another value, in some points along a direction like no other?"""
+    """Whether the opposite direction has another value, tried at a few points along an arbitrary direction."""
     n, r = len(basis), basis.shape[2]
     which = np.unique(np.linspace(0, n - 1, min(n, TRIED)).astype(np.int64))
     like_no_other = np.broadcast_to(np.array([0.5403, 0.8415, 0.3907])[:r], (len(which), r))

@@ -1,8 +1,8 @@
 """The share of directions along which a requirement is met.
 
 In the plane the share of the circle's arc, on the sphere that of its surface. On a circle the ends of the arcs
-are bisected between samples. Arcs that lie between two samples are looked for where the parabola of three says
-that the margin changes its sign. The sphere is cut into circles of latitude, weighted by Gauss and Legendre.
+are bisected between samples. Arcs that lie between two samples are looked for where the parabola through
+three samples changes its sign. The sphere is cut into circles of latitude with the weights of Gauss and Legendre.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CHUNK: Final = 2048  # points at once
 
 @dataclass(frozen=True)
 class ShareOfDirections:
-    """A function of points: which share of their directions meets a requirement."""
+    """Function of an operating point: the share of its directions along which a requirement is met."""
 
     requirement: Requirement
 
@@ -60,7 +60,8 @@ def share_of_directions(requirement: Requirement, point: OperatingPoint) -> Floa
 
     Directions are those in which the handle can move, by angle in the plane and by solid angle in space. One along
     which the measure has no value does not meet it. A measure that does not depend on the direction gives 0 or 1.
-    In the plane the share is good to 1e-7, but for what changes within a few degrees; in space to about 1 %.
+    In the plane the share is accurate to 1e-7, except where the measure changes within a few degrees; in space to
+    about 1 %.
 
     Raises  MeasureError  for a device given by its plant
     """
@@ -131,7 +132,7 @@ def _unsampled_crossings(m: Floats) -> tuple[Ints, Ints, Floats]:
         offset = 0.5 * (left - right) / bend
         peak = m - 0.125 * (left - right) ** 2 / bend
         one_sign = ((left >= 0.0) == (m >= 0.0)) & ((right >= 0.0) == (m >= 0.0))
-        # generous, since the margin is no parabola
+        # generous, since the margin is not exactly a parabola
         turning = (m * bend > 0.0) & (np.abs(offset) <= 0.5) & (peak * np.sign(m) < 0.5 * np.abs(m))
     sample, where = np.nonzero(one_sign & turning)
     return sample, where, offset[sample, where]

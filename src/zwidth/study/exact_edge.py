@@ -1,4 +1,4 @@
-"""Where the exact edge of a chart lies beside a measured point."""
+"""The point of a chart's exact edge that belongs to a measured point."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def exact_edge(chart: StabilityChart, stiffness: float, damping: float, edge: Ed
 
 
 def _excess(chart: StabilityChart, fixed_coordinate: float, value: float, edge: EdgeKind | None) -> float:
-    """Spectral radius less 1, a hidden mode's share being cancelled already."""
+    """Spectral radius minus 1, of the observable motions alone."""
     K, B = (fixed_coordinate, value) if edge != "tip" else (value, fixed_coordinate)
     return float(spectral_radius(chart.loop, K, B)) - 1.0
 
@@ -45,7 +45,7 @@ def _span(chart: StabilityChart, edge: EdgeKind | None) -> float:
 
 
 def _stable_side_matches(chart: StabilityChart, place: float, value: float, edge: EdgeKind | None) -> bool:
-    """Do the stable walls lie on that side?"""
+    """Whether the stable walls lie on the side that the kind of edge says."""
     if edge is None:
         return True
     step = _span(chart, edge) * (1.0 if edge == "lower" else -1.0)
@@ -53,7 +53,7 @@ def _stable_side_matches(chart: StabilityChart, place: float, value: float, edge
 
 
 def _refine(chart: StabilityChart, place: float, value: float, edge: EdgeKind | None) -> float:
-    """The value on the chord, brought to the edge."""
+    """Move a value from the chord of the drawn edge to the exact edge."""
     from scipy.optimize import brentq
 
     if not np.isfinite(value):

@@ -1,14 +1,14 @@
-"""Computing a job's cells: here as long as it is short, else in several processes; whatever is done is kept.
+"""Compute the cells of a job: in this process while it is short, else in several; batches done are stored.
 
     run(job, Store(path, job), progress)
 
-Cells are computed in batches of consecutive ones. Results do not depend on how they are cut, nor on who computes
-them: each lands where it belongs.
+Cells are computed in batches of consecutive ones. Results do not depend on the batches, nor on the process
+that computes them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing
 from time import perf_counter
 from typing import TYPE_CHECKING, Final
@@ -17,20 +17,20 @@ import numpy as np
 
 from zwidth.measures.definition import MISSING, Note
 from zwidth.memory_limit import check_memory
+from zwidth.progress import Progress
 from zwidth.study.job import CellValues, Job
 from zwidth.study.workers import CellRange, Workers, cores, pack_job
 
 if TYPE_CHECKING:
     from zwidth.study.store import Store
 
-Progress = Callable[[str, int, int], None]
 
-PATIENCE: Final = 10.0  # s: what takes longer is worth starting processes for, which takes them some seconds
-BATCH: Final = 0.25  # s that a batch should take: long beside what handing it out and storing it take
-TRIAL: Final = 0.01  # s over which the time per cell is told
-SHARES: Final = 16  # batches at least, so that nobody waits long for the last one
+PATIENCE: Final = 10.0  # s; a longer job is worth starting processes, which takes some seconds
+BATCH: Final = 0.25  # s that a batch should take: much longer than sending and storing it
+TRIAL: Final = 0.01  # s of computation from which the time per cell is estimated
+SHARES: Final = 16  # batches at least, so that no process waits long for the last one
 GOLDEN: Final = 0.6180339887498949
-MOST_NOTES: Final = 100  # per measure; a reason that holds a number may be another one in each cell
+MOST_NOTES: Final = 100  # notes per measure; a reason that contains a number may differ in each cell
 MORE: Final = "further reasons, each in few cells"
 
 
@@ -44,16 +44,16 @@ def run(
     stage: str = "computing",
     patience: float = PATIENCE,
 ) -> CellValues:
-    """All cells of a job.
+    """Compute all cells of a job.
 
-    store     keeps what is done, and knows what was done before
-    progress  is called with `stage`, cells done, cells of all
-    workers   processes at most; left out: as many as there are cores. 1: everything here
-    batch     cells at a time; left out: as many as take a quarter of a second (a store begun before has its own)
-    patience  where the rest is estimated to take longer than this, processes are started [s]
+    store     keeps the batches done; those it already holds are not computed again
+    progress  is called with `stage`, the number of cells done, and of all cells
+    workers   largest number of processes; left out: one per core. 1: this process alone
+    batch     cells per batch; left out: as many as take 0.25 s (a store begun earlier keeps its own number)
+    patience  processes are started if the rest is estimated to take longer than this [s]
     Raises    TooLarge    where the cells would not fit into memory
               StoreError  where they would not fit on the disk
-              WorkerLost  where a process ended before it was done; what was done is kept
+              WorkerLost  where a process ended too early; batches done are kept
               whatever the job raises
 
     >>> class Squares:
@@ -65,7 +65,7 @@ def run(
     [0.0, 1.0, 4.0]
     """
     total = job.count
-    room = 2.0 * total * len(job.measures) * 9 / 8  # values and status, and once more while they are put together
+    room = 2.0 * total * len(job.measures) * 9 / 8  # values and status, and a copy while they are put together
     check_memory(room, f"{total} cells of {len(job.measures)} measures", "ask for fewer")
     number = workers or cores()
     collection = _CellCollection(job)
@@ -94,7 +94,7 @@ def run(
 
 
 class _CellCollection:
-    """What is known so far, each cell in its place."""
+    """Values, status and notes of the cells computed so far."""
 
     def __init__(self, job: Job) -> None:
         shape = job.count, len(job.measures)
@@ -115,9 +115,9 @@ class _CellCollection:
 
 
 def merge_notes(notes: Iterable[Note], most: int = MOST_NOTES) -> tuple[Note, ...]:
-    """Notes of the same reason as one, in the order of their first cells, whatever order they came in.
+    """Join notes of the same reason into one, in the order of their first cells.
 
-    most  of them at most; the rest are counted in one more for each status
+    most  largest number of notes; further ones are counted in one more note for each status
 
     >>> merge_notes([Note(5, "no", 2, (7,)), Note(5, "no", 1, (3,))])
     (Note(status=5, reason='no', count=3, first=(3,)),)
@@ -137,8 +137,8 @@ def merge_notes(notes: Iterable[Note], most: int = MOST_NOTES) -> tuple[Note, ..
 def _batch(job: Job, workers: int) -> int:
     """How many cells take about a quarter of a second.
 
-    Some are computed for it, and forgotten: here and there, since the first cells of a study are often its worst,
-    and more and more at a time, since many at once may cost little more than one.
+    Some cells are computed to measure the time, and their values are dropped: cells spread over the job, since the
+    first of a study are often its slowest, and growing numbers, since many at once may cost little more than one.
     """
     of = job.count
     most = max(1, of // max(SHARES, 4 * workers))
@@ -160,7 +160,7 @@ def _batch(job: Job, workers: int) -> int:
 def _compute_ranges(
     job: Job, ranges: Sequence[CellRange], workers: int, patience: float
 ) -> Generator[tuple[CellRange, CellValues], None, None]:
-    """Cells of all ranges: those that get done in time here, and then all the rest in processes."""
+    """Compute the ranges: in this process until `patience` is exceeded, the rest in several processes."""
     left = sum(last - first for first, last in ranges)
     sent: bytes | None = None
     for n, (first, last) in enumerate(ranges):
@@ -169,7 +169,7 @@ def _compute_ranges(
         seconds = perf_counter() - began
         yield (first, last), cells
         left -= last - first
-        # the first one may have compiled something
+        # the first range may include compiling
         slow = n > 0 and seconds / (last - first) * left > patience
         if slow and workers > 1 and (sent := pack_job(job)) is not None:
             rest = ranges[n + 1 :]

@@ -1,8 +1,9 @@
-"""A virtual experiment with its subjects and trials, and what of the device explains the result.
+"""A virtual experiment: subjects and trials measure a stability boundary, and its causes are looked for.
 
 Subjects are operators: the five numbers of the preset, each times exp(spread n), n normal. Trials of one subject
 differ in the noise and, by such a factor each, in the disturbance, the speed and the push. A single subject is the
-preset himself, and a single trial as it was asked for. The seed decides everything that is random.
+preset himself, and a single trial has the disturbance, speed and push of the plan. All random numbers follow from
+the seed.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
 from zwidth.model.operator import Operator, attach
+from zwidth.progress import Progress
 from zwidth.study.exact_edge import exact_edge
 from zwidth.study.experiment_plan import Plan
 from zwidth.study.journal import Journal, fingerprint
@@ -46,16 +48,15 @@ from zwidth.study.user_points import UserPoint, compare_points
 
 Floats = NDArray[np.float64]
 # stage, done, of how many
-Progress = Callable[[str, int, int], None]
 
-EXPLAINED: Final = 3  # stiffnesses at which causes are looked for
-STEPS: Final = 3.0  # encoder steps that are just visible
-NOISES: Final = 10.0  # standard deviations of the noise that are
-STIFFENED: Final = 2.0  # a reflex adds so many times what arm and grasp have
+EXPLAINED: Final = 3  # number of stiffnesses at which causes are looked for
+STEPS: Final = 3.0  # encoder steps: a vibration of this amplitude is just visible
+NOISES: Final = 10.0  # standard deviations of the encoder's noise, likewise
+STIFFENED: Final = 2.0  # a reflex adds this multiple of the stiffness and damping of arm and grasp
 
 
 def question(loop: Loop, operator: Operator | None, plan: Plan) -> str:
-    """By which a journal knows the experiment."""
+    """Fingerprint by which a journal recognises the experiment."""
     return fingerprint("experiment 3", loop, operator, plan)
 
 
@@ -68,12 +69,12 @@ def measure_boundary(
     progress: Progress | None = None,
     causes: bool = True,
 ) -> Experiment:
-    """A stability boundary as it is measured on a device at one operating point, by the operator who holds it.
+    """Measure a stability boundary on the simulated device at one operating point, held by its operator.
 
-    user_points  that somebody measured, to be compared with the same exact chart
-    file         keeps what is done, so that a run that was stopped goes on from there; None: nothing is kept
-    causes       measure again without each part that is not linear
-    Raises       JournalError  for a file that holds something else;  OSError  where it cannot be read or written
+    user_points  points measured on a real device, to be compared with the same exact chart
+    file         journal of the trials done, from which an interrupted run continues; None: no journal
+    causes       measure again without each nonlinear part (friction, encoder steps, force limit) in turn
+    Raises       JournalError  for a journal of something else;  OSError  where it cannot be read or written
                  what `run_experiment` and `OperatingPoint.plant` raise
     """
     require("point", point, OperatingPoint)
@@ -93,12 +94,13 @@ def run_experiment(
     progress: Progress | None = None,
     causes: bool = False,
 ) -> Experiment:
-    """A stability boundary as it is measured: see `contact.boundary_experiment` for how.
+    """Measure a stability boundary by simulated trials (`contact.boundary_experiment` says how).
 
-    loop      the device by itself, and its computer;   operator  the preset who holds it; None: nobody
-    journal   keeps what is done (see `question`); None: nothing is kept
-    causes    measure again without each part that is not linear
-    Raises    TrialError         for numbers that cannot be meant
+    loop      the device without its operator, and its computer
+    operator  the operator who holds it; None: no operator
+    journal   keeps the trials done (see `question`); None: no journal
+    causes    measure again without each nonlinear part in turn
+    Raises    TrialError         for numbers of the plan that cannot be used
               NoStableWallError  where no stable wall was found
               HysteresisError, UnmovedError  as `simulate_batch`
 
@@ -148,7 +150,7 @@ def _with_visible(loop: Loop, plan: Plan) -> Plan:
     if plan.visible is not None:
         return plan
     method = loop.controller.velocity
-    # within it adaptive windows tell nothing apart
+    # an adaptive window does not resolve motions within its noise band
     doubt = 2.0 * method.position_noise if isinstance(method, Foaw) else 0.0
     steps, noise = reading_step(loop.plant), reading_noise(loop.plant)
     return replace(plan, visible=STEPS * max(steps, doubt) + NOISES * noise)
@@ -158,7 +160,7 @@ def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, .
     if operator is None:
         if plan.subjects > 1 or plan.reflex:
             argument, verb = ("subjects", "differ") if plan.subjects > 1 else ("reflex", "is")
-            nobody = f"{verb} in the arm that holds the device, and nobody does; give an operator"
+            nobody = f"{verb} in the arm that holds the device; give an operator"
             raise TrialError(argument, nobody)
         return (None,)
     if plan.subjects == 1:
@@ -169,7 +171,7 @@ def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, .
 
 
 def _varied(operator: Operator, random: np.random.Generator, spread: float) -> Operator:
-    """Each number times a factor of its own, whose logarithm is normal."""
+    """The operator with each number times its own log-normal factor exp(spread n)."""
     factors = np.exp(spread * random.standard_normal(len(fields(operator)))).tolist()
     own = {field.name: getattr(operator, field.name) for field in fields(operator)}
     changed = {
@@ -187,7 +189,7 @@ def _stability_trial(
     factors: tuple[float, float, float] = (1.0, 1.0, 1.0),
     seed: int = 0,
 ) -> StabilityTrial:
-    """The trial of a plan, its disturbance, speed and push times these factors, even beyond what plans allow."""
+    """The trial of a plan with its disturbance, speed and push times these factors (no limits apply)."""
     disturbance, speed, push = factors[0] * plan.disturbance, factors[1] * plan.speed, factors[2] * plan.push
     reflex = None
     if plan.reflex and operator is not None:
@@ -231,7 +233,7 @@ def _chart(loop: Loop, operator: Operator | None) -> StabilityChart | None:
 def _combine_trials(
     runs: list[list[EdgePoint]], chart: StabilityChart | None, sought: int
 ) -> tuple[tuple[MeasuredPoint, ...], int]:
-    """Points of all trials by what was chosen, and how many nobody found."""
+    """Points of all trials by edge and chosen stiffness or damping, and how many were found in no trial."""
     found: dict[tuple[EdgeKind, float], list[EdgePoint]] = {}
     for points in runs:
         for point in points:

@@ -1,4 +1,4 @@
-"""What a virtual experiment is to measure, with whom, and where to look."""
+"""Plan of a virtual experiment: what is measured, by how many operators, and in which range of walls."""
 
 from __future__ import annotations
 
@@ -9,23 +9,25 @@ from typing import Any, Final
 from zwidth.contact.boundary_experiment import SearchWindow
 from zwidth.contact.stability_trial import TrialError
 
-FARTHEST, FASTEST = 1.0, 100.0  # m, m/s; no device moves by more, or faster
-PUSH: Final = 2.0  # N, with which a one-sided wall is usually touched
-SPEED: Final = 0.02  # m/s
+FARTHEST, FASTEST = 1.0, 100.0  # m, m/s; largest disturbance and speed allowed
+PUSH: Final = 2.0  # N; default push on a one-sided wall
+SPEED: Final = 0.02  # m/s; default speed of the touch
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be measured.
+    """What a virtual experiment measures.
 
     one_sided    touch a one-sided wall with `push` [N] and `speed` [m/s]; else displace by `disturbance` [m]
-    stiffnesses  at which the damping is bisected, twice;   tips  dampings at which the stiffness is
-    visible      see `StabilityTrial` [m]; None: three encoder steps and ten standard deviations of the noise
+    stiffnesses  number of stiffnesses at which the damping is bisected, for the lower and the upper edge
+    tips         number of dampings at which the stiffness is bisected
+    visible      amplitude that counts as a vibration, see `StabilityTrial` [m]; None: three encoder steps and ten
+                 standard deviations of the noise
     reflex       the hand stiffens threefold, 50 ms after half of the push is felt
-    subjects, trials  how many operators, and how often each of them tries
-    spread, seed      of operators and trials: see `study.experiment`
-    box          where to look; None: everywhere
-    Raises       TrialError  for numbers that cannot be meant
+    subjects, trials  number of operators, and of trials of each
+    spread, seed      of the numbers of operators and trials: see `study.experiment`
+    box          range of walls to search; None: no limit
+    Raises       TrialError  for a number outside its allowed range
     """
 
     one_sided: bool = False
@@ -56,9 +58,9 @@ class Plan:
 
     @classmethod
     def touching(cls, *, push: float = PUSH, speed: float = SPEED, **more: Any) -> Plan:
-        """A plan that touches a one-sided wall, with a usual push [N] and speed [m/s] where none is given.
+        """A plan that touches a one-sided wall, with the default push [N] and speed [m/s] where none is given.
 
-        more  arguments of `Plan`
+        more  further arguments of `Plan`
 
         >>> Plan.touching(tips=3).push
         2.0

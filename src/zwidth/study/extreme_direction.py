@@ -1,6 +1,6 @@
-"""The worst, or the best, direction of each point.
+"""Worst, best, lowest or highest value of a measure over the directions at each point.
 
-A measure m(u) of a direction u is asked all round: along the directions that the handle can move in, a line, a
+A measure m(u) of a direction u is computed at samples of all directions in which the handle can move: a line, a
 plane, or space. Between the samples the extreme is refined, by golden sections in the plane and by a compass
 search on the sphere, for all points at once. Where a second extreme comes near the first in the samples, both are
 refined, since the samples do not tell which is the larger.
@@ -28,17 +28,17 @@ GOLDEN: Final = 0.5 * (np.sqrt(5.0) - 1.0)
 SECTIONS: Final = 22  # 2 x 7.5 degrees x 0.618^22 = 7e-6 rad
 COMPASS: Final = 60  # rounds
 FINEST: Final = 3e-6  # rad, where a compass search ends
-NEAR: Final = 0.1  # share of the spread within which a second extreme is refined, too
-CHUNK: Final = 4096  # places at once
+NEAR: Final = 0.1  # share of the values' spread within which a second extreme is refined, too
+CHUNK: Final = 4096  # points computed at once
 
 Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class DirectionExtreme:
-    """An extreme over directions.
+    """The extreme of a measure over the directions at each point.
 
-    extreme    its values, with the points' leading axes
+    extreme    the extreme values, of the points' shape (...)
     direction  (..., 3) unit vectors along which they are reached; nan where there is none, or none counts
     """
 
@@ -50,10 +50,10 @@ def extreme_over_directions(measure: Measure, point: OperatingPoint, extreme: Ex
     """A measure along that direction of each point in which it is worst, best, lowest or highest.
 
     Directions are those in which the handle can move. A direction and its opposite count as one unless the measure
-    tells them apart; then both are asked. A point at which one direction has no value has no worst one; otherwise
-    such directions are left out. Either is told in a note. The direction is found to 1e-5 rad, and so a smooth
-    measure's extreme to 1e-10 of its curvature; where a measure grows beyond bounds about a direction, as
-    stiffness does along a rigid drive, a very large number stands for it.
+    tells them apart; then both are computed. A point at which one direction has no value has no worst value; for
+    the other extremes such directions are left out. A note says so in both cases. The direction is found to 1e-5
+    rad, and so a smooth measure's extreme to 1e-10 of its curvature; where a measure grows without bound about a
+    direction, as stiffness does along a rigid drive, a very large number stands for it.
 
     Raises  MeasureError  for a device given by its plant, or "worst" and "best" of a measure of which neither more
                           nor less is better
@@ -79,19 +79,19 @@ def extreme_over_directions(measure: Measure, point: OperatingPoint, extreme: Ex
 
 
 def extreme_sign(measure: Measure, extreme: Extreme) -> float:
-    """1 where the lowest value is looked for, -1 where the highest. Raises MeasureError where it is not told."""
+    """1 where the lowest value is looked for, -1 where the highest. Raises MeasureError where `better` is None."""
     if extreme in ("lowest", "highest"):
         return 1.0 if extreme == "lowest" else -1.0
     if measure.better is None:
-        raise MeasureError("is neither better high nor better low; ask for its lowest or highest direction")
+        raise MeasureError("has no better side, higher or lower; ask for its lowest or highest direction")
     return 1.0 if (measure.better == "higher") == (extreme == "worst") else -1.0
 
 
 class _Goal:
-    """What is looked for, and why it is not found everywhere.
+    """The extreme to look for, and the points at which there is none.
 
     sign    1: the lowest value, -1: the highest
-    strict  one direction without a value leaves its place without one
+    strict  a point with one direction without a value has no value
     """
 
     def __init__(self, sign: float, strict: bool) -> None:
@@ -99,22 +99,22 @@ class _Goal:
         self.points_by_reason: dict[tuple[int, str], list[int]] = {}
 
     def cost(self, values: Floats) -> Floats:
-        """What to make small; inf where there is no value."""
+        """The function to minimise; inf where there is no value."""
         return np.where(np.isnan(values), np.inf, self.sign * values)
 
     def status(self, found: MeasureValues, status: NDArray[np.uint8], which: Ints) -> NDArray[np.uint8]:
-        """What becomes of places, (n,).
+        """Status (n,) of points, from the status of their samples; reasons are kept for `notes`.
 
-        found   of all samples
-        status  (s, n)  theirs
-        which   (n,)    the places
+        found   the measure at all samples
+        status  (s, n)  its status at s directions of n points
+        which   (n,)    indices of the points
         """
         none = status != OK
         if not none.any():
             return np.full(len(which), OK, dtype=np.uint8)
         reasons = {note.status: note.reason for note in reversed(found.notes)}
         everywhere = none.all(axis=0)
-        # of several kinds the least: a place has no value rather than an undecided one
+        # of several kinds the least: a point has no value rather than an undecided one
         kind = np.where(none, status, MISSING).min(axis=0)
         some = "along some directions: " if self.strict else "along some directions, which are left out: "
         for label, here in (("", everywhere), (some, none.any(axis=0) & ~everywhere)):
@@ -181,7 +181,7 @@ def _parabola_minimum(f: Floats) -> Floats:
 
 
 def _golden(ask, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: ignore[no-untyped-def]
-    """Where each function is lowest between its bounds, and its value there."""
+    """Argument and value of the minimum of each function between its bounds, by golden sections."""
     a, b = low.copy(), high.copy()
     c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
     at_c, at_d = ask(c), ask(d)

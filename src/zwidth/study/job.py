@@ -1,4 +1,4 @@
-"""Many cells to compute: what a map's or a sweep's cells are, whoever computes and keeps them."""
+"""The interface of a job, a list of cells to compute: the cells of a map, or the designs of a sweep."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class CellValues:
 
 
 class Job(Protocol):
-    """A question with many cells; it is sent to other processes, so that it must pickle."""
+    """Many cells to compute. A job is sent to other processes, so that it must be possible to pickle it."""
 
     @property
     def count(self) -> int:
@@ -36,14 +36,14 @@ class Job(Protocol):
 
     @property
     def measures(self) -> Sequence[str]:
-        """Their names, in the order of the columns."""
+        """Names of the measures, in the order of the columns."""
         ...
 
     @property
     def question(self) -> str:
-        """What its results on disk are known by (`journal.fingerprint`): equal for equal questions."""
+        """Fingerprint that stored results are recognised by (`journal.fingerprint`)."""
         ...
 
     def compute(self, first: int, last: int) -> CellValues:
-        """Cells first to last - 1. Failures within a cell are data; only what spoils all cells is raised."""
+        """Compute cells first to last - 1. A cell that fails has a status; only a failure of all is raised."""
         ...

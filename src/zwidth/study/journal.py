@@ -1,7 +1,7 @@
-"""Results of a long run, kept on disk line by line, so that a run that was stopped goes on where it was.
+"""Journal of a long run: its results on disk, one a line, from which an interrupted run continues.
 
-The first line says which question they answer, and the version of the format; a journal of another question is
-begun anew, one of a newer version refused. Numbers come back with all their bits. A line cut short, by a crash
+The first line holds the fingerprint of the question and the version of the format. A journal of another question
+is begun again; one of a newer version is refused. Numbers are read back exactly. A line cut short, by a crash
 or a full disk, is dropped and computed again.
 """
 
@@ -21,9 +21,9 @@ from zwidth.device.format_version import STORE_VERSION, newer_version_message
 
 
 def fingerprint(*parts: object) -> str:
-    """What a question is known by: equal for equal numbers, dataclasses, arrays and containers of them.
+    """Fingerprint of a question: equal for equal numbers, dataclasses, arrays and containers of them.
 
-    Raises  TypeError  for anything whose value cannot be told
+    Raises  TypeError  for an object whose value cannot be read
 
     >>> fingerprint(1.0, np.arange(3)) == fingerprint(1.0, np.arange(3)) != fingerprint(1.0, np.arange(4))
     True
@@ -74,7 +74,7 @@ class Journal:
             self.entries_read = 0
             return
         if path.exists() and not path.is_file():
-            raise JournalError(f"{path.name or path}: is no plain file; name another")
+            raise JournalError(f"{path.name or path}: is not an ordinary file; name another")
         data = path.read_bytes() if path.exists() else b""
         whole = _read(path, data.split(b"\n")[:-1], data != b"", question)
         self.known = {entry["name"]: entry["value"] for entry in map(json.loads, whole[1:])}

@@ -17,8 +17,9 @@ from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note, WantedWall
 from zwidth.measures.evaluate import evaluate
 from zwidth.model.argument_checks import require
+from zwidth.progress import Progress
 from zwidth.study.column import measure_list, unit_attributes
-from zwidth.study.executor import Progress, run
+from zwidth.study.executor import run
 from zwidth.study.extreme_direction import EXTREMES, extreme_over_directions, extreme_sign
 from zwidth.study.job import CellValues
 from zwidth.study.journal import fingerprint

@@ -26,8 +26,8 @@ def map_document(
     """A map by key and unit: its grid, its first measure, and with several all of them under `measures`.
 
     dataset  as `study.map.workspace_map` returns it
-    device   None: what needs postures solved again is left out, as in `over_the_workspace`
-    area     of requirements laid over the map; None: none were
+    device   None: numbers for which postures must be solved again are left out, as in `over_the_workspace`
+    area     common area of requirements; None: no requirements
     """
     names = measures_of(dataset)
     axes = dataset.attrs["plane_axes"]
@@ -47,7 +47,7 @@ def map_document(
 
 
 def map_table(dataset: xr.Dataset) -> dict[str, Any]:
-    """A map as columns, a row for each cell, x fastest: its place in the plane and, unless that is xy, in the base
+    """A map as columns, a row for each cell, x fastest: position in the plane and, unless that is xy, in the base
     frame; values and their status, and directions."""
     x, y = np.meshgrid(dataset["x_m"].values, dataset["y_m"].values)
     table: dict[str, Any] = {"x_m": x.ravel(), "y_m": y.ravel()}

@@ -1,5 +1,5 @@
-"""What a virtual experiment comes to: points of the boundary, how far they are from the exact one, and why;
-and which of them contradict each other."""
+"""Result of a virtual experiment: measured points of the boundary, their distance from the exact one and its
+causes, and points that contradict each other."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from zwidth.study.user_points import PointsComparison
 class MeasuredPoint:
     """One point of the boundary over all subjects and trials.
 
-    stiffness, damping   the mean of what was bisected, and what was chosen
-    edge                 which of the two was bisected: see `EdgePoint`
-    low, high            of what was bisected, over the trials that found an edge
-    trials               how many did;   runs (trials,)  what they found
-    exact                the same number on the exact linear edge; nan where it has none
+    stiffness, damping   one was chosen; the other was bisected, and is the mean over the trials
+    edge                 kind of edge, which says which was bisected: see `EdgePoint`
+    low, high            range of the bisected number over the trials that found an edge
+    trials               number of trials that found an edge;   runs (trials,)  the bisected number in each
+    exact                that number on the exact linear edge; nan where the edge has none
     beyond, amplitude, frequency   of the first trial: see `EdgePoint`
-    unsure               of any trial: see `EdgePoint`
+    unsure               whether it is of any trial: see `EdgePoint`
     """
 
     stiffness: float
@@ -44,11 +44,11 @@ class MeasuredPoint:
 
     @property
     def bisected_value(self) -> float:
-        """What was bisected: a stiffness at the tip, else a damping."""
+        """The bisected number: a stiffness [N/m] at a tip, else a damping [N s/m]."""
         return self.stiffness if self.edge == "tip" else self.damping
 
     def document(self) -> dict[str, Any]:
-        """The point by key and unit; what was not bisected has no spread and is exact."""
+        """The point by key and unit; the number that was chosen has no spread."""
         tip = self.edge == "tip"
         return {
             "stiffness_N_per_m": self.stiffness,
@@ -70,10 +70,10 @@ class MeasuredPoint:
 
 @dataclass(frozen=True)
 class Cause:
-    """What one part of the device does to the edges: they are measured again without it.
+    """Effect of one nonlinear part of the device on the edges: they are measured again without it.
 
-    name       of the part, as `Nonlinear.left_out` has it
-    points     with it;   without  the same points without it [N s/m]; nan: no edge was found
+    name       of the part, as in `Nonlinear.left_out`
+    points     measured with it;   without  the dampings measured without it [N s/m]; nan: no edge was found
     """
 
     name: str
@@ -88,24 +88,24 @@ class Cause:
 
     @property
     def unpaired_count(self) -> int:
-        """At how many points there is an edge with the part or without it, but not both."""
+        """Number of points with an edge either with the part or without it, but not both."""
         both = zip(self.points, self.without, strict=True)
         return sum(isnan(point.damping) != isnan(other) for point, other in both)
 
 
 @dataclass(frozen=True)
 class Experiment(Result):
-    """What was measured.
+    """Result of a virtual experiment.
 
     plan             with the visible amplitude that was used
-    place            where the stable walls are
+    place            extent of the stable walls
     points           lower edges, upper edges, tips; those found by no trial are left out
-    not_found        how many were sought and found by no trial
-    subjects         who pushed; (None,) for nobody
-    chart            the exact linear chart, held by the preset; None where the velocity estimate has none
-    causes           of the difference; () for a linear device, and where they were not asked for
-    journal_entries  how many parts of the run were found in the journal
-    user_points      somebody's own points beside the same chart; None where there are none
+    not_found        number of points that no trial found
+    subjects         the operators; (None,) without one
+    chart            exact linear chart with the preset operator; None where the velocity estimate is not linear
+    causes           of the difference; () for a linear device, and where `causes` was False
+    journal_entries  number of parts of the run read from the journal
+    user_points      the user's points compared with the same chart; None where there are none
     """
 
     plan: Plan
@@ -142,7 +142,7 @@ class Experiment(Result):
         return [point for point in self.points if not isnan(self.deviation(point))]
 
     def document(self) -> dict[str, Any]:
-        """The points and what they come to by key and unit; None where there is no such point, or no chart."""
+        """The points and their summary by key and unit; None where there is no such point, or no chart."""
         best, chart = self.stiffest, self.chart
         own = (
             {"measured": None, "measured_counts": None}
@@ -160,7 +160,7 @@ class Experiment(Result):
         } | own
 
     def table(self) -> dict[str, list[Any]]:
-        """The points as columns, which can be read again as somebody's own."""
+        """The points as columns, in the form that `points_file.read_points` reads."""
         rows = [point.document() for point in self.points]
         return {key: [row[key] for row in rows] for key in (rows[0] if rows else ())}
 
@@ -188,7 +188,7 @@ def edges_beyond_tips(found: Experiment) -> list[BeyondTip]:
     An edge at a stiffness says that the walls on its inner side are stable. A tip says that no stiffer wall is, at
     its damping. Both cannot be right where the edge is stiffer than the tip and the tip's damping is on its inner
     side. Nor can the stiffest tip be the stiffest stable wall where an edge is stiffer. On a device that is not
-    linear this happens where verdicts hang on chance.
+    linear this happens where verdicts depend on chance.
 
     Of several trials only what holds in all of them counts: the highest tip, the narrowest range of damping.
     """

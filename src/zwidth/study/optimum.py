@@ -1,7 +1,7 @@
-"""What holds the largest stiffness where it is, and how it moves when the loop changes a little.
+"""First-order change of the largest stiffness with any change of the loop.
 
-The stiffest wall is an extreme point of the stable set's edge. To first order it moves as the pieces of edge that
-hold it move, and each piece says where it goes in one equation  n . dwall = dr:
+The stiffest wall is an extreme point of the stable set's edge. To first order it moves with the pieces of edge
+that meet in it, and each piece gives one equation for its motion dwall = (dK, dB),  n . dwall = dr:
 
     curve at a fixed angle       n = (B', -K'),  r = n . (K, B) at that angle
     line of a real root          n = (s, v),     r = -(a + s K + v B) at the wall held fixed
@@ -30,7 +30,7 @@ from zwidth.loop.loop import Loop
 Floats = NDArray[np.float64]
 Kind = Literal["smooth maximum", "corner", "edge at B = 0", "end of the curve"]
 
-# A Newton step of K'(angle) longer than this share of the angle means that the wall is no smooth maximum.
+# If a Newton step of K'(angle) is longer than this share of the angle, the wall is not a smooth maximum.
 AT_MAXIMUM: Final = 1e-5
 
 # Extreme points closer than this share of the stable set's size are one.
@@ -45,7 +45,7 @@ class OptimumError(ValueError):
 
 @dataclass(frozen=True)
 class Optimum:
-    """The stiffest wall with what holds it.
+    """The stiffest wall and the part of the edge on which it lies.
 
     peak                      the wall, and the angles of its roots
     kind                      a smooth maximum of the edge; a corner of two pieces of edge; an edge that crosses B
@@ -60,10 +60,10 @@ class Optimum:
 
 
 def optimum(loop: Loop, peak: Peak) -> Optimum:
-    """What holds the stiffest wall of a loop.
+    """Find the part of the edge on which the stiffest wall of a loop lies.
 
     peak    `largest_stiffness(loop)`
-    Raises  OptimumError  where the wall is neither of the kinds, as where rounding hides a piece of the edge
+    Raises  OptimumError  where the wall is of no kind, for instance where rounding hides a piece of the edge
 
     >>> from zwidth.chart.chart import largest_stiffness
     >>> from zwidth.loop.controller import Controller
@@ -88,7 +88,7 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
         angle = inside[0]
         if not _is_maximum(tracer, angle):
             raise OptimumError(
-                "the edge is hidden by rounding where the largest stiffness lies, so that it has no derivative"
+                "rounding hides the edge where the largest stiffness lies, so that it has no derivative"
             )
         return Optimum(peak, "smooth maximum", lambda other: Tracer.of(other).wall(angle)[0])
     return Optimum(peak, "end of the curve", lambda other: _end(other, real[0]))

@@ -1,4 +1,4 @@
-"""A plane of the workspace with a grid over it: where a map asks."""
+"""A grid of positions on a plane of the workspace, at which maps and studies compute measures."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from zwidth.study.advice import Advice
 Floats = NDArray[np.float64]
 
 AXES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-LONG_SIDE: Final = 81  # points along the longer side where nothing is said
+LONG_SIDE: Final = 81  # points along the longer side, by default
 MOST: Final = 10**8  # points
-FLAT: Final = 1e-9  # share of its spread below which what a handle reaches is flat
-PARALLEL: Final = 1e-6  # sine of the angle below which two axes are one
-BETWEEN: Final = 0.08  # share of its extent by which what is reached may lie beyond the nearest known positions
-ROUND: Final = 20  # parts of a power of ten that ranges are rounded to
-DIGITS: Final = 14  # of coordinates, those of the longest counted
+FLAT: Final = 1e-9  # of the spread of reached positions: a thickness below this share counts as flat
+PARALLEL: Final = 1e-6  # sine of an angle; two axes with a smaller one count as parallel
+BETWEEN: Final = 0.08  # share of the extent by which the reachable set may go beyond the known positions
+ROUND: Final = 20  # ranges are rounded outwards to a power of ten over this
+DIGITS: Final = 14  # significant digits of coordinates, counted from the largest
 
 
 class PlaneError(ValueError):
@@ -46,7 +46,7 @@ class PlaneError(ValueError):
         return self.spelled(as_argument)
 
     def spelled(self, spelling: Spelling) -> str:
-        """The sentence, with arguments spelled as the asker gives them: in Python, as options, as keys."""
+        """The message, with arguments spelled as in Python, as options or as keys of a file."""
         return self.reason if self.advice is None else f"{self.reason}; {self.advice.spelled(spelling)}"
 
 
@@ -59,7 +59,7 @@ class PlaneGrid:
     first, second  (3,)   orthonormal axes
     through        (3,)   the plane's point with coordinates (0, 0) [m]
     x, y           (nx,), (ny,)  coordinates of the grid's lines, ascending [m]
-    names          what the axes are called: "x" and "z", or "u" and "v" where they are the plane's own
+    names          names of the axes: such as "x" and "z"; "u" and "v" where they are not along the base frame
     """
 
     first: Floats
@@ -106,9 +106,9 @@ def plane_of(
     x, y      lowest and highest coordinate along both axes [m]; left out: the file's workspace, or a box around
               what is reached, its ends rounded outwards
     cells     points along both; left out: 81 along the longer side, as many to the metre along the other
-    Raises    PlaneError   for parallel axes, an empty range, fewer than two points, a plane that the handle meets
-                           in a line at most
-              DeviceError  for a device without a mechanism, or a point that is none
+    Raises    PlaneError   for parallel axes, an empty range, fewer than two points, a plane that the
+                           reachable set meets in a line or not at all
+              DeviceError  for a device without a mechanism, or a point that is not a position
               PostureError where the assembly is singular throughout, or does not close
     """
     require("device", device, Device)
@@ -130,17 +130,17 @@ def plane_of(
 
 @dataclass(frozen=True)
 class ReachableSet:
-    """What a handle reaches: positions all over it, some way from its edge, and what the links' lengths allow.
+    """The set of positions that a handle reaches, known by samples and by bounds from the links' lengths.
 
-    positions  (K, 3) [m]
-    shells     no chain of links reaches out of its own
+    positions  (K, 3)  reachable positions spread over the set, some way inside its edge [m]
+    shells     spherical shells, one for each chain of links, that contain the set
     """
 
     positions: Floats
     shells: tuple[Shell, ...]
 
     def extent(self, axis: Floats) -> tuple[float, float]:
-        """Lowest and highest coordinate along a unit vector (3,): at least what is reached, little more [m]."""
+        """Lowest and highest coordinate [m] along a unit vector (3,) of a slightly larger set than is reached."""
         along = self.positions @ axis
         low, high = float(along.min()), float(along.max())
         margin = BETWEEN * (high - low)
@@ -159,7 +159,7 @@ class ReachableSet:
 
 
 def reachable_set(mechanism: Mechanism, assembly: str | None) -> ReachableSet:
-    """What an assembly reaches. Raises PostureError where it is singular throughout, or does not close."""
+    """Positions that an assembly reaches. Raises PostureError if it is singular everywhere, or does not close."""
     return ReachableSet(reachable_positions(mechanism, assembly), tuple(shells(pack(mechanism), 0)))
 
 
@@ -187,7 +187,7 @@ def _axes(
             ):
                 return unit[a], unit[b], (name[0], name[1])
         assert reach_normal is not None
-        # along whichever base axis lies flattest in it
+        # the first axis: the base axis at the smallest angle to the plane, projected into it
         along = unit[int(np.argmin(np.abs(reach_normal)))]
         first = along - (along @ reach_normal) * reach_normal
         first /= np.linalg.norm(first)
@@ -206,12 +206,14 @@ def _axes(
 def _orthonormal(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     lengths = [float(np.linalg.norm(v / (np.abs(v).max() or 1.0))) for v in (a, b)]
     if not all(lengths):
-        raise PlaneError(f"an axis of the plane has no length: {_vector(a)} and {_vector(b)}")
+        raise PlaneError(
+            f"an axis of the plane has length 0: {_vector(a)} and {_vector(b)}; give two vectors that are not zero"
+        )
     first, other = (v / np.abs(v).max() / length for v, length in zip((a, b), lengths, strict=True))
     second = other - (first @ other) * first
     across = float(np.linalg.norm(second))
     if across < PARALLEL:
-        raise PlaneError(f"the plane's axes {_vector(a)} and {_vector(b)} are parallel; give two that span it")
+        raise PlaneError(f"the plane's axes {_vector(a)} and {_vector(b)} are parallel; give two that are not")
     return first, second / across
 
 
@@ -253,7 +255,7 @@ def _range(
 
 
 def rounded_outwards(low: float, high: float) -> tuple[float, float]:
-    """The range to the next twentieth of a power of ten that has room in it, such as -0.35 to 0.35.
+    """Widen a range to multiples of a twentieth of the power of ten below its length, such as -0.35 to 0.35.
 
     >>> rounded_outwards(-0.3459, 0.35)
     (-0.35, 0.35)
@@ -261,7 +263,7 @@ def rounded_outwards(low: float, high: float) -> tuple[float, float]:
     if not high > low:
         return low, high
     power = floor(log10(high - low))
-    per_metre = ROUND * 10.0**-power  # divided by, since its decimals are exact
+    per_metre = ROUND * 10.0**-power  # we divide by it: multiplying by its inverse would round the decimals
     return floor(low * per_metre + 1e-6) / per_metre, ceil(high * per_metre - 1e-6) / per_metre
 
 
@@ -269,20 +271,20 @@ def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) 
     if cells is None:
         lengths = [high - low for low, high in ranges]
         if not min(lengths) > 0.0:
-            flat = "what the handle reaches has no extent along an axis"
+            flat = "the reachable positions have no extent along an axis"
             raise PlaneError(flat, Advice("give its range and {}", "cells"))
         nx, ny = (max(2, round((LONG_SIDE - 1) * length / max(lengths)) + 1) for length in lengths)
         return nx, ny
     nx, ny = (int(count) for count in cells)
     if min(nx, ny) < 2:
-        raise PlaneError(f"a map has at least two points along each axis, got {nx},{ny}")
+        raise PlaneError(f"a map needs at least 2 points along each axis, got {nx},{ny}")
     if nx * ny > MOST:
         raise PlaneError(f"a map has at most {MOST:.0e} points, got {nx} x {ny}")
     return nx, ny
 
 
 def _line(low: float, high: float, count: int) -> Floats:
-    """Equidistant points, as symmetric about 0 as their ends are, and the decimals that are meant: -0.15.
+    """Equidistant points, symmetric about 0 if the ends are, rounded to short decimals such as -0.15.
 
     >>> _line(-0.3, 0.3, 9).tolist()
     [-0.3, -0.225, -0.15, -0.075, 0.0, 0.075, 0.15, 0.225, 0.3]

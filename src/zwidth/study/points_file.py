@@ -1,4 +1,4 @@
-"""Walls, and measured points of a stability boundary, from a CSV file; every fault with its line."""
+"""Read walls, or measured points of a stability boundary, from a CSV file; every fault is named with its line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,14 @@ from itertools import islice
 from math import isfinite, nan
 from typing import Any, Final
 
-from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, header_fault, non_blank_rows, read_text
+from zwidth.device.text_file import (
+    LARGEST_TABLE,
+    SEPARATORS,
+    UnreadableFileError,
+    header_fault,
+    non_blank_rows,
+    read_text,
+)
 from zwidth.study.user_points import EDGES, VERDICTS, UserPoint
 
 COLUMNS: Final = ("stiffness_N_per_m", "damping_Ns_per_m")
@@ -21,8 +28,8 @@ SPREADS: Final = (
     "stiffness_high_N_per_m",
 )
 MOST_FAULTS: Final = 20
-MOST_DIGITS: Final = 12  # of a number of trials
-LARGEST_WALL: Final = 1e15  # N/m, N s/m; beyond, rounding would give the verdicts
+MOST_DIGITS: Final = 12  # largest number of digits of a number of trials
+LARGEST_WALL: Final = 1e15  # N/m, N s/m; beyond, verdicts would be rounding
 
 File = str | os.PathLike[str]
 Walls = list[tuple[float, float]]
@@ -31,7 +38,7 @@ Reader = Callable[[str], tuple[Any, str]]
 
 
 class PointsError(ValueError):
-    """A file of walls or points that cannot be meant; `lines` has one fault each, with the file and its line."""
+    """A file of walls or points with faults; `lines` holds one message each, with the file and the line."""
 
     def __init__(self, *lines: str) -> None:
         self.lines = lines
@@ -39,7 +46,7 @@ class PointsError(ValueError):
 
 
 def wall_number(text: str) -> tuple[float, str]:
-    """A wall's stiffness or damping, and what is wrong with it ("" if nothing)."""
+    """Read a wall's stiffness or damping; returns the number, and what is wrong with it ("" if nothing)."""
     try:
         number = float(text)
     except ValueError:
@@ -52,7 +59,7 @@ def wall_number(text: str) -> tuple[float, str]:
 
 
 def read_walls(file: File) -> Walls:
-    """The walls (stiffness [N/m], damping [N s/m]) of a CSV file with these two columns; others are left alone.
+    """The walls (stiffness [N/m], damping [N s/m]) of a CSV file with these two columns; others are ignored.
 
     Raises PointsError  if it cannot be read, lacks a column or holds no wall, or with every line that is wrong
     """
@@ -101,7 +108,7 @@ def _trials(text: str) -> tuple[int, str]:
 
 
 def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
-    """The rows by column; of the optional ones those that are there."""
+    """The rows, each as column -> value; of the optional columns those that the file has."""
     rows = csv.reader(_text(file).splitlines(), strict=True)
     faults: list[str] = []
     found: list[dict[str, Any]] = []
@@ -115,6 +122,9 @@ def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
                     f"{file}: line {rows.line_num}: has {len(row)} cells, but the header names {len(header)} "
                     "columns; write a decimal point, not a comma, or name every column"
                 )
+                continue
+            if other := _row_separator(row):
+                faults.append(f"{file}: line {rows.line_num}: the cells are separated by {other}; use commas")
                 continue
             cells = {}
             for name, place in places.items():
@@ -133,8 +143,15 @@ def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
     return found
 
 
+def _row_separator(row: list[str]) -> str:
+    """The character that separates the cells of a row in place of commas; "" if it is a comma."""
+    if len(row) != 1:
+        return ""
+    return next((name for mark, name in SEPARATORS.items() if mark in row[0].strip()), "")
+
+
 def _contradictions(cells: dict[str, Any]) -> Iterator[str]:
-    """Spreads whose low end is above their high one, and a point that is both edge and wall."""
+    """Faults of a row: a spread whose low end is above its high end, a point that is both edge and tried wall."""
     if cells.get("edge") and cells.get("verdict"):
         yield (
             f"verdict: must be left empty where edge is {cells['edge']!r}, got {cells['verdict']!r}; a point lies "
@@ -146,7 +163,7 @@ def _contradictions(cells: dict[str, Any]) -> Iterator[str]:
 
 
 def _column_indices(file: File, header: list[str], optional: Collection[str]) -> dict[str, int]:
-    """Index of each column wanted, and of the optional ones that are there."""
+    """Index of each required column, and of the optional ones that the file has."""
     if not header:
         raise PointsError(f"{file}: is empty; its first line must name the columns {', '.join(COLUMNS)}")
     if fault := header_fault(header, COLUMNS, optional):

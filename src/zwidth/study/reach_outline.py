@@ -1,8 +1,8 @@
-"""The true edge of what a handle reaches on a map's plane, where the links' lengths alone decide it.
+"""The exact edge of the reachable set on a map's plane, where the links' lengths alone decide it.
 
 Every chain of links from the base to the handle allows a shell about its base (`model.reach_shells`). For many
-mechanisms, all whose joints turn freely, the handle reaches whatever lies in all shells. That is checked against
-every cell of the map; where it holds, the edge consists of arcs of circles, known exactly, not to a cell.
+mechanisms whose joints all turn freely, the handle reaches every point that lies in all shells. That is checked
+against every cell of the map; where it holds, the edge consists of exact arcs of circles.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 KEY: Final = "reach_shells_m"  # attribute of a map: centre x, y, z, least and most distance of each shell
-QUARTER: Final = 256  # chords of a quarter of a circle: its area is 6e-6 of itself too small
+QUARTER: Final = 256  # chords of a quarter of a circle; its area is too small by a share of 6e-6
 NEAR: Final = 1e-6  # share of a shell's size within which a cell may be judged either way
 LAYERS: Final = 2  # cells beyond the last with a value to which values are continued
 
@@ -36,10 +36,10 @@ def shells_attribute(mechanism: Mechanism) -> list[float]:
 
 
 def reach_outline(dataset: xr.Dataset, name: str) -> Any:
-    """What can be reached within a map's grid, as a shapely geometry in the plane's coordinates.
+    """The reachable set within a map's grid, as a shapely geometry in the plane's coordinates.
 
     dataset  a map (`study.map`);   name  one of its measures
-    Returns  None where the shells do not decide what is reached, or the map does not hold them
+    Returns  None where the shells do not decide reach, or the map does not hold them
     """
     import shapely
 
@@ -62,7 +62,7 @@ def reach_outline(dataset: xr.Dataset, name: str) -> Any:
 
 
 def _decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
-    """Does every cell lie in all shells that is reached, and no other?"""
+    """Whether the reached cells are exactly those that lie in all shells."""
     at, status = positions(dataset), dataset[f"{name}_status"].values
     inside = np.ones(status.shape, dtype=np.bool_)
     unsure = status == SINGULAR
@@ -74,7 +74,7 @@ def _decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
 
 
 def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
-    """The values (ny, nx) of a map, and some beyond the edge of reach, within the range of the others.
+    """The values (ny, nx) of a map, continued beyond the edge of reach within the range of the others.
 
     A cell there continues straight the two next to it along each row, column and diagonal that has them, else it
     is as its neighbours are. What lies between cells can then be cut at the true edge, not at the last cell.
@@ -95,7 +95,7 @@ def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
 
 
 def _along(values: Floats, steps: int) -> Floats:
-    """The values (8, ny, nx) so many cells away along rows, columns and diagonals; nan where that is none."""
+    """The values (8, ny, nx) a number of cells away along rows, columns and diagonals; nan outside the grid."""
     padded = np.pad(values, steps, constant_values=np.nan)
     rows, columns = values.shape
     ways = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
@@ -104,7 +104,7 @@ def _along(values: Floats, steps: int) -> Floats:
 
 
 def _mean(values: Floats) -> Floats:
-    """Mean over the first axis of what is finite; nan where nothing is."""
+    """Mean of the finite values over the first axis; nan where there is none."""
     there = np.isfinite(values)
     total = np.where(there, values, 0.0).sum(axis=0)
     return np.where(there.any(axis=0), total / np.maximum(there.sum(axis=0), 1), np.nan)

@@ -1,4 +1,4 @@
-"""What a designer requires of a measure: at least, or at most, so much."""
+"""`Requirement`: a lower or an upper bound on a measure."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class Requirement:
 
     @property
     def text(self) -> str:
-        """As it is typed: "stiffness_max>=5000"."""
+        """The requirement as a user types it: "stiffness_max>=5000"."""
         return f"{self.measure.name}{'>=' if self.at_least else '<='}{self.value:g}"
 
     def margin(self, values: ArrayLike) -> NDArray[np.float64]:
-        """By how much values meet it, in the measure's unit; negative where they do not.
+        """Margin by which values meet the bound, in the measure's unit; negative where they do not.
 
         >>> from zwidth.measures.catalogue import MEASURES
         >>> Requirement(MEASURES["isotropy"], False, 1.5).margin([1.25, 2.0]).tolist()
@@ -43,7 +43,7 @@ class Requirement:
         return beyond if self.at_least else -beyond
 
     def met(self, values: ArrayLike) -> NDArray[np.bool_]:
-        """Which values meet it; one that is not known (nan) does not."""
+        """Which values meet the bound; nan does not."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.margin(values) >= 0.0)
 
@@ -61,7 +61,7 @@ def parse_requirement(text: str, user_measures: Mapping[str, Measure] | None = N
     form = _FORM.fullmatch(text)
     name, sign, number = form.groups() if form else ("", "", "")
     if sign not in ("<=", ">=") or not name:
-        raise ValueError(f"{text!r} is no requirement: write NAME>=VALUE or NAME<=VALUE, such as isotropy<=1.5")
+        raise ValueError(f"{text!r} is not a requirement; write NAME>=VALUE or NAME<=VALUE, such as isotropy<=1.5")
     try:
         value = float(number)
     except ValueError:

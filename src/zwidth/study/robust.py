@@ -1,17 +1,16 @@
-"""Robust charts of a device whose operator, or any of whose numbers, is known in ranges or as a list only.
+"""Robust charts: the walls stable for every operator of a list and for all numbers within their ranges.
 
-A continuum of members cannot be charted; it is sampled, and the sample is then made to bite:
+A family with ranges has infinitely many members. It is sampled, and members that cut the chart are searched for:
 
 1. corners of the box of ranges, its centre, and Sobol's points (low discrepancy) inside;
 2. at points of the robust edge, above all where the binding member changes, the box is searched for the member
-   with the largest spectral radius (pattern search); what exceeds 1 joins, until the edge stands still;
-3. then members nobody has seen, at random, are asked whether they render the robust walls stably, and the worst
-   violation is stated.
+   with the largest spectral radius (pattern search); members above 1 join, until the edge no longer moves;
+3. then further random members are tried on the robust walls, and the worst violation is stated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, Final
@@ -29,36 +28,36 @@ from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
+from zwidth.progress import Progress
 from zwidth.result import Result
 from zwidth.study.robust_family import Family, FamilyMember, RangeError
 
 Floats = NDArray[np.float64]
 # stage, done, of how many
-Progress = Callable[[str, int, int], None]
 
-REFINING: Final = 0.25  # share of the members kept for what the search finds
+REFINING: Final = 0.25  # share of the members that is reserved for those found by the search
 SEARCHED: Final = 12  # points of the edge that each round searches from
-FIRST_STEP, LAST_STEP = 0.25, 1e-3  # of the search, in shares of the ranges
+FIRST_STEP, LAST_STEP = 0.25, 1e-3  # step of the pattern search, in shares of the ranges
 EXCEEDS: Final = 1e-7  # excess of the spectral radius over 1 that makes a member join
-EDGE_WALLS: Final = 200
+EDGE_WALLS: Final = 200  # walls along the edge that random members are tried on
 RASTER: Final = 12  # walls inside, per axis
-DEPTH: Final = 1e-6  # how far inside the edge walls are asked, in shares of the set's size
+DEPTH: Final = 1e-6  # distance of these walls inside the edge, in shares of the set's size
 
 
 class RobustError(ValueError):
-    """Not one member can be built."""
+    """No member of the family can be built and charted."""
 
 
 @dataclass(frozen=True)
 class Violation:
-    """What random members nobody had seen say of the robust walls.
+    """Random members, not used for the chart, tried on the robust walls.
 
-    unseen                 how many were asked; those that could not be built are not counted
-    violating              how many of them find one of the walls unstable
-    worst_spectral_radius  over all of them and all walls; at most 1 if nobody violates
+    unseen                 number of members tried, without those that could not be built
+    violating              number of them for which one of the walls is unstable
+    worst_spectral_radius  largest over all of them and all walls; at most 1 if none violates
     worst_stiffness_share  the largest share of the largest stiffness by which a robust wall (K > 0, B >= 0) must
-                           be softened, at its damping, to be stable for a member; 0 if nobody violates
-    worst_member           that member's values: path -> value; {} if nobody violates
+                           be softened, at its damping, to be stable for a member; 0 if none violates
+    worst_member           that member's values: path -> value; {} if none violates
     """
 
     unseen: int
@@ -80,15 +79,16 @@ class Violation:
 
 @dataclass(frozen=True)
 class RobustStudy(Result):
-    """A robust chart with who its members are and how far it can be trusted.
+    """A robust chart with its members and the evidence that it holds for the whole family.
 
     chart        of all members
     members      path -> value of each; those in `chart.failed` could not be built or charted
-    sampled      members before the search; the rest it found
-    rounds       of the search
-    area_change  share of the area by which the last round moved the edge; 0 if it found nobody
-    settled      whether the search ended because nobody it found moves the edge by more than the tolerance
-    violation    None for a list without ranges, all of whose members are in the chart, and where no wall is stable
+    sampled      number of members before the search; it found the others
+    rounds       number of rounds of the search
+    area_change  share of the area by which the last round moved the edge; 0 if it found no member
+    settled      whether the search ended because no member that it found moves the edge by more than the tolerance
+    violation    random members tried; None for a list without ranges, which is charted whole, and where no wall
+                 is stable
     """
 
     chart: RobustChart
@@ -155,13 +155,13 @@ def robust_study(
 ) -> RobustStudy:
     """The robust chart of a family of devices.
 
-    members    at most so many; a list without ranges has as many as it has
-    unseen     random members asked afterwards (see `Violation`)
-    seed       of everything random: equal seeds give equal answers
-    tolerance  share of the area; a round of the search that moves the edge by less is the last
-    Raises     RangeError      for ranges that cannot be meant
-               DeviceError     for operators that are none
-               RobustError     if not one member can be built or charted
+    members    largest number of members charted; a list of operators without ranges is charted whole
+    unseen     number of random members tried afterwards (see `Violation`)
+    seed       seed of all random numbers: equal seeds give equal answers
+    tolerance  the search ends with a round that changes the area by a smaller share
+    Raises     RangeError      for ranges that cannot be used
+               DeviceError     for operators that cannot be read
+               RobustError     if no member can be built and charted
                NonlinearError  for a velocity estimate that is not linear
 
     >>> from zwidth.device.load import from_document
@@ -213,24 +213,24 @@ class _Members:
         self.loops: dict[FamilyMember, Loop | None] = {}
 
     def add(self, points: list[FamilyMember], stage: str) -> None:
-        """Build and chart more members; those for whom that fails are remembered with the reason."""
+        """Build and chart more members; those that fail are kept with the reason."""
         for done, point in enumerate(points):
             self.progress(stage, done, len(points))
             index = len(self.points)
             self.points.append(point)
             try:
                 self.charted[index] = chart_member(index, self.family.loop(point))
-            except NonlinearError:  # of every member, whatever else varies
+            except NonlinearError:  # the velocity estimate is the same for every member
                 raise
             except (ValueError, ChartError, np.linalg.LinAlgError) as error:
                 self.failed[index] = str(error)
         self.progress(stage, len(points), len(points))
 
     def chart(self) -> RobustChart:
-        """The robust chart of all of them."""
+        """The robust chart of all members so far. Raises RobustError if none could be charted."""
         if not self.charted:
             reason = next(iter(self.failed.values()))
-            raise RobustError(f"not one of {len(self.points)} members could be charted; the first: {reason}")
+            raise RobustError(f"none of {len(self.points)} members could be charted; the first: {reason}")
         return robust_chart_of_members(dict(self.charted), dict(self.failed))
 
     def radius(self, point: FamilyMember, K: float, B: float) -> float:
@@ -272,7 +272,7 @@ def _point(family: Family, operator: int, free: Floats) -> FamilyMember:
 
 
 def _violating_members(found: _Members, chart: RobustChart) -> list[FamilyMember]:
-    """Members that the search finds at the edge and that cut it, the deepest cuts first."""
+    """Members found by the search for which a wall of the edge is unstable, the largest spectral radius first."""
     family, bites = found.family, dict[FamilyMember, float]()
     for K, B, starts in _searched_walls(chart):
         for start in starts:
@@ -304,7 +304,7 @@ def _searched_walls(chart: RobustChart) -> list[tuple[float, float, tuple[int, .
 
 def _worst_member(found: _Members, start: FamilyMember, K: float, B: float) -> tuple[FamilyMember, float]:
     """The member of the largest spectral radius at a wall, by pattern search from a member: one range at a time,
-    steps halved where nothing is gained."""
+    the step halved when no range gives a larger one."""
     best, radius, step = start, found.radius(start, K, B), FIRST_STEP
     while step >= LAST_STEP:
         gained = False
@@ -321,13 +321,13 @@ def _worst_member(found: _Members, start: FamilyMember, K: float, B: float) -> t
 
 
 def _area_change(before: RobustChart, after: RobustChart) -> float:
-    """Share by which the whole set became smaller."""
+    """Share by which the area of the whole set became smaller."""
     areas = [sum(shapely.Polygon(ring).area for ring in chart.regions) for chart in (before, after)]
     return max(1.0 - areas[1] / areas[0], 0.0) if areas[0] > 0.0 else 0.0
 
 
 def _violation(found: _Members, chart: RobustChart, unseen: int, seed: int) -> Violation:
-    """What `unseen` random members say of the robust walls."""
+    """Try `unseen` random members on the robust walls."""
     family = found.family
     walls = sample_walls(chart)
     random = np.random.default_rng([seed, 1])

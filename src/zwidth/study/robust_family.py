@@ -24,7 +24,7 @@ from zwidth.measures.definition import Spelling, as_argument
 from zwidth.model.plant import Plant
 from zwidth.study.advice import Advice
 
-# What two of the faults advise; arguments as Python has them.
+# Advice of two of the faults; arguments are spelled as in Python.
 BY_VALUE: Final = Advice("compute it for each value with {}", "Device.with_")
 LINEARLY: Final = Advice("give a positive number, or leave out {}", "logarithmic")
 
@@ -46,13 +46,13 @@ class RangeFault:
         return self.spelled(as_argument)
 
     def spelled(self, spelling: Spelling) -> str:
-        """The fault on one line, with arguments spelled as the asker gives them."""
+        """The fault on one line, with arguments spelled as in Python or as on the command line."""
         advice = "" if self.advice is None else f"; {self.advice.spelled(spelling)}"
         return f"{one_line(self.path)}: {one_line(self.reason)}{advice}"
 
 
 class RangeError(ValueError):
-    """Ranges that make no family of devices; `faults` says everything that is wrong with them."""
+    """Ranges that cannot be used; `faults` holds everything that is wrong with them."""
 
     def __init__(self, faults: Iterable[RangeFault]) -> None:
         self.faults = tuple(dict.fromkeys(faults))
@@ -83,11 +83,11 @@ class Range:
         return self.low + share * (self.high - self.low)
 
     def fault(self) -> RangeFault | None:
-        """What is wrong with it; None if nothing is."""
+        """What is wrong with the range itself; None if nothing is."""
         if not (isfinite(self.low) and isfinite(self.high)):
             return RangeFault(self.path, f"must lie between two finite numbers, got {self.low:g},{self.high:g}")
         if self.low > self.high:
-            upside_down = f"is upside down, got {self.low:g},{self.high:g}; give the smaller number first"
+            upside_down = f"must be LOW,HIGH with LOW below HIGH, got {self.low:g},{self.high:g}; exchange them"
             return RangeFault(self.path, upside_down)
         if self.logarithmic and not self.low > 0.0:
             return RangeFault(self.path, f"cannot be logarithmic from {self.low:g}", LINEARLY)
@@ -96,7 +96,11 @@ class Range:
 
 @dataclass(frozen=True)
 class FamilyMember:
-    """One member: which operator holds it (0 if only one does), and each range's share 0..1."""
+    """One member of a family.
+
+    operator  index of the operator who holds it; 0 where there is only one
+    shares    for each range, where its number lies: 0 at low, 1 at high
+    """
 
     operator: int
     shares: tuple[float, ...]
@@ -104,12 +108,12 @@ class FamilyMember:
 
 @dataclass(frozen=True)
 class Family:
-    """What the members have in common, and in what they differ.
+    """All devices that differ from one device by numbers within ranges, and by the operator who holds it.
 
-    device           the device itself
-    ranges           the numbers that differ
-    operators        names or files of those who may hold it, "none" for nobody; (): as the device says
-    operating_point  where the device is asked about; the members are asked about there, too
+    device           the device whose numbers are varied
+    ranges           the numbers that differ from member to member
+    operators        names or files of those who may hold it, "none" for no operator; (): as the device file says
+    operating_point  posture, direction and model, the same for all members
     """
 
     device: Device
@@ -119,7 +123,7 @@ class Family:
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Places of the ranges that are more than one value."""
+        """Indices of the ranges whose low and high differ."""
         return tuple(k for k, found in enumerate(self.ranges) if found.low < found.high)
 
     @cached_property
@@ -128,7 +132,7 @@ class Family:
 
     @cached_property
     def _ungripped_plant(self) -> Plant | None:
-        """The device's plant with nobody at it, where the members differ in the operator alone; else None."""
+        """The plant without an operator, where the members differ in the operator alone; else None."""
         operator_only = all(found.path.split(".")[0] == "operator" for found in self.ranges)
         return self.operating_point.ungripped_plant if operator_only else None
 
@@ -159,7 +163,7 @@ class Family:
         return from_document(document, self.device.label).at_point(self.operating_point).loop
 
     def _point_with_operator(self, document: dict[str, Any]) -> OperatingPoint | None:
-        """The point with a document's operator, without reading the rest again; None where he has faults."""
+        """The point with a document's operator, the rest not read again; None if the operator has faults."""
         table = document.get("operator")
         if table is None:
             return self.operating_point.without_operator
@@ -194,14 +198,14 @@ class Family:
                     except DeviceError as error:
                         value = self.ranges[k].at(end)
                         found += [
-                            RangeFault(self.ranges[k].path, f"{value:g} makes no device: {fault}")
+                            RangeFault(self.ranges[k].path, f"with {value:g} the device is not valid: {fault}")
                             for fault in error.faults
                         ]
         return list(dict.fromkeys(found))
 
 
 def _path_faults(document: dict[str, Any], one: Range) -> list[RangeFault]:
-    """The fault of a path that leads to no real number."""
+    """The fault of a path that leads to no real number, in a list; [] if it leads to one."""
     try:
         steps = address.resolve(document, one.path)
     except DeviceError as error:
@@ -217,7 +221,7 @@ def _path_faults(document: dict[str, Any], one: Range) -> list[RangeFault]:
         inside = [
             path for path in address.numeric_addresses(document) if path.startswith(f"{dotted(steps, document)}.")
         ]
-        held = "is no number" if value is None else f"holds {quote(value)}, which is no number"
+        held = "is not a number" if value is None else f"is not a number but {quote(value)}"
         hint = f"; did you mean '{inside[0]}'?" if inside else ""
         return [RangeFault(one.path, held + hint)]
     return []

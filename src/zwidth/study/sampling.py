@@ -17,15 +17,16 @@ CIRCUMSTANCES: Final = ("at", "direction", "assembly", "model", "operator", *WAN
 
 @dataclass(frozen=True)
 class Tie:
-    """A number, or a list of numbers, of the device file that goes with an axis's value v.
+    """A number, or a list of numbers, of the device file that changes with the value v of an axis.
 
         factor * v                          without a power
-        its own value there * (v / v0)^power   with one, v0 being what the file has for the axis
+        file_value * (v / v0)^power         with one; v0 is the axis's value in the device file
 
-    So a link's mass goes with its length by the power 1, its moment of inertia by 3, where its section stays.
+    A link of constant cross-section has a mass in proportion to its length (power 1), and a moment of inertia to
+    its cube (power 3).
 
-    key              its path
-    file_value       what the file has there; None where that does not matter
+    key              path of the tied number
+    file_value       its value in the device file; None without a power
     axis_file_value  v0
     """
 
@@ -36,7 +37,7 @@ class Tie:
     axis_file_value: float = 1.0
 
     def value(self, axis_value: Any) -> Any:
-        """What the axis's value makes of it.
+        """The tied number where the axis has a value.
 
         >>> Tie("links.arm.inertia_kg_m2", power=3.0, file_value=[1.0, 2.0], axis_file_value=0.1).value(0.2)
         [8.0, 16.0]
@@ -52,12 +53,13 @@ def _times(value: Any, factor: float) -> Any:
 
 @dataclass(frozen=True)
 class Axis:
-    """What is varied.
+    """A number or a circumstance that a study varies.
 
     key     a path of the device file, or one of CIRCUMSTANCES
-    values  those of a grid; of a Latin hypercube those it chooses from, () where it has a range
-    span    lowest and highest; None: only the values
-    log     divided evenly in the logarithm
+    values  values of a grid; of a Latin hypercube those it chooses from, () where it has a range
+    span    lowest and highest value; None: only the listed values
+    log     whether the range is divided evenly in the logarithm
+    ties    numbers that change with this one
     unit    "" for none
     """
 
@@ -74,7 +76,7 @@ class Axis:
         return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.values)
 
     def at(self, share: float) -> Any:
-        """The value so far along the axis, 0 <= share < 1."""
+        """The value at a share 0 <= share < 1 of the way along the axis."""
         if self.span is None:
             return self.values[int(share * len(self.values))]
         low, high = self.span
@@ -84,7 +86,7 @@ class Axis:
 
 
 def spread(span: tuple[float, float], count: int, *, logarithmic: bool = False) -> tuple[float, ...]:
-    """So many values of a range, its ends exactly among them; of one value the lower end.
+    """Divide a range into `count` values, its ends exactly among them; one value is the lower end.
 
     >>> spread((1.0, 100.0), 3, logarithmic=True)
     (1.0, 10.0, 100.0)
@@ -95,13 +97,15 @@ def spread(span: tuple[float, float], count: int, *, logarithmic: bool = False) 
 
 @dataclass(frozen=True)
 class Sampling:
-    """Which designs there are, numbered.
+    """The designs of a study, numbered from 0.
 
-    A grid has every combination, the last axis going round fastest. A Latin hypercube of n designs has in each
-    axis one of them in each n-th of the range, anywhere in it (McKay, Beckman and Conover 1979, read second-hand):
+    A grid has every combination; the last axis changes fastest. A Latin hypercube of n designs divides each axis
+    into n equal parts and has one design in each, at a random place in it (McKay, Beckman and Conover 1979,
+    read second-hand):
     the parts of the axes are paired at random, the same for the same seed.
 
-    size  of the Latin hypercube; None: a grid
+    size  number of designs of the Latin hypercube; None: a grid
+    seed  of its random numbers
     """
 
     axes: tuple[Axis, ...]
@@ -110,7 +114,7 @@ class Sampling:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Values along each axis of a grid; of a Latin hypercube its designs."""
+        """Number of values along each axis of a grid; (size,) for a Latin hypercube."""
         return tuple(len(axis.values) for axis in self.axes) if self.size is None else (self.size,)
 
     @property
@@ -131,7 +135,7 @@ class Sampling:
 
     @cached_property
     def _shares(self) -> NDArray[np.float64]:
-        """How far along each axis each design lies, (size, axes)."""
+        """Share 0..1 of the way along each axis at which each design lies, (size, axes)."""
         assert self.size is not None
         random = np.random.default_rng(self.seed)
         columns = [(random.permutation(self.size) + random.random(self.size)) / self.size for _ in self.axes]
@@ -140,7 +144,7 @@ class Sampling:
 
 
 def settings(axes: tuple[Axis, ...], values: tuple[Any, ...]) -> Iterator[tuple[str, Any]]:
-    """Path and value of all that makes a design, tied numbers after those they are tied to."""
+    """Path and value of each number that a design changes, tied numbers after those they are tied to."""
     for axis, value in zip(axes, values, strict=True):
         yield axis.key, value
         for tie in axis.ties:

@@ -1,10 +1,10 @@
-"""What to change first: how the largest stiffness answers to each number of a device and its loop.
+"""Sensitivities: by how much the largest stiffness changes with each number of a device and its loop.
 
     e = d ln K_max / d ln p = (p / K_max) dK_max/dp,       + 1 % of p gives + e % of K_max
 
-exactly at the optimum: the stiffest wall is not searched anew for each number, its first-order motion follows from
-the edge that holds it (`study.optimum`). What is differenced is the device itself, built anew with the number a
-little larger and smaller (`study.derivative`).
+The stiffest wall is not searched again for each number: to first order it moves as the edge on which it lies
+(`study.optimum`). The device is built again with the number slightly larger and smaller, and the motion of the
+edge is differenced (`study.derivative`).
 """
 
 from __future__ import annotations
@@ -31,21 +31,22 @@ from zwidth.study.derivative import Derivative, central_derivative, one_sided_de
 from zwidth.study.optimum import Optimum, OptimumError, optimum, second_peak_stiffness
 from zwidth.study.sensitivity_result import Group, Sensitivities, Sensitivity
 
-# Numbers of a device file that say where it is asked about, or how its posture is found, and not what it is.
+# Numbers of a device file that choose a posture, or help to find it, and are no property of the device.
 NO_PROPERTY: Final = {
     "assemblies": "an approximate angle from which the posture is found",
     "reference": "where the device is asked about, not what it is",
     "workspace": "where the device is asked about, not what it is",
 }
-ZERO: Final = "0 has no logarithm; the derivative by the number itself stands beside it"
-WORTHLESS: Final = 1e-3  # a derivative with a larger estimated error, per relative change, is not given
+ZERO: Final = "0 has no logarithm; the derivative by the number itself is given instead"
+WORTHLESS: Final = 1e-3  # largest estimated error of a derivative, per relative change; above it none is given
 
 
 def sensitivities(device: Device, point: OperatingPoint | None = None) -> Sensitivities:
     """Sensitivity of the largest stiffness to every number of the device file, and to the delay if it gives none.
 
-    point  where the device is asked about, one point of one direction; left out: its reference. The handle stays
-           at the position asked for while links grow, and joints at the angles asked for
+    point  the operating point, one posture and one direction; left out: the device's reference. While a link's
+           length changes, a posture given by the handle's position keeps the position, one given by joint angles
+           keeps the angles
 
     Numbers that cannot be varied, such as whole ones, are reported with the reason. Accuracy: derivatives are
     extrapolated differences at relative steps of 2e-3 and less, good to about 1e-9 of d ln K_max / d ln p where
@@ -87,7 +88,7 @@ def sensitivities(device: Device, point: OperatingPoint | None = None) -> Sensit
 
 
 def _rank(number: Sensitivity) -> tuple[bool, float, bool, float]:
-    """Largest first, then the zeros with a derivative, then what is not known."""
+    """Sorting key: largest first, then numbers of value 0 by their derivative, then those without a result."""
     known, slope = not isnan(number.logarithmic), not isnan(number.derivative)
     return (
         not known,
@@ -99,9 +100,10 @@ def _rank(number: Sensitivity) -> tuple[bool, float, bool, float]:
 
 @dataclass(frozen=True)
 class _StiffnessDerivatives:
-    """How the stiffest wall answers to changes of the device's document.
+    """Derivatives of the largest stiffness by changes of the device's document.
 
-    optimum   None where it has no derivative, for the reason `obstacle`
+    loop_of   device -> its loop at the operating point
+    optimum   the stiffest wall and the edge it lies on; None where it has no derivative, for the reason `obstacle`
     """
 
     device: Device
@@ -110,7 +112,7 @@ class _StiffnessDerivatives:
     obstacle: str
 
     def sensitivity(self, path: str, steps: KeyPath, value: float) -> Sensitivity:
-        """The sensitivity to one number; a number that cannot be varied says why."""
+        """The sensitivity to one number; of a number that cannot be varied, with the reason."""
         document = self.device.document
         unit = _unit(steps)
         scale = abs(value) or _scale(document, steps)
@@ -126,7 +128,7 @@ class _StiffnessDerivatives:
         return Sensitivity(path, value, unit, slope.value * value, slope.value * K, slope.error * scale, side)
 
     def groups(self, found: dict[str, Sensitivity]) -> Iterator[Group]:
-        """The groups of numbers. A plant's matrices are scaled as a whole: so a free plant stays free."""
+        """The groups of numbers. A plant's matrix is scaled as a whole: a free plant stays free."""
         steps_of = {path: steps for path, steps, _ in _numbers(self.device.document)}
         for name, paths in _groups(self.device.document).items():
             parts = [found[path] for path in paths if found[path].value != 0.0]
@@ -191,14 +193,14 @@ class _StiffnessDerivatives:
 def _obstacle(steps: KeyPath, value: float) -> str:
     """Why a number has no derivative whatever the device; "" if it may have one."""
     if not isfinite(value):
-        return "it is infinite, of which there is no share to change"
+        return "it is infinite, and one per cent of it is no change"
     whole = any(found.get("type") == "integer" for found in schema.subschemas(steps))
     return "it is a whole number, which has no derivative" if whole else ""
 
 
 def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
-    """Dotted path, steps and value of each number that is the device's; of a matrix those on and above the
-    diagonal."""
+    """Dotted path, steps and value of each number that is a property of the device; of a symmetric matrix those on
+    and above the diagonal."""
     for steps, value in address.numbers(document):
         if not _no_property(steps) and not _mirrored(document, steps):
             yield dotted(steps, document), steps, float(value)
@@ -248,7 +250,7 @@ def _unit(steps: KeyPath) -> str:
 
 
 def _scale(document: dict[str, Any], steps: KeyPath) -> float:
-    """What a number that is 0 is measured by: the largest of its list, or else of its unit in the file, or 1."""
+    """Step scale of a number that is 0: the largest number of its list, else of its unit in the file, else 1."""
     if steps[-1] == "delay_samples":
         return 1.0
     beside = [abs(v) for path, v in address.numbers(document) if _key(path) == _key(steps) and path[0] == steps[0]]
@@ -261,7 +263,7 @@ def _key(steps: KeyPath) -> str:
 
 
 def _groups(document: dict[str, Any]) -> dict[str, list[str]]:
-    """Lists and matrices as wholes, and the same key of all elements of a list of tables: path -> members."""
+    """Path -> paths of its members: each list and matrix, and each key over all elements of a list of tables."""
     members: dict[str, list[str]] = {}
     for path, steps, _ in _numbers(document):
         whole = steps

@@ -1,4 +1,4 @@
-"""What sensitivities come to: each number's, those of numbers scaled together, and the wall they are about."""
+"""Results of a sensitivity analysis: of each number, of numbers scaled together, and the stiffest wall."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ COLUMNS: Final = (
     "side",
     "reason",
 )
-NOTHING: Final = 1e-8  # a sensitivity that is rounding of none
-TIE: Final = 1e-5  # relative difference of two stiffest walls that are one
+NOTHING: Final = 1e-8  # a smaller sensitivity is rounding of 0
+TIE: Final = 1e-5  # relative difference below which two extreme points of the edge are equally stiff
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How the largest stiffness answers to one number.
+    """Sensitivity of the largest stiffness to one number.
 
-    path         where it stands in the device file; an element of a symmetric matrix moves with its mirror image
+    path         of the number in the device file; an element of a symmetric matrix moves with its mirror image
     value        the number
     unit         as the schema names it; "" if it has none
     logarithmic  d ln K_max / d ln value; nan for the value 0, and where it could not be computed
     derivative   dK_max/dvalue [N/m per unit of the value]; nan where it could not be computed
     error        estimated error of `logarithmic`, for the value 0 of `derivative`
-    side         "both"; "above" or "below" where the derivative is that of a growing or falling number alone
-    reason       why a number is missing; "" where none is
+    side         "both"; "above" or "below" where only the derivative towards larger or smaller numbers exists
+    reason       why a result is missing; "" where none is
     """
 
     path: str
@@ -65,13 +65,13 @@ class Group:
 
 @dataclass(frozen=True, repr=False)
 class Sensitivities(Result):
-    """All of them, with the wall they speak of.
+    """Sensitivities of the largest stiffness to all numbers, and the wall that has it.
 
-    peak         the stiffest wall; None where no wall is stable, and then nothing else is there
-    kind         what holds it (see `study.optimum`); None where that is not known
+    peak         the stiffest wall; None where no wall is stable; then there are no numbers and groups
+    kind         which part of the edge it lies on (see `study.optimum`); None where that is not known
     numbers      largest |logarithmic| first, then those without a logarithm
     groups       largest first
-    left_out     path -> why the number is none of the device
+    left_out     path -> why the number is not a property of the device
     second_peak  largest stiffness of another, separate extreme point of the edge [N/m]; nan if there is none. It
                  takes over as soon as a change makes it the stiffer one.
     """
@@ -143,5 +143,5 @@ class Sensitivities(Result):
 
     @property
     def tie(self) -> bool:
-        """Are two walls stiffest at once? Then each number's derivative is one-sided: that of this one."""
+        """Whether two walls are stiffest at once; each derivative then holds for `peak` alone."""
         return self.peak is not None and bool(self.second_peak >= (1.0 - TIE) * self.peak.stiffness)

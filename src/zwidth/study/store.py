@@ -1,12 +1,12 @@
-"""Cells of a job on disk, in a zarr group, so that a run that was stopped goes on where it was.
+"""Store of a job: its cells on disk in a zarr group, from which an interrupted run continues.
 
     values    (count, measures)  float64; nan where there is none
     status    (count, measures)  uint8, named by its attributes; 255 = not computed
     notes                        a journal beside them: why cells have no value
 
-Attributes say which question they answer, and the version of the format; a store of another question is begun
-anew, one of a newer version refused. Chunks are batches: a batch is one file of values and one of status, each
-there wholly or not at all, and the status is written last.
+Attributes hold the fingerprint of the question and the version of the format. A store of another question is begun
+again; one of a newer version is refused. Chunks are batches: one file of values and one of status, each written
+whole or not at all, the status last.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class StoreError(ValueError):
 
 
 class Store:
-    """What of a job is done, in a folder.
+    """The batches of a job that are done, in a folder.
 
     path     of the folder
     batch    cells in each batch; None: not begun yet
@@ -60,7 +60,7 @@ class Store:
             self._check_disk()
 
     def begin(self, batch: int) -> None:
-        """Begin anew with batches of this size; a store of another question, or of this one, is emptied."""
+        """Begin again with batches of this size; the store is emptied."""
         import zarr
 
         draft = self.path.with_name(f".{self.path.name[:40]}-{secrets.token_hex(4)}")
@@ -86,7 +86,7 @@ class Store:
         self._open()
 
     def stored_batches(self) -> Iterator[tuple[int, CellValues]]:
-        """First cell and cells of each batch that is done."""
+        """First cell and values of each batch that is done."""
         values, status = self._open_arrays()
         assert self.batch is not None
         for first in range(0, self.count, self.batch):
@@ -99,7 +99,7 @@ class Store:
                     yield first, found
 
     def write_batch(self, first: int, cells: CellValues) -> None:
-        """Write a batch. Raises OSError where the disk refuses."""
+        """Write a batch. Raises OSError where it cannot be written."""
         values, status = self._open_arrays()
         part = slice(first, first + len(cells.values))
         values[part] = cells.values
@@ -109,7 +109,7 @@ class Store:
         status[part] = cells.status
 
     def remove(self) -> None:
-        """Remove it from the disk, if it is ours."""
+        """Remove the store from the disk, if it is one of this job."""
         if self._ours:
             shutil.rmtree(self.path, ignore_errors=True)
 
@@ -122,7 +122,7 @@ class Store:
         return self._arrays
 
     def _open(self) -> None:
-        """Read what is there: a store of this question, of another one, or something else."""
+        """Open the folder: a store of this question, of another one, or something else."""
         import zarr
 
         other = StoreError(f"{self.path.name}: is not the store of a study; name another folder, or remove it")
@@ -161,5 +161,5 @@ class Store:
 
 
 def store_for(job: Job, store: Store | str | os.PathLike[str] | None) -> Store | None:
-    """A job's store: as it is, or in the folder of that name; None: none. Raises what `Store` does."""
+    """A job's store: the one given, or one in the folder of that name; None for None. Raises what `Store` does."""
     return Store(Path(store), job) if isinstance(store, str | os.PathLike) else store

@@ -1,4 +1,4 @@
-"""A study: many designs of one device, and what is asked of each; checked, whoever describes it."""
+"""`Study`: many designs of one device and the measures of each; `check_study` makes it from a study document."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from zwidth.study.plane_grid import PlaneError, PlaneGrid, plane_of
 from zwidth.study.sampling import CIRCUMSTANCES, Sampling
 from zwidth.study.study_schema import StudyFile, description, unknown
 
-PER_VALUE: Final = 3  # numbers that a value takes: itself, its status, and once more while they are put together
-PER_AXIS: Final = 12  # those that a design's own take, as they are written
+PER_VALUE: Final = 3  # numbers of memory for each value: the value, its status, and a copy while the table is made
+PER_AXIS: Final = 12  # numbers of memory for each axis of a design, whose values are kept as they are written
 # Argument in Python -> what it is called as a key of a study file, or of its [workspace].
 KEYS: Final[dict[str, str]] = {
     "position": "at",
@@ -35,7 +35,7 @@ KEYS: Final[dict[str, str]] = {
 
 
 def as_key(name: str, value: str | None) -> str:
-    """An argument as a study's file spells it.
+    """An argument of `sweep` as a key of a study file, with its value.
 
     >>> as_key("stiffness", None), as_key("model", "rigid")
     ('stiffness_N_per_m', 'model = "rigid"')
@@ -46,18 +46,18 @@ def as_key(name: str, value: str | None) -> str:
 
 @dataclass(frozen=True, repr=False)
 class Study:
-    """Many designs of one device, and what is asked of each.
+    """Many designs of one device, and the measures to compute for each.
 
-    label      the file, as messages call it
-    document   what it says
-    device     the device without any axis, its own document holding the changes of `set`
-    operators  name -> [operator] table of those that an axis names; None: nobody
+    label      name of the study file, for messages
+    document   the study file as read
+    device     the device that designs are made from, with the changes of `set`
+    operators  name -> [operator] table of the operators that an axis names; None: no operator
     sampling   the designs
-    columns    what is asked
-    at, direction, assembly, model   circumstances that no axis sets; None: the file's
-    wall       the wanted one, which some measures are asked about, as far as no axis sets it
-    plane      the workspace; None where nothing is asked over it
-    spelling   how messages about it spell arguments
+    columns    the measures, one column of the result each
+    at, direction, assembly, model   circumstances that no axis sets; None: those of the device file
+    wall       stiffness, damping and frequency that some measures need, as far as no axis sets them
+    plane      grid over the workspace; None where no measure is over it
+    spelling   how messages spell arguments: as keys of a file or as arguments in Python
     """
 
     label: str
@@ -93,10 +93,10 @@ def check_study(
 ) -> Study | None:
     """The study that a document describes; None where anything is wrong with it, which is added to `faults`.
 
-    device         with the changes of `set`; None: it cannot be had, which is told elsewhere
+    device         with the changes of `set`; None: it could not be loaded, which the caller reports
     operators      as in `Study`
-    user_measures  a user's measures by name; None: they cannot be had, so that no measure is looked up
-    plane          the workspace, in place of the document's
+    user_measures  a user's measures by name; None: they could not be loaded, and no measure is looked up
+    plane          grid over the workspace; None: as the document's [workspace] says
     Raises         TooLarge  where the designs would not fit into memory
     """
     checked: StudyFile | None = None
@@ -105,7 +105,12 @@ def check_study(
     except ValidationError as error:
         faults += validation_messages(error, document, description, unknown)
     if device is not None and device.response is not None:
-        faults.append((("device",), "has a measured [response] and no model, whose numbers a study could vary"))
+        faults.append(
+            (
+                ("device",),
+                "is a measured [response], which has no numbers to vary; name another device",
+            )
+        )
         device = None
     columns = () if user_measures is None else _columns(document, user_measures, faults)
     axes = axes_of(document, device, faults)
@@ -134,7 +139,7 @@ def check_study(
 
 
 def _columns(document: dict[str, Any], user_measures: Mapping[str, Measure], found: Faults) -> tuple[Column, ...]:
-    """The columns as far as their measures are known."""
+    """The columns whose measures exist; unknown and repeated ones are added to `found`."""
     names = document.get("measures")
     columns: list[Column] = []
     for n, name in enumerate(names if isinstance(names, list) else []):
@@ -146,7 +151,7 @@ def _columns(document: dict[str, Any], user_measures: Mapping[str, Measure], fou
             found.append((("measures", n), str(error)))
             continue
         if column.name in [other.name for other in columns]:
-            found.append((("measures", n), f"{column.name} is asked for twice; remove one"))
+            found.append((("measures", n), f"{column.name} is listed twice; remove one"))
         columns.append(column)
     return tuple(columns)
 
@@ -162,19 +167,19 @@ def _check_sampling(document: dict[str, Any], found: Faults) -> None:
 
 
 def _check_circumstances(document: dict[str, Any], device: Device | None, found: Faults) -> None:
-    """Whether circumstances fit the device, and are set once."""
+    """Add the faults of circumstances that do not fit the device, or that an axis sets too."""
     varied = {axis.get("key") for _, axis in tables(document, "axis")}
     for key in CIRCUMSTANCES:
         if key not in document:
             continue
         if key in varied:
-            found.append(((key,), "is an axis, too; remove one of them"))
+            found.append(((key,), "is an axis as well; remove one of the two"))
         right = isinstance(document[key], list if key in ("at", "direction") else str)
         if key in ("at", "direction", "assembly") and right and document[key]:
             components = document[key] if key != "assembly" else [0.0]
             if all(map(is_number, components)) and (message := circumstance_fault(key, document[key], device)):
                 fault = ((key,), message)
-                # the schema may have said so in its own words
+                # the schema may have reported this key already
                 found += [fault] if all(path != (key,) for path, _ in found) else []
 
 
@@ -186,17 +191,23 @@ def _plane(
     found: Faults,
     spelling: Spelling,
 ) -> PlaneGrid | None:
-    """The grid over the workspace, the same for all designs; None where nothing is asked over it."""
+    """The grid over the workspace, the same for all designs; None where no measure is over it."""
     wanted = [column.name for column in columns if column.statistic]
     if not wanted:
         if (plane is not None or "workspace" in document) and columns:
-            said = f"is read by measures over it only, such as average({columns[0].measure.name}); remove it"
+            said = f"is used only by measures over the workspace, such as average({columns[0].measure.name}); "
+            said += "remove it"
             found.append((("workspace",), said))
         return None
     if device is None or any(path[0] in ("workspace", "at", "assembly") for path, _ in found):
         return None
     if device.mechanism is None:
-        found.append((("measures",), f"{wanted[0]} is over a workspace, and the device is given by its [plant]"))
+        found.append(
+            (
+                ("measures",),
+                f"{wanted[0]} needs the workspace of a [mechanism]; this device gives its [plant] only",
+            )
+        )
         return None
     if plane is not None:
         return plane
@@ -217,12 +228,12 @@ def _plane(
     except DeviceError as error:
         found.append((("workspace",), error.faults[0].message))
     except ValueError as error:  # an assembly that is singular throughout, or does not close
-        found.append((("workspace",), f"cannot be laid out: {error}"))
+        found.append((("workspace",), f"no plane can be laid through it: {error}"))
     return None
 
 
 def _check_size(checked: StudyFile, hypercube: bool) -> None:
-    """Raises TooLarge where the designs would not fit into memory, before they are spread out."""
+    """Raises TooLarge where the designs would not fit into memory, before any of them is made."""
     each = [len(axis.values) if axis.values is not None else axis.count or 1 for axis in checked.axis]
     designs = (checked.count or 0) if hypercube else prod(each)
     ties = sum(len(axis.tie) for axis in checked.axis)

@@ -85,14 +85,14 @@ def study_over(
 def _measures(
     measures: str | Measure | Sequence[str | Measure], user_measures: Mapping[str, Measure] | None
 ) -> tuple[list[str], dict[str, Measure]]:
-    """The names of what is asked, and measures of the user's own by name, those given themselves among them."""
+    """The names of the measures, and the user's own `Measure`s by name, from both arguments."""
     listed = measure_list(measures)
     given = {one.name: one for one in listed if isinstance(one, Measure)}
     return [one.name if isinstance(one, Measure) else one for one in listed], {**(user_measures or {}), **given}
 
 
 def _axes(axes: Any) -> Iterator[tuple[str, list[Any]]]:
-    """Path and values of each axis, in Python's own numbers. Raises TypeError, ValueError."""
+    """Path and values of each axis, as Python numbers. Raises TypeError, ValueError."""
     if not isinstance(axes, Mapping):
         raise wrong_type("axes", "a dictionary of paths and values", axes)
     if not axes:
@@ -109,7 +109,7 @@ def _axes(axes: Any) -> Iterator[tuple[str, list[Any]]]:
 
 
 def _plain(value: Any) -> Any:
-    """Arrays, their numbers, tuples and ranges as Python's own numbers and lists."""
+    """Arrays, NumPy numbers, tuples and ranges as Python numbers and lists."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     return [_plain(inner) for inner in value] if isinstance(value, list | tuple | range) else value
@@ -117,7 +117,7 @@ def _plain(value: Any) -> Any:
 
 def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str, Any]) -> Faults:
     """What is wrong with a position given by the angles of the driven joints."""
-    found: Faults = [(("at",), "is an axis, too; remove one of them")] if "at" in axes else []
+    found: Faults = [(("at",), "is an axis as well; remove one of the two")] if "at" in axes else []
     try:
         device.position(angles)
     except DeviceError as error:
@@ -126,7 +126,7 @@ def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str
 
 
 def _fault(path: KeyPath, said: str, keys: list[str]) -> Fault:
-    """A fault of the document, placed where it was given."""
+    """A fault of the document, under the name of the argument that it came from."""
     argument = ARGUMENTS.get(str(path[0]), str(path[0]))
     if path[0] != "axis" or len(path) < 3:
         return Fault(argument, "", said)

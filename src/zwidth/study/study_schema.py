@@ -1,4 +1,4 @@
-"""The study file's keys, each right by itself."""
+"""The keys of a study file with their types and limits; `study.check_study` checks how they go together."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from zwidth.device.schema.value_types import (
 from zwidth.device.toml_access import is_number
 from zwidth.model.reduction import Model
 
-MOST: Final = 10**9  # designs along one axis, and altogether: numbers beyond are slips of the keyboard
+MOST: Final = 10**9  # designs along one axis, and in all; a larger number is a typing error
 LEAST_SEED: Final = 0
 
 
 def _by_name(value: Any) -> Any:
-    """A tie written as the key alone."""
+    """A tie written as its key alone, as a table."""
     if not isinstance(value, str | dict):
         raise ValueError(f"must be a path, or a table with a key, got {quote(value)}")
     return {"key": value} if isinstance(value, str) else value
@@ -43,12 +43,13 @@ def _plane(value: Any) -> Any:
 
 
 class TieSection(Section):
-    """A number that goes with an axis's."""
+    """A number that changes together with the number of an axis."""
 
-    key: Text = documented_key("the number that goes with the axis's: a dotted path of the device file")
-    factor: Number | None = documented_key("times the axis's value", default=None)
+    key: Text = documented_key("the number that changes with the axis: a dotted path of the device file")
+    factor: Number | None = documented_key("this number is factor times the axis's value", default=None)
     power: Number | None = documented_key(
-        "of the axis's value over that in the file, times its own there", default=None
+        "this number is its value in the file, times (the axis's value over that in the file) to this power",
+        default=None,
     )
 
 
@@ -63,15 +64,15 @@ class AxisSection(Section):
     )
     range: Bounds | None = documented_key("lowest and highest value", default=None)
     count: WholeNumber | None = documented_key(
-        "values of the range, its ends among them", ge=1, le=MOST, default=None
+        "number of values in the range, both ends included", ge=1, le=MOST, default=None
     )
     values: tuple[Any, ...] | None = documented_key("the values", min_length=1, default=None)
     scale: Literal["linear", "log"] = documented_key("how the range is divided", default="linear")
-    tie: tuple[TieEntry, ...] = documented_key("numbers that go with this one", default=())
+    tie: tuple[TieEntry, ...] = documented_key("a list of numbers that change with this one", default=())
 
 
 class StudyWorkspaceSection(Section):
-    """Where measures over a workspace are asked: a plane with a grid."""
+    """The grid in a plane on which measures over a workspace are computed."""
 
     plane: Annotated[Any, BeforeValidator(_plane)] = documented_key("xy, xz, yz or six numbers", default=None)
     through_m: Position | None = documented_key("a point of the plane", "m", default=None)
@@ -85,24 +86,28 @@ class StudyWorkspaceSection(Section):
 
 
 class OptimiseSection(Section):
-    """What an optimiser wants of the same file; a sweep does without."""
+    """What `zwidth optimise` reads besides; `zwidth sweep` does not read it."""
 
     objectives: dict[Text, Literal["max", "min"]] = documented_key('measure -> "max" or "min"', default={})
     constraints: dict[Text, Text] = documented_key('measure -> such as "<= 0.3"', default={})
     budget: WholeNumber | None = documented_key("designs to try", ge=1, default=None)
-    seed: WholeNumber | None = documented_key("of what is random", ge=LEAST_SEED, default=None)
+    seed: WholeNumber | None = documented_key("seed of the random numbers", ge=LEAST_SEED, default=None)
 
 
 class StudyFile(Section):
-    """Many designs of one device, and what is asked of each."""
+    """Many designs of one device, and the measures to compute for each."""
 
     file_version: WholeNumber = VERSION
     device: Text = documented_key("a bundled name, or a file beside this one")
-    measures: tuple[Text, ...] = documented_key("what is asked of each design", min_length=1)
+    measures: tuple[Text, ...] = documented_key("the measures to compute for each design", min_length=1)
     measures_file: Text | None = documented_key("a file of your own measures, beside this one", default=None)
-    sampling: Literal["grid", "latin-hypercube"] = documented_key("how the axes are filled", default="grid")
+    sampling: Literal["grid", "latin-hypercube"] = documented_key(
+        "how designs are spread over the axes", default="grid"
+    )
     count: WholeNumber | None = documented_key("designs of a Latin hypercube", ge=1, le=MOST, default=None)
-    seed: WholeNumber | None = documented_key("of a Latin hypercube", ge=LEAST_SEED, default=None)
+    seed: WholeNumber | None = documented_key(
+        "seed of the random numbers of a Latin hypercube", ge=LEAST_SEED, default=None
+    )
     axis: tuple[AxisSection, ...] = documented_key("what is varied, one [[axis]] each", min_length=1)
     at: Position | None = documented_key("the handle's position", "m", default=None)
     direction: Direction | None = documented_key("the rendered direction", default=None)
@@ -132,7 +137,7 @@ def _table(path: KeyPath) -> Any:
 
 
 def description(path: KeyPath) -> str:
-    """What a key of the study file means, with its unit; "" for what stands within one.
+    """What a key of the study file means, with its unit; "" for a value inside a key, such as a list's element.
 
     >>> description(("workspace", "x_m"))
     'lowest and highest coordinate along its first axis [m]'

@@ -17,8 +17,9 @@ from zwidth import _verbs
 from zwidth.device.device import Device
 from zwidth.measures.definition import OK, STATUS, Measure
 from zwidth.model.argument_checks import wrong_type
+from zwidth.progress import Progress
 from zwidth.result import Result
-from zwidth.study.executor import Progress, run
+from zwidth.study.executor import run
 from zwidth.study.job import CellValues
 from zwidth.study.plane_grid import PlaneGrid
 from zwidth.study.sampling import settings

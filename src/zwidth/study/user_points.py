@@ -1,4 +1,4 @@
-"""Somebody's measured points beside the exact chart: how far edges are from its edge, which verdicts it shares."""
+"""A user's measured points compared with the exact chart: distances from its edge, and verdicts."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ VERDICTS: Final = ("stable", "unstable", "")
 
 @dataclass(frozen=True)
 class UserPoint:
-    """A point that somebody measured, of the boundary or beside it; nan, "" and 1 for what is left out.
+    """A point that a user measured, on the stability boundary or a wall tried; nan, "" and 1 where not given.
 
     stiffness, damping          [N/m], [N s/m]
     edge     lower, upper, tip or "": the boundary was found here
     damping_low, damping_high   [N s/m];   stiffness_low, stiffness_high  [N/m]
-    trials   how many it is the mean of
-    verdict  stable, unstable or "": the wall was tried, and was found so
+    trials   number of trials of which it is the mean
+    verdict  stable or unstable: result of a trial of this wall; "" for an edge
     Raises   ValueError  for another edge or verdict, or both
     """
 
@@ -49,7 +49,7 @@ class UserPoint:
 
 @dataclass(frozen=True)
 class ComparedPoint:
-    """A point with what is exact beside it.
+    """A measured point with the exact values that belong to it.
 
     exact          the damping of the nearest exact edge at its stiffness, of a tip the stiffness at its damping;
                    nan where the chart has no such edge
@@ -62,12 +62,12 @@ class ComparedPoint:
 
     @property
     def deviation(self) -> float:
-        """From the exact edge, along what was bisected: of a tip [N/m], else [N s/m]; nan where there is none."""
+        """Distance from the exact edge: in stiffness for a tip [N/m], else in damping [N s/m]; nan if unknown."""
         return (self.point.stiffness if self.point.edge == "tip" else self.point.damping) - self.exact
 
     @property
     def agrees(self) -> bool | None:
-        """Was the wall found to be what it exactly is? None where either is not known."""
+        """Whether the measured verdict is the exact one; None where either is not known."""
         if not self.point.verdict or self.exact_verdict not in ("stable", "unstable"):
             return None
         return self.point.verdict == self.exact_verdict
@@ -92,7 +92,7 @@ class ComparedPoint:
 
 @dataclass(frozen=True)
 class PointsComparison:
-    """All points with what is exact beside them, in the order in which they were given."""
+    """All points with their exact values, in the order in which they were given."""
 
     points: tuple[ComparedPoint, ...]
 
@@ -146,7 +146,7 @@ class PointsComparison:
 
 
 def compare_points(chart: StabilityChart | None, points: Sequence[UserPoint]) -> PointsComparison:
-    """Measured points beside an exact chart; without one nothing can be compared."""
+    """Compare measured points with an exact chart; None: no point has an exact value."""
     if chart is None:
         return PointsComparison(tuple(ComparedPoint(point, nan, None) for point in points))
     from zwidth.study.exact_edge import exact_edge

@@ -1,4 +1,4 @@
-"""Which model where: how far along the edge of the stable walls a simpler model tells the same (thesis 4.3).
+"""Validity of simpler models: where along the stability boundary each agrees with the full model (thesis 4.3).
 
 Each wall on the full model's edge has one frequency, at which it starts to vibrate, and so the edge can be walked
 by frequency: slow vibrations see the device as one mass, fast ones the motors on their springs. At a wall (K, B)
@@ -6,8 +6,8 @@ that fails at the frequency F a model is off by
 
     e = min over the model's edge (k, b, f) of  max( |k/K - 1|, |b/B - 1|, |f/F - 1| )
 
-the least share by which stiffness, damping and frequency must all be allowed to differ for the model to say the
-same. Without the frequency the edges of two models would count as alike where they merely cross.
+the least relative error in stiffness, damping and frequency together. Without the frequency the edges of two
+models would count as equal where they merely cross.
 """
 
 from __future__ import annotations
@@ -36,12 +36,14 @@ from zwidth.result import Result
 Floats = NDArray[np.float64]
 Interval = tuple[float, float]
 
-TOLERANCE: Final = 0.1
+TOLERANCE: Final = 0.1  # of e, by default
 WALLS: Final = 160  # of the full model's edge that are compared; ends of intervals are closed in on between them
-NEGLIGIBLE: Final = 1e-4  # share of the edge's extent below which K or B is 0, and no relative error is one
+NEGLIGIBLE: Final = (
+    1e-4  # share of the edge's extent; a smaller K or B counts as 0, where a relative error means nothing
+)
 NEAR: Final = 0.2  # error at the same frequency below which no farther piece of a model's edge can be nearer
 CLOSE: Final = np.linspace(-1.0, 1.0, 33)
-# Models simpler than the full one, and what they are called; the simplest first.
+# Models simpler than the full one, with their labels; the simplest first.
 SIMPLER: Final[tuple[tuple[Model, str], ...]] = (
     ("rigid", "rigid"),
     ("motor-mass", "motor mass"),
@@ -51,7 +53,7 @@ SIMPLER: Final[tuple[tuple[Model, str], ...]] = (
 
 @dataclass(frozen=True)
 class Fit:
-    """How far one model tells the same as the full one.
+    """Error of one model against the full one along the edge.
 
     key           "rigid", "motor-mass" or "two-mass", with "-undamped" where its damping was left out
     label         for people
@@ -70,7 +72,7 @@ class Fit:
 
     @property
     def everywhere(self) -> bool:
-        """Does it stay within the tolerance along the whole edge?"""
+        """Whether e stays within the tolerance along the whole edge."""
         return len(self.error) > 0 and self.valid_ranges == (
             (float(self.frequency[0]), float(self.frequency[-1])),
         )
@@ -78,13 +80,13 @@ class Fit:
 
 @dataclass(frozen=True, repr=False)
 class Validity(Result):
-    """The models of a device beside its full model.
+    """The simpler models of a device compared with its full model.
 
-    tolerance      that `Fit.valid_ranges` means
-    first_natural  the full model's first flexible natural frequency, nobody holding it [Hz]; nan if it has none
+    tolerance      of e, for `Fit.valid_ranges`
+    first_natural  the full model's first flexible natural frequency without an operator [Hz]; nan if it has none
     frequency      (k,)  along the full model's edge, for walls with K > 0 and B > 0, ascending [Hz]
     walls          (k, 3)  their K, B and frequency
-    arc            (k,)  which piece of edge each belongs to
+    arc            (k,)  index of the arc of the edge to which each belongs
     fits           simplest first
     """
 
@@ -132,8 +134,8 @@ def validity(point: OperatingPoint, tolerance: float = TOLERANCE) -> Validity:
     """Compare the rigid, the motor-mass and the two-mass model, with and without damping, with the full one; each
     with the operator at the handle, if there is one.
 
-    point      one point of one direction, whatever its model
-    tolerance  the largest e that still counts as the same
+    point      one posture and one direction; its model does not matter
+    tolerance  largest e that counts as agreement
     Raises  what `OperatingPoint.plant` raises, and ChartError if the full model cannot be charted
     """
     require("point", point, OperatingPoint)
@@ -173,8 +175,8 @@ def edge_distance(walls: Floats, chart: StabilityChart) -> Floats:
 
 
 def _error(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Floats:
-    """`edge_distance`, but where the model's own wall at the same frequency is near, by a closer look at its curve
-    there: the chords of a large chart are too coarse for small walls."""
+    """`edge_distance`; where the model's wall at the same frequency is near, from points of its exact curve around
+    that frequency, since the chords of a large chart are too coarse for small walls."""
     in_radians = 2.0 * pi * chart.loop.period
     ranges = [(float(arc.frequency.min()), float(arc.frequency.max())) for arc in chart.boundary]
     best = edge_distance(walls, chart)

@@ -1,7 +1,6 @@
-"""What limits the walls of a device: one change at a time, and the largest stiffness it leads to.
+"""What limits the walls of a device: the largest stiffness after one change at a time.
 
-Each change is computed, none is a rule of thumb: the plant is reduced or the loop is sampled anew, and its chart
-drawn exactly.
+No rule of thumb is used: for each change the plant or the loop is built again and its exact chart is computed.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from zwidth.model.plant import Plant
 from zwidth.model.reduction import Model, ModelError
 
 BASE: Final = "as-described"
-# The changes a designer may hope for, of which the one that gains most names what limits the device.
+# Changes that may gain stiffness; the one that gains most names what limits the device.
 REMEDIES: Final = ("rigid-drives", "half-period", "no-delay", "no-filter", "twice-damping", "collocated")
 VARIANT_MODELS: Final = ("full", "two-mass", "motor-mass", "motor-mass-undamped", "rigid-undamped")
 LEAST_GAIN: Final = 1.01  # a change that gains less than 1 % does not count as one that helps
@@ -36,7 +35,7 @@ class Variant:
     """A device with one thing changed.
 
     key     one of BASE, REMEDIES, "one-sample", "with-filter", or "model-" and one of VARIANT_MODELS
-    label   for people
+    label   for tables and figures
     loop    None where the change does not apply
     chart   its stability chart; None where the change does not apply or the chart cannot be drawn
     reason  why there is no chart, "" where there is one
@@ -62,7 +61,7 @@ class Variant:
 
     @property
     def frequencies(self) -> tuple[float, ...]:
-        """At which it vibrates [Hz]: one, two at a corner, none if there is no such wall."""
+        """Frequencies of that wall's vibration [Hz]: one, two at a corner, none if there is no such wall."""
         return () if self.chart is None else self.chart.frequencies_at_stiffness_max
 
     @property
@@ -70,14 +69,14 @@ class Variant:
         """Stable area within K >= 0, B >= 0 [N^2 s/m^2]; 0 if no wall is stable, nan if left out."""
         if self.chart is None:
             return nan
-        # without a stable wall what is left is rounding
+        # without a stable wall the area is rounding error
         return 0.0 if isnan(self.chart.stiffness_max) else self.chart.stable_area
 
 
 def what_if(device: Device, point: OperatingPoint | None = None) -> list[Variant]:
     """The device as described, with each change, and in each of the models of thesis Fig. 4.4.
 
-    point  where it is asked about, one point of one direction; left out: the device's reference
+    point  one posture and one direction; left out: the device's reference
     A change that does not apply has no chart and says why; the device as described comes first and always has one.
     Raises  what `Device.at` and `OperatingPoint.plant` raise; ChartError if the device itself cannot be charted
     """
@@ -123,7 +122,7 @@ def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
 
 def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     controller, plant = point.controller, point.plant
-    alone = point.ungripped_plant  # so that the device's own damping is told from the operator's
+    alone = point.ungripped_plant  # the device's own damping, without the operator's
 
     def computed(**changes: Any) -> Callable[[], Loop]:
         return lambda: Loop(plant, replace(controller, **changes))
@@ -165,7 +164,7 @@ def _collocated(plant: Plant) -> bool:
 
 
 def _models(point: OperatingPoint) -> Iterator[Change]:
-    """The models of Fig. 4.4: the full one, and what is left of it by and by."""
+    """The models of thesis Fig. 4.4: the full one, and its reductions."""
     full = point.in_model("full").ungripped_plant
     damped = " with damping" if full.damping.any() or full.lagged_dampers else ""
     undamped_only = "" if damped else "there is no damping to leave out"
@@ -210,7 +209,8 @@ def _no_estimate(controller: Controller) -> str:
 
 
 def half_period(device: Device) -> Controller:
-    """The device's computer at twice the rate: a delay given in seconds stays, one given in samples shrinks."""
+    """The device's computer at twice the rate: a delay given in seconds stays the same in seconds, one given
+    in samples the same in samples."""
     controller = device.controller
     in_seconds = "delay_s" in device.document.get("loop", {})
     delay = controller.delay * (2.0 if in_seconds else 1.0)

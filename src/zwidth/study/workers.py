@@ -1,9 +1,9 @@
-"""Processes that compute ranges of a job beside each other.
+"""Processes that compute ranges of a job in parallel.
 
-Each is a fresh interpreter (a forked one would inherit numba's threads, and die of them) with one thread for numba
-and one for linear algebra, fed through pipes. Nothing of the caller's main script runs in them again, so that a
-script or a notebook needs no guard. The keyboard does not reach them: whoever started them ends them, and when he
-is killed himself they read the end of their pipe.
+Each is a new interpreter (a forked one would inherit numba's threads and crash) with one thread for numba
+and one for linear algebra, fed through pipes. The caller's main script is not run in them, so that a script
+or a notebook needs no guard. Ctrl-C does not reach them: the process that started them ends them, and if it is
+killed they read the end of their pipe and stop.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ THREADS: Final = ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 START: Final = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from zwidth.study.workers import work; work()"
 )
-GRACE: Final = 2.0  # s that a process gets to end
+GRACE: Final = 2.0  # s; a process that has not ended by then is killed
 
 
 class WorkerLost(RuntimeError):
-    """A process that computed ended before it was done: killed, or out of memory."""
+    """A worker process ended before its task was done: killed, or out of memory."""
 
 
 def cores() -> int:
@@ -49,7 +49,7 @@ def cores() -> int:
 
 
 def pack_job(job: Job) -> bytes | None:
-    """The job as it is sent; None where another process would not understand it.
+    """The job as bytes to send; None where another process could not read them.
 
     That is so for functions typed into a notebook or the main script: they exist in this process only.
     """
@@ -57,16 +57,16 @@ def pack_job(job: Job) -> bytes | None:
         return None
     try:
         data = pickle.dumps(job)
-    except Exception:  # whatever the parts of a job raise
+    except Exception:  # any error that pickling raises
         return None
     return None if b"__main__" in data else data
 
 
 class Workers:
-    """Processes, from `with` to its end; leaving it ends them, whatever they do.
+    """Worker processes as a context manager; leaving the `with` block ends them.
 
-    job    as `pack_job` gives it
-    count  how many
+    job    as `pack_job` returns it
+    count  number of processes
     """
 
     def __init__(self, job: bytes, count: int) -> None:
@@ -100,9 +100,9 @@ class Workers:
         self._end()
 
     def compute(self, ranges: Sequence[CellRange]) -> Iterator[tuple[CellRange, CellValues]]:
-        """The ranges' cells, in the order in which they get done.
+        """Compute the cells of ranges; yield them in the order in which they are finished.
 
-        Raises  WorkerLost  where a process ended before it was done
+        Raises  WorkerLost  where a process ended before its task was done
                 whatever the job raises
         """
         tasks, lock = iter(ranges), Lock()
@@ -140,7 +140,7 @@ class Workers:
 
 
 def _feed(process: subprocess.Popen[bytes], job: bytes, next_task: Any, replies: Any) -> None:
-    """Hand one process its tasks, one after the other, and pass on what it replies."""
+    """Send one process its tasks, one after the other, and pass on its replies."""
     sent, received = process.stdin, process.stdout
     assert sent is not None
     assert received is not None
@@ -154,7 +154,7 @@ def _feed(process: subprocess.Popen[bytes], job: bytes, next_task: Any, replies:
         sent.close()
     except (EOFError, OSError, ValueError, pickle.UnpicklingError):  # ValueError: closed by `_end`
         replies.put((task, WorkerLost(_how_it_ended(process))))
-    except Exception as error:  # a reply that this process does not understand
+    except Exception as error:  # a reply that cannot be unpickled
         replies.put((task, error))
 
 
@@ -171,12 +171,12 @@ def _how_it_ended(process: subprocess.Popen[bytes]) -> str:
 
 
 def work() -> None:
-    """What such a process does: read a job and ranges from its input, write their cells to its output."""
+    """Main function of a worker: read a job and ranges from its input, write their cells to its output."""
     import warnings
 
-    warnings.filterwarnings("ignore", category=RuntimeWarning)  # arithmetic's own, as in the command
+    warnings.filterwarnings("ignore", category=RuntimeWarning)  # of arithmetic, hidden as in the command
     received, sent = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a user's measure prints must not get between the replies
+    os.dup2(2, 1)  # text printed by a user's measure must not mix with the replies
     try:
         job: Any = None
         packed_job = pickle.load(received)
@@ -191,11 +191,11 @@ def work() -> None:
             sent.flush()
             sys.stdout.flush()
     except (EOFError, BrokenPipeError):
-        os._exit(0)  # whoever asked has gone, or has all he wants; nothing is left to be tidied up
+        os._exit(0)  # the asking process has ended, or needs no more; there is nothing to clean up
 
 
 def _error(error: Exception) -> bytes:
-    """The error as it is sent; its text where it cannot be."""
+    """The error as bytes to send; a RuntimeError with its text where it cannot be pickled."""
     try:
         data = pickle.dumps(error)
         pickle.loads(data)

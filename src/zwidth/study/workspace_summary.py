@@ -1,4 +1,4 @@
-"""A map in a few numbers: averages and extremes over the workspace."""
+"""Summary of a map: averages and extremes over the workspace."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def positions(dataset: xr.Dataset) -> NDArray[np.float64]:
 
 
 def areas(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What each point (ny, nx) of a grid stands for by the trapezoidal rule [m^2].
+    """Area [m^2] that belongs to each point (ny, nx) of a grid by the trapezoidal rule.
 
     >>> areas(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0])).tolist()
     [[0.5, 1.0, 0.5], [0.5, 1.0, 0.5]]

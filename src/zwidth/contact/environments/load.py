@@ -37,7 +37,7 @@ def load_environment(source: str) -> Environment:
         raise ValueError(f'no environment is named {source!r}; {hint} (your own: "file.py:name")')
     file = Path(path)
     if not file.is_file():
-        raise ValueError(f"{path} is no plain file" if file.exists() else f"no such file: {path}")
+        raise ValueError(f"{path} is not an ordinary file" if file.exists() else f"no such file: {path}")
     module = _run(file)
     found = getattr(module, name, None)
     if not isinstance(found, Environment):
@@ -79,7 +79,7 @@ def _line(error: BaseException, file: Path) -> int:
 def _missing(file: Path, name: str, module: ModuleType, found: object) -> str:
     own = [key for key, value in vars(module).items() if isinstance(value, Environment)]
     if found is not None:
-        return f"{name} in {file.name} is no environment: put @environment(...) above it"
+        return f"{name} in {file.name} is not an environment; put @environment(...) above it"
     near = get_close_matches(name, own, n=1)
     hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(own) or 'none'}"
     return f"{file.name} has no environment {name}; {hint}"

@@ -1,9 +1,8 @@
-"""The catalogue's closed forms of the impedance range, asked of operating points: see `measures.impedance_range`.
+"""The catalogue's closed forms of the impedance range at operating points: see `measures.impedance_range`.
 
-They are those of the thesis's maps (Figs. 5.2, 5.3), which leave damping out although the device is damped; so do
-these, and say so in their titles. Whatever else a closed form assumes must hold, or it is refused: the model is
-`rigid` or `motor-mass`, nobody holds the handle, the delay is whole (none for `motor-mass`), the velocity is the
-plain backward difference.
+As in the thesis's maps (Figs. 5.2, 5.3), damping is left out although the device is damped; the titles say so. A
+MeasureError is raised unless all other assumptions hold: the model is `rigid` or `motor-mass`, there is no
+operator, the delay is whole (none for `motor-mass`), the velocity is the plain backward difference.
 """
 
 from __future__ import annotations

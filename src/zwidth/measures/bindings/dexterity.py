@@ -1,4 +1,4 @@
-"""The catalogue's measures of the mechanism, asked of operating points: see `measures.dexterity` for the formulas.
+"""The catalogue's measures of the mechanism at operating points: see `measures.dexterity` for the formulas.
 
 A mechanism has as many drives as directions its handle can move in, so that every singular value of its Jacobian
 counts: in a singular posture, too, and in whatever frame.

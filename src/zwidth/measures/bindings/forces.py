@@ -1,6 +1,6 @@
-"""The catalogue's measures of motors and encoders, asked of operating points: formulas are in `measures.forces`.
+"""The catalogue's measures of motors and encoders at operating points: formulas are in `measures.forces`.
 
-What a device file does not tell of a drive is not guessed: the measure cannot be asked of the device then.
+A number of a drive that the device file leaves out is not guessed: a MeasureError names it.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def friction_force(point: OperatingPoint) -> Floats:
 
 
 def _torques(point: OperatingPoint, key: str) -> Floats:
-    """Torques at the joints (..., d) [N m]. Raises MeasureError where a drive's is not told."""
+    """Torques at the joints (..., d) [N m]. Raises MeasureError where the file leaves one out."""
     drives = point.drives
     found = drives.torque_limit if key == "torque_limit_Nm" else drives.continuous_torque
     given = np.full(len(drives.names), np.nan) if found is None else found
@@ -69,7 +69,7 @@ def _require_finite(point: OperatingPoint, key: str, values: Floats) -> Floats:
 
 
 def _require_nonzero(value: float, otherwise: str) -> Floats:
-    """A number of a [plant]; what is 0 there was left out, or might as well have been."""
+    """A number of a [plant]. Raises MeasureError where it is 0, as it is if the file leaves it out."""
     if value == 0.0:
         raise MeasureError(otherwise)
     return np.asarray(value)

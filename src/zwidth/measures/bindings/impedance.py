@@ -1,4 +1,4 @@
-"""Which walls a device can render, exactly, as measures of a point."""
+"""The catalogue's measures of the stable walls, from the exact chart at operating points."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def stiffness_max(point: OperatingPoint) -> MeasureValues:
     """Supremum of K over the stable walls with K > 0, B >= 0, of the point's model and loop [N/m].
 
     Postures of classically damped mechanisms go through compiled code together (`chart.stiffest_batch`); what is
-    in doubt there, and what has no wall there, is asked by itself, as every other device is.
+    in doubt there, or has no stable wall there, is computed one by one, as all other devices are.
     """
     fast = _stiffest_walls_of(point)
     if fast is None:
@@ -36,12 +36,12 @@ def stiffness_max(point: OperatingPoint) -> MeasureValues:
 
 
 def _stiffest_walls_of(point: OperatingPoint) -> StiffestWalls | None:
-    """The stiffest walls of all points, flat; None for what has no modes that compiled code knows."""
+    """The stiffest walls of all points, flat; None for a device whose modes the compiled code cannot treat."""
     controller = point.controller
     if point.mechanism is None or point.posture is None or controller.actuator_time_constant > 0.0:
         return None
     model = point.model or "full"
-    if point.operator is not None and model != "motor-mass":  # which holds him fixed
+    if point.operator is not None and model != "motor-mass":  # this model holds the operator fixed
         return None
     modes = rendered_modes(point.mechanism, point.posture, point.direction, model, point.damping, point.encoders)
     if modes is None:

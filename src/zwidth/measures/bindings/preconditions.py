@@ -1,4 +1,4 @@
-"""What several measures ask of a point: the wanted wall and frequency, and what its loop is like."""
+"""Preconditions that several measures check: the wanted wall and frequency, a handle, properties of the loop."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from zwidth.measures.handle_impedance import HandleError, handle_of
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
 
-# One mass that stands for a mechanism where only its computer is in question.
+# One mass in place of a mechanism, where only the computer matters.
 UNIT: Final = Plant(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1), np.ones(1))
 
 
 def wall_of(wanted: WantedWall) -> tuple[float, float]:
-    """Stiffness and damping of the wanted wall. Raises MeasureError where they were not told."""
+    """Stiffness and damping of the wanted wall. Raises MeasureError where it is not given."""
     K, B = wanted.stiffness, wanted.damping
     if K is None or B is None:
         raise MeasureError("needs a wanted wall", [("stiffness", None), ("damping", None)])
@@ -28,7 +28,7 @@ def wall_of(wanted: WantedWall) -> tuple[float, float]:
 
 
 def frequency_of(wanted: WantedWall) -> float:
-    """At which the hand moves [Hz]. Raises MeasureError where it was not told."""
+    """Frequency at which the hand moves [Hz]. Raises MeasureError where it is not given."""
     if wanted.frequency is None:
         raise MeasureError("needs a frequency at which the hand moves", [("frequency", None)])
     if not 0.0 < wanted.frequency < np.inf:
@@ -37,7 +37,7 @@ def frequency_of(wanted: WantedWall) -> float:
 
 
 def plant_with_handle(point: OperatingPoint) -> Plant:
-    """The device alone at one point, whose handle is known. Raises MeasureError where there is no handle."""
+    """The plant without operator at one point. Raises MeasureError where it has no handle."""
     plant = point.ungripped_plant
     try:
         handle_of(plant)
@@ -70,6 +70,6 @@ def require_assumptions(case: ConditionCase, *more: str) -> None:
 
 
 def require_motor_encoders(point: OperatingPoint) -> None:
-    """Raises MeasureError for encoders behind the drives, which a model with its link side held cannot read."""
+    """Raises MeasureError for encoders at the links, which do not move in a model with its link side fixed."""
     if point.mechanism is not None and point.encoders == "link":
-        raise MeasureError("speaks of motors that are read at the motors, and these encoders read the links")
+        raise MeasureError("needs encoders at the motors; those of this device read the links")

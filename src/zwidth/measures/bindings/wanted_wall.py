@@ -1,8 +1,7 @@
-"""The catalogue's measures of how a wanted wall feels, asked of operating points.
+"""The catalogue's measures of how a wanted wall feels, at operating points.
 
-See `measures.vibration_decay`, `measures.deformation` and `measures.handle_impedance` for the formulas. An
-operator decides with the device whether the wall is stable; what is felt, and what deforms, is the device without
-him.
+See `measures.vibration_decay`, `measures.deformation` and `measures.handle_impedance` for the formulas. Stability
+is that of the device with its operator; the felt impedance and the deformation are those of the device without.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ def spectral_radius(point: OperatingPoint, wanted: WantedWall) -> float:
 
 
 def decay_time(point: OperatingPoint, wanted: WantedWall) -> float:
-    """In which the slowest vibration at the wanted wall shrinks to 1/e."""
+    """Time in which the slowest vibration at the wanted wall shrinks to 1/e."""
     found = _wall_verdicts(point, wanted)
     if found.verdict[0] != STABLE:
         raise NoValueError(f"the wanted wall is {found.names[0]} here, so that vibration does not decay")

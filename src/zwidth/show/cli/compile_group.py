@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import cmath
 import os
 import shlex
 import sys
 import tempfile
+from collections.abc import Callable
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Final
@@ -15,22 +17,33 @@ from zwidth.device.new_device import new_device
 from zwidth.show.cli.first_use import GROUPS
 from zwidth.show.cli.group import invoke
 
-DEVICES: Final = {"linkage": "five-bar", "masses": "plant"}  # file names, and kinds of `zwidth new`
-# Together these want every kernel. Those of a group run one after the other, and what their kernels have in common
-# is translated only once; the groups have little in common.
+# File names, and kinds of `zwidth new`.
+DEVICES: Final = {"linkage": "five-bar", "arm": "serial-2r", "masses": "plant"}
+MEASURED: Final = """
+name = "measured"
+loop = { sampling_period_s = 0.001 }
+[response]
+file = "response.csv"
+integrators = 2
+"""
+# Together with RARE these want every kernel. Those of a group run one after the other, and what their kernels have
+# in common is translated only once; the groups have little in common.
 COMMANDS: Final = (
     (
         "move linkage.toml --plane 0,0.26,0,-1 --stiffness 2000 --damping 5 --push 0,2 --duration 0.05",
         "map linkage.toml --measure stiffness_max --cells 9,9 --output map.svg",
         "show linkage.toml",
+        "show arm.toml --at upper=0.7,lower=1.4",
         "simulate masses.toml --stiffness 4000 --damping 10 --duration 0.05",
     ),
     (
         "report masses.toml --output report.html",
         "guarantees masses.toml",
-        "robust masses.toml --range loop.delay_samples=0,1",
+        "robust masses.toml --range loop.delay_samples=0,1 --unseen 3 --members 3",
         "limit-cycles masses.toml --stiffness 2600 --damping 0 --set loop.saturation.force_N=5 --no-simulation",
         "felt masses.toml --stiffness 1000 --damping 5",
+        "chart masses.toml --set loop.delay_samples=40",
+        "check measured.toml --stiffness 1000 --damping 5",
     ),
 )
 assert len(COMMANDS) == GROUPS
@@ -40,10 +53,50 @@ def write_devices(folder: Path) -> None:
     """Write the device files that the commands name."""
     for name, kind in DEVICES.items():
         (folder / f"{name}.toml").write_text(new_device(name, kind), encoding="utf-8")
+    (folder / "measured.toml").write_text(MEASURED, encoding="utf-8")
+    (folder / "response.csv").write_text(measured_response(), encoding="utf-8")
+
+
+def measured_response(period: float = 0.001, mass: float = 0.1, friction: float = 0.5) -> str:
+    """A response file: a mass with friction, from force command to encoder sample through a zero-order hold.
+
+    H(z) = x1 / (z - 1) + ...;  P(s) = 1 / (s (m s + b)), pole p = exp(-b T / m)
+    H(z) = (1/b) [T / (z - 1) - (m/b) (1 - p) / (z - p)]
+    """
+    pole = cmath.exp(-friction * period / mass).real
+    lines = ["frequency_Hz,real_m_per_N,imag_m_per_N"]
+    for k in range(1, 500):
+        z = cmath.exp(2j * cmath.pi * k * period)
+        value = (period / (z - 1.0) - mass / friction * (1.0 - pole) / (z - pole)) / friction
+        lines.append(f"{k},{value.real!r},{value.imag!r}")
+    return "\n".join(lines) + "\n"
+
+
+def compile_environments() -> None:
+    """Every virtual environment by name: one function each, which simulations reach by its address."""
+    from zwidth.contact.environments import ENVIRONMENTS
+
+    for environment in ENVIRONMENTS.values():
+        _ = environment.force
+
+
+def run_estimators() -> None:
+    """Velocity estimates of recorded positions, and modes one at a time: from Python only."""
+    from zwidth.loop.estimators import BackwardDifference, Foaw, Levant
+    from zwidth.loop.estimators.run_estimator import velocity_of
+    from zwidth.loop.hold import modal_row
+
+    for method in (BackwardDifference(), Foaw(4, 1e-6), Levant(10.0)):
+        velocity_of(method, [0.0, 1e-3, 3e-3], 0.001)
+    modal_row(1.0, 1e4, 0.001)
+
+
+# What no short command line reaches, by group.
+RARE: Final[tuple[tuple[Callable[[], None], ...], ...]] = ((compile_environments, run_estimators), ())
 
 
 def run_group(group: int) -> None:
-    """Run the command lines of one group, and print the name of each kernel that was compiled for them."""
+    """Run what one group wants, and print the name of each kernel that was compiled for it."""
     names = sys.stdout
 
     def listen(name: str, ended: bool) -> None:
@@ -56,6 +109,8 @@ def run_group(group: int) -> None:
         with listening(listen), open(os.devnull, "w") as nowhere, redirect_stdout(nowhere):
             for line in COMMANDS[group]:
                 invoke(shlex.split(line))
+            for work in RARE[group]:
+                work()
         os.chdir("/")
 
 

@@ -19,7 +19,7 @@ from time import monotonic
 from typing import Final, NamedTuple
 
 from zwidth.compile_events import listening
-from zwidth.show.cli.process import say
+from zwidth.show.cli.process import say, time_text
 
 GROUPS: Final = 2  # of kernels that have little in common, see compile_group
 SECONDS_BETWEEN: Final = 5.0  # lines that say what remains
@@ -78,11 +78,6 @@ class Progress:
         left = sum(self.missing.values())
         known = self._total - left
         return left * (monotonic() - self._began) / known if known > 0.2 * self._total else left / self._processes
-
-
-def time_text(seconds: float) -> str:
-    """A span of time as an estimate is told: 5 s, 40 s, 2 min."""
-    return f"{seconds / 60.0:.0f} min" if seconds >= 90.0 else f"{max(5, 5 * round(seconds / 5.0))} s"
 
 
 @contextmanager

@@ -22,6 +22,8 @@ def main() -> None:
     # Read once, when numpy is loaded. The matrices are tiny: threads only cost time, and fight over the cores
     # with whatever else runs there. Whoever sets it means it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Plug-ins are of no use here, and to find that there are none pydantic looks through all installed packages.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     warnings.showwarning = _warn
     sys.exit(run(sys.argv[1:]))
 

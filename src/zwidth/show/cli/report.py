@@ -8,6 +8,7 @@ from typing import Any
 
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Question
+from zwidth.show.cli.progress import show_progress
 from zwidth.show.units import typed
 
 
@@ -30,7 +31,8 @@ class ReportCommand(Command):
         from zwidth.show.report.report import write_report
 
         assert case.path is not None
-        return write_report(case.device, case.path, case.point)
+        with show_progress() as progress:
+            return write_report(case.device, case.path, case.point, progress)
 
     def document(self, case: CommandLine, result: dict[str, Any]) -> dict[str, Any]:
         # what the command line was asked for is stated as typed

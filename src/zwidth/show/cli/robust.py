@@ -182,9 +182,9 @@ def _operators(single: str | None, names: str | None, file: str | None) -> tuple
     if names is None and file is None:
         return ()
     if names is not None and file is not None:
-        raise BadInput("--operators and --operator-list say the same; give one of them")
+        raise BadInput("--operators and --operator-list exclude each other; give one of them")
     if single is not None:
-        raise BadInput("--operator is one of those in the list; leave it out")
+        raise BadInput("--operator and a list of operators exclude each other; leave --operator out")
     if file is not None:
         try:
             lines = read_text(file, LARGEST_FILE).splitlines()

@@ -13,27 +13,39 @@ from markupsafe import Markup
 from zwidth._version import __version__
 from zwidth.device.device import Device
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.progress import Progress
 from zwidth.show.output import write_text
 from zwidth.show.report import sentences, tables
 from zwidth.show.report.facts import Facts, gather
 from zwidth.show.report.figures import svg_figures
 from zwidth.show.units import SPACE
 
+PARTS: Final = 4  # that take about as long as each other: the facts, two of them at length, the page
 BLANK_BEFORE_UNIT: Final = re.compile(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Hz|N|J|s|m|g)|Ns|samples?)(?![\w-]))")
 
 
 def write_report(
-    device: Device, path: str | os.PathLike[str], point: OperatingPoint | None = None
+    device: Device,
+    path: str | os.PathLike[str],
+    point: OperatingPoint | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Write the report on a device, whole or not at all; the numbers in it.
 
     point    operating point with one position and one direction; left out: the device's reference
+    progress  called with "report", the parts that are done, and all parts
     Returns  the numbers by the keys of the command line's --json, `file` and `summary` (its first sentences)
              among them; with a `reason` where no wall is stable
     Raises   what `Device.at` and `OperatingPoint.plant` raise; ChartError if the device cannot be charted
              OutputError (show.output)  where the file cannot be written
     """
+    say = progress or (lambda stage, done, of: None)
     facts = gather(device, point)
+    say("report", 1, PARTS)
+    _ = facts.sensitivities  # each is computed when it is first asked for, and kept
+    say("report", 2, PARTS)
+    _ = facts.validity
+    say("report", 3, PARTS)
     target = Path(path)
     write_text(target, page(facts))
     return {"file": str(target), **tables.document(facts)}
