@@ -23,7 +23,16 @@ DEVICES = sorted(path.stem for path in (PACKAGE / "device" / "zoo").glob("*.toml
 # Numbers flow from left to right: a package imports itself and what stands before it.
 FLOW = ("model", "loop", "chart", "conditions", "guarantees", "contact", "measures", "study", "show")
 # Device files become models and loops; what computes knows nothing of files.
-EVERYWHERE = {"compiled", "compile_events", "machine_code", "memory_limit", "result", "threads", "_version"}
+EVERYWHERE = {
+    "compiled",
+    "compile_events",
+    "progress",
+    "machine_code",
+    "memory_limit",
+    "result",
+    "threads",
+    "_version",
+}
 MAY_IMPORT = {package: {*FLOW[: place + 1], *EVERYWHERE} for place, package in enumerate(FLOW)}
 MAY_IMPORT |= {module: set() for module in EVERYWHERE}
 MAY_IMPORT["compiled"] = {"compile_events", "machine_code"}

@@ -88,7 +88,7 @@ def test_people_read_the_band_and_what_is_not_to_be_relied_on(noisy, tmp_path):
     assert band["stiffness_low_N_per_m"] < document["stiffness_max_N_per_m"] < band["stiffness_high_N_per_m"]
     out = run_command("chart", noisy, "--output", tmp_path / "chart.png").out
     assert "[response]" in out
-    assert "within 95 % of the error that the coherence tells" in out
+    assert "(95 % confidence, from coherence)" in out
     assert "400 of 400 frequencies used, 2 integrators" in out
     assert (tmp_path / "chart.png").stat().st_size > 10_000
 

@@ -297,7 +297,7 @@ FAULTS = [
     (
         with_changes(PLANT_FILE, plant__electrical_damping=[MOTOR | {"along": [1.0]}]),
         "plant.electrical_damping.0.along",
-        "has 1 numbers, but mass_kg has 2 rows",
+        "has 1 number, but mass_kg has 2 rows",
     ),
     (
         with_changes(PLANT_FILE, plant__electrical_damping=[MOTOR | {"inductance_H": 1e-12}]),

@@ -64,7 +64,7 @@ CASES = [
     (ARM_FILE, {"mechanism__handle__link": "lowr"}, "mechanism.handle.link", "did you mean 'lower'?"),
     (ARM_FILE, {"mechanism__drives__1__name": "shoulder"}, "mechanism.drives.shoulder.name", "is given twice"),
     (ARM_FILE, {"mechanism__drives__1__joint": "upper"}, "mechanism.drives.elbow.joint", "has a drive already"),
-    (ARM_FILE, {"mechanism__drives__1__joint": "elbow"}, "mechanism.drives.elbow.joint", "names no link"),
+    (ARM_FILE, {"mechanism__drives__1__joint": "elbow"}, "mechanism.drives.elbow.joint", "'elbow' is not a link"),
     (
         ARM_FILE,
         {"mechanism__drives__1": REMOVED},

@@ -185,7 +185,7 @@ FAULTS = [
     (
         with_changes(PLANT_FILE, friction={"coulomb_N": 0.1}),
         "friction.coulomb_N",
-        "has 1 numbers, but mass_kg has 2 rows",
+        "has 1 number, but mass_kg has 2 rows",
     ),
     (
         with_changes(PLANT_FILE, friction={"coulomb_N": "0.1"}),
@@ -255,7 +255,7 @@ FAULTS = [
     (
         with_changes(PLANT_FILE, plant__spring=[{"along": [1], "hardening_N_per_m3": 1.0}]),
         "plant.spring.0.along",
-        "has 1 numbers",
+        "has 1 number",
     ),
     (with_changes(PLANT_FILE, plant__brake=[{}]), "plant.brake.0.damping_max_Ns_per_m", "is missing"),
     (

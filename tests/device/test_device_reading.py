@@ -131,3 +131,37 @@ def test_listing_the_bundled_devices_needs_no_numerics():
     assert not {"numpy", "pydantic", "numba"} & set(listing.split())
     assert not {"numba", "scipy"} & set(loading.split())
     assert all(all(entry) for entry in bundled())
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ("[plant]\nmass_kg = 0,045\n", "line 2: 0,045 has a decimal comma; write 0.045"),
+        ("[plant]\nactuator = [1.0, 0,5]\n[plant]", "line 3: [plant] is there twice"),
+        ("[plant]\nmass_kg = 1\n\nmass_kg = 2", "line 4: mass_kg is there twice; keep one of them"),
+        ("[mechanism.loops]\na = 1\n[mechanism.loops]\n", "line 3: [mechanism.loops] is there twice"),
+        ('device = "five-bar"\nmeasures = ["stiffness"]\n', "is a study of designs, not a device; sweep it, or give"),
+    ],
+)
+def test_what_was_probably_meant_is_said(tmp_path, data, words):
+    path = tmp_path / "device.toml"
+    path.write_text(data)
+    assert words in message(path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("sampling_frequency_Hz", 800, "give sampling_period_s = 0.00125"),
+        ("sampling_rate_kHz", 4.0, "give sampling_period_s = 0.00025"),
+        ("sampling_rate_Hz", 0, "give sampling_period_s, in seconds"),
+        ("sampling_period_ms", 1.25, "give sampling_period_s = 0.00125"),
+        ("delay_us", 300, "give delay_s = 0.0003"),
+        ("sampling_perod_s", 1, "did you mean 'sampling_period_s'?"),
+    ],
+)
+def test_a_number_in_another_unit_is_converted(tmp_path, key, value, words):
+    path = tmp_path / "device.toml"
+    path.write_bytes(GOOD)
+    path.write_text(path.read_text().replace("[loop]", f"[loop]\n{key} = {value}"))
+    assert words in message(path)

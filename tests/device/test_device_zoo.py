@@ -185,7 +185,7 @@ def test_ways_of_damping(section, kind, numbers):
         ({"position": [0.1, math.nan]}, "at: must be finite"),
         (
             {"assembly": "elbows-outt"},
-            "assembly: names no assembly, got 'elbows-outt'; did you mean 'elbows-out'?",
+            "assembly: 'elbows-outt' is not an assembly of this device; did you mean 'elbows-out'?",
         ),
         ({"model": "stiff"}, "model: must be one of full, two-mass, motor-mass, rigid, got the text 'stiff'"),
     ],

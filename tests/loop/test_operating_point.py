@@ -244,7 +244,7 @@ def test_an_operating_point_needs_no_device_and_no_file():
         ({"direction": (1.0, 0.0), "directions": [(1.0, 0.0)]}, "are given beside a direction"),
         ({"position": [[0.0, np.nan]]}, "at: must be finite"),
         ({"position": {"nobody": 1.0}}, "at: must be the angle of every driven joint"),
-        ({"assembly": "sideways"}, "assembly: names no assembly"),
+        ({"assembly": "sideways"}, "assembly: 'sideways' is not an assembly"),
         ({"model": "soft"}, "model: must be one of full"),
         ({"operator": "nobody-known"}, "no such file|is no bundled|nobody-known"),
     ],

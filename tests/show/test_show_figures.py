@@ -60,7 +60,7 @@ def test_the_tip_is_marked_with_its_numbers(chart):
         [[chart.stiffness_max, chart.damping_at_stiffness_max]]
     ]
     text = " ".join(legend_text(ax)).replace("\u00a0", " ")
-    assert "7.849 kN/m at 10.82 Ns/m; vibrates at 170.5 Hz" in text
+    assert "7.849 kN/m at 10.82 Ns/m; oscillates at 170.5 Hz" in text
 
 
 def test_the_window_is_the_box_or_the_one_asked_for(chart):

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from zwidth.device.address import exists, in_schema
-from zwidth.device.faults import KeyPath, comma_list, quote, suggestion
+from zwidth.device.faults import KeyPath, comma_list, plural, quote, suggestion
 from zwidth.device.loop_consistency import electrical_inconsistencies, loop_inconsistencies
 from zwidth.device.nonlinear_consistency import nonlinear_inconsistencies
 from zwidth.device.schema.device_file import flat_sources
@@ -75,7 +75,10 @@ def _plant(plant: dict[str, Any]) -> KeyMessages:
         value = plant.get(key)
         length = 1 if is_number(value) else len(value) if isinstance(value, list) else None
         if length is not None and length != size:
-            yield ("plant", key), f"has {length} numbers, but mass_kg has {size} rows; give {size} numbers"
+            yield (
+                ("plant", key),
+                f"has {plural(length, 'number')}, but mass_kg has {plural(size, 'row')}; give {size}",
+            )
         elif value is None and size > 1 and key != "handle":
             yield ("plant", key), f"is missing; with {size} coordinates give {size} numbers"
 
@@ -150,7 +153,7 @@ def _tree(mechanism: dict[str, Any]) -> KeyMessages:
         if isinstance(parent, str) and parent not in parents and parent != "base":
             yield (
                 ("mechanism", "links", index, "parent"),
-                f"names no link, got '{parent}'; {suggestion(parent, {*parents, 'base'}, 'links')}",
+                f"'{parent}' is not a link; {suggestion(parent, {*parents, 'base'}, 'links')}",
             )
     reported: set[str] = set()
     for index, link in tables(mechanism, "links"):
@@ -197,7 +200,7 @@ def _references(mechanism: dict[str, Any]) -> KeyMessages:
             if isinstance(name, str) and name not in links and name != "base":
                 yield (
                     ("mechanism", "loops", index, "links", place),
-                    f"names no link, got '{name}'; {suggestion(name, {*links, 'base'}, 'links')}",
+                    f"'{name}' is not a link; {suggestion(name, {*links, 'base'}, 'links')}",
                 )
         if len(names) == 2 and names[0] == names[1]:
             yield (
@@ -208,7 +211,7 @@ def _references(mechanism: dict[str, Any]) -> KeyMessages:
     if isinstance(link, str) and link not in links:
         yield (
             ("mechanism", "handle", "link"),
-            f"names no link, got '{link}'; {suggestion(link, links, 'links')}",
+            f"'{link}' is not a link; {suggestion(link, links, 'links')}",
         )
     driven: set[str] = set()
     for index, drive in tables(mechanism, "drives"):
@@ -216,7 +219,7 @@ def _references(mechanism: dict[str, Any]) -> KeyMessages:
         if not isinstance(joint, str):
             continue
         if joint not in links:
-            yield path, f"names no link, got '{joint}'; {suggestion(joint, links, 'links')}"
+            yield path, f"'{joint}' is not a link; {suggestion(joint, links, 'links')}"
         elif links[joint] == "fixed":
             yield path, f"'{joint}' is fixed to its parent; a drive needs a revolute joint"
         elif joint in driven:
@@ -240,7 +243,7 @@ def _assemblies(mechanism: dict[str, Any]) -> KeyMessages:
     reference = table(mechanism, "reference")
     wanted, place = reference.get("assembly"), ("mechanism", "reference", "assembly")
     if isinstance(wanted, str) and assemblies and wanted not in assemblies:
-        yield place, f"names no assembly, got '{wanted}'; {suggestion(wanted, set(assemblies), 'assemblies')}"
+        yield place, f"'{wanted}' is not an assembly; {suggestion(wanted, set(assemblies), 'assemblies')}"
     elif wanted is None and reference and len(assemblies) > 1:
         yield place, f"is missing; choose one of {comma_list(sorted(assemblies))}"
 

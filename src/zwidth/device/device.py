@@ -304,7 +304,10 @@ class Device:
         """The name of the assembly, and what goes wrong in it as faults of the file where it is one."""
         mechanism = self._mechanism(assembly=assembly)
         if assembly is not None and assembly not in mechanism.assemblies:
-            message = f"names no assembly, got '{assembly}'; {suggestion(assembly, set(mechanism.assemblies))}"
+            known = set(mechanism.assemblies)
+            message = (
+                f"'{assembly}' is not an assembly of this device; {suggestion(assembly, known, 'assemblies')}"
+            )
             raise fail(self.label, "assembly", message)
         name = assembly or self.reference_assembly
         from zwidth.model.posture import LoopOpen, PostureError

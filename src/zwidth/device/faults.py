@@ -92,6 +92,11 @@ def suggestion(word: str, allowed: Collection[str], noun: str = "allowed") -> st
     return f"{noun}: {comma_list(sorted(allowed))}" if allowed else "nothing is allowed here"
 
 
+def plural(count: int, one: str, many: str = "") -> str:
+    """A number and its noun: "1 row", "2 rows"."""
+    return f"{count} {one if count == 1 else many or one + 's'}"
+
+
 def comma_list(words: Sequence[str], most: int = 30) -> str:
     """The words separated by commas, shortened."""
     return ", ".join(words[:most]) + (", ..." if len(words) > most else "")

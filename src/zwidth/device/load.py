@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from zwidth.device import address, build, mechanism_check, unsupported
 from zwidth.device.consistency import inconsistencies
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted
+from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
 from zwidth.device.format_version import refuse_newer, without_version
 from zwidth.device.operator_choice import document_held_by
 from zwidth.device.plausibility import warn_of_implausible
@@ -95,6 +95,11 @@ def from_document(
         hint = f"write load({document!r})" if isinstance(document, str) else ""
         raise wrong_type("document", "a dictionary", document, hint)
     refuse_newer(document, label)
+    if {"measures", "axis"} & document.keys() and not {"loop", "plant", "mechanism", "response"} & document.keys():
+        named = f", {document['device']}" if isinstance(document.get("device"), str) else ""
+        raise fail(
+            label, "", f"is a study of designs, not a device; sweep it, or give the device that it names{named}"
+        )
     cleaned, found = unsupported.refuse(document)
     checked: DeviceFile | None = None
     try:

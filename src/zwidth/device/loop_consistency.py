@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any, Final
 
-from zwidth.device.faults import KeyPath
+from zwidth.device.faults import KeyPath, plural
 from zwidth.device.schema.loop import LONGEST_DELAY
 from zwidth.device.schema.magnitudes import STRONGEST_DAMPING
 from zwidth.device.schema.value_types import LARGEST
@@ -128,7 +128,10 @@ def along_fault(place: KeyPath, along: Any, size: int | None) -> KeyMessages:
     """A vector over the plant's coordinates has as many numbers as there are coordinates."""
     length = 1 if is_number(along) else len(along) if isinstance(along, list) else None
     if size is not None and length is not None and length != size:
-        yield place, f"has {length} numbers, but mass_kg has {size} rows; give {size} numbers"
+        yield (
+            place,
+            f"has {plural(length, 'number')}, but mass_kg has {plural(size, 'row')}; give {size}",
+        )
 
 
 def electrical_inconsistencies(document: dict[str, Any]) -> KeyMessages:

@@ -12,6 +12,7 @@ from typing import Any, Final
 from zwidth.device.faults import comma_list, fail, nearest
 from zwidth.device.format_version import refuse_newer
 from zwidth.device.text_file import UnreadableFileError, read_text
+from zwidth.device.toml_faults import toml_fault
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def parse_document(text: str, label: str, shelf: BundledFiles = DEVICES) -> dict
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise fail(label, "", f"is not TOML: {_lower_first(str(error))}") from None
+        raise fail(label, "", toml_fault(text, error)) from None
     except RecursionError:
         raise fail(label, "", f"is nested too deeply; at most {DEEPEST} levels are allowed") from None
     except ValueError as error:  # a whole number of thousands of digits

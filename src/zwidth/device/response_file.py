@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.device.faults import DeviceError, Fault, fail, quote
+from zwidth.device.faults import DeviceError, Fault, fail, plural, quote
 from zwidth.device.schema.response import ResponseSection
 from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, header_fault, non_blank_rows, read_text
 from zwidth.model.response import Response, ResponseError
@@ -117,7 +117,12 @@ def _spectrum(path: Path, table: Table, section: ResponseSection, period: float)
         )
     _raise(path, causes)
     if len(f) < 6:
-        raise fail(str(path), "", f"has {len(f)} frequencies; at least 6 are needed, some hundreds to be exact")
+        raise fail(
+            str(path),
+            "",
+            f"has {plural(len(f), 'frequency', 'frequencies')}; at least 6 are needed, "
+            "a few hundred for an accurate chart",
+        )
     value = table["real_m_per_N"] + 1j * table["imag_m_per_N"]
     if not np.any(value):
         raise fail(str(path), "", "is 0 m/N at every frequency; is the position in metres?")

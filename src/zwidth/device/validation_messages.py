@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+from math import pi
+from typing import Any, Final
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -11,6 +13,28 @@ from pydantic_core import ErrorDetails
 from zwidth.device.faults import KeyPath, nearest, quote, suggestion
 from zwidth.device.schema import device_file as schema
 from zwidth.device.schema.velocity import DEFAULT_METHOD
+
+# Units that numbers are often given in -> the unit of device files, and the factor.
+OTHER_UNITS: Final = {
+    "N_per_mm": ("N_per_m", 1e3),
+    "Ns_per_mm": ("Ns_per_m", 1e3),
+    "Nm_per_deg": ("Nm_per_rad", 180.0 / pi),
+    "mNm": ("Nm", 1e-3),
+    "Nmm": ("Nm", 1e-3),
+    "g_cm2": ("kg_m2", 1e-7),
+    "g_mm2": ("kg_m2", 1e-9),
+    "kg_cm2": ("kg_m2", 1e-4),
+    "kg_mm2": ("kg_m2", 1e-6),
+    "g": ("kg", 1e-3),
+    "mm": ("m", 1e-3),
+    "cm": ("m", 1e-2),
+    "um": ("m", 1e-6),
+    "deg": ("rad", pi / 180.0),
+    "ms": ("s", 1e-3),
+    "us": ("s", 1e-6),
+    "kHz": ("Hz", 1e3),
+    "mH": ("H", 1e-3),
+}
 
 
 def validation_messages(
@@ -137,7 +161,21 @@ def _unknown(path: KeyPath, document: dict[str, Any]) -> str:
         ]
         if elsewhere and table != (elsewhere[0],):
             return f"is not a key here; it belongs into [{elsewhere[0]}]"
-    return f"is not a key of a device file; {suggestion(key, allowed)}"
+    converted = _in_si(key, _value(document, path), allowed)
+    return f"is not a key of a device file; {converted or suggestion(key, allowed)}"
+
+
+def _in_si(key: str, value: Any, allowed: Collection[str]) -> str:
+    """What to give for a key in another unit: the allowed key and its number; "" where there is none."""
+    known = isinstance(value, int | float) and not isinstance(value, bool)
+    if re.fullmatch(r"sampl\w*_(?:frequency|rate)(?:_k?Hz)?", key) and "sampling_period_s" in allowed:
+        frequency = value * (1e3 if key.endswith("kHz") else 1.0) if known else 0.0
+        return "give sampling_period_s" + (f" = {1.0 / frequency:.10g}" if frequency > 0.0 else ", in seconds")
+    for unit, (base, factor) in OTHER_UNITS.items():
+        meant = key.removesuffix(unit) + base
+        if key.endswith(f"_{unit}") and meant in allowed:
+            return f"give {meant}" + (f" = {value * factor:.10g}" if known else "")
+    return ""
 
 
 def _value(document: Any, path: KeyPath) -> Any:

@@ -66,7 +66,7 @@ def uncertainty_band(loop: MeasuredLoop, cells: StableRegions) -> Band | None:
         stiffness_high=_largest(stable.union(covered), scale),
         meaning="the farthest of the repeated sweeps"
         if loop.response.sweeps is not None
-        else "95 % of the error that the coherence tells",
+        else "95 % confidence, from coherence",
     )
 
 

@@ -145,7 +145,7 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
         warned = "; WARNING: so that the device runs away, whatever the wall"
         # several directions are those of a mechanism, whose springs and dampers feed no motion
         runs_away = isinstance(chart, StabilityChart) and unobserved_instability(chart.loop)
-        yield "moved by no wall", names + (warned if runs_away else "")
+        yield "not affected by a wall", names + (warned if runs_away else "")
 
 
 def _decays(buildable: FastestDecay | None, of_all: FastestDecay | None) -> Iterator[tuple[str, str]]:
@@ -171,7 +171,7 @@ def _stiffest(chart: Chart) -> str:
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
     return (
         f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "
-        f"there it vibrates at {frequencies}"
+        f"at this limit it oscillates at {frequencies}"
     )
 
 
@@ -191,7 +191,7 @@ def measured_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
     """Rows for people on a chart by a frequency response, below those of every chart."""
     if chart.band is not None:
         low, high = amount(chart.band.stiffness_low, "N/m"), amount(chart.band.stiffness_high, "N/m")
-        yield "largest stiffness from", f"{low} to {high} within {chart.band.meaning}"
+        yield "largest stiffness from", f"{low} to {high} ({chart.band.meaning})"
     if chart.stiffness_max_of_sweeps:
         yield "in the single sweeps", ", ".join(amount(K, "N/m") for K in chart.stiffness_max_of_sweeps)
     response = chart.loop.response

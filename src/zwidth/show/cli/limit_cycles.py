@@ -172,7 +172,7 @@ def _circumstances(case: CommandLine, prediction: LimitCyclePrediction) -> Itera
         yield "middle", f"{as_written(prediction.offset)} of a step beyond a count"
     if prediction.resting_limit is not None:
         yield "rests under every push", _up_to(prediction.resting_limit)
-        yield "hunts in no way", f"{_up_to(prediction.quiet_limit)}, at this damping"
+        yield "no encoder hunting", f"{_up_to(prediction.quiet_limit)}, at this damping"
 
 
 def _up_to(stiffness: float | None) -> str:

@@ -206,7 +206,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
     yield (
         "largest stiffness",
         f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "
-        f"there member {members} vibrates at {frequencies}",
+        f"at this limit member {members} oscillates at {frequencies}",
     )
     yield (
         "lost against the best",
@@ -230,7 +230,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
     if study.violation is not None:
         yield "unseen members", _violation(study.violation)
     if chart.unobserved_modes:
-        yield "moved by no wall", ", ".join(group_names(chart.unobserved_modes))
+        yield "not affected by a wall", ", ".join(group_names(chart.unobserved_modes))
 
 
 def _members_text(study: RobustStudy) -> str:

@@ -93,4 +93,4 @@ def _remarks(sensitivities: Sensitivities, more: int) -> Iterator[str]:
         second = amount(sensitivities.second_peak, "N/m")
         yield f"another peak stands at {second}: it takes over once this one falls below it"
     if more > 0:
-        yield f"and {more} more that matter less or not at all; --top N, --json or --output holds them"
+        yield f"{more} more; show them with --top N, or get all with --json or --output"

@@ -129,7 +129,7 @@ def _remarks(simulation: ContactSimulation) -> Iterator[str]:
     elif not np.ptp(simulation.handle) > 0.0:
         yield "nothing moves it: give --push, --start-velocity or --start-position"
     if simulation.given_up:
-        yield "given up: the device is farther from the wall than any device goes"
+        yield "stopped early: the device was farther from the wall than any device moves"
     if (beyond := simulation.range_exit) is not None:
         back, forth = amount(beyond.backward, "m"), amount(beyond.forward, "m")
         yield (

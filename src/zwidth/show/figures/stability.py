@@ -91,7 +91,7 @@ def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart) -> None:
         markeredgewidth=1.6,
         linestyle="none",
         zorder=5.0,
-        label=f"stiffest: {numbers}; vibrates at {vibration}",
+        label=f"stiffest: {numbers}; oscillates at {vibration}",
     )
 
 
