@@ -140,7 +140,10 @@ def test_listing_the_bundled_devices_needs_no_numerics():
         ("[plant]\nactuator = [1.0, 0,5]\n[plant]", "line 3: [plant] is there twice"),
         ("[plant]\nmass_kg = 1\n\nmass_kg = 2", "line 4: mass_kg is there twice; keep one of them"),
         ("[mechanism.loops]\na = 1\n[mechanism.loops]\n", "line 3: [mechanism.loops] is there twice"),
-        ('device = "five-bar"\nmeasures = ["stiffness"]\n', "is a study of designs, not a device; sweep it, or give"),
+        (
+            'device = "five-bar"\nmeasures = ["stiffness"]\n',
+            "is a study of designs, not a device; sweep it, or give",
+        ),
     ],
 )
 def test_what_was_probably_meant_is_said(tmp_path, data, words):
