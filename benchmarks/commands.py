@@ -1,8 +1,8 @@
 """How long a user waits for a command, as a whole process.
 
 Run `python benchmarks/commands.py`. Commands run twice before they are timed, so that their kernels are cached.
-Beside them: a process that imports numba and calls one cached kernel, in turn with each command, and how much longer
-the command takes; also in processor time, which other work on the machine disturbs less.
+Beside them: a process that imports numba and calls one cached kernel, in turn with each command, and how much
+longer the command takes; also in processor time, which other work on the machine disturbs less.
 """
 
 from __future__ import annotations
