@@ -1,4 +1,4 @@
-"""Who wants to know that a kernel is being compiled: free of numba, so that listening costs nothing."""
+"""Listeners to the compilation of kernels; free of numba, so that importing costs nothing."""
 
 from __future__ import annotations
 

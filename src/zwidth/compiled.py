@@ -76,7 +76,7 @@ def compiled_for(signature: Any, function: Callable[..., Any]) -> Any:
 
 
 def can_be_taken_apart() -> bool:
-    """Is the installed numba one of those whose compiler is known from within?"""
+    """Whether the compiler of the installed numba is one of those known from within."""
     oldest, newest = TAKEN_APART
     return oldest <= tuple(numba.version_info.short) <= newest
 
@@ -98,7 +98,7 @@ class _PartLibrary(JITCodeLibrary):
 
     @property
     def codegen(self) -> Any:
-        """What numba asks to register the loaded code; nothing was."""
+        """Stands in for the code generator where numba registers loaded code; nothing is loaded."""
         return self._Unloaded()
 
     def _optimize_final_module(self) -> None:

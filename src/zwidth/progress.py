@@ -1,4 +1,4 @@
-"""How a long computation says how far it is."""
+"""The function by which a long computation reports its progress."""
 
 from __future__ import annotations
 

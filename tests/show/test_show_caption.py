@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 import zwidth
 from tests.cli.command_runner import run_command
+from zwidth.measures.felt_chart import felt_chart
 from zwidth.show.figures.caption import MARGIN, SIZE, caption_of_facts, caption_of_result, wrapped, write_caption
 from zwidth.show.figures.style import figure, inline_svg, save, text_width
 from zwidth.study.study_arguments import study_over
@@ -157,3 +158,11 @@ def test_the_same_caption_makes_the_same_bytes(tmp_path):
     assert drawn("a.png") == drawn("b.png")
     assert drawn("a.svg") == drawn("b.svg")
     assert io.BytesIO(drawn("a.pdf")).read(4) == b"%PDF"
+
+
+def test_parts_of_a_result_are_captioned_when_drawn_alone():
+    point = zwidth.load("hapkit-course").at()
+    found = point.guarantees()
+    felt = felt_chart(point.chart(), point.ungripped_plant)
+    for result in (found, found["passive"].region, felt):
+        assert said(result).startswith("Hapkit, course model | sampled every 1 ms")

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 class StabilityChart(Chart):
     """The stable walls of a loop.
 
-    loop, radius    what was asked: walls whose roots all have |z| < radius (1: stable)
+    loop, radius    of the chart: walls whose roots all have |z| < radius (1: stable)
     corner_blur     share of the set's size to which its corners are known: 1e-7, more where a mode that the wall
                     hardly moves hides one in rounding
     """

@@ -64,7 +64,7 @@ class Chart(Result, ABC):
     fastest_decay: FastestDecay | None = None
     fastest_decay_in_first_quadrant: FastestDecay | None = None
 
-    # What is told of each wall of the edge: key -> attribute of `BoundaryArc`.
+    # Numbers of each wall on the edge: key -> attribute of `BoundaryArc`.
     _edge_columns: ClassVar[dict[str, str]] = {
         "stiffness_N_per_m": "stiffness",
         "damping_Ns_per_m": "damping",

@@ -2,8 +2,8 @@
 
 That part's optimum is the whole set's where that has K, B >= 0. Else it lies inside the quadrant, or on one of its
 two axes: the search moves in the quadrant, walls outside it being taken for the nearest ones inside, and each axis
-is searched by itself. A cell of walls that decay faster than the best found is bounded and the quadrant is not, so
-that a cell which reaches into the quadrant has some of its edge there. That edge is what is looked for at the end.
+is searched separately. A cell of walls that decay faster than the best found is bounded and the quadrant is not,
+so that a cell which reaches into the quadrant has some of its edge there. The search ends by looking for those.
 """
 
 from __future__ import annotations
@@ -96,6 +96,7 @@ def descend(
     x, f = np.empty((3, 2)), np.empty(3)
     best_K, best_B = start[0], start[1]
     value = _bounded(polynomials, radius, best_K, best_B, least, p, roots)
+    # the spectral radius has edges and cusps: a simplex collapses onto one, and a new, smaller one goes on
     for size in sizes:
         for i in range(3):
             x[i, 0] = best_K + (size * extent[0] if i == 1 else 0.0)
@@ -103,10 +104,12 @@ def descend(
             f[i] = value if i == 0 else _bounded(polynomials, radius, x[i, 0], x[i, 1], least, p, roots)
         for _ in range(60):
             _sort_corners(x, f)
+            # K and B differ by orders of magnitude, so that sizes count in shares of the cell
             spread = max(abs(x[2, 0] - x[0, 0]) / extent[0], abs(x[2, 1] - x[0, 1]) / extent[1])
             if spread < 0.01 * size:
                 break
             K, B = 0.5 * (x[0, 0] + x[1, 0]), 0.5 * (x[0, 1] + x[1, 1])
+            # reflect the worst corner; then farther if that is the best, back towards the middle if it is no use
             away_K, away_B = K - x[2, 0], B - x[2, 1]
             reflected = _bounded(polynomials, radius, K + away_K, B + away_B, least, p, roots)
             if reflected < f[0]:
@@ -162,12 +165,14 @@ def double_root_wall(factors: Factors, positive: bool, low: float, high: float) 
     ends, values = np.array([low, high]), np.empty(2)
     K, B = 0.0, 0.0
     for i in range(60):
+        # the two ends first, then false position
         radius = ends[i] if i < 2 else (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0])
         A, S, V = characteristic(factors, radius)[:3]
         m, n = (0, 1) if positive else (N, N - 1)
         det = S[m] * V[n] - S[n] * V[m]
         K, B = (A[n] * V[m] - A[m] * V[n]) / det, (A[m] * S[n] - A[n] * S[m]) / det
         for k in range(N - 1):
+            # the polynomial without its double root: two coefficients at one end vanish
             at = k + 2 if positive else k
             rest[k] = A[at] + K * S[at] + B * V[at]
         value = polynomial_radius(rest, radius, roots) - radius

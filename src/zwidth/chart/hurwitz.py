@@ -1,4 +1,4 @@
-"""Are all roots of a polynomial inside? Routh's array, with an account of what rounding can hide.
+"""Test whether all roots of a polynomial are inside: Routh's array, with a bound of what rounding can hide.
 
 Polynomials are in the bilinear variable s, ascending coefficients, so that "inside the circle" is "in the open
 left half plane". The kernels share one working array `room` (8, N + 2), whose rows hold
@@ -84,6 +84,7 @@ def _hurwitz_by_one_bound(room: Floats, row: int, degree: int) -> int:
     error = ROUNDING
     for i in range(degree + 1):
         value, terms = sign * room[row, i], ROUNDING * room[row + 1, i]
+        # a coefficient of the other sign, certainly: a root outside
         if value < -terms:
             return -1
         if not value > 1e3 * terms:
@@ -98,6 +99,7 @@ def _hurwitz_by_one_bound(room: Floats, row: int, degree: int) -> int:
             new = room[4, i + 1] - ratio * room[5, i + 1]
             room[4, i], room[5, i] = room[5, i], new
         left = abs(room[5, 0])
+        # the sign of the new leading entry is within rounding
         if not left > error * before:
             return 0
         if room[5, 0] < 0.0:
@@ -115,6 +117,7 @@ def hurwitz(room: Floats, row: int, degree: int) -> int:
     its terms, is carried through the array; a sign that it could turn decides nothing, and the answer is 0: a
     root on the axis, as far as double precision can tell. So do numbers that are not finite.
     """
+    # one error bound for all entries is quicker, and nearly always enough
     plainly = _hurwitz_by_one_bound(room, row, degree)
     if plainly != 0:
         return plainly
@@ -134,6 +137,7 @@ def hurwitz(room: Floats, row: int, degree: int) -> int:
         room[7, i] = ROUNDING * room[row + 1, j - 1] if j >= 1 else 0.0
     for k in range(degree - 1):
         ratio = room[4, 0] / room[5, 0]
+        # rows 4 and 5 hold the two last rows of the array, 6 and 7 the errors of their entries
         ratio_error = (room[6, 0] + ratio * room[7, 0]) / room[5, 0]
         for i in range((degree - k) // 2 + 1):
             new = room[4, i + 1] - ratio * room[5, i + 1]

@@ -60,7 +60,7 @@ def hysteretic_chart(loop: Loop) -> MeasuredChart:
         np.abs(loop.plant.stiffness)
     ):
         raise HysteresisError(f"the loss factor is below {LEAST_LOSS_FACTOR:.0e}, {TOO_SMALL}")
-    # what the response holds already is not asked of the computer again
+    # delay, lag and filter are in the response already, and must not be applied twice
     remaining_controller = replace(loop.controller, delay=0.0, actuator_time_constant=0.0, force_filter=None)
     try:
         chart = measured_chart(_response(loop), remaining_controller)

@@ -90,6 +90,7 @@ def _halved(
     while position < high:
         pieces += 1
         step = min(length, high - position)
+        # the value is near 0, where its phase is rounding
         if pieces > 64 * HALVINGS or length < 1e-15:
             return np.nan
         after = end
@@ -97,6 +98,7 @@ def _halved(
             a, s, v = terms_at(factors, radius, position + step)
             after = (a + K * s + B * v) * _side(position + step, pair)
         turn = _phase_change(value, after)
+        # too large a turn to be sure of its sheet: the same step again, half as long
         if abs(turn) > FAR / 2.0:
             length = 0.5 * step
             continue

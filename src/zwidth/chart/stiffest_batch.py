@@ -1,11 +1,10 @@
 """The largest stiffness of many loops at once, compiled, for maps and studies.
 
 The same curve, the same flags and the same corners as in the chart, but nothing is joined or drawn: the curve
-is sampled, the samples that edge the stable set are told from the others, and what could be the largest
+is sampled, the samples on the edge of the stable set are selected, and each candidate for the largest
 stiffness is refined: a smooth maximum of K, a corner at the end of a run of edge samples, a crossing of B = 0.
-What a chart does to be sure (walks that close, eigenvalues where rounding hides a root) is not done here.
-Instead the answer is put to the test, and a loop that leaves a doubt is to be asked by itself
-(`chart.largest_stiffness`):
+The checks of a chart (closed outlines, eigenvalues where rounding hides a root) are not made here.
+Instead the answer is tested, and a doubtful loop is marked, to be computed alone by `chart.largest_stiffness`:
 
 - a sample whose flag is lost in rounding, or a corner that does not settle;
 - a straight edge (a real root at z = 1 or -1) whose end may lie beyond the stiffest wall found;
@@ -59,7 +58,7 @@ class StiffestWalls:
 
     stiffness, damping  (N,)    nan unless the status is FOUND
     angles              (N, 2)  of the roots on the circle there, ascending; twice the same but at a corner
-    status              (N,)    FOUND, NO_WALL, or DOUBTFUL: to be asked by itself
+    status              (N,)    FOUND, NO_WALL, or DOUBTFUL: to be computed alone
     """
 
     stiffness: Floats
@@ -280,6 +279,7 @@ def corner_between(
     degree = polynomials.shape[1] - 1
     edge, none = on, off
     for _ in range(36):
+        # bisection for where the flag changes; 36 halvings leave a step of rounding size
         middle = 0.5 * (edge + none)
         K, B = wall_alone(factors, 1.0, middle)
         if edges_stable_set(polynomials, middle, K, B, room) > 0:
@@ -290,12 +290,14 @@ def corner_between(
     K1, B1 = wall_alone(factors, 1.0, high)
     for end in (0, 1):
         column = 0 if end == 0 else degree
+        # a real root at z = 1 or -1 (the lines of the chart) takes part where the end coefficient changes its sign
         a, s, v = polynomials[0, column], polynomials[1, column], polynomials[2, column]
         if (a + s * K0 + v * B0) * (a + s * K1 + v * B1) < 0.0:
             crossing = zero_between(factors, 1.0, (a, s, v, 0.0, 0.0), low, high)
             if abs(crossing - edge) <= 1e-6 * edge:
                 return crossing, 0.0 if end == 0 else np.pi, True
     K, B = wall_alone(factors, 1.0, edge)
+    # else a second pair of roots is on the circle: it is what remains nearest to it without the first pair
     combine(polynomials, K, B, room)
     deflate(room, degree, np.tan(0.5 * edge) ** 2)
     roots = np.empty(degree - 2, dtype=np.complex128)

@@ -29,7 +29,7 @@ ROOTS: tuple[RealRoot, RealRoot] = ("plus", "minus")
 
 @dataclass(frozen=True)
 class Tracer:
-    """What the kernels take, with the questions that are asked of it.
+    """A loop in the arrays that the kernels take, with the functions that evaluate them.
 
     loop         the loop
     factors      `factor_arrays(loop)`
@@ -86,9 +86,9 @@ class Tracer:
     def trace(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """K, B and stable-edge flag at ascending angles in (0, pi).
 
-        What polynomials leave open, eigenvalues are asked; what they, or in a long loop the phase along the
-        circle, leave open (several roots on the circle within rounding) is taken as at the nearest decided sample
-        before, or after if there is none.
+        Where rounding leaves a flag of the polynomials open, eigenvalues decide. Where they, or in a long loop the
+        phase along the circle, leave it open, too (several roots on the circle within rounding), it is that of the
+        nearest decided sample before, or after if there is none.
         """
         K, B, flags = self._flagged(thetas)
         unsure = np.flatnonzero(flags == 0)
@@ -101,7 +101,7 @@ class Tracer:
         return K, B, flags > 0
 
     def _flagged(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.int64]]:
-        """K, B and flag 1, -1, or 0 where eigenvalues must be asked."""
+        """K, B and flag 1, -1, or 0 where eigenvalues must decide."""
         if not self.is_high_degree:
             return trace(self.factors, self.polynomials, self.radius, thetas)
         K, B = walls(self.factors, self.radius, thetas)

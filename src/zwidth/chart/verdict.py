@@ -1,4 +1,4 @@
-"""Is this wall stable? Eigenvalues of the transition matrix, and a verdict that admits what it cannot tell."""
+"""Verdicts on walls by eigenvalues of the transition matrix: stable, unstable, or undecided within rounding."""
 
 from __future__ import annotations
 

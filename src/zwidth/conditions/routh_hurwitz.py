@@ -71,7 +71,7 @@ def principal_minors(coefficients: ArrayLike) -> Floats:
 
 
 def is_stable(coefficients: ArrayLike) -> NDArray[np.bool_]:
-    """Do all roots of a0 s^n + ... + an lie in the open left half plane? (...).
+    """Whether all roots of a0 s^n + ... + an lie in the open left half plane (...).
 
     Where a0 > 0 and all minors are positive (thesis eq. A.3). A polynomial with a0 < 0 is judged with its sign
     turned; a0 = 0 has lost a root to infinity and is not stable.

@@ -1,4 +1,4 @@
-"""What happens on contact: the loop in time, with all that is not linear about it."""
+"""Contact in time: simulation of the sampled loop with its nonlinear parts, and limit cycles."""
 
 import lazy_loader
 

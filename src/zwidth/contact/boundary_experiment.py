@@ -100,9 +100,9 @@ class EdgePoint:
 def find_stable_walls(
     trial: StabilityTrial, box: SearchWindow | None = None, progress: Progress | None = None
 ) -> StableExtent:
-    """Where the stable walls are.
+    """Find the range of stable walls.
 
-    progress  told how many of the six steps are done
+    progress  called with the number of steps done, and of all six
     box     look here only; None: everywhere between millionths and all of what the device's mass allows
     Raises  NoStableWallError  where no stable wall with K > 0 is found
     """
@@ -213,7 +213,7 @@ def _powers(largest: float, least: float) -> Floats:
 
 
 def _masses(plant: Plant) -> tuple[float, float]:
-    """What a sudden force at the wall accelerates, and what a steady one does [kg]."""
+    """Mass that a sudden force at the wall accelerates, and that of a steady one [kg]."""
     inverse = np.linalg.inv(plant.mass)
     a, s, shape = plant.actuator, plant.sensor, least_deforming_motion(plant)
     light = 1.0 / float(np.sqrt((a @ inverse @ a) * (s @ inverse @ s)))

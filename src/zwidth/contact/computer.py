@@ -74,7 +74,7 @@ class Computers(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """What a computer remembers of s coordinates and c commands.
+    """Memory of a computer with s coordinates and c commands.
 
     first     (s,)         the first reading
     past      (s, memory)  what the estimate looks back on
@@ -100,7 +100,7 @@ class EstimateParameters(NamedTuple):
 
 
 def estimate_parameters(controller: Controller) -> EstimateParameters:
-    """How the computer estimates velocities."""
+    """Velocity estimate of the computer, as numbers for the kernels."""
     own = controller.velocity
     if not isinstance(own, Foaw | Levant):
         found = velocity_estimator(controller)
@@ -174,7 +174,7 @@ def signals_of(computer: Computer, coordinates: int, commands: int) -> Signals:
 
 @compiled_inline
 def read_encoder(place: float, step: float, noise: float, seed: np.uint64, sample: int, channel: int) -> float:
-    """What an encoder reads at a place: with its noise, rounded to the nearest step, half a step upwards.
+    """Reading of an encoder at a position: with its noise, rounded to the nearest step, half a step upwards.
 
     step     0: as fine as you like;   noise  standard deviation of what is added before rounding, in the same unit
     channel  number of the encoder: each draws noise of its own

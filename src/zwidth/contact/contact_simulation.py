@@ -32,11 +32,11 @@ class RangeExit:
 
 
 class PassivityComparison(NamedTuple):
-    """What a passivity controller costs and does.
+    """Effect of a passivity controller: the stiffness felt, and the verdict, with and without it.
 
     rendered_stiffness      felt with the controller, by `passivity_controller.rendered_stiffness` [N/m]
     uncontrolled_stiffness  the same without it [N/m]
-    uncontrolled            what the run without it says
+    uncontrolled            verdict on the run without it
     """
 
     rendered_stiffness: float
@@ -54,10 +54,10 @@ class ContactSimulation(Result):
     start_position      of the reading [m];   start_velocity  [m/s]
     distance_from_path  how far from the start the handle's path passes [m]; None for a device without a mechanism
     predicted_growth    ln rho per sample of the linear loop on the two-sided wall; None where there is none
-    length              seconds that were asked for, and the reason for so many
+    length              length of the run [s], and the reason for it
     substeps            taken between samples;   seed  of the encoders' noise
     response            the motion
-    judgement           what the motion says
+    judgement           verdict on the motion
     range_exit          where it leaves the handle's range; None where it stays within, or without a mechanism
     uncontrolled        the same run without the passivity controller; None where there is no controller
     """
@@ -82,7 +82,7 @@ class ContactSimulation(Result):
 
     @property
     def behaviour(self) -> Behaviour | Literal["forced"]:
-        """As judged (see `motion_verdict.Judgement`); "forced" where the device only goes with the hand's tremor,
+        """Behaviour (see `motion_verdict.Judgement`); "forced" where the device only goes with the hand's tremor,
         "growing" where it was gone before there was anything to judge."""
         judged, tremor = self.judgement, self.hand.tremor
         if self.response.given_up and judged.behaviour == "undecided":
@@ -94,7 +94,7 @@ class ContactSimulation(Result):
 
     @property
     def stable(self) -> bool | None:
-        """Does the motion die away? None where the run does not tell."""
+        """Whether the motion decays; None where the run leaves that open."""
         return None if self.behaviour in ("forced", "undecided") else self.judgement.stable is True
 
     @property
@@ -129,7 +129,7 @@ class ContactSimulation(Result):
 
     @cached_property
     def passivity(self) -> PassivityComparison | None:
-        """What the passivity controller costs and does; None without one."""
+        """Effect of the passivity controller; None without one."""
         if self.uncontrolled is None:
             return None
         return PassivityComparison(
@@ -138,7 +138,7 @@ class ContactSimulation(Result):
 
     @property
     def ledger(self) -> dict[str, float]:
-        """What each has put in by the end, by its name (`time_response.SOURCES`) [J]."""
+        """Energy that each source has supplied by the end, by its name (`time_response.SOURCES`) [J]."""
         return dict(zip(SOURCES, self.response.energies[-1].tolist(), strict=True))
 
     # --- what was simulated ---------------------------------------------------------------------------
@@ -165,7 +165,7 @@ class ContactSimulation(Result):
 
     @property
     def starts_inside(self) -> bool:
-        """Does the reading start beyond the wall's position?"""
+        """Whether the reading starts inside the wall."""
         return self.start_position > self.wall_position
 
     # --- in time --------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Describing functions: what passes of a sinus at its own frequency, of one nonlinearity each.
+"""Describing functions: complex gain of one nonlinearity each for a sine, at the sine's frequency.
 
 For an input c + A sin(theta) and a nonlinearity f that gives no other output for rising than for falling input
 
@@ -36,7 +36,7 @@ def _each(gain: Callable[..., float], *values: ArrayLike) -> Floats:
 def quantiser(amplitude: ArrayLike, step: ArrayLike, offset: ArrayLike = 0.0) -> Floats:
     """Gain of an encoder that rounds to the nearest step:  step * round(x / step).
 
-    The staircase rises by Delta at each threshold t = (k + 1/2) Delta. A sinus crosses t upwards and downwards at
+    The staircase rises by Delta at each threshold t = (k + 1/2) Delta. A sine crosses t upwards and downwards at
     sin theta = (t - c)/A, and such a step alone gives 2 Delta cos(theta)/(pi A), so that
 
         N(A, c) = 2 Delta/(pi A) sum over |t - c| < A of sqrt(1 - ((t - c)/A)^2)
@@ -134,7 +134,7 @@ def saturation(amplitude: ArrayLike, limit: ArrayLike) -> Floats:
 
         N = (2/pi) (asin s + s sqrt(1 - s^2)),     s = limit/A;        1 for A <= limit
 
-    amplitude  (...)  A of the force that is asked for [N], positive
+    amplitude  (...)  A of the commanded force [N], positive
     limit      (...)  [N], positive; inf: 1
 
     >>> saturation([1.0, 2.0, 100.0], 1.0).round(4).tolist()

@@ -1,4 +1,4 @@
-"""What works on one motion of the plant and is not linear: the mean force of each over a substep.
+"""Nonlinear elements on one motion of the plant: the mean force of each over a substep.
 
 Over a substep the motion q = along . x goes from q0 at velocity v0 to q1 at v1, if nothing of it acts. A unit of
 force held over the substep adds `shift` to q1 and `mobility` to v1. A force f held over the substep does the work

@@ -103,6 +103,7 @@ def enter_substep(
     N, n, X = devices.energy.shape[1], devices.size[d], book.work
     for i in range(N):
         X[i] = before[i]
+    # states, held forces and elements' forces: the losses of a linear substep are a quadratic form of them all
     X[N], X[N + 1] = command, push
     for e in range(forces.size):
         X[N + 2 + e] = forces[e]
@@ -115,6 +116,7 @@ def enter_substep(
         kind = devices.kind[d, e]
         if kind == NOTHING:
             continue
+        # the force is constant over the substep, so that its work is exact
         work = forces[e] * (after[N + 2 * e] - before[N + 2 * e])
         if kind in (COULOMB, BRISTLES):
             entries[FRICTION] += work

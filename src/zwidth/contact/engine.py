@@ -1,9 +1,10 @@
 """The loop in time: sample, compute, hold, and step the plant exactly in between.
 
-At each sample the encoders are read, the velocity estimated, the environment asked for its force, that filtered,
-limited and queued; then the plant goes through the two parts of the interval, the first with the command of one
-sample more of delay. What is linear is exact whatever the substep. What is not acts as the mean force over a
-substep that the substep's own motion asks for, second order in its length (see `elements`).
+At each sample the encoders are read, the velocity is estimated, the environment computes its force, which is
+filtered, limited and queued; then the plant goes through the two parts of the interval, the first with the
+command of one sample more of delay. Linear parts are exact with any substep. A nonlinear part acts as its mean
+force over a substep, determined by the motion in that substep; the error is of second order in its length (see
+`elements`).
 """
 
 from __future__ import annotations
@@ -95,11 +96,13 @@ def advance_substeps(
     hand, E, kept, booked = members.push, devices.kind.shape[1], trail.shape[1] > 0, book.entries.size > 0
     steady = hand[m, 1] == 0.0 and hand[m, 5] == 0.0 and hand[m, 6] == 0.0
     push, here = hand[m, 0], state
+    # one dry friction under a constant push, nothing recorded: the commonest case, in a loop of its own
     if E == 1 and devices.kind[d, 0] == COULOMB and steady and not (kept or booked) and end > begin:
         set_held_increment(inputs, d, part, command, push, state.held_increment)
         step_with_friction(A, inputs, d, part, devices.numbers[d, 0, 0], end - begin, state)
         return
     for j in range(begin, end):
+        # a push that changes is held at its value in the middle, an error of second order in the substep
         if not steady:
             push = hand_force(hand, m, time + (j + 0.5) * h)
         if not steady or j == begin:
@@ -110,9 +113,11 @@ def advance_substeps(
         step(A, inputs, d, part, here)
         if booked:
             enter_substep(devices, d, part, here.states, here.next_states, command, push, here.forces, book)
+        # the two arrays of states change places, instead of a copy for each substep
         here = PlantState(here.next_states, here.states, here.forces, here.memory, here.held_increment)
         if kept:
             trail[m, first + j] = dot(devices.handle, d, here.states, 0, n)
+    # after an odd number of exchanges the result is in the other array
     if (end - begin) % 2:
         for i in range(state.states.size):
             state.states[i] = state.next_states[i]
@@ -176,6 +181,7 @@ def run_member(
     book, started = new_ledger(devices, booked), energy_of(devices, d, states)
     for j in range(samples):
         time, truth = j * T, dot(devices.sensor, d, states, 0, n)
+        # the order of one period: read, estimate, render, filter, limit, send
         counted = read_sensor(devices, d, states, truth, members.seed[m], j)
         speed = estimate_velocity(computer, signals, 0, counted, j)
         environment_force = force(counted - wall, speed, time, T, values, memory)
@@ -183,6 +189,8 @@ def run_member(
             passivity_force(observer, watch, environment_force, counted, T) if watched else environment_force
         )
         if booked:
+            # what would be rendered without encoder steps, and with the true velocity: the differences are their
+            # energies
             smooth = estimate_velocity(computer, exact, 0, truth, j)
             unquantised_force = force(truth - wall, smooth, time, T, values, sampled_memory)
             true_speed = dot(devices.sensor, d, states, n, n)
@@ -203,6 +211,7 @@ def run_member(
         traces[m, j, READING], traces[m, j, TRUTH], traces[m, j, VELOCITY] = counted, truth, speed
         traces[m, j, FORCE], traces[m, j, HANDLE] = command, dot(devices.handle, d, states, 0, n)
         records.samples[m] = j + 1
+        # written so that nan ends the run, too
         if not abs(truth - wall) <= members.bound[m]:
             break
         if varies:

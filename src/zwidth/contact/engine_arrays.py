@@ -86,7 +86,7 @@ class RunArrays(NamedTuple):
 
 
 class Records(NamedTuple):
-    """What is kept of m runs of S samples; arrays of size 0 where it is not wanted.
+    """Records of m runs of S samples; arrays of size 0 where they are not wanted.
 
     samples  (m,)           how many were run
     traces   (m, S, 5)      reading, truth, velocity, force, handle at each sample

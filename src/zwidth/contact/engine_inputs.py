@@ -59,7 +59,7 @@ class HeldDevice:
 
     @property
     def counters(self) -> tuple[Counter, ...]:
-        """What is counted; without encoder steps, the sensor as it is."""
+        """The encoders; without steps and noise, the plant's sensor."""
         return self.modal_plant.nonlinear.counters or (Counter(self.modal_plant.sensor, 0.0),)
 
     @property
@@ -170,7 +170,7 @@ def _fill_motions(found: PlantArrays, d: int, held_device: HeldDevice) -> None:
 
 
 def _fill_part(found: PlantArrays, d: int, part: int, step: Substep) -> None:
-    """What a substep of this part does; the ledger's forms have the states first, then the forces, as padded."""
+    """Matrices of a substep of one part; the ledger's forms take the states first, then the forces, padded."""
     m, F = step.inputs.shape
     N = found.transition.shape[-1]
     at, last = np.concatenate([np.arange(m), np.arange(N, N + F)]), N + 2 * (F - 2)

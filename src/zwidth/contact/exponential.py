@@ -43,6 +43,7 @@ def exponential(A: Floats, time: float, size: float, E: Floats, G: Floats, scrat
     """
     step, series, product = scratch[0], scratch[1], scratch[2]
     N, doublings = A.shape[0], 0
+    # over so short a time the series converges in TERMS terms without cancellation
     while size > SMALL and doublings < 60:
         size *= 0.5
         doublings += 1
@@ -52,6 +53,7 @@ def exponential(A: Floats, time: float, size: float, E: Floats, G: Floats, scrat
             step[i, j] = tau * A[i, j]
             series[i, j] = 0.0
         series[i, i] = 1.0
+    # Horner's scheme: the smallest terms are added first
     for term in range(TERMS, 0, -1):
         multiply(step, series, product)
         for i in range(N):
@@ -64,6 +66,7 @@ def exponential(A: Floats, time: float, size: float, E: Floats, G: Floats, scrat
         for j in range(N):
             G[i, j] = tau * series[i, j]
     for _ in range(doublings):
+        # G before E, since it needs the E of the shorter time
         multiply(E, G, product)
         for i in range(N):
             for j in range(N):

@@ -76,6 +76,8 @@ def bristle_force(
 
     low, high = free, free
     low_gap = high_gap = _gap(z, numbers, free, free, mobility, h)
+    # the friction changes the velocity by no more than mobility times its largest force: the root is bracketed by
+    # steps of that size
     reach = mobility * most
     for _ in range(60):
         if low_gap <= 0.0 <= high_gap:
@@ -95,6 +97,7 @@ def bristle_force(
         gap = _gap(z, numbers, free, u, mobility, h)
         if abs(gap) <= 1e-14 * (abs(free) + mobility * most):
             break
+        # Illinois: the value at an end that stays twice is halved, else false position creeps from one side
         if gap > 0.0:
             high, high_gap = u, gap
             low_gap *= 0.5 if last == 1 else 1.0

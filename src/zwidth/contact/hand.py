@@ -93,7 +93,7 @@ class Reflex:
 
 @dataclass(frozen=True)
 class Hand:
-    """Who holds the handle, and what he does.
+    """The operator at the handle and his movements: push, tremor, reach, reflex.
 
     operator   his passive arm and grasp; None: nobody, or the loop's plant has him already
     push       a constant force towards the wall [N], on the arm behind an elastic grasp, else on the handle
@@ -118,7 +118,7 @@ class Hand:
 
     @property
     def push_numbers(self) -> Floats:
-        """What `hand_force` takes."""
+        """Numbers for `hand_force`."""
         numbers = np.zeros(PUSH_NUMBERS)
         numbers[:2] = self.push, self.ramp
         if self.reach is not None and self.operator is not None:
@@ -131,7 +131,7 @@ class Hand:
 
     @property
     def reflex_numbers(self) -> Floats:
-        """What `sample_brakes_and_reflexes` takes; an infinite threshold for none."""
+        """Numbers for `sample_brakes_and_reflexes`; an infinite threshold for none."""
         own = self.reflex
         if own is None:
             return np.array([inf, *np.zeros(REFLEX_NUMBERS - 1)])

@@ -1,6 +1,6 @@
 """Limit cycles of the sampled loop by harmonic balance: which vibrations keep themselves up, and are they met?
 
-Dry friction, encoder steps and saturation are replaced by what they do to a sinus of amplitude A
+Dry friction, encoder steps and saturation are replaced by their effect on a sine of amplitude A
 (`contact.describing_functions`). Where the linear loop so made (`contact.quasi_linear`) has its root on the unit
 circle, a vibration of that amplitude neither grows nor dies. It is stable, and so seen, where smaller ones grow
 and larger ones die; an unstable one is the edge of what the loop recovers from.
@@ -48,12 +48,12 @@ FOLDED = 40  # steps by a fifth in velocity
 
 @dataclass(frozen=True)
 class LimitCycle:
-    """A vibration that keeps itself up.
+    """A limit cycle: a vibration whose amplitude stays the same.
 
     amplitude            of the sensor's motion, before rounding [m]
     frequency_Hz
     stable               do smaller vibrations grow into it, and larger ones shrink?
-    force_amplitude      of the force that is asked for, before saturation [N]
+    force_amplitude      of the commanded force before saturation [N]
     velocity_amplitudes  (f,)  at each dry friction [m/s]
     largest_motion       as far as the device can move to either side [m]
     """
@@ -67,13 +67,13 @@ class LimitCycle:
 
     @property
     def within_range(self) -> bool:
-        """Can the device move so far? Where it cannot, the model says nothing of it, and nobody sees the cycle."""
+        """Whether the device can move so far; a cycle beyond its range cannot happen."""
         return self.amplitude <= self.largest_motion
 
 
 @dataclass(frozen=True)
 class HarmonicBalance:
-    """What happens to vibrations of each amplitude.
+    """Growth of vibrations over their amplitude.
 
     amplitude     (p,)  of the sensor's motion [m], ascending
     growth        (p,)  rate at which the fastest growing vibration of that amplitude grows [1/s]; -inf where
@@ -91,7 +91,7 @@ class HarmonicBalance:
 
     @property
     def leaves_range(self) -> bool:
-        """Do the largest vibrations within the range grow, so that nothing modelled holds them?"""
+        """Whether the largest vibrations within the range grow, so that nothing in the model limits them."""
         within = self.growth[self.amplitude <= self.largest_motion]
         return bool(len(within) and within[-1] > 0.0)
 
@@ -197,7 +197,7 @@ def _nothing(largest_motion: float) -> HarmonicBalance:
 def _parts(
     loop: Loop, coulomb_friction: ArrayLike | None, resolution: float | None, force_limit: float | None
 ) -> tuple[Nonlinear, float]:
-    """What is not linear of the loop, with what replaces it, and the smallest limit on the force."""
+    """The nonlinear parts of the loop, the linear parts that replace them, and the smallest force limit."""
     plant, parts = loop.plant, loop.plant.nonlinear
     if coulomb_friction is not None:
         C = np.asarray(coulomb_friction, dtype=float)

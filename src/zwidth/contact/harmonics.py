@@ -1,11 +1,11 @@
-"""A limit cycle of a limited force with its harmonics: what a sinus alone misses deep in saturation.
+"""A limit cycle of a limited force with its harmonics: a single sine is inaccurate deep in saturation.
 
-The limit acts on the samples of the force that is asked for, so that with theta = omega T j + a phase
+The limit acts on the samples of the commanded force, so that with theta = omega T j + a phase
 
     w(theta) = sum over odd n of Re(W_n exp(i n theta)),     W_n = G(exp(i n omega T)) U_n
 
 where U_n are the harmonics of the limited w(theta) and G is the loop cut at the limit, from the force that acts to
-the one asked for. One equation for each harmonic, solved by Newton's method from the first one, which is the
+the commanded one. One equation for each harmonic, solved by Newton's method from the first one, which is the
 describing function's answer. With all harmonics this is exact for vibrations that are not locked to the samples.
 """
 
@@ -33,7 +33,7 @@ FAR = 4.0  # times: a step to another cycle is none
 def with_harmonics(
     loop: Loop, wall_stiffness: float, wall_damping: float, cycle: LimitCycle, force_limit: float | None = None
 ) -> LimitCycle:
-    """The same limit cycle with up to 16 odd harmonics: amplitude, frequency and force are half peak to peak.
+    """Refine a limit cycle with up to 16 odd harmonics: amplitude, frequency and force are half peak to peak.
 
     Only the limit of the force is taken for nonlinear. Where Newton's method fails the cycle of the harmonics that
     it could follow is returned, of the first alone the one that was given.
@@ -107,14 +107,14 @@ class _OpenLoop:
         return np.asarray(found.x) if good else None
 
     def vibration(self, solution: Floats, count: int) -> tuple[float, float, float]:
-        """Half of peak to peak of the force that is asked for and of the position, and the angle per sample."""
+        """Half of peak to peak of the commanded force and of the position, and the angle per sample."""
         W, angle = _parts(solution, count)
         position = self._loop_response(angle, count)[1] * self._limited(W)
         force, place = (0.5 * float(np.ptp(self._over_phases(part))) for part in (W, position))
         return force, place, angle
 
     def _loop_response(self, angle: float, count: int) -> Complexes:
-        """(2, h) the force that is asked for, and the sensor's motion, by the force that acts."""
+        """(2, h) responses of the commanded force and of the sensor's motion to the force that acts."""
         size, orders = len(self.transition), np.arange(1, 2 * count, 2)
         z = np.exp(1j * angle * orders)[:, None, None]
         inner = np.linalg.solve(z * np.eye(size) - self.transition, self.force[:, None].astype(complex))[..., 0]

@@ -16,7 +16,7 @@ MOST_TOLD: Final = 4  # cycles that a prediction shows of itself
 
 @dataclass(frozen=True)
 class SimulatedVibration:
-    """What a simulation finds.
+    """Vibration that a simulation ends in.
 
     start, duration  [m] from the middle of the vibration, [s]
     behaviour        as in `motion_verdict.Judgement`
@@ -80,12 +80,12 @@ class LimitCyclePrediction(Result):
 
     @property
     def leaves_range(self) -> bool:
-        """Do the largest vibrations within the range grow, so that nothing modelled holds them?"""
+        """Whether the largest vibrations within the range grow, so that nothing in the model limits them."""
         return self.balance.leaves_range
 
     @property
     def simulation_disagrees(self) -> bool:
-        """Does a simulation go round at another frequency than is predicted? Then believe the simulation."""
+        """Whether a simulation has a limit cycle at another frequency than predicted; it is right then."""
         return any(
             found is not None
             and found.behaviour != "converged"
@@ -163,5 +163,5 @@ def _as_cell(value: float | bool) -> float | str:
 
 
 def cycle_speed(cycle: LimitCycle) -> float:
-    """Velocity amplitude at the sensor, of the sinus [m/s]."""
+    """Velocity amplitude at the sensor, of the sine [m/s]."""
     return 2.0 * pi * cycle.frequency_Hz * cycle.amplitude

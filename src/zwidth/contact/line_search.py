@@ -96,7 +96,7 @@ def stiffness_lines(damping: Floats, least: float) -> Lines:
 def nearest_change(
     trial: StabilityTrial, lines: Lines, found: Brackets, tolerance: Floats, *, start_stable: bool
 ) -> Brackets:
-    """The same places where every wall on the way to them is stable; else where the verdict changes first.
+    """Move the end of each line back to the first change of the verdict; ends with a stable way to them stay.
 
     found         along the lines, as `march` and `bisect` leave it;   tolerance  (m,)  of a change
     start_stable  is the start of each line known to be stable? If not, the way begins at the first stable wall
@@ -132,7 +132,7 @@ def nearest_change(
 
 
 def stable_beyond(trial: StabilityTrial, lines: Lines, unstable: Floats) -> NDArray[np.bool_]:
-    """Is some wall farther out than the first unstable one (m,) stable again? False where none was unstable."""
+    """Whether a wall beyond the first unstable one (m,) is stable again; False where none is unstable."""
     known = np.flatnonzero(np.isfinite(unstable))
     again = np.zeros(len(unstable), dtype=bool)
     t = np.outer(unstable[known], AFTER)

@@ -1,13 +1,13 @@
-"""What a run says: does the motion die away, grow, go round, bounce, or leave?
+"""Verdict on a simulated motion: it decays, grows, is a limit cycle, bounces, or leaves the wall.
 
-Judged is the second half of the run, by its third and its last quarter. Growth is told by the differences from
-sample to sample, which know nothing of where the device comes to rest: with d_j = y_{j+1} - y_j,
+The second half of the run is judged, by its third and its last quarter. Growth is measured on the differences from
+sample to sample, which do not depend on where the device comes to rest: with d_j = y_{j+1} - y_j,
 
     growth = ln( rms(d, last quarter) / rms(d, third quarter) ) / (samples between them)     per sample
 
 Each motion rho^j gives ln rho, in the end that of the slowest decay or the fastest growth: the logarithm of the
-spectral radius. The quarters are weighted by a Hann window, so that a started period does not count. Nothing here
-speaks of other starts: without a hand the wall may hold a small motion and lose a large one.
+spectral radius. The quarters are weighted by a Hann window, so that a started period does not count. The
+verdict holds for this start only: without a hand the wall may hold a small motion and lose a large one.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ FEWEST: Final = 16  # samples
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a run says.
+    """Verdict on a run.
 
     behaviour     converged: at rest inside; decaying; growing; limit cycle: keeps its size without losing contact;
                   bouncing: in and out without an end; lost contact: out, and not back; undecided
@@ -55,14 +55,14 @@ class Judgement:
 
     @property
     def stable(self) -> bool | None:
-        """Does the motion die away inside the wall?"""
+        """Whether the motion decays inside the wall."""
         if self.behaviour == "undecided":
             return None
         return self.behaviour in ("converged", "decaying")
 
 
 def judge_response(response: TimeResponse) -> Judgement:
-    """What a run says; one with fewer than 16 samples says nothing, unless it has left its bounds.
+    """Judge a run; one with fewer than 16 samples is undecided, unless it has left its bounds.
 
     A motion below half the encoder's step that the encoder does not see is at rest; so is one that noise alone
     keeps up, below half a step and three standard deviations. One that the encoder sees goes round, however small.
@@ -121,7 +121,7 @@ def _behaviour(
 
 
 def _at_rest(response: TimeResponse, last: slice) -> bool:
-    """Is what is left of the motion below what the encoders tell?"""
+    """Whether the remaining motion is smaller than what the encoders resolve."""
     swing = _half_peak_to_peak(response.truth[last])
     if response.noise > 0.0:
         return swing < 0.5 * response.quantum + 3.0 * response.noise

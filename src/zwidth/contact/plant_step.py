@@ -21,7 +21,7 @@ SETTLED = 1e-14  # relative change of their forces that is none
 
 
 class PlantState(NamedTuple):
-    """What moves of one run, and room for a substep.
+    """State of one run, and working memory for a substep.
 
     states, next_states  (R,)    now, and after the substep: N states, then place and speed of each element's
                          motion
@@ -47,7 +47,7 @@ def motion_from(devices: PlantArrays, start: Floats) -> PlantState:
 
 @compiled_inline
 def set_held_increment(inputs: Floats, d: int, part: int, command: float, push: float, held: Floats) -> None:
-    """What command and push add over a substep."""
+    """Change of the states by command and push over a substep."""
     for i in range(held.size):
         held[i] = inputs[d, part, 0, i] * command + inputs[d, part, 1, i] * push
 
@@ -81,7 +81,7 @@ def step(A: Floats, inputs: Floats, d: int, part: int, state: PlantState) -> Non
 def step_with_friction(
     A: Floats, inputs: Floats, d: int, part: int, level: float, count: int, state: PlantState
 ) -> None:
-    """So many substeps under one Coulomb friction alone and a force that stays.
+    """Take several substeps under one Coulomb friction and a constant force.
 
     The very numbers of `predict_motions`, `solve_forces` and `step`, without asking each time what there is; in so
     short a loop that costs more than the algebra.
@@ -101,7 +101,8 @@ def step_with_friction(
         there[speed] = w + mobility * force
         here, there = there, here
     state.forces[0] = force
-    # the motion's place is asked for by nobody on the way: `there` has what it came from
+    # the position enters no force within the interval, so that it is computed once, from `there`: the states that
+    # `here` was stepped from
     place = held[N]
     for k in range(N):
         place += A[d, part, N, k] * there[k]

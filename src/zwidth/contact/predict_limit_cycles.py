@@ -23,13 +23,13 @@ from zwidth.model.modes import least_deforming_motion
 from zwidth.progress import Progress
 
 NOT_PREDICTED: Final = ("noise", "programmable brakes")
-STARTS: Final = (0.7, 1.4)  # of the predicted amplitude; the run that ends nearer to it is told
+STARTS: Final = (0.7, 1.4)  # of the predicted amplitude; the run that ends nearer to it is reported
 CYCLES: Final = 500  # that a run has, within these numbers of samples
 FEWEST, MOST = 4_000, 60_000
 COUNTS: Final = 5.0  # from which a device starts where no stable cycle is predicted
 SMALL: Final = 1e-3  # m, from which one without encoder steps does
 BY_FIRST: Final = (
-    "harmonic balance: each nonlinear part as it acts on a sinus. Good to some per cent for vibrations of ten "
+    "harmonic balance: each nonlinear part as it acts on a sine. Good to some per cent for vibrations of ten "
     "samples and more in a cycle; an estimate for what an encoder holds, or locks to the samples"
 )
 BY_HARMONICS: Final = (
@@ -49,7 +49,7 @@ class NothingNonlinearError(ValueError):
 
 
 class NoEncoderStepsError(ValueError):
-    """A device without encoder steps, about whose counts something is asked."""
+    """A device without encoder steps, for which a place between two steps was given."""
 
     def __init__(self) -> None:
         super().__init__("offset lies between two encoder steps, and the device has none; leave it at 0")
@@ -125,7 +125,7 @@ def predict_limit_cycles(
 
 
 def amplitude_dependent(point: OperatingPoint, offset: float = 0.0) -> tuple[str, ...]:
-    """What of a device depends on the amplitude of a vibration, in words; brakes and noise do not count.
+    """Name the parts of a device that depend on the amplitude of a vibration; brakes and noise do not count.
 
     Raises  what `predict_limit_cycles` raises before it computes
     """
@@ -144,7 +144,7 @@ def amplitude_dependent(point: OperatingPoint, offset: float = 0.0) -> tuple[str
 
 
 def largest_motion(point: OperatingPoint) -> float:
-    """How far a device can move to either side of its posture [m].
+    """Largest motion of a device to either side of its posture [m].
 
     Returns  for a mechanism how far its handle gets along the direction, in its assembly; for a given plant as far
              as any device does
@@ -157,7 +157,7 @@ def largest_motion(point: OperatingPoint) -> float:
 
 
 def settles(cycle: LimitCycle) -> bool:
-    """Does a vibration settle there, and can the device move so far?"""
+    """Whether the cycle is stable and within the range of the device."""
     return cycle.stable and cycle.within_range
 
 
@@ -172,7 +172,7 @@ def _limits(loop: Loop, K: float, B: float) -> tuple[float | None, float | None]
 
 
 def _simulated(loop: Loop, K: float, B: float, offset: float, cycle: LimitCycle) -> SimulatedVibration:
-    """What becomes of starts on both sides of a cycle: the vibration that ends nearer to it."""
+    """Simulate from both sides of a cycle; the vibration that ends nearer to it."""
     starts = [share * cycle.amplitude for share in STARTS]
     found = _runs(loop, K, B, offset, starts, cycle.frequency_Hz)
     alive = [run for run in found if run.amplitude > 0.0 and run.behaviour != "converged"]
@@ -182,7 +182,7 @@ def _simulated(loop: Loop, K: float, B: float, offset: float, cycle: LimitCycle)
 def _simulate_small_start(
     loop: Loop, K: float, B: float, offset: float, cycles: tuple[LimitCycle, ...]
 ) -> SimulatedVibration:
-    """What becomes of a start some counts off, and well within the smallest cycle, below which it should die."""
+    """Simulate from a start of a few counts, well within the smallest cycle, which should decay."""
     quantum = reading_step(loop.plant)
     starts = [COUNTS * quantum] if quantum else [SMALL]
     starts += [0.5 * cycle.amplitude for cycle in cycles]

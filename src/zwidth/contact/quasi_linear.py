@@ -40,7 +40,7 @@ class Vibration:
 
     root         z of the equivalent loop; it grows where |z| > 1
     amplitude    of the sensor's motion, before any rounding [m]
-    force        amplitude of the force that is asked for, before saturation [N]
+    force        amplitude of the commanded force before saturation [N]
     velocities   (f,)  at the frictions: sqrt 2 times the root mean square, over all times [m/s]
     readings     (c,)  at the counters [m or rad]
     deflections  (s,)  at the bent springs [m]
@@ -69,7 +69,7 @@ def friction_velocity_of(swing: Vibration) -> float:
 
 @dataclass(frozen=True)
 class EquivalentLoop:
-    """A loop and a wall, ready to be asked about any amplitude.
+    """A loop with a wall, in the form in which its vibrations of any amplitude are computed.
 
     offset  middle of the vibration, as a share of each counter's step
     """
@@ -97,7 +97,7 @@ class EquivalentLoop:
         return self._swing(root, sizes) if known else None
 
     def seed(self, amplitude: float, angle: float) -> Vibration:
-        """A vibration at some angle per sample, as if all moved like the sensor: something to start from."""
+        """A vibration at an angle per sample, everything moving like the sensor, to start an iteration from."""
         w, parts = angle / self.loop.period, self.parts
         return Vibration(
             complex(np.exp(1j * angle)),
@@ -131,7 +131,7 @@ class EquivalentLoop:
 
     def open_at_limit(self) -> tuple[Floats, Floats, Floats]:
         """The linear loop cut at the limit of its force: transition (M, M) without the force, what a force of 1 N
-        adds (M,), and the force that is asked for, (M,)."""
+        adds (M,), and the commanded force, (M,)."""
         steps = plant_steps(self._arrays, self._unbent)
         closed, _, command = transition(self._arrays, self._unbent, 1.0, *steps)
         cut, _, _ = transition(self._arrays, self._unbent, 0.0, *steps)

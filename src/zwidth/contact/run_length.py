@@ -1,4 +1,4 @@
-"""How long a contact is simulated by default, in how many steps, and at which distance the device is given up."""
+"""Default length and substeps of a simulated contact, and the distance at which a run stops."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from zwidth.contact.simulate import LARGEST_MOTION
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.loop import Loop
 
-MOST: Final = 60.0  # s
+MOST: Final = 60.0  # s of a run
 MOST_SAMPLES: Final = 1_000_000
-DECADES: Final = 6  # after which a motion that grows or dies fast has said what it does
-FEWEST: Final = 100  # samples, unless the decades are over before
-NEEDED: Final = 24  # samples that a verdict takes
-TENFOLDS: Final = 5  # of what is not linear, which takes its time to settle
-LEAST: Final = 2.0  # s, of what is not linear
-PERIODS: Final = 8  # from which a frequency can be told
-GROWN: Final = 2  # tenfold changes of what grows, which nobody waits for
-SWINGS: Final = 10  # of a tremor that a run has at least
-JUDGED: Final = 32  # samples of growth that are run all the same, so that it can be told
-FARTHEST: Final = 1e6  # m, to which they may grow
-COUNTED: Final = {"encoder steps", "noise"}  # of a device that moves linearly between samples
-SHOWN_BETWEEN: Final = 20  # substeps of what is exact with any
+DECADES: Final = 6  # tenfold changes after which the verdict on a fast motion is certain
+FEWEST: Final = 100  # samples of a run, unless the decades end before
+NEEDED: Final = 24  # samples that a verdict needs
+TENFOLDS: Final = 5  # tenfold changes of a nonlinear run, which settles slowly
+LEAST: Final = 2.0  # s of a nonlinear run
+PERIODS: Final = 8  # of a vibration, so that its frequency can be determined
+GROWN: Final = 2  # tenfold changes of a growing motion; more show nothing new
+SWINGS: Final = 10  # least number of swings of a tremor in a run
+JUDGED: Final = 32  # samples of growth that are simulated in any case, so that it can be measured
+FARTHEST: Final = 1e6  # m, to which a motion may grow in these samples
+COUNTED: Final = {"encoder steps", "noise"}  # nonlinear parts that leave the motion between samples linear
+SHOWN_BETWEEN: Final = 20  # substeps of a run that is exact with any number
 
 
 class RunLength(NamedTuple):
@@ -98,14 +98,14 @@ def run_length(
     frequency: float = 0.0,
     sound: float = 0.0,
 ) -> RunLength:
-    """Seconds worth simulating.
+    """Choose the length of a run [s].
 
     growth      predicted, ln rho per sample; None: not known
     period      T [s]
-    linear      nothing but exponentials can come of it
-    busy_until  when the hand has done what it does [s]
-    frequency   predicted, of what dies away last or grows fastest [Hz]; 0: none
-    sound       how long it takes to be heard [s]
+    linear      True: the motion is a sum of exponentials
+    busy_until  end of the hand's last movement [s]
+    frequency   predicted, of the motion that decays last or grows fastest [Hz]; 0: none
+    sound       length that a sound file needs [s]
     """
     tenfold = log(10.0) / abs(growth) if growth else inf
     if linear:
@@ -131,7 +131,7 @@ def run_length(
 
 
 def lengthened(length: RunLength, sound: float, period: float) -> RunLength:
-    """As long, or the seconds that a first run has shown to be needed for its vibration to be heard."""
+    """The length, or a longer one where a first run shows that its sound needs more seconds."""
     return length if sound <= length.seconds else _capped(sound, "to be heard", period)
 
 
@@ -146,7 +146,7 @@ def _capped(seconds: float, reason: str, period: float) -> RunLength:
 
 
 def busy_until(hand: Hand) -> float:
-    """When the hand has done what it does [s]."""
+    """End of the hand's last movement [s]."""
     reached = 0.0 if hand.reach is None else hand.reach.start + hand.reach.duration
     slow = hand.tremor is not None and hand.tremor.frequency > 0.0
     trembled = SWINGS / hand.tremor.frequency if slow and hand.tremor is not None else 0.0
@@ -154,17 +154,19 @@ def busy_until(hand: Hand) -> float:
 
 
 def bound_of_run(offset: float, growth: float | None) -> float:
-    """Distance from the wall at which a run is given up: the device is lost, or has grown beyond every device [m].
+    """Distance from the wall at which a run stops, because no device moves so far [m].
 
     offset  of the start from the wall [m];   growth  predicted per sample; None: not known
-    Returns more than that where the run starts so far away, or grows so far while its growth is being told
+    Returns more than that where the run starts so far away, or grows so far in the samples in which its growth is
+            measured
     """
     grown = offset * exp(min(max(growth or 0.0, 0.0) * JUDGED, 600.0))
     return max(LARGEST_MOTION, 10.0 * offset, min(grown, FARTHEST))
 
 
 def needed_substeps(loop: Loop, hand: Hand, substeps: int) -> int:
-    """As many, but of a linear device under a steady push no more than show what is between samples."""
+    """The number of substeps; of a linear device under a steady push only those that a figure needs, as all are
+    exact."""
     steady = hand.reflex is None and hand.tremor is None and hand.reach is None and not hand.ramp
     linear = not set(loop.plant.nonlinear.kinds) - COUNTED
     return min(substeps, SHOWN_BETWEEN) if steady and linear else substeps

@@ -1,4 +1,4 @@
-"""What happens on contact: one loop, or many at once, against an environment, sample by sample."""
+"""Simulate one loop, or many at once, against an environment, sample by sample."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def simulate_batch(
 def _plan(
     run: Run, held_device: HeldDevice, plants: PlantArrays, d: int, samples: int, environment: Environment
 ) -> RunSettings:
-    """What was asked for of one run."""
+    """Settings of one run, for its `TimeResponse`."""
     counters = held_device.counters
     plain = not held_device.elements and run.passivity is None and isinf(held_device.limit)
     plain = plain and not isinstance(held_device.loop.controller.velocity, Foaw | Levant)

@@ -1,4 +1,4 @@
-"""What happens when a device touches a wall, or something else: from an operating point to a verdict."""
+"""Simulated contact with a wall or another environment: from an operating point to a verdict."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class NoForceError(ValueError):
     def __init__(self, environment: str, time: float, penetration: float, velocity: float) -> None:
         self.environment, self.time, self.penetration, self.velocity = environment, time, penetration, velocity
         super().__init__(
-            f"{environment} gave no finite force at {time:.6g} s, where it was told a position of "
+            f"{environment} gave no finite force at {time:.6g} s, where it was given a position of "
             f"{penetration:.6g} m and {velocity:.6g} m/s; have it return a number there"
         )
 
@@ -197,7 +197,8 @@ def _long_enough(
 
 
 def range_exit(point: OperatingPoint, response: TimeResponse) -> RangeExit | None:
-    """Where a motion leaves the handle's range; the whole range is asked only if an extreme cannot be reached."""
+    """Find where a motion leaves the handle's range, which is computed only if an extreme of the motion cannot be
+    reached."""
     handle = response.handle
     try:
         for extreme in (handle.min(), handle.max()):

@@ -62,7 +62,7 @@ class TrialError(ValueError):
 
 @dataclass(frozen=True)
 class StabilityTrial:
-    """What is on the table.
+    """A virtual experiment: device, disturbance, hand, and what counts as stable.
 
     loop         the device and its computer, without an operator
     hand         who holds it and pushes
@@ -104,18 +104,18 @@ class StabilityTrial:
 
     @property
     def smooth(self) -> bool:
-        """Is nothing nonlinear but the wall?"""
+        """Whether nothing is nonlinear except the wall."""
         linear_estimate = not isinstance(self.loop.controller.velocity, Foaw | Levant)
         return not self.loop.nonlinear and linear_estimate
 
     @property
     def linear(self) -> bool:
-        """Is nothing nonlinear at all?"""
+        """Whether nothing is nonlinear."""
         return self.smooth and not self.one_sided and self.hand.reflex is None and self.hand.tremor is None
 
     @cached_property
     def first_samples(self) -> int:
-        """Samples watched at first: four periods of the slowest vibration that the device has by itself."""
+        """Samples watched at first: four periods of the slowest vibration of the device without a wall."""
         own = natural_frequencies(self.loop.plant)
         slow = PERIODS / float(own[own > 0.0].min(initial=np.inf)) / self.loop.period
         held = self.one_sided or self.hand.operator is not None
@@ -126,7 +126,7 @@ class StabilityTrial:
         )
 
     def linearised(self) -> StabilityTrial:
-        """The same table with what is linear of the device only, and a two-sided wall."""
+        """The same trial with the linear part of the device only, and a two-sided wall."""
         plain = replace(self.loop.plant, nonlinear=Nonlinear())
         computer = replace(self.loop.controller, force_limit=float("inf"))
         hand = replace(self.hand, push=0.0, reflex=None, tremor=None, reach=None)
@@ -135,7 +135,7 @@ class StabilityTrial:
 
 @dataclass(frozen=True)
 class Observation:
-    """What was seen of one wall.
+    """Verdict on one wall, from the motion after a disturbance.
 
     stable     the motion died away inside the wall, or is too small to be seen
     behaviour  as `motion_verdict` names it

@@ -31,9 +31,9 @@ SOURCES: Final = (
 
 
 class RunSettings(NamedTuple):
-    """What was asked for of a run.
+    """Settings of a run.
 
-    samples  how many;   offsets (p,)  ends of the substeps after a sample [s];   the others as in TimeResponse
+    samples  their number;   offsets (p,)  ends of the substeps after a sample [s];   the others as in TimeResponse
     """
 
     samples: int
@@ -49,7 +49,7 @@ class RunSettings(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class TimeResponse(Result):
-    """What a loop does in time; S samples.
+    """Motion of a loop in time; S samples.
 
     period           T [s]
     wall_position    where the environment begins [m]
@@ -65,9 +65,9 @@ class TimeResponse(Result):
     given_up         the reading left the bounds before the end
     quantum          largest step of the reading, of all encoders together [m]; 0 where it has none
     noise            standard deviation of the reading's noise [m]
-    linear           nothing but the environment could be nonlinear, and that is the two-sided wall
-    surface          the environment has one to touch, and contact can be lost
-    held             somebody pushes
+    linear           the device is linear, and the environment is the two-sided wall
+    surface          the environment has a surface, so that contact can be lost
+    held             a hand pushes the device against the wall
     """
 
     period: float
@@ -141,7 +141,7 @@ class TimeResponse(Result):
 
     @property
     def series(self) -> dict[str, Floats]:
-        """What is known of each sample, by key and unit; the energy where it was kept."""
+        """The records of each sample, by key and unit; energies where they were recorded."""
         energy = {"energy_J": self.stored} if self.stored.size else {}
         return {
             "time_s": self.time,

@@ -111,6 +111,8 @@ def plant_steps(loop: LoopArrays, sizes: Floats) -> tuple[Floats, Floats]:
         for i in range(n):
             strongest += abs(loop.force_inputs[n + i, p] * loop.friction_motions[p, i])
         b = damper_gain(loop.coulomb[p], max(sizes[VELOCITIES + p], LEAST))
+        # at small amplitudes dry friction acts as an ever larger damper; one that stops the motion within the
+        # sample is enough, a stronger one does the same
         b = min(b, STOPPED * loop.period / strongest) if strongest > 0.0 else 0.0
         for i in range(N):
             for j in range(n):
@@ -121,6 +123,7 @@ def plant_steps(loop: LoopArrays, sizes: Floats) -> tuple[Floats, Floats]:
         for i in range(N):
             for j in range(n):
                 A[i, j] -= k * loop.force_inputs[i, f + s] * loop.spring_motions[s, j]
+    # with a delay that is not whole, the old force acts first and the new one after it
     times = PARTS * (2 if loop.fractional_delay > 0.0 else 1)
     states, forces = np.zeros((times, N, N)), np.zeros((times, 2, N))
     E, g, product = np.eye(N), np.zeros((2, N)), np.zeros((N, N))
@@ -148,7 +151,7 @@ def transition(
     loop: LoopArrays, sizes: Floats, passes: float, states: Floats, forces: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Transition (M, M) of the loop whose gains are those of a vibration; the velocities (t, n, M) at times within
-    the sample, from its beginning to its end [m per sample]; and the force (M,) that is asked for.
+    the sample, from its beginning to its end [m per sample]; and the commanded force (M,).
 
     passes  share of the force that acts; negative: what its limit lets pass
     """
@@ -330,21 +333,25 @@ def iterate_vibration(
         roots, all_sizes = vibrations(loop, now, size, by_velocity)
         if len(roots) == 0:
             return False, z, now
+        # the root nearest to the last one: the branch is followed, not the fastest root
         k = np.argmin(np.abs(roots - z))
         after = all_sizes[k]
         change = max(abs(roots[k] - z), difference(loop, now, after, roots[k]))
         if change < same:
             return True, roots[k], after
+        # two blocks without progress end the iteration, as the changes may rise and fall within a block
         peak = max(peak, change)
         if (iteration + 1) % BLOCK == 0:
             vain = vain + 1 if peak > NEARER * last else 0
             last, peak = peak, 0.0
             if vain == 2:
                 break
+        # slow or swinging progress: smaller steps
         if change > 0.7 * before:
             weight = max(0.6 * weight, 0.05)
         before, z = change, roots[k]
         for i in range(len(now)):
+            # sizes differ by orders of magnitude and stay positive, so that the mean is taken of their logarithms
             both = now[i] > 0.0 and after[i] > 0.0
             now[i] = np.exp((1.0 - weight) * np.log(now[i]) + weight * np.log(after[i])) if both else after[i]
     return before < 1e-6, z, now

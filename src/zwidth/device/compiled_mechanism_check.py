@@ -1,4 +1,4 @@
-"""Whether a device already checked can still be put together with other numbers, told by compiled code."""
+"""Check in compiled code whether a checked device can still be assembled with other numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from zwidth.model.posture import OK, Posture, solve_posture
 
 
 def assembles(mechanism: Mechanism, assembly: str | None) -> bool:
-    """Is there a posture at the reference, with a mass behind every motion?
+    """Whether there is a posture at the reference, with a mass for every motion.
 
     What holds is what `mechanism_check.mechanism_faults` checks of any mechanism, in a tenth of its time. Where it
     does not hold nothing is said: the mechanism may still be put together with its handle elsewhere.
@@ -22,7 +22,7 @@ def assembles(mechanism: Mechanism, assembly: str | None) -> bool:
 
 
 def moves_mass(posture: Posture) -> bool:
-    """Has every motion a mass, wherever there is a posture?"""
+    """Whether every motion has a mass in each posture."""
     M = posture.mass_matrix[posture.status == OK]
     eigenvalues = np.linalg.eigvalsh(M)
     least = M.shape[-1] * np.finfo(float).eps * eigenvalues[..., -1]

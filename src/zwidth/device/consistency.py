@@ -1,6 +1,6 @@
 """What two keys must agree on: either-or, sizes, names that refer to names.
 
-These checks read the plain document and pass over whatever is not as it should be by itself, so that they run
+These checks read the plain document and skip every value that is itself faulty, so that they run
 beside the checks of single keys and no fault hides another.
 """
 
@@ -84,7 +84,7 @@ def _plant(plant: dict[str, Any]) -> KeyMessages:
 
 
 def _springless(stiffness: Any) -> bool:
-    """Is a stiffness left out, or zero throughout?"""
+    """Whether a stiffness is left out, or zero throughout."""
     if isinstance(stiffness, list):
         return all(map(_springless, stiffness))
     return stiffness is None or (is_number(stiffness) and stiffness == 0)

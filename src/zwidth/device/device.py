@@ -82,20 +82,20 @@ class Device:
 
     @property
     def friction_known(self) -> bool:
-        """Does the file tell the dry friction, be it 0?"""
+        """Whether the file gives the dry friction, 0 included."""
         mechanism = self.document.get("mechanism", {})
         return "friction" in self.document or any("coulomb_Nm" in d for d in mechanism.get("drives", ()))
 
     @property
     def resolution_known(self) -> bool:
-        """Does the file tell the encoders' steps, be they 0? Of a mechanism it has to tell them all."""
+        """Whether the file gives the encoders' steps, 0 included; those of all drives for a mechanism."""
         if self.mechanism is not None:
             return bool(np.isfinite(self.mechanism.drives.encoder_counts).all())
         return self.document.get("loop", {}).get("encoder", {}).get("resolution_m") is not None
 
     @property
     def linear_omissions(self) -> tuple[str, ...]:
-        """What of the device a linear answer leaves out, in words; () if it leaves out nothing."""
+        """Parts of the device that a linear answer leaves out, in words; () if there are none."""
         return linear_omissions(self.mechanism, self.given_plant, self.controller)
 
     def at(
@@ -178,7 +178,7 @@ class Device:
         return _verbs.old_posture(self, *arguments, **options)
 
     def at_point(self, point: OperatingPoint) -> OperatingPoint:
-        """This device where another was asked about, at a single point: the same position asked for (or the same
+        """This device at the operating point of another, a single one: the same requested position (or the same
         joint angles), directions, assembly and model. Raises what `at` raises."""
         if point.posture is None:
             return self.at(model=point.model)
@@ -272,7 +272,7 @@ class Device:
         return unit_vectors(self.label, "direction", self.reference_direction if direction is None else direction)
 
     def _requested_position(self, position: Position | ArrayLike | Posture | None) -> Position | Floats | None:
-        """What a point remembers of the position asked for: enough to ask another device for the same."""
+        """The requested position and direction that a point keeps, so that another device can be put there."""
         from zwidth.model.posture import Posture
 
         if position is None or isinstance(position, Mapping):

@@ -56,7 +56,7 @@ def load(
 def device_with_settings(device: Device, settings: Settings) -> Device:
     """The device with settings applied, checked again; see `Device.with_`.
 
-    Whether the mechanism can be put together is asked again only where one of its numbers has changed, and of
+    Whether the mechanism can be assembled is checked again only where one of its numbers has changed, and of
     compiled code first.
     """
     document = address.apply(device.document, _listed(settings))
@@ -84,7 +84,7 @@ def from_document(
     """The device that a document describes; `label` is what messages call it.
 
     Single keys and what they say about each other are checked together; whether the mechanism can be put
-    together is asked once all of that is right, which takes most of the time.
+    together is checked once all of that is right, which takes most of the time.
 
     skip_assembly_check  True: it is known that it can, since it is a device already checked with numbers little
                          changed

@@ -49,7 +49,7 @@ def lag_fault(place: KeyPath, tau: Any, T: float) -> KeyMessages:
 
 
 def _no_lag(tau: float, T: float) -> bool:
-    """Is this a time constant that rounding would drown in, or that no device has?"""
+    """Whether a time constant is too short or too long for the sampling period, or for any device."""
     return (0 < tau < SHORTEST_LAG * T) or (tau > LONGEST_LAG * T and math.isfinite(tau))
 
 
@@ -93,7 +93,7 @@ def _encoder(document: dict[str, Any], loop: dict[str, Any]) -> KeyMessages:
 
 
 def _noise(loop: dict[str, Any]) -> KeyMessages:
-    """A method that counts on the encoder's error is told how large it is."""
+    """A method that uses the encoder's error needs its size."""
     velocity, encoder = table(loop, "velocity"), table(loop, "encoder")
     named = {"kalman": "the standard deviation of the encoder's error", "foaw": "the encoder's largest error"}
     method = next((name for name in named if name == velocity.get("method")), None)

@@ -1,6 +1,6 @@
 """Numbers that are allowed and look wrong: a unit has probably slipped.
 
-Nothing is changed and nothing refused; whoever loads the device is warned. A number is named where it lies far
+Nothing is changed or refused; loading the device gives a warning. A number is named where it lies far
 outside what haptic devices have, by more than design can explain and by less than the usual slips: grams for
 kilograms and millimetres for metres (1000), degrees for radians (57.3), g cm^2 for kg m^2 (1e7), milliseconds for
 seconds. Lengths are judged by themselves; masses, inertias and torques by the size of the device that has them.

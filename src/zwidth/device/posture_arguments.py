@@ -60,7 +60,7 @@ def unit_vectors(label: str, name: str, value: Any) -> Floats:
 def joint_angles(label: str, mechanism: Mechanism, at: Mapping[str, float]) -> dict[str, float]:
     """Angles of all driven joints by the names of their links [rad].
 
-    Raises  DeviceError  for other joints than the driven ones, and for what is no angle
+    Raises  DeviceError  for other joints than the driven ones, and for a value that is not an angle
     """
     driven = [mechanism.links.names[joint] for joint in mechanism.drives.joint]
     if set(at) != set(driven):

@@ -28,7 +28,7 @@ SPECTRUM: Final = ("frequency_Hz", "real_m_per_N", "imag_m_per_N")
 RECORD: Final = ("time_s", "force_command_N", "position_m")
 OPTIONAL: Final = ("coherence", "sweep")
 LINE: Final = ""
-MOST_LINES: Final = 3  # told of one cause
+MOST_LINES: Final = 3  # reported for one cause
 UNEVEN: Final = 0.05  # of the sampling period, by which time stamps may jitter
 PERIOD_TOLERANCE: Final = 1e-3  # relative, by which their mean may differ from it
 
@@ -91,7 +91,7 @@ def _responses(path: Path, section: ResponseSection, period: float) -> Iterator[
 
 
 def _spectrum(path: Path, table: Table, section: ResponseSection, period: float) -> Response:
-    """A response as it stands, its frequencies checked."""
+    """A response read unchanged, its frequencies checked."""
     f, lines = table["frequency_Hz"], table[LINE].astype(int)
     half = 0.5 / period
     low, twice, falling = f <= 0.0, np.diff(f) == 0.0, np.diff(f) < 0.0
@@ -239,7 +239,7 @@ def _got(cell: str) -> str:
 
 
 def _lies_in(folder: Path, path: Path) -> bool:
-    """Does a file lie in a folder or below it, all links followed?
+    """Whether a file lies in a folder or below it, all links followed.
 
     Who opens a device file from somebody else must not have other files of his own read by it, nor through a link
     that came with it.

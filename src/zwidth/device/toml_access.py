@@ -25,7 +25,7 @@ def is_number(value: Any) -> TypeGuard[float]:
 
 
 def row_count(value: Any) -> int | None:
-    """How many rows a matrix has, 1 for a single number; None for what is no matrix."""
+    """How many rows a matrix has, 1 for a single number; None for anything else."""
     if is_number(value):
         return 1
     return len(value) if isinstance(value, list) and value else None

@@ -43,7 +43,7 @@ def validation_messages(
     description: Callable[[KeyPath], str] = schema.key_description,
     unknown: Callable[[KeyPath], str] | None = None,
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Path and sentence of each fault; a key missing only because it is misspelt is told once.
+    """Path and sentence of each fault; a key missing only because it is misspelt is reported once.
 
     description, unknown  of files that are no device files: what the key at a path means, "" for nothing; and the
                           sentence on a key that there is not
@@ -68,7 +68,8 @@ def validation_messages(
 
 
 def _long_enough(detail: ErrorDetails) -> bool:
-    """Whether a list is called too short only because elements at fault, told themselves, are not counted."""
+    """Whether a list counts as too short only because its faulty elements, which have their own message, do not
+    count."""
     limits = detail.get("ctx", {})
     return detail["type"] == "too_short" and len(detail["input"]) >= limits["min_length"]
 

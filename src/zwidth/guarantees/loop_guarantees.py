@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -59,6 +59,12 @@ class Guarantees(Result):
             if guarantee.name == name:
                 return guarantee
         raise KeyError(name)
+
+    def about(self, point: OperatingPoint) -> Self:
+        """Remember the operating point, for the regions, too, which can be drawn alone; returns the result."""
+        for one in self.guarantees:
+            one.region.about(point)
+        return super().about(point)
 
     @property
     def is_empty(self) -> bool:

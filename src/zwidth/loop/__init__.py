@@ -1,4 +1,4 @@
-"""What the computer does: controllers, filters, velocity estimates, the sampled loop, operating points."""
+"""The sampled loop: controllers, filters, velocity estimates, holds, operating points."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""What the computer does between reading the encoder and setting the force."""
+"""The controller: what the computer does between reading the encoder and setting the force."""
 
 from __future__ import annotations
 

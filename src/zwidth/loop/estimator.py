@@ -28,7 +28,7 @@ class Estimator:
 
 
 class NonlinearError(ValueError):
-    """An estimate that is not linear was asked for w(z), which it does not have.
+    """A velocity estimate that is not linear has no transfer function w(z).
 
     estimate  what it is called
     """

@@ -222,7 +222,8 @@ def _plant_numerator(
 ) -> int:
     """Numerator of the sum over rows, times (1 - s)^degree, into `total`; returns the degree.
 
-    What cancels in the sum goes into `cancelled`: a coefficient is known to rounding of |total| + cancelled.
+    The size of the terms that cancel in the sum goes into `cancelled`: a coefficient is known to the rounding of
+    |total| + cancelled.
     """
     rows, split = factors.rows, factors.split
     m = rows.shape[0]

@@ -69,7 +69,7 @@ def _stacked(rows: Rows) -> Floats:
 
 
 def force_filter(controller: Controller) -> Filter:
-    """What the computer does to the whole force, F(z)."""
+    """Filter of the whole force, F(z)."""
     top, bottom = low_pass_factors(controller.force_filter, controller.sampling_period)
     return Filter(_stacked(top), _stacked(bottom))
 

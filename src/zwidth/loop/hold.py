@@ -101,7 +101,7 @@ def held_row(decay: float, squared: float, period: float, fraction: float) -> Ro
 
 
 def modal_row(decay: float, squared: float, period: float, fraction: float = 0.0, lag: float = 0.0) -> Floats:
-    """The same as an array (8,), with or without actuator lag."""
+    """One mode's row as an array (8,), with or without actuator lag."""
     if lag == 0.0:
         return np.array(held_row(decay, squared, period, fraction))
     T, rest = period, (1.0 - fraction) * period

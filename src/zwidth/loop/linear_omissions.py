@@ -1,4 +1,4 @@
-"""What of a device is not linear, and so left out of every linear answer."""
+"""Parts of a device that are not linear, and so left out of every linear answer."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class Loop:
         """Close the loop of a plant with a controller, or with a plain one of this period and delay.
 
         sampling_period  T [s];   delay  from reading to force [samples], any real >= 0
-        Raises  TypeError   for what is no plant or controller, or neither controller nor period
+        Raises  TypeError   for anything but a plant and a controller, or neither controller nor period
                 ValueError  for a plant that holds nan, a controller beside a period or delay, numbers out of range
         """
         require("plant", plant, Plant, _INSTEAD.get(type(plant).__name__, ""))
@@ -100,8 +100,8 @@ class Loop:
 
     @property
     def nonlinear(self) -> Nonlinear:
-        """What of plant and computer is not linear, a nonlinear estimate apart; its force limit is the smaller of
-        the actuator's and the computer's."""
+        """The nonlinear parts of plant and computer, except a nonlinear velocity estimate; the force limit is
+        the smaller of the actuator's and the computer's."""
         own = self.plant.nonlinear
         return replace(own, force_limit=min(own.force_limit, self.controller.force_limit))
 
@@ -113,7 +113,7 @@ class Loop:
 
     @cached_property
     def force_path(self) -> Filter:
-        """What the force passes before it moves anything: its filter, then the actuator's lag."""
+        """The force's filter and the actuator's lag in series."""
         return force_path(self.controller)
 
     @cached_property

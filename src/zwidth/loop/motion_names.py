@@ -16,7 +16,7 @@ def motion_name(squared: float, decay: float) -> str:
 
 
 def pole_name(pole: complex) -> str:
-    """The same for a motion with a pole of its own; a braked free motion stays where it is left, at 0 Hz."""
+    """Name of a motion with a pole of its own; a braked free motion stays where it is left, at 0 Hz."""
     if pole == 0.0:
         return motion_name(0.0, 0.0)
     if pole.imag != 0.0:

@@ -35,7 +35,7 @@ class MultiLoop:
     controller: Controller
 
     def __post_init__(self) -> None:
-        """Raise TypeError for what is no plant of several directions, or no controller."""
+        """Raise TypeError for anything but a plant of several directions and a controller."""
         hint = "write Loop(plant, controller) for one direction" if isinstance(self.plant, Plant) else ""
         require("plant", self.plant, MultiPlant, hint)
         require("controller", self.controller, Controller)
@@ -62,7 +62,7 @@ class MultiLoop:
 
     @cached_property
     def continuous_plant(self) -> ContinuousPlant:
-        """What the walls move of the plant, in continuous time. Raises UnmovedError where that is nothing."""
+        """The part of the plant that walls move, in continuous time. Raises UnmovedError where there is none."""
         found = continuous_plant(self.plant, self.period, self.fractional_delay)
         if not len(found.A):
             raise UnmovedError("the wall forces move nothing that the sensors read; check actuators and sensors")

@@ -75,9 +75,9 @@ class OperatingPoint:
     encoders            what a mechanism's encoders read: "motor" or "link"
     operator            the arm and grasp at the handle; None: nobody
     operator_name       what he is called; None: nobody
-    friction_known, resolution_known   is the dry friction told, and the encoders' step, be they 0?
+    friction_known, resolution_known   whether the dry friction, and the encoders' step, are given, 0 included
     name                what the device is called in results and figures
-    requested_position  the position asked for, before it was projected; None: the device's reference
+    requested_position  position as requested, before it was projected; None: the device's reference
     """
 
     controller: Controller
@@ -181,7 +181,7 @@ class OperatingPoint:
 
     @cached_property
     def without_operator(self) -> OperatingPoint:
-        """The device by itself, with nobody at its handle."""
+        """The plant without an operator."""
         return self if self.operator is None else replace(self, operator=None, operator_name=None)
 
     # --- the mechanism there --------------------------------------------------------------------------
@@ -239,7 +239,7 @@ class OperatingPoint:
 
     @property
     def handle_range(self) -> tuple[float, float] | None:
-        """How far the handle can be from its posture along the direction [m]: backwards (not positive), forwards.
+        """Range of the handle from its posture along the direction [m]: backwards (not positive), forwards.
 
         None for a device without a mechanism. Raises OperatingPointError for several points.
         """
@@ -249,7 +249,7 @@ class OperatingPoint:
         return handle_range(self.mechanism, self._posture, self.direction)
 
     def distance_from_path(self, displacement: float) -> float | None:
-        """How far from a displacement along the direction the handle's path passes [m].
+        """Distance of the handle's path from a displacement along the direction [m].
 
         The linear plant moves along the tangent, the handle along a curve if it has few drives.
 
@@ -336,7 +336,7 @@ class OperatingPoint:
                 ".measure(name), which answers for all"
             )
 
-    # --- what can be asked of it: each verb forwards to the function that answers ---------------------
+    # --- verbs: each forwards to the function that computes the result ---------------------------------
 
     def chart(self, radius: float = 1.0, *, decay: bool = True) -> Chart:
         """The stable walls at a single point, exactly; see `chart.point_chart.chart_at`.
@@ -358,7 +358,7 @@ class OperatingPoint:
         return _verbs.by_direction(self, plane, count).about(self)
 
     def describe(self) -> Description:
-        """Masses, stiffness, frequencies and dexterity of the device by itself at a single point."""
+        """Masses, stiffness, frequencies and dexterity of the device without operator at a single point."""
         return _verbs.describe(self).about(self)
 
     def measure(
@@ -398,7 +398,7 @@ class OperatingPoint:
         return _verbs.guarantees(self, coupling, wall, progress).about(self.without_operator)
 
     def felt(self, stiffness: float, damping: float) -> FeltWall:
-        """What the hand feels of a wall [N/m], [N s/m]; see `measures.felt_wall`."""
+        """Felt impedance and stiffness of a wall [N/m], [N s/m]; see `measures.felt_wall`."""
         return _verbs.felt(self, stiffness, damping).about(self)
 
     def simulate(
@@ -423,7 +423,7 @@ class OperatingPoint:
         substeps: int = 20,
         seed: int = 0,
     ) -> ContactSimulation:
-        """What happens on contact with a wall, or something else; see `contact.simulate_contact`, which has all
+        """Simulate contact with a wall, or another environment; see `contact.simulate_contact`, which has all
         arguments, for their meaning."""
         return _verbs.simulate(
             self,
@@ -502,19 +502,19 @@ class OperatingPoint:
         return _verbs.measure_boundary(self, plan, user_points, file, progress).about(self)
 
     def validity(self, tolerance: float = 0.1) -> Validity:
-        """How far along the edge of the full model a simpler one tells the same; see `study.validity`."""
+        """Find where along the edge of the full model the simpler ones agree with it; see `study.validity`."""
         return _verbs.validity(self, tolerance).about(self)
 
     # --- what results say of it -----------------------------------------------------------------------
 
     @property
     def linear_omissions(self) -> tuple[str, ...]:
-        """What of the device a linear answer leaves out, in words; () if it leaves out nothing."""
+        """Parts of the device that a linear answer leaves out, in words; () if there are none."""
         return linear_omissions(self.mechanism, self.given_plant, self.controller)
 
     @property
     def charted_by_response(self) -> bool:
-        """Is the chart that of a frequency response: a measured one, or that of a loss factor?"""
+        """Whether the chart is that of a frequency response: a measured one, or that of a loss factor."""
         hysteretic = self.given_plant is not None and self.given_plant.hysteresis is not None
         return self.response is not None or hysteretic
 

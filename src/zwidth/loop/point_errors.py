@@ -10,7 +10,7 @@ from zwidth.model.reduction import Encoders
 
 
 class OperatingPointError(ValueError):
-    """What was asked of an operating point does not exist for this device; the text says what does."""
+    """An operating point does not have this for its device; the text says what it has."""
 
 
 class NoMechanismError(OperatingPointError):

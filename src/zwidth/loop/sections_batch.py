@@ -55,6 +55,7 @@ def _rows(
             entering, leaving = entering + abs(enter[i, k]), leaving + abs(leave[i, k])
             stiffest, fastest = max(stiffest, abs(squared[i, k])), max(fastest, abs(decay[i, k]))
         total = entering * leaving
+        # a posture without numbers has no sections: `used` stays 0
         if not np.isfinite(total):
             continue
         for k in range(m):
@@ -62,12 +63,15 @@ def _rows(
                 continue
             weight = residue[k]
             for j in range(k + 1, m):
+                # modes of one frequency and damping are one section with the sum of their residues: apart,
+                # rounding would leave a pole and a zero that nearly cancel
                 apart = abs(squared[i, j] - squared[i, k])
                 if apart <= REPEATED * stiffest and abs(decay[i, j] - decay[i, k]) <= REPEATED * fastest:
                     taken[j] = True
                     weight += residue[j]
             row = held_row(decay[i, k], squared[i, k], period, fraction)
             still = abs(decay[i, k]) * period < 1e-9
+            # a mode that the wall does not move, or the sensor does not see, is left out, as rounding is all of it
             level = total * period**2 * (UNOBSERVED_UNDAMPED if still else UNOBSERVED)
             size = 0.0
             for c in range(2, 8):

@@ -16,7 +16,7 @@ GROWS = 1e-12  # growth of |z|^2 - 1 in one sample that is no rounding
 
 
 def unobserved_instability(loop: Loop) -> bool:
-    """Does the plant move by itself, ever faster, in a way that no wall moves or the sensor does not read?
+    """Whether the plant has an unstable motion that no wall affects, or that the sensor does not read.
 
     True if the plant has more poles outside the unit circle than are left in the sampled sections, from which
     such motions have been cancelled.

@@ -1,4 +1,4 @@
-"""How good a device is: dexterity, forces, impedance range, fidelity, what the hand feels."""
+"""Measures of a device's quality: dexterity, forces, impedance range, fidelity, what the hand feels."""
 
 import lazy_loader
 

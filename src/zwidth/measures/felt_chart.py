@@ -102,9 +102,9 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
     arcs = []
     for arc in chart.boundary:
         for run in _runs(arc.stiffness >= 0.0):
-            felt = static_stiffness(plant, arc.stiffness[run])
-            arcs.append(BoundaryArc(felt, arc.damping[run], arc.frequency[run]))
-    return FeltChart(
+            stiffness = static_stiffness(plant, arc.stiffness[run])
+            arcs.append(BoundaryArc(stiffness, arc.damping[run], arc.frequency[run]))
+    felt = FeltChart(
         regions=tuple(rings),
         boundary=tuple(arcs),
         stiffness_max=float(static_stiffness(plant, chart.stiffness_max))
@@ -112,6 +112,7 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
         else float("nan"),
         limit=static_stiffness_limit(plant),
     )
+    return felt if chart.operating_point is None else felt.about(chart.operating_point)
 
 
 def _runs(inside: NDArray[np.bool_]) -> list[slice]:

@@ -1,4 +1,4 @@
-"""What a device is: mechanisms and their postures, plants, operators, measured responses."""
+"""Models of a device: mechanisms and their postures, plants, operators, measured responses."""
 
 import lazy_loader
 

@@ -61,7 +61,7 @@ def wrong_type(name: str, wanted: str, value: object, hint: str = "") -> TypeErr
 
 
 def describe_value(value: object) -> str:
-    """What an argument is, for people: 0.001, the text 'five', a Device.
+    """Describe an argument's value for a message: 0.001, the text 'five', a Device.
 
     >>> describe_value(0.001), describe_value("x"), describe_value([1]), describe_value(None)
     ('0.001', "the text 'x'", 'a list', 'None')

@@ -133,6 +133,7 @@ def bias(
             total += driven_rates[s] * per_drive[s, u]
         rates[u] = total
         turning[u] = 0.0
+    # first with passive joints that do not accelerate: the closures then open by what these must make up for
     fill_accelerations(mech, work, gravity, flow)
     if k > 0:
         gaps, solution = work.gaps, work.solution

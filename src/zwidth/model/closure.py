@@ -83,8 +83,10 @@ def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, row
         for r in range(rows):
             left += Q[j, r] * Q[j, r]
         for i in range(j):
+            # with what columns before have taken away, this is the column's original length
             taken += R[i, j] * R[i, j] * R[i, i]
         shortest, longest = min(shortest, left), max(longest, left + taken)
+        # a column that is spanned already takes no part; the returned condition is 0 then
         scale = 1.0 / left if left > 0.0 else 0.0
         R[j, j] = left
         for i in range(j + 1, unknowns):
@@ -184,6 +186,7 @@ def orientation(start: Floats, rows: Floats, G: Floats, unknowns: int, count: in
             for r in range(count):
                 part += start[i, r] * rows[j, r]
             G[i, j] = part
+    # Gauss with row exchanges, each of which turns the sign
     determinant = 1.0
     for j in range(unknowns):
         pivot = j

@@ -108,6 +108,7 @@ def follow(mech: MechanismArrays, design: int, target: Floats, angles: Floats, w
     done, step, condition = 0.0, 1.0, 1.0
     while done < 1.0:
         step = min(step, 1.0 - done)
+        # positions on the way need less accuracy than the target
         final = done + step >= 1.0
         for x in range(3):
             goal[x] = target[x] if final else begin[x] + (done + step) * (target[x] - begin[x])
@@ -118,6 +119,7 @@ def follow(mech: MechanismArrays, design: int, target: Floats, angles: Floats, w
             if done == 0.0 and step == 1.0:
                 place_links(mech, design, angles, work)
                 begin = link_point(work.rotation, work.origin, mech.handle_link, mech.handle, design, 0)
+            # Newton's method has left the branch or not converged: a nearer goal on the straight line is tried
             step *= 0.5
             if step < SMALLEST_STEP:
                 return OUT_OF_REACH
@@ -126,6 +128,7 @@ def follow(mech: MechanismArrays, design: int, target: Floats, angles: Floats, w
             angles[i] = trial[i]
         done = 1.0 if final else done + step
         step *= 2.0
+    # written so that nan counts as out of reach
     if not largest_magnitude(work.gaps, work.gaps.size) <= CLOSURE_TOLERANCE * mech.size[design]:
         return OUT_OF_REACH
     condition = min(condition, passive_rates(mech, work))
@@ -175,6 +178,7 @@ def assemble(
         trial_error = 0.0
         for r in range(count):
             trial_error += gaps[r] * gaps[r]
+        # Levenberg-Marquardt: less damping after a step that helped, more after one that did not
         if trial_error < error:
             error = trial_error
             damping = max(0.1 * damping, 1e-16)
@@ -190,6 +194,7 @@ def assemble(
             for r in range(count):
                 basis[u, r] = rows[u, r]
             for r in range(m):
+                # angles are damped in units of the device's size, as the gaps are lengths
                 basis[u, count + r] = np.sqrt(damping) * mech.size[design] if r == u else 0.0
         for r in range(count + m):
             sides[0, r] = gaps[r] if r < count else 0.0

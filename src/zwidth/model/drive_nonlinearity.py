@@ -1,4 +1,4 @@
-"""What of a mechanism's drives is not linear, at the joints: friction, counters, springs, brakes, a force limit.
+"""Nonlinear parts of a mechanism's drives, at the joints: friction, counters, springs, brakes, a force limit.
 
 A number at the motor is referred to the joint by the transmission's ratio n: a torque by n, a stiffness or damping
 by n^2, a torque per angle cubed by n^4, an angle by 1/n.

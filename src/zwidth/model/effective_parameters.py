@@ -1,4 +1,4 @@
-"""What a mechanism weighs and how stiff it is, felt along one direction at the handle."""
+"""Effective masses and stiffness of a mechanism along one direction at the handle."""
 
 from __future__ import annotations
 

@@ -63,6 +63,7 @@ def mass_matrix(mech: MechanismArrays, design: int, work: WorkingMemory, out: Fl
     for s in range(d):
         for t in range(d):
             out[index, s, t] = 0.0
+    # p the link's momentum, l its moment about the link's origin, for a unit rate of drive s
     for i in range(mass.shape[1]):
         c = link_point(R, o, i, center, k, i)
         rx, ry, rz = c[0] - o[i, 0], c[1] - o[i, 1], c[2] - o[i, 2]
@@ -71,6 +72,7 @@ def mass_matrix(mech: MechanismArrays, design: int, work: WorkingMemory, out: Fl
             px = mass[k, i] * (v[s, i, 0] + wy * rz - wz * ry)
             py = mass[k, i] * (v[s, i, 1] + wz * rx - wx * rz)
             pz = mass[k, i] * (v[s, i, 2] + wx * ry - wy * rx)
+            # angular velocity in the link's frame, times its inertia, and back
             ax = R[i, 0, 0] * wx + R[i, 1, 0] * wy + R[i, 2, 0] * wz
             ay = R[i, 0, 1] * wx + R[i, 1, 1] * wy + R[i, 2, 1] * wz
             az = R[i, 0, 2] * wx + R[i, 1, 2] * wy + R[i, 2, 2] * wz

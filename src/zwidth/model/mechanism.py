@@ -67,7 +67,7 @@ class Closures:
 
 @dataclass(frozen=True)
 class DriveNonlinearity:
-    """What of the drives is not linear, all at the motor; 0, or nan where said so, is none of it.
+    """Nonlinear parts of the drives, all at the motor; 0, or nan where stated, means that there is none.
 
     coulomb             (..., d)  dry friction between rotor and housing [N m]
     friction_model      of all of it, as in `nonlinear.Friction`

@@ -1,4 +1,4 @@
-"""Do the drives fit the mechanism: one for each degree of freedom, and the handle shows them all?"""
+"""Check that there is one drive for each degree of freedom, and that the handle shows them all."""
 
 from __future__ import annotations
 

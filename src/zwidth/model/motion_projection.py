@@ -1,4 +1,4 @@
-"""How a reduced model sees what works on one motion of the full one."""
+"""Projection of a part that acts on one motion of the full model onto the motions of a reduced one."""
 
 from __future__ import annotations
 

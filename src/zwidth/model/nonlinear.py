@@ -1,4 +1,4 @@
-"""What of a plant is not linear: dry friction, encoder steps, bent springs, programmable brakes, a force limit.
+"""Nonlinear parts of a plant: dry friction, encoder steps, bent springs, programmable brakes, a force limit.
 
 Charts and closed forms speak of the linear rest; `contact` simulates all of it. Every part works on one motion of
 the plant, along . x, so that a reduced model carries it as it carries its dampers.
@@ -79,7 +79,7 @@ class Counter:
 
 @dataclass(frozen=True)
 class Spring:
-    """What a spring has beyond its stiffness: force = -along (cubic d^3 + excess min(d, 0)),  d = along . x.
+    """Nonlinear part of a spring's force: -along (cubic d^3 + excess min(d, 0)),  d = along . x.
 
     cubic            hardening, or softening where negative [N/m^3]
     backward_excess  how much stiffer it is for d < 0 [N/m]
@@ -126,7 +126,7 @@ class Nonlinear:
         return bool(self.friction or self.counters or self.springs or self.brakes or isfinite(self.force_limit))
 
     def project(self, motions: Floats) -> Nonlinear:
-        """As it works on motions (n, m), one in each column: what moves none of them is dropped."""
+        """The parts as they act on motions (n, m), one in each column, without those that act on none of them."""
         return replace(
             self,
             friction=_projected(self.friction, motions),
@@ -136,7 +136,7 @@ class Nonlinear:
         )
 
     def padded(self, count: int) -> Nonlinear:
-        """The same for a plant with more coordinates, added at the end."""
+        """The parts for a plant with more coordinates, added at the end."""
         return replace(
             self,
             friction=_padded(self.friction, count),
@@ -147,7 +147,7 @@ class Nonlinear:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What a linear answer leaves out, in words."""
+        """The nonlinear parts that a linear answer leaves out, in words."""
         found = {
             "dry friction": any(part.coulomb > 0.0 for part in self.friction),
             "encoder steps": any(part.step > 0.0 for part in self.counters),

@@ -43,7 +43,7 @@ class Operator:
 
     @property
     def rigid_grasp(self) -> bool:
-        """Is the arm one with the handle?"""
+        """Whether the arm is rigidly attached to the handle."""
         return self.grasp_stiffness is None
 
 

@@ -62,8 +62,8 @@ class Posture:
     """A mechanism at rest with its handle somewhere; all arrays carry the batch's leading axes.
 
     assembly          name of the assembly
-    position          (..., 3)     handle [m]; where not OK as asked for
-    projected         (...)        how far that lies from the position asked for [m]: 0, but where it was projected
+    position          (..., 3)     handle [m]; where not OK the requested one
+    projected         (...)        distance from the requested position [m]; 0 unless it was projected
     status            (...)        OK, OUT_OF_REACH or SINGULAR; where not OK the numbers below are nan
     angles            (..., n)     joint angles, 0 for fixed joints [rad]
     mass_matrix       (..., d, d)  M of the links in the driven coordinates [kg m^2]
@@ -128,7 +128,7 @@ def solve_posture(
               axes of the mechanism's numbers
     tolerance how far a position may be projected, as a share of the arm's length from base to handle
     Returns   Posture; in a batch a position that cannot be had is marked by its status
-    Raises    OutOfReach, Singular  where a single posture is asked for and cannot be had; an assembly may be
+    Raises    OutOfReach, Singular  where a single posture is requested and does not exist; an assembly may be
                           singular throughout
               LoopOpen    if the loops of a single mechanism do not close near the assembly's angles
               ValueError  for an unknown assembly, or drives that do not fit the mechanism's freedom
@@ -185,7 +185,7 @@ def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Fl
               ValueError  for an unknown assembly, or a batch of designs
     """
     name = _assembly_name(mechanism, assembly)
-    mech, reference = _single(mechanism, name, "what can be reached is asked of one design at a time")
+    mech, reference = _single(mechanism, name, "reachable positions are computed for one design at a time")
     return roadmap(mech, 0, reference).position
 
 
@@ -234,8 +234,8 @@ def handle_motions(posture: Posture) -> Floats:
 def handle_range(mechanism: Mechanism, posture: Posture, direction: ArrayLike) -> tuple[float, float]:
     """How far the handle can be from a posture along a direction, backwards (not positive) and forwards [m].
 
-    What lies between is not asked: the handle need not get there on a straight line. It is right to the spacing of
-    the postures of `reachable_positions`.
+    Positions between are not checked: the handle need not get there on a straight line. It is right to the spacing
+    of the postures of `reachable_positions`.
     posture    a single one, OK
     direction  (3,)  unit vector in the base frame
     Raises     as `reachable_positions`

@@ -2,7 +2,7 @@
 
 Every way from the base to the handle through links and closures is a chain of segments of fixed length. A chain of
 lengths l_1 ... l_n reaches from max(0, 2 max l - sum l) to sum l of where it begins, and no farther. A goal
-outside of any chain's shell is out of reach, which is told at once; inside of all it may still be.
+outside any chain's shell is out of reach, which is found at once; inside all of them it may still be out of reach.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SharedPoint = tuple[int, Floats, int, Floats]
 
 
 class Shell(NamedTuple):
-    """What one chain allows: the handle's distance from `centre` lies between `least` and `most` [m]."""
+    """Range of one chain: the handle's distance from `centre` lies between `least` and `most` [m]."""
 
     centre: Floats
     least: float

@@ -38,7 +38,7 @@ READING_TOLERANCE: Final = 1e-6  # relative difference of two readings of a rigi
 
 
 class ModelError(ValueError):
-    """The model asked for does not apply to this device or this direction."""
+    """The chosen model does not apply to this device or this direction."""
 
 
 class DirectionError(ModelError):
@@ -260,7 +260,7 @@ def _rigid(mass: float, damping: float) -> Plant:
 
 
 def _is_two_mass(plant: Plant) -> bool:
-    """Is the plant a link side and a motor side joined by a spring, in this order?"""
+    """Whether the plant is a link side and a motor side joined by a spring, in this order."""
     if plant.size != 2 or plant.handle is None:
         return False
     k = plant.stiffness[0, 0]
@@ -339,8 +339,11 @@ def _with_sensor_and_elements(reduced: Plant, plant: Plant, model: Model) -> Pla
 
 
 def _reduced_nonlinear(reduced: Plant, plant: Plant, motions: Floats) -> Nonlinear:
-    """What is not linear, as the motions move it. A single counter, of the whole reading, counts the reduced
-    sensor, which is known where springs tie the plant to the ground, too; what several count there is not."""
+    """The nonlinear parts of a reduced plant, as its motions move them.
+
+    A single counter of the whole reading counts the reduced sensor, which is known even where springs tie the
+    plant to the ground; there the readings of several counters are not known.
+    """
     found, counters = plant.nonlinear.project(motions), plant.nonlinear.counters
     if len(counters) == 1 and np.array_equal(counters[0].weight * counters[0].along, plant.sensor):
         return replace(found, counters=(replace(counters[0], along=reduced.sensor / counters[0].weight),))

@@ -155,16 +155,19 @@ def _full_modes(
             for t in range(d):
                 M[s, t] = mass[i, s, t]
             M[s, s] += rotor[s]
+        # all drives rigid: links and rotors together move as one free mass
         free = inverse_form(M, h, d)
         for s in range(d):
             for t in range(d):
                 M[s, t] = mass[i, s, t]
+            # rotors behind rigid drives move with the links; the others are coordinates of their own
             M[s, s] += 0.0 if np.isfinite(spring[s]) else rotor[s]
         invert(M, inverse)
         for a in range(f):
             p = flexible[a]
             for b in range(f):
                 q = flexible[b]
+                # the deflections' equation in units that make it symmetric: S = sqrt(K) (M^-1 + rotors^-1) sqrt(K)
                 S[a, b] = np.sqrt(spring[p] * spring[q]) * inverse[p, q]
             S[a, a] += spring[p] / rotor[p]
         jacobi(S, V)
@@ -184,6 +187,7 @@ def _full_modes(
                 moved += along[i, p] * np.sqrt(spring[p]) * V[a, k] / (w * rotor[p])
             squared[i, k], enter[i, k], leave[i, k] = S[k, k], moved, moved if at_motor else read
         squared[i, f], enter[i, f], leave[i, f] = 0.0, np.sqrt(free), np.sqrt(free)
+        # a posture with one nan has no modes at all
         known = free > 0.0
         for k in range(f + 1):
             known = known and np.isfinite(squared[i, k] + enter[i, k] + leave[i, k])

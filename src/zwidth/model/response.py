@@ -30,7 +30,7 @@ class Response:
     coherence    (n,) magnitude squared, 0 to 1; None: not known
     averages     independent averages behind the coherence
     sweeps       (k, n) complex, the repetitions of which `value` is the mean; None: one measurement
-    note         how the response was made, a sentence for people; "" where it was read as it stands
+    note         how the response was made, a sentence for people; "" where it was read unchanged
     """
 
     frequency: Floats

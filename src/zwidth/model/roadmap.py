@@ -175,6 +175,7 @@ def flood(mech: MechanismArrays, reference: Floats, turns: int) -> tuple[Floats,
     margin = 0.3 * min(passive_rates(mech, work), newton_step(mech, work))
     substeps = int(min(16.0, np.ceil(MARGIN * pitch / margin))) if margin > 0.0 else 16
     margin = min(margin, MARGIN * pitch)
+    # a queue in arrays: `count` postures are known, those from `head` on have neighbours to be tried
     visited = np.zeros(cells, dtype=np.bool_)
     cell_of = np.zeros(cells, dtype=np.int64)
     angles, position = np.zeros((cells, n)), np.zeros((cells, 3))
@@ -190,6 +191,8 @@ def flood(mech: MechanismArrays, reference: Floats, turns: int) -> tuple[Floats,
         for drive in range(d):
             digit = (cell_of[head] // place_value) % turns
             for sign in (-1, 1):
+                # the cell's number has one digit to the base `turns` for each drive; a turn beyond the last comes
+                # back to 0
                 cell = cell_of[head] + ((digit + sign) % turns - digit) * place_value
                 if visited[cell]:
                     continue

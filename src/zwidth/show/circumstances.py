@@ -20,12 +20,12 @@ def operator_text(name: str) -> str:
 
 
 def omission_text(left_out: Sequence[str]) -> str:
-    """What of a device a linear answer leaves out."""
+    """Parts of a device that a linear answer leaves out."""
     return f"linear: leaves out {', '.join(left_out)}"
 
 
 def computer_text(controller: Controller) -> str:
-    """What the computer and the amplifier do, in one line."""
+    """Computer and amplifier in one line."""
     from zwidth.loop.estimators import METHODS, BackwardDifference
 
     period = _given(controller.sampling_period, "s")

@@ -1,6 +1,6 @@
 """Numbers with units for people: one rounding everywhere, SI prefixes, a real minus sign.
 
-What is computed has four significant digits, rounded to nearest, limits too: whoever renders a wall at its limit
+What is computed has four significant digits, rounded to nearest, limits too: a wall rendered at its limit
 has no margin, and a pair of stiffness and damping promises nothing however it is rounded. What somebody chose
 stays as it was written (`as_written`), an error has two digits (`uncertain`), a spectral radius four of its
 distance from 1.

@@ -152,7 +152,7 @@ def _overlap_faults(
 
 
 def _exclude(one: KeyPath, other: KeyPath) -> bool:
-    """Are these keys of one table of which a file may hold one only?"""
+    """Whether these keys belong to one table and exclude each other."""
     if one[:-1] != other[:-1]:
         return False
     groups = address.EXCLUSIVE.get(tuple(map(str, one[:-1])), ())

@@ -72,7 +72,7 @@ class Axis:
 
     @property
     def numeric(self) -> bool:
-        """Are its values numbers?"""
+        """Whether its values are numbers."""
         return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.values)
 
     def at(self, share: float) -> Any:

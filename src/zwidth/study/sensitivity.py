@@ -221,7 +221,7 @@ def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _mirrored(document: dict[str, Any], steps: KeyPath) -> bool:
-    """Is it an element below the diagonal of a matrix?"""
+    """Whether the path is an element below the diagonal of a matrix."""
     return _is_matrix(document, steps) and int(steps[-2]) > int(steps[-1])
 
 

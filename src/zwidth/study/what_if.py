@@ -157,7 +157,7 @@ def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
 
 
 def _collocated(plant: Plant) -> bool:
-    """Does the sensor read along the coordinate on which the wall acts, whatever its gain?"""
+    """Whether the sensor reads the coordinate on which the wall acts, with any gain."""
     sensor, actuator = plant.sensor, plant.actuator
     along = float(sensor @ actuator) / float(actuator @ actuator)
     return bool(np.max(np.abs(sensor - along * actuator)) <= 1e-9 * np.max(np.abs(sensor)))

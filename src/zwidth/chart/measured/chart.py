@@ -50,7 +50,7 @@ class MeasuredChart(Chart):
     interpolation_error   relative error that interpolation is expected to leave in stiffness_max
     measured_stiffness_max  the stiffest of the measured points on the edge with K > 0, B >= 0 [N/m]; nan: none
     band                  walls whose verdict the measurement's error leaves open; None where no error is known
-    stiffness_max_of_sweeps  of each repeated sweep by itself [N/m]; () for one measurement
+    stiffness_max_of_sweeps  of each repeated sweep alone [N/m]; () for one measurement
     unusable              stretches of frequency that cannot be relied on
     open                  whether the edge does not close, for lack of data: regions then end at a window not their
                           own, and what would be read off them is nan

@@ -22,7 +22,7 @@ CHORD = 1e-5  # a chord's distance from the curve, as a share of the window
 GRID = 1e-11  # to which lines are noded, as a share of the window
 LARGEST = 1e3  # stable walls, in `wall_scales` that a tenth of the stable set's edge exceeds
 TICK = 1e-9  # by which the curve's ends are drawn across the lines they end on
-BESIDE = 1e-4  # from a chord, in its lengths: where its side is asked for its count
+BESIDE = 1e-4  # distance from a chord, in its lengths, of the walls whose roots are counted on its two sides
 
 
 @dataclass(frozen=True)

@@ -167,8 +167,8 @@ def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) 
 
 
 def _passed_over(samples: list[ArcPoints], members: list[Member], unit: float) -> bool:
-    """Whether a member cuts a piece of edge, asked at its quarters 1e-9 of its length inside, by less than chords
-    see."""
+    """Whether a member makes walls unstable just inside a piece of edge, tested at its quarters at a depth of 1e-9
+    of its length; such cuts are too small for the chords of the outlines."""
     for _, K, B in samples:
         walk = np.column_stack([K * unit, B])
         depth = 1e-9 * float(np.max(np.ptp(walk, axis=0)))

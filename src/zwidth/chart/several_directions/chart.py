@@ -41,7 +41,7 @@ OUTSIDE = 1e-9
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class MultiChart(Chart):
-    """The stable walls of several directions under one law; `loop` is what was asked."""
+    """The stable walls of several directions under one law."""
 
     loop: MultiLoop
 

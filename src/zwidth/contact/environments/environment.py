@@ -1,4 +1,4 @@
-"""What a virtual environment is: a small compiled function with named parameters."""
+"""Virtual environments: a small compiled function with named parameters."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Parameter:
         return f"from {self.low:g} to {self.high:g}"
 
     def allows(self, value: float) -> bool:
-        """Is the value one of those allowed?"""
+        """Whether the value is allowed."""
         if self.switch:
             return value in (0.0, 1.0)
         return (isfinite(value) or (self.endless and value == inf)) and self.low <= value <= self.high

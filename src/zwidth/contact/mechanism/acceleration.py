@@ -111,6 +111,7 @@ def accelerate(system: System, memory: Memory, x: Floats, hand: Floats) -> None:
         rate[2 * n + k] = (command[k] - damping[k] * speed - s) / time[k]
     for i in range(d):
         rest[i] += J[0, 0, i] * hand[0] + J[0, 1, i] * hand[1] + J[0, 2, i] * hand[2] - c[i]
+        # motor[i] is the drive's own motor coordinate; with a rigid drive it is the joint itself
         if motor[i] != i:
             bent = x[motor[i]] - x[i]
             torque = bent * (spring[i] + cubic[i] * bent * bent)

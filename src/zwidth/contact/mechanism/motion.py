@@ -24,19 +24,19 @@ AT_LIMIT: Final = 1.0 - 1e-12  # share of a limit from which a force or torque w
 class MechanismMotion(Result):
     """A motion of a whole mechanism sampled by its computer; k samples from the start on, or none.
 
-    What was simulated:
+    Input:
 
     point            the device in the posture that the motion starts from; its operator takes no part
     surface          what the handle meets; None: nothing
     environment      what is rendered at the surface;   values (P,) of its parameters. None without a surface
     start_velocity   (3,) of the handle [m/s]
-    push             (1, 3) force at the handle, or one for each period asked for, held throughout it [N]
+    push             (1, 3) force at the handle, or one for each sampling period, held throughout it [N]
     gravity          (3,) [m/s^2]
-    duration         asked for [s];   substeps between samples;   seed of the encoders' noise
+    duration         requested [s];   substeps between samples;   seed of the encoders' noise
     counted          are the encoders read in counts, with noise?
     torque_limits    "each" or "together", as simulated
 
-    What came of it:
+    Result:
 
     time             (k,) [s]
     position         (k, 3)  where the handle is [m]
@@ -104,7 +104,7 @@ class MechanismMotion(Result):
 
     @property
     def two_sided(self) -> bool:
-        """Does the wall act on both sides of the surface alike?"""
+        """Whether the wall acts on both sides of the surface alike."""
         return self.environment is not None and self.environment.linear
 
     @property
@@ -142,7 +142,7 @@ class MechanismMotion(Result):
 
     @property
     def energy_book(self) -> dict[str, float]:
-        """What each has put in by the end, and how much more is stored than at the start [J].
+        """Energy that each source has supplied by the end, and increase of the stored energy [J].
 
         Dampers have what the others leave; nan where the motors' work is not known, and without samples.
         """

@@ -1,4 +1,4 @@
-"""What a motion is asked with, checked before it runs."""
+"""Arguments of a mechanism's simulation, checked before it runs."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ MOST_SUBSTEPS: Final = 100_000
 
 
 class MotionError(ValueError):
-    """The motion asked for cannot be meant, or cannot be simulated here.
+    """An argument of the simulation is not valid, or the motion cannot be simulated here.
 
-    argument  of `simulate_mechanism` that cannot be meant; "" where it is the device, or several together
+    argument  of `simulate_mechanism` that is not valid; "" where it is the device, or several together
     """
 
     def __init__(self, text: str, argument: str = "") -> None:

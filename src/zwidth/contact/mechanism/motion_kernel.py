@@ -30,7 +30,7 @@ NEAR_SINGULAR: Final = (
 
 
 class Trace(NamedTuple):
-    """What is kept of each sample, k of them.
+    """Records of k samples.
 
     state (k, N);   position, seen, velocity, force (k, 3);   torque (k, d) at the joints;   depth (k,)
     energy (k, 3)  kinetic, elastic, gravitational [J];   work (k, 3)  by the hand, by the motors, against friction
@@ -70,6 +70,7 @@ def run_motion(
     x, trial, hand = start.copy(), np.zeros(start.size), np.zeros(3)
     friction, resting, work = np.zeros(d), np.zeros(d), np.zeros(3)
     lengths = np.array([fraction * period, (1.0 - fraction) * period])
+    # the held force changes within the interval where the delay is not whole; each part gets its share of substeps
     counts = np.array([0, substeps])
     if fraction > 0.0:
         counts[0] = max(1, int(np.ceil(fraction * substeps)))
@@ -83,6 +84,7 @@ def run_motion(
         if status != DONE:
             return status, j
         record_state(system, memory, law, x, hand, work, trace, j)
+        # the computer has a posture of its own, that of the counted angles: it renders where it sees the handle
         if not locate_handle(system, law, own, x, j):
             return LOOP_LOST, j
         answered = render(law, computer, own, j)
@@ -91,6 +93,7 @@ def run_motion(
             return NO_FORCE, j + 1
         if j == samples:
             break
+        # the linear part of a step is made anew only where the mechanism has turned far enough to change it
         if j == 0 or turned(memory, x):
             linearise(system, memory, x)
             for part in range(2):
@@ -99,6 +102,7 @@ def run_motion(
         row = j if push.shape[0] > 1 else 0
         for k in range(3):
             hand[k] = push[row, k]
+        # `check_state` has configured the state at the sample; later substeps configure their own
         configured = True
         for part in range(2):
             if counts[part] == 0:
@@ -136,7 +140,7 @@ def _remember(work: WorkingMemory) -> None:
 
 @compiled_lean
 def check_state(system: System, memory: Memory, x: Floats, condition: float) -> int:
-    """Is the state a posture to go on from? Its loops are compared with those one sample before."""
+    """Whether the motion can go on from this state; its loops are compared with those one sample before."""
     work, mech = memory.work, system.mech
     for i in range(x.size):
         if not np.isfinite(x[i]):
@@ -198,7 +202,7 @@ def record_state(
 
 @compiled_lean
 def record_computer(rendering: RenderingMemory, trace: Trace, j: int) -> None:
-    """What the computer sees, estimates and commands."""
+    """Record the position, velocity and command of the computer."""
     seen, velocity, force, torque = trace.counted_position, trace.velocity, trace.force, trace.torque
     for k in range(3):
         seen[j, k], velocity[j, k], force[j, k] = (

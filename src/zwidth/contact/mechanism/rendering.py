@@ -1,4 +1,4 @@
-"""What the computer does in each period of a whole mechanism: place the handle by its counts, render the surface.
+"""One period of the computer of a whole mechanism: locate the handle by its counts, render the surface.
 
 Counting, estimating, filtering and delaying one signal are `contact.computer`'s.
 """
@@ -32,7 +32,7 @@ from zwidth.model.mechanism_arrays import MechanismArrays
 
 
 class RenderingMemory(NamedTuple):
-    """What the computer of a mechanism works in.
+    """Working memory of the computer of a mechanism.
 
     signals               of the handle's three coordinates, and of the d motors' torques
     work, angles (links,), counted (d,), jacobian (1, 3, d)  the posture that is counted

@@ -1,4 +1,4 @@
-"""What is rendered at the surface, and how the drives take part in it, as numbers for the kernels."""
+"""Environment, surface and drives of a rendering as numbers for the kernels."""
 
 from __future__ import annotations
 

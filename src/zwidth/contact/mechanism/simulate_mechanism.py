@@ -175,7 +175,7 @@ def _empty_trace(samples: int, states: int, drives: int) -> kernel.Trace:
 
 
 def _course(system: System, trace: kernel.Trace, reached: int, period: float) -> dict[str, Floats]:
-    """What is known of each sample, by its name in `MechanismMotion`."""
+    """The records of each sample, by their names in `MechanismMotion`."""
     d, n, motor = len(system.motor), len(system.damping), system.motor
     state, energy, work = trace.state[:reached], trace.energy[:reached], trace.work[:reached]
     lagging = np.any(system.lag_command >= 0)
@@ -209,10 +209,10 @@ def _reason(status: int, mechanism: Mechanism, seconds: float) -> str:
 
 
 def _unanswered(motion: MechanismMotion, environment: Environment, surface: Surface) -> str:
-    """What the environment was told at the last sample, to which it gave no finite force."""
+    """Message about the last sample, at which the environment gave no finite force."""
     depth, normal = depth_and_normal(surface, motion.counted_position[-1])
     rate = -float(normal @ motion.velocity[-1])
     return (
-        f"after {motion.time[-1]:.6g} s {environment.name} gave no finite force, where it was told a depth of "
+        f"after {motion.time[-1]:.6g} s {environment.name} gave no finite force, where it was given a depth of "
         f"{float(depth):.6g} m and {rate:.6g} m/s"
     )

@@ -61,12 +61,14 @@ def linearise(system: System, memory: Memory, x: Floats) -> None:
                 rest[i] = -B[i, j - n]
             elif j >= 2 * n:
                 rest[i] = along[j - 2 * n, i]
+        # of the forces that depend on positions only the springs are in A; the others are in R
         if j < n:
             for i in range(motor.size):
                 if motor[i] != i and (j == i or j == motor[i]):
                     torque = spring[i] if j == motor[i] else -spring[i]
                     rest[i] += torque
                     rest[motor[i]] -= torque
+        # each column of forces becomes one of accelerations, by the mass matrix of this state
         solve(system, memory, rest, 0)
         for i in range(n):
             A[n + i, j] = rest[i]
@@ -200,6 +202,7 @@ def solve_friction(
             before, m = friction[i], mobility[part, i, i]
             if model[i] == DRY:
                 friction[i] = coulomb_force(numbers[i, 0], v0, w, m)
+                # dry friction that stops the motor: the velocity is 0 up to rounding
                 resting[i] = 1.0 if abs(w + m * friction[i]) <= AT_REST * (abs(w) + abs(v0)) else 0.0
             else:
                 friction[i], _after = bristle_force(bristles[i], law_of_bristles(system, i), v0, w, m, h)
@@ -207,6 +210,7 @@ def solve_friction(
         if change <= 1e-14 * most:
             break
     for i in range(d):
+        # the bristles' deflection is moved on once, by the frictions that are found, and not in every sweep
         if model[i] == BRISTLES:
             v0, w = x[n + motor[i]], velocity_without_own_friction(system, memory, x, part, i, friction)
             law, m = law_of_bristles(system, i), mobility[part, i, i]

@@ -1,4 +1,4 @@
-"""Does the handle ever touch a surface?"""
+"""Whether the handle ever touches a surface."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ BRISTLES: Final = 2  # friction: Dahl's or LuGre's
 
 
 class System(NamedTuple):
-    """What does not change during a motion; n coordinates, l lagged torques, N = 2 n + l states.
+    """Constants of a motion; n coordinates, l lagged torques, N = 2 n + l states.
 
     mech     the links
     motor    (d,)    coordinate of each motor; i itself where drive i is rigid
@@ -58,7 +58,7 @@ class System(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What the kernels work in.
+    """Working memory of the kernels.
 
     work, flow        of the links;   angles (links,)  their present joint angles
     mass (1, d, d), jacobian (1, 3, d), bias (d,), factor (d, d)  at the present place; factor: Cholesky's of M

@@ -1,4 +1,4 @@
-"""What the computer renders at a surface: the Kelvin-Voigt wall, or any environment along the surface's normal."""
+"""Rendering at a surface: the Kelvin-Voigt wall, or any environment along the surface's normal."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def subschemas(path: tuple[str | int, ...]) -> list[dict[str, Any]]:
 
 def keys(path: tuple[str | int, ...]) -> set[str]:
     """The keys that the table at a path may hold."""
-    if not path:  # asked of every device; the whole JSON Schema takes 20 ms
+    if not path:  # needed for every device; the whole JSON Schema takes 20 ms
         return set(DeviceFile.model_fields)
     return {key for found in subschemas(path) for key in found.get("properties", {})}
 

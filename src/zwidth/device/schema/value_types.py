@@ -1,4 +1,4 @@
-"""The kinds of values in a device file, each right by itself.
+"""The kinds of values in a device file, each checked alone.
 
 Numbers are strict (no text, no true or false) and finite unless said otherwise. Where a shorter form may
 stand for a vector or a matrix (one number for n = 1, three moments for an inertia), it is written out here.

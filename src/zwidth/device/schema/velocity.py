@@ -47,7 +47,7 @@ _NOISE: Final = (
 
 
 class _Method(Section):
-    """What every method has; two parameters that do not fit each other are told by the estimator itself."""
+    """Base of all methods; the estimator itself checks that its parameters fit each other."""
 
     method: str
     filter: LowPass | None = documented_key("low pass on the velocity; omitted: none", default=None)

@@ -1,4 +1,4 @@
-"""How the velocity is estimated from positions: one method per file, most a discrete transfer function w(z).
+"""Velocity estimates from positions: one method per file, most a discrete transfer function w(z).
 
 Every linear method has `estimator(period)`, its factors at a sampling period; `delay(period)`, how late it is at
 low frequencies; and `noise_gain(period)`, how much of the position's white noise it passes. None takes or keeps a

@@ -61,7 +61,7 @@ class AlphaBeta:
         return Estimator(np.array([[gain, gain, 0.0]]), np.array([[1.0, self.alpha + self.beta, self.beta]]))
 
     def delay(self, period: float) -> float:
-        """How late the estimate is at low frequencies [s]: (alpha/beta - 1/2) T; early where negative."""
+        """Delay of the estimate at low frequencies [s]: (alpha/beta - 1/2) T; early where negative."""
         return (self.alpha / self.beta - 0.5) * period
 
     def noise_gain(self, period: float) -> float:

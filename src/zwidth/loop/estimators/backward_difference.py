@@ -28,7 +28,7 @@ class BackwardDifference:
         return mean_difference(np.ones(1), period)
 
     def delay(self, period: float) -> float:
-        """How late the estimate is [s]: T/2, at every frequency."""
+        """Delay of the estimate [s]: T/2, at every frequency."""
         return 0.5 * period
 
     def noise_gain(self, period: float) -> float:

@@ -28,7 +28,7 @@ class CentralDifference:
         return mean_difference(np.full(2, 0.5), period)
 
     def delay(self, period: float) -> float:
-        """How late the estimate is [s]: T, at every frequency."""
+        """Delay of the estimate [s]: T, at every frequency."""
         return period
 
     def noise_gain(self, period: float) -> float:

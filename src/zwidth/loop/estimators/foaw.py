@@ -81,7 +81,7 @@ class Foaw:
 
     @property
     def parameters(self) -> Floats:
-        """What `foaw_estimate` takes, (3,): N, d, and 1 for the best fit."""
+        """Numbers for `foaw_estimate`, (3,): N, d, and 1 for the best fit."""
         return np.array([float(self.samples), self.position_noise, float(self.fit == "best-fit")])
 
     @property

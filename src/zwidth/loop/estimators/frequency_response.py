@@ -1,4 +1,4 @@
-"""What an estimate makes of a true velocity: gain and phase delay over frequency.
+"""Frequency response of a velocity estimate: gain and phase delay.
 
 A position e^{s t} with s = i 2 pi f has the velocity s e^{s t}, and the estimate w(e^{s T}) e^{s t}; their ratio
 
@@ -50,7 +50,7 @@ def relative_response(method: VelocityMethod | Estimator, period: float, frequen
 
 
 def phase_delay(method: VelocityMethod | Estimator, period: float, frequency_Hz: ArrayLike) -> Floats:
-    """How late the estimate is against the true velocity, -phi/(2 pi f), its phase followed from frequency 0.
+    """Delay of the estimate against the true velocity, -phi/(2 pi f), its phase followed from frequency 0.
 
     Where the gain passes through zero (a windowed difference whose window holds whole vibrations) the phase is
     followed through it, and it is the gain that changes sign: symmetric windows have one delay at all

@@ -61,7 +61,7 @@ class Kalman:
         return self.alpha_beta(period).estimator(period)
 
     def delay(self, period: float) -> float:
-        """How late the estimate is at low frequencies [s]: T r/(1 - r)."""
+        """Delay of the estimate at low frequencies [s]: T r/(1 - r)."""
         return self.alpha_beta(period).delay(period)
 
     def noise_gain(self, period: float) -> float:

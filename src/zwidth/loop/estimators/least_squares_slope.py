@@ -51,7 +51,7 @@ class LeastSquaresSlope:
         return mean_difference(6.0 * ((k + 1) * (n - 1 - k)) / (n * (n * n - 1)), period)
 
     def delay(self, period: float) -> float:
-        """How late the estimate is [s]: (n - 1) T/2, at every frequency."""
+        """Delay of the estimate [s]: (n - 1) T/2, at every frequency."""
         return 0.5 * (self.samples - 1) * period
 
     def noise_gain(self, period: float) -> float:

@@ -69,7 +69,7 @@ class Levant:
 
     @property
     def parameters(self) -> Floats:
-        """What `levant_estimate` takes, (2,): lambda0 and lambda1."""
+        """Numbers for `levant_estimate`, (2,): lambda0 and lambda1."""
         return np.array([1.5 * sqrt(self.acceleration_max), 1.1 * self.acceleration_max])
 
     @property

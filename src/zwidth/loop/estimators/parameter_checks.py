@@ -1,4 +1,4 @@
-"""What the parameters of velocity estimators may be."""
+"""Checks of the parameters of velocity estimators."""
 
 from __future__ import annotations
 

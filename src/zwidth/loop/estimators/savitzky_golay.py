@@ -69,7 +69,7 @@ class SavitzkyGolay:
         return mean_difference(np.array(_weights(self.samples, self.order, self.centred)), period)
 
     def delay(self, period: float) -> float:
-        """How late the estimate is at low frequencies [s].
+        """Delay of the estimate at low frequencies [s].
 
         (n - 1) T/2 in the middle (there at every frequency) and for degree 1; 0 at the newest position otherwise
         """

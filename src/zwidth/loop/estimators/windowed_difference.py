@@ -35,7 +35,7 @@ class WindowedDifference:
         return mean_difference(np.full(self.samples, 1.0 / self.samples), period)
 
     def delay(self, period: float) -> float:
-        """How late the estimate is [s]: n T/2, at every frequency."""
+        """Delay of the estimate [s]: n T/2, at every frequency."""
         return 0.5 * self.samples * period
 
     def noise_gain(self, period: float) -> float:

@@ -1,4 +1,4 @@
-"""What a command found, and how it is printed: for people, or as JSON."""
+"""Answer of a command, printed for people or as JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Answer:
     """The result of one command.
 
     document  keys and values of --json
-    pages     builds what is printed for people, only where it is asked for: rich renderables or text
+    pages     builds what is printed for people, only where it is needed: rich renderables or text
     reason    why the question has no answer; None if it has one
     """
 

@@ -62,7 +62,7 @@ class CommandLine:
         return self.options[option]
 
     def writes(self, endings: Sequence[str]) -> bool:
-        """Is a file with one of these endings to be written?"""
+        """Whether the output file has one of these endings."""
         return self.path is not None and self.path.suffix.lower() in endings
 
 

@@ -1,4 +1,4 @@
-"""What is asked of a contact on the command line: what is touched, from where, and by which hand."""
+"""Command-line options of a contact: environment, start, and hand."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def _by_name(parameters: Sequence[tuple[str, float]]) -> dict[str, float]:
 
 @contextmanager
 def _name_option(option: str) -> Iterator[None]:
-    """What is wrong with an option's numbers is said under its name."""
+    """Turn errors in an option's numbers into messages that name the option."""
     try:
         yield
     except ValueError as error:
@@ -193,7 +193,7 @@ def wall_options() -> tuple[Callable[..., Any], ...]:
 
 
 def contact_options() -> tuple[Callable[..., Any], ...]:
-    """What is touched, from where and by whom, as options."""
+    """Options for environment, start and hand."""
     return (*_wall_and_environment_options(), *_start_options(), *_hand_options())
 
 
@@ -288,5 +288,5 @@ def _hand_options() -> list[Callable[..., Any]]:
 
 
 def usage_error(text: str) -> click.UsageError:
-    """What is wrong with options of the command that runs."""
+    """Usage error about options of the running command."""
     return click.UsageError(text, click.get_current_context())

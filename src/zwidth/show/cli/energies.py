@@ -1,4 +1,4 @@
-"""What an energy balance reads like: each entry in its column, what is stored last."""
+"""Text of an energy balance: one entry per column, the stored energy last."""
 
 from __future__ import annotations
 

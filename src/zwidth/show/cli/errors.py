@@ -1,4 +1,4 @@
-"""What users are told when a command fails: one line per fault, and an exit code."""
+"""Messages of a command that fails: one line per fault, and an exit code."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ DEBUG = "ZWIDTH_DEBUG"
 
 
 class BadInput(Exception):
-    """What was asked for cannot be meant; each line is one fault."""
+    """The command line is not valid; each line is one fault."""
 
     def __init__(self, *lines: str) -> None:
         self.lines = lines

@@ -66,7 +66,7 @@ def warning(experiment: Experiment) -> str | None:
 
 
 def sentences(experiment: Experiment) -> Iterator[tuple[str, str]]:
-    """What to say below the points: labels and values."""
+    """Rows below the points: labels and values."""
     best = experiment.stiffest
     if best is not None and best.edge == "tip":
         doubt = ", unsure" if best.unsure else ""
@@ -89,7 +89,7 @@ def sentences(experiment: Experiment) -> Iterator[tuple[str, str]]:
 
 
 def _doubt(tips: list[bool], *, single: bool) -> str:
-    """What the unsure points are, each a tip or not."""
+    """Sentence on the unsure points, each a tip or not."""
     counts = [(len(tips) - sum(tips), "edge"), (sum(tips), "tip")]
     which = " and ".join(f"{count} {name}{'s' * (count > 1)}" for count, name in counts if count)
     text = (
@@ -99,7 +99,7 @@ def _doubt(tips: list[bool], *, single: bool) -> str:
 
 
 def explanation(experiment: Experiment) -> list[str]:
-    """What the measured edges have to do with the exact linear ones, and which part of the device is why."""
+    """Comparison of the measured edges with the exact linear ones, and the parts of the device that explain it."""
     difference = [_difference(experiment)] if experiment.chart is not None else []
     return difference + [_cause(cause, experiment.damping_range) for cause in experiment.causes]
 
@@ -134,7 +134,7 @@ def _gaps(points: list[MeasuredPoint]) -> str:
 
 
 def _cause(cause: Cause, width: float) -> str:
-    """What one part does: where the edge goes without it."""
+    """Effect of one part: the edge without it."""
     if not cause.comparisons or isnan(width):
         return f"without {cause.name} no edge could be compared"
     point, other = max(cause.comparisons, key=lambda pair: abs(pair[0].damping - pair[1]))

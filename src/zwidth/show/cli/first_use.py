@@ -1,4 +1,4 @@
-"""The wait at first use: kernels are compiled once for each processor, and whoever waits is told for what.
+"""The wait at first use: kernels are compiled once for each processor, and the user is told what the wait is for.
 
 all kernels           `zwidth compile`, and setting up by make: processes beside each other
 those of one command  as they are wanted: announced when the first is, and every few seconds what remains

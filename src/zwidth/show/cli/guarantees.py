@@ -26,7 +26,7 @@ NOTHING: Final = "no wall has K > 0 and B >= 0 and any of the guarantees"
 class GuaranteesCommand(Command):
     """Find which walls of DEVICE are stable with every passive operator, with every spring, and at all.
 
-    The bare device is asked about, whatever operator its file names: he is one of those allowed.
+    The operator of the device file is left out: he is one of those that the guarantees allow.
     """
 
     name = "guarantees"

@@ -35,6 +35,6 @@ def heading(question: Question, device: Device, *, linear: bool = True) -> str:
 
 
 def omission(device: Device) -> str:
-    """What of a device a linear answer leaves out."""
+    """Parts of a device that a linear answer leaves out."""
     simulated = "" if device.response is not None else "; `zwidth simulate` has them"
     return omission_text(device.linear_omissions) + simulated

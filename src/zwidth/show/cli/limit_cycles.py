@@ -194,7 +194,7 @@ def _rows(prediction: LimitCyclePrediction) -> Iterator[tuple[str, ...]]:
 
 
 def _kind(cycle: LimitCycle) -> str:
-    """What a limit cycle is to who stands before the device."""
+    """Describe a limit cycle as a user of the device would see or hear it."""
     if not cycle.within_range:
         return "beyond the range: outside what the model holds for"
     return "stable: what is seen" if cycle.stable else "unstable: larger ones grow, smaller ones die"

@@ -1,4 +1,4 @@
-"""What `zwidth map` tells people."""
+"""Text page of `zwidth map`."""
 
 from __future__ import annotations
 

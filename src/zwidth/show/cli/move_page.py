@@ -1,4 +1,4 @@
-"""What people read of a whole mechanism's motion."""
+"""Text page of a whole mechanism's motion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ENCODER_EFFECTS: Final = ("encoder steps", "noise")
 
 
 def move_page(case: CommandLine, motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Any]:
-    """What was asked, how it ended, the numbers, the energies, and what is worth a remark."""
+    """The page of a motion: its input, how it ended, its numbers and energies, and remarks."""
     start = vector(motion.start.position, "m")
     yield f"{printable(case.device.name)}: the whole mechanism from {start}, assembly {document['assembly']}"
     yield computer_text(case.device.controller)

@@ -14,12 +14,12 @@ INTERRUPTED: Final = 130
 
 
 def stopped_in_a_kernel(error: BaseException) -> bool:
-    """Is it the ctrl-C that came while compiled code was called? Python makes a SystemError of that."""
+    """Whether the error is a ctrl-C during a call of compiled code, which Python turns into a SystemError."""
     return isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt)
 
 
 def interrupted() -> int:
-    """What an interruption comes to."""
+    """Exit code and message of an interruption."""
     say("zwidth: interrupted; nothing was left half-written")
     return INTERRUPTED
 

@@ -1,4 +1,4 @@
-"""How far a long computation is."""
+"""Progress of a long computation on standard error."""
 
 from __future__ import annotations
 

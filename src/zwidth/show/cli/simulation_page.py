@@ -150,7 +150,7 @@ def _remarks(simulation: ContactSimulation) -> Iterator[str]:
 
 
 def _rubs(simulation: ContactSimulation) -> bool:
-    """Does dry friction stand against a force?"""
+    """Whether dry friction acts against the force."""
     import numpy as np
 
     pushed = bool(np.any(simulation.force != 0.0)) or simulation.hand.push != 0.0

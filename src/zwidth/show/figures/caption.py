@@ -113,7 +113,7 @@ def caption_of_result(result: Any) -> list[str]:
 
 
 def facts_of_point(at: OperatingPoint, *, linear: bool = True) -> dict[str, Any]:
-    """What an operating point states of itself; nothing of where it is, for many of them."""
+    """Facts of an operating point for a caption; without position and direction where there are many."""
     facts: dict[str, Any] = {"name": at.name, "model": at.model, "left_out": at.linear_omissions if linear else ()}
     if at.model != "motor-mass" and at.operator is not None:
         facts["operator"] = at.operator_name or AS_GIVEN
@@ -144,7 +144,7 @@ def facts_of_study(study: Any) -> dict[str, Any]:
 
 
 def wall_of_document(document: Mapping[str, Any]) -> dict[str, Any]:
-    """The same of a result's document."""
+    """The wall or environment of a result, from its document."""
     if document.get("environment") is not None:
         return {key: document.get(key) for key in ("environment", "parameters")}
     values = {name: document.get(f"wall_{name}_{unit}") for name, unit in WALL_UNITS.items()}

@@ -181,7 +181,7 @@ def binned_extremes(time: Floats, values: Floats, bins: int = BINS) -> tuple[Flo
 
 
 def _draw_energies(ax: Axes, response: TimeResponse, run: _Part, draw: Callable[..., None]) -> None:
-    """What is stored, and the entries of the ledger that move most of it."""
+    """Stored energy, and the largest entries of the energy ledger."""
     draw(ax, run.time, run(response.stored), BLACK, "stored")
     size = np.abs(response.energies).max(axis=0)
     worth = [i for i in np.argsort(-size)[:LEDGER] if size[i] > WORTH * size.max()]

@@ -79,7 +79,7 @@ def draw_guarantees(ax: Axes, guarantees: Guarantees, window: Window | None = No
 
 
 def _is_small(ring: np.ndarray, view: Window) -> bool:
-    """Is what lies within a ring hardly seen?"""
+    """Whether a ring is too small to be seen in the figure."""
     across, up = np.ptp(ring, axis=0) / (view[1] - view[0], view[3] - view[2])
     return bool(min(across, up) < SMALL)
 

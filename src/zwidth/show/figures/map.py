@@ -277,7 +277,7 @@ def _arrow(ax: Axes, mechanism: ProjectedMechanism, dataset: xr.Dataset) -> None
 
 
 def _view(x: Floats, y: Floats, mechanism: ProjectedMechanism | None) -> tuple[float, ...]:
-    """What is shown: the map and the mechanism."""
+    """Outline of what a map's figure shows: the map and the mechanism."""
     low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
     if mechanism is not None:
         points = np.vstack([*mechanism[0], mechanism[1], mechanism[2][None]])

@@ -23,7 +23,7 @@ from zwidth.show.units import quantity
 Floats = NDArray[np.float64]
 
 WALL: Final = "#E3E3E3"
-GRID: Final = 801  # points across a drawing at which a surface's depth is asked
+GRID: Final = 801  # points across a drawing at which a surface's depth is computed
 FILLED: Final = 1.0  # widths of the view that a wall is drawn beyond it: equal scales show more of one axis
 NEAR: Final = 1e-6  # rad, by which a posture found again may differ; share of a place that is no motion
 LEAST: Final = 1e-3  # share of the mechanism's size that a close-up shows at least

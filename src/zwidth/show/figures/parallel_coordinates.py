@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-DARKEST: Final = 0.9  # of the colours' scale: its light end cannot be told from paper
+DARKEST: Final = 0.9  # of the colours' scale: its light end looks like paper
 LETTERS: Final = 17
 INCOMPLETE_COLOUR: Final = "#A8A8A8"
 THIN_LINES_FROM: Final = 150  # designs from which on lines are drawn thinner

@@ -1,4 +1,4 @@
-"""How each result draws itself: what `result.plot()` and a notebook call."""
+"""The drawing function of each kind of result, for `result.plot()` and notebooks."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def notebook(result: Any) -> str:
 
 
 def drawing_of(result: Any) -> Draw:
-    """What draws results of this kind. Raises TypeError where nothing does."""
+    """The drawing function for results of this kind. Raises TypeError where there is none."""
     for kind in type(result).__mro__:
         if kind.__name__ in DRAWINGS:
             return DRAWINGS[kind.__name__]

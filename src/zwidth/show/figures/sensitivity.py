@@ -1,4 +1,4 @@
-"""What to change first, as bars."""
+"""Sensitivities as bars, the largest first."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def draw_first_column(ax: Axes, dataset: xr.Dataset) -> None:
 
 
 def _few_lines(dataset: xr.Dataset, name: str, numeric: Sequence[str], texts: Sequence[str]) -> bool:
-    """Has a study one axis to draw along, and few enough values of the others for a line each?"""
+    """Whether a study has one axis to draw along, and few enough values of the others for a line each."""
     if dataset[name].dims == ("design",) or len(numeric) > 1:
         return False
     lines = int(np.prod([dataset.sizes[key] for key in texts]))
@@ -92,7 +92,7 @@ def _split_axes(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], l
     """The axes of numbers, and those of texts."""
     axes = [str(dim) for dim in dataset[names[0]].dims]
     numeric = [key for key in axes if dataset[key].dtype.kind in "if"] if axes != ["design"] else []
-    # one of a single value has nothing to be drawn along; it is told beside the texts
+    # one of a single value cannot be drawn as an axis; it is stated beside the texts
     numeric = [key for key in numeric if dataset.sizes[key] > 1] or numeric[:1]
     return numeric, [key for key in axes if key not in numeric]
 

@@ -1,6 +1,6 @@
 """How figures look and how they are saved: the same bytes from the same numbers, and no global state.
 
-Colours are those of Okabe and Ito (2008), told apart with any colour vision; lines that share a figure also
+Colours are those of Okabe and Ito (2008), distinguishable with any colour vision; lines that share a figure also
 differ in their dashes and in lightness, so that a grey print can be read.
 """
 

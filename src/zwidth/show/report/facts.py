@@ -88,7 +88,7 @@ class Facts:
 
     @property
     def renders(self) -> bool:
-        """Is any wall with K > 0 and B >= 0 stable?"""
+        """Whether any wall with K > 0 and B >= 0 is stable."""
         return self.base.stiffness_max > 0.0
 
     @cached_property

@@ -42,7 +42,7 @@ def write_report(
     say = progress or (lambda stage, done, of: None)
     facts = gather(device, point)
     say("report", 1, PARTS)
-    _ = facts.sensitivities  # each is computed when it is first asked for, and kept
+    _ = facts.sensitivities  # each is computed at its first use, and kept
     say("report", 2, PARTS)
     _ = facts.validity
     say("report", 3, PARTS)

@@ -226,7 +226,7 @@ def left_out(facts: Facts) -> str:
 
 
 def outside(facts: Facts) -> str:
-    """What happens inside and outside the edge of the stable set."""
+    """Sentence on vibrations inside and outside the edge of the stable set."""
     nyquist = 0.5 / facts.loop.period
     straight = [arc for arc in facts.chart.boundary if np.all(arc.frequency <= 1e-9 * nyquist)]
     text = "Inside the edge the motion comes to rest; outside, an oscillation builds up"
@@ -329,7 +329,7 @@ def _way(value: float) -> str:
 
 
 def compare_answers(facts: Facts) -> str:
-    """Does the number to change first belong to the cause that `limit` names? "" where either is not known."""
+    """Sentence on whether the number to change first belongs to the cause that `limit` names; "" if unknown."""
     best, candidates = limiting_change(facts.variants), _changeable_numbers(facts)
     if best is None or not candidates:
         return ""
