@@ -130,7 +130,7 @@ def test_what_cannot_be_asked_is_refused_in_one_line(words, said, tmp_path, monk
 
 
 def test_a_simulation_that_vibrates_otherwise_is_said_to():
-    """Far beyond the edge the slow vibration wins, which a sinus that grows fastest does not show."""
+    """Far beyond the edge the slow vibration wins, which a sine that grows fastest does not show."""
     ran = run_command(
         "limit-cycles", TWO_MASS, *LIMITED, "--set", "loop.delay_samples=0.5", "--stiffness", 7000, "--damping", 10
     )

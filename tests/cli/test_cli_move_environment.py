@@ -111,7 +111,7 @@ def test_an_environment_of_my_own(user_environment):
 def test_a_law_that_gives_no_number_has_no_answer(user_environment):
     ran = run_command("move", MECHANISM, *PLANE, *PUSH, "--environment", user_environment("silent"), "--json")
     assert (ran.code, ran.document["status"], ran.document["environment"]) == (1, None, None)
-    assert "after 0.01125 s silent gave no finite force, where it was told a depth of" in ran.document["reason"]
+    assert "after 0.01125 s silent gave no finite force, where it was given a depth of" in ran.document["reason"]
 
 
 @pytest.mark.parametrize("name", ["hunt_crossley", "texture", "wall"])

@@ -23,7 +23,7 @@ def device(number):
 
 
 def test_the_whole_force_is_in_the_harmonics():
-    """3.3 times the limit asked for: a sinus has half the amplitude and 1.4 times the frequency."""
+    """3.3 times the limit asked for: a sine has half the amplitude and 1.4 times the frequency."""
     loop, K, B = device(6)
     (first,) = (cycle for cycle in limit_cycles(loop, K, B) if cycle.stable)
     full = with_harmonics(loop, K, B, first)

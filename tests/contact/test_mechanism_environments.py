@@ -254,7 +254,7 @@ def test_an_environment_that_gives_no_number_ends_the_motion_there():
     depth = depth_and_normal(SURFACES[0], motion.counted_position)[0]
     assert depth[-1] >= 1e-3 > np.max(depth[:-1])
     assert np.all(np.isfinite(motion.position))
-    told = f"after {motion.time[-1]:.6g} s silent gave no finite force, where it was told a depth of "
+    told = f"after {motion.time[-1]:.6g} s silent gave no finite force, where it was given a depth of "
     assert motion.reason.startswith(f"{told}{depth[-1]:.6g} m and ")
 
 

@@ -297,7 +297,7 @@ def test_a_sound_has_its_time_but_not_of_what_grows():
     again = simulate_contact(one_mass(), environment=slot, seconds_to_hear=lambda f: 50.0 / f if f else 0.0)
     assert again.length == (pytest.approx(50.0 / again.dominant_frequency, rel=0.1), "to be heard")
     asked = simulate_contact(point, 4000.0, 10.0, duration=0.1, seconds_to_hear=lambda frequency: 3.0)
-    assert asked.length == (0.1, "as asked")
+    assert asked.length == (0.1, "as requested")
 
 
 def test_a_run_is_given_up_a_metre_away_or_where_its_growth_can_be_told():

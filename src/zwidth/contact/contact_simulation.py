@@ -124,7 +124,7 @@ class ContactSimulation(Result):
 
     @property
     def given_up(self) -> bool:
-        """Did the run end early, the device farther from the wall than any goes?"""
+        """Whether the run stopped early, the device farther from the wall than any device moves."""
         return self.response.given_up
 
     @cached_property

@@ -71,7 +71,7 @@ class RunArrays(NamedTuple):
     push        (m, 9)   the hand's (see `hand`);   reflex (m, 7)
     observer    (m, Q)   the passivity controller's; nan in the first: none
     seed        (m,)
-    bound       (m,)     reading from the wall at which a run is given up [m]
+    bound       (m,)     reading from the wall at which a run stops [m]
     """
 
     device: Ints

@@ -43,7 +43,7 @@ class Run:
     wall_position   where the environment begins, on the axis of the reading [m]
     seed            of the noise
     passivity       a passivity controller; None: none
-    bound           distance of the reading from the wall at which the run is given up [m]
+    bound           distance of the reading from the wall at which the run stops [m]
     """
 
     loop: Loop

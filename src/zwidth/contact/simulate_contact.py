@@ -157,7 +157,7 @@ def simulate_contact(
     substeps = needed_substeps(loop, hand, substeps)
     simulate = partial(simulate_batch, runs, touched, substeps=substeps, trail=trail, ledger=True)
     if duration is not None:
-        length = RunLength(duration, "as asked")
+        length = RunLength(duration, "as requested")
         responses = simulate(duration=duration)
     else:
         length = contact_run_length(loop, hand, growth, controlled=controlled, seconds_to_hear=seconds_to_hear)

@@ -131,7 +131,7 @@ class TimeResponse(Result):
         return float(gap.max() / max(np.abs(self.energies).max(), np.abs(self.stored).max(), 1e-300))
 
     def document(self) -> dict[str, Any]:
-        """The motion by key and unit, and whether it was given up."""
+        """The motion by key and unit, and whether it was stopped early."""
         return {"wall_position_m": self.wall_position, "given_up": self.given_up, **self.series}
 
     def table(self) -> dict[str, Floats]:
@@ -155,7 +155,7 @@ class TimeResponse(Result):
 
     def __repr__(self) -> str:
         largest = float(np.max(np.abs(self.force), initial=0.0))
-        given_up = ", given up" if self.given_up else ""
+        given_up = ", stopped early" if self.given_up else ""
         last = float(self.time[-1]) if len(self.time) else 0.0
         return f"TimeResponse: {len(self.time)} samples, {last:.4g} s{given_up}, largest force {largest:.4g} N"
 

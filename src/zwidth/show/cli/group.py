@@ -3,34 +3,37 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, MutableMapping, Sequence
+from importlib import import_module
+from typing import Any, Final
 
 import click
 
 from zwidth._version import __version__
-from zwidth.show.cli.bounds import BoundsCommand
-from zwidth.show.cli.chart import ChartCommand
-from zwidth.show.cli.check import CheckCommand
-from zwidth.show.cli.command import Command
-from zwidth.show.cli.compile import compile_command
-from zwidth.show.cli.devices import devices
-from zwidth.show.cli.experiment import ExperimentCommand
-from zwidth.show.cli.felt import FeltCommand
-from zwidth.show.cli.guarantees import GuaranteesCommand
-from zwidth.show.cli.limit_cycles import LimitCyclesCommand
-from zwidth.show.cli.map import MapCommand
-from zwidth.show.cli.move import MoveCommand
-from zwidth.show.cli.new import NewCommand
-from zwidth.show.cli.polar import PolarCommand
-from zwidth.show.cli.report import ReportCommand
-from zwidth.show.cli.robust import RobustCommand
-from zwidth.show.cli.schema import schema
-from zwidth.show.cli.sensitivity import SensitivityCommand
-from zwidth.show.cli.show import ShowCommand
-from zwidth.show.cli.simulate import SimulateCommand
-from zwidth.show.cli.sweep import SweepCommand
 
+# Name -> module and attribute: a `Command` to be made, or click's own.
+COMMANDS: Final = {
+    "devices": ("devices", "devices"),
+    "schema": ("schema", "schema"),
+    "compile": ("compile", "compile_command"),
+    "new": ("new", "NewCommand"),
+    "show": ("show", "ShowCommand"),
+    "chart": ("chart", "ChartCommand"),
+    "check": ("check", "CheckCommand"),
+    "polar": ("polar", "PolarCommand"),
+    "map": ("map", "MapCommand"),
+    "sweep": ("sweep", "SweepCommand"),
+    "report": ("report", "ReportCommand"),
+    "sensitivity": ("sensitivity", "SensitivityCommand"),
+    "felt": ("felt", "FeltCommand"),
+    "bounds": ("bounds", "BoundsCommand"),
+    "guarantees": ("guarantees", "GuaranteesCommand"),
+    "robust": ("robust", "RobustCommand"),
+    "simulate": ("simulate", "SimulateCommand"),
+    "experiment": ("experiment", "ExperimentCommand"),
+    "limit-cycles": ("limit_cycles", "LimitCyclesCommand"),
+    "move": ("move", "MoveCommand"),
+}
 EPILOG = """\b
 Example:
   zwidth devices
@@ -39,7 +42,34 @@ Example:
 Exit codes: 0 done; 1 the question has no answer; 2 bad input; 70 an error in zwidth; 130 interrupted."""
 
 
+class LazyCommands(MutableMapping[str, click.Command]):
+    """The commands by name, each imported when it is wanted: importing all of them takes 60 ms."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, click.Command] = {}
+
+    def __getitem__(self, name: str) -> click.Command:
+        if name not in self._made:
+            module, attribute = COMMANDS[name]
+            found = getattr(import_module(f"zwidth.show.cli.{module}"), attribute)
+            self._made[name] = found if isinstance(found, click.Command) else found().for_click()
+        return self._made[name]
+
+    def __setitem__(self, name: str, command: click.Command) -> None:
+        self._made[name] = command
+
+    def __delitem__(self, name: str) -> None:
+        del self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
+
+
 @click.group(
+    commands=LazyCommands(),
     epilog=EPILOG,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
@@ -50,32 +80,6 @@ def zwidth(context: click.Context) -> None:
     """Which virtual walls a haptic device can render, what limits them, and what to change."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
-
-
-COMMANDS = (
-    devices,
-    schema,
-    compile_command,
-    NewCommand(),
-    ShowCommand(),
-    ChartCommand(),
-    CheckCommand(),
-    PolarCommand(),
-    MapCommand(),
-    SweepCommand(),
-    ReportCommand(),
-    SensitivityCommand(),
-    FeltCommand(),
-    BoundsCommand(),
-    GuaranteesCommand(),
-    RobustCommand(),
-    SimulateCommand(),
-    ExperimentCommand(),
-    LimitCyclesCommand(),
-    MoveCommand(),
-)
-for command in COMMANDS:
-    zwidth.add_command(command.for_click() if isinstance(command, Command) else command)
 
 
 def invoke(arguments: Sequence[str]) -> int:
