@@ -39,9 +39,9 @@ def dexterity() -> list[Row]:
             "Fig. 5.1",
             "kinematic isotropy",
             "almost constant and close to unity in most of the workspace, where the manipulabilities are maximum",
-            f"the condition number is at most 1.5 in {100 * share:.0f} % of what is reached (y ≥ 0.05 m), at most "
-            f"2 in {100 * maps.isotropic[2.0]:.0f} %; where both manipulabilities are within a tenth of their "
-            f"largest it goes from {low:.2f} to {high:.2f}",
+            f"the condition number is at most 1.5 in {100 * share:.0f} % of the reachable area "
+            f"(y ≥ 0.05 m), at most 2 in {100 * maps.isotropic[2.0]:.0f} %; where both manipulabilities are "
+            f"within a tenth of their largest it goes from {low:.2f} to {high:.2f}",
             share > 0.5,
         ),
         Claim(
@@ -118,7 +118,8 @@ def common_area() -> list[Row]:
         *(
             Number(
                 "Fig. 5.4",
-                f"common area, {name} ≥ 0.2 kg ({100 * common.areas[mass].common.share:.0f} % of what is reached)",
+                f"common area, {name} ≥ 0.2 kg "
+                f"({100 * common.areas[mass].common.share:.0f} % of the reachable area)",
                 1e4 * common.areas[mass].common.area,
                 "cm²",
                 second_value=1e4 * common.by_integration[mass],

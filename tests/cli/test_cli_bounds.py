@@ -144,7 +144,7 @@ def test_people_read_which_assumptions_are_not_met():
     assert "exact, at 9.975 Ns/m" in out
     assert "7.134 kN/m" in out
     assert "1  The device moves along the wall as one rigid mass, tied to nothing." in out
-    assert "not asked, for the device lacks what they take:" in out
+    assert "not applied, because the device lacks what they need:" in out
 
 
 def test_a_device_that_breaks_nothing_shows_no_list(paddle):

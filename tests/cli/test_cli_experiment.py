@@ -204,7 +204,7 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     journal = folder / "points.csv.progress"
     code, _, err = stopped_by_ctrl_c(words, "zwidth.study.journal:Journal.get_or_compute", 4, folder)
     assert code == 130
-    assert "points.csv.progress keeps what is done" in err
+    assert "points.csv.progress keeps the finished work" in err
     assert not (folder / "points.csv").exists()
     assert journal.read_bytes().count(b"\n") == 5, "the question, and four results"
     assert run_command(*words).code == 0
@@ -254,7 +254,7 @@ def test_a_measured_response_has_nothing_to_disturb(folder):
     ("words", "line"),
     [
         (("--stiffness", "8000,1000", "--damping", "0,30"), "needs LOW < HIGH"),
-        (("--stiffness", "0,8000"), "give both, or none"),
+        (("--stiffness", "0,8000"), "give both or neither"),
         (("--subjects", 0), "subjects"),
         (("--subjects", 2), "give an operator"),
         (("--reflex",), "give an operator"),
@@ -263,7 +263,7 @@ def test_a_measured_response_has_nothing_to_disturb(folder):
         (("--disturbance", 0), "--disturbance: must be larger"),
         (("--disturbance", "nan"), "--disturbance: must be finite"),
         (("--disturbance", 1.5), "--disturbance: must be 1 m or less, got 1.5"),
-        (("--disturbance", 0.01, "--wall", "one-sided"), "--disturbance: is of a two-sided wall"),
+        (("--disturbance", 0.01, "--wall", "one-sided"), "--disturbance: applies to a two-sided wall"),
         (("--speed", -200), "--speed: must be 100 m/s or less, got -200"),
         (("--visible", -1), "--visible: must be finite"),
         (("--wall", "one-sided", "--push", 0), "--push: must be positive"),

@@ -104,7 +104,7 @@ def test_a_wall_s_exact_verdict_stands_beside_the_one_that_was_seen(tmp_path):
 
 def test_without_an_exact_chart_nothing_is_counted_as_agreeing(tmp_path):
     document, text = points_report(tmp_path, HEAD + EDGES + WALLS, drawn=False)
-    assert text == "6 points; there is no exact chart to hold them against"
+    assert text == "6 points; there is no exact chart to compare them with"
     assert document["measured_counts"]["stable_walls_agreeing"] == 0
     assert {p["agrees"] for p in document["measured"]} == {None}
 

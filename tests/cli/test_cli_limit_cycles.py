@@ -70,10 +70,10 @@ def test_the_numbers_are_those_of_the_package(cycle_prediction):
 def test_people_read_the_same():
     out = " ".join(run_command("limit-cycles", ONE_MASS, *ROUGH_AND_LIMITED).out.split())
     assert "2.600 kN/m, 0 Ns/m: unstable if linear" in out
-    assert "not linear dry friction, encoder steps, the force limit" in out
+    assert "nonlinear parts dry friction, encoder steps, the force limit" in out
     assert "rests under every push on walls up to 3.000 kN/m" in out
     assert "450.8 µm 46.51 Hz" in out
-    assert "stable: what is seen limit cycle, 2.778 mm" in out
+    assert "stable: persists limit cycle, 2.778 mm" in out
     assert "leaves out" not in out
 
 
@@ -134,7 +134,7 @@ def test_a_simulation_that_vibrates_otherwise_is_said_to():
     ran = run_command(
         "limit-cycles", TWO_MASS, *LIMITED, "--set", "loop.delay_samples=0.5", "--stiffness", 7000, "--damping", 10
     )
-    assert "vibrates otherwise than predicted" in ran.out
+    assert "disagrees with the prediction" in ran.out
     assert "otherwise" not in run_command("limit-cycles", TWO_MASS, *WALL, *LIMITED).out
 
 

@@ -208,7 +208,7 @@ def test_a_response_cut_short_warns_above_the_numbers(tmp_path):
     chart, text = document_of("chart", short), run_command("chart", short).out
     assert chart["measured_up_to_share"] == pytest.approx(0.75)
     assert chart["warning"].startswith("measured up to 300.0 Hz, 75.00 % of half the sampling rate (400.0 Hz)")
-    assert "walls that fail above are not seen" in chart["warning"]
+    assert "walls that are unstable only above it are not found" in chart["warning"]
     assert text.index("warning: measured up to 300.0 Hz") < text.index("largest stiffness")
 
 

@@ -204,7 +204,7 @@ def test_a_motion_that_ends_at_a_singularity_is_an_answer(tmp_path):
     assert "reason" not in document
     assert document["largest_penetration_m"] is document["contact_share"] is document["started_inside"] is None
     assert set(document["depth_m"]) == {None}
-    assert "ended before its time: after 0.3" in run_command("move", MECHANISM, *words).out
+    assert "ended early: after 0.3" in run_command("move", MECHANISM, *words).out
 
 
 def test_people_read_how_deep_how_hard_and_remarks(tmp_path):
@@ -214,7 +214,7 @@ def test_people_read_how_deep_how_hard_and_remarks(tmp_path):
     assert "none in the file" in out
     out = run_command("move", MECHANISM, "--plane", "0,0.24,0,-1", *WALL, "--duration", 0.02).out
     assert "starts 10.00 mm inside the wall" in out
-    assert "nothing moves it" in run_command("move", MECHANISM, "--duration", 0.02).out
+    assert "nothing moves the handle" in run_command("move", MECHANISM, "--duration", 0.02).out
     out = run_command("move", MECHANISM, "--plane", "0,0.28,0,-1", *WALL, "--push", "0,1", "--duration", 0.02).out
     assert "the handle never touches the surface" in out
     parts = (
@@ -224,15 +224,15 @@ def test_people_read_how_deep_how_hard_and_remarks(tmp_path):
         2,
     )
     out = run_command("move", MECHANISM, *BALL, *parts, *WEAK).out
-    assert "with what a chart leaves out: dry friction, encoder steps" in out
-    assert "take --substeps 4 or more" in out
+    assert "includes what a chart leaves out: dry friction, encoder steps" in out
+    assert "use --substeps 4 or more" in out
     assert "motor-right reached in" in out
     assert "dry friction" in out
     arm = ("arm_mass_kg=1", "arm_stiffness_N_per_m=100", "arm_damping_Ns_per_m=1", "grasp=rigid")
     held = (MECHANISM, *BALL, *(word for key in arm for word in ("--set", f"operator.{key}")))
     document = document_of("move", *held)
     assert (document["left_out"], document["operator"]) == (["the operator"], None)
-    assert "leaves out the operator: the hand is the push alone" in run_command("move", *held).out
+    assert "leaves out the operator: the hand is only the push" in run_command("move", *held).out
 
 
 @pytest.mark.parametrize("kind", ["png", "svg", "pdf", "csv", "json"])
@@ -256,13 +256,13 @@ def test_a_file_holds_what_was_found(tmp_path, ball, kind):
 PLANE = ("--plane", "0,0.28,0,-1")
 BAD = [
     ((*PLANE, "--sphere", "0,0.3,0.05", *WALL), "--plane and --sphere exclude each other"),
-    (WALL, "--stiffness says what a surface does; add --plane"),
-    (("--hollow",), "--hollow says what a surface does"),
+    (WALL, "--stiffness needs a surface; add --plane"),
+    (("--hollow",), "--hollow needs a surface"),
     ((*PLANE, "--stiffness", 10), "missing: --damping"),
     ((*PLANE, "--damping", 10), "missing: --stiffness"),
     ((*PLANE, *WALL, "--hollow"), "goes with --sphere or --box"),
     (("--box", "0,0.3,0.1,0.1", *WALL, "--two-sided"), "goes with --plane"),
-    ((*PLANE, *WALL, "--two-sided", "--no-pull"), "pulls by its nature"),
+    ((*PLANE, *WALL, "--two-sided", "--no-pull"), "always pulls"),
     ((*PLANE, "--stiffness", -1, "--damping", 1), "from 0 up to"),
     ((*PLANE, "--stiffness", 1, "--damping", "nan"), "finite"),
     (("--plane", "0,0.28,0", *WALL), "4 or 6 finite numbers"),
@@ -279,12 +279,12 @@ BAD = [
     (("--push", "nan"), "finite numbers"),
     (("--push", "1,2,3,4"), "1 or 2 or 3 finite numbers"),
     (("--push", 1, "--direction", "0,0"), "direction: has zero length"),
-    (("--direction", "1,0"), "--direction is that of a --push"),
-    (("--push", "1,0", "--direction", "1,0"), "--direction is that of a --push"),
+    (("--direction", "1,0"), "--direction is used only with a --push"),
+    (("--push", "1,0", "--direction", "1,0"), "--direction is used only with a --push"),
     (("--start-velocity", "0,0,1"), "--start-velocity: the handle cannot move"),
     (("--gravity", "9.81"), "2 or 3 finite numbers"),
     (("--model", "rigid"), "--model rigid does not apply"),
-    (("--operator", "thesis-arm"), "no arm holds a mechanism"),
+    (("--operator", "thesis-arm"), "no operator holds the mechanism"),
     (("--assembly", "elbows"), "assembly"),
     (("--torque-limits", "some"), "not one of"),
     (("--output", "path.wav"), "must end in"),

@@ -122,8 +122,8 @@ def test_a_figure_is_drawn_of_it(tmp_path, name):
 
 
 BAD = [
-    (("--environment", "slot"), "--environment says what a surface does; add --plane"),
-    (("--parameter", "width=1"), "--parameter says what a surface does; add --plane"),
+    (("--environment", "slot"), "--environment needs a surface; add --plane"),
+    (("--parameter", "width=1"), "--parameter needs a surface; add --plane"),
     ((*PLANE, "--parameter", "width=1", "--stiffness", 1, "--damping", 1), "--parameter belongs to --environment"),
     ((*PLANE, "--environment", "slot", "--two-sided"), "--two-sided and --environment exclude each other"),
     ((*PLANE, "--environment", "slott"), "--environment: no environment is named 'slott'; did you mean slot?"),

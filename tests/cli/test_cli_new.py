@@ -69,8 +69,11 @@ def test_another_file_may_be_named(folder):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["there", "--kind", "plant"], "there.toml: is there already; remove it, or name another with --output"),
-        (["x", "--kind", "plant", "--output", "there.toml"], "there.toml: is there already"),
+        (
+            ["there", "--kind", "plant"],
+            "there.toml: exists already; remove it, or name another file with --output",
+        ),
+        (["x", "--kind", "plant", "--output", "there.toml"], "there.toml: exists already"),
         (["no/where", "--kind", "plant"], "there is no folder"),
         (["x", "--kind", "plant", "--output", "x.json"], "x.json: must end in .toml"),
         (["x"], "missing option '--kind'"),

@@ -61,14 +61,16 @@ def device(tmp_path, monkeypatch):
 def test_what_charts_refuses_in_one_line_and_writes_nothing(device, tmp_path, command, more):
     before = set(tmp_path.iterdir())
     (line,) = refusal_lines(command, device, *COMMANDS[command], *more)
-    assert line.startswith("adaptive.toml: adaptive windowing is not linear: it has no chart; ask zwidth simulate")
+    assert line.startswith(
+        "adaptive.toml: adaptive windowing is not linear, so it has no chart; use zwidth simulate"
+    )
     assert set(tmp_path.iterdir()) == before
 
 
 @pytest.mark.parametrize("command", ["chart", "polar", "bounds"])
 def test_a_mechanism_is_refused_alike(command):
     (line,) = refusal_lines(command, MECHANISM, *LEVANT)
-    assert line.startswith(f"{MECHANISM}: Levant's differentiator is not linear: it has no chart")
+    assert line.startswith(f"{MECHANISM}: Levant's differentiator is not linear, so it has no chart")
 
 
 def test_a_measured_device_is_refused_alike(device, tmp_path):

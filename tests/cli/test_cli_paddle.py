@@ -47,9 +47,9 @@ def test_a_position_beside_the_circle_is_projected_and_said_to_be(file):
         document = document_of(*words)
         assert document["projected_m"] == pytest.approx(1e-4**2 / (2.0 * LENGTH), rel=1e-3)
         assert document["position_m"] == pytest.approx([1e-4, LENGTH, 0.0], abs=1e-7)
-        assert "55.56 nm from the position asked for" in run_command(*words).out
+        assert "55.56 nm from the requested position" in run_command(*words).out
     assert document_of("chart", file)["projected_m"] == 0.0
-    assert "asked for" not in run_command("chart", file).out
+    assert "requested" not in run_command("chart", file).out
     ran = run_command("chart", file, "--at", "0,0.1", "--json")
     assert ran.code == 1
     assert "the nearest that it has is (0, 0.09, 0) m, 10 mm away" in ran.document["reason"]

@@ -97,7 +97,7 @@ def test_a_chart_of_two_directions_under_one_law():
     assert ran.document["directions"] == [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
     assert ran.document["stiffness_max_N_per_m"] == pytest.approx(4148.658573678898, rel=1e-9)
     assert ran.document["fastest_decay"] is None
-    assert "under one law" in run_command("chart", MECHANISM, "--with-direction", "1,0").out
+    assert "same wall along" in run_command("chart", MECHANISM, "--with-direction", "1,0").out
 
 
 @pytest.mark.parametrize(

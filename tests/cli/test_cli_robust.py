@@ -58,8 +58,8 @@ def test_people_read_who_binds_what_is_lost_and_what_was_tried():
     ran = run_command("robust", ONE_MASS, *MASSES, *QUICK)
     assert ran.code == 0, ran.err
     assert ran.err == ""
-    assert "lost against the best  50.00 % of its stiffness" in ran.out
-    assert "of 20 at random none finds one of these walls unstable" in ran.out
+    assert "loss against the best  50.00 % of its stiffness" in ran.out
+    assert "none of 20 random ones makes one of these walls unstable" in ran.out
     assert "100.0 %" in ran.out
     assert "plant.mass_kg" in ran.out
 
@@ -108,7 +108,7 @@ def test_no_wall_for_all_is_said_with_the_two_that_exclude_each_other():
         (("--range", "name=0.1,0.2"), "not a number"),
         (("--range", "plant.mass_kg=-0.1,0.2"), "-0.1 the device is not valid"),
         (("--operators", "none,nobody-we-know"), "nobody-we-know"),
-        (("--operators", "none", "--operator", "none"), "leave --operator out"),
+        (("--operators", "none", "--operator", "none"), "leave out --operator"),
         (("--operators", "none", "--operator-list", "x"), "give one of them"),
         (("--operators", "none,,thesis-arm"), "names with commas"),
         ((*MASSES, "--members", "1"), "--members"),

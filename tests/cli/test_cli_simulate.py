@@ -296,4 +296,4 @@ def test_people_read_verdict_growth_energies_and_remarks(folder):
     out = run_command("simulate", ONE_MASS, "--stiffness", 200_000, "--damping", 1, "--duration", 1).out
     assert "stopped early" in out
     out = run_command("simulate", TWO_MASS, *WALL, "--tremor", "1,10").out
-    assert "leave --tremor out" in out
+    assert "leave out --tremor" in out

@@ -48,7 +48,7 @@ BAD = [
     ((*WALL, "--wall-position", "inf"), "must be a number from"),
     ((*WALL, "--wall", "soft"), "not one of"),
     ((*WALL, "--wall", "one-sided", "--environment", "slot"), "exclude each other"),
-    ((*WALL, "--no-pull"), "pulls by its nature"),
+    ((*WALL, "--no-pull"), "always pulls"),
     ((*WALL, "--parameter", "width=1"), "belongs to --environment"),
     (("--environment", "slott"), "did you mean slot?"),
     (("--environment", "slot", "--parameter", "wdth=1"), "did you mean width?"),

@@ -88,7 +88,7 @@ def test_what_people_read(folder):
     text = STUDY.replace("count = 5", "count = 21") + "[optimise]\nbudget = 3\n"
     (folder / "study.toml").write_text(text)
     ran = run_command("sweep", "study.toml")
-    assert "[optimise] is left aside" in ran.out
+    assert "[optimise] is not used" in ran.out
     assert re.search(r"lowest +1\.\d+ at links\.upper-right\.length_m = 0\.18, assembly = elbows-", ran.out)
     assert re.search(r"designs +\d+ ok, \d+ out of reach", ran.out)
 
@@ -163,7 +163,7 @@ def test_everything_wrong_is_told_at_once(folder):
         (["none.toml"], "none.toml: no such file; give a study file"),
         (["."], ".: is a directory; give a study file"),
         (["study.toml", "--output", "a.txt"], "a.txt: must end in .png or .svg or .pdf"),
-        (["study.toml", "--output", "there.zarr"], "there.zarr: is there already; remove it, or name another"),
+        (["study.toml", "--output", "there.zarr"], "there.zarr: exists already; remove it, or name another"),
         (["study.toml", "--workers", "0"], "0 is not in the range x>=1"),
         (["study.toml", "--resume", "slow.py"], "slow.py: is not the store of a study; name another folder"),
         (["study.toml", "--resume", "no/where"], "no/where"),
@@ -198,7 +198,7 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     words = ["sweep", "study.toml", "--output", "designs.csv", "--workers", "2", "--json"]
     code, out, err = stopped_by_ctrl_c(words, "zwidth.study.store:Store.write_batch", 3, folder)
     assert (code, out) == (130, "")
-    assert "designs.csv.progress keeps what is done; the same command goes on from there" in err
+    assert "designs.csv.progress keeps the finished work; the same command continues from it" in err
     assert "Traceback" not in err
     batches = stored_cells(folder / "designs.csv.progress")
     assert len(batches) == 3
@@ -218,7 +218,7 @@ def test_a_stop_within_compiled_code_is_a_stop(folder, monkeypatch):
     monkeypatch.setattr("zwidth.study.executor._compute_ranges", stopped)
     ran = run_command("sweep", "study.toml", "--output", "out.csv")
     assert ran.code == 130
-    assert "out.csv.progress keeps what is done; the same command goes on from there" in ran.err
+    assert "out.csv.progress keeps the finished work; the same command continues from it" in ran.err
     assert not (folder / "out.csv").exists()
 
 
@@ -254,7 +254,7 @@ def test_a_lost_process_is_one_clear_line(folder):
     assert (ran.returncode, ran.stdout) == (70, "")
     (line,) = ran.stderr.splitlines()
     assert line.startswith("zwidth: a process that computed was killed (SIGKILL)")
-    assert line.endswith("cells keeps what is done; the same command goes on from there")
+    assert line.endswith("cells keeps the finished work; the same command continues from it")
 
 
 # --- the page ---------------------------------------------------------------------------------------

@@ -272,7 +272,7 @@ def test_an_environment_that_gives_no_number_ends_the_motion_there():
             replace(SURFACES[0], two_sided=True),
             "two_sided is of a SurfaceWall; wall says itself on which sides",
         ),
-        (SurfaceWall(1.0, no_pull=True), replace(SURFACES[0], two_sided=True), "pulls by its nature"),
+        (SurfaceWall(1.0, no_pull=True), replace(SURFACES[0], two_sided=True), "always pulls"),
         (ENVIRONMENTS["wall"], SURFACES[0], "must be a SurfaceWall or a SurfaceEnvironment, got Environment"),
         (SurfaceWall(1.0), "plane", "must be a Plane, a Sphere or a Box, got str"),
     ],

@@ -278,7 +278,7 @@ def test_a_linear_run_lasts_a_tenfold_change_or_eight_periods():
 
 
 def test_a_run_that_is_not_linear_lasts_two_seconds_or_five_tenfold_changes():
-    assert run_length(None, 0.001, linear=False) == (2.0, "chosen for what is not linear")
+    assert run_length(None, 0.001, linear=False) == (2.0, "chosen for a nonlinear run")
     assert run_length(None, 0.001, linear=False, busy_until=1.5).seconds == 3.5
     slow = run_length(-1e-3, 0.001, linear=False)
     assert slow.seconds == pytest.approx(5 * log(10.0))

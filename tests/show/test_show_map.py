@@ -105,7 +105,8 @@ def test_requirements_are_outlined_and_what_they_share_is_dotted(dataset, device
     assert said[1].startswith("Condition number of the Jacobian ≤ 1.3: ")
     assert said[2].startswith("Manipulability ≥ 0.015\u00a0m²/rad²: ")
     assert (
-        said[3] == f"Common area: {area_text(area.common.area)}, {percent(area.common.share)} of what is reached"
+        said[3]
+        == f"Common area: {area_text(area.common.area)}, {percent(area.common.share)} of the reachable area"
     )
     patches = [patch for patch in ax.patches if isinstance(patch, PathPatch)]
     assert len({patch.get_hatch() for patch in patches} - {None}) == 3

@@ -62,7 +62,7 @@ WRONG = [
     ),
     (
         {"measures": ["average(isotropy)"], "workspace": {"plane": "xz"}},
-        "workspace: the handle cannot leave the plane z = 0 m, and meets the plane asked for in a line; "
+        "workspace: the handle cannot leave the plane z = 0 m, and meets the requested plane in a line; "
         'ask for plane = "xy"',
     ),
     (

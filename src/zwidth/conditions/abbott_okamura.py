@@ -35,8 +35,10 @@ def stiffness_limit(
     b, friction, T, step = (
         np.asarray(v, dtype=float) for v in (device_damping, coulomb_friction, sampling_period, resolution)
     )
-    blind = np.where(step > 0.0, 2.0 * friction / np.where(step > 0.0, step, 1.0), np.inf + 0.0 * friction)
-    return np.asarray(np.minimum(2.0 * np.maximum(b, 0.0) / T, np.where(np.isnan(step), np.nan, blind)))
+    friction_limit = np.where(
+        step > 0.0, 2.0 * friction / np.where(step > 0.0, step, 1.0), np.inf + 0.0 * friction
+    )
+    return np.asarray(np.minimum(2.0 * np.maximum(b, 0.0) / T, np.where(np.isnan(step), np.nan, friction_limit)))
 
 
 def pure_spring_limit(stiffness: float, wall_damping: Floats) -> Floats:
@@ -45,7 +47,7 @@ def pure_spring_limit(stiffness: float, wall_damping: Floats) -> Floats:
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The two limits on a loop."""
+    """The lesser of both limits on a loop, for walls with B = 0."""
     b, T = case.traits.ground_damping, case.loop.period
     largest = float(stiffness_limit(b, case.coulomb_friction, T, case.resolution))
     return case.bound(

@@ -77,7 +77,9 @@ class ConditionCase:
     ) -> Bound:
         """The `Bound` of one condition on this loop; without a limit where a number that it needs is missing.
 
-        largest  largest stiffness over B >= 0 and its damping; nan: the condition names none
+        limit    largest stiffness [N/m] at dampings B (...) [N s/m]
+        largest  largest stiffness over B >= 0 and its damping [N/m], [N s/m]; nan: the condition names none
+        The other arguments are those of `Bound`.
         """
         lacking = tuple(key for key, value in taken.items() if isnan(value))
         stiffness, damping = (nan, nan) if lacking else (float(largest[0]), float(largest[1]))
@@ -93,7 +95,7 @@ class ConditionCase:
             violated=tuple(sentence for sentence in assumptions if sentence in self.unmet),
             taken=taken,
             lacking=lacking,
-            limit=_silent if lacking else limit,
+            limit=_no_limit if lacking else limit,
         )
 
 
@@ -101,44 +103,40 @@ def case_of(
     loop: Loop, wall_damping: float = nan, coulomb_friction: float = nan, resolution: float = nan
 ) -> ConditionCase:
     """Determine the properties of a loop once for all conditions."""
-    found = traits(loop)
-    return ConditionCase(
-        loop, found, wall_damping, coulomb_friction, resolution, _unmet(loop, found, wall_damping)
-    )
+    loop_traits = traits(loop)
+    unmet = _unmet(loop, loop_traits, wall_damping)
+    return ConditionCase(loop, loop_traits, wall_damping, coulomb_friction, resolution, unmet)
 
 
-def _silent(wall_damping: Floats) -> Floats:
+def _no_limit(wall_damping: Floats) -> Floats:
     """The limit of a condition for which a number of the device is missing: nan."""
     return np.full(wall_damping.shape, nan)
 
 
-def _unmet(loop: Loop, found: Traits, wall_damping: float) -> frozenset[str]:
+def _unmet(loop: Loop, t: Traits, wall_damping: float) -> frozenset[str]:
+    """The assumptions that a loop with traits t does not meet, for walls of one damping B [N s/m]."""
     T = loop.period
-    mass, drag = (
-        (found.mode_mass, found.mode_damping) if found.has_one_mode else (found.rigid_mass, found.ground_damping)
-    )
-    sprung, spring = (
-        (mass, found.mode_stiffness) if found.has_one_mode else (found.side_mass, found.side_stiffness)
-    )
+    mass, friction = (t.mode_mass, t.mode_damping) if t.has_one_mode else (t.rigid_mass, t.ground_damping)
+    sprung_mass, spring = (mass, t.mode_stiffness) if t.has_one_mode else (t.side_mass, t.side_stiffness)
     met = {
-        RIGID: found.free,
-        SPRUNG: found.sprung,
-        ONE_MODE: found.has_one_mode,
-        UNDAMPED: found.undamped and not found.corner_frequencies,
-        COLLOCATED: found.collocated,
+        RIGID: t.free,
+        SPRUNG: t.sprung,
+        ONE_MODE: t.has_one_mode,
+        UNDAMPED: t.undamped and not t.corner_frequencies,
+        COLLOCATED: t.collocated,
         UNDELAYED: loop.whole_delay == 0 and loop.fractional_delay == 0.0,
         UNIT_DELAY: loop.whole_delay == 1 and loop.fractional_delay == 0.0,
         WHOLE_DELAY: loop.fractional_delay == 0.0,
-        DIFFERENCE: found.uses_backward_difference,
+        DIFFERENCE: t.uses_backward_difference,
         VELOCITY_UNFILTERED: loop.controller.velocity_filter is None,
-        FIRST_ORDER: found.has_first_order_filter,
-        FORCE_UNFILTERED: not found.force_filtered,
-        PROMPT: not found.actuator_lags,
-        RESISTIVE: not found.corner_frequencies,
-        NYQUIST_BELOW_CORNER: all(corner * T >= np.pi for corner in found.corner_frequencies),
+        FIRST_ORDER: t.has_first_order_filter,
+        FORCE_UNFILTERED: not t.force_filtered,
+        PROMPT: not t.actuator_lags,
+        RESISTIVE: not t.corner_frequencies,
+        NYQUIST_BELOW_CORNER: all(corner * T >= np.pi for corner in t.corner_frequencies),
         # a missing number violates no assumption
-        LIGHT: not drag * T > LIGHT_FRICTION * mass,
+        LIGHT: not friction * T > LIGHT_FRICTION * mass,
         LIGHT_WALL: not abs(wall_damping) * T > LIGHT_FRICTION * mass,
-        SLOW: not spring * T**2 > SLOW_SPRING**2 * sprung,
+        SLOW: not spring * T**2 > SLOW_SPRING**2 * sprung_mass,
     }
     return frozenset(sentence for sentence, holds in met.items() if not holds)

@@ -69,8 +69,8 @@ def stiffness_limit_filtered(
         np.asarray(v, dtype=float) for v in (wall_damping, device_damping, sampling_period, time_constant)
     )
     # (1 - a)/(1 + a) with a = tau/(tau + T)
-    burden = np.where(B >= 0.0, B * T / (2.0 * tau + T), -B)
-    return np.asarray(2.0 * np.maximum(b - burden, 0.0) / T)
+    damping_term = np.where(B >= 0.0, B * T / (2.0 * tau + T), -B)
+    return np.asarray(2.0 * np.maximum(b - damping_term, 0.0) / T)
 
 
 def condition(case: ConditionCase) -> Bound:

@@ -83,6 +83,7 @@ class BoundsComparison(Result):
         }
 
     def _entry(self, bound: Bound) -> dict[str, Any]:
+        """One condition of the document."""
         return {
             "name": bound.name,
             "source": bound.source,
@@ -101,7 +102,7 @@ class BoundsComparison(Result):
         }
 
     def __repr__(self) -> str:
-        held = [bound.name for bound in self.bounds if bound.holds]
+        met = sum(bound.holds for bound in self.bounds)
         exact = (
             f"exact {self.exact:.6g} N/m there, {self.largest:.6g} N/m at most"
             if self.chart is not None
@@ -109,7 +110,7 @@ class BoundsComparison(Result):
         )
         return (
             f"BoundsComparison: at {self.damping:.6g} N s/m {exact}\n"
-            f"  {len(self.bounds)} conditions, {len(held)} with all assumptions met"
+            f"  {len(self.bounds)} conditions, {met} with all assumptions met"
         )
 
 
@@ -118,15 +119,15 @@ def compare_bounds(point: OperatingPoint, damping: float | None = None) -> Bound
 
     damping  B of the walls compared [N s/m]; left out: that of the stiffest stable wall, 0 if there is none
     Raises   ValueError  for a damping that is not finite
-             what `OperatingPoint.loop` and `stability_chart` raise, but for ChartError: see `undecided`
+             what `OperatingPoint.loop` and `stability_chart` raise, except ChartError: its text is in `undecided`
 
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant
     >>> import numpy as np
     >>> one = np.ones(1)
     >>> free_mass = Plant(np.array([[1.0]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
-    >>> found = compare_bounds(OperatingPoint(Controller(1.0), given_plant=free_mass), damping=1.0)
-    >>> round(found.exact, 9), round(found.stiffness_max(found.bounds[0]), 9)
+    >>> comparison = compare_bounds(OperatingPoint(Controller(1.0), given_plant=free_mass), damping=1.0)
+    >>> round(comparison.exact, 9), round(comparison.stiffness_max(comparison.bounds[0]), 9)
     (0.666666667, 0.666666667)
     """
     require("point", point, OperatingPoint)
@@ -160,9 +161,10 @@ def bounds_of(point: OperatingPoint, wall_damping: float = nan) -> list[Bound]:
 
 
 def exact_stiffness_limit(chart: StabilityChart, wall_damping: float) -> float:
-    """Supremum of the stable stiffnesses K > 0 at a damping B [N s/m], all cells together [N/m].
+    """Supremum of the stable stiffnesses K > 0 at a damping B [N s/m], over all regions of the chart [N/m].
 
-    0 where no wall with K > 0 is stable. The chart's edge gives the place, and eigenvalues refine it.
+    0 where no wall with K > 0 is stable. The samples of the chart's edge give a first value, and eigenvalues of
+    walls near it give the result.
 
     >>> import numpy as np
     >>> from zwidth.chart.chart import stability_chart
@@ -188,17 +190,17 @@ def exact_stiffness_limit(chart: StabilityChart, wall_damping: float) -> float:
 
 def _crossings(chart: StabilityChart, wall_damping: float) -> list[float]:
     """Stiffnesses at which the edge's samples cross the line of this damping."""
-    found: list[float] = []
+    stiffnesses: list[float] = []
     for arc in chart.boundary:
         off = arc.damping - wall_damping
         n = np.flatnonzero((off[:-1] * off[1:] <= 0.0) & (off[:-1] != off[1:]))
         share = off[n] / (off[n] - off[n + 1])
-        found += (arc.stiffness[n] + share * (arc.stiffness[n + 1] - arc.stiffness[n])).tolist()
-    return found
+        stiffnesses += (arc.stiffness[n] + share * (arc.stiffness[n + 1] - arc.stiffness[n])).tolist()
+    return stiffnesses
 
 
 def _refined(chart: StabilityChart, stiffness: float, wall_damping: float, width: float) -> float | None:
-    """The edge near a stiffness by eigenvalues; None where walls just below it are not stable."""
+    """The edge near a stiffness by eigenvalues [N/m]; None where no edge is near, with stable walls below it."""
 
     def excess(K: float) -> float:
         return float(spectral_radius(chart.loop, K, wall_damping)) - chart.radius

@@ -46,10 +46,11 @@ def reading_noise(plant: Plant) -> float:
 
 
 def _motion(plant: Plant) -> Floats:
+    """x of `ground_friction`, one number for each coordinate, with a.x = 1 m at the actuator."""
     a = plant.actuator
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     free = shapes[:, squared == 0.0]
-    pushed = free @ (free.T @ a)
-    begun = np.linalg.solve(plant.mass, a)
-    motion = pushed if a @ pushed > 1e-12 * (a @ begun) else begun
+    free_motion = free @ (free.T @ a)
+    acceleration = np.linalg.solve(plant.mass, a)
+    motion = free_motion if a @ free_motion > 1e-12 * (a @ acceleration) else acceleration
     return np.asarray(motion / (a @ motion))

@@ -35,14 +35,14 @@ def stiffness_limit(
     >>> float(stiffness_limit(1.0, 0.1, 0.001))
     2200.0
     """
-    B, b, T, late = (np.asarray(v, dtype=float) for v in (wall_damping, device_damping, sampling_period, delay))
-    return np.asarray(np.maximum(b + B, 0.0) / (T / 2.0 + late))
+    B, b, T, t_d = (np.asarray(v, dtype=float) for v in (wall_damping, device_damping, sampling_period, delay))
+    return np.asarray(np.maximum(b + B, 0.0) / (T / 2.0 + t_d))
 
 
 def condition(case: ConditionCase) -> Bound:
     """The linear condition on a loop."""
     b, T = case.traits.ground_damping, case.loop.period
-    late = case.loop.controller.delay * T
+    delay = case.loop.controller.delay * T
     return case.bound(
         name="linear condition",
         source="thesis eq. 4.17, which names Gil et al. 2004 and Minsky et al. 1990; with delay Gil et al. 2009 "
@@ -51,6 +51,6 @@ def condition(case: ConditionCase) -> Bound:
         claim="approximate",
         statement="K < (b + B)/(T/2 + t_d), for dampings well below m/T and short delays",
         assumptions=(RIGID, LIGHT, LIGHT_WALL, COLLOCATED, *PLAIN, RESISTIVE),
-        taken={"damping_Ns_per_m": b, "sampling_period_s": T, "delay_s": late},
-        limit=partial(stiffness_limit, device_damping=b, sampling_period=T, delay=late),
+        taken={"damping_Ns_per_m": b, "sampling_period_s": T, "delay_s": delay},
+        limit=partial(stiffness_limit, device_damping=b, sampling_period=T, delay=delay),
     )

@@ -48,17 +48,17 @@ def stiffness_limit(
     >>> float(stiffness_limit(1.0, 0.1, 5.4, 0.001))
     13000.0
     """
-    B, b, hand, T, late = (
+    B, b, b_h, T, t_d = (
         np.asarray(v, dtype=float)
         for v in (wall_damping, device_damping, operator_damping, sampling_period, delay)
     )
-    return np.asarray(np.maximum(b + hand + B, 0.0) / (T / 2.0 + late))
+    return np.asarray(np.maximum(b + b_h + B, 0.0) / (T / 2.0 + t_d))
 
 
 def condition(case: ConditionCase) -> Bound:
     """The linear condition on a loop, with all friction of device and hand that the wall feels."""
-    drag, T = case.traits.mode_damping if case.traits.has_one_mode else float("nan"), case.loop.period
-    late = case.loop.controller.delay * T
+    friction, T = case.traits.mode_damping if case.traits.has_one_mode else float("nan"), case.loop.period
+    delay = case.loop.controller.delay * T
     return case.bound(
         name="linear condition with a hand",
         source="Hulin et al. 2008 (known at second hand; derived here)",
@@ -66,6 +66,8 @@ def condition(case: ConditionCase) -> Bound:
         claim="approximate",
         statement="K < (b + b_h + B)/(T/2 + t_d), for dampings well below m/T, short delays and slow springs",
         assumptions=(ONE_MODE, SLOW, LIGHT, LIGHT_WALL, COLLOCATED, *PLAIN, RESISTIVE),
-        taken={"mode_damping_Ns_per_m": drag, "sampling_period_s": T, "delay_s": late},
-        limit=partial(stiffness_limit, device_damping=drag, operator_damping=0.0, sampling_period=T, delay=late),
+        taken={"mode_damping_Ns_per_m": friction, "sampling_period_s": T, "delay_s": delay},
+        limit=partial(
+            stiffness_limit, device_damping=friction, operator_damping=0.0, sampling_period=T, delay=delay
+        ),
     )

@@ -50,7 +50,7 @@ def stiffness_limit(
 
 
 def condition(case: ConditionCase) -> Bound:
-    """The condition on a loop."""
+    """The passive wall on a loop, its electrical damping counted as friction."""
     b, e, T = case.traits.ground_damping, case.traits.electrical_damping, case.loop.period
     return case.bound(
         name="passive wall with electrical damping",

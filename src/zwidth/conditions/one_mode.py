@@ -43,7 +43,7 @@ class OneMode:
 
     @property
     def r(self) -> float:
-        """g - n: the answer to the force of the sample before."""
+        """g - n: the response to the force of the sample before."""
         return self.g - self.n
 
     def stiffness_interval(self, wall_damping: ArrayLike) -> tuple[Floats, Floats]:
@@ -73,7 +73,8 @@ class OneMode:
     def largest(self) -> tuple[float, float]:
         """Largest stable stiffness over B >= 0 and its damping [N/m], [N s/m]; (0, nan) if there is none.
 
-        At B = 0, where the pair's edge is level, where it meets the line of z = -1, or where the damping ends.
+        It lies at B = 0, where the pair's edge is level, where that edge meets the line of z = -1, or at the
+        largest stable damping; the best of these candidates is taken.
         """
         n, g, e, h, r = self.n, self.g, self.e, self.h, self.r
         a0, a1, a2 = e - h, g - r * e, -r * g  # the pair's edge: r (1 + n c) k = a0 + a1 c + a2 c^2
@@ -105,19 +106,19 @@ def one_mode(mass: float, device_damping: float, stiffness: float, sampling_peri
     decay, squared = device_damping / (2.0 * mass), stiffness / mass
     e, h = denominator(decay, squared, sampling_period)
     n, speed = step_response(decay, squared, sampling_period)
-    # at z = 1 the answer n (1 - phi_22) + speed phi_12 of the map over one period, without differences
+    # at z = 1 the response n (1 - phi_22) + speed phi_12 of the map over one period, without differences
     g = (2.0 * decay * speed + squared * n) * n + speed**2
     return OneMode(n / mass, g / mass, e, h, sampling_period)
 
 
 def _roots(a: float, b: float, c: float) -> list[float]:
-    """Real roots of a x^2 + b x + c, none of them by a difference of near numbers."""
-    inside = b * b - 4.0 * a * c
-    if inside < 0.0:
+    """Real roots of a x^2 + b x + c, computed without cancellation."""
+    discriminant = b * b - 4.0 * a * c
+    if discriminant < 0.0:
         return []
-    sum_ = -0.5 * (b + (sqrt(inside) if b >= 0.0 else -sqrt(inside)))
-    found = [sum_ / a if a else inf, c / sum_ if sum_ else inf]
-    return [root for root in found if isfinite(root)]
+    sum_ = -0.5 * (b + (sqrt(discriminant) if b >= 0.0 else -sqrt(discriminant)))
+    roots = [sum_ / a if a else inf, c / sum_ if sum_ else inf]
+    return [root for root in roots if isfinite(root)]
 
 
 def condition(case: ConditionCase) -> Bound:

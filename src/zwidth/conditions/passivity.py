@@ -32,7 +32,12 @@ ANGLES = np.unique(np.concatenate([np.geomspace(1e-6, np.pi, 1500), np.linspace(
 
 @dataclass(frozen=True)
 class PassiveSet:
-    """The half planes b > K S + B V of a device damping b [N s/m]; spring S and damper V are (k,)."""
+    """The half planes b > K S + B V of the module's text, one for each of k frequencies.
+
+    device_damping  b [N s/m]
+    spring          (k,)  S [s]
+    damper          (k,)  V [1]
+    """
 
     device_damping: float
     spring: Floats
@@ -49,7 +54,10 @@ class PassiveSet:
         return np.asarray(np.where((high > low) & level, high, 0.0))
 
     def largest(self) -> tuple[float, float]:
-        """Largest passive stiffness over B >= 0 and its damping, by ternary search: the limit is concave in B."""
+        """Largest passive stiffness over B >= 0 and its damping [N/m], [N s/m]; (0, 0) without friction.
+
+        By ternary search, since the limit is concave in B.
+        """
         if not self.device_damping > 0.0:
             return 0.0, 0.0
         low, high = 0.0, self.device_damping / float(np.max(self.damper))
@@ -67,7 +75,7 @@ class PassiveSet:
 def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
     """The passive walls of a loop on a mass with friction b: its period, whole delay, velocity and force filter.
 
-    The actuator is taken to follow at once, whatever its time constant.
+    The actuator's time constant is left out.
 
     Raises  ValueError  if the delay is not a whole number of samples: the theorem holds a sample for a whole
                         period
@@ -79,16 +87,16 @@ def passive_set(loop: Loop, device_damping: float) -> PassiveSet:
     t, l, T = ANGLES, loop.whole_delay, loop.period
     sine = np.sin(t / 2.0)
     d = 2.0 * sine * (1j * np.cos(t / 2.0) - sine)  # e^jt - 1 without cancellation
-    force, own, z = force_filter(loop.controller), loop.estimator, 1.0 + d
-    w = factor_response(own.numerator, own.denominator, d) * window_response(own.window, z)
-    late = (
+    force, estimator, z = force_filter(loop.controller), loop.estimator, 1.0 + d
+    w = factor_response(estimator.numerator, estimator.denominator, d) * window_response(estimator.window, z)
+    delayed_force = (
         d
         * np.exp(-1j * (l + 1) * t)
         * factor_response(force.numerator, force.denominator, d)
         * T
         / (4.0 * sine**2)
     )
-    return PassiveSet(device_damping, np.real(late), np.real(late * w))
+    return PassiveSet(device_damping, np.real(delayed_force), np.real(delayed_force * w))
 
 
 def condition(case: ConditionCase) -> Bound:
@@ -109,11 +117,11 @@ def condition(case: ConditionCase) -> Bound:
             "sampling_period_s": loop.period,
             "delay_samples": loop.controller.delay,
         },
-        limit=passive.stiffness_limit if passive else _silent,
+        limit=passive.stiffness_limit if passive else _no_limit,
         largest=passive.largest() if passive else (nan, nan),
     )
 
 
-def _silent(wall_damping: Floats) -> Floats:
-    """The limit where the theorem does not speak."""
+def _no_limit(wall_damping: Floats) -> Floats:
+    """The limit where the theorem does not apply: nan."""
     return np.full(wall_damping.shape, nan)

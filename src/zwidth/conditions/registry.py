@@ -53,20 +53,20 @@ def compare(
 ) -> list[Bound]:
     """Every condition of this package on a loop, always in the same order.
 
-    Each takes from the plant the numbers named in its `taken`, whether or not the device meets its assumptions:
-    what it then says is what somebody who applies it would be told. `violated` says where not to trust it.
+    A condition is evaluated with the numbers of the plant listed in its `taken` even where the device does not
+    meet its assumptions: `Bound.violated` lists these, and its limit is then not to be relied on.
 
-    wall_damping      B of the walls asked about, for assumptions on it [N s/m]; nan: they count as met
+    wall_damping      B of the walls, for assumptions on it [N s/m]; nan: these assumptions count as met
     coulomb_friction  f_c, dry friction against the ground where the wall acts [N]; nan: not known
     resolution        Delta, the encoder's step there [m]; nan: not known
+    Raises            ValueError  for an infinite wall_damping;  TypeError  for a loop that is no `Loop`
 
     >>> import numpy as np
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant
     >>> one = np.ones(1)
     >>> free_mass = Plant(np.array([[1.0]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
-    >>> held = [bound for bound in compare(Loop(free_mass, Controller(1.0))) if bound.holds]
-    >>> "rigid mass" in [bound.name for bound in held]
+    >>> "rigid mass" in [bound.name for bound in compare(Loop(free_mass, Controller(1.0))) if bound.holds]
     True
     """
     require("loop", loop, Loop)

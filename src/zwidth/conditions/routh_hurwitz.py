@@ -73,12 +73,12 @@ def principal_minors(coefficients: ArrayLike) -> Floats:
 def is_stable(coefficients: ArrayLike) -> NDArray[np.bool_]:
     """Whether all roots of a0 s^n + ... + an lie in the open left half plane (...).
 
-    Where a0 > 0 and all minors are positive (thesis eq. A.3). A polynomial with a0 < 0 is judged with its sign
-    turned; a0 = 0 has lost a root to infinity and is not stable.
+    Where a0 > 0 and all minors are positive (thesis eq. A.3). A polynomial with a0 < 0 is multiplied
+    by -1 first; with a0 = 0 a root is at infinity, and it is not stable.
 
     >>> bool(is_stable([1.0, 3.0, 2.0])), bool(is_stable(bilinear_coefficients([1.0, 0.0, -1.1])))
     (True, False)
     """
     a = np.asarray(coefficients, dtype=float)
-    upright = a * np.where(a[..., :1] < 0.0, -1.0, 1.0)
-    return np.asarray((upright[..., 0] > 0.0) & np.all(principal_minors(upright) > 0.0, axis=-1))
+    normalised = a * np.where(a[..., :1] < 0.0, -1.0, 1.0)
+    return np.asarray((normalised[..., 0] > 0.0) & np.all(principal_minors(normalised) > 0.0, axis=-1))

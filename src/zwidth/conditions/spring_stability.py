@@ -1,7 +1,7 @@
 """Spring stability: stable with whatever spring holds the device (Colgate and Schenkel 1997).
 
-A spring returns all energy and so is the worst of passive hands, but for those that also have mass. Of all springs
-two decide: none, and the one on which the device would vibrate at half the sampling rate.
+A spring returns all energy, and so is the worst passive hand among those without mass. Of all springs two decide:
+none, and the one on which the device would vibrate at half the sampling rate.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ class SpringStability:
         return (stiffness, at) if stiffness > 0.0 else (0.0, nan)
 
     def _stiffness_margin(self, wall_damping: float) -> float:
+        """Largest stiffness of the held device minus that of the free one [N/m]."""
         return float(
             self.on_nyquist_spring.stiffness_limit(wall_damping) - self.free.stiffness_limit(wall_damping)
         )

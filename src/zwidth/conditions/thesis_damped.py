@@ -1,6 +1,6 @@
 """One rigid mass with friction against the ground, without delay: the thesis's (4.7)-(4.12), completed.
 
-With p = K T^2/m, d = B T/m, x = b T/m, E = exp(-x) the mass answers a held force by
+With p = K T^2/m, d = B T/m, x = b T/m, E = exp(-x) the mass moves under a force u held for one sample by
 
     x_{j+1} - x_j = (1 - E)/x v_j + n1 u,    n1 = (x - 1 + E)/x^2,    n0 = (1 - E - x E)/x^2
 
@@ -47,7 +47,7 @@ class HeldForceResponse(NamedTuple):
 
 
 def held_force_response(x: ArrayLike) -> HeldForceResponse:
-    """The mass's answer to a held force, without cancellation for any x = b T/m >= 0 (...)."""
+    """The mass's response to a held force, without cancellation for any x = b T/m >= 0 (...)."""
     x = np.asarray(x, dtype=float)
     tiny = x < 1e-8
     safe = np.where(tiny, 1.0, x)
@@ -99,6 +99,7 @@ def printed_tip(device_damping: ArrayLike, mass: ArrayLike, sampling_period: Arr
 
 
 def _printed_tip(x: Floats) -> tuple[Floats, Floats]:
+    """p and d of (4.10), (4.11) at x = b T/m, (...)."""
     n1, n0, E, _ = held_force_response(x)
     d = E / (n0 + np.sqrt(n0**2 + n0 * n1 * E))
     return (n1 + n0) * (x + d) * (1.0 - n0 * d) / (n0 * (1.0 + n1 * d)), d
@@ -121,9 +122,9 @@ def largest(device_damping: ArrayLike, mass: ArrayLike, sampling_period: ArrayLi
     a = n0 * (n1 - n0)
     h = ((n1 + n0) * (1.0 - n0 * x) - n0 * (n1 * flip - 2.0)) / 2.0
     c = (n1 + n0) * x - n0 * flip
-    bend = np.sqrt(np.maximum(h**2 - a * c, 0.0))
+    root = np.sqrt(np.maximum(h**2 - a * c, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):  # without friction a = 0, and the tip stands
-        corner = np.where(h > 0.0, -c / (h + bend), (bend - h) / a)
+        corner = np.where(h > 0.0, -c / (h + root), (root - h) / a)
     corner = np.maximum(corner, 0.0)
     stands = tip_p + 2.0 * tip_d <= flip
     p = np.where(stands, tip_p, flip - 2.0 * corner) + 0.0 * x
@@ -132,7 +133,8 @@ def largest(device_damping: ArrayLike, mass: ArrayLike, sampling_period: ArrayLi
 
 
 def largest_damping(device_damping: ArrayLike, mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
-    """Largest stable damping for K -> 0: 1/n0, or half of where z = -1 is reached, in m/T [N s/m], (...).
+    """Largest stable damping for K -> 0: the lesser of 1/n0 and half the p + 2 d at which a root is z = -1, in m/T
+    [N s/m], (...).
 
     2 m/T without friction.
     """
@@ -144,7 +146,7 @@ def largest_damping(device_damping: ArrayLike, mass: ArrayLike, sampling_period:
 def tangent_stiffness_limit(
     wall_damping: ArrayLike, device_damping: ArrayLike, mass: ArrayLike, sampling_period: ArrayLike
 ) -> Floats:
-    """Stiffness that a damping B allows soft walls: the tangent of (4.9) where it meets p = 0.
+    """Largest stiffness of soft walls at a damping B: the tangent of (4.9) where it meets p = 0.
 
         d > s p - x,    s = (1 - E - x E)/(x (1 - E)(1 + x)) = n0/((n1 + n0)(1 + x))          (thesis eq. 4.12)
 

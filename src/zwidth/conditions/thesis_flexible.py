@@ -81,7 +81,10 @@ def largest_stiffness(mass: ArrayLike, stiffness: ArrayLike, sampling_period: Ar
 
 
 def damping_at_largest_stiffness(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLike) -> Floats:
-    """Its damping, k T (sqrt(1 + c) - 1)/(1 - c) (thesis eq. 4.45) [N s/m], (...); 0 where there is no wall."""
+    """Damping of the stiffest stable wall, k T (sqrt(1 + c) - 1)/(1 - c) (thesis eq. 4.45) [N s/m], (...).
+
+    0 where no wall with K > 0, B >= 0 is stable.
+    """
     m, k, T = (np.asarray(value, dtype=float) for value in (mass, stiffness, sampling_period))
     u, s = _tip(m, k, T)
     return np.asarray(u / s * m / T)

@@ -41,7 +41,7 @@ def largest_stiffness(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
 
 
 def damping_at_largest_stiffness(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
-    """Its damping: 2 (sqrt 2 - 1) m/T (thesis, below eq. 4.14) [N s/m], (...)."""
+    """Damping of the stiffest stable wall: 2 (sqrt 2 - 1) m/T (thesis, below eq. 4.14) [N s/m], (...)."""
     return np.asarray(2.0 * (np.sqrt(2.0) - 1.0) * np.asarray(mass) / np.asarray(sampling_period))
 
 

@@ -52,7 +52,10 @@ def largest_stiffness(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
 
 
 def damping_at_largest_stiffness(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
-    """Its damping: 0.424694 m/T [N s/m], (...); not in the thesis, which misprints it as 0.828."""
+    """Damping of the stiffest stable wall: 0.424694 m/T [N s/m], (...).
+
+    Not in the thesis, which misprints it as 0.828.
+    """
     return np.asarray(TIP_D * np.asarray(mass) / np.asarray(sampling_period))
 
 

@@ -6,7 +6,8 @@ On z = e^jt it reads p + d (1 - 1/z) = -2 z^l (z - 1)^2/(z + 1), whose real and 
     p = 4 tan^2(t/2) cos((l + 1) t)
     d = 2 tan(t/2) sin((l + 1/2) t) / cos(t/2),            0 < t < pi/(2 (l + 1))
 
-with p = K T^2/m and d = B T/m. The edge runs from the origin, where t = 0, to p = 0 at the largest damping.
+with p = K T^2/m and d = B T/m. The edge begins at the origin, where t = 0, and ends where
+p = 0, at the largest damping.
 """
 
 from __future__ import annotations
@@ -98,11 +99,14 @@ def stable_area(mass: ArrayLike, sampling_period: ArrayLike, delay_samples: Arra
     """
     m, T, l = (np.asarray(v, dtype=float) for v in (mass, sampling_period, delay_samples))
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
-    half = np.pi / (4.0 * (l[..., None] + 1.0))
-    t, whole = half * (1.0 + nodes), l[..., None]
-    tangent, secant, turned = np.tan(t / 2.0), 1.0 / np.cos(t / 2.0), (whole + 0.5) * t
-    # dd/dt of d = 2 tan(t/2) sin(turned)/cos(t/2)
-    growth = np.sin(turned) * (secant**2 + tangent**2) + 2.0 * (whole + 0.5) * tangent * np.cos(turned)
+    # the nodes are the last axis
+    whole = l[..., None]
+    half = np.pi / (4.0 * (whole + 1.0))
+    t = half * (1.0 + nodes)
+    delayed = (whole + 0.5) * t
+    tangent, secant = np.tan(t / 2.0), 1.0 / np.cos(t / 2.0)
+    # dd/dt = growth/cos(t/2) of d = 2 tan(t/2) sin(delayed)/cos(t/2)
+    growth = np.sin(delayed) * (secant**2 + tangent**2) + 2.0 * (whole + 0.5) * tangent * np.cos(delayed)
     p, _ = edge(t, whole)
     number = np.sum(weights * half * p * growth * secant, axis=-1)
     return np.asarray(number * m**2 / T**3)
@@ -121,8 +125,8 @@ def _bisect(rising: Callable[[Floats], Floats], end: Floats) -> Floats:
 def condition(case: ConditionCase) -> Bound:
     """(4.26) on a loop, its delay rounded up to whole samples."""
     loop = case.loop
-    m, T, late = case.traits.rigid_mass, loop.period, loop.whole_delay + (loop.fractional_delay > 0.0)
-    stiffness, damping = largest(m, T, late)
+    m, T, l = case.traits.rigid_mass, loop.period, loop.whole_delay + (loop.fractional_delay > 0.0)
+    stiffness, damping = largest(m, T, l)
     return case.bound(
         name="rigid mass, whole samples of delay",
         source="thesis eq. 4.26, solved on the unit circle here",
@@ -131,7 +135,7 @@ def condition(case: ConditionCase) -> Bound:
         statement="p < 4 tan^2(t/2) cos((l + 1) t) where d = 2 tan(t/2) sin((l + 1/2) t)/cos(t/2), "
         "0 < t < pi/(2 l + 2)",
         assumptions=(RIGID, UNDAMPED, COLLOCATED, WHOLE_DELAY, *PLAIN),
-        taken={"rigid_mass_kg": m, "sampling_period_s": T, "delay_samples": float(late)},
-        limit=partial(stiffness_limit, mass=m, sampling_period=T, delay_samples=late),
+        taken={"rigid_mass_kg": m, "sampling_period_s": T, "delay_samples": float(l)},
+        limit=partial(stiffness_limit, mass=m, sampling_period=T, delay_samples=l),
         largest=(float(stiffness), float(damping)),
     )

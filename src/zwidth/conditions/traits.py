@@ -14,7 +14,7 @@ from zwidth.model.modes import REPEATED, clusters, undamped_modes
 from zwidth.model.plant import Floats, LaggedDamper, Plant
 from zwidth.model.reduction import plant_effective_parameters
 
-# A motion with a smaller share in the wall's compliance counts as one that no wall moves.
+# Modes with a smaller share of the response to the wall's force count as modes that no wall moves.
 UNSEEN = 1e-9
 # Damping below this share of the largest in the plant is rounding of 0.
 UNDAMPED = 1e-12
@@ -29,12 +29,13 @@ class Traits:
                               the ground [N s/m]
     side_mass                 the mass that (4.43) means: of a plant that the wall moves as one mass on a grounded
                               spring that mass, else the motor side's, 1/(a^T M^-1 a) with two sides [kg]
-    side_stiffness the spring of that mass, else the effective stiffness between actuator and handle [N/m]
+    side_stiffness            the spring of that mass, else the effective stiffness between actuator and handle
+                              [N/m]
     mode_mass                 of a plant that the wall moves as one mass, on at most one spring and one damper to
                               the ground,
     mode_damping              its mass, friction and spring [kg], [N s/m], [N/m]
     mode_stiffness
-    electrical_damping  b_e of what brakes the free motion with b_e/(1 + s L/R), all together [N s/m]
+    electrical_damping        b_e of all lagged dampers b_e/(1 + s L/R) on the free motion, added [N s/m]
     corner_frequencies        the corner frequencies R/L of the lagged dampers that brake what the wall moves
                               [rad/s]
     free                      the wall moves only free motion: one rigid mass, tied to nothing
@@ -43,7 +44,7 @@ class Traits:
     collocated                the wall acts where the encoder reads
     uses_backward_difference  the velocity is estimated by the backward difference, whatever filter follows
     has_first_order_filter    a first-order filter follows
-    force_filtered the force is filtered in the computer
+    force_filtered            the force is filtered in the computer
     actuator_lags             the actuator follows with a time constant
     """
 
@@ -76,13 +77,15 @@ def traits(loop: Loop) -> Traits:
     plant = loop.plant
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     push, read = shapes.T @ plant.actuator, shapes.T @ plant.sensor
-    moved = _moved_modes(squared, push, read)
-    rates = [float(np.mean(squared[run])) for run in moved]
-    single = len(rates) == 1 and _by_itself(plant, shapes, moved[0], push)
-    sprung = single and rates[0] > 0.0
+    moved_modes = _moved_modes(squared, push, read)
+    moved_squared = [float(np.mean(squared[run])) for run in moved_modes]
+    single = len(moved_squared) == 1 and _is_uncoupled(plant, shapes, moved_modes[0], push)
+    sprung = single and moved_squared[0] > 0.0
     mass, drag, electrical = _free_motion(plant, squared, shapes)
-    corners = tuple(1.0 / d.time_constant for d in plant.lagged_dampers if _brakes(d, shapes, moved))
-    mode_mass, mode_drag, mode_stiffness = _mode(plant, shapes, moved[0], push, rates[0]) if single else 3 * (nan,)
+    corners = tuple(1.0 / d.time_constant for d in plant.lagged_dampers if _damper_acts(d, shapes, moved_modes))
+    mode_mass, mode_drag, mode_stiffness = (
+        _mode(plant, shapes, moved_modes[0], push, moved_squared[0]) if single else 3 * (nan,)
+    )
     if sprung:
         side_mass, side_stiffness = mode_mass, mode_stiffness
     else:
@@ -98,13 +101,13 @@ def traits(loop: Loop) -> Traits:
         mode_stiffness=mode_stiffness,
         electrical_damping=electrical,
         corner_frequencies=corners,
-        free=single and rates == [0.0],
+        free=single and moved_squared == [0.0],
         sprung=sprung,
-        undamped=not _is_damped(plant, shapes, moved),
+        undamped=not _is_damped(plant, shapes, moved_modes),
         collocated=bool(
             np.allclose(plant.actuator, plant.sensor, rtol=0.0, atol=1e-9 * np.max(np.abs(plant.sensor)))
         ),
-        uses_backward_difference=_differences(loop),
+        uses_backward_difference=_uses_backward_difference(loop),
         has_first_order_filter=isinstance(loop.controller.velocity_filter, FirstOrder),
         force_filtered=loop.controller.force_filter is not None,
         actuator_lags=loop.controller.actuator_time_constant > 0.0,
@@ -112,13 +115,17 @@ def traits(loop: Loop) -> Traits:
 
 
 def _moved_modes(squared: Floats, push: Floats, read: Floats) -> list[slice]:
-    """Groups of equal frequency that the wall moves and the encoder sees."""
+    """Groups of modes of equal frequency that the wall moves and the encoder reads, as slices of the modes.
+
+    squared     (n,)  squared natural frequencies [rad^2/s^2]
+    push, read  (n,)  modal parts of the actuator's force and of the reading
+    """
     scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
     whole = float(np.linalg.norm(push) * np.linalg.norm(read))
     return [run for run in clusters(squared, REPEATED * scale) if abs(push[run] @ read[run]) > UNSEEN * whole]
 
 
-def _by_itself(plant: Plant, shapes: Floats, run: slice, push: Floats) -> bool:
+def _is_uncoupled(plant: Plant, shapes: Floats, run: slice, push: Floats) -> bool:
     """Whether the motion that the wall makes in one group of modes stays in it, damping included."""
     motion = np.zeros(len(push))
     motion[run] = push[run]
@@ -129,30 +136,33 @@ def _by_itself(plant: Plant, shapes: Floats, run: slice, push: Floats) -> bool:
     return bool(np.all(np.abs(force - along) <= 1e-9 * np.max(scale, initial=0.0)))
 
 
-def _mode(plant: Plant, shapes: Floats, run: slice, push: Floats, rate: float) -> tuple[float, float, float]:
-    """Mass, friction and spring of the one motion that the wall makes, one metre at the actuator."""
+def _mode(plant: Plant, shapes: Floats, run: slice, push: Floats, squared: float) -> tuple[float, float, float]:
+    """Mass [kg], friction [N s/m] and spring [N/m] of the one motion that the wall makes, 1 m at the actuator.
+
+    squared  its squared natural frequency [rad^2/s^2]
+    """
     mass = 1.0 / float(push[run] @ push[run])
     motion = mass * (shapes[:, run] @ push[run])
     inside = float(np.abs(motion) @ np.abs(plant.damping) @ np.abs(motion))
     drag = float(motion @ plant.damping @ motion)
-    return mass, drag if drag > UNDAMPED * inside else 0.0, mass * rate
+    return mass, drag if drag > UNDAMPED * inside else 0.0, mass * squared
 
 
-def _is_damped(plant: Plant, shapes: Floats, moved: list[slice]) -> bool:
+def _is_damped(plant: Plant, shapes: Floats, moved_modes: list[slice]) -> bool:
     """Whether damping acts on a motion that the wall makes, directly or through another motion."""
     modal = np.abs(shapes.T @ plant.damping @ shapes)
-    worst = max((float(np.max(modal[run])) for run in moved), default=0.0)
+    worst = max((float(np.max(modal[run])) for run in moved_modes), default=0.0)
     return worst > UNDAMPED * float(np.max(modal))
 
 
-def _brakes(damper: LaggedDamper, shapes: Floats, moved: list[slice]) -> bool:
+def _damper_acts(damper: LaggedDamper, shapes: Floats, moved_modes: list[slice]) -> bool:
     """Whether a lagged damper acts on a motion that the wall makes."""
     reach = np.abs(damper.along @ shapes)
-    worst = max((float(np.max(reach[run])) for run in moved), default=0.0)
+    worst = max((float(np.max(reach[run])) for run in moved_modes), default=0.0)
     return damper.damping > 0.0 and worst > UNSEEN * float(np.max(reach))
 
 
-def _differences(loop: Loop) -> bool:
+def _uses_backward_difference(loop: Loop) -> bool:
     """Whether the velocity before its filter is the backward difference, under any name."""
     T = loop.period
     z = np.exp(1j * np.linspace(0.1, np.pi, 7))

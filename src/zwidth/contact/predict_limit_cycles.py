@@ -43,7 +43,7 @@ class NothingNonlinearError(ValueError):
 
     def __init__(self) -> None:
         super().__init__(
-            "nothing in this device depends on the amplitude, so that no vibration keeps its size; give it dry "
+            "nothing in this device depends on the amplitude, so it has no limit cycle; give it dry "
             "friction, encoder steps or a largest force"
         )
 

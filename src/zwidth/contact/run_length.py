@@ -123,7 +123,7 @@ def run_length(
         reason = f"{PERIODS} periods" if _periods(frequency) >= sound else "to be heard"
         least = max(_periods(frequency), sound)
     else:
-        reason = "chosen for what is not linear"
+        reason = "chosen for a nonlinear run"
     slow = TENFOLDS * tenfold * period
     if isfinite(slow) and slow > least:
         return _capped(slow, f"{TENFOLDS} tenfold changes at the predicted rate", period)

@@ -84,7 +84,7 @@ def destination(file: str | os.PathLike[str], kinds: Collection[str]) -> Path:
 
 def _check_place(path: Path, name: str) -> None:
     if path.suffix.lower() in FOLDERS and path.exists():
-        raise OutputError(f"{printable(name)}: is there already; remove it, or name another")
+        raise OutputError(f"{printable(name)}: exists already; remove it, or name another")
     if path.is_dir():
         raise OutputError(f"{printable(name)}: is a directory; name a file in it")
     if not path.parent.is_dir():

@@ -45,7 +45,7 @@ class PlaneArea:
     share: float
 
     def __repr__(self) -> str:
-        return f"PlaneArea: {self.area:.4g} m^2, {100.0 * self.share:.4g} % of what is reached"
+        return f"PlaneArea: {self.area:.4g} m^2, {100.0 * self.share:.4g} % of the reachable area"
 
 
 @dataclass(frozen=True, repr=False)
@@ -73,9 +73,8 @@ class CommonArea(Result):
         common = self.common
         if not self.reach.area > 0.0:
             return f"CommonArea: the map reaches nothing, with {required}"
-        return (
-            f"CommonArea: {common.area:.4g} m^2, {100.0 * common.share:.4g} % of what is reached, with {required}"
-        )
+        share = f"{100.0 * common.share:.4g} % of the reachable area"
+        return f"CommonArea: {common.area:.4g} m^2, {share}, with {required}"
 
     def document(self) -> dict[str, Any]:
         """The areas by key and unit."""

@@ -40,19 +40,24 @@ def _excess(chart: StabilityChart, fixed_coordinate: float, value: float, edge: 
 
 
 def _span(chart: StabilityChart, edge: EdgeKind | None) -> float:
+    """A thousandth of the chart's extent in the coordinate that is looked for [N/m] or [N s/m]."""
     K0, K1, B0, B1 = chart.box
     return 1e-3 * (K1 - K0 if edge == "tip" else B1 - B0)
 
 
-def _stable_side_matches(chart: StabilityChart, place: float, value: float, edge: EdgeKind | None) -> bool:
+def _stable_side_matches(
+    chart: StabilityChart, fixed_coordinate: float, value: float, edge: EdgeKind | None
+) -> bool:
     """Whether the stable walls lie on the side that the kind of edge says."""
     if edge is None:
         return True
     step = _span(chart, edge) * (1.0 if edge == "lower" else -1.0)
-    return _excess(chart, place, value + step, edge) < _excess(chart, place, value - step, edge)
+    return _excess(chart, fixed_coordinate, value + step, edge) < _excess(
+        chart, fixed_coordinate, value - step, edge
+    )
 
 
-def _refine(chart: StabilityChart, place: float, value: float, edge: EdgeKind | None) -> float:
+def _refine(chart: StabilityChart, fixed_coordinate: float, value: float, edge: EdgeKind | None) -> float:
     """Move a value from the chord of the drawn edge to the exact edge."""
     from scipy.optimize import brentq
 
@@ -60,6 +65,8 @@ def _refine(chart: StabilityChart, place: float, value: float, edge: EdgeKind | 
         return nan
     span = _span(chart, edge)
     low, high = value - span, value + span
-    if not _excess(chart, place, low, edge) * _excess(chart, place, high, edge) <= 0.0:
+    if not _excess(chart, fixed_coordinate, low, edge) * _excess(chart, fixed_coordinate, high, edge) <= 0.0:
         return value
-    return float(brentq(lambda at: _excess(chart, place, at, edge), low, high, xtol=1e-13 * span, rtol=1e-15))
+    return float(
+        brentq(lambda at: _excess(chart, fixed_coordinate, at, edge), low, high, xtol=1e-13 * span, rtol=1e-15)
+    )

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 PATIENCE: Final = 10.0  # s; a longer job is worth starting processes, which takes some seconds
 BATCH: Final = 0.25  # s that a batch should take: much longer than sending and storing it
 TRIAL: Final = 0.01  # s of computation from which the time per cell is estimated
-SHARES: Final = 16  # batches at least, so that no process waits long for the last one
+SHARES: Final = 16  # least number of batches, so that no process waits long for the last one
 GOLDEN: Final = 0.6180339887498949
 MOST_NOTES: Final = 100  # notes per measure; a reason that contains a number may differ in each cell
 MORE: Final = "further reasons, each in few cells"
@@ -65,8 +65,8 @@ def run(
     [0.0, 1.0, 4.0]
     """
     total = job.count
-    room = 2.0 * total * len(job.measures) * 9 / 8  # values and status, and a copy while they are put together
-    check_memory(room, f"{total} cells of {len(job.measures)} measures", "ask for fewer")
+    numbers = 2.0 * total * len(job.measures) * 9 / 8  # values and status, and a copy while they are put together
+    check_memory(numbers, f"{total} cells of {len(job.measures)} measures", "ask for fewer")
     number = workers or cores()
     collection = _CellCollection(job)
     if store is not None and store.batch is not None:
@@ -122,11 +122,11 @@ def merge_notes(notes: Iterable[Note], most: int = MOST_NOTES) -> tuple[Note, ..
     >>> merge_notes([Note(5, "no", 2, (7,)), Note(5, "no", 1, (3,))])
     (Note(status=5, reason='no', count=3, first=(3,)),)
     """
-    found: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
+    by_reason: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
     for note in notes:
-        count, first = found.get((note.status, note.reason), (0, note.first))
-        found[note.status, note.reason] = (count + note.count, min(first, note.first))
-    notes_in_order = [Note(*key, *rest) for key, rest in found.items()]
+        count, first = by_reason.get((note.status, note.reason), (0, note.first))
+        by_reason[note.status, note.reason] = (count + note.count, min(first, note.first))
+    notes_in_order = [Note(*key, *rest) for key, rest in by_reason.items()]
     notes_in_order.sort(key=lambda note: (note.first, note.status, note.reason))
     if len(notes_in_order) <= most:
         return tuple(notes_in_order)
@@ -140,13 +140,13 @@ def _batch(job: Job, workers: int) -> int:
     Some cells are computed to measure the time, and their values are dropped: cells spread over the job, since the
     first of a study are often its slowest, and growing numbers, since many at once may cost little more than one.
     """
-    of = job.count
-    most = max(1, of // max(SHARES, 4 * workers))
+    count = job.count
+    most = max(1, count // max(SHARES, 4 * workers))
     if most == 1:
         return 1
     size, place, seconds, tried = 1, 0.0, 0.0, False
     while size <= most:
-        first = int(place * (of - size))
+        first = int(place * (count - size))
         place = (place + GOLDEN) % 1.0
         began = perf_counter()
         job.compute(first, first + size)
@@ -162,7 +162,7 @@ def _compute_ranges(
 ) -> Generator[tuple[CellRange, CellValues], None, None]:
     """Compute the ranges: in this process until `patience` is exceeded, the rest in several processes."""
     left = sum(last - first for first, last in ranges)
-    sent: bytes | None = None
+    packed_job: bytes | None = None
     for n, (first, last) in enumerate(ranges):
         began = perf_counter()
         cells = job.compute(first, last)
@@ -171,8 +171,8 @@ def _compute_ranges(
         left -= last - first
         # the first range may include compiling
         slow = n > 0 and seconds / (last - first) * left > patience
-        if slow and workers > 1 and (sent := pack_job(job)) is not None:
+        if slow and workers > 1 and (packed_job := pack_job(job)) is not None:
             rest = ranges[n + 1 :]
-            with Workers(sent, min(workers, len(rest))) as pool:
+            with Workers(packed_job, min(workers, len(rest))) as pool:
                 yield from pool.compute(rest)
             return

@@ -1,8 +1,8 @@
-"""A virtual experiment: subjects and trials measure a stability boundary, and its causes are looked for.
+"""A virtual experiment: measure a stability boundary with several subjects and trials, and find its causes.
 
 Subjects are operators: the five numbers of the preset, each times exp(spread n), n normal. Trials of one subject
 differ in the noise and, by such a factor each, in the disturbance, the speed and the push. A single subject is the
-preset himself, and a single trial has the disturbance, speed and push of the plan. All random numbers follow from
+preset operator, and a single trial has the disturbance, speed and push of the plan. All random numbers follow from
 the seed.
 """
 
@@ -47,9 +47,8 @@ from zwidth.study.measured_boundary import Cause, Experiment, MeasuredPoint
 from zwidth.study.user_points import UserPoint, compare_points
 
 Floats = NDArray[np.float64]
-# stage, done, of how many
 
-EXPLAINED: Final = 3  # number of stiffnesses at which causes are looked for
+EXPLAINED: Final = 3  # number of stiffnesses at which the edges are measured again to find causes
 STEPS: Final = 3.0  # encoder steps: a vibration of this amplitude is just visible
 NOISES: Final = 10.0  # standard deviations of the encoder's noise, likewise
 STIFFENED: Final = 2.0  # a reflex adds this multiple of the stiffness and damping of arm and grasp
@@ -72,9 +71,10 @@ def measure_boundary(
     """Measure a stability boundary on the simulated device at one operating point, held by its operator.
 
     user_points  points measured on a real device, to be compared with the same exact chart
-    file         journal of the trials done, from which an interrupted run continues; None: no journal
+    file         journal that keeps the trials done, from which an interrupted run continues; None: no journal
     causes       measure again without each nonlinear part (friction, encoder steps, force limit) in turn
-    Raises       JournalError  for a journal of something else;  OSError  where it cannot be read or written
+    Raises       JournalError  for a file that is not a journal, or of a newer version
+                 OSError       where it cannot be read or written
                  what `run_experiment` and `OperatingPoint.plant` raise
     """
     require("point", point, OperatingPoint)
@@ -82,8 +82,8 @@ def measure_boundary(
     loop = point.without_operator.loop
     operator = None if loop.plant.handle is None else point.operator
     journal = Journal(None if file is None else Path(file), question(loop, operator, plan))
-    found = run_experiment(loop, operator, plan, journal, progress, causes and bool(loop.nonlinear))
-    return replace(found, user_points=compare_points(found.chart, user_points)) if user_points else found
+    result = run_experiment(loop, operator, plan, journal, progress, causes and bool(loop.nonlinear))
+    return replace(result, user_points=compare_points(result.chart, user_points)) if user_points else result
 
 
 def run_experiment(
@@ -108,22 +108,23 @@ def run_experiment(
     >>> from zwidth.model.plant import Plant
     >>> one = np.ones(1)
     >>> mass = Plant(np.array([[0.1]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
-    >>> found = run_experiment(Loop(mass, Controller(0.001)), plan=Plan(stiffnesses=2, tips=1))
-    >>> [point.edge for point in found.points]
+    >>> loop = Loop(mass, Controller(0.001))
+    >>> experiment = run_experiment(loop, plan=Plan(stiffnesses=2, tips=1))
+    >>> [point.edge for point in experiment.points]
     ['lower', 'lower', 'upper', 'upper', 'tip']
-    >>> bool(abs(found.points[-1].stiffness / 68629.15 - 1) < 1e-4)         # (12 - 8 sqrt 2) m/T^2 (thesis 4.14)
+    >>> bool(abs(experiment.points[-1].stiffness / 68629.15 - 1) < 1e-4)    # (12 - 8 sqrt 2) m/T^2 (thesis 4.14)
     True
     """
     plan = _with_visible(loop, plan or Plan())
     journal = journal or Journal(None, "")
-    tell = progress or (lambda stage, done, of: None)
+    report = progress or (lambda stage, done, of: None)
     subjects = _subjects(operator, plan)
     first = _stability_trial(loop, operator, plan)
-    look = partial(tell, "looking for stable walls")
+    report_search = partial(report, "looking for stable walls")
     place = StableExtent(
-        *journal.get_or_compute("place", lambda: _numbers(find_stable_walls(first, plan.box, look)))
+        *journal.get_or_compute("place", lambda: _numbers(find_stable_walls(first, plan.box, report_search)))
     )
-    look(1, 1)
+    report_search(1, 1)
     low = 0.0 if plan.box is None else max(plan.box.stiffness[0], 0.0)
     top = TIP_SHARE * place.stiffness
     grid = low + (top - low) * np.arange(1, plan.stiffnesses + 1) / plan.stiffnesses
@@ -131,7 +132,7 @@ def run_experiment(
     dampings: Floats | None = None
     for s, subject in enumerate(subjects):
         for t in range(plan.trials):
-            tell("measuring the boundary", done, total_trials)
+            report("measuring the boundary", done, total_trials)
             trial, name = _trial(loop, subject, plan, s, t), f"subject {s} trial {t}"
             edges = _edge_points(journal, f"{name} edges", partial(measure_edges, trial, grid, place, plan.box))
             if dampings is None:
@@ -139,29 +140,31 @@ def run_experiment(
             tips = _edge_points(journal, f"{name} tips", partial(measure_tips, trial, dampings, place, plan.box))
             runs.append([*edges, *tips])
             done += 1
-            tell("measuring the boundary", done, total_trials)
+            report("measuring the boundary", done, total_trials)
     chart = _chart(loop, operator)
     points, lost = _combine_trials(runs, chart, 2 * len(grid) + len(dampings if dampings is not None else ()))
-    cause_list = _causes(loop, operator, plan, place, runs[0], journal, tell) if causes else ()
+    cause_list = _causes(loop, operator, plan, place, runs[0], journal, report) if causes else ()
     return Experiment(plan, place, points, lost, subjects, chart, cause_list, journal.entries_read)
 
 
 def _with_visible(loop: Loop, plan: Plan) -> Plan:
+    """The plan with the default of `visible` for this loop's encoder, where it has none."""
     if plan.visible is not None:
         return plan
     method = loop.controller.velocity
     # an adaptive window does not resolve motions within its noise band
-    doubt = 2.0 * method.position_noise if isinstance(method, Foaw) else 0.0
+    noise_band = 2.0 * method.position_noise if isinstance(method, Foaw) else 0.0
     steps, noise = reading_step(loop.plant), reading_noise(loop.plant)
-    return replace(plan, visible=STEPS * max(steps, doubt) + NOISES * noise)
+    return replace(plan, visible=STEPS * max(steps, noise_band) + NOISES * noise)
 
 
 def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, ...]:
+    """One operator for each subject of the plan; (None,) without an operator."""
     if operator is None:
         if plan.subjects > 1 or plan.reflex:
             argument, verb = ("subjects", "differ") if plan.subjects > 1 else ("reflex", "is")
-            nobody = f"{verb} in the arm that holds the device; give an operator"
-            raise TrialError(argument, nobody)
+            reason = f"{verb} in the arm that holds the device; give an operator"
+            raise TrialError(argument, reason)
         return (None,)
     if plan.subjects == 1:
         return (operator,)
@@ -173,13 +176,13 @@ def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, .
 def _varied(operator: Operator, random: np.random.Generator, spread: float) -> Operator:
     """The operator with each number times its own log-normal factor exp(spread n)."""
     factors = np.exp(spread * random.standard_normal(len(fields(operator)))).tolist()
-    own = {field.name: getattr(operator, field.name) for field in fields(operator)}
-    changed = {
+    preset = {field.name: getattr(operator, field.name) for field in fields(operator)}
+    varied = {
         name: value * factor
-        for (name, value), factor in zip(own.items(), factors, strict=True)
+        for (name, value), factor in zip(preset.items(), factors, strict=True)
         if value is not None
     }
-    return replace(operator, **changed)
+    return replace(operator, **varied)
 
 
 def _stability_trial(
@@ -189,7 +192,7 @@ def _stability_trial(
     factors: tuple[float, float, float] = (1.0, 1.0, 1.0),
     seed: int = 0,
 ) -> StabilityTrial:
-    """The trial of a plan with its disturbance, speed and push times these factors (no limits apply)."""
+    """The trial of a plan with its disturbance, speed and push times these factors, which may take them beyond the plan's limits."""
     disturbance, speed, push = factors[0] * plan.disturbance, factors[1] * plan.speed, factors[2] * plan.push
     reflex = None
     if plan.reflex and operator is not None:
@@ -205,6 +208,7 @@ def _stability_trial(
 
 
 def _trial(loop: Loop, operator: Operator | None, plan: Plan, subject: int, trial: int) -> StabilityTrial:
+    """One trial of one subject, with its own random numbers."""
     factors = (1.0, 1.0, 1.0)
     if plan.trials > 1:
         random = np.random.default_rng([plan.seed, subject, trial])
@@ -212,17 +216,20 @@ def _trial(loop: Loop, operator: Operator | None, plan: Plan, subject: int, tria
     return _stability_trial(loop, operator, plan, factors, seed=(plan.seed * 1000 + subject) * 1000 + trial)
 
 
-def _numbers(found: Any) -> list[Any]:
-    return [getattr(found, field.name) for field in fields(found)]
+def _numbers(record: Any) -> list[Any]:
+    """The fields of a dataclass in their order, as a journal keeps them."""
+    return [getattr(record, field.name) for field in fields(record)]
 
 
 def _edge_points(journal: Journal, name: str, compute: Callable[[], list[EdgePoint]]) -> list[EdgePoint]:
+    """The points that the journal keeps under this name; computed where it has none."""
     return [
         EdgePoint(*numbers) for numbers in journal.get_or_compute(name, lambda: [_numbers(p) for p in compute()])
     ]
 
 
 def _chart(loop: Loop, operator: Operator | None) -> StabilityChart | None:
+    """The exact chart with the operator; None where the loop has none."""
     held = loop if operator is None else Loop(attach(loop.plant, operator), loop.controller)
     try:
         return stability_chart(held, decay=False)
@@ -231,19 +238,19 @@ def _chart(loop: Loop, operator: Operator | None) -> StabilityChart | None:
 
 
 def _combine_trials(
-    runs: list[list[EdgePoint]], chart: StabilityChart | None, sought: int
+    runs: list[list[EdgePoint]], chart: StabilityChart | None, requested_points: int
 ) -> tuple[tuple[MeasuredPoint, ...], int]:
-    """Points of all trials by edge and chosen stiffness or damping, and how many were found in no trial."""
-    found: dict[tuple[EdgeKind, float], list[EdgePoint]] = {}
+    """Points of all trials by edge and chosen stiffness or damping, and how many no trial found."""
+    by_edge: dict[tuple[EdgeKind, float], list[EdgePoint]] = {}
     for points in runs:
         for point in points:
             chosen = point.damping if point.edge == "tip" else point.stiffness
-            edge_points = found.setdefault((point.edge, chosen), [])
+            edge_points = by_edge.setdefault((point.edge, chosen), [])
             if point.unstable_behaviour is not None:
                 edge_points.append(point)
     order = {"lower": 0, "upper": 1, "tip": 2}
-    made = []
-    for (edge, chosen), points in sorted(found.items(), key=lambda item: (order[item[0][0]], item[0][1])):
+    combined = []
+    for (edge, chosen), points in sorted(by_edge.items(), key=lambda item: (order[item[0][0]], item[0][1])):
         if not points:
             continue
         values = tuple(p.stiffness if edge == "tip" else p.damping for p in points)
@@ -252,7 +259,7 @@ def _combine_trials(
         exact = nan if chart is None else exact_edge(chart, K, B, edge)
         first = points[0]
         observation = (first.unstable_behaviour, first.amplitude, first.frequency)
-        made.append(
+        combined.append(
             MeasuredPoint(
                 K,
                 B,
@@ -266,7 +273,7 @@ def _combine_trials(
                 any(p.unsure for p in points),
             )
         )
-    return tuple(made), sought - len(made)
+    return tuple(combined), requested_points - len(combined)
 
 
 def _causes(
@@ -276,27 +283,30 @@ def _causes(
     place: StableExtent,
     points: list[EdgePoint],
     journal: Journal,
-    tell: Progress,
+    report: Progress,
 ) -> tuple[Cause, ...]:
+    """Edges measured again without each nonlinear part, at a few of the stiffnesses of these points."""
     names = loop.nonlinear.kinds
     grid = sorted({p.stiffness for p in points if p.edge == "lower"})
     picked = [grid[i] for i in np.unique(np.linspace(0, len(grid) - 1, min(EXPLAINED + 2, len(grid))).astype(int))]
     picked = picked[1:-1] or picked
-    some = [p for p in points if p.edge != "tip" and p.stiffness in picked]
-    made = []
+    compared = [p for p in points if p.edge != "tip" and p.stiffness in picked]
+    causes = []
     for done, name in enumerate(names):
-        tell("measuring without each part", done, len(names))
+        report("measuring without each part", done, len(names))
         trial = _stability_trial(without(loop, name), operator, plan)
         again = partial(measure_edges, trial, np.array(picked), place, plan.box)
-        found = _edge_points(journal, f"without {name}", again)
-        value = {(p.edge, p.stiffness): p.damping for p in found}
-        made.append(Cause(name, tuple(some), tuple(value.get((p.edge, p.stiffness), nan) for p in some)))
-    tell("measuring without each part", len(names), len(names))
-    return tuple(made)
+        remeasured = _edge_points(journal, f"without {name}", again)
+        damping = {(p.edge, p.stiffness): p.damping for p in remeasured}
+        causes.append(
+            Cause(name, tuple(compared), tuple(damping.get((p.edge, p.stiffness), nan) for p in compared))
+        )
+    report("measuring without each part", len(names), len(names))
+    return tuple(causes)
 
 
 def without(loop: Loop, name: str) -> Loop:
-    """The loop without one part that is not linear, by its name in `Nonlinear.left_out`."""
+    """The loop without one nonlinear part, named as in `Nonlinear.kinds`. Raises ValueError for another name."""
     computer, nonlinear = loop.controller, loop.plant.nonlinear
     match name:
         case "dry friction":
@@ -312,7 +322,7 @@ def without(loop: Loop, name: str) -> Loop:
         case "the force limit":
             nonlinear, computer = replace(nonlinear, force_limit=inf), replace(computer, force_limit=inf)
         case _:
-            raise ValueError(f"{name!r} is no part that is not linear")
+            raise ValueError(f"name must be one of the nonlinear parts in Nonlinear.kinds, got {name!r}")
     if all(c.step == 0.0 and c.noise == 0.0 for c in nonlinear.counters):
         nonlinear = replace(nonlinear, counters=())
     return Loop(replace(loop.plant, nonlinear=nonlinear), computer)

@@ -68,13 +68,13 @@ def extreme_over_directions(measure: Measure, point: OperatingPoint, extreme: Ex
     status = row.status.copy()
     for which, search in direction_searches(measure, row):
         for first in range(0, len(which), CHUNK):
-            mine = np.arange(first, min(first + CHUNK, len(which)))
-            found = _SEARCH[search.basis.shape[2]](search, mine, goal, which)
-            values[which[mine]], direction[which[mine]], status[which[mine]] = found
+            indices = np.arange(first, min(first + CHUNK, len(which)))
+            at = which[indices]
+            values[at], direction[at], status[at] = _SEARCH[search.basis.shape[2]](search, indices, goal, which)
     shape = point.shape
-    told = goal.notes(shape)
+    notes = goal.notes(shape)
     return DirectionExtreme(
-        MeasureValues(values.reshape(shape), status.reshape(shape), told), direction.reshape((*shape, 3))
+        MeasureValues(values.reshape(shape), status.reshape(shape), notes), direction.reshape((*shape, 3))
     )
 
 
@@ -134,11 +134,11 @@ class _Goal:
 SearchResult = tuple[Floats, Floats, NDArray[np.uint8]]
 
 
-def _in_line(search: DirectionSearch, mine: Ints, goal: _Goal, which: Ints) -> SearchResult:
+def _in_line(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
     components = np.array([[1.0], [-1.0]]) if search.one_sided else np.array([[1.0]])
-    f, status = _sampled(search, mine, components, goal, which)
+    f, status = _sampled(search, indices, components, goal, which)
     best = f.argmin(axis=0)
-    return _search_result(search, mine, goal.sign * f.min(axis=0), components[best], status)
+    return _search_result(search, indices, goal.sign * f.min(axis=0), components[best], status)
 
 
 def _in_plane(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
@@ -159,10 +159,10 @@ def _in_plane(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) 
     keep = np.isfinite(lowest[place])
     start, place = start[keep], place[keep]
 
-    def ask(angle: Floats) -> Floats:
+    def cost(angle: Floats) -> Floats:
         return goal.cost(search.evaluate_along(indices[place], _unit_vectors(angle)).values)
 
-    angle, value = _golden(ask, start - step, start + step)
+    angle, value = _golden(cost, start - step, start + step)
     best_angle: Floats = angles[k]
     best = lowest.copy()
     for rows in (slice(0, int(keep[: len(n)].sum())), slice(int(keep[: len(n)].sum()), len(place))):
@@ -180,29 +180,29 @@ def _parabola_minimum(f: Floats) -> Floats:
     return np.where((f <= left) & (f <= right), np.where(np.isfinite(vertex), vertex, f), np.inf)
 
 
-def _golden(ask, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: ignore[no-untyped-def]
+def _golden(cost, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: ignore[no-untyped-def]
     """Argument and value of the minimum of each function between its bounds, by golden sections."""
     a, b = low.copy(), high.copy()
     c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-    at_c, at_d = ask(c), ask(d)
+    at_c, at_d = cost(c), cost(d)
     for _ in range(SECTIONS):
         left = at_c < at_d
         a, b = np.where(left, a, c), np.where(left, d, b)
-        kept, at_kept = np.where(left, c, d), np.where(left, at_c, at_d)
+        old, at_old = np.where(left, c, d), np.where(left, at_c, at_d)
         new = np.where(left, b - GOLDEN * (b - a), a + GOLDEN * (b - a))
-        at_new = ask(new)
-        c, d = np.where(left, new, kept), np.where(left, kept, new)
-        at_c, at_d = np.where(left, at_new, at_kept), np.where(left, at_kept, at_new)
+        at_new = cost(new)
+        c, d = np.where(left, new, old), np.where(left, old, new)
+        at_c, at_d = np.where(left, at_new, at_old), np.where(left, at_old, at_new)
     left = at_c < at_d
     return np.where(left, c, d), np.where(left, at_c, at_d)
 
 
-def _on_sphere(search: DirectionSearch, mine: Ints, goal: _Goal, which: Ints) -> SearchResult:
+def _on_sphere(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
     points = sphere(2 * ON_SPHERE)
     points = points if search.one_sided else points[:ON_SPHERE]
     reach = float(np.sqrt(2.0 * np.pi / ON_SPHERE))
-    f, status = _sampled(search, mine, points, goal, which)
-    k, n = f.argmin(axis=0), np.arange(len(mine))
+    f, status = _sampled(search, indices, points, goal, which)
+    k, n = f.argmin(axis=0), np.arange(len(indices))
     lowest = f[k, n]
     cosine = points @ points[k].T
     near = cosine > np.cos(2.0 * reach) if search.one_sided else np.abs(cosine) > np.cos(2.0 * reach)
@@ -213,20 +213,24 @@ def _on_sphere(search: DirectionSearch, mine: Ints, goal: _Goal, which: Ints) ->
     value = np.concatenate([lowest, second.min(axis=0)[also]])
     keep = np.isfinite(value)
     start, place, value = start[keep], place[keep], value[keep]
-    end, value = _compass(search, mine[place], start, value, goal, 0.6 * reach)
+    end, value = _compass(search, indices[place], start, value, goal, 0.6 * reach)
     best, best_point = lowest.copy(), points[k].copy()
     split = int(keep[: len(n)].sum())
     for rows in (slice(0, split), slice(split, len(place))):
         better = value[rows] < best[place[rows]]
         best[place[rows][better]] = value[rows][better]
         best_point[place[rows][better]] = end[rows][better]
-    return _search_result(search, mine, goal.sign * best, best_point, status)
+    return _search_result(search, indices, goal.sign * best, best_point, status)
 
 
 def _compass(
     search: DirectionSearch, place: Ints, u: Floats, value: Floats, goal: _Goal, reach: float
 ) -> tuple[Floats, Floats]:
-    """The lowest of eight directions round each, again and again; nearer ones where none of them is lower."""
+    """Compass search from directions u (n, 3): step to the lowest of eight directions at angle `reach` [rad] around
+    each, and halve the angle where none of them is lower. Returns directions and values.
+
+    place  (n,)  index of the point of each direction
+    """
     u, value, step = u.copy(), value.copy(), np.full(len(u), reach)
     for turn in range(COMPASS):
         busy = np.flatnonzero(step > FINEST)
@@ -236,19 +240,19 @@ def _compass(
         angle = 0.25 * np.pi * np.arange(8) + turn  # no axis is preferred
         out = np.cos(angle)[:, None, None] * p + np.sin(angle)[:, None, None] * q
         trial = np.cos(step[busy])[:, None] * u[busy] + np.sin(step[busy])[:, None] * out
-        asked = search.evaluate_along(np.tile(place[busy], 8), trial.reshape(-1, 3)).values.reshape(8, -1)
-        f = goal.cost(asked)
+        values = search.evaluate_along(np.tile(place[busy], 8), trial.reshape(-1, 3)).values.reshape(8, -1)
+        f = goal.cost(values)
         k, n = f.argmin(axis=0), np.arange(len(busy))
         better = f[k, n] < value[busy]
-        moved = busy[better]
-        u[moved] = trial[k, n][better]
-        value[moved] = f[k, n][better]
+        improved = busy[better]
+        u[improved] = trial[k, n][better]
+        value[improved] = f[k, n][better]
         step[busy[~better]] *= 0.5
     return u, value
 
 
 def _tangents(u: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors across each of these (n, 3), and across each other."""
+    """Two unit vectors (n, 3) each, at right angles to each of these (n, 3) and to each other."""
     axis = np.eye(3)[np.abs(u).argmin(axis=1)]
     p = np.cross(u, axis)
     p /= np.linalg.norm(p, axis=1, keepdims=True)
@@ -272,25 +276,26 @@ def _unit_vectors(angle: Floats) -> Floats:
 
 
 def _sampled(
-    search: DirectionSearch, mine: Ints, components: Floats, goal: _Goal, which: Ints
+    search: DirectionSearch, indices: Ints, components: Floats, goal: _Goal, which: Ints
 ) -> tuple[Floats, NDArray[np.uint8]]:
-    """What to make small, (s, n), inf where there is no value; and what became of each place, (n,)."""
-    s, n = len(components), len(mine)
-    found = search.evaluate_along(np.tile(mine, s), np.repeat(components, n, axis=0))
-    status = goal.status(found, found.status.reshape(s, n), which[mine])
-    return goal.cost(found.values.reshape(s, n)), status
+    """Cost (s, n) of s directions at n points, inf where there is no value; and status (n,) of the points."""
+    s, n = len(components), len(indices)
+    samples = search.evaluate_along(np.tile(indices, s), np.repeat(components, n, axis=0))
+    status = goal.status(samples, samples.status.reshape(s, n), which[indices])
+    return goal.cost(samples.values.reshape(s, n)), status
 
 
 def _spread(f: Floats) -> Floats:
+    """Highest minus lowest finite value of each column of f (s, n), (n,); 0 where there is none."""
     finite = np.isfinite(f)
     high, low = np.where(finite, f, -np.inf).max(axis=0), np.where(finite, f, np.inf).min(axis=0)
     return np.where(finite.any(axis=0), high - low, 0.0)
 
 
 def _search_result(
-    search: DirectionSearch, mine: Ints, values: Floats, components: Floats, status: NDArray[np.uint8]
+    search: DirectionSearch, indices: Ints, values: Floats, components: Floats, status: NDArray[np.uint8]
 ) -> SearchResult:
-    u = search.directions(mine, components)
+    u = search.directions(indices, components)
     if not search.one_sided:  # of a direction and its opposite, the one that points along the first axis it can
         lead = np.take_along_axis(u, (np.abs(u) > 1e-9).argmax(axis=1)[:, None], axis=1)
         u = u * np.where(lead < 0.0, -1.0, 1.0)

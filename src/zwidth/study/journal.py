@@ -1,8 +1,8 @@
 """Journal of a long run: its results on disk, one a line, from which an interrupted run continues.
 
 The first line holds the fingerprint of the question and the version of the format. A journal of another question
-is begun again; one of a newer version is refused. Numbers are read back exactly. A line cut short, by a crash
-or a full disk, is dropped and computed again.
+is emptied and begun again; one of a newer version is refused. Numbers are read back exactly. A line cut short, by
+a crash or a full disk, is dropped and computed again.
 """
 
 from __future__ import annotations
@@ -45,19 +45,20 @@ def _plain(part: object) -> Any:
         return ["list", [_plain(value) for value in part]]
     if is_dataclass(part) and not isinstance(part, type):
         return [type(part).__name__, [[field.name, _plain(getattr(part, field.name))] for field in fields(part)]]
-    raise TypeError(f"a question cannot hold {part!r}")
+    hint = "; load measures with zwidth.measures.load_measures, or leave out the store" if callable(part) else ""
+    raise TypeError(f"a fingerprint cannot hold {part!r}: its value cannot be read{hint}")
 
 
 class JournalError(ValueError):
-    """A file that holds something else, and is left alone."""
+    """A file that is not a journal, or is one of a newer version; it is not changed."""
 
 
 class Journal:
-    """What has been computed so far, by name.
+    """Results computed so far, each under a name.
 
-    path      where it is kept; None: in memory only
+    path      file of the journal; None: in memory only
     question  see `fingerprint`
-    Raises    JournalError  for a file that is no journal
+    Raises    JournalError  for a file that is no journal, or of a newer version
               OSError       where it cannot be read or written
 
     >>> journal = Journal(None, fingerprint("how much?"))
@@ -76,14 +77,14 @@ class Journal:
         if path.exists() and not path.is_file():
             raise JournalError(f"{path.name or path}: is not an ordinary file; name another")
         data = path.read_bytes() if path.exists() else b""
-        whole = _read(path, data.split(b"\n")[:-1], data != b"", question)
-        self.known = {entry["name"]: entry["value"] for entry in map(json.loads, whole[1:])}
-        if (text := b"".join(line + b"\n" for line in whole)) != data:
+        lines = _read(path, data.split(b"\n")[:-1], data != b"", question)
+        self.known = {entry["name"]: entry["value"] for entry in map(json.loads, lines[1:])}
+        if (text := b"".join(line + b"\n" for line in lines)) != data:
             path.write_bytes(text)
-        self.entries_read = len(self.known)  # how many were found there
+        self.entries_read = len(self.known)  # number of results that the file held
 
     def get_or_compute(self, name: str, compute: Callable[[], Any]) -> Any:
-        """The value under this name, computed and kept where it is not yet known.
+        """The value under this name; if there is none yet, it is computed and written to the journal.
 
         compute  returns what JSON holds: numbers (inf and nan, too), text, lists, dictionaries with text as keys
         """
@@ -98,15 +99,15 @@ class Journal:
         return self.known[name]
 
 
-def _read(path: Path, lines: list[bytes], there: bool, question: str) -> list[bytes]:
-    """The lines up to the first that is damaged; a first line only where they answer another question."""
+def _read(path: Path, lines: list[bytes], not_empty: bool, question: str) -> list[bytes]:
+    """The lines up to the first that is damaged; for a journal of another question, a new first line alone."""
     first = json.dumps({"version": STORE_VERSION, "question": question}).encode()
-    known = _entry(lines[0]) if lines else {}
-    if message := newer_version_message(known.get("version"), STORE_VERSION):
+    header = _entry(lines[0]) if lines else {}
+    if message := newer_version_message(header.get("version"), STORE_VERSION):
         raise JournalError(f"{path.name}: its version {message}, or name another file")
-    if there and not isinstance(known.get("question"), str):
+    if not_empty and not isinstance(header.get("question"), str):
         raise JournalError(f"{path.name}: is not the journal of a run; name another file, or remove it")
-    if known.get("question") != question:
+    if header.get("question") != question:
         return [first]
     count = 1
     while count < len(lines) and _entry(lines[count]).keys() >= {"name", "value"}:
@@ -115,8 +116,9 @@ def _read(path: Path, lines: list[bytes], there: bool, question: str) -> list[by
 
 
 def _entry(line: bytes) -> dict[str, Any]:
+    """The JSON object of a line; {} where it holds none."""
     try:
-        found = json.loads(line)
+        entry = json.loads(line)
     except ValueError:
-        found = {}
-    return found if isinstance(found, dict) else {}
+        return {}
+    return entry if isinstance(entry, dict) else {}

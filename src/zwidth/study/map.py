@@ -32,18 +32,18 @@ if TYPE_CHECKING:
 
 Direction = Sequence[float] | str | None
 COMPONENTS: Final = ("x", "y", "z")
-# Measures asked of all cells at once cost much the same for one cell as for hundreds.
-FEWEST: Final = 512
-BATCHES: Final = 16
+# A measure evaluated for many cells at once costs about the same for one cell as for hundreds.
+FEWEST: Final = 512  # cells in a batch of such measures
+BATCHES: Final = 16  # number of batches of a large map
 
 
 @dataclass(frozen=True, repr=False)
 class MapJob:
     """The cells of a map: rows of the plane's grid one after the other; columns are measures.
 
-    requested_measures  the measures, about the wanted wall where they are about one
+    requested_measures  the measures; those that are about a wanted wall hold `wall`
     direction           a vector of any length but zero; one of EXTREMES; None: the file's
-    wall                the wanted one
+    wall                the wanted wall
     """
 
     device: Device
@@ -70,7 +70,10 @@ class MapJob:
 
     @property
     def question(self) -> str:
-        """What its results are known by. Raises TypeError for a measure whose function has no name elsewhere."""
+        """Fingerprint that stored results are recognised by.
+
+        Raises  TypeError  for a measure whose function was not read from a file or a module
+        """
         direction = self.direction
         return fingerprint(
             "map",
@@ -86,7 +89,7 @@ class MapJob:
 
     @property
     def batch(self) -> int | None:
-        """Cells to compute at a time; None: as many as take their time, for measures asked one by one."""
+        """Cells per batch; None: `executor.run` chooses, where a measure is evaluated cell by cell."""
         if any(measure.each for measure in self.requested_measures):
             return None
         return max(FEWEST, -(-self.count // BATCHES))
@@ -98,7 +101,7 @@ class MapJob:
     def compute(self, first: int, last: int) -> CellValues:
         """Cells first to last - 1, their postures solved together.
 
-        Raises  MeasureError  where a measure cannot be asked of this device, with its name
+        Raises  MeasureError  where a measure does not exist for this device, with its name
         """
         vector = None if isinstance(self.direction, str) else self.direction
         positions = self._positions[first:last]
@@ -122,13 +125,14 @@ class MapJob:
     def _column(
         self, measure: Measure, points: OperatingPoint
     ) -> tuple[NDArray[np.float64], NDArray[np.uint8], tuple[Note, ...]]:
+        """Values (n, columns) of one measure at n points, status (n,) and notes."""
         if not isinstance(self.direction, str) or not measure.along:
-            found = evaluate(measure, points)
-            return found.values[:, None], found.status, found.notes
+            result = evaluate(measure, points)
+            return result.values[:, None], result.status, result.notes
         extreme: Any = self.direction
         directed = extreme_over_directions(measure, points, extreme)
-        found = directed.extreme
-        return np.column_stack([found.values, directed.direction]), found.status, found.notes
+        result = directed.extreme
+        return np.column_stack([result.values, directed.direction]), result.status, result.notes
 
 
 def workspace_map(
@@ -149,8 +153,8 @@ def workspace_map(
 
     measures       one or several: names, or measures themselves
     plane          left out: `plane_of(device)`
-    direction      rendered in every cell; "worst" or "best": in each cell the direction in which the measure is
-                   so, "lowest" or "highest": in which it is so; left out: the file's
+    direction      rendered in every cell: a vector, or "worst", "best", "lowest" or "highest": the direction in
+                   which the measure is so in that cell; left out: the file's
     wall           the wanted wall, for measures that are about one
     user_measures  measures of a user's own, by name (`measures.user_measures.load_measures`)
     store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
@@ -161,7 +165,7 @@ def workspace_map(
                    no value stands in the attribute `notes`, a line for each reason
     Raises         PlaneError    where the handle reaches no cell, and as `plane_of` does
                    ValueError    for an unknown measure, or two of one name
-                   MeasureError  for a measure that cannot be asked of this device
+                   MeasureError  for a measure that does not exist for this device
                    DeviceError   as `Device.at` does
                    what `executor.run` and `Store` raise
     """
@@ -180,14 +184,16 @@ def map_job(
     *,
     user_measures: Mapping[str, Measure] | None = None,
 ) -> MapJob:
-    """The question that `workspace_map` asks, checked, so that a store can be made for it."""
+    """Check the arguments of `workspace_map` and return the job, for which a `Store` can be made."""
     require("device", device, Device)
     requested_measures = tuple(
         one if isinstance(one, Measure) else find_measure(one, user_measures) for one in measure_list(measures)
     )
     names = [one.name for one in requested_measures]
-    if not names or len(set(names)) < len(names):
-        raise ValueError(f"a map has measures of different names, got {', '.join(names) or 'none'}")
+    if not names:
+        raise ValueError("measures must name at least one measure, got none")
+    if len(set(names)) < len(names):
+        raise ValueError(f"the names of a map's measures must differ, got {', '.join(names)}")
     if isinstance(direction, str):
         if direction not in EXTREMES:
             raise ValueError(f"the direction must be a vector or one of {', '.join(EXTREMES)}, got {direction!r}")
@@ -219,7 +225,7 @@ def as_dataset(job: MapJob, cells: CellValues) -> xr.Dataset:
     for measure in job.requested_measures:
         width = len(job._columns(measure))
         unit = measure.unit.replace("^r", f"^{len(mechanism.drives.names)}")
-        about = {
+        attributes = {
             **unit_attributes(unit),
             "title": measure.title,
             "long_name": measure.title,
@@ -230,13 +236,13 @@ def as_dataset(job: MapJob, cells: CellValues) -> xr.Dataset:
             "key": measure.key,
             "notes": "\n".join(_sentence(note, plane) for note in cells.notes[column]),
         }
-        data[measure.name] = (axes, cells.values[:, column].reshape(plane.shape), about)
+        data[measure.name] = (axes, cells.values[:, column].reshape(plane.shape), attributes)
         status = cells.status[:, column].reshape(plane.shape)
         data[f"{measure.name}_status"] = (axes, status, _flags())
         if width > 1:
             directions = cells.values[:, column + 1 : column + width].reshape(*plane.shape, 3)
-            told = {"title": f"{str(job.direction).capitalize()} direction of {measure.title.lower()}"}
-            data[f"{measure.name}_direction"] = ((*axes, "component"), directions, told)
+            title = {"title": f"{str(job.direction).capitalize()} direction of {measure.title.lower()}"}
+            data[f"{measure.name}_direction"] = ((*axes, "component"), directions, title)
         column += width
     x, y = (
         (axis, values, {"units": "m", "long_name": name})
@@ -254,7 +260,7 @@ def measures_of(dataset: xr.Dataset) -> list[str]:
 
 
 def reachable(dataset: xr.Dataset, name: str) -> NDArray[np.bool_]:
-    """Cells (ny, nx) with a posture, whatever became of the measure in them."""
+    """Whether each cell (ny, nx) has a posture; the measure `name` may still have no value in it."""
     status = dataset[f"{name}_status"].values
     return np.asarray((status != OUT_OF_REACH) & (status != SINGULAR))
 
@@ -265,6 +271,7 @@ def _flags() -> dict[str, Any]:
 
 
 def _sentence(note: Note, plane: PlaneGrid) -> str:
+    """A note in words: how many cells, why they have no value, and where the first of them lies."""
     row, column = divmod(note.first[0], len(plane.x))
     x, y = (round(float(value), 12) + 0.0 for value in (plane.x[column], plane.y[row]))
     where = f"{plane.names[0]} = {x:.6g} m, {plane.names[1]} = {y:.6g} m"
@@ -283,12 +290,12 @@ def _check_reached(job: MapJob, cells: CellValues) -> None:
 
 
 def _attributes(job: MapJob) -> dict[str, Any]:
-    """What the map was asked with, as attributes that any file can hold."""
+    """The map's device, plane, direction and wanted wall, as attributes that any file can hold."""
     from zwidth._version import __version__
 
     device, plane, direction = job.device, job.plane, job.direction
     assert device.mechanism is not None
-    asked = direction if isinstance(direction, str) else device.direction(direction).tolist()
+    rendered = direction if isinstance(direction, str) else device.direction(direction).tolist()
     wanted = {
         "wanted_stiffness_N_per_m": job.wall.stiffness,
         "wanted_damping_Ns_per_m": job.wall.damping,
@@ -300,7 +307,7 @@ def _attributes(job: MapJob) -> dict[str, Any]:
         "assembly": job.assembly or device.reference_assembly or "",
         "model": job.model or "full",
         "operator": device.operator_name or "none",
-        "direction": asked,
+        "direction": rendered,
         "plane": "".join(plane.names),
         "plane_axes": [*plane.first.tolist(), *plane.second.tolist()],
         "plane_through_m": plane.through.tolist(),

@@ -71,19 +71,20 @@ def why_no_cell(dataset: xr.Dataset) -> str | None:
 
 
 def _measure(dataset: xr.Dataset, name: str, device: Device | None) -> dict[str, Any]:
-    about = dataset[name].attrs
-    found = {
-        "title": about["title"],
-        "unit": about.get("unit", ""),
-        "better": about["better"] or None,
-        "source": about["source"],
+    """One measure of the document."""
+    attributes = dataset[name].attrs
+    document = {
+        "title": attributes["title"],
+        "unit": attributes.get("unit", ""),
+        "better": attributes["better"] or None,
+        "source": attributes["source"],
         "values": dataset[name].values,
         "status": NAMES[dataset[f"{name}_status"].values],
         "overall": over_the_workspace(dataset, name, device),
         "notes": _notes(dataset, name),
     }
     directed = f"{name}_direction"
-    return found | ({"directions": dataset[directed].values} if directed in dataset else {})
+    return document | ({"directions": dataset[directed].values} if directed in dataset else {})
 
 
 def _notes(dataset: xr.Dataset, name: str) -> list[str]:

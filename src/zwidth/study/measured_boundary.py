@@ -1,4 +1,4 @@
-"""Result of a virtual experiment: measured points of the boundary, their distance from the exact one and its
+"""Result of a virtual experiment: measured points of the boundary, their distance from the exact edge and its
 causes, and points that contradict each other."""
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class MeasuredPoint:
 class Cause:
     """Effect of one nonlinear part of the device on the edges: they are measured again without it.
 
-    name       of the part, as in `Nonlinear.left_out`
+    name       of the part, as in `Nonlinear.kinds`
     points     measured with it;   without  the dampings measured without it [N s/m]; nan: no edge was found
     """
 
@@ -132,9 +132,10 @@ class Experiment(Result):
         return max(both, default=nan)
 
     def deviation(self, point: MeasuredPoint) -> float:
-        """Distance from the exact edge as a share of `damping_range`, of a tip's stiffness; nan if unknown."""
-        whole = abs(point.exact) if point.edge == "tip" else self.damping_range
-        return abs(point.bisected_value - point.exact) / whole if whole > 0.0 else nan
+        """Distance from the exact edge, as a share of a tip's exact stiffness, else of `damping_range`; nan if
+        unknown."""
+        scale = abs(point.exact) if point.edge == "tip" else self.damping_range
+        return abs(point.bisected_value - point.exact) / scale if scale > 0.0 else nan
 
     @property
     def compared_points(self) -> list[MeasuredPoint]:
@@ -144,7 +145,7 @@ class Experiment(Result):
     def document(self) -> dict[str, Any]:
         """The points and their summary by key and unit; None where there is no such point, or no chart."""
         best, chart = self.stiffest, self.chart
-        own = (
+        user_points = (
             {"measured": None, "measured_counts": None}
             if self.user_points is None
             else self.user_points.document()
@@ -157,7 +158,7 @@ class Experiment(Result):
             "exact_stiffness_max_N_per_m": None if chart is None else chart.stiffness_max,
             "visible_m": self.plan.visible,
             "subjects": [None if subject is None else vars(subject) for subject in self.subjects],
-        } | own
+        } | user_points
 
     def table(self) -> dict[str, list[Any]]:
         """The points as columns, in the form that `points_file.read_points` reads."""
@@ -207,11 +208,11 @@ def edges_beyond_tips(found: Experiment) -> list[BeyondTip]:
     return sorted(pairs, key=lambda pair: pair.tip.high / pair.stiffness)
 
 
-def _stable_ranges(found: Experiment) -> dict[float, tuple[float, float]]:
+def _stable_ranges(experiment: Experiment) -> dict[float, tuple[float, float]]:
     """By stiffness, the dampings that every trial found stable, from the tip's damping to the edges found."""
-    start_damping = found.place.damping
+    start_damping = experiment.place.damping
     ranges: dict[float, tuple[float, float]] = {}
-    for point in found.points:
+    for point in experiment.points:
         low, high = ranges.get(point.stiffness, (start_damping, start_damping))
         if point.edge == "lower":
             ranges[point.stiffness] = min(low, point.high), high

@@ -231,11 +231,11 @@ def _check_intersection(normal: Floats, point: Floats, own: Floats | None, reach
     where = f"the plane {'xyz'[k]} = {_short(known[0, k])} m" if aligned else f"the plane across {_vector(own)}"
     if np.linalg.norm(np.cross(normal, own)) > PARALLEL:
         advice = Advice("ask for {}", "axes", plane) if plane else Advice("leave {} out", "axes")
-        raise PlaneError(f"the handle cannot leave {where}, and meets the plane asked for in a line", advice)
+        raise PlaneError(f"the handle cannot leave {where}, and meets the requested plane in a line", advice)
     off = float(abs((point - known[0]) @ own))
     if off > FLAT * float(np.ptp(known, axis=0).max()):
         raise PlaneError(
-            f"the handle cannot leave {where}, and the plane asked for lies {off:.4g} m beside it; it reaches "
+            f"the handle cannot leave {where}, and the requested plane lies {off:.4g} m beside it; it reaches "
             f"{reach}"
         )
 

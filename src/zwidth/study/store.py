@@ -4,9 +4,9 @@
     status    (count, measures)  uint8, named by its attributes; 255 = not computed
     notes                        a journal beside them: why cells have no value
 
-Attributes hold the fingerprint of the question and the version of the format. A store of another question is begun
-again; one of a newer version is refused. Chunks are batches: one file of values and one of status, each written
-whole or not at all, the status last.
+Attributes hold the fingerprint of the question and the version of the format. A store of another question is
+emptied and begun again; one of a newer version is refused. Chunks are batches: one file of values and one of
+status, each written whole or not at all, the status last.
 """
 
 from __future__ import annotations
@@ -67,17 +67,22 @@ class Store:
         try:
             group = zarr.open_group(str(draft), mode="w-", zarr_format=3)
             shape, chunks = (self.count, len(self.measures)), (min(batch, self.count), len(self.measures))
-            about: dict[str, Any] = {"measures": list(self.measures)}
+            attributes: dict[str, Any] = {"measures": list(self.measures)}
             group.create_array(
-                "values", shape=shape, chunks=chunks, dtype="float64", fill_value=np.nan, attributes=about
+                "values", shape=shape, chunks=chunks, dtype="float64", fill_value=np.nan, attributes=attributes
             )
             meanings = [text.replace(" ", "_") for text in STATUS.values()]
             flags: dict[str, Any] = {"flag_values": list(STATUS), "flag_meanings": " ".join(meanings)}
             group.create_array(
-                "status", shape=shape, chunks=chunks, dtype="uint8", fill_value=MISSING, attributes=about | flags
+                "status",
+                shape=shape,
+                chunks=chunks,
+                dtype="uint8",
+                fill_value=MISSING,
+                attributes=attributes | flags,
             )
-            about = {"zwidth": KIND, "version": STORE_VERSION, "question": self.question, "batch": batch}
-            group.attrs.update(about)
+            header = {"zwidth": KIND, "version": STORE_VERSION, "question": self.question, "batch": batch}
+            group.attrs.update(header)
             if self._ours or (self.path.is_dir() and not any(self.path.iterdir())):
                 shutil.rmtree(self.path)
             draft.replace(self.path)
@@ -92,11 +97,11 @@ class Store:
         for first in range(0, self.count, self.batch):
             part = slice(first, min(first + self.batch, self.count))
             with suppress(Exception):  # a file that a crash has damaged: its batch is not done
-                found = CellValues(values[part], status[part], self._batch_notes(first))
+                cells = CellValues(values[part], status[part], self._batch_notes(first))
                 # zarr does not tell a file that has gone from one that holds nan only
-                lost = (found.status == OK) & np.isnan(found.values)
-                if not (lost | (found.status == MISSING)).any():
-                    yield first, found
+                lost = (cells.status == OK) & np.isnan(cells.values)
+                if not (lost | (cells.status == MISSING)).any():
+                    yield first, cells
 
     def write_batch(self, first: int, cells: CellValues) -> None:
         """Write a batch. Raises OSError where it cannot be written."""
@@ -104,8 +109,8 @@ class Store:
         part = slice(first, first + len(cells.values))
         values[part] = cells.values
         if any(cells.notes):
-            told = [[[n.status, n.reason, n.count, list(n.first)] for n in notes] for notes in cells.notes]
-            self._notes.get_or_compute(str(first), lambda: told)
+            entry = [[[n.status, n.reason, n.count, list(n.first)] for n in notes] for notes in cells.notes]
+            self._notes.get_or_compute(str(first), lambda: entry)
         status[part] = cells.status
 
     def remove(self) -> None:
@@ -114,8 +119,8 @@ class Store:
             shutil.rmtree(self.path, ignore_errors=True)
 
     def _batch_notes(self, first: int) -> tuple[tuple[Note, ...], ...]:
-        told = self._notes.known.get(str(first), [[] for _ in self.measures])
-        return tuple(tuple(Note(s, reason, n, tuple(at)) for s, reason, n, at in notes) for notes in told)
+        entry = self._notes.known.get(str(first), [[] for _ in self.measures])
+        return tuple(tuple(Note(s, reason, n, tuple(at)) for s, reason, n, at in notes) for notes in entry)
 
     def _open_arrays(self) -> tuple[Any, Any]:
         assert self._arrays is not None, "not begun"
@@ -135,8 +140,8 @@ class Store:
             raise
         except Exception:  # zarr's own, of many kinds
             raise other from None
-        if kind == KIND and (said := newer_version_message(version, STORE_VERSION)):
-            raise StoreError(f"{self.path.name}: its version {said}, or name another folder")
+        if kind == KIND and (message := newer_version_message(version, STORE_VERSION)):
+            raise StoreError(f"{self.path.name}: its version {message}, or name another folder")
         if kind != KIND or not isinstance(batch, int):
             raise other
         self._ours = True
@@ -150,8 +155,8 @@ class Store:
         self.batch = batch
 
     def _check_disk(self) -> None:
-        place = next((p for p in (self.path, *self.path.absolute().parents) if p.exists()), Path())
-        free, wanted = shutil.disk_usage(place).free, float(PER_CELL) * self.count * len(self.measures)
+        folder = next((p for p in (self.path, *self.path.absolute().parents) if p.exists()), Path())
+        free, wanted = shutil.disk_usage(folder).free, float(PER_CELL) * self.count * len(self.measures)
         if wanted > free:
             raise StoreError(
                 f"{self.path.name}: {self.count} cells of {len(self.measures)} measures would take "

@@ -37,12 +37,14 @@ Floats = NDArray[np.float64]
 Interval = tuple[float, float]
 
 TOLERANCE: Final = 0.1  # of e, by default
-WALLS: Final = 160  # of the full model's edge that are compared; ends of intervals are closed in on between them
+WALLS: Final = 160  # walls of the full model's edge that are compared; ends of ranges are bisected between them
 NEGLIGIBLE: Final = (
     1e-4  # share of the edge's extent; a smaller K or B counts as 0, where a relative error means nothing
 )
 NEAR: Final = 0.2  # error at the same frequency below which no farther piece of a model's edge can be nearer
-CLOSE: Final = np.linspace(-1.0, 1.0, 33)
+CLOSE: Final = np.linspace(
+    -1.0, 1.0, 33
+)  # frequencies around a wall's at which the curve is computed, over its error
 # Models simpler than the full one, with their labels; the simplest first.
 SIMPLER: Final[tuple[tuple[Model, str], ...]] = (
     ("rigid", "rigid"),
@@ -56,7 +58,7 @@ class Fit:
     """Error of one model against the full one along the edge.
 
     key           "rigid", "motor-mass" or "two-mass", with "-undamped" where its damping was left out
-    label         for people
+    label         name in texts and figures
     frequency     (k,)  of walls along the full model's edge, ascending [Hz]
     error         (k,)  e at these walls; inf where the model has no stable wall
     valid_ranges  frequency ranges of the edge in which e stays within the tolerance, ascending [Hz]
@@ -136,7 +138,7 @@ def validity(point: OperatingPoint, tolerance: float = TOLERANCE) -> Validity:
 
     point      one posture and one direction; its model does not matter
     tolerance  largest e that counts as agreement
-    Raises  what `OperatingPoint.plant` raises, and ChartError if the full model cannot be charted
+    Raises     what `OperatingPoint.plant` raises, and ChartError if the full model cannot be charted
     """
     require("point", point, OperatingPoint)
     full = point.in_model("full")
@@ -184,19 +186,19 @@ def _error(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Floats:
         for low, high in ranges:
             if not low < wall[2] < high:
                 continue
-            off = float(np.max(np.abs(np.array(tracer.wall(in_radians * wall[2])[:2]) / wall[:2] - 1.0)))
-            if off < NEAR:
-                about = [f for f in wall[2] * (1.0 + off * CLOSE) if low < f < high]
-                own = np.array([(*tracer.wall(in_radians * f)[:2], f) for f in about])
-                best[n] = _nearest(own / wall - 1.0)
+            error = float(np.max(np.abs(np.array(tracer.wall(in_radians * wall[2])[:2]) / wall[:2] - 1.0)))
+            if error < NEAR:
+                frequencies = [f for f in wall[2] * (1.0 + error * CLOSE) if low < f < high]
+                points = np.array([(*tracer.wall(in_radians * f)[:2], f) for f in frequencies])
+                best[n] = _nearest(points / wall - 1.0)
     return best
 
 
 def _nearest(points: Floats) -> float:
-    """Least max(|u|, |v|, ...) along a walk of straight pieces, points (k, n).
+    """Least max(|u|, |v|, ...) along a polyline through points (k, n).
 
-    Along each piece it is convex, and least at an end, where one of them vanishes, or where two are equal or
-    opposite.
+    Along each straight piece it is convex, and least at an end, where one of u, v, ... is 0, or where two of them
+    are equal or opposite.
     """
     start, step = points[:-1].T, np.diff(points, axis=0).T
     pairs = list(combinations(range(len(start)), 2))
@@ -235,7 +237,7 @@ class _Edge:
 def _fit(
     edge: _Edge, controller: Controller, key: str, label: str, plant: Plant | None, reason: str, tolerance: float
 ) -> Fit:
-    """One model beside the full one; `reason` says why it has no plant."""
+    """The `Fit` of one model to the full one; `reason` says why it has no plant."""
     none = np.empty(0)
     if plant is None:
         return Fit(key, label, none, none, (), reason)
@@ -261,10 +263,10 @@ def _range_end(frequency: Floats, fits: Callable[[float], bool], good: int, bad:
     fitting = float(frequency[good])
     if not 0 <= bad < len(frequency):
         return fitting
-    off = float(frequency[bad])
+    outside = float(frequency[bad])
     for _ in range(20):
-        middle = 0.5 * (fitting + off)
-        fitting, off = (middle, off) if fits(middle) else (fitting, middle)
+        middle = 0.5 * (fitting + outside)
+        fitting, outside = (middle, outside) if fits(middle) else (fitting, middle)
     return fitting
 
 

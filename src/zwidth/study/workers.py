@@ -191,7 +191,7 @@ def work() -> None:
             sent.flush()
             sys.stdout.flush()
     except (EOFError, BrokenPipeError):
-        os._exit(0)  # the asking process has ended, or needs no more; there is nothing to clean up
+        os._exit(0)  # the process that started this one has ended, or needs no more; nothing to clean up
 
 
 def _error(error: Exception) -> bytes:

@@ -59,7 +59,7 @@ def rendered_environment(wall: SurfaceRendering, surface: Surface) -> tuple[Envi
     if not isfinite(wall.damping):
         raise MotionError(f"the wall's damping must be finite [N s/m], of either sign, got {wall.damping}")
     if two_sided and wall.no_pull:
-        raise MotionError("a two-sided plane pulls by its nature; leave no_pull or two_sided out")
+        raise MotionError("a two-sided plane always pulls; leave out no_pull or two_sided")
     gains = {"stiffness": float(wall.stiffness), "damping": float(wall.damping)}
     if two_sided:
         return ENVIRONMENTS["wall"], ENVIRONMENTS["wall"].values(**gains)

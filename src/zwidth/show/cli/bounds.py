@@ -21,10 +21,10 @@ LACKED: Final = {
     "rigid_mass_kg": "a free mass",
     "damping_Ns_per_m": "friction of a free mass",
     "motor_side_mass_kg": "a motor side",
-    "stiffness_N_per_m": "a spring behind it",
-    "mode_mass_kg": "a single motion",
-    "mode_damping_Ns_per_m": "a single motion's friction",
-    "mode_stiffness_N_per_m": "a single motion's spring",
+    "stiffness_N_per_m": "a spring behind the motor side",
+    "mode_mass_kg": "a single mode",
+    "mode_damping_Ns_per_m": "the friction of a single mode",
+    "mode_stiffness_N_per_m": "the spring of a single mode",
     "time_constant_s": "a first-order filter",
     "electrical_damping_Ns_per_m": "electrical damping",
     "coulomb_friction_N": "dry friction",
@@ -46,8 +46,8 @@ class BoundsCommand(Command):
             "--damping",
             metavar="B",
             type=Finite(),
-            help="Damping of the walls compared [Ns/m]. Default: that of the stiffest stable wall; 0 if there is "
-            "none.",
+            help="Damping at which the conditions are compared [Ns/m]. Default: that of the stiffest stable wall; "
+            "0 if there is none.",
         ),
     )
     keys = (
@@ -72,7 +72,7 @@ class BoundsCommand(Command):
             "condition",
             "claims",
             f"at {amount(result.damping, 'Ns/m')}",
-            "of exact",
+            "ratio to exact",
             "largest",
             "not met",
         ]
@@ -82,7 +82,7 @@ class BoundsCommand(Command):
             yield two_columns([(f"{n}", sentence) for n, sentence in enumerate(unmet, start=1)])
         silent = [(bound.name, _needs(bound)) for bound in result.bounds if bound.lacking]
         if silent:
-            yield "not asked, for the device lacks what they take:"
+            yield "not applied, because the device lacks what they need:"
             yield two_columns(silent)
 
 

@@ -98,8 +98,8 @@ class ChartCommand(Command):
     def document(self, case: CommandLine, result: Chart) -> dict[str, Any]:
         from zwidth.chart.measured.chart import MeasuredChart
 
-        told = {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
-        return result.document() | told
+        warning = {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
+        return result.document() | warning
 
     def reason(self, case: CommandLine, result: Chart) -> str | None:
         if result.stiffness_max == result.stiffness_max:
@@ -112,7 +112,7 @@ class ChartCommand(Command):
         from zwidth.chart.measured.chart import MeasuredChart
 
         together = " and ".join(map(vector, document.get("directions", ())))
-        first = [("under one law", together)] if together else []
+        first = [("same wall along", together)] if together else []
         last = measured_rows(result) if isinstance(result, MeasuredChart) else ()
         yield two_columns([*first, *_rows(result), *last])
 
@@ -142,7 +142,7 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
         from zwidth.loop.unobserved_instability import unobserved_instability
 
         names = ", ".join(group_names(chart.unobserved_modes))
-        warned = "; WARNING: so that the device runs away, whatever the wall"
+        warned = "; WARNING: this motion is unstable, whatever the wall"
         # several directions are those of a mechanism, whose springs and dampers feed no motion
         runs_away = isinstance(chart, StabilityChart) and unobserved_instability(chart.loop)
         yield "not affected by a wall", names + (warned if runs_away else "")
@@ -183,7 +183,7 @@ def unmeasured_warning(chart: MeasuredChart) -> str | None:
     return (
         f"measured up to {amount(share * half, 'Hz')}, {typed(percent(share))} of half the sampling rate "
         f"({amount(half, 'Hz')}); "
-        "walls that fail above are not seen"
+        "walls that are unstable only above it are not found"
     )
 
 
@@ -199,9 +199,9 @@ def measured_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
     measured = f"{used} of {given} frequencies used, {chart.integrators} integrators"
     yield "response", f"{measured}; {response.note}" if response.note else measured
     for stretch in chart.unusable[:SHOWN_STRETCHES]:
-        yield "not to be relied on", stretch_text(stretch)
+        yield "unreliable", stretch_text(stretch)
     if len(chart.unusable) > SHOWN_STRETCHES:
-        yield "", f"and {len(chart.unusable) - SHOWN_STRETCHES} more stretches; --json holds them all"
+        yield "", f"and {len(chart.unusable) - SHOWN_STRETCHES} more ranges; --json lists all"
 
 
 def stretch_text(stretch: UnusableRange) -> str:

@@ -21,10 +21,10 @@ SHOWN: Final = 200  # rows printed for people; --json and --output hold all
 
 
 class CheckCommand(Command):
-    """Say of each wall whether DEVICE renders it stably, by the eigenvalues of the loop."""
+    """Judge single walls of DEVICE, stable or not, by the eigenvalues of the loop."""
 
     name = "check"
-    summary = "Say of single walls whether DEVICE renders them stably."
+    summary = "Judge single walls: stable or not."
     examples = (
         "zwidth check my-device.toml --stiffness 4000 --damping 10",
         "zwidth check my-device.toml --points walls.csv --json",
@@ -73,7 +73,7 @@ def _walls(points: str | None, stiffness: float | None, damping: float | None) -
     context = click.get_current_context()
     if points is not None:
         if stiffness is not None or damping is not None:
-            raise click.UsageError("--points stands for itself; leave --stiffness and --damping out", context)
+            raise click.UsageError("--points replaces --stiffness and --damping; leave them out", context)
         return read_walls(points)
     if stiffness is None or damping is None:
         raise click.UsageError("needs --points FILE.csv, or both --stiffness and --damping", context)

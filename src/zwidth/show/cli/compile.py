@@ -19,8 +19,8 @@ from zwidth.show.cli.options import as_json, example
 def compile_command(as_json: bool) -> int:
     """Compile all kernels for this processor, so that no command has to.
 
-    Commands compile what they want at first use, which takes up to a minute each; here all of it happens at once,
-    on several cores. What is compiled is kept, beside the sources or in your cache folder.
+    Without it, each command compiles the kernels it needs when it is first used, which takes up to half a minute.
+    The compiled kernels are kept beside the sources, or in your cache folder.
     """
     from zwidth.machine_code import written_folder
     from zwidth.show.cli.errors import BadInput
@@ -28,9 +28,7 @@ def compile_command(as_json: bool) -> int:
 
     folder = written_folder()
     if folder is None:
-        raise BadInput(
-            "no folder may be written to that could keep compiled kernels; set NUMBA_CACHE_DIR to one of yours"
-        )
+        raise BadInput("no folder for compiled kernels can be written; set NUMBA_CACHE_DIR to a folder of yours")
     began = monotonic()
     count = compile_kernels()
     found = {"kernels": count, "seconds": monotonic() - began, "folder": str(folder)}

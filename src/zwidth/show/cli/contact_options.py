@@ -91,7 +91,7 @@ def check_contact(options: Mapping[str, Any]) -> None:
     if options["parameters"]:
         raise usage_error("--parameter belongs to --environment; a wall has --stiffness and --damping")
     if options["no_pull"] and wall != "one-sided":
-        raise usage_error("a two-sided wall pulls by its nature; --no-pull goes with --wall one-sided")
+        raise usage_error("a two-sided wall always pulls; --no-pull needs --wall one-sided")
 
 
 def contact_arguments(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -204,7 +204,7 @@ def _wall_and_environment_options() -> list[Callable[..., Any]]:
         click.option(
             "--wall",
             type=click.Choice(("two-sided", "one-sided")),
-            help="Does it act on both sides of its position? Default: two-sided.",
+            help="Whether the wall acts on both sides of its position. Default: two-sided.",
         ),
         *environment_options(),
         click.option("--no-pull", is_flag=True, help="The wall never pulls the device inwards."),
@@ -218,7 +218,7 @@ def environment_options() -> list[Callable[..., Any]]:
             "--environment",
             metavar="NAME|FILE.py:NAME",
             callback=refuse_empty,
-            help="Something else to touch: a bundled environment, or one of a file of your own.",
+            help="An environment instead of a wall: a bundled one, or one from a file of your own.",
         ),
         click.option(
             "--parameter",
@@ -235,20 +235,25 @@ def _start_options() -> list[Callable[..., Any]]:
     place = BoundedNumber("m", -FARTHEST, FARTHEST)
     return [
         click.option(
-            "--wall-position", metavar="M", type=place, default=0.0, help="Where the wall begins [m]. Default: 0."
+            "--wall-position",
+            metavar="M",
+            type=place,
+            default=0.0,
+            help="Position of the wall's surface [m]. Default: 0.",
         ),
         click.option(
             "--start-position",
             metavar="M",
             type=place,
-            help="Where the device starts [m]. Default: 1 mm inside what acts everywhere, 1 mm outside a surface.",
+            help="Position at the start [m]. Default: 1 mm outside an environment with a surface, 1 mm inside "
+            "any other.",
         ),
         click.option(
             "--start-velocity",
             metavar="V",
             type=BoundedNumber("m/s", -FARTHEST, FARTHEST),
             default=0.0,
-            help="How fast it starts [m/s]. Default: 0.",
+            help="Velocity at the start [m/s]. Default: 0.",
         ),
     ]
 
@@ -259,30 +264,32 @@ def _hand_options() -> list[Callable[..., Any]]:
             "--push",
             metavar="F",
             type=BoundedNumber("N", -LARGEST_FORCE, LARGEST_FORCE),
-            help="The hand's force towards the wall [N]. Default: 2 against a surface, if the hand does not "
-            "reach; else 0.",
+            help="Constant force of the hand towards the wall [N]. Default: 2 against a surface, unless "
+            "--reach is given; else 0.",
         ),
         click.option(
             "--ramp",
             metavar="S",
             type=BoundedNumber("s", 0.0, 1e6),
             default=0.0,
-            help="Time in which the push grows to it [s]. Default: 0.",
+            help="Time in which the push rises to its full value [s]. Default: 0.",
         ),
         click.option(
-            "--tremor", type=Numbers("N,HZ", (2,), "0.1,10"), help="A trembling force, and its frequency."
+            "--tremor",
+            type=Numbers("N,HZ", (2,), "0.1,10"),
+            help="Amplitude and frequency of a tremor, as a force [N, Hz].",
         ),
         click.option(
             "--reach",
             type=Numbers("M[,START,DURATION]", (1, 3), "0.01 or 0.01,0,0.5"),
-            help="The arm's rest position moves by so much; when, and how long it takes [s]. Default: 0,0.5. "
-            "Needs an operator.",
+            help="Displacement of the arm's rest position [m], and start and duration of this motion [s]. "
+            "Default: 0,0.5. Needs an operator.",
         ),
         click.option(
             "--reflex",
             type=Numbers("N,K,B[,LATENCY,RISE]", (3, 5), "3,500,5 or 3,500,5,0.05,0.05"),
-            help="Above a force the arm stiffens by K and B, after a latency, within a rise [s]. "
-            "Needs an operator.",
+            help="Stiffen the arm by K and B once the force exceeds N, after a latency and within a rise time "
+            "[s]. Needs an operator.",
         ),
     ]
 

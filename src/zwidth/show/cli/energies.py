@@ -8,6 +8,8 @@ from typing import Final
 from zwidth.show.units import amount
 
 HEADINGS: Final = ("energy", "put in", "taken out")
+# Entries of the ledger whose names say too little beside others.
+LABELS: Final = {"hold": "sample and hold", "quantiser": "encoder steps"}
 NEGLIGIBLE: Final = 1e-9  # share of the largest energy that is not worth a line
 
 
@@ -16,8 +18,8 @@ def energy_rows(entries: Mapping[str, float], stored: float) -> Iterator[tuple[s
     largest = max([abs(stored), *map(abs, entries.values())])
     for name, energy in entries.items():
         if abs(energy) > NEGLIGIBLE * largest:
-            told = amount(abs(energy), "J")
-            yield (name, told, "") if energy > 0.0 else (name, "", told)
+            label, size = LABELS.get(name, name), amount(abs(energy), "J")
+            yield (label, size, "") if energy > 0.0 else (label, "", size)
     if abs(stored) <= NEGLIGIBLE * largest:
         yield "stored since the start", "0 J", ""
     elif stored > 0.0:

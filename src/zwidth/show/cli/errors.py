@@ -74,8 +74,8 @@ def translate_errors(question: Question) -> Iterator[None]:
         raise BadInput(f"{question.name}: response: {error}") from None
     except NonlinearError as error:
         raise BadInput(
-            f"{question.name}: {error.estimate} is not linear: it has no chart; ask zwidth simulate or zwidth "
-            "experiment, or chart another estimate with --set loop.velocity.method=backward-difference"
+            f"{question.name}: {error.estimate} is not linear, so it has no chart; use zwidth simulate or zwidth "
+            "experiment, or another estimate with --set loop.velocity.method=backward-difference"
         ) from None
     except (UnmovedError, HysteresisError) as error:
         raise BadInput(f"{question.name}: {error}") from None

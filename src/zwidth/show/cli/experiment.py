@@ -46,11 +46,11 @@ def _check_range(ctx: click.Context, param: click.Parameter, span: tuple[float, 
 
 
 class ExperimentCommand(Command):
-    """Measure a stability boundary on the virtual DEVICE: disturb it, watch it, bisect the damping for each
+    """Measure a stability boundary on a simulated DEVICE: disturb it, judge the motion, bisect the damping at each
     stiffness, and the stiffness near the tip."""
 
     name = "experiment"
-    summary = "Measure a stability boundary on the virtual DEVICE."
+    summary = "Measure a stability boundary on a simulated DEVICE."
     examples = (
         "zwidth experiment my-device.toml --output boundary.svg",
         "zwidth experiment my-device.toml --operator thesis-arm --wall one-sided --subjects 2 --trials 4",
@@ -68,51 +68,51 @@ class ExperimentCommand(Command):
             type=click.IntRange(1, MOST),
             default=16,
             metavar="N",
-            help="At how many stiffnesses the damping is bisected (default 16).",
+            help="Number of stiffnesses at which the damping is bisected (default 16).",
         ),
         click.option(
             "--tips",
             type=click.IntRange(0, MOST),
             default=8,
             metavar="N",
-            help="At how many dampings the stiffness is, near the tip (default 8).",
+            help="Number of dampings, near the tip, at which the stiffness is bisected (default 8).",
         ),
         click.option(
             "--stiffness",
             type=Numbers("KMIN,KMAX", (2,), "0,8000"),
             callback=_check_range,
-            help="Where to look [N/m].",
+            help="Range of stiffness to search [N/m].",
         ),
         click.option(
             "--damping",
             type=Numbers("BMIN,BMAX", (2,), "0,30"),
             callback=_check_range,
-            help="Where to look [Ns/m].",
+            help="Range of damping to search [Ns/m].",
         ),
         click.option(
             "--disturbance",
             type=float,
             metavar="M",
-            help="Displaced by this [m], from a two-sided wall (default 0.001; at most 1).",
+            help="Displacement at the start, for a two-sided wall [m] (default 0.001; at most 1).",
         ),
         click.option(
             "--visible",
             type=float,
             metavar="M",
-            help="A lasting vibration up to this amplitude [m] counts as none (default: three encoder steps and "
-            "ten standard deviations of the noise).",
+            help="Largest amplitude of a lasting vibration that counts as none [m] (default: three encoder steps "
+            "and ten standard deviations of the noise).",
         ),
         click.option(
             "--push",
             type=float,
             metavar="N",
-            help="Of the hand [N] (default: 2 against a one-sided wall, else 0).",
+            help="Constant force of the hand [N] (default: 2 against a one-sided wall, else 0).",
         ),
         click.option(
             "--speed",
             type=float,
             metavar="V",
-            help="At the start [m/s] (default: 0.02 to a one-sided wall; at most 100).",
+            help="Velocity at the start [m/s] (default: 0.02 towards a one-sided wall, else 0; at most 100).",
         ),
         click.option(
             "--reflex",
@@ -120,31 +120,46 @@ class ExperimentCommand(Command):
             help="The hand stiffens threefold, 50 ms after the wall has half of the push.",
         ),
         click.option(
-            "--subjects", type=click.IntRange(1, MOST), default=1, metavar="N", help="Operators (default 1)."
+            "--subjects",
+            type=click.IntRange(1, MOST),
+            default=1,
+            metavar="N",
+            help="Number of operators (default 1).",
         ),
         click.option(
-            "--trials", type=click.IntRange(1, MOST), default=1, metavar="N", help="Of each subject (default 1)."
+            "--trials",
+            type=click.IntRange(1, MOST),
+            default=1,
+            metavar="N",
+            help="Number of trials with each operator (default 1).",
         ),
         click.option(
             "--spread",
             type=click.FloatRange(0.0, 2.0),
             default=0.2,
             metavar="S",
-            help="Of operators and trials: standard deviation of the logarithm (default 0.2).",
+            help="Spread of operators and trials: standard deviation of the logarithm (default 0.2).",
         ),
         click.option(
-            "--seed", type=click.IntRange(min=0), default=1, metavar="N", help="Of what is random (default 1)."
+            "--seed",
+            type=click.IntRange(min=0),
+            default=1,
+            metavar="N",
+            help="Seed of the random numbers (default 1).",
         ),
         click.option(
             "--measured",
             metavar="FILE.csv",
             callback=refuse_empty,
-            help="Your own points: stiffness_N_per_m, damping_Ns_per_m, and edge (lower, upper, tip) or verdict "
-            "(stable, unstable) of each; if you like damping_low_Ns_per_m, damping_high_Ns_per_m, "
-            "stiffness_low_N_per_m, stiffness_high_N_per_m, trials.",
+            help="Your own points, with columns stiffness_N_per_m, damping_Ns_per_m, and edge (lower, upper, tip) "
+            "or verdict (stable, unstable); optional: damping_low_Ns_per_m, "
+            "damping_high_Ns_per_m, stiffness_low_N_per_m, stiffness_high_N_per_m, trials.",
         ),
         click.option(
-            "--resume", metavar="FILE", callback=refuse_empty, help="Keep what is done here, and go on from it."
+            "--resume",
+            metavar="FILE",
+            callback=refuse_empty,
+            help="Save finished work here; the same command continues from it.",
         ),
     )
     output_help = "Write a figure (.png .svg .pdf) or the points (.csv .json)."
@@ -217,11 +232,11 @@ def _plan(case: CommandLine) -> Plan:
 
     stiffness, damping = case["stiffness"], case["damping"]
     if (stiffness is None) != (damping is None):
-        raise BadInput("--stiffness and --damping say where to look together; give both, or none")
+        raise BadInput("--stiffness and --damping give the search range together; give both or neither")
     one_sided = case["wall"] == "one-sided"
     if one_sided and case["disturbance"] is not None:
         raise BadInput(
-            "--disturbance: is of a two-sided wall; the device meets a one-sided one with --push and --speed"
+            "--disturbance: applies to a two-sided wall; against a one-sided wall use --push and --speed"
         )
     given = {name: case[name] for name in PLAN_OPTIONS if case[name] is not None}
     box = None if stiffness is None else SearchWindow(stiffness, damping)
@@ -245,5 +260,5 @@ def _report_kept_work(file: Path | None) -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         if file is not None and file.exists():
-            say(f"zwidth: {file} keeps what is done; the same command goes on from there")
+            say(f"zwidth: {file} keeps the finished work; the same command continues from it")
         raise

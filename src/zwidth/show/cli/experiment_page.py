@@ -60,8 +60,8 @@ def warning(experiment: Experiment) -> str | None:
     return (
         f"an edge lies beyond a tip: at {amount(stiffness, 'N/m')} walls from {amount(low, 'Ns/m')} to "
         f"{amount(high, 'Ns/m')} were stable, although the tip at {amount(tip.damping, 'Ns/m')} is "
-        f"{amount(tip.stiffness, 'N/m')}{others}; verdicts there hang on chance: repeat with --trials 8, or stay "
-        "below with --stiffness and --damping"
+        f"{amount(tip.stiffness, 'N/m')}{others}; verdicts there depend on chance: repeat with --trials 8, or "
+        "stay below with --stiffness and --damping"
     )
 
 
@@ -76,7 +76,7 @@ def sentences(experiment: Experiment) -> Iterator[tuple[str, str]]:
     if experiment.not_found:
         yield (
             "not found",
-            f"{experiment.not_found} of the points sought: no unstable wall, or no stable one, was met there",
+            f"{experiment.not_found} of the points: no unstable wall, or no stable one, was found there",
         )
     doubtful = [p.edge == "tip" for p in experiment.points if p.unsure]
     if doubtful:
@@ -95,7 +95,7 @@ def _doubt(tips: list[bool], *, single: bool) -> str:
     text = (
         f"at {which} the verdict changes more than once along the line; the change nearest to its start is given"
     )
-    return text + "; a single trial does not say how far it scatters, --trials 8 does" * single
+    return text + "; a single trial does not show the scatter; use --trials 8" * single
 
 
 def explanation(experiment: Experiment) -> list[str]:
@@ -111,7 +111,7 @@ def _difference(experiment: Experiment) -> str:
         return "no measured edge has an exact one beside it"
     worst = max(compared, key=experiment.deviation)
     if experiment.deviation(worst) <= AGREES:
-        return f"measured and exact linear edges agree: {_gaps(compared)} apart"
+        return f"measured and exact linear edges agree within {_gaps(compared)}"
     tip = worst.edge == "tip"
     larger = (worst.bisected_value > worst.exact) == (worst.edge != "lower")
     at = amount(worst.damping, "Ns/m") if tip else amount(worst.stiffness, "N/m")
@@ -130,7 +130,7 @@ def _gaps(points: list[MeasuredPoint]) -> str:
     tips = [abs(p.stiffness - p.exact) for p in points if p.edge == "tip"]
     told = [amount(max(edges), "Ns/m")] if edges else []
     told += [f"{amount(max(tips), 'N/m')}{' at the tips' if edges else ''}"] if tips else []
-    return "at most " + " and ".join(told)
+    return " and ".join(told)
 
 
 def _cause(cause: Cause, width: float) -> str:
@@ -152,7 +152,7 @@ def _cause(cause: Cause, width: float) -> str:
 def own_point_sentences(comparison: PointsComparison) -> Iterator[str]:
     """A sentence for each kind of point that is there."""
     if all(one.exact_verdict is None for one in comparison.points):
-        yield f"{len(comparison.points)} points; there is no exact chart to hold them against"
+        yield f"{len(comparison.points)} points; there is no exact chart to compare them with"
         return
     yield from _edges(comparison.edges)
     for verdict in ("stable", "unstable"):

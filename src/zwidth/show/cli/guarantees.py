@@ -24,22 +24,32 @@ NOTHING: Final = "no wall has K > 0 and B >= 0 and any of the guarantees"
 
 
 class GuaranteesCommand(Command):
-    """Find which walls of DEVICE are stable with every passive operator, with every spring, and at all.
+    """Find the walls of DEVICE that are stable with every passive operator, and with every spring at the handle.
 
-    The operator of the device file is left out: he is one of those that the guarantees allow.
+    The operator of the device file is left out: the guarantees hold with every passive one.
     """
 
     name = "guarantees"
-    summary = "Find what the walls of DEVICE are guaranteed against."
+    summary = "Find the walls that are stable with every passive operator."
     examples = (
         "zwidth guarantees my-device.toml --output guarantees.svg",
         "zwidth guarantees my-device.toml --coupling --stiffness 5000 --json",
     )
     options = (
-        click.option("--coupling", is_flag=True, help="Also the virtual couplings after Llewellyn and Raisbeck."),
-        click.option("--stiffness", metavar="K", type=Finite(), help="With --coupling: a wall's stiffness [N/m]."),
         click.option(
-            "--damping", metavar="B", type=Finite(), help="With --coupling: its damping [Ns/m]; 0 if left out."
+            "--coupling",
+            is_flag=True,
+            help="Also find the virtual couplings that keep the device stable with every passive wall and "
+            "operator (Llewellyn), or make it passive (Raisbeck).",
+        ),
+        click.option(
+            "--stiffness", metavar="K", type=Finite(), help="With --coupling: stiffness of the wall [N/m]."
+        ),
+        click.option(
+            "--damping",
+            metavar="B",
+            type=Finite(),
+            help="With --coupling: damping of the wall [Ns/m]. Default: 0.",
         ),
     )
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: the outlines, .json)."
@@ -105,5 +115,5 @@ def _limit(limit: Coupling) -> str:
         return "the wall needs no coupling: it is stable with every passive operator"
     return (
         f"the wall needs a coupling no stiffer than {amount(limit.stiffness, 'N/m')}, damped by "
-        f"{amount(limit.damping, 'Ns/m')}; then one feels {amount(limit.felt_stiffness, 'N/m')}"
+        f"{amount(limit.damping, 'Ns/m')}; the hand then feels {amount(limit.felt_stiffness, 'N/m')}"
     )

@@ -27,7 +27,7 @@ def heading(question: Question, device: Device, *, linear: bool = True) -> str:
     if device.mechanism:
         where = f"along {vector(facts['direction'])} at {vector(facts['position_m'], 'm')}"
         if (facts["projected_m"] or 0.0) > ROUNDING:
-            where += f" ({amount(facts['projected_m'], 'm')} from the position asked for)"
+            where += f" ({amount(facts['projected_m'], 'm')} from the requested position)"
         place = f"{where}, assembly {facts['assembly']}, {place}"
     held = f", held by {operator_text(facts['operator'])}" if facts["operator"] else ""
     lines = [f"{printable(device.name)}: {place}{held}", computer_text(device.controller)]

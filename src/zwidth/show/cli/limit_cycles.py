@@ -27,18 +27,18 @@ if TYPE_CHECKING:
 FRICTION_KEYS: Final = ("friction.coulomb_N", "mechanism.drives.*.coulomb_Nm")  # of a [plant], of a [mechanism]
 ENCODER_KEYS: Final = ("loop.encoder.resolution_m", "mechanism.drives.*.encoder_counts_per_rev")
 NOTHING_NONLINEAR: Final = (
-    "nothing in this device depends on the amplitude, so that no vibration keeps its size; give it dry "
+    "nothing in this device depends on the amplitude, so it has no limit cycle; give it dry "
     "friction ({}), encoder steps ({}) or a largest force (loop.saturation.force_N), in the file or by --set"
 )
 PLANE_STIFFNESSES: Final = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the wall's stiffness, drawn in the plane
 
 
 class LimitCyclesCommand(Command):
-    """Find the vibrations that dry friction, encoder steps and the force limit keep up on a two-sided wall of
-    DEVICE, and hold them against a simulation."""
+    """Find the limit cycles that dry friction, encoder steps and the force limit sustain on a two-sided wall of
+    DEVICE, and compare them with a simulation."""
 
     name = "limit-cycles"
-    summary = "Find the vibrations that keep themselves up on a wall of DEVICE."
+    summary = "Find the limit cycles (sustained vibrations) on a wall of DEVICE."
     examples = (
         "zwidth limit-cycles my-device.toml --stiffness 4000 --damping 1 --set loop.saturation.force_N=5",
         "zwidth limit-cycles my-device.toml --stiffness 900 --damping 1 --set loop.saturation.force_N=5 --json",
@@ -50,15 +50,15 @@ class LimitCyclesCommand(Command):
             metavar="SHARE",
             type=BoundedNumber("steps", -0.5, 0.5),
             default=0.0,
-            help="Where the vibration's middle lies, as a share of an encoder's step: 0.5 between two counts, as "
-            "far as a constant push can do. Default: 0.",
+            help="Middle of the vibration, as a share of an encoder step: 0.5 is halfway between two counts, the "
+            "most that a constant push can do. Default: 0.",
         ),
-        click.option("--no-simulation", is_flag=True, help="Predict only; simulate nothing."),
+        click.option("--no-simulation", is_flag=True, help="Predict only, without simulation."),
         click.option(
             "--plane",
             metavar="FILE",
             callback=refuse_empty,
-            help="Draw the friction-quantisation plane with the device in it (.png .svg .pdf).",
+            help="Draw the device in the friction-quantisation plane (.png .svg .pdf).",
         ),
     )
     output_help = "Write a figure (.png .svg .pdf: growth over amplitude) or the data (.csv: the cycles, .json)."
@@ -78,7 +78,7 @@ class LimitCyclesCommand(Command):
 
     def check(self, case: CommandLine) -> None:
         if case["plane"] is not None and destination(case["plane"], FIGURES) == case.path:
-            raise BadInput("--plane: names the file of --output; name another")
+            raise BadInput("--plane: is the same file as --output; name another")
 
     def repeated_options(self, case: CommandLine) -> dict[str, Any]:
         return {
@@ -103,7 +103,7 @@ class LimitCyclesCommand(Command):
                 NOTHING_NONLINEAR.format(_device_key(FRICTION_KEYS, case), _device_key(ENCODER_KEYS, case))
             ) from None
         except NoEncoderStepsError:
-            lacking = f"{name} has no encoder steps to lie between"
+            lacking = f"{name} has no encoder steps"
             raise BadInput(f"--offset: {lacking}; give {_device_key(ENCODER_KEYS, case)}") from None
         if case["plane"] is not None:
             if "encoder steps" not in parts:
@@ -122,7 +122,7 @@ class LimitCyclesCommand(Command):
     def pages(self, case: CommandLine, result: LimitCyclePrediction, document: Mapping[str, Any]) -> Iterator[Any]:
         yield two_columns(list(_circumstances(case, result)))
         if result.cycles:
-            headings = ["limit cycle", "frequency", "speed", "force asked for", "what it is", "simulated"]
+            headings = ["limit cycle", "frequency", "speed", "commanded force", "kind", "simulated"]
             yield table(headings, list(_rows(result)))
         else:
             yield "no limit cycle is predicted"
@@ -165,11 +165,11 @@ def _plane(case: CommandLine) -> DevicePlane:
 def _circumstances(case: CommandLine, prediction: LimitCyclePrediction) -> Iterator[tuple[str, str]]:
     wall = f"{amount(prediction.wall_stiffness, 'N/m')}, {amount(prediction.wall_damping, 'Ns/m')}"
     yield "wall", f"{wall}: {prediction.verdict} if linear"
-    yield "not linear", ", ".join(prediction.nonlinear)
+    yield "nonlinear parts", ", ".join(prediction.nonlinear)
     whose = "the handle moves" if case.device.mechanism else "taken to move"
     yield "range", f"{whose} {amount(prediction.largest_motion, 'm')} to either side at most"
     if prediction.offset:
-        yield "middle", f"{as_written(prediction.offset)} of a step beyond a count"
+        yield "middle", f"{as_written(prediction.offset)} of a step from the nearest count"
     if prediction.resting_limit is not None:
         yield "rests under every push", _up_to(prediction.resting_limit)
         yield "no encoder hunting", f"{_up_to(prediction.quiet_limit)}, at this damping"
@@ -197,7 +197,7 @@ def _kind(cycle: LimitCycle) -> str:
     """Describe a limit cycle as a user of the device would see or hear it."""
     if not cycle.within_range:
         return "beyond the range: outside what the model holds for"
-    return "stable: what is seen" if cycle.stable else "unstable: larger ones grow, smaller ones die"
+    return "stable: persists" if cycle.stable else "unstable: larger ones grow, smaller ones die out"
 
 
 def _vibration_text(simulated: SimulatedVibration) -> str:
@@ -211,11 +211,14 @@ def _remarks(prediction: LimitCyclePrediction) -> Iterator[str]:
         small = prediction.small_start_vibration
         yield f"simulated from {amount(small.start, 'm')}: {_vibration_text(small)}"
     if prediction.simulation_disagrees:
-        yield "the simulation vibrates otherwise than predicted; believe it: predictions follow one kind"
+        yield (
+            "the simulation disagrees with the prediction; trust the simulation: several vibrations are possible "
+            "here, and the prediction follows one of them"
+        )
     if prediction.leaves_range:
         yield "vibrations that grow leave this range: what stops them is not modelled"
     yield f"predicted by {prediction.predicted_by}"
     if prediction.left_out:
         yield f"the prediction leaves out {', '.join(prediction.left_out)}"
     if "encoder steps" in prediction.nonlinear and "dry friction" not in prediction.nonlinear:
-        yield "without dry friction a device may rattle between two counts also where nothing is predicted"
+        yield "without dry friction a device may rattle between two counts even where nothing is predicted"

@@ -71,16 +71,16 @@ def _axis_range(name: str) -> Callable[[Callback], Callback]:
         f"--{name}",
         f"{name}_range",
         type=Numbers("LOW,HIGH", (2,), "-0.2,0.2"),
-        help=f"Range along the plane's {'first' if name == 'x' else 'second'} axis [m]. Default: the file's "
-        "workspace, or what is reached.",
+        help=f"Range along the plane's {'first' if name == 'x' else 'second'} axis [m]. Default: the "
+        "workspace of the device file, or the reachable range.",
     )
 
 
 class MapCommand(Command):
     """Map measures of DEVICE over a plane of its workspace.
 
-    Cells out of reach, singular or without a value are told by their status. Requirements are laid over each
-    other, and the area that they have in common is measured.
+    Cells out of reach, singular or without a value are marked by their status. With requirements, the area in
+    which all of them are met is measured.
     """
 
     name = "map"
@@ -91,12 +91,12 @@ class MapCommand(Command):
         "zwidth map my-device.toml --require 'rigid_mass>=0.2' --require 'isotropy<=1.3' --output common.svg",
     )
     options = (
-        click.option("--measure", "measures", metavar="NAME", multiple=True, help="What to map; repeatable."),
+        click.option("--measure", "measures", metavar="NAME", multiple=True, help="Measure to map; repeatable."),
         click.option(
             "--measures-file",
             metavar="FILE.py",
             callback=refuse_empty,
-            help="Measures of your own, to be named by --measure.",
+            help="File with measures of your own, for --measure.",
         ),
         click.option(
             "--plane",
@@ -106,33 +106,41 @@ class MapCommand(Command):
         click.option(
             "--through",
             type=Numbers("X,Y[,Z]", (2, 3), "0,0.25"),
-            help="A point of it [m]. Default: the reference position.",
+            help="A point of the plane [m]. Default: the reference position.",
         ),
         _axis_range("x"),
         _axis_range("y"),
         click.option(
-            "--cells", type=CellsType(), help="Points along both axes. Default: 81 along the longer one."
+            "--cells", type=CellsType(), help="Number of cells along both axes. Default: 81 along the longer one."
         ),
         click.option(
             "--require",
             "requirements",
             metavar="NAME>=VALUE",
             multiple=True,
-            help="Show where it is met, and where all are; repeatable. Or NAME<=VALUE.",
+            help="Show where this requirement is met, and where all are; repeatable. Or NAME<=VALUE.",
         ),
         click.option(
             "--share",
             "shares",
             metavar="NAME>=VALUE",
             multiple=True,
-            help="Map the share of directions that meet it. Or NAME<=VALUE.",
+            help="Map the share of directions that meet this requirement. Or NAME<=VALUE.",
         ),
         click.option(
-            "--stiffness", type=Finite(), metavar="K", help="Of the wall that some measures are about [N/m]."
+            "--stiffness",
+            type=Finite(),
+            metavar="K",
+            help="Stiffness of the wall, for measures of one wall [N/m].",
         ),
-        click.option("--damping", type=Finite(), metavar="B", help="Of that wall [Ns/m]."),
         click.option(
-            "--frequency", type=Finite(), metavar="F", help="At which the hand moves, for some measures [Hz]."
+            "--damping", type=Finite(), metavar="B", help="Damping of the wall, for measures of one wall [Ns/m]."
+        ),
+        click.option(
+            "--frequency",
+            type=Finite(),
+            metavar="F",
+            help="Frequency of the hand's motion, for measures that depend on it [Hz].",
         ),
     )
     outputs = (*FIGURES, *DATA, *ARRAYS)
@@ -182,7 +190,7 @@ class MapCommand(Command):
 
         question, device = case.question, case.device
         if device.mechanism is None:
-            raise BadInput(f"{question.name}: has no [mechanism], and so no workspace to map; ask for its chart")
+            raise BadInput(f"{question.name}: has no [mechanism], and so no workspace to map; use zwidth chart")
         try:
             plane = _plane(case)
             with show_progress() as progress:
@@ -266,7 +274,7 @@ def _measures(case: CommandLine) -> tuple[list[Measure], list[Requirement]]:
         option = "--share"
         shares = [share_measure(parse_requirement(text, user_measures)) for text in case["shares"]]
         if len(shares) > 1:
-            raise ValueError(f"a map has one {NAME}, got {len(shares)}; ask for the others in maps of their own")
+            raise ValueError(f"a map has one {NAME}, got {len(shares)}; map the others separately")
         user_measures |= {one.name: one for one in shares}
         option = "--measure"
         if NAME in names and not shares:
@@ -278,7 +286,7 @@ def _measures(case: CommandLine) -> tuple[list[Measure], list[Requirement]]:
         raise BadInput(f"{option}: {error}") from None
     every = {one.name: one for one in (*found, *shares, *(r.measure for r in required))}
     if not every:
-        raise BadInput("--measure: is missing; name what to map (`zwidth map --help` lists the measures)")
+        raise BadInput("--measure: is missing; name a measure to map (`zwidth map --help` lists the measures)")
     return list(every.values()), required
 
 

@@ -70,7 +70,7 @@ def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Itera
             row, column = np.unravel_index(at, values.shape)
             where = vector((dataset["x_m"].values[column], dataset["y_m"].values[row]), "m")
             yield label, f"{_amount(values[row, column], unit)} at {where}"
-        yield "uniformity", f"{amount(overall['uniformity'])} (least over largest)"
+        yield "uniformity", f"{amount(overall['uniformity'])} (smallest over largest)"
         for key, title in (("conditioning_index", "conditioning index"), ("isotropy_index", "isotropy index")):
             if key in overall:
                 yield title, amount(overall[key])
@@ -89,4 +89,4 @@ def _area_rows(area: CommonArea) -> Iterator[tuple[str, str]]:
 
 
 def _area(area: float, share: float) -> str:
-    return f"{area_text(area).replace('²', '^2')}, {typed(percent(share))} of what is reached"
+    return f"{area_text(area).replace('²', '^2')}, {typed(percent(share))} of the reachable area"

@@ -27,11 +27,11 @@ NUMBERS_PER_SAMPLE: Final = (17, 3)  # numbers shown of each sample, and as many
 
 
 class MoveCommand(Command):
-    """Move the whole mechanism of DEVICE, free or against a surface: large motions, with all that bends, rubs and
-    swings. The posture is where it starts; the hand is a push."""
+    """Simulate the whole mechanism of DEVICE, free or against a surface: large motions, flexible drives, friction,
+    gravity. It starts in the given posture; the hand is a force."""
 
     name = "move"
-    summary = "Move the whole mechanism of DEVICE, against a surface or free."
+    summary = "Simulate the whole mechanism of DEVICE, free or against a surface."
     examples = (
         "zwidth move my-arms.toml --plane 0,0.28,0,-1 --stiffness 2000 --damping 5 --push 0,2",
         "zwidth move my-arms.toml --sphere 0,0.3,0.05 --stiffness 900 --damping 3 --push 2 --output path.svg",

@@ -50,7 +50,7 @@ def _check_wall(options: Mapping[str, Any], surfaces: Sequence[str]) -> None:
     if not surfaces:
         alone = [name for name in WALL_OPTIONS if options[name] not in (None, False, ())]
         if alone:
-            raise usage_error(f"{_option(alone[0])} says what a surface does; add --plane, --sphere or --box")
+            raise usage_error(f"{_option(alone[0])} needs a surface; add --plane, --sphere or --box")
         return
     missing = [f"--{name}" for name in ("stiffness", "damping") if options[name] is None]
     if environment is None and missing:
@@ -63,11 +63,11 @@ def _check_wall(options: Mapping[str, Any], surfaces: Sequence[str]) -> None:
             "acts, as `--environment wall` does on both"
         )
     if two_sided and plane is None:
-        raise usage_error("--two-sided goes with --plane; a sphere and a box have one side, or --hollow the other")
+        raise usage_error("--two-sided goes with --plane; the side of a sphere or a box is chosen by --hollow")
     if options["hollow"] and plane is not None:
-        raise usage_error("--hollow goes with --sphere or --box; turn a plane round by its normal")
+        raise usage_error("--hollow goes with --sphere or --box; reverse a plane by its normal")
     if two_sided and options["no_pull"]:
-        raise usage_error("a two-sided plane pulls by its nature; leave --no-pull or --two-sided out")
+        raise usage_error("a two-sided plane always pulls; leave out --no-pull or --two-sided")
 
 
 def _check_sizes(options: Mapping[str, Any]) -> None:
@@ -81,14 +81,14 @@ def _check_sizes(options: Mapping[str, Any]) -> None:
 def _check_question(options: Mapping[str, Any], question: Question) -> None:
     if question.model not in (None, "full"):
         raise usage_error(
-            f"the whole mechanism moves, so that --model {question.model} does not apply; leave it out"
+            f"the whole mechanism moves, so that --model {question.model} does not apply; leave out --model"
         )
     if question.operator not in (None, "none"):
-        raise usage_error("no arm holds a mechanism that moves; leave --operator out and give a --push")
+        raise usage_error("no operator holds the mechanism here; leave out --operator and give a --push")
     along = [options["push"], options["start_velocity"]]
     if question.direction is not None and not any(value is not None and len(value) == 1 for value in along):
         one = "a --push or --start-velocity given as one number"
-        raise usage_error(f"--direction is that of {one}; give one, or leave it out")
+        raise usage_error(f"--direction is used only with {one}; give one, or leave out --direction")
 
 
 def surface_option(options: Mapping[str, Any]) -> str:
@@ -163,9 +163,12 @@ def _surface_options() -> list[Callable[..., Any]]:
         click.option("--two-sided", is_flag=True, help="The plane holds the handle from both sides."),
         click.option("--hollow", is_flag=True, help="The sphere or box keeps the handle in, not out."),
         click.option(
-            "--stiffness", metavar="K", type=BoundedNumber("N/m", 0.0, LARGEST_WALL), help="Of the wall [N/m]."
+            "--stiffness",
+            metavar="K",
+            type=BoundedNumber("N/m", 0.0, LARGEST_WALL),
+            help="Stiffness of the wall [N/m].",
         ),
-        click.option("--damping", metavar="B", type=Finite(), help="Of the wall [Ns/m]."),
+        click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall [Ns/m]."),
         *environment_options(),
         click.option("--no-pull", is_flag=True, help="The wall never pulls the handle in."),
     ]
@@ -176,12 +179,12 @@ def _force_options() -> list[Callable[..., Any]]:
         click.option(
             "--push",
             type=Numbers("F|FX,FY[,FZ]", (1, 2, 3), "2 or 0,2"),
-            help="The hand's force [N]; one number is along the direction. Default: none.",
+            help="Force of the hand [N]; one number acts along the direction. Default: none.",
         ),
         click.option(
             "--start-velocity",
             type=Numbers("V|VX,VY[,VZ]", (1, 2, 3), "0.1 or 0,0.1"),
-            help="Of the handle [m/s]; one number is along the direction. Default: at rest.",
+            help="Velocity of the handle at the start [m/s]; one number is along the direction. Default: at rest.",
         ),
         click.option(
             "--gravity", type=Numbers("GX,GY[,GZ]", (2, 3), "0,-9.81"), help="Gravity [m/s²]. Default: none."
@@ -190,8 +193,8 @@ def _force_options() -> list[Callable[..., Any]]:
             "--torque-limits",
             type=click.Choice(("each", "together")),
             default="each",
-            help="Is every motor cut at its own limit, or are all scaled alike, so that the force keeps its "
-            "direction? Default: each.",
+            help="Limit each motor by itself, or scale all together, so that the force keeps its direction. "
+            "Default: each.",
         ),
     ]
 
@@ -203,18 +206,21 @@ def _run_options() -> list[Callable[..., Any]]:
             metavar="S",
             type=BoundedNumber("s", 0.0, LONGEST, above=True),
             default=1.0,
-            help="How long [s]. Default: 1.",
+            help="Simulated time [s]. Default: 1.",
         ),
         click.option(
-            "--substeps", type=click.IntRange(1, 100_000), default=4, help="Steps between samples. Default: 4."
+            "--substeps",
+            type=click.IntRange(1, 100_000),
+            default=4,
+            help="Integration steps per sample. Default: 4.",
         ),
         click.option(
             "--seed",
             type=click.IntRange(0, LARGEST_SEED),
             default=0,
-            help="Another noise of the encoders. Default: 0.",
+            help="Seed of the encoders' noise. Default: 0.",
         ),
-        click.option("--exact", is_flag=True, help="Read the encoders as finely as you like, without noise."),
+        click.option("--exact", is_flag=True, help="Ideal encoders: no steps, no noise."),
     ]
 
 

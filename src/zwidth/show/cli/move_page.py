@@ -37,7 +37,7 @@ def move_page(case: CommandLine, motion: MechanismMotion, document: Mapping[str,
 def _status(document: Mapping[str, Any]) -> str:
     if document["ended_because"] is None:
         return f"moved for {amount(document['duration_s'], 's')}"
-    return f"ended before its time: {document['ended_because']}"
+    return f"ended early: {document['ended_because']}"
 
 
 def _circumstances(case: CommandLine, motion: MechanismMotion) -> Iterator[Row]:
@@ -59,7 +59,7 @@ def _surface(motion: MechanismMotion, named: bool) -> str:
 
     surface, environment = motion.surface, motion.environment
     if surface is None or environment is None:
-        return "none: the motors stay without current"
+        return "none: the motors are off"
     if isinstance(surface, Plane):
         sides = "two-sided plane" if motion.two_sided else "plane"
         place = f"{sides} through {vector(surface.point, 'm')}, normal {vector(surface.normal)}"
@@ -90,7 +90,7 @@ def _results(motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[R
     size = float(np.max(np.abs(motion.position)))
     yield "handle at the end", vector(_without_rounding(motion.position[-1], size), "m")
     path = float(np.sum(np.linalg.norm(np.diff(motion.position, axis=0), axis=1)))
-    yield "its path", amount(path if path > ROUNDING_SHARE * size else 0.0, "m")
+    yield "path length", amount(path if path > ROUNDING_SHARE * size else 0.0, "m")
 
 
 def _without_rounding(position: Any, size: float) -> Any:
@@ -142,15 +142,18 @@ def _remarks(case: CommandLine, motion: MechanismMotion, document: Mapping[str, 
         yield f"starts {amount(float(motion.depth[0]), 'm')} {side}"
     effects = [name for name in case.device.linear_omissions if motion.counted or name not in ENCODER_EFFECTS]
     if effects:
-        yield f"with what a chart leaves out: {', '.join(effects)}"
+        yield f"includes what a chart leaves out: {', '.join(effects)}"
     if "dry friction" in effects and motion.substeps < FINE:
-        yield f"friction switches within a step: take --substeps {FINE} or more"
+        yield f"friction switches within a step: use --substeps {FINE} or more"
     if document["left_out"]:
-        yield f"leaves out {', '.join(document['left_out'])}: the hand is the push alone"
+        yield f"leaves out {', '.join(document['left_out'])}: the hand is only the push"
     if ineffective := _ineffective_push(motion):
-        yield f"{amount(ineffective, 'N')} of the push are across all ways the handle can go, and move nothing"
+        yield (
+            f"{amount(ineffective, 'N')} of the push act at right angles to every motion of the handle, and have "
+            "no effect"
+        )
     if not (motion.push.any() or motion.start_velocity.any() or motion.gravity.any()) and still:
-        yield "nothing moves it: give --push, --start-velocity or --gravity"
+        yield "nothing moves the handle: give --push, --start-velocity or --gravity"
     elif motion.surface is not None and not document["contact_share"]:
         yield "the handle never touches the surface"
 

@@ -21,10 +21,10 @@ ENDING: Final = ".toml"
 
 
 class NewCommand(Command):
-    """Write a device file NAME.toml to start from: exchange its numbers for yours.
+    """Write a device file NAME.toml to start from: replace its numbers with yours.
 
-    It is complete and answers at once. Every number has a comment that says what it is and where one gets it; what
-    may be left out is there as a comment. A file that is there already is never replaced.
+    It is complete and works at once. Every number has a comment that says what it is and where to find it;
+    optional entries stand there as comments. An existing file is never overwritten.
     """
 
     name = "new"
@@ -45,10 +45,10 @@ class NewCommand(Command):
 
     def about(self, command: Callback) -> Callback:
         @wraps(command)
-        def told(device: str, **more: Any) -> int:
+        def with_name(device: str, **more: Any) -> int:
             return command(Question(device), **more)
 
-        return click.argument("device", metavar="NAME", callback=refuse_empty)(told)
+        return click.argument("device", metavar="NAME", callback=refuse_empty)(with_name)
 
     def default_output(self, question: Question) -> str:
         return question.name if question.name.lower().endswith(ENDING) else question.name + ENDING
@@ -56,7 +56,7 @@ class NewCommand(Command):
     def check(self, case: CommandLine) -> None:
         assert case.path is not None
         if case.path.exists():
-            raise BadInput(f"{case.path}: is there already; remove it, or name another with --output")
+            raise BadInput(f"{case.path}: exists already; remove it, or name another file with --output")
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         return {"name": _name(case.question), "kind": case["kind"]}
@@ -77,7 +77,7 @@ class NewCommand(Command):
 
     def pages(self, case: CommandLine, result: str, document: Mapping[str, Any]) -> Iterator[Any]:
         file = printable(shlex.quote(document["file"]))
-        yield f"{document['kind']}: exchange its numbers for yours; it answers already:\n  zwidth chart {file}"
+        yield f"{document['kind']}: replace its numbers with yours; it works already:\n  zwidth chart {file}"
 
     def write(self, case: CommandLine, result: str, document: dict[str, Any], reason: str | None) -> str | None:
         assert case.path is not None

@@ -209,7 +209,7 @@ def about_a_device(command: Callback) -> Callback:
         click.option(
             "--direction",
             type=Numbers("DX,DY[,DZ]", (2, 3), "0,1"),
-            help="Rendered direction, of any length.",
+            help="Rendered direction, a vector of any length.",
         ),
     )
 
@@ -229,7 +229,8 @@ def about_a_workspace(command: Callback) -> Callback:
         click.option(
             "--direction",
             type=DirectionType(f"DX,DY[,DZ]|{choice}", (2, 3), f"0,1, or one of {', '.join(EXTREMES)}"),
-            help="Rendered direction, of any length; worst: in each cell the one in which the measure is worst.",
+            help="Rendered direction, a vector of any length; worst: in each cell the direction in which the "
+            "measure is worst.",
         ),
     )
 

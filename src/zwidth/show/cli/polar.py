@@ -32,8 +32,8 @@ class PolarCommand(Command):
         click.option(
             "--plane",
             type=click.Choice(PLANES),
-            help="Plane of the directions. Default: xy, or where the handle cannot move all over it, one where it "
-            "can.",
+            help="Plane of the directions. Default: xy, or, where the handle cannot move in all of it, "
+            "a plane in which it can.",
         ),
         click.option(
             "--count",
@@ -71,7 +71,7 @@ class PolarCommand(Command):
     def compute(self, case: CommandLine) -> ByDirection:
         question = case.question
         if case.device.mechanism is None:
-            raise BadInput(f"{question.name}: has no [mechanism], and so one direction only; ask for its chart")
+            raise BadInput(f"{question.name}: has no [mechanism], and so one direction only; use zwidth chart")
         question.refuse_unsupported(case.device)
         return case.point.by_direction(case["plane"], case["count"])
 
@@ -93,7 +93,7 @@ def _rows(by_direction: ByDirection) -> Iterator[tuple[str, str]]:
 
     plane, count = by_direction.plane, len(by_direction.stiffness)
     have = np.isfinite(by_direction.stiffness)
-    yield "directions", f"{count} of the {plane} plane"
+    yield "directions", f"{count} in the {plane} plane"
     if have.any():
         angles = by_direction.angles
         for name, k in (

@@ -23,13 +23,16 @@ def resume_options(command: Callback) -> Callback:
     """Give a command `--resume` and `--workers`."""
     options: list[Callable[[Any], Any]] = [
         click.option(
-            "--resume", metavar="FOLDER", callback=refuse_empty, help="Keep what is done here, and go on from it."
+            "--resume",
+            metavar="FOLDER",
+            callback=refuse_empty,
+            help="Save finished work here; the same command continues from it.",
         ),
         click.option(
             "--workers",
             type=click.IntRange(min=1),
             metavar="N",
-            help="Processes at most that compute a long run. Default: one for each core.",
+            help="Largest number of processes for a long run. Default: one for each core.",
         ),
     ]
     for option in reversed(options):
@@ -72,7 +75,7 @@ def report_kept_work(store: Store | None) -> Iterator[None]:
     goes_on = (
         ""
         if store is None
-        else f"{printable(str(store.path))} keeps what is done; the same command goes on from there"
+        else f"{printable(str(store.path))} keeps the finished work; the same command continues from it"
     )
     try:
         yield

@@ -33,7 +33,7 @@ class RobustCommand(Command):
     ranges."""
 
     name = "robust"
-    summary = "Find the walls that DEVICE renders stably whoever holds it."
+    summary = "Find the walls that are stable for every operator and number in a range."
     examples = (
         "zwidth robust my-device.toml --range operator.arm_mass_kg=0.3,2 --range loop.delay_samples=0,1",
         "zwidth robust my-device.toml --operators none,thesis-arm,my-hand.toml --output robust.svg",
@@ -51,26 +51,34 @@ class RobustCommand(Command):
             "--operators",
             metavar="A,B,C",
             callback=refuse_empty,
-            help="Who may hold the handle: names, files, none.",
+            help="Operators that may hold the handle: names, files, none.",
         ),
         click.option(
             "--operator-list",
             metavar="FILE",
             callback=refuse_empty,
-            help="The same, one a line; # begins a comment.",
+            help="File of operators that may hold the handle, one per line; # begins a comment.",
         ),
         click.option(
-            "--members", type=click.IntRange(2, MOST), default=256, metavar="N", help="Charts (default 256)."
+            "--members",
+            type=click.IntRange(2, MOST),
+            default=256,
+            metavar="N",
+            help="Number of charts (default 256).",
         ),
         click.option(
             "--unseen",
             type=click.IntRange(1, MOST),
             default=10_000,
             metavar="N",
-            help="Random members that the answer is tried on afterwards (default 10000).",
+            help="Number of random members that check the answer afterwards (default 10000).",
         ),
         click.option(
-            "--seed", type=click.IntRange(min=0), default=1, metavar="N", help="Of what is random (default 1)."
+            "--seed",
+            type=click.IntRange(min=0),
+            default=1,
+            metavar="N",
+            help="Seed of the random numbers (default 1).",
         ),
     )
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: the edge, .json)."
@@ -148,7 +156,7 @@ class RobustCommand(Command):
             [str(index), *(printable(value_text(result.members[index][p])) for p in paths), typed(percent(share))]
             for index, share in list(shares.items())[:BINDING_ROWS]
         ]
-        yield table(["binds", *paths, "of the edge"], rows)
+        yield table(["limiting member", *paths, "share of the edge"], rows)
         if len(shares) > BINDING_ROWS:
             yield f"... and {len(shares) - BINDING_ROWS} more; --json lists all"
 
@@ -184,7 +192,7 @@ def _operators(single: str | None, names: str | None, file: str | None) -> tuple
     if names is not None and file is not None:
         raise BadInput("--operators and --operator-list exclude each other; give one of them")
     if single is not None:
-        raise BadInput("--operator and a list of operators exclude each other; leave --operator out")
+        raise BadInput("--operator and a list of operators exclude each other; leave out --operator")
     if file is not None:
         try:
             lines = read_text(file, LARGEST_FILE).splitlines()
@@ -202,17 +210,18 @@ def _operators(single: str | None, names: str | None, file: str | None) -> tuple
 def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
     chart = study.chart
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
-    members = " and ".join(map(str, chart.members_at_stiffness_max))
+    members = " and ".join(_member(study, member) for member in chart.members_at_stiffness_max)
     yield (
         "largest stiffness",
         f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "
-        f"at this limit member {members} oscillates at {frequencies}",
+        f"at this limit {members} oscillates at {frequencies}",
     )
+    stiffest, widest = _member(study, chart.best_by_stiffness), _member(study, chart.best_by_area)
     yield (
-        "lost against the best",
+        "loss against the best",
         (
-            f"{typed(percent(chart.lost_stiffness_share))} of its stiffness (member {chart.best_by_stiffness}), "
-            f"{typed(percent(chart.lost_share))} of its area (member {chart.best_by_area})"
+            f"{typed(percent(chart.lost_stiffness_share))} of its stiffness ({stiffest}), "
+            f"{typed(percent(chart.lost_share))} of its area ({widest})"
         ),
     )
     yield "largest damping", amount(chart.damping_max, "Ns/m")
@@ -233,25 +242,36 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
         yield "not affected by a wall", ", ".join(group_names(chart.unobserved_modes))
 
 
+def _member(study: RobustStudy, member: int) -> str:
+    """A member by its operator, where members differ in nothing else; otherwise by its number."""
+    from zwidth.device.operator_choice import NOBODY
+
+    values = study.members[member]
+    if list(values) != ["operator"]:
+        return f"member {member}"
+    operator = values["operator"]
+    return "the ungripped device" if operator == NOBODY else f"the device held by {printable(str(operator))}"
+
+
 def _members_text(study: RobustStudy) -> str:
     count, edge_change = len(study.members), f"{typed(uncertain(100 * study.area_change))} %"
     if study.violation is None:
-        return f"{count}, all of the list"
+        return f"{count}, the whole list"
     if study.settled:
-        end = f"the search settled, its last round moved the edge by {edge_change} of the area"
+        end = f"the search converged: its last round moved the edge by {edge_change} of the area"
     else:
         end = f"the search used up --members {count} and had still moved the edge by {edge_change}"
-    return f"{count}, of which {count - study.sampled} found by searching the ranges for worse ones; {end}"
+    return f"{count}, of which {count - study.sampled} found by searching the ranges for worse cases; {end}"
 
 
 def _violation(violation: Violation) -> str:
     if not violation.violating:
-        return f"of {violation.unseen} at random none finds one of these walls unstable"
+        return f"none of {violation.unseen} random ones makes one of these walls unstable"
     less = typed(uncertain(100 * violation.worst_stiffness_share))
-    softer = f"{less} % less of the largest stiffness would do for all"
+    softer = f"with {less} % less of the largest stiffness all are stable"
     if violation.worst_stiffness_share == 0.0:
         softer = "all of these have K <= 0 or B < 0"
     return (
-        f"of {violation.unseen} at random {violation.violating} find a wall unstable, with spectral radii up to "
+        f"{violation.violating} of {violation.unseen} random ones make a wall unstable, with spectral radii up to "
         f"{radius(violation.worst_spectral_radius)}; {softer}"
     )

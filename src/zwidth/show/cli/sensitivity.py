@@ -20,17 +20,21 @@ NO_WALL: Final = "no stable wall has K > 0 and B >= 0, so that there is no large
 
 
 class SensitivityCommand(Command):
-    """Find what of DEVICE to change first: how the largest stiffness answers to each of its numbers."""
+    """Find which numbers of DEVICE to change first: the change of the largest stiffness with each of them."""
 
     name = "sensitivity"
-    summary = "Find what of DEVICE to change first."
+    summary = "Find which numbers of DEVICE to change first."
     examples = (
         "zwidth sensitivity my-device.toml --top 5",
         "zwidth sensitivity my-device.toml --set loop.delay_samples=1 --output bars.svg",
     )
     options = (
         click.option(
-            "--top", metavar="N", type=click.IntRange(min=1), default=12, help="Rows for people (default 12)."
+            "--top",
+            metavar="N",
+            type=click.IntRange(min=1),
+            default=12,
+            help="Rows of the printed table (default 12).",
         ),
     )
     keys = (

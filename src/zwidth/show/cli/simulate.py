@@ -54,10 +54,10 @@ class PitchFactor(ParamType):
 
 
 class SimulateCommand(Command):
-    """Simulate what happens when DEVICE touches a wall: does the motion die away, grow, go round, or leave?"""
+    """Simulate a contact of DEVICE with a wall: the motion dies away, grows, repeats itself or leaves the wall."""
 
     name = "simulate"
-    summary = "Simulate what happens when DEVICE touches a wall."
+    summary = "Simulate a contact of DEVICE with a wall."
     examples = (
         "zwidth simulate my-device.toml --stiffness 4000 --damping 10 --output motion.svg",
         "zwidth simulate my-device.toml --stiffness 4000 --damping 10 --wall one-sided --output heard.wav",
@@ -70,20 +70,20 @@ class SimulateCommand(Command):
             "--duration",
             metavar="S",
             type=BoundedNumber("s", 0.0, LONGEST, above=True),
-            help="How long [s]. Default: a tenfold change at the predicted rate, and at least eight periods, "
-            "at most 60 s.",
+            help="Simulated time [s]. Default: a tenfold change at the predicted rate, and at least eight "
+            "periods, at most 60 s.",
         ),
         click.option(
             "--substeps",
             type=click.IntRange(1, 100_000),
             default=20,
-            help="Steps between samples, for what is not linear. Default: 20.",
+            help="Integration steps per sample, where the device or the environment is not linear. Default: 20.",
         ),
         click.option(
             "--seed",
             type=click.IntRange(0, LARGEST_SEED),
             default=0,
-            help="Another noise of the encoders. Default: 0.",
+            help="Seed of the encoders' noise. Default: 0.",
         ),
         click.option(
             "--passivity",
@@ -97,7 +97,7 @@ class SimulateCommand(Command):
             metavar="V",
             type=BoundedNumber("m/s", 1e-9, 1e9),
             help="Velocity of the handle at full scale of a .wav [m/s], the same for files to be compared; "
-            "faster is clipped. Default: each file as loud as it goes.",
+            "faster is clipped. Default: each file at its own full scale.",
         ),
         click.option(
             "--sound-pitch",

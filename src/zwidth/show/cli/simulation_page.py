@@ -23,7 +23,7 @@ BEHAVIOUR_VERDICTS: Final = {
     "limit cycle": "not stable: a limit cycle, which neither grows nor dies away",
     "bouncing": "not stable: it bounces in and out without an end",
     "lost contact": "not stable: contact is lost, and does not come back",
-    "forced": "undecided: it goes with the hand's tremor; leave --tremor out to see what the wall does by itself",
+    "forced": "undecided: it follows the hand's tremor; leave out --tremor to see what the wall does by itself",
     "undecided": "undecided: this run does not tell; try a longer --duration",
 }
 NEAR_NYQUIST: Final = 0.9
@@ -42,13 +42,13 @@ def simulation_page(simulation: ContactSimulation, sound: Mapping[str, Any] | No
 
 def _verdict(simulation: ContactSimulation) -> str:
     if simulation.behaviour == "undecided" and simulation.range_exit is not None:
-        return "undecided: the motion leaves the range of the handle before the run tells"
+        return "undecided: the motion leaves the range of the handle before the run decides"
     return BEHAVIOUR_VERDICTS[simulation.behaviour]
 
 
 def _circumstances(simulation: ContactSimulation) -> Iterator[Row]:
     place = f", at {amount(simulation.wall_position, 'm')}" if simulation.wall_position else ""
-    yield "touched", f"{environment_words(simulation.environment, simulation.parameters)}{place}"
+    yield "environment", f"{environment_words(simulation.environment, simulation.parameters)}{place}"
     yield "start", _start(simulation)
     yield "hand", _hand(simulation.hand)
     why = f" ({simulation.length.reason})"
@@ -100,7 +100,7 @@ def _results(simulation: ContactSimulation) -> Iterator[Row]:
     yield "amplitude at the end", amount(simulation.amplitude, "m")
     if isfinite(simulation.dominant_frequency):
         yield "dominant frequency", amount(simulation.dominant_frequency, "Hz")
-    none = "too fast to tell" if simulation.given_up else "no motion is left"
+    none = "too fast to determine" if simulation.given_up else "no motion is left"
     growth = f"{typed(signed(simulation.growth))} per sample" if isfinite(simulation.growth) else none
     if simulation.predicted_growth is not None:
         left = simulation.loop.plant.nonlinear.kinds
@@ -127,26 +127,26 @@ def _remarks(simulation: ContactSimulation) -> Iterator[str]:
         largest = amount(float(np.max(np.abs(simulation.force))), "N")
         yield f"dry friction holds it: the wall's force, {largest}, and the hand's do not overcome it"
     elif not np.ptp(simulation.handle) > 0.0:
-        yield "nothing moves it: give --push, --start-velocity or --start-position"
+        yield "nothing moves the handle: give --push, --start-velocity or --start-position"
     if simulation.given_up:
         yield "stopped early: the device was farther from the wall than any device moves"
     if (beyond := simulation.range_exit) is not None:
         back, forth = amount(beyond.backward, "m"), amount(beyond.forward, "m")
         yield (
-            f"from {amount(beyond.time, 's')} on the run says nothing of this device: along this direction "
+            f"from {amount(beyond.time, 's')} on the run is not valid for this device: along this direction "
             f"its handle gets from {back} to {forth}, and the model knows no end of the way; `zwidth move` does"
         )
     if simulation.response.quantum > 2.0 * simulation.amplitude > 0.0:
         yield f"the motion is smaller than the encoder's step of {amount(simulation.response.quantum, 'm')}"
     if simulation.dominant_frequency > NEAR_NYQUIST * 0.5 / simulation.loop.period:
-        yield "the vibration is as fast as sampling lets it be: it alternates from sample to sample"
+        yield "the vibration is close to half the sampling rate: it alternates from sample to sample"
     if simulation.environment.surface and abs(simulation.hand.push) > simulation.force_limit:
-        yield "the hand pushes harder than the largest force there is"
+        yield "the hand pushes harder than the force limit"
     if simulation.loop.plant.handle is None:
-        yield "no handle is known: it is taken to be where the sensor is"
+        yield "the plant names no handle: it is assumed to be at the sensor"
     if simulation.response.imbalance > 1e-6:
         missing = typed(uncertain(100.0 * simulation.response.imbalance))
-        yield f"the energies miss adding up by {missing} % of the largest"
+        yield f"the energies do not add up: the error is {missing} % of the largest"
 
 
 def _rubs(simulation: ContactSimulation) -> bool:

@@ -55,21 +55,21 @@ def about_a_study(command: Callback) -> Callback:
     """Give a command STUDY.toml, as a `StudyQuestion`."""
 
     @wraps(command)
-    def told(study: str, **more: Any) -> int:
+    def with_study(study: str, **more: Any) -> int:
         return command(StudyQuestion(study), **more)
 
-    return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(told)
+    return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(with_study)
 
 
 class SweepCommand(Command):
-    """Compare many designs of a device: measures over any numbers of its file, as STUDY.toml says.
+    """Compare many designs of a device: measures over any numbers of its file, described in STUDY.toml.
 
-    Designs that are no device, or out of reach, are told by their status. What takes long is spread over
-    processes; with --resume or --output it can be stopped, and the same command goes on.
+    Designs that are no valid device, or out of reach, are marked by their status. Long runs are spread over
+    processes; with --resume or --output a run can be stopped, and the same command continues it.
     """
 
     name = "sweep"
-    summary = "Compare many designs, as STUDY says."
+    summary = "Compare many designs, described by a study file."
     examples = (
         "zwidth sweep my-study.toml",
         "zwidth sweep my-study.toml --output designs.svg",
@@ -128,7 +128,7 @@ class SweepCommand(Command):
         if document["left_out"]:
             yield f"linear: leaves out {', '.join(document['left_out'])}"
         if result.study.document.get("optimise"):
-            yield "[optimise] is left aside: a sweep computes the designs that the axes name"
+            yield "[optimise] is not used: a sweep computes the designs that the axes name"
         if count <= LISTED:
             headings = [*(axis.key for axis in sampling.axes), *map(_heading, columns)]
             designs = [

@@ -218,7 +218,7 @@ def draw_areas(ax: Axes, area: CommonArea) -> list[Any]:
     dotted: dict[str, Any] = {"linestyle": (0, (0.1, 1.6)), "linewidth": 3.2}
     for path in _paths(area.common.shape):
         ax.add_patch(PathPatch(path, facecolor="none", edgecolor=BLACK, zorder=2.6, capstyle="round", **dotted))
-    share = f"{percent(area.common.share)} of what is reached"
+    share = f"{percent(area.common.share)} of the reachable area"
     text = f"Common area: {area_text(area.common.area)}, {share}"
     handles.append(Line2D([], [], color=BLACK, dash_capstyle="round", label=text, **dotted))
     return handles
