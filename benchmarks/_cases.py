@@ -1,9 +1,9 @@
-"""Our own part of a benchmark: named cases, timed without the peers.
+"""The part of a benchmark that times zwidth alone: named cases, without the peers.
 
-A script states them in a function `cases` and ends with `run(main, cases)`. Then
+A script defines them in a function `cases` and ends with `run(main, cases)`. Then
 
-    python benchmarks/chart.py                   compares with the peers, as ever
-    python benchmarks/chart.py --ours            times the own cases only; with --json as an object,
+    python benchmarks/chart.py                   compares zwidth with the peers
+    python benchmarks/chart.py --ours            times these cases only; with --json as an object,
                                                  name -> {"seconds": ..., "answer": ...}
     python benchmarks/chart.py --ours --on-request
                                                  prints the names as a list, then times each case that is named on
@@ -28,11 +28,11 @@ SAMPLE_S = 0.1  # calls are repeated until they have taken so long together
 
 @dataclass(frozen=True)
 class TimedCase:
-    """Something of ours that is timed.
+    """A computation of zwidth that is timed.
 
-    work   what is timed; returns a number that another commit, asked the same, returns as well
-    fresh  makes what `work` is handed, before each call and not timed; None: `work` is handed nothing
-    warm   called once before, so that what is timed need not load kernels; None: the work itself
+    work   the function that is timed; returns a number, by which the results of two commits are compared
+    fresh  makes the argument of `work` before each call, untimed; None: `work` takes no argument
+    warm   called once before, so that kernels are loaded outside the timed calls; None: the work itself
     """
 
     work: Callable[..., float]
@@ -41,9 +41,9 @@ class TimedCase:
 
     def call(self) -> tuple[float, float]:
         """Seconds of one call, and its answer."""
-        handed = [] if self.fresh is None else [self.fresh()]
+        arguments = [] if self.fresh is None else [self.fresh()]
         start = perf_counter()
-        answer = self.work(*handed)
+        answer = self.work(*arguments)
         return perf_counter() - start, float(answer)
 
 
@@ -63,18 +63,23 @@ def time_case(case: TimedCase) -> dict[str, float]:
 
 
 def run(main: Callable[[], int | None], own: Callable[[], Cases], words: list[str] | None = None) -> int | None:
-    """What a script does when it is run; returns its exit code."""
+    """Main function of a benchmark script; returns its exit code.
+
+    main   compares with the peers
+    own    makes the cases of zwidth alone
+    words  arguments of the command line; None: those of the process
+    """
     parser = argparse.ArgumentParser()
     parser.add_argument("--ours", action="store_true", help="time our own cases, and no peers")
     parser.add_argument("--json", action="store_true", help="as an object")
     parser.add_argument("--on-request", action="store_true", help="time each case that standard input names")
-    asked = parser.parse_args(words)
-    if not asked.ours:
+    options = parser.parse_args(words)
+    if not options.ours:
         return main()
     cases = own()
-    if asked.on_request:
+    if options.on_request:
         answer_requests(cases)
-    elif asked.json:
+    elif options.json:
         print(json.dumps({name: time_case(case) for name, case in cases.items()}, indent=1))
     else:
         for name, case in cases.items():
@@ -87,7 +92,7 @@ def answer_requests(cases: Cases) -> None:
     print(json.dumps(list(cases)), flush=True)
     for line in sys.stdin:
         try:
-            found: dict[str, Any] = dict(time_case(cases[line.rstrip("\n")]))
+            result: dict[str, Any] = dict(time_case(cases[line.rstrip("\n")]))
         except Exception as failure:  # the others can be timed all the same
-            found = {"error": f"{type(failure).__name__}: {failure}"}
-        print(json.dumps(found), flush=True)
+            result = {"error": f"{type(failure).__name__}: {failure}"}
+        print(json.dumps(result), flush=True)

@@ -2,7 +2,7 @@
 
     python benchmarks/_compiling.py          processor time of some commands, each from nothing, and of all kernels
     python benchmarks/_compiling.py --check  all kernels only; fails where more is compiled than MOST allows
-    python benchmarks/_compiling.py --write  time every kernel and see which command wants which, for the estimates
+    python benchmarks/_compiling.py --write  time every kernel and note which command uses which, for the estimates
                                             that `zwidth` gives: src/zwidth/show/cli/kernel_times.json
 
 Processor time, so that other work on the machine matters little; beside a busy neighbour a core is still slower.
@@ -50,7 +50,7 @@ OTHERS = {
     "limit-cycles": "limit-cycles hapkit-course --stiffness 2600 --damping 0 --set loop.saturation.force_N=5",
 }
 
-# Asked in other ways: after `zwidth compile` none of them may compile either.
+# Other options of the commands: after `zwidth compile` none of them may compile either.
 VARIANTS = (
     "chart five-bar --with-direction 1,0 --output chart.svg",
     "chart five-bar --model two-mass --operator thesis-arm",
@@ -70,8 +70,10 @@ VARIANTS = (
 
 
 def compile_for(*lines: str) -> None:
-    """In a process of its own: run the command lines, or the GROUP of a line `group GROUP`, and print as JSON what
-    was compiled for them."""
+    """Run command lines, or the GROUP of a line `group GROUP`, and print what was compiled for them as JSON.
+
+    Called in a process of its own, by `compiled_in`.
+    """
     from numba.core import event
 
     from zwidth.show.cli.main import run
@@ -108,7 +110,7 @@ def compile_for(*lines: str) -> None:
                     run_group(int(words[0]))
                 else:
                     codes[line] = run([command, *words])
-    found = {
+    result = {
         "failed": [line for line, code in codes.items() if code],
         "processor": process_time(),
         "elapsed": perf_counter() - wall,
@@ -116,21 +118,21 @@ def compile_for(*lines: str) -> None:
         "signatures": sum(functions.values()),
         "kernels": {name: round(seconds, 2) for name, seconds in sorted(kernels.items())},
     }
-    print(json.dumps(found))
+    print(json.dumps(result))
 
 
 def compiled_in(folder: str, *lines: str) -> dict:
-    """What `compile_for` prints where the kernels that are in a folder, and no others, are on disk."""
+    """Result of `compile_for` in a new process that finds compiled kernels in this folder only."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, __file__, "--child", *lines]
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
-    found = json.loads(done.stdout)
-    assert not found["failed"], f"these command lines failed: {found['failed']}"
-    return found
+    result = json.loads(done.stdout)
+    assert not result["failed"], f"these command lines failed: {result['failed']}"
+    return result
 
 
 def from_nothing(*lines: str) -> dict:
-    """What `compile_for` prints where no kernel is on disk."""
+    """Result of `compile_for` in a new process that finds no compiled kernel."""
     with tempfile.TemporaryDirectory() as folder:
         return compiled_in(folder, *lines)
 
@@ -163,7 +165,7 @@ def measure(commands: dict[str, str]) -> None:
 
 
 def write() -> None:
-    """Keep the time of each kernel, and which command wants which."""
+    """Write the time of each kernel, and which command uses which, to TIMES."""
     seconds: dict[str, float] = {}
     of_command = {}
     for name, line in {**COMMANDS, **OTHERS}.items():
@@ -171,7 +173,7 @@ def write() -> None:
         of_command[name] = list(kernels)
         seconds |= {kernel: max(taken, seconds.get(kernel, 0.0)) for kernel, taken in kernels.items()}
         print(name, len(kernels), f"{sum(kernels.values()):.1f} s", flush=True)
-    for group in range(GROUPS):  # kernels that only Python wants
+    for group in range(GROUPS):  # kernels that no command uses
         seconds = from_nothing(f"group {group}")["kernels"] | seconds
     times = {"seconds": dict(sorted(seconds.items())), "of_command": of_command}
     TIMES.write_text(json.dumps(times, indent=1) + "\n")

@@ -1,6 +1,6 @@
-"""Is our own part of every benchmark as fast as before? Two commits timed in turn.
+"""Compare the speed of two commits: time the cases of zwidth alone in every benchmark, in turn.
 
-    python -m benchmarks._pairs                                  what is here, beside where it left main
+    python -m benchmarks._pairs                                  the working tree, beside its merge base with main
     python -m benchmarks._pairs --base main~3 --new main         two commits
     python -m benchmarks._pairs --only 'chart: *' --pairs 3      some cases, fewer pairs
 
@@ -62,7 +62,7 @@ class CommitBenchmarks:
 
 @dataclass
 class Timing:
-    """What was found of one case: seconds of base and new in each pair, and why it cannot be compared."""
+    """Timing of one case: seconds of base and new in each pair; why they cannot be compared, "" if they can."""
 
     base: list[float] = field(default_factory=list)
     new: list[float] = field(default_factory=list)
@@ -71,8 +71,8 @@ class Timing:
     @property
     def ratios(self) -> tuple[float, float, float]:
         """Lower quartile, median and upper quartile of new over base, pair by pair."""
-        found = [new / base for base, new in zip(self.base, self.new, strict=True)]
-        low, middle, high = statistics.quantiles(found, method="inclusive") if len(found) > 1 else found * 3
+        ratios = [new / base for base, new in zip(self.base, self.new, strict=True)]
+        low, middle, high = statistics.quantiles(ratios, method="inclusive") if len(ratios) > 1 else ratios * 3
         return low, middle, high
 
 
@@ -192,7 +192,7 @@ def _started(stack: ExitStack, script: str, side: CommitBenchmarks) -> TimingWor
 
 
 def _time_pair(timing: Timing, base: TimingWorker, new: TimingWorker, case: str, new_first: bool) -> None:
-    """One pair of one case; a case that fails on the way has a fault and no times."""
+    """Time one pair of one case; a case that fails gets a fault and no times."""
     if timing.fault:
         return
     if new_first:
@@ -208,7 +208,7 @@ def _time_pair(timing: Timing, base: TimingWorker, new: TimingWorker, case: str,
 
 
 def row(name: str, timing: Timing, limit: float) -> tuple[str, ...]:
-    """A row of the table: case, both medians, ratio, quartiles, and what is wrong."""
+    """A row of the table: case, both medians, ratio, quartiles, and the fault."""
     if timing.fault:
         return name, "", "", "", "", timing.fault
     low, middle, high = timing.ratios
@@ -217,7 +217,7 @@ def row(name: str, timing: Timing, limit: float) -> tuple[str, ...]:
 
 
 def document(timings: Timings) -> dict[str, object]:
-    """All that was measured, for --json."""
+    """All times and ratios by case, for --json."""
     return {
         name: {"fault": timing.fault}
         if timing.fault
@@ -227,7 +227,7 @@ def document(timings: Timings) -> dict[str, object]:
 
 
 def is_selected(name: str, patterns: list[str]) -> bool:
-    """Is a case among those that were asked for?"""
+    """Whether a case matches one of the patterns; without patterns every case does."""
     return not patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
@@ -237,38 +237,42 @@ def print_progress(line: str) -> None:
 
 
 def options(words: list[str] | None = None) -> argparse.Namespace:
-    """What was asked for."""
+    """The options of the command line."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks._pairs",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--base", help="the commit before; left out: where the new one left main")
-    parser.add_argument("--new", default=revisions.WORKING_TREE, help="that after; left out: the working tree")
-    parser.add_argument("--pairs", type=int, default=PAIRS, help=f"how many; {PAIRS} where it is left out")
+    parser.add_argument(
+        "--base", help="the commit to compare with; left out: the merge base of the new one with main"
+    )
+    parser.add_argument(
+        "--new", default=revisions.WORKING_TREE, help="the commit to be tested; left out: the working tree"
+    )
+    parser.add_argument("--pairs", type=int, default=PAIRS, help=f"number of pairs; left out: {PAIRS}")
     parser.add_argument(
         "--only", action="append", default=[], metavar="PATTERN", help="cases, repeatable: 'maps: *'"
     )
-    parser.add_argument("--limit", type=float, default=LIMIT, help=f"largest ratio allowed; else {LIMIT:g}")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="all times, too")
+    parser.add_argument("--limit", type=float, default=LIMIT, help=f"largest ratio allowed; left out: {LIMIT:g}")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all times to this file")
     return parser.parse_args(words)
 
 
 def main(words: list[str] | None = None) -> int:
-    """Time, print, and say whether anything has become slower."""
-    asked = options(words)
-    head = "HEAD" if asked.new == revisions.WORKING_TREE else asked.new
-    base = asked.base or revisions.git("merge-base", "main", head)
-    both = commit_benchmarks(base, asked.new), commit_benchmarks(asked.new, asked.new)
-    timings = warm_up(both, asked.only)
-    time_pairs(both, timings, asked.pairs)
-    rows = [row(name, timing, asked.limit) for name, timing in timings.items()]
-    print(f"{both[0].label} and {both[1].label}, {asked.pairs} pairs; {machine('numpy', 'numba')}")
+    """Time all cases and print them; returns 1 if one has become slower or cannot be compared."""
+    chosen = options(words)
+    head = "HEAD" if chosen.new == revisions.WORKING_TREE else chosen.new
+    base = chosen.base or revisions.git("merge-base", "main", head)
+    both = commit_benchmarks(base, chosen.new), commit_benchmarks(chosen.new, chosen.new)
+    timings = warm_up(both, chosen.only)
+    time_pairs(both, timings, chosen.pairs)
+    rows = [row(name, timing, chosen.limit) for name, timing in timings.items()]
+    print(f"{both[0].label} and {both[1].label}, {chosen.pairs} pairs; {machine('numpy', 'numba')}")
     print_table(("our own part", "before", "after", "after/before", "quartiles", ""), rows)
     bad = sum(bool(cells[-1]) for cells in rows)
-    print(f"{len(rows)} cases, {bad} slower than {asked.limit:g} times or not comparable")
-    if asked.json:
-        asked.json.write_text(json.dumps(document(timings), indent=1))
+    print(f"{len(rows)} cases, {bad} slower than {chosen.limit:g} times or not comparable")
+    if chosen.json:
+        chosen.json.write_text(json.dumps(document(timings), indent=1))
     return 1 if bad or not rows else 0
 
 

@@ -1,4 +1,4 @@
-"""The chart as a competent user would otherwise make it: by eigenvalues, by python-control, by a Jury raster.
+"""The chart as a competent user would make it without zwidth: by eigenvalues, by python-control, by Jury's test.
 
 All three rasterise walls; each says of every wall whether it is stable.
 """

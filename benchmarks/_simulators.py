@@ -26,12 +26,12 @@ class TwoMassDevice:
     period: float
 
     def force(self, reading: float, before: float, K: float, B: float) -> float:
-        """What the computer commands."""
-        asked = -(K * reading + B * (reading - before) / self.period)
-        return min(max(asked, -self.limit), self.limit)
+        """Force that the computer commands, within the limit [N]."""
+        command = -(K * reading + B * (reading - before) / self.period)
+        return min(max(command, -self.limit), self.limit)
 
     def quantised(self, place: float) -> float:
-        """The encoder."""
+        """Position as the encoder reads it, a whole number of steps [m]."""
         return self.step * floor(place / self.step + 0.5)
 
 
@@ -123,7 +123,7 @@ def by_events(bench: TwoMassDevice, K: float, B: float, start: float, samples: i
             if side == 0.0:
                 s[3] = 0.0
             way, event = (slide, stops) if side else (stick, starts)
-            found = solve_ivp(
+            solution = solve_ivp(
                 way,
                 (t, bench.period),
                 s,
@@ -134,9 +134,9 @@ def by_events(bench: TwoMassDevice, K: float, B: float, start: float, samples: i
                 args=(force, side),
                 max_step=bench.period / 4.0,
             )
-            s, t = found.y[:, -1].copy(), found.t[-1]
+            s, t = solution.y[:, -1].copy(), solution.t[-1]
             forced = 0.0
-            if found.status == 1:
+            if solution.status == 1:
                 if side:
                     s[3] = 0.0
                 else:

@@ -31,10 +31,10 @@ def seconds(value: float) -> str:
 
 
 def machine(*packages: str) -> str:
-    """CPU count, how busy they are, and versions, in one line."""
+    """Number of CPUs, their load, and versions of Python and these packages, in one line."""
     busy = f" (load {os.getloadavg()[0]:.1f})" if hasattr(os, "getloadavg") else ""
-    found = ", ".join(f"{name} {version(name)}" for name in packages)
-    return f"{os.cpu_count()} CPUs{busy}, Python {platform.python_version()}, {found}"
+    versions = ", ".join(f"{name} {version(name)}" for name in packages)
+    return f"{os.cpu_count()} CPUs{busy}, Python {platform.python_version()}, {versions}"
 
 
 def print_table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:

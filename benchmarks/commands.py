@@ -47,7 +47,7 @@ double(1.0)
 
 
 def run_command(line: tuple[str, ...]) -> subprocess.CompletedProcess[bytes]:
-    """One process, its output thrown away; fails where the command does."""
+    """Run a command in a process, without its output; raises CalledProcessError where it fails."""
     return subprocess.run([ZWIDTH, *line], stdout=subprocess.DEVNULL, check=True)
 
 

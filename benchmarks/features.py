@@ -82,9 +82,9 @@ def main() -> None:
         ours = median_time(lambda plant=plant, controller=controller: stability_chart(Loop(plant, controller)), 30)
         plain = plain or ours
         chart = stability_chart(Loop(plant, controller))
-        found, grid = by_grid(Loop(plant, controller), chart)
+        grid_stiffness, grid = by_grid(Loop(plant, controller), chart)
         step = chart.box[1] / COARSE
-        agrees = chart.stiffness_max - 3.0 * step <= found <= chart.stiffness_max * (1.0 + 1e-9)
+        agrees = chart.stiffness_max - 3.0 * step <= grid_stiffness <= chart.stiffness_max * (1.0 + 1e-9)
         rows.append(
             (
                 name,

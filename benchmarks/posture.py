@@ -45,9 +45,9 @@ def positions(count):
 
 def this_engine(at):
     posture = solve_posture(MECHANISM, at)
-    found = effective_parameters(MECHANISM, posture, ALONG_Y)
+    numbers = effective_parameters(MECHANISM, posture, ALONG_Y)
     assert (posture.status == OK).all()
-    return np.stack([found.link_side_mass, found.motor_side_mass, found.stiffness], axis=-1)
+    return np.stack([numbers.link_side_mass, numbers.motor_side_mass, numbers.stiffness], axis=-1)
 
 
 def cases() -> Cases:
@@ -149,7 +149,7 @@ def by_pinocchio(at):
 
 
 def best(function, at):
-    """Seconds per posture, the best of a few rounds, after one to warm up."""
+    """Seconds per posture, the shortest of a few rounds, after one call to load kernels."""
     function(at)
     times = []
     for _ in range(ROUNDS):

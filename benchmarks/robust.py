@@ -32,7 +32,7 @@ TARGET = 3.0
 
 
 def loops(count: int = MEMBERS) -> list[Loop]:
-    """The first members, with nothing derived yet."""
+    """Loops of the first members, of which nothing is computed yet."""
     device = load("published-two-mass")
     random = np.random.default_rng(1)
     arms = random.uniform((0.3, 100.0, 2.0), (3.0, 2000.0, 20.0), (MEMBERS, 3))
@@ -59,6 +59,7 @@ def by_grid(members: list[Loop], K, B) -> np.ndarray:
 
 
 def time_call(call) -> tuple[float, object]:
+    """Seconds that a call takes, and its result."""
     start = perf_counter()
     result = call()
     return perf_counter() - start, result
@@ -77,7 +78,7 @@ def main() -> None:
     some = loops()[:GRIDDED]
     grid, stable = time_call(lambda: by_grid(some, K, B[:, None]))
     grid *= MEMBERS / GRIDDED
-    apart = disagreement(robust_chart(some), K, B, stable)
+    differing = disagreement(robust_chart(some), K, B, stable)
     print_table(
         ("1000 members", "time", "ratio to ours"),
         [
@@ -90,14 +91,14 @@ def main() -> None:
             (f"eigenvalues of 100 x 100 walls each (from {GRIDDED} members)", seconds(grid), f"{grid / ours:.1f}"),
         ],
     )
-    print(f"{len(chart.binding)} members bind; grid and chart part at {apart} walls")
+    print(f"{len(chart.binding)} members bind; grid and chart disagree at {differing} walls")
     print(f"target: {TARGET:g} s; {'met' if ours <= TARGET else 'MISSED'}")
-    if apart:
+    if differing:
         sys.exit("grid and chart disagree")
 
 
 def disagreement(chart, K, B, stable) -> int:
-    """Walls on which the grid and the robust chart of the same members part, apart from the edge itself."""
+    """Number of walls, away from the edge, on which the grid and the robust chart of the same members disagree."""
     x, y = np.broadcast_arrays(K / K[-1], (B / B[-1])[:, None])
     cells = shapely.union_all([shapely.Polygon(ring / (K[-1], B[-1])) for ring in chart.regions])
     near = shapely.distance(cells.boundary, shapely.points(x, y)) < 1e-6

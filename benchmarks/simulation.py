@@ -35,7 +35,7 @@ FRICTION, STEP, LIMIT = 0.1, 1e-5, 20.0
 
 
 def loop_and_device() -> tuple[Loop, TwoMassDevice]:
-    """The device for us and for the others."""
+    """The device as a loop of zwidth, and as the numbers that the other simulators take."""
     device = load("published-two-mass")
     plant, controller = device.at().plant, device.controller
     rough = Nonlinear((Friction(plant.actuator, FRICTION),), (Counter(plant.sensor, STEP),), force_limit=LIMIT)
@@ -60,9 +60,9 @@ def time_zwidth(loop: Loop, duration: float, walls: int = 1, repeats: int = 7):
     times = []
     for _ in range(repeats + 1):
         begun = perf_counter()
-        found = simulated(loop, duration, walls)
+        responses = simulated(loop, duration, walls)
         times.append(perf_counter() - begun)
-    return found[0].truth, median(times[1:])
+    return responses[0].truth, median(times[1:])
 
 
 def cases() -> Cases:
@@ -91,7 +91,7 @@ def rms_text(readings: np.ndarray, period: float) -> str:
 
 
 def simulator_rows() -> tuple[list[tuple[str, ...]], list[str]]:
-    """Rows of the table, and what follows from it."""
+    """Rows of the table, and lines with the ratios that are wanted."""
     loop, bench = loop_and_device()
     T = bench.period
     numba.set_num_threads(1)
@@ -101,7 +101,7 @@ def simulator_rows() -> tuple[list[tuple[str, ...]], list[str]]:
     located, ode = by_events(bench, STIFFNESS, DAMPING, START, round(0.5 / T))
     _, batch = time_zwidth(loop, 2.0, 1000, 3)
     cores = numba.get_num_threads()
-    found = [
+    runs = [
         ("zwidth, one core", 60.0, mine, rms_text(fine, T)),
         ("MuJoCo, the same step", 4.0, muj, rms_text(readings, T)),
         ("solve_ivp with events", 0.5, ode, rms_text(located, T)),
@@ -116,22 +116,22 @@ def simulator_rows() -> tuple[list[tuple[str, ...]], list[str]]:
             f"{(took / length) / (mine / 60.0):.3g}",
             size,
         )
-        for name, length, took, size in found
+        for name, length, took, size in runs
     ]
     ratio = (muj / 4.0) / (mine / 60.0)
-    says = [
+    ratios = [
         f"times real time on one core, {SUBSTEPS} substeps: {60.0 / mine:.0f} (at least 2000 wanted)",
         f"faster than MuJoCo at the same step: {ratio:.1f} (at least 50 wanted)",
     ]
-    return rows, says
+    return rows, ratios
 
 
 def main() -> None:
     print(machine("numpy", "numba", "scipy", "mujoco"))
-    rows, says = simulator_rows()
+    rows, ratios = simulator_rows()
     head = ("simulator", "simulated", "took", "times real time", "time to ours", "rms motion, 0.05 to 0.25 s")
     print_table(head, rows)
-    print("\n".join(says))
+    print("\n".join(ratios))
     for name in ("simulation_mechanism", "simulation_experiment"):
         if (Path(__file__).parent / f"{name}.py").is_file():
             import_module(f"benchmarks.{name}").main()

@@ -1,4 +1,4 @@
-"""How long a measured stability boundary takes: 40 points of the published two-mass plant, and how right they are.
+"""How long a measured stability boundary takes: 40 points of the published two-mass plant, and their accuracy.
 
 Run `python benchmarks/simulation_experiment.py`.
 """
@@ -33,12 +33,12 @@ def cases() -> Cases:
 
 
 def published() -> OperatingPoint:
-    """The published plant, which nobody holds."""
+    """The published plant without an operator."""
     return load("published-two-mass").at()
 
 
 def warm_up(point: OperatingPoint) -> None:
-    """Compile or load what an experiment runs."""
+    """Compile or load the kernels of an experiment."""
     observe(StabilityTrial(point.loop), [[1000.0, 5.0]])
 
 
@@ -47,13 +47,13 @@ def experiment() -> list[tuple[str, ...]]:
     point = published()
     warm_up(point)
     start = perf_counter()
-    found = measure_boundary(point)
+    measured = measure_boundary(point)
     taken = perf_counter() - start
-    assert len(found.points) == 40
-    edges = [point for point in found.points if point.edge != "tip"]
+    assert len(measured.points) == 40
+    edges = [point for point in measured.points if point.edge != "tip"]
     width = max(p.damping for p in edges) - min(p.damping for p in edges)
     worst = max(abs(p.damping - p.exact) for p in edges) / width
-    tip = max(abs(p.stiffness / p.exact - 1.0) for p in found.points if p.edge == "tip")
+    tip = max(abs(p.stiffness / p.exact - 1.0) for p in measured.points if p.edge == "tip")
     assert taken <= TARGET, f"{taken:.1f} s"
     return [("40 boundary points, two-sided", seconds(taken), f"{worst:.1e} of the range; tips {tip:.1e}")]
 

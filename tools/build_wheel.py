@@ -4,8 +4,8 @@
 
 An ordinary wheel is built by pip. Its kernels are then compiled for a generic processor of the platform, by the
 Python that runs this script, and packed in beside the sources (`zwidth.machine_code` reads them). Machine code
-is read back by the very release of numba that made it: the wheel requires that release. With another one,
-forced upon it, kernels are compiled at first use as in a clone.
+can be read only by the release of numba that made it, and so the wheel requires that release. With another one
+installed all the same, kernels are compiled at first use as in a clone.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def main(folder: Path) -> Path:
 
 
 def run(*command: str | Path, **environment: str) -> None:
-    """Run a command; its errors end this script."""
+    """Run a command in this environment with these variables added; ends the script if it fails."""
     subprocess.run([str(word) for word in command], check=True, env={**os.environ, **environment})
 
 
@@ -67,14 +67,14 @@ def compile_into(kernels: Path, content: Path, work: Path) -> None:
 
 
 def wheel_tags() -> list[str]:
-    """Of this Python, and of the platforms that llvmlite's own wheel is for: the machine code asks for no more."""
+    """Tags of this Python on the platforms of llvmlite's own wheel: machine code runs on the same ones."""
     python = f"cp{sys.version_info[0]}{sys.version_info[1]}"
-    found = re.findall(r"(?m)^Tag: \S+?-\S+?-(\S+)$", distribution("llvmlite").read_text("WHEEL") or "")
-    return [f"{python}-{python}-{platform}" for platform in sorted(set(found))]
+    platforms = re.findall(r"(?m)^Tag: \S+?-\S+?-(\S+)$", distribution("llvmlite").read_text("WHEEL") or "")
+    return [f"{python}-{python}-{platform}" for platform in sorted(set(platforms))]
 
 
 def edit(file: Path, pattern: str, text: str) -> None:
-    """Replace what the pattern finds, all of it by one text; it must be found."""
+    """Replace the first match of a pattern by a text and remove the others; ends the script if there is none."""
     old = file.read_text(encoding="utf-8")
     first = re.search(pattern, old)
     if first is None:
@@ -84,7 +84,7 @@ def edit(file: Path, pattern: str, text: str) -> None:
 
 
 def write_record(content: Path, metadata: Path) -> None:
-    """RECORD: every file with its digest and size, as pip checks them."""
+    """Write RECORD: every file with its digest and size, as pip checks them."""
     record = metadata / "RECORD"
     lines = []
     for file in sorted(path for path in content.rglob("*") if path.is_file() and path != record):

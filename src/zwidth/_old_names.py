@@ -69,11 +69,12 @@ def old_name(name: str) -> Any:
 
 
 def old_names() -> list[str]:
-    """All of them."""
+    """All old names that still work, in alphabetical order."""
     return sorted([*REPLACED, *(name for names in MOVED.values() for name in names.split())])
 
 
 def _package_of(name: str) -> str | None:
+    """The package to which a name of the top module moved; None if it did not."""
     return next((package for package, names in MOVED.items() if name in names.split()), None)
 
 
@@ -83,7 +84,7 @@ def _warn(old: str, new: str, depth: int = 4) -> None:
 
 
 def sweep_of_study(study: Any, *more: Any) -> Any:
-    """What `zwidth.sweep` gave for a study before it took a device and axes. Warns DeprecationWarning."""
+    """Result of `zwidth.sweep(study)`, from before it took a device and axes. Warns DeprecationWarning."""
     from zwidth.study.sweep import run_study
 
     _warn("zwidth.sweep(study)", "zwidth.run_study(study)", 5)
@@ -99,14 +100,14 @@ def plant_of(
     *,
     held: bool = True,
 ) -> Plant:
-    """What `device.plant(...)` gave before there were operating points. Warns DeprecationWarning."""
+    """Result of `device.plant(...)`, from before there were operating points. Warns DeprecationWarning."""
     _warn("device.plant(...)", "device.at(...).plant, or .ungripped_plant", 5)
     point = device.at(at, direction, assembly=assembly, model=model)
     return point.plant if held else point.ungripped_plant
 
 
 def posture_of(device: Device, at: Any = None, assembly: str | None = None) -> Posture:
-    """What `device.posture(...)` gave before there were operating points. Warns DeprecationWarning."""
+    """Result of `device.posture(...)`, from before there were operating points. Warns DeprecationWarning."""
     _warn("device.posture(...)", "device.at(...).posture", 5)
     posture = device.at(at, assembly=assembly).posture
     assert posture is not None
@@ -209,7 +210,7 @@ def _simulate_mechanism(
     return simulate_mechanism(point, wall, surface, **more)
 
 
-# Old name -> what to write instead, and what it gives meanwhile.
+# Old name -> what to write instead, and a function that returns the object it still names.
 REPLACED: Final[dict[str, tuple[str, Callable[[], Any]]]] = {
     "Place": ("zwidth.OperatingPoint", _operating_point),
     "Wanted": ("zwidth.measures.WantedWall", _wanted_wall),

@@ -1,7 +1,7 @@
 """The functions behind the methods of `Device` and `OperatingPoint`: the one module that may import upwards.
 
-`point.chart()` reads better than `chart_at(point)`, but an operating point knows nothing of charts. Each function
-here imports what it forwards to when it is called, and does nothing else.
+`point.chart()` reads better than `chart_at(point)`, but an operating point may not import charts. Each function
+here imports the function of the same task when it is called, calls it, and does nothing else.
 """
 
 from __future__ import annotations

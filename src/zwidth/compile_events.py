@@ -1,4 +1,4 @@
-"""Listeners to the compilation of kernels; free of numba, so that importing costs nothing."""
+"""Report the compilation of kernels to listeners; without importing numba, which takes long."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _listeners: list[Listener] = []
 
 @contextmanager
 def listening(listener: Listener) -> Iterator[None]:
-    """Have the compilations of kernels that Python calls told to `listener`.
+    """Report to `listener` each compilation of a kernel that Python calls, while the `with` block runs.
 
     listener  called with the kernel's full name and False when its compilation begins, and with True when it has
-              ended; kernels found on disk are not told
+              ended; kernels read from disk are not reported
     """
     _listeners.append(listener)
     try:
@@ -27,7 +27,7 @@ def listening(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def compiling(name: str) -> Iterator[None]:
-    """Around the compilation of a kernel. Where nobody listens, a script or a notebook, the log says so once."""
+    """Report when the compilation of a kernel begins and ends; without a listener, log the first use once."""
     if not _listeners and name.startswith("zwidth."):
         _log_first_use()
     for listener in _listeners:

@@ -1,4 +1,4 @@
-"""The one door to numba: typed decorators for kernels that are compiled once and kept on disk.
+"""Typed decorators for kernels: numba compiles a kernel once, and its machine code is kept on disk.
 
 Kernels work on plain arrays and scalars, never on Python objects, so that the same source can also be
 compiled for other targets.
@@ -29,10 +29,10 @@ from zwidth.machine_code import MachineCode
 Function = TypeVar("Function", bound=Callable[..., Any])
 # Division follows IEEE (1/0 is inf), so that a singular point is data and not an exception.
 OPTIONS: Final[dict[str, Any]] = {"nopython": True, "error_model": "numpy"}
-NO_REFERENCE_COUNTS: Final[dict[str, Any]] = {"_nrt": False}  # numba takes this flag, its stubs do not name it
+NO_REFERENCE_COUNTS: Final[dict[str, Any]] = {"_nrt": False}  # a flag of numba's that its stubs do not name
 INLINED: Final[dict[str, Any]] = {**NO_REFERENCE_COUNTS, "forceinline": True}
-# Numba's releases whose compiler is known to work as it is taken apart below; with others kernels are compiled by
-# `numba.njit` as it is: the same answers, a longer wait at first use.
+# First and last release of numba whose internal classes are known to work as they are used below. With any other
+# release, kernels are compiled by plain `numba.jit`: the same results, a longer wait at first use.
 TAKEN_APART: Final = ((0, 61), (0, 68))
 COMPILING_THRESHOLDS: Final = (100_000, 1000, 1000)  # of Python's garbage collector, see gc.set_threshold
 
@@ -53,16 +53,16 @@ def compiled_lean(function: Function) -> Function:
 
 
 def compiled_inline(function: Function) -> Function:
-    """Like `compiled_lean`, for the innermost steps of a hot loop: built into whatever calls them.
+    """Like `compiled_lean`, for the innermost steps of a hot loop: inlined into every kernel that calls them.
 
-    Left to itself the compiler stops building them in once the loop around them has grown, and the calls then
-    cost as much as the algebra.
+    By itself the compiler stops inlining them once the loop around them has grown, and the calls then cost as
+    much as the algebra.
     """
     return _kernel(function, INLINED)
 
 
 def compiled_for(signature: Any, function: Callable[..., Any]) -> Any:
-    """Compile `function` for one signature now, for callers that know its address only.
+    """Compile `function` for one signature now, for callers that use only its address.
 
     signature  a numba signature, such as float64(float64, float64)
     Returns    numba's dispatcher; keep it as long as its address is in use
@@ -76,7 +76,7 @@ def compiled_for(signature: Any, function: Callable[..., Any]) -> Any:
 
 
 def can_be_taken_apart() -> bool:
-    """Whether the compiler of the installed numba is one of those known from within."""
+    """Whether the installed numba is a release whose internal classes are known (`TAKEN_APART`)."""
     oldest, newest = TAKEN_APART
     return oldest <= tuple(numba.version_info.short) <= newest
 
@@ -126,6 +126,8 @@ class _EntryLibrary(JITCodeLibrary):
 
 
 class _PartCompiler(compiler.CompilerBase):
+    """Numba's pipeline, with the library of a kernel that other kernels call."""
+
     library: type[JITCodeLibrary] = _PartLibrary
 
     def define_pipelines(self) -> list[Any]:
@@ -135,6 +137,8 @@ class _PartCompiler(compiler.CompilerBase):
 
 
 class _EntryCompiler(_PartCompiler):
+    """The same pipeline, with the library of a kernel that Python calls."""
+
     library = _EntryLibrary
 
 
@@ -144,10 +148,10 @@ class _Entry(registry.CPUDispatcher):
     def __init__(
         self, function: Callable[..., Any], options: dict[str, Any], kernel: _Kernel | None = None
     ) -> None:
-        alone = {name: value for name, value in options.items() if name != "forceinline"}
-        alone |= {"no_cfunc_wrapper": True, "nogil": True}
-        super().__init__(function, targetoptions=alone, pipeline_class=_EntryCompiler)
-        self._cache = MachineCode(function, alone)
+        entry_options = {name: value for name, value in options.items() if name != "forceinline"}
+        entry_options |= {"no_cfunc_wrapper": True, "nogil": True}
+        super().__init__(function, targetoptions=entry_options, pipeline_class=_EntryCompiler)
+        self._cache = MachineCode(function, entry_options)
         self._compiler: Any = _AnnouncedCompiler(self._compiler, f"{function.__module__}.{function.__qualname__}")
         self._kernel = kernel
 
@@ -158,7 +162,7 @@ class _Entry(registry.CPUDispatcher):
 
 
 class _AnnouncedCompiler:
-    """Numba's compiler, which also says what it compiles."""
+    """Numba's compiler, which also reports what it compiles to `compile_events`."""
 
     def __init__(self, inner: Any, name: str) -> None:
         self._inner, self._name = inner, name
@@ -173,8 +177,8 @@ class _AnnouncedCompiler:
 
 @contextmanager
 def rare_garbage_collection() -> Iterator[None]:
-    """Around a compilation, which makes millions of objects that live until its end: looking through all of them
-    again and again takes a tenth of the time."""
+    """Run Python's garbage collector rarely during a compilation, which makes millions of objects that live until
+    its end: checking all of them again and again takes a tenth of the time."""
     thresholds = gc.get_threshold()
     gc.set_threshold(*COMPILING_THRESHOLDS)
     try:
@@ -184,11 +188,11 @@ def rare_garbage_collection() -> Iterator[None]:
 
 
 class _Kernel(registry.CPUDispatcher):
-    """A kernel as other kernels call it; a call from Python goes to its entry."""
+    """A kernel as other kernels call it; a call from Python goes to its `_Entry`."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        inside = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        super().__init__(function, targetoptions=inside, pipeline_class=_PartCompiler)
+        part_options = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        super().__init__(function, targetoptions=part_options, pipeline_class=_PartCompiler)
         self.kernel_options = options
         self._entry: _Entry | None = None
 
@@ -202,7 +206,7 @@ class _Kernel(registry.CPUDispatcher):
         self.overloads[tuple(result.signature.args)] = result
 
     def get_call_template(self, arguments: Any, keywords: Any) -> Any:
-        """Types as the callee sees them: a number written in the call is a number, not a type of its own."""
+        """Types of the arguments of a call; numba would give each number written in the call a type of its own."""
         plain = {name: types.unliteral(kind) for name, kind in keywords.items()}
         return super().get_call_template(tuple(map(types.unliteral, arguments)), plain)
 

@@ -33,15 +33,15 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
 from numba.misc.appdirs import AppDirs
 
-FORMAT: Final = 1  # raised when what a file holds, or what its name depends on, changes
+FORMAT: Final = 1  # version of the files; to be increased when their content or their naming changes
 PACKAGE: Final = Path(__file__).parent
-SHIPPED: Final = PACKAGE / "kernels"  # in a wheel; a clone has none
+SHIPPED: Final = PACKAGE / "kernels"  # folder of a wheel's kernels; a clone has none
 GENERIC: Final = ("generic", "")  # the processor that a wheel's kernels are compiled for, and its features
 ENDING: Final = f".py{sys.version_info[0]}{sys.version_info[1]}.nbc"
 
 
 class MachineCode(_Cache):
-    """The kept machine code of one kernel, in the place of numba's `FunctionCache`."""
+    """The machine code of one kernel on disk; takes the place of numba's `FunctionCache`."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         self._function, self._options = function, options
@@ -62,19 +62,19 @@ class MachineCode(_Cache):
                 # a file that was cut short, or written by somebody else, is compiled anew
                 with suppress(OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError, ValueError):
                     data = (folder / self._file(signature, triple, processor)).read_bytes()
-                    return _loaded(target, pickle.loads(data))
+                    return _restored(target, pickle.loads(data))
         return None
 
     def save_overload(self, signature: Any, result: CompileResult) -> None:
-        """Keep a kernel that was compiled; where nothing may be written it serves this process only."""
+        """Write a compiled kernel to disk; where no folder may be written to, it serves this process only."""
         folder = written_folder()
         if folder is None or result.library.has_dynamic_globals:
             return
-        if not Path(self._function.__code__.co_filename).is_file():  # typed in: no other process can have it
+        if not Path(self._function.__code__.co_filename).is_file():  # typed at a prompt: no other process has it
             return
         triple, *processor = result.codegen.magic_tuple()
         with suppress(OSError):
-            _write(folder / self._file(signature, triple, tuple(processor)), dumps(_saved(result)))
+            _write(folder / self._file(signature, triple, tuple(processor)), dumps(_reduced(result)))
 
     def enable(self) -> None:
         """Numba's interface; always enabled."""
@@ -86,12 +86,12 @@ class MachineCode(_Cache):
         """Numba's interface; a file is never out of date."""
 
     def _file(self, signature: Any, triple: str, processor: tuple[str, ...]) -> str:
-        """Name of the file: the kernel, for people; what it is called with and for which processor; its source."""
+        """Name of the file: the kernel's name, a digest of argument types and processor, and one of its source."""
         if self._source is None:
             options = sorted(self._options.items())
             self._source = _digest(FORMAT, numba.__version__, options, *_source(self._function))
         kinds = signature if isinstance(signature, tuple) else signature.args
-        use = _digest(triple, processor, *(_described(kind) for kind in kinds))
+        use = _digest(triple, processor, *(_type_text(kind) for kind in kinds))
         module = (self._function.__module__ or "").removeprefix("zwidth.")
         name = f"{module}.{self._function.__name__}"
         return f"{name}-{use[:12]}-{_digest(self._source, use)[:16]}{ENDING}"
@@ -113,14 +113,17 @@ def written_folder() -> Path | None:
 
 
 def kept_kernels() -> set[str]:
-    """Full names of the kernels that have machine code on disk for this Python, of whatever sources."""
+    """Full names of the kernels that have machine code on disk for this Python, even of older sources."""
     folders = [folder for folder in (written_folder(), SHIPPED) if folder is not None and folder.is_dir()]
     return {f"zwidth.{file.name.split('-')[0]}" for folder in folders for file in folder.glob(f"*{ENDING}")}
 
 
 def _write(file: Path, data: bytes) -> None:
-    """Whole or not at all: several processes may compile the same kernel at once. Beside the sources, machine code
-    of sources that are no more is removed; other folders serve several versions of zwidth."""
+    """Write a file whole or not at all: several processes may compile the same kernel at once.
+
+    In the folder beside the sources, the kernel's files of older sources are removed; other folders serve several
+    versions of zwidth.
+    """
     with NamedTemporaryFile(dir=file.parent, delete=False) as temporary:
         temporary.write(data)
     Path(temporary.name).replace(file)
@@ -131,10 +134,10 @@ def _write(file: Path, data: bytes) -> None:
                 older.unlink(missing_ok=True)
 
 
-def _saved(result: CompileResult) -> tuple[Any, ...]:
-    """What a compiled kernel is made of again, without its intermediate code: no kernel is built into another from
-    what is on disk."""
-    result.fndesc.typemap = result.fndesc.calltypes = None  # large, and of no use any more
+def _reduced(result: CompileResult) -> tuple[Any, ...]:
+    """The parts of a compiled kernel from which `_restored` makes it again. Its intermediate code is left out: no
+    kernel is inlined into another from disk."""
+    result.fndesc.typemap = result.fndesc.calltypes = None  # large, and not used any more
     library = result.library
     module = library._final_module
     names = [
@@ -146,9 +149,9 @@ def _saved(result: CompileResult) -> tuple[Any, ...]:
     return library.name, library._get_compiled_object(), names, result.fndesc, result.environment, result.signature
 
 
-def _loaded(target: Any, saved: tuple[Any, ...]) -> CompileResult:
-    """A kept kernel as numba would have compiled it."""
-    name, machine_code, names, description, environment, signature = saved
+def _restored(target: Any, parts: tuple[Any, ...]) -> CompileResult:
+    """The compiled kernel of these parts, as returned by numba's compiler."""
+    name, machine_code, names, description, environment, signature = parts
     codegen = target.codegen()
     library = codegen.create_library(name)
     library.enable_object_caching()
@@ -178,31 +181,32 @@ def _digest(*parts: Any) -> str:
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
-def _described(kind: Any) -> str:
-    """A numba type in full; the names of a tuple's fields are not part of numba's own name for it."""
+def _type_text(kind: Any) -> str:
+    """A numba type in full; numba's own name of a named tuple does not hold the names of its fields."""
     if hasattr(kind, "instance_class") and hasattr(kind, "fields"):  # a named tuple
-        inner = ", ".join(map(_described, kind.types))
+        inner = ", ".join(map(_type_text, kind.types))
         return f"{kind.instance_class.__qualname__}{kind.fields}({inner})"
     return str(kind)
 
 
 def _source(function: Callable[..., Any]) -> list[str]:
-    """All that the machine code of a function is made from, its own and that of whatever it calls."""
-    seen: dict[int, None] = {}
+    """Lines that state all that the machine code of a function depends on: its instructions and constants, and
+    those of the functions that it calls."""
+    visited: dict[int, None] = {}
     lines: list[str] = []
     todo: list[Any] = [function]
     while todo:
         item = todo.pop()
-        if id(item) in seen:
+        if id(item) in visited:
             continue
-        seen[id(item)] = None
+        visited[id(item)] = None
         if isinstance(item, Dispatcher):
             lines.append(f"options {sorted(item.targetoptions.items())}")
             item = item.py_func
         if isinstance(item, FunctionType):
             lines.append(f"{item.__module__}.{item.__qualname__} {item.__defaults__}")
             lines += _instructions(item.__code__, item.__doc__)
-            for name, value in _used(item):
+            for name, value in _references(item):
                 if isinstance(value, Dispatcher | FunctionType):
                     todo.append(value)
                 else:
@@ -211,7 +215,7 @@ def _source(function: Callable[..., Any]) -> list[str]:
 
 
 def _instructions(code: CodeType, text: str | None = None) -> Iterator[str]:
-    """Instructions, names and constants, without the docstring and the numbers of lines."""
+    """Instructions, names and constants of a function's code, without its docstring (`text`) and line numbers."""
     constants = [c for c in code.co_consts if not isinstance(c, CodeType) and not (text is not None and c == text)]
     yield f"{code.co_code.hex()} {code.co_names} {code.co_varnames} {code.co_freevars} {constants!r}"
     for constant in code.co_consts:
@@ -219,8 +223,9 @@ def _instructions(code: CodeType, text: str | None = None) -> Iterator[str]:
             yield from _instructions(constant)
 
 
-def _used(function: FunctionType) -> Iterator[tuple[str, Any]]:
-    """What a function finds outside itself: global names, its closure, and what it reads off modules of ours."""
+def _references(function: FunctionType) -> Iterator[tuple[str, Any]]:
+    """Name and value of everything outside itself that a function uses: global names, variables of its closure,
+    and attributes of zwidth's modules."""
     names = {name for code in _codes(function.__code__) for name in code.co_names}
     for name in sorted(names):
         if name in function.__globals__:
@@ -235,6 +240,7 @@ def _used(function: FunctionType) -> Iterator[tuple[str, Any]]:
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
+    """The code, and that of the functions defined in it."""
     yield code
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
@@ -242,7 +248,7 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
 
 
 def _constant(value: Any) -> str:
-    """A value by what a kernel may know of it; the same in every process."""
+    """A text for a value that a kernel uses, the same in every process."""
     if isinstance(value, np.ndarray):
         return f"array {value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, type):

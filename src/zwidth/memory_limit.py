@@ -16,8 +16,9 @@ class TooLarge(ValueError):
 def check_memory(numbers: float, what: str, advice: str) -> None:
     """Raise TooLarge if floating-point numbers of 8 bytes would take more than half of the machine's memory.
 
-    numbers  how many there would be
-    what     what they are, which begins the message;   advice  what to do instead, which ends it
+    numbers  how many numbers the result would have
+    what     name of the result, with which the message begins
+    advice   what to do instead, with which the message ends
     """
     try:
         memory = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))

@@ -5,5 +5,5 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
-# Called with the stage, how much of it is done, and of how much.
+# Called with the name of the stage, the number of its steps done, and the number of its steps.
 Progress: TypeAlias = Callable[[str, int, int], None]

@@ -17,8 +17,8 @@ class Result:
     """A result: numbers that can be read as a document, a table, a figure or in a notebook.
 
     `document()` holds every number under its key, the unit in the name, as `--json` prints it; `table()` holds
-    columns of equal length, as a .csv file has them. `repr` is a few lines; arrays are not spelled out. Nothing of
-    files or figures is loaded until `plot`, or a notebook, asks for it.
+    columns of equal length, as a .csv file has them. `repr` is a few lines without arrays. The code that draws
+    figures is imported only when `plot` is called or a notebook shows the result.
 
     operating_point  operating point of the result, which its figure states; None: a result without a device
     """
@@ -47,5 +47,5 @@ class Result:
         return _verbs.plot(self, ax)
 
     def _repr_html_(self) -> str:
-        """The result as notebooks show it: its few lines, and its figure."""
+        """The result as notebooks show it, in HTML: its `repr` and its figure."""
         return _verbs.notebook(self)

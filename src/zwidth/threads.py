@@ -1,7 +1,7 @@
 """Run a kernel on all cores: threads that each compute chunks of a loop.
 
-Kernels release the interpreter's lock, so that threads of Python's own suffice. Numba's parallel loops do the same
-work, but take ten seconds of compiling each, for a loop that holds nothing but a call.
+Kernels release the interpreter's lock, so that Python's own threads are enough. Numba's parallel loops would do
+the same, but each takes ten seconds to compile, even a loop that only calls a kernel.
 """
 
 from __future__ import annotations

@@ -168,7 +168,7 @@ def test_everything_wrong_is_told_at_once(folder):
         (["study.toml", "--resume", "slow.py"], "slow.py: is not the store of a study; name another folder"),
         (["study.toml", "--resume", "no/where"], "no/where"),
         (["plant.toml"], "plant.toml: measures: isotropy needs a [mechanism]"),
-        (["large.toml"], "large.toml: 100000000000000 designs of 1 measures would take"),
+        (["large.toml"], "large.toml: 100000000000000 designs of 1 measure would take"),
     ],
 )
 def test_what_is_refused(folder, words, said):

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 import zwidth
 from tests.cli.command_runner import run_command
 from zwidth.measures.felt_chart import felt_chart
-from zwidth.show.figures.caption import MARGIN, SIZE, caption_of_facts, caption_of_result, wrapped, write_caption
-from zwidth.show.figures.style import figure, inline_svg, save, text_width
+from zwidth.show.figures.caption import MARGIN, SIZE, caption_of_facts, caption_of_result, write_caption
+from zwidth.show.figures.style import figure, inline_svg, save, text_width, wrapped
 from zwidth.study.study_arguments import study_over
 
 ROUGH = {"friction.coulomb_N": [0.3, 0.1], "loop.encoder.resolution_m": 1e-5, "loop.saturation.force_N": 5.0}
@@ -67,7 +67,7 @@ def test_a_chart_says_what_it_shows(saved, tmp_path, options, words):
         (("simulate", "hapkit-course", "--stiffness", "500", "--damping", "2"), "wall of 500 N/m and 2 Ns/m"),
         (("guarantees", "hapkit-course", "--operator", "course-hand"), "Hapkit, course model sampled every 1 ms"),
         (("robust", "hapkit-course", "--range", "loop.delay_samples=0,1", "--members", "4", "--unseen", "4"),
-         "but for what is varied: loop.delay_samples"),
+         "varied: loop.delay_samples"),
         (("polar", "five-bar", "--count", "4"), "handle at (0, 0.25) m, assembly elbows-out sampled every"),
         (("map", "five-bar", "--measure", "rigid_mass", "--cells", "9,7"), "assembly elbows-out, along (0, 1)"),
         (("map", "five-bar", "--measure", "isotropy", "--cells", "9,7"), "assembly elbows-out sampled every"),
@@ -87,7 +87,7 @@ def test_a_sweep_says_what_is_varied(saved, tmp_path):
     assert run_command("sweep", study, "--output", tmp_path / "a.svg").code == 0
     assert "rigid model" in saved[0]
     assert "handle at" not in saved[0]
-    assert saved[0].endswith("but for what is varied: at")
+    assert saved[0].endswith("varied: at")
 
 
 def test_results_remember_where_they_were_computed():
@@ -102,7 +102,7 @@ def test_results_remember_where_they_were_computed():
     assert "wall of 1 kN/m and 5 Ns/m" in said(motion)
     assert "linear" not in said(motion)
     study = study_over(zwidth.load("hapkit-course"), {"loop.delay_samples": [0, 1]}, "stiffness_max")
-    assert said(zwidth.run_study(study)).endswith("but for what is varied: loop.delay_samples")
+    assert said(zwidth.run_study(study)).endswith("varied: loop.delay_samples")
 
 
 def test_a_bare_loop_says_how_it_is_sampled():
@@ -146,7 +146,7 @@ def test_lines_fit_the_figure_and_the_axes_keep_their_height():
     assert box.y1 <= ax.xaxis.get_tightbbox().y0
     assert ax.get_window_extent().height == pytest.approx(before, rel=0.05)
     room = 72.0 * (3.0 - 2.0 * MARGIN)
-    assert all(text_width(line, SIZE) <= room for line in wrapped("x" * 300 + " a b", room))
+    assert all(text_width(line, SIZE) <= room for line in wrapped("x" * 300 + " a b", room, SIZE))
 
 
 def test_the_same_caption_makes_the_same_bytes(tmp_path):

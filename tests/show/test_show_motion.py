@@ -10,6 +10,7 @@ from tests.systems import published
 from zwidth.contact.environments import ENVIRONMENTS
 from zwidth.contact.simulate import simulate
 from zwidth.contact.time_response import SOURCES
+from zwidth.show.energies import energy_label
 from zwidth.show.figures.contact_response import (
     LONGEST_LINE,
     binned_extremes,
@@ -53,7 +54,8 @@ def test_the_largest_entries_of_the_ledger_are_drawn():
     response, _, axes = simulate_and_draw(0.3)
     size = dict(zip(SOURCES, np.abs(response.energies).max(axis=0), strict=True))
     names = [text.get_text() for text in axes[-1].get_legend().get_texts()]
-    assert names == ["stored", *sorted(size, key=size.get, reverse=True)[:3]]
+    assert names == ["stored", *map(energy_label, sorted(size, key=size.get, reverse=True)[:3])]
+    assert energy_label("hold") == "sample and hold"
 
 
 def test_legends_do_not_lie_on_other_panels():

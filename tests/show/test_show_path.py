@@ -45,7 +45,7 @@ def test_the_panels_name_their_units_and_hold_the_motion(tmp_path):
         assert ax.get_aspect() == 1.0
     assert depth.lines[0].get_ydata() == pytest.approx(motion.depth)
     assert force.lines[0].get_ydata() == pytest.approx(np.linalg.norm(motion.force, axis=1))
-    assert texts(energy) == ["kinetic", "drives bent", "hand", "motors"]
+    assert texts(energy) == ["kinetic", "drives, elastic", "hand", "motors"]
     save(made, tmp_path / "path.png")
 
 

@@ -293,10 +293,12 @@ def test_a_page_that_asks_elsewhere_would_be_noticed(tmp_path):
 MEASURE = """<pre id="measured"></pre><script>onload = () => {
 const page = document.querySelector("iframe").contentDocument;
 const boxes = [...page.querySelectorAll("h1, h2, p, th, td, code, figcaption, summary, small")];
-const svg = page.querySelector("figure svg");
+const drawn = [...page.querySelectorAll("figure svg")].filter(svg => svg.getBoundingClientRect().width);
+const svg = drawn[0];
 document.getElementById("measured").textContent = JSON.stringify({
   page: page.documentElement.scrollWidth,
-  right: Math.max(...boxes.map(box => box.getBoundingClientRect().right)),
+  right: Math.max(...[...boxes, ...drawn].map(box => box.getBoundingClientRect().right)),
+  drawings: drawn.length / page.querySelectorAll("figure").length,
   cut: boxes.filter(box => box.clientWidth && box.scrollWidth > box.clientWidth + 1).map(box => box.textContent),
   scale: svg.getBoundingClientRect().width / svg.viewBox.baseVal.width,
 })};</script>"""
@@ -321,6 +323,7 @@ def test_nothing_is_cut_off_or_too_small_to_be_read(tmp_path, width):
     found = measured_in_browser(tmp_path, page(gather(from_document(document))), width)
     assert found["page"] <= width
     assert found["right"] <= width
+    assert found["drawings"] == 1
     assert found["cut"] == []
     assert found["scale"] * 6.5 > 8.0  # the smallest text of a figure has 6.5 points
 

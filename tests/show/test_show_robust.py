@@ -35,8 +35,8 @@ def test_every_arc_is_drawn_in_the_line_of_its_member_and_named(tmp_path):
         looks.setdefault(arc.member, set()).add((line.get_color(), str(line.get_linestyle())))
     assert all(len(look) == 1 for look in looks.values())
     assert len(set.union(*looks.values())) == len(chart.binding) == 2
-    assert "binds: mass_kg = 0.3, delay_samples = 1" in texts(ax)
-    assert "binds: mass_kg = 0.1, delay_samples = 0" in texts(ax)
+    assert "limited by mass_kg = 0.3, delay_samples = 1" in texts(ax)
+    assert "limited by mass_kg = 0.1, delay_samples = 0" in texts(ax)
     assert texts(ax)[:2] == ["a member's edge", "stable for every member"]
     assert len(texts(ax)) == len(set(texts(ax)))
     assert save(made, tmp_path / "robust.png").stat().st_size > 10_000
@@ -57,9 +57,9 @@ def test_many_binding_members_share_the_last_line():
     chart = robust_chart(loops)
     _, ax = figure()
     draw_robust(ax, chart)
-    named = [text for text in texts(ax) if text.startswith("binds: ")]
+    named = [text for text in texts(ax) if text.startswith("limited by ")]
     assert len(named) <= NAMED
-    assert all(text.removeprefix("binds: member ").isdigit() for text in named)
+    assert all(text.removeprefix("limited by member ").isdigit() for text in named)
 
 
 def test_nothing_stable_is_said():

@@ -17,6 +17,7 @@ from tests.study.study_cases import (
     study_document,
 )
 from zwidth.device.faults import DeviceError
+from zwidth.device.new_device import new_device
 from zwidth.memory_limit import TooLarge
 from zwidth.study.study_file import read_study
 
@@ -287,6 +288,10 @@ def test_a_measured_device_has_no_numbers_to_vary(tmp_path):
         (b"", "is empty; a study needs a device, measures and an [[axis]]"),
         (b"device = ", "is not TOML"),
         (b"\xff\xfea\x00", "is UTF-16 text"),
+        (
+            new_device("arm", "serial-2r").encode(),
+            'is a device, not a study; write a study file with device = "study.toml", measures and an [[axis]]',
+        ),
     ],
 )
 def test_a_file_that_is_no_study_is_told(tmp_path, data, said):
@@ -298,12 +303,17 @@ def test_a_file_that_is_no_study_is_told(tmp_path, data, said):
     assert [fault.message.startswith(said) for fault in caught.value.faults] == [True]
 
 
+def test_a_bundled_device_is_no_study():
+    with pytest.raises(DeviceError, match=r"^five-bar: is a bundled device, not a study; .* device = .five-bar.,"):
+        read_study("five-bar")
+
+
 @pytest.mark.parametrize("hypercube", [False, True])
 def test_a_study_that_would_not_fit_is_refused_with_its_size(hypercube):
     span = {"range": [0.1, 0.2]} | ({} if hypercube else {"count": 10**6})
     more = {"sampling": "latin-hypercube", "count": 10**9} if hypercube else {}
     designs = "1000000000" if hypercube else "1000000000000"
     with pytest.raises(
-        TooLarge, match=rf"^{designs} designs of 1 measures would take .* GB of memory, .* lower a count"
+        TooLarge, match=rf"^{designs} designs of 1 measure would take .* GB of memory, .* lower a count"
     ):
         study(axis(RIGHT_LENGTH, **span), axis(LEFT_LENGTH, **span), **more)

@@ -121,8 +121,8 @@ def panel_ends(loop: Loop, held_port: Port) -> Floats:
     poles = np.abs(held_port.poles) * loop.period
     lowest = min(LOWEST, BELOW * float(np.min(poles[poles > SLOWEST], initial=1.0)))
     centre, width, turns = _singularities(loop, held_port)
-    seen = turns > 1e-3 * lowest
-    centre, width = centre[seen], np.maximum(width, 1e-9 * turns)[seen]
+    resolved = turns > 1e-3 * lowest
+    centre, width = centre[resolved], np.maximum(width, 1e-9 * turns)[resolved]
     steps = 2.0 ** np.arange(0, 31)
     across = width[:, None] * steps
     near = across < np.minimum(0.3, 0.5 * centre)[:, None]

@@ -1,4 +1,4 @@
-"""Virtual couplings k_c, b_c that keep a device stable, and the softest limit that a given wall needs."""
+"""Virtual couplings k_c, b_c that keep a device stable, and the stiffest through which one wall is stable."""
 
 from __future__ import annotations
 
@@ -94,11 +94,11 @@ class Couplings(Result):
     def __repr__(self) -> str:
         if self.reason is not None:
             return f"Couplings: none: {self.reason}"
-        told = "Couplings: " + ", ".join(f"{name} {stiffness_text(one)}" for name, one in self.regions.items())
+        text = "Couplings: " + ", ".join(f"{name} {stiffness_text(one)}" for name, one in self.regions.items())
         if self.limit is None:
-            return told
+            return text
         needed = f"at most {self.limit.stiffness:.6g} N/m" if self.limit.needed else "no coupling"
-        return f"{told}\n  the wall needs {needed}, felt {self.limit.felt_stiffness:.6g} N/m"
+        return f"{text}\n  the wall needs {needed}, felt {self.limit.felt_stiffness:.6g} N/m"
 
 
 def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None) -> Couplings:
@@ -164,9 +164,9 @@ def _excludes_springs(demand: Demand) -> bool:
     each spring fails below some angle. The couplings that pass on a grid of angles are then as small as the square
     of its lowest angle; they belong to the grid and not to the device.
     """
-    angles, asked = demand.angles, demand.conductance
+    angles, conductance = demand.angles, demand.conductance
     n = int(np.searchsorted(angles, 2.0 * angles[0]))
-    return bool(asked[0] > 0.0 and asked[n] < asked[0] * (angles[n] / angles[0]) ** LEAST_ORDER)
+    return bool(conductance[0] > 0.0 and conductance[n] < conductance[0] * (angles[n] / angles[0]) ** LEAST_ORDER)
 
 
 def _stiffest(reach: Callable[[Floats], Floats], near: float) -> float:
@@ -202,8 +202,8 @@ def softest_limit(demand: Demand, wall_stiffness: float, wall_damping: float, pe
         |a|^2 mu^2 + 2 Re(a* (x + q)) mu + |x|^2 + 2 Re(x* q) + |q|^2 - r^2 >= 0,     x = 1/Z_w
 
     and the best ratio b_c/k_c is searched for. At low angles |q| and r are many orders larger than what is left of
-    them, so that the power |q|^2 - r^2 is taken as it comes, and the root of a rising quadratic in the form that
-    subtracts nothing.
+    them, so that the power |q|^2 - r^2 is taken from `Demand.power`, and the root of a rising quadratic in the
+    form without a difference.
     """
     angles = demand.angles
     wall = 1.0 / coupling_impedance(wall_stiffness, wall_damping, angles, period)
@@ -215,10 +215,10 @@ def softest_limit(demand: Demand, wall_stiffness: float, wall_damping: float, pe
         a = 1.0 / coupling_impedance(np.cos(direction) / period, np.sin(direction), angles, period)
         lean, size = np.real(a.conj() * shown), np.abs(a) ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
-            under = lean**2 - size * power
-            root = np.sqrt(np.maximum(under, 0.0))
+            discriminant = lean**2 - size * power
+            root = np.sqrt(np.maximum(discriminant, 0.0))
             mu = np.where(lean > 0.0, -power / (lean + root), (root - lean) / size)
-            mu = np.where(under >= 0.0, mu, 0.0)
+            mu = np.where(discriminant >= 0.0, mu, 0.0)
             return np.asarray(1.0 / np.maximum(np.max(mu, axis=-1), 0.0))
 
     if not np.all(np.isfinite(demand.radius)):
@@ -240,8 +240,8 @@ def angle_grid(loop: Loop, held: Floats) -> Floats:
     from outside), folded into (0, pi).
     """
     plant = loop.plant
-    seen = (plant, hold_fixed(plant, held), hold_fixed(plant, plant.actuator))
-    poles = np.concatenate([port(one, one.actuator).poles for one in seen if one.size])
+    plants = (plant, hold_fixed(plant, held), hold_fixed(plant, plant.actuator))
+    poles = np.concatenate([port(one, one.actuator).poles for one in plants if one.size])
     poles = poles[poles.imag > 0.0] * loop.period
     turn = np.mod(poles.imag, 2.0 * np.pi)
     centre = np.where(turn > np.pi, 2.0 * np.pi - turn, turn)

@@ -107,16 +107,16 @@ class Aliases:
         direct, swing = _terms(self.loop, self.held_port, theta[:, None] / (2.0 * np.pi) + k)
         p, q, others = direct[:, self.near], swing[:, self.near], k != 0
         at = theta / np.pi
-        late = np.exp(-1j * theta * self.loop.whole_delay)
-        common = one_less_z_inverse(theta) * late * force_filter_response(self.loop, theta)
+        delay = np.exp(-1j * theta * self.loop.whole_delay)
+        common = one_less_z_inverse(theta) * delay * force_filter_response(self.loop, theta)
         with np.errstate(invalid="ignore"):
             c = (direct - swing)[:, others].sum(axis=1) + _interpolated(self.centre, at)
             r = np.abs(swing)[:, others].sum(axis=1) + _interpolated(self.radius, at).real
             centre, radius = common * (p - q + c), np.abs(common) * (np.abs(q) + r)
             power = np.abs(common) ** 2 * _power(p, q, c, r)
-        lost = ~np.isfinite(radius)
-        centre, radius = np.where(lost, 0.0, centre), np.where(lost, np.inf, radius)
-        return Disks(theta, centre, radius, np.where(lost, -np.inf, power))
+        unbounded = ~np.isfinite(radius)
+        centre, radius = np.where(unbounded, 0.0, centre), np.where(unbounded, np.inf, radius)
+        return Disks(theta, centre, radius, np.where(unbounded, -np.inf, power))
 
 
 def _power(p: Complexes, q: Complexes, c: Complexes, r: Floats) -> Floats:
@@ -125,11 +125,11 @@ def _power(p: Complexes, q: Complexes, c: Complexes, r: Floats) -> Floats:
     p - q and |q| are centre and radius of the lowest frequency's own disk: at low angles it is all but a half
     plane, |q| many orders larger than what is left.
     """
-    kept = np.abs(p) ** 2 - 2.0 * np.real(p * q.conj())
-    own = np.abs(p - q)
+    own_power = np.abs(p) ** 2 - 2.0 * np.real(p * q.conj())
+    own_centre = np.abs(p - q)
     mixed = 2.0 * np.real((p - q) * c.conj()) - 2.0 * np.abs(q) * r
-    power = kept + mixed + (np.abs(c) - r) * (np.abs(c) + r)
-    terms = np.abs(p) * (np.abs(p) + np.abs(q)) + own * np.abs(c) + np.abs(q) * r + np.abs(c) ** 2 + r**2
+    power = own_power + mixed + (np.abs(c) - r) * (np.abs(c) + r)
+    terms = np.abs(p) * (np.abs(p) + np.abs(q)) + own_centre * np.abs(c) + np.abs(q) * r + np.abs(c) ** 2 + r**2
     return np.where(np.abs(power) > ROUNDING * terms, power, 0.0)
 
 
@@ -153,12 +153,12 @@ def _terms(loop: Loop, held_port: Port, cycles: Floats) -> tuple[Complexes, Comp
     T = loop.period
     w = 2.0 * np.pi * cycles / T
     response = port_response(held_port, w)
-    moved = response.port_to_reading * response.actuator_to_port
+    coupling = response.port_to_reading * response.actuator_to_port
     weight = np.exp(-2j * np.pi * cycles * loop.fractional_delay) / T
     weight = weight / (1.0 + 1j * w * loop.controller.actuator_time_constant)
-    dead = ~(response.dissipation > 0.0) & (np.abs(moved) > 0.0)
+    dead = ~(response.dissipation > 0.0) & (np.abs(coupling) > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        swing = np.where(np.abs(moved) > 0.0, weight * moved / (2.0 * response.dissipation), 0.0)
+        swing = np.where(np.abs(coupling) > 0.0, weight * coupling / (2.0 * response.dissipation), 0.0)
     return weight * response.direct / (1j * w), np.where(dead, np.inf, swing)
 
 

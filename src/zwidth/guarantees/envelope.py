@@ -96,17 +96,17 @@ def touching_points(
         return []
     own, beside = pair[0].factors, pair[1].factors
     first, last = max(min(first, last), 1e-7), min(max(first, last), np.pi - 1e-7)
-    found = []
+    points = []
     for theta in _touches(own, beside, first, last, pieces):
         K, B, dK, dB = wall_at(own, 1.0, float(theta))
         unit = springs.unit
         z = complex(np.exp(1j * theta))
         left = 1.0 if velocity_response(own, z, z - 1.0)[0].imag > 0.0 else -1.0
         along = left * np.array([dK * unit, dB])
-        found.append(
+        points.append(
             TouchingPoint(share, float(theta), np.array([K * unit, B]), along / max(np.hypot(*along), 1e-300))
         )
-    return found
+    return points
 
 
 def nearest_touching_point(
@@ -114,9 +114,9 @@ def nearest_touching_point(
 ) -> TouchingPoint | None:
     """The touching point of a spring nearest to an angle, within reach of it."""
     for wide in reach * WINDOWS:
-        found = touching_points(springs, share, theta - wide, theta + wide, 8)
-        if found:
-            return min(found, key=lambda touch: abs(touch.theta - theta))
+        points = touching_points(springs, share, theta - wide, theta + wide, 8)
+        if points:
+            return min(points, key=lambda touch: abs(touch.theta - theta))
     return None
 
 
@@ -132,7 +132,8 @@ def envelope_between(
     """The envelope between two touching points where it is near a shape.
 
     Walks (n, 2), the stable side on their left, each with the shares of the springs at its ends. Where the
-    envelope does not join the points there is nothing, and a spring between joins the lost ones.
+    envelope does not join the points the list is empty, and the share of a spring between them is added to
+    `lost_shares`.
     """
     length = float(np.hypot(*(other.wall - one.wall)))
     if shapely.distance(shape, shapely.LineString([one.wall, other.wall])) > length:

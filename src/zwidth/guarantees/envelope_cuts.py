@@ -15,18 +15,18 @@ from zwidth.guarantees.spring_family import SpringFamily, polygons_of
 
 # In shares of the set's size: touching points further away do not matter, nor do sweeps wider than this.
 NEAR, WIDEST = 0.05, 0.05
-# From its touching points an envelope is followed to the next spring charted by these parts of the way (nothing is
-# known at first of how the angle moves), ...
+# Shares of the way from a touching point to the next charted spring by which an envelope is followed; short at
+# first, since it is not known yet how the angle moves.
 STEPS = (0.02, 0.15, 0.5, 1.0)
-# ... and there it is an envelope found already if its touching point is this near.
+# Angle [rad] within which a touching point reached in this way is one that is known already.
 SAME = 1e-6
-# Springs of a stretch, its ends' among them, of which one must make what it cuts off unstable.
+# Number of springs of a stretch, its ends included; one of them must make a part unstable for it to be cut off.
 PROBES = 7
 
 
 @dataclass(frozen=True)
 class EnvelopeCuts:
-    """The parts swept over that have been found so far; walls are [K unit, B].
+    """The parts known so far that springs between the charted ones sweep over; walls are [K unit, B].
 
     touching_points  touching points of each spring
     strips           parts of the shapes between the envelope and the arcs that it touches
@@ -59,16 +59,16 @@ class EnvelopeCuts:
 
     def _touching(self, share: float) -> list[TouchingPoint]:
         """Touching points on the edge of one spring's chart."""
-        member, found = self.springs.member(share), []
+        member, points = self.springs.member(share), []
         for arc in member.edge.arcs if member else ():
             if arc.curved:
-                found += touching_points(self.springs, share, arc.start, arc.end)
-        return found
+                points += touching_points(self.springs, share, arc.start, arc.end)
+        return points
 
     def _neighbours(
         self, binding: set[float], shares: Floats, shape: shapely.Geometry, near: float
     ) -> Iterator[tuple[TouchingPoint, TouchingPoint]]:
-        """Touching points of neighbouring springs on one envelope, each couple once."""
+        """Touching points of neighbouring springs on one envelope, each pair once."""
         for share in sorted(binding):
             at = int(np.searchsorted(shares, share))
             for touch in self.touching_points[share]:
@@ -81,14 +81,14 @@ class EnvelopeCuts:
                     if way in self.visited_pairs:
                         continue
                     self.visited_pairs.add(way)
-                    other = self._followed(touch, float(shares[place]))
+                    other = self._follow_envelope(touch, float(shares[place]))
                     first, last = sorted((touch, other), key=lambda end: end.share)
                     key = (first.share, round(first.theta, 6), last.share, round(last.theta, 6))
                     if first.share < last.share and key not in self.visited_pairs:
                         self.visited_pairs.add(key)
                         yield first, last
 
-    def _followed(self, start: TouchingPoint, share: float) -> TouchingPoint:
+    def _follow_envelope(self, start: TouchingPoint, share: float) -> TouchingPoint:
         """The envelope's touching point towards another spring: with it, or as near to it as the envelope goes."""
         before, now = start, start
         for part in STEPS:
@@ -114,7 +114,7 @@ def _strips(
     other: TouchingPoint,
     shape: shapely.Geometry,
     size: float,
-    lost: list[float],
+    lost_shares: list[float],
 ) -> list[shapely.Polygon]:
     """Parts of a shape in strips outside the envelope between two touching points.
 
@@ -129,7 +129,7 @@ def _strips(
     aside = max(abs(end.tangent[0] * gap[1] - end.tangent[1] * gap[0]) for end in (one, other))
     wide = min(2.0 * aside + 1e-4 * length, WIDEST * size)
     strips = []
-    for walk, first, last in envelope_between(springs, one, other, shape, size, lost):
+    for walk, first, last in envelope_between(springs, one, other, shape, size, lost_shares):
         along = np.gradient(walk, axis=0)
         along /= np.maximum(np.hypot(*along.T), 1e-300)[:, None]
         outwards = np.column_stack([along[:, 1], -along[:, 0]])

@@ -106,16 +106,16 @@ def find_guarantees(
     >>> from zwidth.model.plant import Plant
     >>> one = np.ones(1)
     >>> paddle = Plant(np.array([[0.03]]), np.array([[1.0]]), np.zeros((1, 1)), one, one, one)
-    >>> found = find_guarantees(Loop(paddle, Controller(sampling_period=0.001)))
-    >>> [guarantee.name for guarantee in found.guarantees]
+    >>> result = find_guarantees(Loop(paddle, Controller(sampling_period=0.001)))
+    >>> [guarantee.name for guarantee in result.guarantees]
     ['passive', 'spring-stable', 'nyquist-spring', 'stable']
     """
     require("loop", loop, Loop)
     plant = loop.plant
-    found = []
+    guarantees = []
     apart = plant.handle is None or not _same_place(plant.actuator, plant.handle)
     if apart:
-        found.append(
+        guarantees.append(
             Guarantee(
                 "passive-at-actuator",
                 "stable whatever passive linear operator holds the actuator",
@@ -123,42 +123,42 @@ def find_guarantees(
                 COLGATE,
             )
         )
-    held = plant.handle is not None
-    found.append(
+    has_handle = plant.handle is not None
+    guarantees.append(
         Guarantee(
             "passive",
             "stable whatever passive linear operator holds the handle",
-            passive_region(loop) if held else empty_region(NO_HANDLE),
+            passive_region(loop) if has_handle else empty_region(NO_HANDLE),
             COLGATE,
         )
     )
-    found.append(
+    guarantees.append(
         Guarantee(
             "spring-stable",
             "stable whatever spring holds the handle, from none to one that holds it fixed",
             _region_or_undecided(partial(spring_stable_region, progress=progress), loop)
-            if held
+            if has_handle
             else empty_region(NO_HANDLE),
             SPRINGS,
         )
     )
-    found.append(
+    guarantees.append(
         Guarantee(
             "nyquist-spring",
             "stable with the one spring that puts a mode at the Nyquist frequency",
-            _region_or_undecided(nyquist_region, loop) if held else empty_region(NO_HANDLE),
+            _region_or_undecided(nyquist_region, loop) if has_handle else empty_region(NO_HANDLE),
             SPRINGS,
         )
     )
     if robust is not None:
-        found.append(
+        guarantees.append(
             Guarantee("robust", "stable for a whole range of operators", region_of(robust), "robust chart")
         )
     chart = stability_chart(loop, decay=False)
     peak = chart.stiffness_max
     stable = Region(chart.regions, peak, chart.damping_at_stiffness_max, None if np.isfinite(peak) else NO_STABLE)
-    found.append(Guarantee("stable", "stable with the device as described", stable, EXACT))
-    return Guarantees(loop, tuple(found), chart)
+    guarantees.append(Guarantee("stable", "stable with the device as described", stable, EXACT))
+    return Guarantees(loop, tuple(guarantees), chart)
 
 
 def guarantees_of(
@@ -179,11 +179,11 @@ def guarantees_of(
     if wall is not None:
         _check_wall(wall)
     loop = point.without_operator.loop
-    found = find_guarantees(loop, progress=progress)
+    guarantees = find_guarantees(loop, progress=progress)
     if not coupling and wall is None:
-        return found
+        return guarantees
     handle = loop.plant.handle
-    return replace(found, couplings=without_handle() if handle is None else couplings(loop, handle, wall))
+    return replace(guarantees, couplings=without_handle() if handle is None else couplings(loop, handle, wall))
 
 
 def _check_wall(wall: object) -> None:

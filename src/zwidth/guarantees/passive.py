@@ -42,7 +42,8 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     """The walls that are stable whatever passive linear operator holds the device.
 
     loop  the device without operator; an operator attached to the plant counts as a part of the device
-    held  (n,) where the operator holds it; left out: the plant's handle
+    held  (n,) coordinate held . x at which the operator holds it; left out: the plant's handle
+    Raises  ValueError  where `held` is left out and the plant has no handle
 
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant
@@ -54,7 +55,7 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     require("loop", loop, Loop)
     held = loop.plant.handle if held is None else held
     if held is None:
-        raise ValueError("the plant has no handle: say with `held` where the operator holds it")
+        raise ValueError("the plant has no handle; give `held`, the coordinate at which the operator holds it")
     loop_gauge = gauge(loop, held)
     directions, ends = _outline(loop_gauge, loop.period)
     if not np.any(ends):
@@ -76,50 +77,51 @@ def _walls(directions: Floats, reach: Floats, period: float) -> tuple[Floats, Fl
     return reach * np.cos(directions) / period, reach * np.sin(directions)
 
 
-def _mu(found: Gauge, directions: Floats, period: float) -> Floats:
+def _mu(loop_gauge: Gauge, directions: Floats, period: float) -> Floats:
     """mu of walls at reach 1 along directions (k,): 1 over the length of each ray [1/(N s/m)]."""
-    return found.largest(*_walls(directions, np.ones(len(directions)), period))[0]
+    return loop_gauge.largest(*_walls(directions, np.ones(len(directions)), period))[0]
 
 
-def _ends(found: Gauge, directions: Floats, period: float) -> Complexes:
-    """Where rays end (k,): K T + j B; 0 where they fail at once."""
-    return np.asarray(np.exp(1j * directions) / np.maximum(_mu(found, directions, period), UNLIMITED))
+def _ends(loop_gauge: Gauge, directions: Floats, period: float) -> Complexes:
+    """Ends of the rays of passive walls along directions (k,): K T + j B [N s/m]; 0 where no wall is passive."""
+    return np.asarray(np.exp(1j * directions) / np.maximum(_mu(loop_gauge, directions, period), UNLIMITED))
 
 
-def _outline(found: Gauge, period: float) -> tuple[Floats, Complexes]:
-    """Directions (k,) once round and where rays end, K T + j B (k,), bisected until chords follow the outline.
+def _outline(loop_gauge: Gauge, period: float) -> tuple[Floats, Complexes]:
+    """Directions (k,) all around and the ends of their rays, K T + j B (k,), bisected until chords follow the
+    outline.
 
     Lightly damped modes cut narrow notches: directions in which an angle forbids walls of a chord are added.
     """
     directions = np.linspace(-np.pi, np.pi, 241)
-    ends = _ends(found, directions, period)
+    ends = _ends(loop_gauge, directions, period)
     left = np.arange(len(directions) - 1)
     for _ in range(ROUNDS):
         for _ in range(BISECTIONS):
             if not len(left):
                 break
             middle = (directions[left] + directions[left + 1]) / 2.0
-            between = _ends(found, middle, period)
+            between = _ends(loop_gauge, middle, period)
             off = _off_chord(between, ends[left], ends[left + 1])
             directions, ends = np.insert(directions, left + 1, middle), np.insert(ends, left + 1, between)
             left = (left + np.arange(len(left)))[off]
             left = np.sort(np.concatenate([left, left + 1]))
-        bites = _missed_directions(found, directions, ends, period)
-        if not len(bites):
+        missed = _missed_directions(loop_gauge, directions, ends, period)
+        if not len(missed):
             break
-        at = np.searchsorted(directions, bites)
-        directions = np.insert(directions, at, bites)
-        ends = np.insert(ends, at, _ends(found, bites, period))
-        at += np.arange(len(bites))
+        at = np.searchsorted(directions, missed)
+        directions = np.insert(directions, at, missed)
+        ends = np.insert(ends, at, _ends(loop_gauge, missed, period))
+        at += np.arange(len(missed))
         left = np.unique(np.concatenate([at - 1, at]))
     return directions, ends
 
 
-def _missed_directions(found: Gauge, directions: Floats, ends: Complexes, period: float) -> Floats:
+def _missed_directions(loop_gauge: Gauge, directions: Floats, ends: Complexes, period: float) -> Floats:
     """Directions in which an angle forbids walls inside the outline's chords, where they lie deepest inside."""
-    if found.conics is None:
+    if loop_gauge.conics is None:
         return np.zeros(0)
-    tip = found.conics.tips(period)
+    tip = loop_gauge.conics.tips(period)
     right = np.clip(np.searchsorted(directions, np.angle(tip)), 1, len(directions) - 1)
     first, last = ends[right - 1], ends[right]
     along = last - first
@@ -139,20 +141,20 @@ def _off_chord(between: Complexes, first: Complexes, last: Complexes) -> NDArray
     return np.asarray((np.abs(inwards) > allowed) | ((first == 0.0) != (last == 0.0)))
 
 
-def _stiffest(found: Gauge, period: float, low: float, high: float) -> tuple[float, float]:
+def _stiffest(loop_gauge: Gauge, period: float, low: float, high: float) -> tuple[float, float]:
     """The largest K between two directions and its B."""
-    top = np.array([_golden(found, period, low, high)])
-    K, B = _walls(top, 1.0 / _mu(found, top, period), period)
+    top = np.array([_golden(loop_gauge, period, low, high)])
+    K, B = _walls(top, 1.0 / _mu(loop_gauge, top, period), period)
     return float(K[0]), float(B[0])
 
 
-def _golden(found: Gauge, period: float, low: float, high: float) -> float:
+def _golden(loop_gauge: Gauge, period: float, low: float, high: float) -> float:
     """The direction of the largest K in an interval in which it has one maximum; the least B of equal ones."""
     ratio = (np.sqrt(5.0) - 1.0) / 2.0
     ends = (low, high)
 
     def stiffness(direction: float) -> float:
-        return float(np.cos(direction) / _mu(found, np.array([direction]), period)[0])
+        return float(np.cos(direction) / _mu(loop_gauge, np.array([direction]), period)[0])
 
     a, b = high - ratio * (high - low), low + ratio * (high - low)
     at_a, at_b = stiffness(a), stiffness(b)

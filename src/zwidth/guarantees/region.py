@@ -70,7 +70,7 @@ class Region(Result):
 def stiffness_text(region: Region) -> str:
     """A region's largest stiffness as text.
 
-    >>> stiffness_text(Region((), 2000.0, 0.5)), stiffness_text(empty_region("for want of friction"))
+    >>> stiffness_text(Region((), 2000.0, 0.5)), stiffness_text(empty_region("nothing dissipates"))
     ('2000 N/m', 'none')
     """
     return "none" if region.reason is not None else f"{region.stiffness_max:.6g} N/m"
@@ -92,7 +92,7 @@ def outline_columns(regions: Mapping[str, Region], name_column: str) -> dict[str
 
 
 def empty_region(reason: str) -> Region:
-    """A region without walls, for a reason."""
+    """A region without walls; `reason` says why."""
     return Region((), float("nan"), float("nan"), reason)
 
 
@@ -105,5 +105,5 @@ def rings_of(shape: Any) -> tuple[Floats, ...]:
 
 def stiffest_corner(rings: Iterable[Floats]) -> tuple[float, float]:
     """Largest K over the rings within K > 0, B >= 0, and its B; nan where there is none."""
-    found = find_peak(Arcs.chords(list(rings)), (), 0.0)
-    return (found.stiffness, found.damping) if found else (float("nan"), float("nan"))
+    peak = find_peak(Arcs.chords(list(rings)), (), 0.0)
+    return (peak.stiffness, peak.damping) if peak else (float("nan"), float("nan"))

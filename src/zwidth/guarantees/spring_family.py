@@ -80,40 +80,41 @@ class SpringFamily:
     def unit(self) -> float:
         """Time [s] by which K is multiplied, so that K unit and B have similar size in distances."""
         T = self.loop.period
-        some = [member_polygons(m, T) for share in (0.0, 0.45, 1.0) if (m := self.member(share)) is not None]
-        left, low, right, high = shapely.intersection_all(some).bounds if some else (np.nan,) * 4
+        shapes = [member_polygons(m, T) for share in (0.0, 0.45, 1.0) if (m := self.member(share)) is not None]
+        left, low, right, high = shapely.intersection_all(shapes).bounds if shapes else (np.nan,) * 4
         return float(T * (high - low) / (right - left)) if right > left else T
 
     def stiffness(self, share: float) -> float:
-        """k [N/m]."""
+        """Stiffness k of the spring with a share s [N/m]; inf for s = 1."""
         return self.reference_stiffness * share / (1.0 - share) if share < 1.0 else float("inf")
 
     def shares(self, stiffness: Floats) -> Floats:
-        """s of springs k (n,)."""
+        """Shares s (n,) of springs k (n,) [N/m]."""
         with np.errstate(invalid="ignore"):
             return np.where(np.isinf(stiffness), 1.0, stiffness / (stiffness + self.reference_stiffness))
 
     def tracer(self, share: float) -> Tracer | None:
-        """The loop with that spring; None where the wall then moves nothing, which is stable."""
+        """Tracer of the loop with that spring; None where the wall then moves nothing: every wall is stable."""
         if share not in self._tracers:
-            self._tracers[share] = self._traced(share)
+            self._tracers[share] = self._trace(share)
         return self._tracers[share]
 
-    def _traced(self, share: float) -> Tracer | None:
+    def _trace(self, share: float) -> Tracer | None:
+        """`tracer`, computed anew."""
         plant = with_spring(self.loop.plant, self.stiffness(share))
         if plant.size == 0:
             return None
-        found = Loop(plant, self.loop.controller)
+        loop = Loop(plant, self.loop.controller)
         try:
-            return Tracer.of(found) if len(found.sections.rows) else None
+            return Tracer.of(loop) if len(loop.sections.rows) else None
         except UnmovedError:
             return None
 
     def neighbour_pair(self, share: float) -> tuple[Tracer, Tracer] | None:
-        """The loop with that spring and with a slightly stiffer one, softer at the end of all."""
+        """Tracers of the loop with that spring and with a slightly stiffer one, a softer one where s is 1."""
         if share not in self._beside:
             step = STEP * share * (1.0 - share) or (STEP_AT_ENDS if share == 0.0 else -STEP_AT_ENDS)
-            self._beside[share] = self._traced(share + step)
+            self._beside[share] = self._trace(share + step)
         one, other = self.tracer(share), self._beside[share]
         return None if one is None or other is None else (one, other)
 
@@ -139,5 +140,5 @@ class SpringFamily:
 
 def polygons_of(shape: shapely.Geometry) -> list[shapely.Polygon]:
     """The polygons of a geometry."""
-    found = shapely.get_parts(shapely.get_parts(shape))
-    return [part for part in found if isinstance(part, shapely.Polygon) and part.area > 0.0]
+    parts = shapely.get_parts(shapely.get_parts(shape))
+    return [part for part in parts if isinstance(part, shapely.Polygon) and part.area > 0.0]

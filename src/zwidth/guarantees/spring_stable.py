@@ -20,27 +20,33 @@ from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
 
-# Springs charted first, by the frequency of the mode they make: so many, up to so many times Nyquist's.
+# Number of springs charted first, spread by the frequency of the mode that each makes; and the highest of these
+# frequencies over the Nyquist frequency.
 SPRINGS, BEYOND = 27, 6.0
-# Springs that walls at the edge are tried with, how many walls, and rounds of charting the springs that fail.
+# Number of springs with which walls at the edge are tried; number of these walls; largest number of rounds in
+# which springs that make such a wall unstable are charted, too.
 TRIED, WALLS, ROUNDS = 90, 600, 10
-# Springs whose mode looks, sampled, like the vibration at the edge are tried too: to so many times the sampling
-# rate, and this far beside it.
+# Springs whose mode has an alias at a vibration of the edge are tried, too: aliases up to so many times the
+# sampling rate, modes this share of their frequency beside them, and vibrations of so many arcs at most.
 ALIASES, BESIDE, VIBRATIONS = 2, np.array([-0.003, -0.0003, 0.0003, 0.003]), 12
-# Springs are looked through for two modes of one alias: so many, as far as a mode at so many times Nyquist's.
+# Number of springs whose modes are computed to find two modes of one alias; and the frequency of the stiffest
+# one's mode over the Nyquist frequency.
 MODES_AT, FARTHEST = 6000, 16.0
-# Springs between those that bind are tried too, at these parts of the way.
+# Springs between a binding one and its neighbours are tried, too, at these shares of the way.
 BETWEEN = np.arange(1, 6) / 6.0
-# Places of the edge are chosen anew each round, by the golden section, and so many rounds must find nothing.
+# Each round takes the vibrations at other places of the arcs, by the golden section; the search ends after so many
+# rounds in a row in which no spring fails.
 GOLDEN, CLEAN = 0.6180339887, 2
-# Springs near a multiple of Nyquist's are looked at between these parts of its frequency; a mode so much stronger
-# there than at these is not damped.
+# The spring that brings a root to -1 most easily is searched for between these shares of each multiple of the
+# Nyquist frequency. A distance below DOUBLE times the lesser one at the ends means a mode without damping; FAR
+# [N/m] stands for no root at -1 at all.
 AROUND, DOUBLE, FAR = np.array([0.95, 1.05]), 1e-5, 1e200
-# How far inside the edge walls are tried, in shares of the set's size; and the most springs that join in a round.
+# Distance inside the edge at which walls are tried, in shares of the set's size; and the largest number of springs
+# that are added in a round.
 INSIDE, JOINING = 1e-5, 12
-# A cell smaller than this share of the whole is a crumb that strips have left between them.
+# A cell smaller than this share of the whole is a remnant between two cut-off strips, and is dropped.
 CRUMB = 1e-6
-# Rounds after which a cell goes of which no wall tried is stable.
+# Number of rounds after which a cell is dropped if none of its walls that were tried is stable with every spring.
 LATE = 4
 NOTHING = "no wall at all is stable with every spring at the handle"
 NO_SPRING = "no wall with K > 0 and B >= 0 is stable with every spring at the handle"
@@ -159,7 +165,7 @@ def _alternating(springs: SpringFamily) -> Floats:
     """
     nyquist = np.pi / springs.loop.period
     multiples = nyquist * np.arange(1.0, ALIASES + 2.0)
-    found = []
+    shares = []
     around = springs.shares(spring_for(springs.loop.plant, np.outer(multiples, AROUND).ravel())).reshape(-1, 2)
     for ends in np.sort(around):
         if 0.0 < ends[0] < ends[1] < 1.0:
@@ -171,8 +177,8 @@ def _alternating(springs: SpringFamily) -> Floats:
             )
             # the double root that an undamped mode has there takes long to chart, and its neighbours tell as much
             if best.fun > DOUBLE * min(_distance(springs, float(end)) for end in ends):
-                found.append(float(best.x))
-    return np.array(found)
+                shares.append(float(best.x))
+    return np.array(shares)
 
 
 def _distance(springs: SpringFamily, share: float) -> float:
@@ -183,7 +189,7 @@ def _distance(springs: SpringFamily, share: float) -> float:
 
 
 def _spread(shares: Floats) -> Floats:
-    """The same in an order that is coarse first: what leaves nothing shows early."""
+    """The same shares, coarsely spread ones first, so that springs that leave no wall are charted early."""
     order: list[int] = []
     for step in 2 ** np.arange(6)[::-1]:
         order += [i for i in range(0, len(shares), int(step)) if i not in order]
@@ -238,11 +244,11 @@ def _cells_and_failing(
     bad = np.split(
         springs.unstable(np.vstack(walls), tried), np.cumsum([len(some) for some in walls])[:-1], axis=1
     )
-    kept = [k for k in range(len(cells)) if not (late and bad[k].any(axis=0).all())]
-    count = sum((bad[k].sum(axis=1) for k in kept), np.zeros(len(tried), dtype=int))
+    stable_cells = [k for k in range(len(cells)) if not (late and bad[k].any(axis=0).all())]
+    count = sum((bad[k].sum(axis=1) for k in stable_cells), np.zeros(len(tried), dtype=int))
     worst = [i for i in range(len(tried)) if count[i] and count[i] == count[max(i - 1, 0) : i + 2].max()]
     worst = sorted(worst, key=lambda i: -count[i])[:JOINING]
-    return shapely.MultiPolygon([cells[k] for k in kept]), np.asarray(tried[np.array(worst, dtype=int)])
+    return shapely.MultiPolygon([cells[k] for k in stable_cells]), np.asarray(tried[np.array(worst, dtype=int)])
 
 
 def _walls(cell: shapely.Polygon, depth: float) -> Floats:
@@ -256,8 +262,8 @@ def _spread_corners(ring: Floats) -> Floats:
     """Corners of a ring spread evenly along it, the stiffest among them (k, 2)."""
     size = np.maximum(np.ptp(ring, axis=0), 1e-300)
     along = np.append(0.0, np.cumsum(np.hypot(*(np.diff(ring, axis=0) / size).T)))
-    picked = np.searchsorted(along, np.linspace(0.0, along[-1], WALLS, endpoint=False))
-    return np.asarray(ring[np.union1d(picked, [np.argmax(ring[:, 0])])])
+    corners = np.searchsorted(along, np.linspace(0.0, along[-1], WALLS, endpoint=False))
+    return np.asarray(ring[np.union1d(corners, [np.argmax(ring[:, 0])])])
 
 
 def _springs_between(members: dict[float, Member], edge: Edge) -> Floats:
@@ -270,7 +276,7 @@ def _springs_between(members: dict[float, Member], edge: Edge) -> Floats:
 
 
 def _springs_alike_at_edge(springs: SpringFamily, edge: Edge, turn: int) -> Floats:
-    """Shares of springs whose mode has an alias just beside vibrations at the edge, at other places each turn."""
+    """Shares of springs whose mode has an alias just beside vibrations at the edge, at other places each round."""
     ends = np.array([(arc.start, arc.end) for _, arc in edge if arc.curved]).reshape(-1, 2)
     ends = ends[np.unique(np.linspace(0, len(ends) - 1, VIBRATIONS).astype(int))] if len(ends) else ends
     theta = ends[:, 0] + (0.5 + GOLDEN * turn) % 1.0 * (ends[:, 1] - ends[:, 0])

@@ -115,5 +115,5 @@ def allows(demand: Demand, stiffness: ArrayLike, damping: ArrayLike, period: flo
     """Whether couplings k_c, b_c (...) meet a demand at all its angles."""
     Z = coupling_impedance(stiffness, damping, demand.angles, period)
     with np.errstate(divide="ignore", invalid="ignore"):
-        given = np.where(Z == 0.0, np.inf, Z.real / np.abs(Z) ** 2)
-    return np.asarray(np.all(given >= demand.conductance, axis=-1))
+        conductance = np.where(Z == 0.0, np.inf, Z.real / np.abs(Z) ** 2)
+    return np.asarray(np.all(conductance >= demand.conductance, axis=-1))

@@ -92,13 +92,13 @@ def structural_distortion(plant: Plant, frequency: float) -> float:
     # the ripple of a plateau is rounding
     tops = (here >= left) & (here >= right) & (here > (1.0 + 1e-9) * np.minimum(left, right))
     for i in np.flatnonzero(tops & (here >= 0.5 * best)) + 1:
-        found = minimize_scalar(
+        refined = minimize_scalar(
             lambda w: -float(np.abs(fixed_plant.deformation(np.array(w)))),
             bounds=(frequencies[i - 1], frequencies[i + 1]),
             method="bounded",
             options={"xatol": 1e-9 * top},
         )
-        best = max(best, -float(found.fun))
+        best = max(best, -float(refined.fun))
     return best
 
 
@@ -131,10 +131,10 @@ class _FixedActuatorPlant:
         push = s**2 * self.push[0] + s * self.push[1] + self.push[2] + 1j * self.loss_push
         inner = s[..., None] ** 2 * np.eye(len(self.squared_frequencies)) + s[..., None] * self.damping
         inner = inner + np.diag(self.squared_frequencies) + 1j * self.loss
-        for along, damping, lag, moved in self.dampers:
+        for along, damping, lag, actuator_share in self.dampers:
             lagged = damping * s / (1.0 + s * lag)
             inner = inner + lagged[..., None] * np.outer(along, along)
-            push = push + lagged * moved * along
+            push = push + lagged * actuator_share * along
         return np.asarray(self.static - _solve(inner, push) @ self.mode_deformations)
 
     @property

@@ -109,7 +109,10 @@ def damping_ratios(plant: Plant) -> list[float | None] | None:
     L = np.zeros_like(plant.stiffness) if plant.hysteresis is None else plant.hysteresis
     loss = np.einsum("ij,ik,kj->j", modes.shapes, L, modes.shapes)
     each = zip(modes.decay.tolist(), loss.tolist(), modes.frequency_squared.tolist(), strict=True)
-    return [a / squared**0.5 + lost / (2.0 * squared) if squared > 0.0 else None for a, lost, squared in each]
+    return [
+        a / squared**0.5 + modal_loss / (2.0 * squared) if squared > 0.0 else None
+        for a, modal_loss, squared in each
+    ]
 
 
 def entries(document: Mapping[str, Any]) -> dict[str, list[Any]]:

@@ -121,10 +121,10 @@ def eigenvalue_paths(matrix_at: Callable[[float], ArrayLike], values: ArrayLike)
     Raises     PathError   where the number of eigenvalues changes, or a matrix is not finite
                ValueError  for values that neither rise nor fall
 
-    >>> found = eigenvalue_paths(lambda a: [[0.0, 1.0], [-a, 1.0]], [0.0, 1.2])    # z^2 - z + a
-    >>> found.spectral_radius[found.requested].round(6).tolist()
+    >>> paths = eigenvalue_paths(lambda a: [[0.0, 1.0], [-a, 1.0]], [0.0, 1.2])    # z^2 - z + a
+    >>> paths.spectral_radius[paths.requested].round(6).tolist()
     [1.0, 1.095445]
-    >>> [(round(c.value, 9), c.outwards) for c in found.crossings]                 # both of the pair, at a = 1
+    >>> [(round(c.value, 9), c.outwards) for c in paths.crossings]                 # both of the pair, at a = 1
     [(1.0, True), (1.0, True)]
     """
     requested = np.asarray(values, dtype=np.float64)
@@ -132,8 +132,8 @@ def eigenvalue_paths(matrix_at: Callable[[float], ArrayLike], values: ArrayLike)
     if requested.ndim != 1 or len(requested) < 2 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise ValueError("values must be at least two numbers in rising or falling order")
     walk = _PathTracer(matrix_at, requested)
-    crossings = [found for path in range(walk.z.shape[1]) for found in walk.crossings(path)]
-    crossings.sort(key=lambda found: (found.value, found.path), reverse=bool(steps[0] < 0.0))
+    crossings = [crossing for path in range(walk.z.shape[1]) for crossing in walk.crossings(path)]
+    crossings.sort(key=lambda crossing: (crossing.value, crossing.path), reverse=bool(steps[0] < 0.0))
     return EigenvaluePaths(walk.values, np.isin(walk.values, requested), walk.z, tuple(crossings))
 
 
@@ -143,7 +143,8 @@ def loop_paths(
     """Eigenvalues of one wall's transition matrix while the loop changes: a mass, a delay, any number of the file.
 
     loop_at  value -> loop
-    The other arguments and what is raised are those of `eigenvalue_paths`.
+    wall_stiffness, wall_damping  K [N/m] and B [N s/m] of the wall
+    values, and what is raised    as for `eigenvalue_paths`
     """
     return eigenvalue_paths(lambda value: loop_at(value).transition_matrix(wall_stiffness, wall_damping), values)
 
@@ -151,10 +152,10 @@ def loop_paths(
 def wall_paths(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> EigenvaluePaths:
     """Eigenvalues of one loop along a straight line of walls, from the first to the last (thesis Fig. 5.10).
 
-    wall_stiffness  K [N/m], and
-    wall_damping    B [N s/m]: one of them (k,) and rising or falling, the other one number
-    Returns         values are those of K or B
-    Raises          ValueError  unless just one of them is a row, and all are finite
+    wall_stiffness  K [N/m]
+    wall_damping    B [N s/m]; one of the two is a list (k,), rising or falling, the other one number
+    Returns         paths over the values of the list
+    Raises          ValueError  unless exactly one of them is a list, and all are finite
 
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant
@@ -213,13 +214,13 @@ class _PathTracer:
         """Crossings of the unit circle by one path; a path that only comes near the circle has none."""
         height = np.abs(self.z[:, path]) - 1.0
         off = np.flatnonzero(np.abs(height) > BAND)
-        found = []
+        crossings = []
         for i, j in pairwise(off.tolist()):
             if height[i] * height[j] < 0.0:
                 # of the steps between, all but one end in the band
                 at = i + int(np.argmax(height[i + 1 : j + 1] * height[j] > 0.0))
-                found.append(self.crossing(path, at, bool(height[j] > 0.0)))
-        return found
+                crossings.append(self.crossing(path, at, bool(height[j] > 0.0)))
+        return crossings
 
     def crossing(self, path: int, at: int, outwards: bool) -> Crossing:
         """The crossing between step `at` and the next, by Brent's method (1973)."""

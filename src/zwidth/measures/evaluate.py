@@ -41,8 +41,9 @@ NO_VALUE_ERRORS = (NoValueError, ModelError, UnmovedError, HysteresisError, Nonl
 def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
     """A measure's values at all points, nan with a status where it has none.
 
-    What a measure raises, or returns in another shape, at one point is that point's status FAILED with a note: the
-    others keep their values.
+    Where the measure's function raises an error at a point, or returns something else than a number, that point
+    has the status FAILED and a note; the others keep their values.
+
     Raises  MeasureError  where this device does not have the measure at any point
     """
     require("measure", measure, Measure)
@@ -50,16 +51,16 @@ def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
     if measure.each:
         return evaluate_pointwise(measure.compute, point)
     try:
-        found = measure.compute(point)
+        result = measure.compute(point)
     except MeasureError:
         raise
     except NoMechanismError:
         raise MeasureError(NO_MECHANISM) from None
     except FAILURES as error:
         return _same_status(point, FAILED, _error_text(error))
-    if isinstance(found, MeasureValues):
-        return found
-    values = np.asarray(found)
+    if isinstance(result, MeasureValues):
+        return result
+    values = np.asarray(result)
     if values.shape != point.shape:
         return _same_status(
             point, FAILED, f"returned an array of shape {values.shape} for points of {point.shape}"
@@ -102,6 +103,7 @@ def with_status(
 
 
 def _same_status(point: OperatingPoint, status: int, reason: str) -> MeasureValues:
+    """No value at any point: those that are OK have this status and reason."""
     failed = point.status == OK
     notes = (_note(failed, status, reason),) if failed.any() else ()
     return MeasureValues(
@@ -127,18 +129,18 @@ def evaluate_pointwise(compute: Callable[[OperatingPoint], Any], point: Operatin
 
 def notes_of_points(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, ...]:
     """Notes from the status and reason of each point without value, in the order of the points."""
-    seen: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
+    by_reason: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
     for index, key in why.items():
-        count, first = seen.get(key, (0, index))
-        seen[key] = (count + 1, first)
-    return tuple(Note(*key, *rest) for key, rest in seen.items())
+        count, first = by_reason.get(key, (0, index))
+        by_reason[key] = (count + 1, first)
+    return tuple(Note(*key, *rest) for key, rest in by_reason.items())
 
 
 def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
     """Value, status and reason of one call; only a MeasureError is raised."""
     try:
-        found = compute()
-        value = np.asarray(found)
+        result = compute()
+        value = np.asarray(result)
     except MeasureError:
         raise
     except NoMechanismError:
@@ -152,11 +154,11 @@ def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
     if value.shape != ():
         return float("nan"), FAILED, f"returned an array of shape {value.shape} instead of one number"
     if value.dtype.kind not in NUMBERS:
-        return float("nan"), FAILED, f"returned {repr(found)[:60]} instead of a number"
+        return float("nan"), FAILED, f"returned {repr(result)[:60]} instead of a number"
     if np.isnan(value):
         return float("nan"), NO_VALUE, "has no value here"
     return float(value), OK, ""
 
 
 def _error_text(error: BaseException) -> str:
-    return f"raised {type(error).__name__}: {str(error).splitlines()[0] if str(error) else 'without a word'}"
+    return f"raised {type(error).__name__}: {str(error).splitlines()[0] if str(error) else 'without a message'}"

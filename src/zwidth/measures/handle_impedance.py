@@ -10,7 +10,7 @@ part at w itself is U times
 
     H = F(z) e^{-jw delay} (1 - e^{-jwT})/(jwT) / (1 + jw tau)
 
-Its other parts, at w + 2 pi n/T, move the sensor too, and the samples cannot tell:
+Its other parts, at w + 2 pi n/T, move the sensor too, and samples do not distinguish them:
 
     Y = s^T x + S U,      S = P(z) - H s^T D^-1 a,      D = -w^2 M + jw B + K + lagged dampers
 
@@ -58,8 +58,8 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
     Raises     HandleError  where the plant has no handle
                ValueError   for a frequency out of range
 
-    A mass of 0.1 kg at 1 Hz feels like its wall, of 1000 N/m and 1 N s/m, but for its inertia (and the sample that
-    hold and difference are late by):
+    A mass of 0.1 kg at 1 Hz feels like its wall, of 1000 N/m and 1 N s/m, less its inertia (and the delay of hold
+    and backward difference, one sample):
 
     >>> from zwidth.loop.controller import Controller
     >>> one, none = np.ones(1), np.zeros((1, 1))
@@ -145,9 +145,9 @@ def free_motion_mass(plant: Plant) -> float:
     nan where a spring ties the handle to the ground, since a stiffness is felt then.
     """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
-    moved = shapes.T @ handle_of(plant)
-    mobility = float(np.sum(moved[squared == 0.0] ** 2))
-    return 1.0 / mobility if mobility > FREE * float(moved @ moved) else float("nan")
+    modal_handle = shapes.T @ handle_of(plant)
+    mobility = float(np.sum(modal_handle[squared == 0.0] ** 2))
+    return 1.0 / mobility if mobility > FREE * float(modal_handle @ modal_handle) else float("nan")
 
 
 def handle_of(plant: Plant) -> Floats:
@@ -207,7 +207,7 @@ def _stiffness(A: Floats, h: Floats) -> Floats:
     scale = np.linalg.norm(h)
     is_free = np.any(small & ((np.abs(into) > 1e-6 * scale) | (np.abs(out) > 1e-6 * scale)), axis=-1)
     compliance = np.sum(np.where(small, 0.0, into * out / np.where(small, 1.0, size)), axis=-1)
-    # what is left of h held still is rounding
+    # a compliance that is only rounding is 0: the handle is held still
     whole = np.sum(np.where(small, 0.0, np.abs(into * out) / np.where(small, 1.0, size)), axis=-1)
     compliance = np.where(np.abs(compliance) <= 1e-14 * whole, 0.0, compliance)
     with np.errstate(divide="ignore"):

@@ -115,9 +115,9 @@ def scaled_jacobian(jacobian: ArrayLike, largest_velocities: ArrayLike, largest_
     """
     J = np.asarray(jacobian, dtype=np.float64)
     task, joint = (np.asarray(v, dtype=np.float64) for v in (largest_velocities, largest_rates))
-    for name, given in (("largest_velocities", task), ("largest_rates", joint)):
-        if np.any(given <= 0.0):
-            raise ValueError(f"{name} must be greater than 0, got {float(np.min(given)):.6g}")
+    for name, values in (("largest_velocities", task), ("largest_rates", joint)):
+        if np.any(values <= 0.0):
+            raise ValueError(f"{name} must be greater than 0, got {float(np.min(values)):.6g}")
     return np.asarray(J * joint[..., None, :] / task[..., :, None])
 
 
@@ -125,8 +125,8 @@ def _powers(J: Floats, rotations: Sequence[int], prismatic: Sequence[int]) -> Fl
     """Power of the length by which each entry is multiplied, (m, n)."""
     if J.ndim < 2:
         raise ValueError(f"a Jacobian is a matrix, got an array of shape {J.shape}")
-    for name, given, count in (("rotations", rotations, J.shape[-2]), ("prismatic", prismatic, J.shape[-1])):
-        wrong = [index for index in given if not 0 <= index < count]
+    for name, indices, count in (("rotations", rotations, J.shape[-2]), ("prismatic", prismatic, J.shape[-1])):
+        wrong = [index for index in indices if not 0 <= index < count]
         if wrong:
             raise ValueError(f"{name} must be from 0 to {count - 1}, got {wrong[0]}")
     power = np.zeros(J.shape[-2:])

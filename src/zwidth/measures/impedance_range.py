@@ -7,7 +7,7 @@ readings, unfiltered:
     motor side m on the structure's spring k       (4.43), (5.7), (5.8), no delay          `sprung_range`
 
 Everything else (damping, several masses, filters, other estimators, part of a sample of delay) has its exact chart
-only. Both are exact within what they assume: no W = sqrt(k/m) T is too large, aliasing included. (5.5), whose
+only. Both are exact where their assumptions hold: no W = sqrt(k/m) T is too large, aliasing included. (5.5), whose
 coefficient the scan has lost, is (12 - 16 ln 2) m^2/T^3; (5.7) is extended beyond W = pi; (5.8), damaged in the
 scan, is read with ln(1 + c). (4.46), the largest damping of all stable K, at K = -k, is not used: here it is that
 of K -> 0. The numbers below (4.32) in the thesis are a misprint: they are those without delay.
@@ -54,8 +54,8 @@ def rigid_range(mass: ArrayLike, sampling_period: ArrayLike, delay_samples: Arra
     delay_samples    (...)  l
     Returns          (...)  all broadcast; nan where m or T is not positive and finite, or l not whole and >= 0
 
-    >>> found = rigid_range([0.2616, 0.287], 0.00125)
-    >>> found.stiffness_max.round(1).tolist(), found.damping_max.round(2).tolist()
+    >>> free = rigid_range([0.2616, 0.287], 0.00125)
+    >>> free.stiffness_max.round(1).tolist(), free.damping_max.round(2).tolist()
     ([114901.7, 126058.0], [418.56, 459.2])
     >>> rigid_range(0.287, 0.00125, [1.0, 0.5]).stiffness_max.round(1).tolist()
     [26536.1, nan]
@@ -82,8 +82,8 @@ def sprung_range(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLi
     Returns          (...)  all broadcast; nan where m or T is not positive and finite, or k is negative or not
                             finite, and where W is 2 pi, 4 pi ...: then no wall moves what is read
 
-    >>> found = sprung_range(0.0254, 15620.0, 0.00125)
-    >>> [round(float(v), 4) for v in (found.stiffness_max, found.damping_at_stiffness_max, found.damping_max)]
+    >>> sprung = sprung_range(0.0254, 15620.0, 0.00125)
+    >>> [round(float(v), 4) for v in (sprung.stiffness_max, sprung.damping_at_stiffness_max, sprung.damping_max)]
     [4325.8941, 10.914, 24.5317]
     """
     m, k, T = _broadcast(mass, stiffness, sampling_period)

@@ -26,8 +26,8 @@ class Overall:
     """A measure over a workspace; all nan where no cell counts.
 
     average     weighted mean of the cells that count
-    worst       the least where higher is better, the largest where lower is better; nan where that depends
-    best        the other way round
+    worst       the least where higher is better, the largest where lower is better; nan where `better` is None
+    best        the other of the two
     uniformity  least over largest value, 1 where all are equal: worst/best where higher is better, best/worst
                 where lower is; nan where a value is negative
     variation   standard deviation over the size of the average, weighted: 0 where all are equal; nan where the
@@ -59,11 +59,11 @@ def overall(
     status   (...)  as in `measures.definition`: only OK counts; None: all that are not nan, and those are all
              reached
     weights  (...)  area or volume of each cell, broadcasting with the values; None: all alike
-    better   "higher", "lower", or None where it depends
+    better   which values are better: "higher", "lower", or None where that depends on the purpose
     Raises   ValueError  for weights that are negative, infinite or do not fit, and a status that does not
 
-    >>> found = overall([4.0, 1.0, float("nan"), 3.0], better="higher")
-    >>> found.average, found.worst, found.uniformity, found.share
+    >>> summary = overall([4.0, 1.0, float("nan"), 3.0], better="higher")
+    >>> summary.average, summary.worst, summary.uniformity, summary.share
     (2.6666666666666665, 1.0, 0.25, 0.75)
     """
     x, w, counts, reached = _cells(values, status, weights)
@@ -107,10 +107,10 @@ def global_conditioning_index(
     0.5
     """
     kappa, w, counts, _ = _cells(condition, status, weights)
-    kept = kappa[counts]
-    if len(kept) and kept.min() < 1.0 - ROUNDING:
-        raise ValueError(f"a condition number is at least 1, got {float(kept.min()):.6g}; is it a reciprocal?")
-    return _moments(1.0 / kept, w[counts])[0] if len(kept) else float("nan")
+    counted = kappa[counts]
+    if len(counted) and counted.min() < 1.0 - ROUNDING:
+        raise ValueError(f"a condition number is at least 1, got {float(counted.min()):.6g}; is it a reciprocal?")
+    return _moments(1.0 / counted, w[counts])[0] if len(counted) else float("nan")
 
 
 def global_isotropy_index(
@@ -166,8 +166,8 @@ def _cells(
     return x, w, np.asarray((s == OK) & ~np.isnan(x) & (w > 0.0)), np.asarray(~nowhere)
 
 
-def _weight_share(weights: Floats, whole: float) -> float:
-    return float(weights.sum()) / whole if whole else float("nan")
+def _weight_share(weights: Floats, total: float) -> float:
+    return float(weights.sum()) / total if total else float("nan")
 
 
 def _moments(x: Floats, w: Floats) -> tuple[float, float]:

@@ -12,6 +12,6 @@ def __getattr__(name: str) -> Any:
     """A name of `user_measures`. Warns DeprecationWarning; raises AttributeError for any other."""
     if name.startswith("_") or not hasattr(user_measures, name):
         raise AttributeError(f"module 'zwidth.measures.own' has no attribute {name!r}")
-    told = f"zwidth.measures.own goes with the next release; write from zwidth import {name}"
-    warnings.warn(told, DeprecationWarning, stacklevel=2)
+    message = f"zwidth.measures.own goes with the next release; write from zwidth import {name}"
+    warnings.warn(message, DeprecationWarning, stacklevel=2)
     return getattr(user_measures, name)

@@ -72,7 +72,7 @@ def measure(
     """Make a measure of a function of one operating point; its name is the function's.
 
     unit    "" for none
-    title   what it is called in figures; left out: the first line of the function's docstring, or its name
+    title   label in figures; left out: the first line of the function's docstring, or its name
     better  "higher", "lower", or None where that depends on the purpose
     along   False: it does not depend on the rendered direction
     each    True: called with one point at a time; False: of many at once, returning an array of their shape
@@ -128,17 +128,17 @@ def load_measures(path: str) -> dict[str, Measure]:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{file.name}: cannot be read: {error}") from None
-    found = _measures(str(file.resolve()), text)
-    if not found:
+    measures = _measures(str(file.resolve()), text)
+    if not measures:
         raise ValueError(
             f"{file.name} has no measure; put @measure(unit=...) above a function of one operating point"
         )
-    taken = sorted(MEASURES.keys() & found.keys())
+    taken = sorted(MEASURES.keys() & measures.keys())
     if taken:
         raise ValueError(f"{file.name}: the name {taken[0]} is taken by a measure of zwidth; rename the function")
     return {
         name: replace(one, function=FileFunction(str(file.resolve()), text, name), source=f"your own, {file.name}")
-        for name, one in found.items()
+        for name, one in measures.items()
     }
 
 

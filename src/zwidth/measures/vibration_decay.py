@@ -69,8 +69,8 @@ def optimal_mass(
 
     The walls B and C of the thesis's Fig. 5.11 (whose results it prints for each other):
 
-    >>> found = optimal_mass([3000.0, 4000.0], [15.0, 20.0], 15620.0, 0.00125)
-    >>> found.spectral_radius.round(6).tolist(), found.mass.round(7).tolist()
+    >>> optimum = optimal_mass([3000.0, 4000.0], [15.0, 20.0], 15620.0, 0.00125)
+    >>> optimum.spectral_radius.round(6).tolist(), optimum.mass.round(7).tolist()
     ([0.895606, 0.872978], [0.0510576, 0.0602998])
     """
     K, B, k, T = (
@@ -116,11 +116,11 @@ def fastest_mass(
         return float(spectral_radius(changed, wall_stiffness, wall_damping))
 
     scale = np.linspace(np.log(lowest), np.log(highest), max(int(TRIED * np.log10(highest / lowest)), 8))
-    found = np.array([radius(at) for at in scale])
-    best = (float(found.min()), float(scale[np.argmin(found)]))
-    padded = np.concatenate([[np.inf], found, [np.inf]])
-    lowest_of_three = (found <= padded[:-2]) & (found <= padded[2:])
-    for i in np.flatnonzero(lowest_of_three & (found <= best[0] + NEAR)).tolist():
+    radii = np.array([radius(at) for at in scale])
+    best = (float(radii.min()), float(scale[np.argmin(radii)]))
+    padded = np.concatenate([[np.inf], radii, [np.inf]])
+    lowest_of_three = (radii <= padded[:-2]) & (radii <= padded[2:])
+    for i in np.flatnonzero(lowest_of_three & (radii <= best[0] + NEAR)).tolist():
         bounds = scale[max(i - 1, 0)], scale[min(i + 1, len(scale) - 1)]
         refined = minimize_scalar(radius, bounds=bounds, method="bounded", options={"xatol": 1e-10})
         best = min(best, (float(refined.fun), float(refined.x)))

@@ -75,20 +75,20 @@ def _table(quotient: Callable[[float], float], first: float, scale: float, facto
     its own step: that two entries agree may be luck.
     """
     row: list[float] = []
-    best, found = Derivative(float("nan"), float("inf")), 0
+    best, best_level = Derivative(float("nan"), float("inf")), 0
     for level in range(MOST):
         above, row = row, [quotient(first / 2.0**level)]
         for k, coarse in enumerate(above):
             row.append(row[k] + (row[k] - coarse) / (factor ** (k + 1) - 1.0))
             error = max(abs(row[k + 1] - row[k]), abs(row[k + 1] - coarse))
             if k > 0 and error < best.error:
-                best, found = Derivative(row[k + 1], error), level
+                best, best_level = Derivative(row[k + 1], error), level
         if level + 1 >= LEVELS:
             if best.error <= ENOUGH * max(abs(best.value), 1.0 / scale):
                 return best
             if _rounding(row, best):
                 break
-    return Derivative(best.value, max(best.error, abs(row[0] - best.value) * 2.0 ** (found - level)))
+    return Derivative(best.value, max(best.error, abs(row[0] - best.value) * 2.0 ** (best_level - level)))
 
 
 def _rounding(row: list[float], best: Derivative) -> bool:

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 STILL: Final = 1e-9  # share of the fastest motion; along slower directions the handle counts as fixed
-TRIED: Final = 16  # number of points at which a direction is compared with its opposite
+TRIED: Final = 16  # largest number of points at which a direction is compared with its opposite
 SAME: Final = 1e-9  # relative difference of values that is rounding
 ROWS: Final = 100_000  # directions computed at once
 
@@ -41,8 +41,8 @@ class DirectionSearch:
         parts = []
         for first in range(0, max(1, len(which)), ROWS):
             rows = slice(first, first + ROWS)
-            there = self.point[which[rows]]
-            parts.append(evaluate(self.measure, there.towards(self.directions(which[rows], components[rows]))))
+            points = self.point[which[rows]]
+            parts.append(evaluate(self.measure, points.towards(self.directions(which[rows], components[rows]))))
         if len(parts) == 1:
             return parts[0]
         return MeasureValues(
@@ -67,19 +67,20 @@ def direction_searches(measure: Measure, point: OperatingPoint) -> Iterator[tupl
     freedom = (speeds > STILL * speeds[:, :1]).sum(axis=1)
     for r in np.unique(freedom):
         indices = np.flatnonzero(freedom == r)
-        some = point[ok[indices]]
+        points = point[ok[indices]]
         basis = left[indices][:, :, :r]
-        yield ok[indices], DirectionSearch(measure, some, basis, _one_sided(measure, some, basis))
+        yield ok[indices], DirectionSearch(measure, points, basis, _one_sided(measure, points, basis))
 
 
 def _one_sided(measure: Measure, point: OperatingPoint, basis: Floats) -> bool:
     """Whether the opposite direction has another value, tried at a few points along an arbitrary direction."""
     n, r = len(basis), basis.shape[2]
     which = np.unique(np.linspace(0, n - 1, min(n, TRIED)).astype(np.int64))
-    like_no_other = np.broadcast_to(np.array([0.5403, 0.8415, 0.3907])[:r], (len(which), r))
+    # a direction at no special angle
+    components = np.broadcast_to(np.array([0.5403, 0.8415, 0.3907])[:r], (len(which), r))
     search = DirectionSearch(measure, point, basis, one_sided=False)
-    there = search.evaluate_along(which, like_no_other).values
-    back = search.evaluate_along(which, -like_no_other).values
+    forward = search.evaluate_along(which, components).values
+    backward = search.evaluate_along(which, -components).values
     with np.errstate(invalid="ignore"):
-        apart = np.abs(there - back) > SAME * np.maximum(np.abs(there), np.abs(back))
-    return bool((apart | (np.isnan(there) != np.isnan(back))).any())
+        apart = np.abs(forward - backward) > SAME * np.maximum(np.abs(forward), np.abs(backward))
+    return bool((apart | (np.isnan(forward) != np.isnan(backward))).any())

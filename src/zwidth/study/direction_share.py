@@ -72,25 +72,27 @@ def share_of_directions(requirement: Requirement, point: OperatingPoint) -> Floa
     for which, search in direction_searches(requirement.measure, row):
         r = search.basis.shape[2]
         for first in range(0, len(which), CHUNK):
-            mine = np.arange(first, min(first + CHUNK, len(which)))
-            share[which[mine]] = _SHARES[r](requirement, search, mine)
+            indices = np.arange(first, min(first + CHUNK, len(which)))
+            share[which[indices]] = _SHARES[r](requirement, search, indices)
     return np.asarray(share.reshape(point.shape))
 
 
-def _of_line(requirement: Requirement, search: DirectionSearch, mine: Ints) -> Floats:
-    ways = (np.ones((len(mine), 1)), -np.ones((len(mine), 1)))
-    return np.asarray(np.mean([requirement.met(search.evaluate_along(mine, way).values) for way in ways], axis=0))
+def _of_line(requirement: Requirement, search: DirectionSearch, indices: Ints) -> Floats:
+    ways = (np.ones((len(indices), 1)), -np.ones((len(indices), 1)))
+    return np.asarray(
+        np.mean([requirement.met(search.evaluate_along(indices, way).values) for way in ways], axis=0)
+    )
 
 
-def _of_circle(requirement: Requirement, search: DirectionSearch, mine: Ints) -> Floats:
-    return _of_latitude(requirement, search, mine, 0.0, whole=search.one_sided)
+def _of_circle(requirement: Requirement, search: DirectionSearch, indices: Ints) -> Floats:
+    return _of_latitude(requirement, search, indices, 0.0, whole=search.one_sided)
 
 
-def _of_sphere(requirement: Requirement, search: DirectionSearch, mine: Ints) -> Floats:
+def _of_sphere(requirement: Requirement, search: DirectionSearch, indices: Ints) -> Floats:
     height, weight = np.polynomial.legendre.leggauss(LATITUDES * (2 if search.one_sided else 1))
     if not search.one_sided:  # the other half is the same
         height = 0.5 * (height + 1.0)
-    parts = [_of_latitude(requirement, search, mine, z, whole=True) for z in height.tolist()]
+    parts = [_of_latitude(requirement, search, indices, z, whole=True) for z in height.tolist()]
     return np.asarray(0.5 * weight @ np.array(parts))
 
 
@@ -115,17 +117,18 @@ def _of_latitude(
     mark, met = np.repeat(angles, 2)[:, None] * np.ones(len(n)), np.repeat(m >= 0.0, 2, axis=0)
     sample, where, offset = _unsampled_crossings(m)
     hidden = angles[sample] + step * offset
-    there = margin(where, hidden) >= 0.0
+    hidden_met = margin(where, hidden) >= 0.0
     before = offset < 0.0
     # the one before its sample stands second in the pair of the sample before
     slot = np.where(before, (2 * sample - 1) % (2 * count), 2 * sample + 1)
     mark[slot, where] = np.where(before & (sample == 0), hidden + turn, hidden)
-    met[slot, where] = there
+    met[slot, where] = hidden_met
     return _met_share(margin, mark, met, turn)
 
 
 def _unsampled_crossings(m: Floats) -> tuple[Ints, Ints, Floats]:
-    """Where three neighbours of one sign lie on a parabola of both: sample, point, offset in steps (+-0.5)."""
+    """Where the parabola through three neighbours of one sign changes its sign between them: index of the middle
+    sample, index of the point, and offset of the parabola's vertex from the sample in steps, -0.5 to 0.5."""
     left, right = np.roll(m, 1, axis=0), np.roll(m, -1, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         bend = left - 2.0 * m + right

@@ -226,8 +226,8 @@ def _on_sphere(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints)
 def _compass(
     search: DirectionSearch, place: Ints, u: Floats, value: Floats, goal: _Goal, reach: float
 ) -> tuple[Floats, Floats]:
-    """Compass search from directions u (n, 3): step to the lowest of eight directions at angle `reach` [rad] around
-    each, and halve the angle where none of them is lower. Returns directions and values.
+    """Compass search from directions u (n, 3): step to the lowest of eight directions around each, at an angle
+    that begins at `reach` [rad] and is halved where none of them is lower. Returns directions and values.
 
     place  (n,)  index of the point of each direction
     """
@@ -278,7 +278,7 @@ def _unit_vectors(angle: Floats) -> Floats:
 def _sampled(
     search: DirectionSearch, indices: Ints, components: Floats, goal: _Goal, which: Ints
 ) -> tuple[Floats, NDArray[np.uint8]]:
-    """Cost (s, n) of s directions at n points, inf where there is no value; and status (n,) of the points."""
+    """Cost (s, n) of s directions at n points, inf where there is no value; status (n,)."""
     s, n = len(components), len(indices)
     samples = search.evaluate_along(np.tile(indices, s), np.repeat(components, n, axis=0))
     status = goal.status(samples, samples.status.reshape(s, n), which[indices])

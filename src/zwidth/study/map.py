@@ -193,7 +193,7 @@ def map_job(
     if not names:
         raise ValueError("measures must name at least one measure, got none")
     if len(set(names)) < len(names):
-        raise ValueError(f"the names of a map's measures must differ, got {', '.join(names)}")
+        raise ValueError(f"a map's measures must have different names, got {', '.join(names)}; list each once")
     if isinstance(direction, str):
         if direction not in EXTREMES:
             raise ValueError(f"the direction must be a vector or one of {', '.join(EXTREMES)}, got {direction!r}")

@@ -71,9 +71,9 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
     >>> def wall_of(mass):
     ...     one, none = np.ones(1), np.zeros((1, 1))
     ...     return Loop(Plant(np.array([[mass]]), none, none, one, one), Controller(0.001))
-    >>> held = optimum(wall_of(0.1), largest_stiffness(wall_of(0.1)))
-    >>> heavier, lighter = (held.stiffness_to_first_order(wall_of(mass)) for mass in (0.1001, 0.0999))
-    >>> held.kind, round((heavier - lighter) / (0.002 * 68629.15), 6)
+    >>> stiffest = optimum(wall_of(0.1), largest_stiffness(wall_of(0.1)))
+    >>> heavier, lighter = (stiffest.stiffness_to_first_order(wall_of(mass)) for mass in (0.1001, 0.0999))
+    >>> stiffest.kind, round((heavier - lighter) / (0.002 * 68629.15), 6)
     ('smooth maximum', 1.0)
     """
     tracer = Tracer.of(loop)
@@ -126,19 +126,19 @@ def _crossing(peak: Peak, kind: Kind, pieces: list[Piece], period: float) -> Opt
     weights = np.linalg.solve(normals.T, np.array([1.0, 0.0]))
     readers = [read for _, read in pieces]
 
-    def moves(other: Loop) -> float:
+    def stiffness(other: Loop) -> float:
         tracer = Tracer.of(other)
         return float(weights @ [read(tracer) for read in readers])
 
-    return Optimum(peak, kind, moves)
+    return Optimum(peak, kind, stiffness)
 
 
 def _is_maximum(tracer: Tracer, angle: float) -> bool:
     """Whether dK/dangle vanishes at the angle, as nearly as bisection can place it."""
     step = 1e-6 * min(angle, pi - angle)
     low, here, high = (tracer.wall(angle + shift)[2] for shift in (-step, 0.0, step))
-    bend = (high - low) / (2.0 * step)
-    return bool(abs(here) <= AT_MAXIMUM * angle * abs(bend))
+    curvature = (high - low) / (2.0 * step)
+    return bool(abs(here) <= AT_MAXIMUM * angle * abs(curvature))
 
 
 def _end(loop: Loop, root: RealRoot) -> float:
@@ -149,8 +149,9 @@ def _end(loop: Loop, root: RealRoot) -> float:
 
 
 def second_peak_stiffness(chart: StabilityChart) -> float:
-    """Largest stiffness of the walls with K > 0, B >= 0 that are stiffest among their neighbours on the edge, the
-    stiffest of all left aside [N/m]; nan if there is none. Known as the regions are, to 1e-6 of the set's size.
+    """Largest stiffness of the walls with K > 0, B >= 0 that are stiffest among their neighbours on the edge,
+    without the stiffest of all [N/m]; nan if there is none. Accurate to 1e-6 of the set's size, as the
+    regions are.
 
     One of these walls takes over when the stiffest gives way.
 

@@ -111,7 +111,7 @@ def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
     """The rows, each as column -> value; of the optional columns those that the file has."""
     rows = csv.reader(_text(file).splitlines(), strict=True)
     faults: list[str] = []
-    found: list[dict[str, Any]] = []
+    cells_of_rows: list[dict[str, Any]] = []
     try:
         header = [name.strip() for name in next(non_blank_rows(rows), [])]
         places = _column_indices(file, header, optional)
@@ -132,15 +132,15 @@ def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
                 if fault:
                     faults.append(f"{file}: line {rows.line_num}: {name}: {fault}")
             faults += [f"{file}: line {rows.line_num}: {fault}" for fault in _contradictions(cells)]
-            found.append(cells)
+            cells_of_rows.append(cells)
     except csv.Error as error:
         raise PointsError(f"{file}: line {rows.line_num}: is not CSV: {error}") from None
     if faults:
         more = [f"{file}: and {len(faults) - MOST_FAULTS} more faults"] if len(faults) > MOST_FAULTS else []
         raise PointsError(*islice(faults, MOST_FAULTS), *more)
-    if not found:
+    if not cells_of_rows:
         raise PointsError(f"{file}: holds no walls; give a line with {' and '.join(COLUMNS)} for each")
-    return found
+    return cells_of_rows
 
 
 def _row_separator(row: list[str]) -> str:

@@ -31,8 +31,9 @@ LAYERS: Final = 2  # cells beyond the last with a value to which values are cont
 
 def shells_attribute(mechanism: Mechanism) -> list[float]:
     """The shells of a mechanism's chains as a list of numbers, five for each shell."""
-    found = shells(pack(mechanism), 0)
-    return [float(value) for shell in found for value in (*shell.centre, shell.least, shell.most)]
+    return [
+        float(value) for shell in shells(pack(mechanism), 0) for value in (*shell.centre, shell.least, shell.most)
+    ]
 
 
 def reach_outline(dataset: xr.Dataset, name: str) -> Any:
@@ -76,8 +77,9 @@ def _decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
 def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
     """The values (ny, nx) of a map, continued beyond the edge of reach within the range of the others.
 
-    A cell there continues straight the two next to it along each row, column and diagonal that has them, else it
-    is as its neighbours are. What lies between cells can then be cut at the true edge, not at the last cell.
+    The value of such a cell is extrapolated linearly from the next two cells along each row, column and diagonal
+    that has them, and averaged; without two such cells it is the mean of its neighbours. A figure can then be cut
+    at the true edge, not at the last cell.
     """
     known = np.array(values, dtype=np.float64)
     beyond = np.isin(status, (OUT_OF_REACH, SINGULAR))
@@ -89,8 +91,8 @@ def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
         next_to, behind = _along(known, 1), _along(known, 2)
         with np.errstate(invalid="ignore"):
             straight = _mean(2.0 * next_to - behind)
-        found = np.where(np.isnan(straight), _mean(next_to), straight)
-        known = np.where(beyond & np.isnan(known), np.clip(found, low, high), known)
+        estimate = np.where(np.isnan(straight), _mean(next_to), straight)
+        known = np.where(beyond & np.isnan(known), np.clip(estimate, low, high), known)
     return known
 
 

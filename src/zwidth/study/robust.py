@@ -33,10 +33,9 @@ from zwidth.result import Result
 from zwidth.study.robust_family import Family, FamilyMember, RangeError
 
 Floats = NDArray[np.float64]
-# stage, done, of how many
 
 REFINING: Final = 0.25  # share of the members that is reserved for those found by the search
-SEARCHED: Final = 12  # points of the edge that each round searches from
+SEARCHED: Final = 12  # number of walls of the edge at which each round searches for a worse member
 FIRST_STEP, LAST_STEP = 0.25, 1e-3  # step of the pattern search, in shares of the ranges
 EXCEEDS: Final = 1e-7  # excess of the spectral radius over 1 that makes a member join
 EDGE_WALLS: Final = 200  # walls along the edge that random members are tried on
@@ -130,7 +129,7 @@ class RobustStudy(Result):
         return self.chart.table()
 
     def __repr__(self) -> str:
-        chart, found = self.chart, self.violation
+        chart, violation = self.chart, self.violation
         lines = [f"{len(self.members)} members, {len(chart.binding)} of which bind"]
         if chart.members_at_stiffness_max:
             stiffest = f"{chart.stiffness_max:.6g} N/m at {chart.damping_at_stiffness_max:.6g} N s/m"
@@ -140,8 +139,10 @@ class RobustStudy(Result):
             )
         else:
             lines.append("no wall with K > 0 and B >= 0 is stable for all")
-        if found is not None:
-            lines.append(f"{found.violating} of {found.unseen} unseen members find one of the walls unstable")
+        if violation is not None:
+            lines.append(
+                f"{violation.violating} of {violation.unseen} unseen members find one of the walls unstable"
+            )
         return "RobustStudy: " + "\n  ".join(lines)
 
 
@@ -175,35 +176,35 @@ def robust_study(
     require("family", family, Family)
     if faults := family.faults():
         raise RangeError(faults)
-    found = _Members(family, progress or (lambda stage, done, of: None))
+    charted = _Members(family, progress or (lambda stage, done, of: None))
     points = list(_sample(family, members, seed))
-    found.add(points, "members")
-    chart = found.chart()
+    charted.add(points, "members")
+    chart = charted.chart()
     rounds, area_change, settled = 0, 0.0, not family.free
-    while not settled and len(found.points) < members and chart.regions:
-        found.progress("search", rounds, rounds + 1)
-        new_members = _violating_members(found, chart)[: members - len(found.points)]
+    while not settled and len(charted.points) < members and chart.regions:
+        charted.progress("search", rounds, rounds + 1)
+        new_members = _violating_members(charted, chart)[: members - len(charted.points)]
         if not new_members:
             area_change, settled = 0.0, True
             break
         rounds += 1
-        found.add(new_members, "members")
-        before, chart = chart, found.chart()
+        charted.add(new_members, "members")
+        before, chart = chart, charted.chart()
         area_change = _area_change(before, chart)
         settled = area_change < tolerance
     return RobustStudy(
         chart=chart,
-        members=tuple(family.values(point) for point in found.points),
+        members=tuple(family.values(point) for point in charted.points),
         sampled=len(points),
         rounds=rounds,
         area_change=area_change,
         settled=settled,
-        violation=_violation(found, chart, unseen, seed) if family.free and chart.regions else None,
+        violation=_violation(charted, chart, unseen, seed) if family.free and chart.regions else None,
     ).about(family.operating_point)
 
 
 class _Members:
-    """The members so far, each charted once."""
+    """The members of a family that were charted so far, each once."""
 
     def __init__(self, family: Family, progress: Progress) -> None:
         self.family, self.progress = family, progress
@@ -266,21 +267,22 @@ def _sample(family: Family, members: int, seed: int) -> Iterator[FamilyMember]:
 
 
 def _point(family: Family, operator: int, free: Floats) -> FamilyMember:
+    """The member with these shares of the free ranges; of fixed ranges the share is 0."""
     shares = np.zeros(len(family.ranges))
     shares[list(family.free)] = free
     return FamilyMember(operator, tuple(shares.tolist()))
 
 
-def _violating_members(found: _Members, chart: RobustChart) -> list[FamilyMember]:
+def _violating_members(charted: _Members, chart: RobustChart) -> list[FamilyMember]:
     """Members found by the search for which a wall of the edge is unstable, the largest spectral radius first."""
-    family, bites = found.family, dict[FamilyMember, float]()
+    family, radii = charted.family, dict[FamilyMember, float]()
     for K, B, starts in _searched_walls(chart):
         for start in starts:
-            point, radius = _worst_member(found, found.points[start], K, B)
-            if radius > 1.0 + EXCEEDS and point not in found.points:
+            point, radius = _worst_member(charted, charted.points[start], K, B)
+            if radius > 1.0 + EXCEEDS and point not in charted.points:
                 rounded = _point(family, point.operator, np.round([point.shares[k] for k in family.free], 6))
-                bites[rounded] = max(radius, bites.get(rounded, 0.0))
-    return sorted(bites, key=lambda point: -bites[point])
+                radii[rounded] = max(radius, radii.get(rounded, 0.0))
+    return sorted(radii, key=lambda point: -radii[point])
 
 
 def _searched_walls(chart: RobustChart) -> list[tuple[float, float, tuple[int, ...]]]:
@@ -302,19 +304,19 @@ def _searched_walls(chart: RobustChart) -> list[tuple[float, float, tuple[int, .
     return walls[:SEARCHED]
 
 
-def _worst_member(found: _Members, start: FamilyMember, K: float, B: float) -> tuple[FamilyMember, float]:
+def _worst_member(charted: _Members, start: FamilyMember, K: float, B: float) -> tuple[FamilyMember, float]:
     """The member of the largest spectral radius at a wall, by pattern search from a member: one range at a time,
     the step halved when no range gives a larger one."""
-    best, radius, step = start, found.radius(start, K, B), FIRST_STEP
+    best, radius, step = start, charted.radius(start, K, B), FIRST_STEP
     while step >= LAST_STEP:
         gained = False
-        for k in found.family.free:
+        for k in charted.family.free:
             for sign in (-1.0, 1.0):
                 share = min(max(best.shares[k] + sign * step, 0.0), 1.0)
-                tried = FamilyMember(best.operator, (*best.shares[:k], share, *best.shares[k + 1 :]))
-                reached = found.radius(tried, K, B) if tried != best else -1.0
-                if reached > radius:
-                    best, radius, gained = tried, reached, True
+                neighbour = FamilyMember(best.operator, (*best.shares[:k], share, *best.shares[k + 1 :]))
+                new_radius = charted.radius(neighbour, K, B) if neighbour != best else -1.0
+                if new_radius > radius:
+                    best, radius, gained = neighbour, new_radius, True
         if not gained:
             step *= 0.5
     return best, radius
@@ -326,15 +328,15 @@ def _area_change(before: RobustChart, after: RobustChart) -> float:
     return max(1.0 - areas[1] / areas[0], 0.0) if areas[0] > 0.0 else 0.0
 
 
-def _violation(found: _Members, chart: RobustChart, unseen: int, seed: int) -> Violation:
+def _violation(charted: _Members, chart: RobustChart, unseen: int, seed: int) -> Violation:
     """Try `unseen` random members on the robust walls."""
-    family = found.family
+    family = charted.family
     walls = sample_walls(chart)
     random = np.random.default_rng([seed, 1])
     tested_members, violating, radius, share, worst = 0, 0, -1.0, 0.0, dict[str, Any]()
     for done in range(unseen):
         if done % 50 == 0:
-            found.progress("unseen members", done, unseen)
+            charted.progress("unseen members", done, unseen)
         operator = int(random.integers(max(len(family.operators), 1)))
         point = _point(family, operator, random.random(len(family.free)))
         try:
@@ -352,18 +354,19 @@ def _violation(found: _Members, chart: RobustChart, unseen: int, seed: int) -> V
         if max(softer) > share or not worst:
             share, worst = max(max(softer), share), family.values(point)
         radius = max(radius, float(bad_radius.max()))
-    found.progress("unseen members", unseen, unseen)
+    charted.progress("unseen members", unseen, unseen)
     if radius < 0.0:
         radius = float(max(np.max(spectral_radius(chart.members[k], *walls.T)) for k in chart.binding))
     return Violation(tested_members, violating, radius, share, worst)
 
 
 def _share(tracer: Tracer, K: float, B: float, stiffness_max: float) -> float:
+    """`Violation.worst_stiffness_share` of one wall; 0 for a wall with K <= 0 or B < 0."""
     return softening(tracer.polynomials, K, B) / stiffness_max if K > 0.0 and B >= 0.0 else 0.0
 
 
 def sample_walls(chart: RobustChart) -> Floats:
-    """Walls (k, 2) of [K, B] that stand for a robust set: along its edge, just inside, and a raster over it."""
+    """Walls (k, 2), K [N/m] and B [N s/m], to test a robust set: just inside its edge, and a raster over it."""
     if not chart.regions:
         return np.empty((0, 2))
     size = np.ptp(np.vstack(chart.regions), axis=0)
@@ -387,8 +390,8 @@ def sample_walls(chart: RobustChart) -> Floats:
     inside.append(low + size * np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2))
     walls = np.vstack(inside)
     cells = [shapely.Polygon(ring) for ring in chart.regions]
-    kept = np.any([shapely.contains_xy(cell, walls) for cell in cells], axis=0)
-    return np.asarray(walls[kept])
+    in_set = np.any([shapely.contains_xy(cell, walls) for cell in cells], axis=0)
+    return np.asarray(walls[in_set])
 
 
 def _lengths(K: Floats, B: Floats, size: Floats) -> Floats:

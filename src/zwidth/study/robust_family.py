@@ -87,8 +87,8 @@ class Range:
         if not (isfinite(self.low) and isfinite(self.high)):
             return RangeFault(self.path, f"must lie between two finite numbers, got {self.low:g},{self.high:g}")
         if self.low > self.high:
-            upside_down = f"must be LOW,HIGH with LOW below HIGH, got {self.low:g},{self.high:g}; exchange them"
-            return RangeFault(self.path, upside_down)
+            exchanged = f"must be LOW,HIGH with LOW below HIGH, got {self.low:g},{self.high:g}; exchange them"
+            return RangeFault(self.path, exchanged)
         if self.logarithmic and not self.low > 0.0:
             return RangeFault(self.path, f"cannot be logarithmic from {self.low:g}", LINEARLY)
         return None
@@ -124,7 +124,7 @@ class Family:
     @property
     def free(self) -> tuple[int, ...]:
         """Indices of the ranges whose low and high differ."""
-        return tuple(k for k, found in enumerate(self.ranges) if found.low < found.high)
+        return tuple(k for k, one in enumerate(self.ranges) if one.low < one.high)
 
     @cached_property
     def _documents(self) -> tuple[dict[str, Any], ...]:
@@ -133,24 +133,24 @@ class Family:
     @cached_property
     def _ungripped_plant(self) -> Plant | None:
         """The plant without an operator, where the members differ in the operator alone; else None."""
-        operator_only = all(found.path.split(".")[0] == "operator" for found in self.ranges)
+        operator_only = all(one.path.split(".")[0] == "operator" for one in self.ranges)
         return self.operating_point.ungripped_plant if operator_only else None
 
     def values(self, point: FamilyMember) -> dict[str, Any]:
         """Path -> value of a member; the operator's name under "operator" where there are several."""
-        held = {"operator": self.operators[point.operator]} if self.operators else {}
+        operator = {"operator": self.operators[point.operator]} if self.operators else {}
         pairs = zip(self.ranges, point.shares, strict=True)
-        return held | {found.path: found.at(share) for found, share in pairs}
+        return operator | {one.path: one.at(share) for one, share in pairs}
 
     def document(self, point: FamilyMember) -> dict[str, Any]:
         """A member's device file; a number off a matrix's diagonal is set together with its mirror image."""
         document = self._documents[point.operator]
-        for found, share in zip(self.ranges, point.shares, strict=True):
-            steps = address.resolve(document, found.path)
-            document = address.assign(document, found.path, found.at(share))
+        for one, share in zip(self.ranges, point.shares, strict=True):
+            steps = address.resolve(document, one.path)
+            document = address.assign(document, one.path, one.at(share))
             if len(steps) > 2 and isinstance(steps[-1], int) and isinstance(steps[-2], int):
                 mirror = dotted((*steps[:-2], steps[-1], steps[-2]), document)
-                document = address.assign(document, mirror, found.at(share))
+                document = address.assign(document, mirror, one.at(share))
         return document
 
     def loop(self, point: FamilyMember) -> Loop:
@@ -177,18 +177,18 @@ class Family:
 
     def faults(self) -> list[RangeFault]:
         """What is wrong with the ranges: each by itself, then at its two ends with the others in their middle."""
-        found = [fault for one in self.ranges if (fault := one.fault()) is not None]
+        faults = [fault for one in self.ranges if (fault := one.fault()) is not None]
         paths = [one.path for one in self.ranges]
-        found += [
+        faults += [
             RangeFault(path, "is given twice; one range for each number")
             for path in dict.fromkeys(paths)
             if paths.count(path) > 1
         ]
         for document in self._documents:
             for one in self.ranges:
-                found += _path_faults(document, one)
-        if found:
-            return list(dict.fromkeys(found))
+                faults += _path_faults(document, one)
+        if faults:
+            return list(dict.fromkeys(faults))
         for k in range(len(self.ranges)):
             for end in (0.0, 1.0):
                 for operator in range(len(self._documents)):
@@ -197,11 +197,11 @@ class Family:
                         from_document(self.document(FamilyMember(operator, shares)), self.device.label)
                     except DeviceError as error:
                         value = self.ranges[k].at(end)
-                        found += [
+                        faults += [
                             RangeFault(self.ranges[k].path, f"with {value:g} the device is not valid: {fault}")
                             for fault in error.faults
                         ]
-        return list(dict.fromkeys(found))
+        return list(dict.fromkeys(faults))
 
 
 def _path_faults(document: dict[str, Any], one: Range) -> list[RangeFault]:
@@ -210,7 +210,7 @@ def _path_faults(document: dict[str, Any], one: Range) -> list[RangeFault]:
         steps = address.resolve(document, one.path)
     except DeviceError as error:
         return [RangeFault(fault.key, fault.message) for fault in error.faults]
-    types = {kind for found in schema.subschemas(steps) for kind in _types(found)}
+    types = {kind for subschema in schema.subschemas(steps) for kind in _types(subschema)}
     if "integer" in types and "number" not in types:
         return [RangeFault(one.path, "is a whole number and has no range", BY_VALUE)]
     try:
@@ -221,12 +221,13 @@ def _path_faults(document: dict[str, Any], one: Range) -> list[RangeFault]:
         inside = [
             path for path in address.numeric_addresses(document) if path.startswith(f"{dotted(steps, document)}.")
         ]
-        held = "is not a number" if value is None else f"is not a number but {quote(value)}"
+        reason = "is not a number" if value is None else f"is not a number but {quote(value)}"
         hint = f"; did you mean '{inside[0]}'?" if inside else ""
-        return [RangeFault(one.path, held + hint)]
+        return [RangeFault(one.path, reason + hint)]
     return []
 
 
-def _types(found: dict[str, Any]) -> Sequence[str]:
-    kind = found.get("type", "")
+def _types(subschema: dict[str, Any]) -> Sequence[str]:
+    """The JSON types that a subschema allows."""
+    kind = subschema.get("type", "")
     return [kind] if isinstance(kind, str) else list(kind)

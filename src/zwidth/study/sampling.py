@@ -91,8 +91,8 @@ def spread(span: tuple[float, float], count: int, *, logarithmic: bool = False) 
     >>> spread((1.0, 100.0), 3, logarithmic=True)
     (1.0, 10.0, 100.0)
     """
-    found = np.geomspace(*span, count) if logarithmic else np.linspace(*span, count)
-    return tuple(float(value) for value in found)
+    values = np.geomspace(*span, count) if logarithmic else np.linspace(*span, count)
+    return tuple(float(value) for value in values)
 
 
 @dataclass(frozen=True)
@@ -101,8 +101,7 @@ class Sampling:
 
     A grid has every combination; the last axis changes fastest. A Latin hypercube of n designs divides each axis
     into n equal parts and has one design in each, at a random place in it (McKay, Beckman and Conover 1979,
-    read second-hand):
-    the parts of the axes are paired at random, the same for the same seed.
+    known at second hand): the parts of the axes are paired at random, the same for the same seed.
 
     size  number of designs of the Latin hypercube; None: a grid
     seed  of its random numbers

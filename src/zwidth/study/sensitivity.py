@@ -60,26 +60,26 @@ def sensitivities(device: Device, point: OperatingPoint | None = None) -> Sensit
     [('loop.sampling_period_s', -2.0), ('plant.mass_kg', 1.0)]
     """
     require("device", device, Device)
-    asked = point or device.at()
+    operating_point = point or device.at()
 
     def loop_of(changed: Device) -> Loop:
-        return changed.at_point(asked).loop
+        return changed.at_point(operating_point).loop
 
-    loop = asked.loop
+    loop = operating_point.loop
     peak = largest_stiffness(loop)
     left_out = dict(_left_out(device.document))
     if peak is None:
         return Sensitivities(None, None, (), (), left_out, nan)
     try:
-        held, obstacle = optimum(loop, peak), ""
+        stiffest, obstacle = optimum(loop, peak), ""
     except OptimumError as error:
-        held, obstacle = None, str(error)
-    answer = _StiffnessDerivatives(device, loop_of, held, obstacle)
-    numbers = [answer.sensitivity(*number) for number in _numbers(device.document)]
-    groups = answer.groups({number.path: number for number in numbers})
+        stiffest, obstacle = None, str(error)
+    derivatives = _StiffnessDerivatives(device, loop_of, stiffest, obstacle)
+    numbers = [derivatives.sensitivity(*number) for number in _numbers(device.document)]
+    groups = derivatives.groups({number.path: number for number in numbers})
     return Sensitivities(
         peak=peak,
-        kind=None if held is None else held.kind,
+        kind=None if stiffest is None else stiffest.kind,
         numbers=tuple(sorted(numbers, key=_rank)),
         groups=tuple(sorted(groups, key=lambda group: -abs(group.logarithmic))),
         left_out=left_out,
@@ -127,11 +127,11 @@ class _StiffnessDerivatives:
             return Sensitivity(path, value, unit, nan, slope.value * K, slope.error * K, side, ZERO)
         return Sensitivity(path, value, unit, slope.value * value, slope.value * K, slope.error * scale, side)
 
-    def groups(self, found: dict[str, Sensitivity]) -> Iterator[Group]:
+    def groups(self, by_path: dict[str, Sensitivity]) -> Iterator[Group]:
         """The groups of numbers. A plant's matrix is scaled as a whole: a free plant stays free."""
         steps_of = {path: steps for path, steps, _ in _numbers(self.device.document)}
         for name, paths in _groups(self.device.document).items():
-            parts = [found[path] for path in paths if found[path].value != 0.0]
+            parts = [by_path[path] for path in paths if by_path[path].value != 0.0]
             if len(parts) < 2:
                 continue
             total = float(sum(part.logarithmic for part in parts))
@@ -154,19 +154,19 @@ class _StiffnessDerivatives:
     def _slope(
         self, change: Callable[[float], dict[str, Any]], at: float, scale: float
     ) -> tuple[Derivative, str, str]:
-        """Derivative of ln K_max, its side, and the reason why there is none: from both sides where these are
-        alike, else from above, else from below.
+        """Derivative of ln K_max, its side, and "" or the reason why there is none. It is taken from both sides
+        where these are alike, else from above, else from below.
 
         A delay that crosses whole samples changes the form of the loop, and the largest stiffness bends there.
         """
         if self.optimum is None:
             return Derivative(nan, nan), "", self.obstacle
-        held, delays = self.optimum, dict[int, tuple[int, bool]]()
+        stiffest, delays = self.optimum, dict[int, tuple[int, bool]]()
 
         def stiffness(changed: float) -> float:
             loop = self.loop_of(from_document(change(changed), skip_assembly_check=True))
             delays[int(np.sign(changed - at))] = (loop.whole_delay, loop.fractional_delay > 0.0)
-            return held.stiffness_to_first_order(loop) / held.peak.stiffness
+            return stiffest.stiffness_to_first_order(loop) / stiffest.peak.stiffness
 
         reason = ""
         for side, sign in (("both", 0), ("above", 1), ("below", -1)):
@@ -209,12 +209,14 @@ def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
 
 
 def _no_property(steps: KeyPath) -> str:
+    """Why a number is not a property of the linear device; "" if it is one."""
     if what := nonlinear_kind(steps):
         return f"{what}, which the chart leaves out: it is linear"
     return NO_PROPERTY.get(str(steps[1]), "") if steps[0] == "mechanism" and len(steps) > 1 else ""
 
 
 def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Dotted path of each number that is not a property of the linear device, and why."""
     for steps, _ in address.numbers(document):
         if reason := _no_property(steps):
             yield dotted(steps, document), reason

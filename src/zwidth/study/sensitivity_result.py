@@ -132,14 +132,14 @@ class Sensitivities(Result):
 
     @property
     def ranking(self) -> tuple[tuple[str, float], ...]:
-        """Path and logarithmic sensitivity with lists and matrices as wholes, as those who build a device think of
-        them; largest first, without those that are not known or have no influence."""
+        """Path and logarithmic sensitivity of each number, or of a list or matrix scaled as a whole; largest
+        first, without those that are not known or have no influence."""
         lists = [group for group in self.groups if "*" not in group.path]
         members = {path for group in lists for path in group.members}
         single = [(number.path, number.logarithmic) for number in self.numbers if number.path not in members]
-        found = [*single, *((group.path, group.logarithmic) for group in lists)]
-        told = [(path, value) for path, value in found if abs(value) > NOTHING]
-        return tuple(sorted(told, key=lambda pair: -abs(pair[1])))
+        pairs = [*single, *((group.path, group.logarithmic) for group in lists)]
+        influential = [(path, value) for path, value in pairs if abs(value) > NOTHING]
+        return tuple(sorted(influential, key=lambda pair: -abs(pair[1])))
 
     @property
     def tie(self) -> bool:

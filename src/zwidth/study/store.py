@@ -81,7 +81,12 @@ class Store:
                 fill_value=MISSING,
                 attributes=attributes | flags,
             )
-            header = {"zwidth": KIND, "version": STORE_VERSION, "question": self.question, "batch": batch}
+            header: dict[str, Any] = {
+                "zwidth": KIND,
+                "version": STORE_VERSION,
+                "question": self.question,
+                "batch": batch,
+            }
             group.attrs.update(header)
             if self._ours or (self.path.is_dir() and not any(self.path.iterdir())):
                 shutil.rmtree(self.path)

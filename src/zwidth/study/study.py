@@ -10,7 +10,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError
+from zwidth.device.faults import DeviceError, plural
 from zwidth.device.toml_access import is_number, table, tables
 from zwidth.device.validation_messages import validation_messages
 from zwidth.measures.definition import Measure, Spelling, WantedWall
@@ -77,7 +77,8 @@ class Study:
     def __repr__(self) -> str:
         axes = ", ".join(axis.key for axis in self.sampling.axes)
         names = ", ".join(column.name for column in self.columns)
-        return f"Study: {self.sampling.count} designs of {self.device.label!r} over {axes}\n  of each {names}"
+        designs = plural(self.sampling.count, "design")
+        return f"Study: {designs} of {self.device.label!r} over {axes}\n  of each {names}"
 
 
 def check_study(
@@ -138,8 +139,8 @@ def check_study(
     )
 
 
-def _columns(document: dict[str, Any], user_measures: Mapping[str, Measure], found: Faults) -> tuple[Column, ...]:
-    """The columns whose measures exist; unknown and repeated ones are added to `found`."""
+def _columns(document: dict[str, Any], user_measures: Mapping[str, Measure], faults: Faults) -> tuple[Column, ...]:
+    """The columns whose measures exist; unknown and repeated ones are added to `faults`."""
     names = document.get("measures")
     columns: list[Column] = []
     for n, name in enumerate(names if isinstance(names, list) else []):
@@ -148,39 +149,40 @@ def _columns(document: dict[str, Any], user_measures: Mapping[str, Measure], fou
         try:
             column = column_named(name, user_measures)
         except ValueError as error:
-            found.append((("measures", n), str(error)))
+            faults.append((("measures", n), str(error)))
             continue
         if column.name in [other.name for other in columns]:
-            found.append((("measures", n), f"{column.name} is listed twice; remove one"))
+            faults.append((("measures", n), f"{column.name} is listed twice; remove one"))
         columns.append(column)
     return tuple(columns)
 
 
-def _check_sampling(document: dict[str, Any], found: Faults) -> None:
+def _check_sampling(document: dict[str, Any], faults: Faults) -> None:
+    """Add the faults of `count` and `seed`, which belong to a Latin hypercube."""
     if document.get("sampling", "grid") == "latin-hypercube":
         if "count" not in document:
-            found.append((("sampling",), "'latin-hypercube' needs count, how many designs"))
+            faults.append((("sampling",), "'latin-hypercube' needs count, how many designs"))
         return
     for key in ("count", "seed"):
         if key in document:
-            found.append(((key,), "is read with sampling = 'latin-hypercube' only; remove it, or set that"))
+            faults.append(((key,), "is read with sampling = 'latin-hypercube' only; remove it, or set that"))
 
 
-def _check_circumstances(document: dict[str, Any], device: Device | None, found: Faults) -> None:
+def _check_circumstances(document: dict[str, Any], device: Device | None, faults: Faults) -> None:
     """Add the faults of circumstances that do not fit the device, or that an axis sets too."""
     varied = {axis.get("key") for _, axis in tables(document, "axis")}
     for key in CIRCUMSTANCES:
         if key not in document:
             continue
         if key in varied:
-            found.append(((key,), "is an axis as well; remove one of the two"))
+            faults.append(((key,), "is an axis as well; remove one of the two"))
         right = isinstance(document[key], list if key in ("at", "direction") else str)
         if key in ("at", "direction", "assembly") and right and document[key]:
             components = document[key] if key != "assembly" else [0.0]
             if all(map(is_number, components)) and (message := circumstance_fault(key, document[key], device)):
                 fault = ((key,), message)
                 # the schema may have reported this key already
-                found += [fault] if all(path != (key,) for path, _ in found) else []
+                faults += [fault] if all(path != (key,) for path, _ in faults) else []
 
 
 def _plane(
@@ -188,24 +190,23 @@ def _plane(
     device: Device | None,
     columns: Sequence[Column],
     plane: PlaneGrid | None,
-    found: Faults,
+    faults: Faults,
     spelling: Spelling,
 ) -> PlaneGrid | None:
     """The grid over the workspace, the same for all designs; None where no measure is over it."""
-    wanted = [column.name for column in columns if column.statistic]
-    if not wanted:
+    names = [column.name for column in columns if column.statistic]
+    if not names:
         if (plane is not None or "workspace" in document) and columns:
-            said = f"is used only by measures over the workspace, such as average({columns[0].measure.name}); "
-            said += "remove it"
-            found.append((("workspace",), said))
+            message = f"is used only by measures over the workspace, such as average({columns[0].measure.name}); "
+            faults.append((("workspace",), message + "remove it"))
         return None
-    if device is None or any(path[0] in ("workspace", "at", "assembly") for path, _ in found):
+    if device is None or any(path[0] in ("workspace", "at", "assembly") for path, _ in faults):
         return None
     if device.mechanism is None:
-        found.append(
+        faults.append(
             (
                 ("measures",),
-                f"{wanted[0]} needs the workspace of a [mechanism]; this device gives its [plant] only",
+                f"{names[0]} needs the workspace of a [mechanism]; this device gives its [plant] only",
             )
         )
         return None
@@ -224,11 +225,11 @@ def _plane(
             document.get("assembly"),
         )
     except PlaneError as error:
-        found.append((("workspace",), error.spelled(spelling)))
+        faults.append((("workspace",), error.spelled(spelling)))
     except DeviceError as error:
-        found.append((("workspace",), error.faults[0].message))
+        faults.append((("workspace",), error.faults[0].message))
     except ValueError as error:  # an assembly that is singular throughout, or does not close
-        found.append((("workspace",), f"no plane can be laid through it: {error}"))
+        faults.append((("workspace",), f"no plane can be laid through it: {error}"))
     return None
 
 
@@ -238,4 +239,8 @@ def _check_size(checked: StudyFile, hypercube: bool) -> None:
     designs = (checked.count or 0) if hypercube else prod(each)
     ties = sum(len(axis.tie) for axis in checked.axis)
     numbers = designs * (PER_VALUE * len(checked.measures) + PER_AXIS * (len(checked.axis) + ties))
-    check_memory(float(numbers), f"{designs} designs of {len(checked.measures)} measures", "lower a count")
+    check_memory(
+        float(numbers),
+        f"{plural(designs, 'design')} of {plural(len(checked.measures), 'measure')}",
+        "lower a count",
+    )

@@ -69,16 +69,16 @@ def study_over(
         "axis": [{"key": key, "values": values} for key, values in _axes(axes)],
         **{KEYS.get(name, name): _plain(value) for name, value in given.items() if value is not None},
     }
-    found: Faults = []
+    faults: Faults = []
     operator_faults: list[Fault] = []
     operators = axis_operators(document, File(), operator_faults)
     study = check_study(
-        document, LABEL, device, operators, measures_by_name, found, plane=plane, spelling=as_argument
+        document, LABEL, device, operators, measures_by_name, faults, plane=plane, spelling=as_argument
     )
     if isinstance(position, Mapping):
-        found += _angle_faults(device, position, axes)
-    if found or operator_faults or study is None:
-        raise DeviceError([*(_fault(path, said, list(axes)) for path, said in found), *operator_faults])
+        faults += _angle_faults(device, position, axes)
+    if faults or operator_faults or study is None:
+        raise DeviceError([*(_fault(path, message, list(axes)) for path, message in faults), *operator_faults])
     return replace(study, at=position) if isinstance(position, Mapping) else study
 
 
@@ -117,20 +117,22 @@ def _plain(value: Any) -> Any:
 
 def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str, Any]) -> Faults:
     """What is wrong with a position given by the angles of the driven joints."""
-    found: Faults = [(("at",), "is an axis as well; remove one of the two")] if "at" in axes else []
+    faults: Faults = [(("at",), "is an axis as well; remove one of the two")] if "at" in axes else []
     try:
         device.position(angles)
     except DeviceError as error:
-        found.append((("at",), error.faults[0].message))
-    return found
+        faults.append((("at",), error.faults[0].message))
+    return faults
 
 
-def _fault(path: KeyPath, said: str, keys: list[str]) -> Fault:
+def _fault(path: KeyPath, message: str, keys: list[str]) -> Fault:
     """A fault of the document, under the name of the argument that it came from."""
     argument = ARGUMENTS.get(str(path[0]), str(path[0]))
     if path[0] != "axis" or len(path) < 3:
-        return Fault(argument, "", said)
+        return Fault(argument, "", message)
     key = keys[int(path[1])]
     if path[2] != "key":
-        return Fault(argument, key, said)
-    return Fault(argument, "", f"'{key}' as an axis is called '{KEYS[key]}'" if key in RENAMED_ARGUMENTS else said)
+        return Fault(argument, key, message)
+    return Fault(
+        argument, "", f"'{key}' as an axis is called '{KEYS[key]}'" if key in RENAMED_ARGUMENTS else message
+    )

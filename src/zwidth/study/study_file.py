@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path as File
 from typing import Any, Final
 
 from zwidth.device import address
+from zwidth.device.consistency import KINDS
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, fail
 from zwidth.device.format_version import refuse_newer
@@ -34,6 +36,8 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     try:
         text = read_text(label, LARGEST_FILE)
     except UnreadableFileError as error:
+        if error.missing and label in bundled_names():
+            raise _device_instead(label, "a bundled device") from None
         raise fail(label, "", f"{error}; give a study file") from None
     return study_of(parse_document(text, label, STUDIES), label)
 
@@ -46,15 +50,25 @@ def study_of(document: dict[str, Any], label: str = "study") -> Study:
             TooLarge     where its designs would not fit into memory
     """
     refuse_newer(document, label)
-    found: Faults = []
-    elsewhere: list[Fault] = []
+    if {*KINDS, "loop"} & document.keys() and not {"measures", "axis"} & document.keys():
+        raise _device_instead(label, "a device")
+    faults: Faults = []
+    file_faults: list[Fault] = []  # of the files that the study names
     folder = File(label).parent
-    device = _device(document, folder, found, elsewhere)
-    operators = axis_operators(document, folder, elsewhere)
-    study = check_study(document, label, device, operators, _own_measures(document, folder, found), found)
-    if study is None or elsewhere:
-        raise DeviceError([*in_order(found, document, label), *elsewhere])
+    device = _device(document, folder, faults, file_faults)
+    operators = axis_operators(document, folder, file_faults)
+    study = check_study(document, label, device, operators, _own_measures(document, folder, faults), faults)
+    if study is None or file_faults:
+        raise DeviceError([*in_order(faults, document, label), *file_faults])
     return study
+
+
+def _device_instead(label: str, what: str) -> DeviceError:
+    """The fault of a device that was given as a study."""
+    name = json.dumps(File(label).name)
+    return fail(
+        label, "", f"is {what}, not a study; write a study file with device = {name}, measures and an [[axis]]"
+    )
 
 
 def axis_operators(document: dict[str, Any], folder: File, file_faults: list[Fault]) -> dict[str, Any]:
@@ -63,59 +77,62 @@ def axis_operators(document: dict[str, Any], folder: File, file_faults: list[Fau
     folder       that files are looked for in
     file_faults  gets the faults of their files
     """
-    found: dict[str, Any] = {}
+    operators: dict[str, Any] = {}
     for _, axis in tables(document, "axis"):
         values = axis.get("values")
         for name in values if axis.get("key") == "operator" and isinstance(values, list) else []:
             if isinstance(name, str) and name:
                 try:
-                    found[name] = _operator(name, folder)
+                    operators[name] = _operator(name, folder)
                 except DeviceError as error:
                     file_faults += error.faults
-    return found
+    return operators
 
 
-def _device(document: dict[str, Any], folder: File, found: Faults, elsewhere: list[Fault]) -> Device | None:
-    """The device with those of the study's changes that can be meant; None where there is none, which is told."""
+def _device(document: dict[str, Any], folder: File, faults: Faults, file_faults: list[Fault]) -> Device | None:
+    """The device with the study's operator and changes; None where it cannot be loaded.
+
+    faults, file_faults  get the faults of the study, and of the files that it names
+    """
     name, operator, changes = (document.get(key) for key in ("device", "operator", "set"))
     if not isinstance(name, str) or not name:
         return None
     try:
         inner, label = read(_resolve_name(name, folder))
     except DeviceError as error:
-        elsewhere += error.faults
+        file_faults += error.faults
         return None
     if isinstance(operator, str) and operator:
         try:
             inner = with_operator(inner, _operator(operator, folder))
         except DeviceError as error:
-            elsewhere += error.faults
+            file_faults += error.faults
     for n, change in enumerate(changes if isinstance(changes, list) else []):
         if not isinstance(change, str):
             continue
         try:
             inner = address.apply(inner, [change])
         except DeviceError as error:
-            found += [(("set", n), ": ".join(filter(None, (f.key, f.message)))) for f in error.faults]
+            faults += [(("set", n), ": ".join(filter(None, (f.key, f.message)))) for f in error.faults]
     try:
         device = from_document(inner, label)
     except DeviceError as error:
-        elsewhere += error.faults
+        file_faults += error.faults
         return None
     if device.response is None:
         warn_of_implausible(device)
     return device
 
 
-def _own_measures(document: dict[str, Any], folder: File, found: Faults) -> dict[str, Measure] | None:
-    """The measures of the file that the study names, by name; None where it has faults, which are told."""
+def _own_measures(document: dict[str, Any], folder: File, faults: Faults) -> dict[str, Measure] | None:
+    """The measures of the file that the study names, by name; None where it has faults."""
     file = document.get("measures_file")
     if not isinstance(file, str) or not file:
         return {}
     try:
         return load_measures(str(folder / file))
     except ValueError as error:
-        found.append((("measures_file",), str(error)))
+        faults.append((("measures_file",), str(error)))
         return None  # a measure that is not known may be one of those
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from zwidth import _verbs
 from zwidth.device.device import Device
+from zwidth.device.faults import plural
 from zwidth.measures.definition import OK, STATUS, Measure
 from zwidth.model.argument_checks import wrong_type
 from zwidth.progress import Progress
@@ -42,9 +43,9 @@ SHOWN: Final = 3  # columns of a repr
 
 @dataclass(frozen=True, repr=False)
 class Sweep(Result):
-    """A study and what came of it.
+    """A study and its results.
 
-    cells  (designs, columns), in the designs' order
+    cells  values and status (designs, columns), in the designs' order
     """
 
     study: Study
@@ -53,32 +54,30 @@ class Sweep(Result):
 
     def __repr__(self) -> str:
         axes = ", ".join(axis.key for axis in self.job.sampling.axes)
-        lines = [f"Sweep: {self.job.count} designs of {self.study.device.label!r} over {axes}"]
+        lines = [f"Sweep: {plural(self.job.count, 'design')} of {self.study.device.label!r} over {axes}"]
         lines += [self._extremes(n) for n in range(len(self.job.columns))][:SHOWN]
         more = len(self.job.columns) - SHOWN
         return "\n  ".join([*lines, f"and {more} more"] if more > 0 else lines)
 
     @property
     def reason(self) -> str | None:
-        """Why no design has a value: the first reason told, or else what became of them; None where one has."""
+        """Why no design has a value: the first reason, or else their status; None where a design has one."""
         if (self.cells.status == OK).any():
             return None
-        told = [sentence for _, sentence in note_sentences(self)]
-        return (
-            f"{NO_DESIGN}: {told[0] if told else ', '.join(STATUS[int(k)] for k in np.unique(self.cells.status))}"
-        )
+        status = ", ".join(STATUS[int(k)] for k in np.unique(self.cells.status))
+        return f"{NO_DESIGN}: {next((sentence for _, sentence in note_sentences(self)), status)}"
 
     def design(self, number: int) -> dict[str, Any]:
-        """Path -> value of all that makes a design."""
+        """Path -> value of each number and circumstance that a design sets, by its number from 0."""
         sampling = self.job.sampling
         return dict(settings(sampling.axes, sampling.values(number)))
 
     def dataset(self) -> xr.Dataset:
-        """The values over the axes, with units and what was asked; see `sweep_data.as_dataset`."""
+        """The values over the axes, with units and the study; see `sweep_data.as_dataset`."""
         return as_dataset(self)
 
     def document(self) -> dict[str, Any]:
-        """The designs and what came of each by key, lists of one entry for each design."""
+        """The designs with their values and status by key, lists of one entry for each design."""
         return sweep_document(self)
 
     def table(self) -> dict[str, list[Any]]:
@@ -87,9 +86,9 @@ class Sweep(Result):
 
     def _extremes(self, column: int) -> str:
         one, values = self.job.columns[column], self.cells.values[:, column]
-        there = values[self.cells.status[:, column] == OK]
-        span = f"{there.min():.4g} to {there.max():.4g} {one.unit}".rstrip() + ", " if len(there) else ""
-        return f"{one.name}: {span}{len(there)} of {len(values)} have a value"
+        known = values[self.cells.status[:, column] == OK]
+        span = f"{known.min():.4g} to {known.max():.4g} {one.unit}".rstrip() + ", " if len(known) else ""
+        return f"{one.name}: {span}{len(known)} of {len(values)} have a value"
 
 
 def sweep(
@@ -126,12 +125,12 @@ def sweep(
                    the device's own
     user_measures  measures of a user's own, by name (`measures.user_measures.load_measures`)
     store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
-    progress       is called with what is done now, how many designs are done, and how many there are
+    progress       is called with the stage, the number of designs done, and of all designs
     workers        processes at most; left out: one for each core
-    Returns        a dataset with a dimension for each axis, called as it is: for each measure its values, nan
+    Returns        a dataset with a dimension for each axis, named by its path: for each measure its values, nan
                    where a design has none, and NAME_status. Why they have none stands in the attribute `notes`
-    Raises         DeviceError   with all faults of what was given
-                   MeasureError  for measures that cannot be asked of this device
+    Raises         DeviceError   with all faults of the arguments and the device
+                   MeasureError  for measures that do not exist for this device
                    TooLarge      where the designs would not fit into memory
                    TypeError     for arguments of another kind
                    what `executor.run` and `Store` raise
@@ -167,7 +166,7 @@ def run_study(
 
     store, progress, workers  as for `sweep`
     Raises  DeviceError   with all faults of the study's file and the device's
-            MeasureError  for measures that cannot be asked of this device
+            MeasureError  for measures that do not exist for this device
             TooLarge      where the designs would not fit into memory
             what `executor.run` and `Store` raise
     """

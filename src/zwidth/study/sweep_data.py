@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from zwidth.device.faults import plural
 from zwidth.measures.definition import STATUS, Note
 from zwidth.study.axis_tables import unit_of
 from zwidth.study.column import unit_attributes
@@ -37,7 +38,7 @@ def as_dataset(found: Sweep) -> xr.Dataset:
     dims = tuple(axis.key for axis in sampling.axes) if grid else (DESIGN,)
     data: dict[str, Any] = {}
     for n, one in enumerate(found.job.columns):
-        about = {
+        attributes = {
             **unit_attributes(one.unit),
             "title": one.title,
             "long_name": one.title,
@@ -46,7 +47,7 @@ def as_dataset(found: Sweep) -> xr.Dataset:
             "key": one.key,
             "notes": "\n".join(_sentence(found, note) for note in found.cells.notes[n]),
         }
-        data[one.name] = (dims, found.cells.values[:, n].reshape(sampling.shape), about)
+        data[one.name] = (dims, found.cells.values[:, n].reshape(sampling.shape), attributes)
         data[f"{one.name}_status"] = (dims, found.cells.status[:, n].reshape(sampling.shape), _flags())
     coordinates: dict[str, Any] = {} if grid else {DESIGN: np.arange(sampling.count)}
     rows = None if grid else [sampling.values(n) for n in range(sampling.count)]
@@ -58,17 +59,17 @@ def as_dataset(found: Sweep) -> xr.Dataset:
 
 
 def _columns(found: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str, tuple[Any, dict[str, str]]]]:
-    """The axis's coordinates: itself, and what goes with it."""
-    about = {**unit_attributes(axis.unit), "long_name": axis.key, "scale": "log" if axis.log else "linear"}
+    """The coordinates of an axis: its values, their components, and the numbers tied to it."""
+    attributes = {**unit_attributes(axis.unit), "long_name": axis.key, "scale": "log" if axis.log else "linear"}
     if values and isinstance(values[0], tuple):
         texts = {"long_name": axis.key, "role": "axis"}
         yield axis.key, (np.array([axis_value_text(value) for value in values]), texts)
         length = max(len(value) for value in values)
         padded = np.array([[*value, *[0.0] * (length - len(value))] for value in values])
         for n in range(length):
-            yield f"{axis.key}_{COMPONENTS[n]}", (padded[:, n], about)
+            yield f"{axis.key}_{COMPONENTS[n]}", (padded[:, n], attributes)
     else:
-        yield axis.key, (np.array(values), about | {"role": "axis"})
+        yield axis.key, (np.array(values), attributes | {"role": "axis"})
     for tie in axis.ties:
         tied = np.array([tie.value(value) for value in values])
         unit = unit_of(found.study.device.document, tie.key)
@@ -89,7 +90,7 @@ def axis_value_text(value: Any) -> str:
 
 
 def sweep_document(found: Sweep) -> dict[str, Any]:
-    """The designs, and what came of each measure in them, by key and unit; see `Sweep.document`."""
+    """The designs, with values, status and notes of each measure, by key and unit; see `Sweep.document`."""
     sampling, names = found.job.sampling, found.job.measures
     status = ([STATUS[int(s)] for s in row] for row in found.cells.status)
     return {
@@ -110,15 +111,15 @@ def sweep_document(found: Sweep) -> dict[str, Any]:
 
 
 def sweep_table(found: Sweep) -> dict[str, list[Any]]:
-    """Column -> one entry for each design: all that makes it, the values under names with units, the status."""
+    """Column -> one entry for each design: its numbers, the values under names with units, the status."""
     designs = [found.design(n) for n in range(found.job.count)]
-    made = {path: [_cell(design[path]) for design in designs] for path in (designs[0] if designs else {})}
+    settings = {path: [_cell(design[path]) for design in designs] for path in (designs[0] if designs else {})}
     columns = {one.key: list(found.cells.values[:, n]) for n, one in enumerate(found.job.columns)}
     status = {
         f"{one.name}_status": [STATUS[int(s)] for s in found.cells.status[:, n]]
         for n, one in enumerate(found.job.columns)
     }
-    return made | columns | status
+    return settings | columns | status
 
 
 def note_sentences(found: Sweep) -> Iterator[tuple[str, str]]:
@@ -138,7 +139,7 @@ def _sentence(found: Sweep, note: Note) -> str:
     where = ", ".join(
         f"{axis.key} = {axis_value_text(value)}" for axis, value in zip(sampling.axes, values, strict=True)
     )
-    many = "1 design" if note.count == 1 else f"{note.count} designs"
+    many = plural(note.count, "design")
     return f"{many} {STATUS.get(note.status, 'ok')}: {note.reason}; first at {where}"
 
 
@@ -148,7 +149,7 @@ def _flags() -> dict[str, Any]:
 
 
 def _attributes(found: Sweep) -> dict[str, Any]:
-    """What was asked, as attributes that any file can hold."""
+    """The study and its device, as attributes that any file can hold."""
     from zwidth._version import __version__
 
     device = found.study.device

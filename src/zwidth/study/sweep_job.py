@@ -1,7 +1,7 @@
 """The designs of a study as a job, computed one by one.
 
-Each design is the device file with a few numbers changed, checked and built like any other. One that is no device,
-or cannot get where it is asked about, has a status instead of values, and the others keep theirs.
+Each design is the device file with a few numbers changed, checked and built like any other. One that has
+faults, or does not reach the handle position, has a status instead of values; the other designs are not affected.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from zwidth.device import address
 from zwidth.device.compiled_mechanism_check import moves_mass
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError
+from zwidth.device.faults import DeviceError, plural
 from zwidth.device.load import from_document
 from zwidth.device.operator_choice import with_operator
 from zwidth.loop.operating_point import OperatingPoint
@@ -48,7 +48,7 @@ WALL: Final = ("stiffness", "damping", "frequency")  # of the wanted wall, as ar
 
 
 class _NoPoint(Exception):
-    """A design that cannot be asked anything: its status, and why."""
+    """A design without an operating point: its status, and why."""
 
     def __init__(self, status: int, reason: str = "") -> None:
         self.status, self.reason = status, reason
@@ -61,9 +61,9 @@ class SweepJob:
     document             of the device, the study's changes made
     label                of the device, for messages
     operators            as in `Study`
-    columns              what is asked
-    positions            (..., 3) of the workspace [m]; None where nothing is asked over it
-    weights              (...) what each of them stands for [m^2]
+    columns              the measures to compute
+    positions            (..., 3) of the workspace [m]; None where no column is over the workspace
+    weights              (...) area that belongs to each position [m^2]
     fixed_circumstances  circumstances that no axis sets
     """
 
@@ -78,7 +78,7 @@ class SweepJob:
     _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def __repr__(self) -> str:
-        return f"SweepJob({self.count} designs of {self.label!r}: {', '.join(self.measures)})"
+        return f"SweepJob({plural(self.count, 'design')} of {self.label!r}: {', '.join(self.measures)})"
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_cache": {}}
@@ -95,7 +95,10 @@ class SweepJob:
 
     @property
     def question(self) -> str:
-        """What its results are known by. Raises TypeError for a measure whose function has no name elsewhere."""
+        """Fingerprint that stored results are recognised by.
+
+        Raises  TypeError  for a measure whose function was not read from a file or a module
+        """
         return fingerprint(
             "sweep",
             self.document,
@@ -112,15 +115,15 @@ class SweepJob:
         values, status = np.full(shape, np.nan), np.empty(shape, dtype=np.uint8)
         designs_by_reason: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]
         for row in range(last - first):
-            for column, (value, what, reason) in enumerate(self._row(first + row)):
-                values[row, column], status[row, column] = value, what
+            for column, (value, cell_status, reason) in enumerate(self._row(first + row)):
+                values[row, column], status[row, column] = value, cell_status
                 if reason:
-                    designs_by_reason[column].setdefault((what, reason), []).append(first + row)
+                    designs_by_reason[column].setdefault((cell_status, reason), []).append(first + row)
         notes = [tuple(Note(*key, len(at), (at[0],)) for key, at in kinds.items()) for kinds in designs_by_reason]
         return CellValues(values, status, tuple(notes))
 
     def design(self, number: int) -> Design:
-        """One of the designs, with the operating points that it is asked about."""
+        """One of the designs, by its number from 0."""
         return Design(self, number)
 
     def _row(self, number: int) -> Iterator[tuple[float, int, str]]:
@@ -142,11 +145,11 @@ class SweepJob:
         return frozenset(key for key in own if address.resolve(self.document, key)[0] == "mechanism")
 
     def of_mechanism(self, chosen: dict[str, Any]) -> list[tuple[str, Any]]:
-        """What of a design changes the mechanism."""
+        """Path and value of each number of a design that stands in [mechanism]."""
         return [(key, value) for key, value in chosen.items() if key in self._in_mechanism]
 
     def device(self, chosen: dict[str, Any]) -> Device:
-        """The device with its axes' values; kept until another is asked for. Raises DeviceError."""
+        """The device with these values of its axes; the last one is cached. Raises DeviceError."""
         own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
         key = (chosen.get("operator"), own)
         if self._cache.get("key") != key:
@@ -173,11 +176,11 @@ class Design:
         return WantedWall(**{name: self._circumstance(KEYS[name]) for name in WALL})
 
     def point(self) -> OperatingPoint:
-        """The posture asked about. Raises _NoPoint."""
+        """The operating point at the design's handle position. Raises _NoPoint."""
         return self._solve_once("point", self._circumstance("at"))
 
     def workspace(self) -> OperatingPoint:
-        """All postures of the workspace. Raises _NoPoint."""
+        """The operating points of all positions of the workspace. Raises _NoPoint."""
         return self._solve_once("workspace", self.job.positions)
 
     def _solve_once(self, name: str, positions: Any) -> OperatingPoint:
@@ -186,10 +189,10 @@ class Design:
                 self.points[name] = self._solve(name, positions)
             except _NoPoint as none:
                 self.points[name] = none
-        found = self.points[name]
-        if isinstance(found, _NoPoint):
-            raise found
-        return found
+        point = self.points[name]
+        if isinstance(point, _NoPoint):
+            raise point
+        return point
 
     def _solve(self, name: str, positions: Any) -> OperatingPoint:
         try:
@@ -238,23 +241,23 @@ def _column_value(
         if measure.each:
             status = int(point.status)
             return (np.nan, status, "") if status != OK else evaluate_safely(lambda: measure.compute(point))
-        found = evaluate(measure, point)
+        result = evaluate(measure, point)
     except MeasureError as error:
         return np.nan, NO_VALUE, error.spelled(as_key)
-    return float(found.values), int(found.status), found.notes[0].reason if found.notes else ""
+    return float(result.values), int(result.status), result.notes[0].reason if result.notes else ""
 
 
 def sweep_job(study: Study) -> SweepJob:
-    """The question that a study asks, so that a store can be made for it.
+    """The job of a study, for which a `Store` can be made.
 
-    Raises  MeasureError  for measures that cannot be asked of this device, all of them
+    Raises  MeasureError  for measures that do not exist for this device, with all their names
     """
     wanted = {KEYS[name]: getattr(study.wall, name) for name in WALL}
     circumstances = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
     fixed = {key: value for key, value in circumstances.items() if value is not None}
     plane = study.plane
     positions, weights = (None, None) if plane is None else (plane.positions, areas(plane.x, plane.y))
-    # what a device's numbers come from is told of the study; it need not be read again for each design
+    # the sources of a device's numbers change no result; they need not be read again for each design
     document = {key: value for key, value in study.device.document.items() if key != "sources"}
     columns, designs = study.columns, study.sampling
     job = SweepJob(document, study.device.label, study.operators, designs, columns, positions, weights, fixed)
@@ -263,7 +266,7 @@ def sweep_job(study: Study) -> SweepJob:
 
 
 def _check_measures(job: SweepJob, spelling: Spelling) -> None:
-    """Raises MeasureError where a measure can be asked of no design, as far as a few of them tell."""
+    """Raises MeasureError where a measure exists for none of three designs: the first, the middle and the last."""
     pending, refused = job.columns, dict[str, str]()
     for number in sorted({0, job.count // 2, job.count - 1}):
         design = job.design(number)

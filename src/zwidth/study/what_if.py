@@ -121,6 +121,7 @@ def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
 
 
 def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
+    """One change at a time of the device or its computer."""
     controller, plant = point.controller, point.plant
     alone = point.ungripped_plant  # the device's own damping, without the operator's
 
@@ -135,25 +136,27 @@ def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     usual = usual_filter(controller.sampling_period)
     own = "structural damping" if flexible else "friction"
 
-    rigid = only(flexible, f"its {'drives are' if point.mechanism is not None else 'structure is'} rigid already")
+    obstacle = only(
+        flexible, f"its {'drives are' if point.mechanism is not None else 'structure is'} rigid already"
+    )
     name = "rigid drives" if point.mechanism is not None else "rigid structure"
-    yield "rigid-drives", name, rigid, lambda: point.in_model("rigid").loop
+    yield "rigid-drives", name, obstacle, lambda: point.in_model("rigid").loop
     faster = half_period(device)
     yield "half-period", "half the sampling period", _no_estimate(faster), lambda: Loop(plant, faster)
     yield "no-delay", "no delay", only(delay != 0.0, "the device has no delay"), computed(delay=0.0)
-    late = only(delay != 1.0, "the device has one sample of delay")
-    yield "one-sample", "one sample of delay", late, computed(delay=1.0)
-    bare = only(low_pass is not None, "the device has no velocity filter")
-    yield "no-filter", "without the velocity filter", bare, computed(velocity_filter=None)
-    filtered = only(low_pass is None, "the device has a velocity filter")
-    through = f"velocity through a Butterworth filter of order 2 at {usual.cutoff_Hz:.4g} Hz"
-    yield "with-filter", through, filtered, computed(velocity_filter=usual)
+    obstacle = only(delay != 1.0, "the device has one sample of delay")
+    yield "one-sample", "one sample of delay", obstacle, computed(delay=1.0)
+    obstacle = only(low_pass is not None, "the device has no velocity filter")
+    yield "no-filter", "without the velocity filter", obstacle, computed(velocity_filter=None)
+    obstacle = only(low_pass is None, "the device has a velocity filter")
+    label = f"velocity through a Butterworth filter of order 2 at {usual.cutoff_Hz:.4g} Hz"
+    yield "with-filter", label, obstacle, computed(velocity_filter=usual)
     twice = replace(alone, damping=2.0 * alone.damping)
-    lossless = only(damped, f"the device has no {own}")
-    yield "twice-damping", f"twice the {own}", lossless, lambda: Loop(point.attach_operator(twice), controller)
-    there = only(not _collocated(plant), "the sensor reads where the wall acts already")
-    moved = replace(plant, sensor=plant.actuator)
-    yield "collocated", "sensor at the actuator", there, lambda: Loop(moved, controller)
+    obstacle = only(damped, f"the device has no {own}")
+    yield "twice-damping", f"twice the {own}", obstacle, lambda: Loop(point.attach_operator(twice), controller)
+    obstacle = only(not _collocated(plant), "the sensor reads where the wall acts already")
+    collocated = replace(plant, sensor=plant.actuator)
+    yield "collocated", "sensor at the actuator", obstacle, lambda: Loop(collocated, controller)
 
 
 def _collocated(plant: Plant) -> bool:
@@ -170,7 +173,7 @@ def _models(point: OperatingPoint) -> Iterator[Change]:
     undamped_only = "" if damped else "there is no damping to leave out"
 
     def same(name: Model) -> str:
-        # a plant that is this model already is returned as it is
+        # `in_model` returns a plant unchanged that is this model already
         return "the device as described is this model" if reduces_to_itself(name) else ""
 
     def reduces_to_itself(name: Model) -> bool:
@@ -185,8 +188,8 @@ def _models(point: OperatingPoint) -> Iterator[Change]:
             if not lossless:
                 return reduced.loop
             plant = reduced.ungripped_plant
-            kept = replace(plant, damping=0.0 * plant.damping, lagged_dampers=())
-            return Loop(point.attach_operator(kept), point.controller)
+            undamped = replace(plant, damping=0.0 * plant.damping, lagged_dampers=())
+            return Loop(point.attach_operator(undamped), point.controller)
 
         return make
 

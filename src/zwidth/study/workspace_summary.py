@@ -27,16 +27,16 @@ def over_the_workspace(dataset: xr.Dataset, name: str, device: Device | None = N
     values, status = dataset[name].values, dataset[f"{name}_status"].values
     weights = areas(dataset["x_m"].values, dataset["y_m"].values)
     better = dataset[name].attrs["better"] or None
-    found = dict(vars(overall(values, status, weights, better)))
+    summary = dict(vars(overall(values, status, weights, better)))
     if name in CONDITIONS:
-        found["conditioning_index"] = global_conditioning_index(values, status, weights)
+        summary["conditioning_index"] = global_conditioning_index(values, status, weights)
     if name == "isotropy" and device is not None and device.mechanism is not None:
         from zwidth.model.posture import solve_posture
 
         posture = solve_posture(device.mechanism, positions(dataset), dataset.attrs["assembly"])
         freedoms = len(device.mechanism.drives.names)
-        found["isotropy_index"] = global_isotropy_index(posture.jacobian, status, freedoms)
-    return found
+        summary["isotropy_index"] = global_isotropy_index(posture.jacobian, status, freedoms)
+    return summary
 
 
 def positions(dataset: xr.Dataset) -> NDArray[np.float64]:

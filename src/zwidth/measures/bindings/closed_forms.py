@@ -38,19 +38,19 @@ def _range(point: OperatingPoint) -> ImpedanceRange:
     if point.operator is not None and point.model != "motor-mass":
         raise MeasureError("has a closed form for the device alone", [("operator", "none")])
     case = loop_case(point)
-    T, late = point.controller.sampling_period, point.controller.whole_delay
+    T, delay_samples = point.controller.sampling_period, point.controller.whole_delay
     mass: ArrayLike
     motor: ArrayLike
     stiffness: ArrayLike
     if point.mechanism is None:
-        found, rigid, sprung = case.traits, RIGID not in case.unmet, SPRUNG not in case.unmet
-        mass, motor, stiffness = found.rigid_mass, found.side_mass, found.side_stiffness
+        traits, rigid, sprung = case.traits, RIGID not in case.unmet, SPRUNG not in case.unmet
+        mass, motor, stiffness = traits.rigid_mass, traits.side_mass, traits.side_stiffness
     else:
         numbers, rigid, sprung = point.effective, point.model == "rigid", point.model == "motor-mass"
         mass, motor, stiffness = numbers.rigid_mass, numbers.motor_side_mass, numbers.stiffness
     if rigid:
         require_assumptions(case, WHOLE_DELAY)
-        return rigid_range(mass, T, late)
+        return rigid_range(mass, T, delay_samples)
     if sprung:
         require_motor_encoders(point)
         require_assumptions(case, UNDELAYED)

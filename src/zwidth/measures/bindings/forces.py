@@ -15,23 +15,26 @@ from zwidth.model.mechanism import Floats
 
 
 def peak_force(point: OperatingPoint) -> Floats:
-    """Exactly along the rendered direction, within the torque limits."""
+    """Largest force exactly along the rendered direction within the torque limits [N]."""
     return forces.force_along(point.jacobian, point.direction, _torques(point, "torque_limit_Nm"))
 
 
 def continuous_force(point: OperatingPoint) -> Floats:
-    """Exactly along the rendered direction, within the continuous torques."""
+    """Largest force exactly along the rendered direction within the continuous torques [N]."""
     return forces.force_along(point.jacobian, point.direction, _torques(point, "continuous_torque_Nm"))
 
 
 def acceleration_max(point: OperatingPoint) -> Floats:
-    """Exactly along the rendered direction, from rest, within the torque limits; drives rigid."""
+    """Largest acceleration exactly along the rendered direction, from rest, within the torque limits [m/s^2].
+
+    Drives count as rigid.
+    """
     torques = _torques(point, "torque_limit_Nm")
     return forces.acceleration_along(point.jacobian, point.whole_mass_matrix, point.direction, torques)
 
 
 def position_resolution(point: OperatingPoint) -> Floats:
-    """Step of the reading along the rendered direction when all encoders step; of a [plant] its sensor's."""
+    """Step of the reading along the rendered direction when all encoders step; for a [plant] its sensor's [m]."""
     if point.given_plant is not None:
         return _require_nonzero(
             reading_step(point.given_plant), "needs the step of the encoder; give loop.encoder.resolution_m"
@@ -43,7 +46,7 @@ def position_resolution(point: OperatingPoint) -> Floats:
 
 
 def friction_force(point: OperatingPoint) -> Floats:
-    """Dry friction of all drives felt along the rendered direction; of a [plant] where the wall acts."""
+    """Dry friction of all drives felt along the rendered direction; for a [plant] where the wall acts [N]."""
     if point.given_plant is not None:
         return _require_nonzero(ground_friction(point.given_plant), "needs dry friction; give friction.coulomb_N")
     dry = point.drives.nonlinearity
@@ -55,9 +58,9 @@ def friction_force(point: OperatingPoint) -> Floats:
 def _torques(point: OperatingPoint, key: str) -> Floats:
     """Torques at the joints (..., d) [N m]. Raises MeasureError where the file leaves one out."""
     drives = point.drives
-    found = drives.torque_limit if key == "torque_limit_Nm" else drives.continuous_torque
-    given = np.full(len(drives.names), np.nan) if found is None else found
-    return np.asarray(drives.transmission * _require_finite(point, key, given))
+    limits = drives.torque_limit if key == "torque_limit_Nm" else drives.continuous_torque
+    known = np.full(len(drives.names), np.nan) if limits is None else limits
+    return np.asarray(drives.transmission * _require_finite(point, key, known))
 
 
 def _require_finite(point: OperatingPoint, key: str, values: Floats) -> Floats:

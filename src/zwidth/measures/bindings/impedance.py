@@ -19,8 +19,8 @@ NO_WALL = "no wall with K > 0 and B >= 0 is stable"
 def stiffness_max(point: OperatingPoint) -> MeasureValues:
     """Supremum of K over the stable walls with K > 0, B >= 0, of the point's model and loop [N/m].
 
-    Postures of classically damped mechanisms go through compiled code together (`chart.stiffest_batch`); what is
-    in doubt there, or has no stable wall there, is computed one by one, as all other devices are.
+    Postures of classically damped mechanisms are computed together in compiled code (`chart.stiffest_batch`);
+    those of them without a certain result, and all other devices, are computed one posture at a time.
     """
     fast = _stiffest_walls_of(point)
     if fast is None:
@@ -68,7 +68,7 @@ def stable_area(point: OperatingPoint) -> float:
 
 def fastest_decay(point: OperatingPoint) -> float:
     """Spectral radius of the wall whose slowest motion decays fastest, of one point."""
-    found = stability_chart(point.loop).fastest_decay
-    if found is None:
+    wall = stability_chart(point.loop).fastest_decay
+    if wall is None:
         raise NoValueError("no wall is stable")
-    return found.spectral_radius
+    return wall.spectral_radius

@@ -48,7 +48,7 @@ def plant_with_handle(point: OperatingPoint) -> Plant:
 
 
 def loop_case(point: OperatingPoint) -> ConditionCase:
-    """The point's loop in the words of the published conditions; of a mechanism the computer's part only.
+    """The properties of the point's loop that published conditions use; of a mechanism those of the computer only.
 
     Raises  MeasureError  where the loop is not linear, or the model does not apply to a given plant
     """
@@ -62,7 +62,8 @@ def loop_case(point: OperatingPoint) -> ConditionCase:
 def require_assumptions(case: ConditionCase, *more: str) -> None:
     """Raises MeasureError, with the assumptions in words, where a loop does not meet those of the closed forms.
 
-    They take the velocity as the backward difference and apply the force as computed; that of damping is left out.
+    Closed forms assume the velocity by backward difference and the force as computed; their assumption that
+    nothing is damped is not checked.
     """
     broken = [sentence for sentence in (COLLOCATED, *more, *PLAIN) if sentence in case.unmet]
     if broken:

@@ -31,26 +31,29 @@ _NOT_REACHED = (
 
 
 def optimal_spectral_radius(point: OperatingPoint, wanted: WantedWall) -> MeasureValues:
-    """Thesis eq. 5.15, of the motor side on the structure's spring; the masses of the device do not count."""
+    """Least spectral radius of the wanted wall over all motor-side masses (thesis eq. 5.15).
+
+    Of the motor side on the structure's spring; the device's own masses do not matter.
+    """
     return with_status(point, _optimal(point, wanted).spectral_radius, _NOT_REACHED)
 
 
 def optimal_motor_side_mass(point: OperatingPoint, wanted: WantedWall) -> MeasureValues:
-    """Thesis eq. 5.14 with 5.15."""
+    """Motor-side mass with which vibration at the wanted wall decays fastest [kg] (thesis eq. 5.14 with 5.15)."""
     return with_status(point, _optimal(point, wanted).mass, _NOT_REACHED)
 
 
 def spectral_radius(point: OperatingPoint, wanted: WantedWall) -> float:
-    """Of the wanted wall, by eigenvalues, for whatever model and loop."""
+    """Spectral radius of the wanted wall by eigenvalues, for any model and loop."""
     return float(_wall_verdicts(point, wanted).spectral_radius[0])
 
 
 def decay_time(point: OperatingPoint, wanted: WantedWall) -> float:
-    """Time in which the slowest vibration at the wanted wall shrinks to 1/e."""
-    found = _wall_verdicts(point, wanted)
-    if found.verdict[0] != STABLE:
-        raise NoValueError(f"the wanted wall is {found.names[0]} here, so that vibration does not decay")
-    return float(vibration_decay.decay_time(found.spectral_radius[0], point.controller.sampling_period))
+    """Time in which the slowest vibration at the wanted wall shrinks to 1/e [s]."""
+    verdicts = _wall_verdicts(point, wanted)
+    if verdicts.verdict[0] != STABLE:
+        raise NoValueError(f"the wanted wall is {verdicts.names[0]} here, so that vibration does not decay")
+    return float(vibration_decay.decay_time(verdicts.spectral_radius[0], point.controller.sampling_period))
 
 
 def structural_distortion(point: OperatingPoint, wanted: WantedWall) -> float:
@@ -59,22 +62,24 @@ def structural_distortion(point: OperatingPoint, wanted: WantedWall) -> float:
 
 
 def felt_stiffness(point: OperatingPoint, wanted: WantedWall) -> float:
-    """Real part of force per displacement at the handle, at the wanted wall and frequency."""
+    """Real part of force per displacement at the handle, at the wanted wall and frequency [N/m]."""
     wall, frequency = wall_of(wanted), frequency_of(wanted)
     nyquist = 0.5 / point.controller.sampling_period
     if frequency >= nyquist:
         raise MeasureError(
             f"needs a frequency below half the sampling frequency, {nyquist:g} Hz, got {frequency:g} Hz"
         )
-    plant, found = plant_with_handle(point), _wall_verdicts(point, wanted)
-    if found.verdict[0] != STABLE:
-        raise NoValueError(f"the wanted wall is {found.names[0]} here, so that there is no steady motion to feel")
+    plant, verdicts = plant_with_handle(point), _wall_verdicts(point, wanted)
+    if verdicts.verdict[0] != STABLE:
+        raise NoValueError(
+            f"the wanted wall is {verdicts.names[0]} here, so that there is no steady motion to feel"
+        )
     Z = handle_impedance.felt_impedance(Loop(plant, point.controller), *wall, frequency)
     return float((2j * np.pi * frequency * Z).real)
 
 
 def free_motion_force(point: OperatingPoint, wanted: WantedWall) -> float:
-    """Size of force per velocity at the handle without any wall, at the wanted frequency."""
+    """Size of force per velocity at the handle without any wall, at the wanted frequency [N s/m]."""
     frequency = frequency_of(wanted)
     return float(np.abs(handle_impedance.free_motion_impedance(plant_with_handle(point), frequency)))
 

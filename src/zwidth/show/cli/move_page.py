@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.show.circumstances import computer_text
 from zwidth.show.cli.answer import Row, table, two_columns
-from zwidth.show.cli.energies import HEADINGS, energy_rows
 from zwidth.show.cli.simulation_page import environment_words
+from zwidth.show.energies import HEADINGS, energy_rows
 from zwidth.show.output import printable
 from zwidth.show.units import amount, percent, typed, vector
 

@@ -7,8 +7,8 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.show.cli.answer import Row, table, two_columns
-from zwidth.show.cli.energies import HEADINGS, energy_rows
 from zwidth.show.cli.heading import ROUNDING
+from zwidth.show.energies import HEADINGS, energy_rows
 from zwidth.show.units import amount, as_written, percent, signed, typed, uncertain
 
 if TYPE_CHECKING:

@@ -122,7 +122,8 @@ class SweepCommand(Command):
         from zwidth.study.sweep_data import axis_value_text
 
         count, sampling, columns = result.job.count, result.job.sampling, result.job.columns
-        over = " x ".join(map(str, sampling.shape)) + " designs" if sampling.size is None else f"{count} designs"
+        shape = str(count) if sampling.size is not None else " x ".join(map(str, sampling.shape))
+        over = f"{shape} design{'s' * (count != 1)}"
         axes = ", ".join(axis.key for axis in sampling.axes)
         yield f"{printable(document['name'])}: {over} over {axes}"
         if document["left_out"]:

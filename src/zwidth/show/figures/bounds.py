@@ -140,8 +140,8 @@ def _entries(
     if not met and any(not bound.holds for bound in known):
         entries.append(_without_line(NOT_MET))
     for n, bound, look in sorted(drawn, key=lambda one: one[0]):
-        binds = met and 0.0 < bound.stiffness_max <= lowest
-        limit = f", at most {quantity(bound.stiffness_max, 'N/m')}: binds" if binds else ""
+        strictest = met and 0.0 < bound.stiffness_max <= lowest
+        limit = f", at most {quantity(bound.stiffness_max, 'N/m')}: strictest" if strictest else ""
         text = "\n".join(wrap(f"{n}\u00a0 {bound.name}{limit}", LETTERS, break_long_words=False))
         entries.append(Line2D([], [], label=text, **look))
     seen = [bound for _, bound, _ in drawn]

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
 from zwidth.show.circumstances import AS_GIVEN, computer_text, omission_text, operator_text
-from zwidth.show.figures.style import FAMILY, context, text_width
+from zwidth.show.figures.style import FAMILY, context, wrapped
 from zwidth.show.output import printable
 from zwidth.show.units import as_written, point
 
@@ -41,7 +41,7 @@ def write_caption(made: Figure, paragraphs: Sequence[str]) -> None:
     """
     width, height = made.get_size_inches()
     room = 72.0 * (width - 2.0 * MARGIN)
-    lines = [line for paragraph in paragraphs for line in wrapped(paragraph, room)]
+    lines = [line for paragraph in paragraphs for line in wrapped(_with_known_letters(paragraph), room, SIZE)]
     if not lines:
         return
     added = len(lines) * LEADING * SIZE / 72.0 + MARGIN
@@ -58,23 +58,6 @@ def write_caption(made: Figure, paragraphs: Sequence[str]) -> None:
         )
 
 
-def wrapped(text: str, room: float) -> list[str]:
-    """The text in lines no wider than room [points], broken at blanks, and within a word that is wider itself."""
-    lines = [""]
-    for word in _with_known_letters(text).split(" "):
-        longer = f"{lines[-1]} {word}" if lines[-1] else word
-        if text_width(longer, SIZE) <= room:
-            lines[-1] = longer
-            continue
-        lines += [word] if lines[-1] else []
-        lines[-1] = lines[-1] or word
-        while text_width(lines[-1], SIZE) > room:
-            last = lines[-1]
-            fits = next((n for n in range(len(last) - 1, 1, -1) if text_width(last[:n], SIZE) <= room), 1)
-            lines[-1:] = [last[:fits], last[fits:]]
-    return [line for line in lines if line]
-
-
 def caption_of_facts(facts: Mapping[str, Any], controller: Controller | None) -> list[str]:
     """The paragraphs of a caption: the device and its posture; the computer, and what a linear answer leaves out.
 
@@ -85,7 +68,7 @@ def caption_of_facts(facts: Mapping[str, Any], controller: Controller | None) ->
     about = f"{name}: {', '.join(first)}" if name and first else name or ", ".join(first)
     last = [] if controller is None else [computer_text(controller)]
     if varied := facts.get("varied"):
-        last.append(f"but for what is varied: {', '.join(map(printable, varied))}")
+        last.append(f"varied: {', '.join(map(printable, varied))}")
     if left_out := facts.get("left_out"):
         last.append(omission_text(left_out))
     return [paragraph for paragraph in (about, "; ".join(last)) if paragraph]

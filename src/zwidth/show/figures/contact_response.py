@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from zwidth.contact.time_response import SOURCES, TimeResponse
+from zwidth.show.energies import energy_label
 from zwidth.show.figures.style import BLACK, BLUE, GREY, LINES, VERMILION, context, figure, label, legend_above
 from zwidth.show.units import quantity
 
@@ -186,7 +187,7 @@ def _draw_energies(ax: Axes, response: TimeResponse, run: _Part, draw: Callable[
     size = np.abs(response.energies).max(axis=0)
     worth = [i for i in np.argsort(-size)[:LEDGER] if size[i] > WORTH * size.max()]
     for i, (colour, dashes) in zip(worth, LINES[1:], strict=False):
-        draw(ax, run.time, run(response.energies[:, i]), colour, SOURCES[i], dashes=dashes)
+        draw(ax, run.time, run(response.energies[:, i]), colour, energy_label(SOURCES[i]), dashes=dashes)
     _across(ax, 0.0, "")
 
 

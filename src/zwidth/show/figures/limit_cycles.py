@@ -107,10 +107,14 @@ def draw_plane(ax: Axes, device: DevicePlane) -> None:
     lacking = " and ".join(word for word, part in (("viscous", x), ("dry", y)) if not np.all(part > 0.0))
     text = f"the device has no {lacking} friction: at the border" if lacking else "the device, by wall stiffness"
     ax.plot(*seen, color=BLUE, marker="o", markersize=4.0, label=text, clip_on=False)
-    for K, across, up in zip(device.wall_stiffness, *seen, strict=True):
+    places_of_walls: dict[tuple[float, float], list[float]] = {}
+    for K, across, up in zip(device.wall_stiffness, *map(np.ndarray.tolist, seen), strict=True):
+        places_of_walls.setdefault((across, up), []).append(float(K))
+    for (across, up), walls in places_of_walls.items():
         before = left < across < corner  # its label keeps off the corner's line
+        several = f"{quantity(min(walls), 'N/m')} to {quantity(max(walls), 'N/m')}"  # without either friction
         ax.annotate(
-            quantity(float(K), "N/m"),
+            quantity(walls[0], "N/m") if len(walls) == 1 else several,
             (across, up),
             xytext=(-5, 3) if before else (5, -3),
             ha="right" if before else "left",

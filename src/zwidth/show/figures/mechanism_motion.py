@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from zwidth.contact.mechanism.motion import MechanismMotion
@@ -182,6 +183,7 @@ def _frame(ax: Axes, view: Floats, flat: list[int]) -> None:
     ax.set_aspect("equal", adjustable="datalim")
     ax.grid(color="#D4D4D4", linewidth=0.5)
     ax.set_axisbelow(True)
+    ax.xaxis.set_major_locator(MaxNLocator(4, steps=(1, 2, 5, 10)))  # long labels of a close view keep apart
     for axis, k in zip((ax.xaxis, ax.yaxis), flat, strict=True):
         label(axis, AXES[k], "m", plain=True)
 
@@ -222,7 +224,7 @@ def _draw_energies(ax: Axes, motion: MechanismMotion, draw: Any) -> None:
     """Of the motion and of bent drives; what the others have put in since, where it is worth a line."""
     courses = {
         "kinetic": motion.kinetic,
-        "drives bent": motion.elastic,
+        "drives, elastic": motion.elastic,
         "gravity": motion.gravitational[0] - motion.gravitational,
         "hand": motion.hand_work,
         "motors": motion.motor_work,

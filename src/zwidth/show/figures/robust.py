@@ -62,7 +62,7 @@ def _draw_edge(ax: Axes, chart: RobustChart, members: Sequence[Mapping[str, Any]
     for arc in chart.boundary:
         place = named.index(arc.member) if arc.member in named else NAMED
         colour, dashes = LINES[place]
-        text = f"binds: {_words(members, arc.member)}" if place < NAMED else "others bind"
+        text = f"limited by {_words(members, arc.member)}" if place < NAMED else "limited by others"
         ax.plot(
             arc.stiffness,
             arc.damping,

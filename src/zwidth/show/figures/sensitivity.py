@@ -9,11 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION
+from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION, text_width, wrapped
 from zwidth.show.units import MINUS, NONE, signed
 from zwidth.study.sensitivity_result import Sensitivities
 
 NUMBER_ROOM: Final = 0.24  # of what the bars span, for the numbers beside them
+NUMBER_WIDTH: Final = 40.0  # points that such a number takes at least
+MARGINS: Final = 20.0  # points beside axes and labels
+TICK_SIZE: Final = 8.0
+AXIS_SIZE: Final = 9.0
 
 
 def draw_sensitivities(ax: Axes, sensitivities: Sensitivities, top: int = 12, *, grouped: bool = False) -> None:
@@ -53,19 +57,40 @@ def draw_sensitivities(ax: Axes, sensitivities: Sensitivities, top: int = 12, *,
         )
     ax.axvline(0.0, color=BLACK, linewidth=0.8)
     low, high = min([0.0, *values]), max([0.0, *values])
+    labels = [_fitted(_short(path), 0.45 * _width(ax)) for path, _ in shown]
+    beside = _width(ax) - _widest(labels) - MARGINS
     # numbers stand outside of the bars: both sides have room for the longest, whatever the bars span
-    room = NUMBER_ROOM * (high - low or 1.0)
+    sides = (low < 0.0) + (high > 0.0)
+    share = max(NUMBER_ROOM, NUMBER_WIDTH / max(beside - sides * NUMBER_WIDTH, NUMBER_WIDTH))
+    room = share * (high - low or 1.0)
     ax.set_xlim(low - (room if low < 0.0 else 0.02 * widest), high + (room if high > 0.0 else 0.02 * widest))
     ax.set_ylim(0.4, len(shown) + 0.6)
-    ax.set_yticks(rows, [_short(path) for path, _ in shown])
+    ax.set_yticks(rows, labels)
     ax.tick_params(axis="y", length=0.0)
     ax.spines["left"].set_visible(False)
     ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}".replace("-", MINUS))
     ax.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-    ax.set_xlabel("Change of the largest stiffness for 1 % more [%]")
+    ax.set_xlabel("\n".join(wrapped("Change of the largest stiffness for 1 % more [%]", beside, AXIS_SIZE)))
     if not shown:
         ax.set_yticks([])
         ax.text(0.5, 0.5, NONE, transform=ax.transAxes, ha="center", va="center", color=GREY)
+
+
+def _width(ax: Axes) -> float:
+    """Width of the figure [points]."""
+    assert ax.figure is not None
+    return 72.0 * float(ax.figure.get_figwidth())  # type: ignore[union-attr]
+
+
+def _widest(labels: list[str]) -> float:
+    """Width of the widest line [points]."""
+    return max((text_width(line, TICK_SIZE) for label in labels for line in label.split("\n")), default=0.0)
+
+
+def _fitted(path: str, width: float) -> str:
+    """The path on one line, or with its last name on a second where it is wider than this [points]."""
+    table, dot, name = path.rpartition(".")
+    return path if text_width(path, TICK_SIZE) <= width or not dot else f"{table}.\n{name}"
 
 
 def _short(path: str) -> str:

@@ -50,6 +50,7 @@ LINES: Final[tuple[tuple[str, Any], ...]] = (
 
 FAMILY: Final = "DejaVu Sans"  # comes with matplotlib: the same glyphs on every machine
 LEGEND_SIZE: Final = 8.0
+HANDLE: Final = 3.4  # widths of a letter that a legend's line takes before its text
 BESIDE_AXES: Final = 0.7  # inches beside axes that a legend above them cannot use: the labels of the upright axis
 MOST_DECADES: Final = 8  # of a logarithmic axis that are all numbered
 # Decades from which on a logarithmic axis has ticks at these multiples of each power of ten.
@@ -205,11 +206,33 @@ def text_width(text: str, size: float) -> float:
     return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0])
 
 
+def wrapped(text: str, room: float, size: float) -> list[str]:
+    """The text in lines no wider than room [points], broken at blanks, and within a word that is wider itself."""
+    lines = [""]
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}" if lines[-1] else word
+        if text_width(longer, size) <= room:
+            lines[-1] = longer
+            continue
+        lines += [word] if lines[-1] else []
+        lines[-1] = lines[-1] or word
+        while text_width(lines[-1], size) > room:
+            last = lines[-1]
+            fits = next((n for n in range(len(last) - 1, 1, -1) if text_width(last[:n], size) <= room), 1)
+            lines[-1:] = [last[:fits], last[fits:]]
+    return [line for line in lines if line]
+
+
+def room_above(ax: Axes) -> float:
+    """Width of what stands above axes and does not leave the figure [points]."""
+    assert ax.figure is not None
+    return 72.0 * (float(ax.figure.get_figwidth()) - BESIDE_AXES)  # type: ignore[union-attr]
+
+
 def fitted_columns(ax: Axes, labels: Sequence[str], columns: int, size: float = LEGEND_SIZE) -> int:
     """Columns of a legend above axes, at most so many, in which the labels do not leave the figure."""
-    assert ax.figure is not None
-    room = 72.0 * (float(ax.figure.get_figwidth()) - BESIDE_AXES)  # type: ignore[union-attr]
-    widths = [max(text_width(line, size) for line in text.split("\n")) + 3.4 * size for text in labels]
+    room = room_above(ax)
+    widths = [max(text_width(line, size) for line in text.split("\n")) + HANDLE * size for text in labels]
     for count in range(min(columns, len(labels)), 1, -1):
         rows, more = divmod(len(labels), count)  # matplotlib makes the first columns longer
         ends = [n * rows + min(n, more) for n in range(count + 1)]
@@ -219,12 +242,20 @@ def fitted_columns(ax: Axes, labels: Sequence[str], columns: int, size: float = 
     return 1
 
 
+def _in_lines(text: str, room: float) -> str:
+    """A legend's text with its own lines broken where they are wider than room [points]."""
+    return "\n".join(line for part in text.split("\n") for line in wrapped(part, room, LEGEND_SIZE))
+
+
 def _legend(ax: Axes, **place: Any) -> None:
     handles, labels = ax.get_legend_handles_labels()
     if not handles:
         return
     if "ncols" in place:
         place["ncols"] = fitted_columns(ax, labels, place["ncols"])
+        room = room_above(ax)
+        labels = [_in_lines(text, room - HANDLE * LEGEND_SIZE) for text in labels]
+        place["title"] = place["title"] and _in_lines(place["title"], room)
     made = ax.legend(
         handles,
         labels,

@@ -1,9 +1,10 @@
-"""The report's figures, each as an <svg> element."""
+"""The report's figures, each as two <svg> elements: one for a page, one drawn narrower for a phone."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from math import isfinite
+from typing import Final
 
 from matplotlib.axes import Axes
 
@@ -23,10 +24,11 @@ from zwidth.show.report.facts import Facts
 from zwidth.study.validity import Validity
 
 TOP = 10  # bars of sensitivities
+WIDTHS: Final = {"wide": 6.2, "narrow": 3.75}  # class of the page's style sheet -> width [inches]
 
 
 def svg_figures(facts: Facts) -> dict[str, str]:
-    """Name -> SVG; "" for a figure that does not apply to this device."""
+    """Name -> HTML of both drawings; "" for a figure that does not apply to this device."""
     device, chart, plant = facts.device, facts.chart, facts.loop.plant
     drawn = {
         "chart": _svg(facts, "chart", "Stability chart: stable walls", lambda ax: draw_chart(ax, chart))
@@ -75,13 +77,14 @@ def _sensitivities(facts: Facts) -> str:
     rows = len(facts.sensitivities.ranking[:TOP])
     if not rows:
         return ""
-    height = 0.8 + 0.24 * max(rows, 2)
+    height, narrow_height = (0.8 + row * max(rows, 2) for row in (0.24, 0.33))  # paths on two lines
     return _svg(
         facts,
         "sensitivities",
         "Sensitivity of the largest stiffness to each number",
         lambda ax: draw_sensitivities(ax, facts.sensitivities, TOP, grouped=True),
         height,
+        narrow_height,
     )
 
 
@@ -99,9 +102,22 @@ def _models(facts: Facts) -> dict[str, StabilityChart]:
     return {given: facts.chart, **{v.label: v.chart for v in others if v.chart is not None}}
 
 
-def _svg(facts: Facts, name: str, description: str, draw: Callable[[Axes], None], height: float = 3.7) -> str:
-    with context():
-        made, ax = figure(6.2, height)
-        draw(ax)
-        write_caption(made, caption_of_facts(facts_of_point(facts.point), facts.point.controller))
-        return inline_svg(made, name, description)
+def _svg(
+    facts: Facts,
+    name: str,
+    description: str,
+    draw: Callable[[Axes], None],
+    height: float = 3.7,
+    narrow_height: float | None = None,
+) -> str:
+    """Both drawings of a figure; the style sheet shows the one that suits the screen."""
+    caption = caption_of_facts(facts_of_point(facts.point), facts.point.controller)
+    drawings = []
+    heights = {"wide": height, "narrow": narrow_height or height}
+    for kind, width in WIDTHS.items():
+        with context():
+            made, ax = figure(width, heights[kind])
+            draw(ax)
+            write_caption(made, caption)
+            drawings.append(f'<div class="{kind}">{inline_svg(made, f"{name}-{kind}", description)}</div>')
+    return "\n".join(drawings)
