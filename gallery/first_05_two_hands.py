@@ -1,7 +1,7 @@
-"""Two hands: the walls of one device in a firm grasp, in a hand without mass, let go, and whoever holds it.
+"""Two hands: the walls of one device in a firm grasp, in a hand without mass, ungripped, and for all at once.
 
 An operator is a mass, springs and dampers at the handle; two come with the package. A wall for everybody has to be
-stable with each of them and with nobody: the robust chart is what the charts have in common, and says who sets
+stable with each of them and ungripped: the robust chart is what the charts have in common, and says who sets
 each part of its edge. In the corner where two meet, the common limit lies below that of each.
 """
 

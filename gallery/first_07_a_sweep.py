@@ -2,7 +2,7 @@
 
 Axes are paths of the device file with their values, and what comes back is an xarray dataset over them. Half the
 period brings four times the stiffness and more, one sample of delay takes most of it away. At 2 ms a second sample
-of delay helps: with flexible drives it hangs on the phase at which the wall meets their vibration.
+of delay helps: with flexible drives it depends on the phase at which the wall meets their vibration.
 """
 
 import zwidth

@@ -1,8 +1,8 @@
 """A study in parallel: two processes at most, a folder that keeps what is done, and a second start after a stop.
 
-Every batch of designs is kept in the folder once it is computed: after ctrl-C or a crash the same call goes on
+Every batch of designs is kept in the folder once it is computed: after ctrl-C or a crash the same call continues
 where it was. Processes start where the rest would take more than ten seconds, which this study does not; numbers
-are the same to the last bit, whoever computes them.
+are the same to the last bit, whichever process computes them.
 """
 
 from tempfile import TemporaryDirectory

@@ -1,6 +1,6 @@
 """A figure for a paper: two designs in one chart of one column's width, with labels and a legend, as a PDF.
 
-`plot` draws into the axes that it is given and returns them, and all of matplotlib goes on from there. Regions are
+`plot` draws into the axes that it is given and returns them, and all of matplotlib applies from there. Regions are
 arrays of [K, B], so that another design is laid over the first one as a line. The circle is the stiffest wall.
 """
 

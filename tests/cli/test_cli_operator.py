@@ -184,7 +184,7 @@ BAD = [
     ),
     ("arm_mas_kg = 1.0\ngrasp = 'rigid'", ["operator.arm_mas_kg: is not a key of a device file; did you mean"]),
     ("[operator]\narm_mass_kg = 1\ngrasp = 'rigid'\n[hand]\nx = 1", ["hand: is no part of an operator"]),
-    (DEVICE, ["operator: is missing; a device file without an [operator] holds none"]),
+    (DEVICE, ["operator: is missing; this device file has no operator; add an [operator] table"]),
     ("", ["is empty; an operator needs an [operator] table"]),
     ("operator = 3", ["operator: must be a table, got 3"]),
 ]

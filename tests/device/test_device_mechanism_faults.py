@@ -124,7 +124,7 @@ CASES = [
         "mechanism.workspace.x_m",
         "leaves out the reference",
     ),
-    (ARM_FILE, {"mechanism__damping": {}}, "mechanism.damping", "says nothing"),
+    (ARM_FILE, {"mechanism__damping": {}}, "mechanism.damping", "is empty"),
     (ARM_FILE, {"mechanism__damping__given": True}, "mechanism.damping", "exactly one way"),
     (ARM_FILE, {"mechanism__damping": {"given": False}}, "mechanism.damping.given", "must be true, got false"),
     (ARM_FILE, {"mechanism__damping": {"mode_ratio": 5}}, "mechanism.damping.mode_ratio", "at most 2, got 5"),

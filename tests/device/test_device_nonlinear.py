@@ -251,7 +251,7 @@ FAULTS = [
         "plant.spring.0.along",
         "is missing; with 2",
     ),
-    (with_changes(PLANT_FILE, plant__spring=[{"along": [1, -1]}]), "plant.spring.0", "says nothing"),
+    (with_changes(PLANT_FILE, plant__spring=[{"along": [1, -1]}]), "plant.spring.0", "is an ordinary spring"),
     (
         with_changes(PLANT_FILE, plant__spring=[{"along": [1], "hardening_N_per_m3": 1.0}]),
         "plant.spring.0.along",

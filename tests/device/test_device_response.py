@@ -139,7 +139,7 @@ def test_many_faults_are_told_together_and_not_without_end(write, spectrum):
 
 def test_a_file_that_is_not_there_or_not_text(write, spectrum, tmp_path):
     (line,) = faults(write(spectrum, 'file = "swep.csv"'))
-    assert line == "swep.csv: no such file; response.file is meant beside the device file"
+    assert line == "swep.csv: no such file; response.file is a path from the device file's folder"
     path = write(spectrum)
     (tmp_path / "sweep.csv").write_bytes(b"\xff\x00")
     assert "is not UTF-8 text" in faults(path)[0]

@@ -253,7 +253,7 @@ def test_a_symmetric_matrix_stays_symmetric():
 def test_numbers_that_say_where_are_left_out_and_named():
     found = sensitivities_of("five-bar")
     assert not any("reference" in n.path or "assemblies" in n.path for n in found.numbers)
-    assert "where the device is asked about" in found.left_out["mechanism.reference.position_m.1"]
+    assert "the operating point" in found.left_out["mechanism.reference.position_m.1"]
     paths = {n.path for n in found.numbers} | found.left_out.keys() | {"loop.delay_samples"}
     assert paths == address.numeric_addresses(load("five-bar").document).keys() | {"loop.delay_samples"}
 

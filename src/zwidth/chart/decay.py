@@ -254,9 +254,9 @@ def _decay_by_eigenvalues(loop: Loop, K: float, B: float) -> FastestDecay:
 def _on_axes(loop: Loop, best: FastestDecay) -> FastestDecay:
     """The same wall with K or B exactly zero where that decays as fast to within rounding."""
     for K, B in ((0.0, 0.0), (0.0, best.damping), (best.stiffness, 0.0)):
-        found = _decay_by_eigenvalues(loop, K, B)
-        if found.spectral_radius <= best.spectral_radius + 1e-12:
-            return found
+        candidate = _decay_by_eigenvalues(loop, K, B)
+        if candidate.spectral_radius <= best.spectral_radius + 1e-12:
+            return candidate
     return best
 
 
@@ -275,9 +275,9 @@ def _search(tracer: Tracer, outline: Floats, least: Floats, best: FastestDecay |
     extent = np.maximum(np.ptp(outline, axis=0), 1e-300)
     for start in starts[np.argsort(values)[:STARTS]]:
         K, B, _ = descend(tracer.polynomials, tracer.radius, start, extent, RESTARTS, least)
-        found = _decay_by_eigenvalues(tracer.loop, float(K), float(B))
-        if found.spectral_radius < (best.spectral_radius if best else tracer.radius):
-            best = found
+        candidate = _decay_by_eigenvalues(tracer.loop, float(K), float(B))
+        if candidate.spectral_radius < (best.spectral_radius if best else tracer.radius):
+            best = candidate
     return best
 
 

@@ -86,10 +86,12 @@ def stiffest_walls(factors: Factors, rows: Floats, section_count: NDArray[np.int
     N = len(rows)
     late = factors.whole_delay + len(factors.window)
     blind = len(factors.window) > 1 or len(factors.velocity_denominator) > 1 or len(factors.force_denominator) > 0
-    found = StiffestWalls(np.full(N, np.nan), np.full(N, np.nan), np.full((N, 2), np.nan), np.empty(N, np.uint8))
+    stiffest = StiffestWalls(
+        np.full(N, np.nan), np.full(N, np.nan), np.full((N, 2), np.nan), np.empty(N, np.uint8)
+    )
     loops = (np.ascontiguousarray(rows), section_count, factors, computer_points(factors, 1.0))
-    in_chunks(partial(_several, *loops, min(LONGEST, 0.5 / late), blind, *vars(found).values()), N)
-    return found
+    in_chunks(partial(_several, *loops, min(LONGEST, 0.5 / late), blind, *vars(stiffest).values()), N)
+    return stiffest
 
 
 @compiled

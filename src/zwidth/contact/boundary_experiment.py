@@ -84,7 +84,7 @@ class EdgePoint:
     unstable_behaviour  what the device does at that first unstable wall; None: no unstable wall was found, and the
                         point has nan for what was bisected
     amplitude, frequency   of that [m], [Hz]
-    unsure              of what is not linear: the verdict changes more than once along the line; this is the
+    unsure              of a nonlinear device: the verdict changes more than once along the line; this is the
                         change nearest to its start
     """
 
@@ -197,7 +197,7 @@ def _raster_region(trial: StabilityTrial, box: SearchWindow | None) -> tuple[Flo
         B = np.linspace(*box.damping, 24)
     walls = np.stack(np.meshgrid(K, B, indexing="ij"), axis=-1).reshape(-1, 2)
     for levels in range(1, LEVELS + 1):
-        stable = np.array([seen.stable for seen in observe(trial.linearised(), walls, levels)])
+        stable = np.array([observation.stable for observation in observe(trial.linearised(), walls, levels)])
         if stable.any():
             break
     else:
@@ -233,14 +233,14 @@ def _columns(
     top = np.array([K[np.flatnonzero(inside[:, b])[-1]] for b in some])
     least = np.array([K[np.flatnonzero(inside[:, b])[0]] for b in some])
     within = _within(box)
-    found = dict[int, _Column]()
+    columns_by_number = dict[int, _Column]()
     for start in (0.5 * top, 0.1 * top, least):
-        lanes = [i for i in range(len(some)) if i not in found]
+        lanes = [i for i in range(len(some)) if i not in columns_by_number]
         columns = _largest_stiffnesses(trial, B[some[lanes]], start[lanes], 0.05, within, levels=COARSE)
         for i, column in zip(lanes, columns, strict=True):
             if column[1] > 0.0:
-                found[i] = column
-    return sorted(found.values())
+                columns_by_number[i] = column
+    return sorted(columns_by_number.values())
 
 
 def _largest_stiffnesses(
@@ -254,31 +254,35 @@ def _largest_stiffnesses(
 ) -> list[_Column]:
     """The largest stable stiffness at dampings B (m,), from a start that should be stable; 0 where it is not.
 
-    Of what is not linear the lowest change counts, whatever `levels` says.
+    Of a nonlinear device the lowest change counts, whatever `levels` says.
     """
     least, most = within
     m = len(B)
-    begins = np.array([seen.stable for seen in observe(trial, np.column_stack([start, B]), levels)], dtype=bool)
+    begins = np.array(
+        [observation.stable for observation in observe(trial, np.column_stack([start, B]), levels)], dtype=bool
+    )
     lines = Lines(np.column_stack([start, B]), np.tile([1.0, 0.0], (m, 1)))
     farthest = np.where(begins, np.minimum(most, 1e6 * start) - start, 0.0)
-    found = march(trial, lines, 0.5 * start if step is None else step, np.maximum(farthest, 0.0), levels)
-    found = bisect(trial, lines, found, tolerance * start, levels)
-    found = Brackets(np.where(begins, start + found.stable, 0.0), start + found.unstable, found.observations)
+    brackets = march(trial, lines, 0.5 * start if step is None else step, np.maximum(farthest, 0.0), levels)
+    brackets = bisect(trial, lines, brackets, tolerance * start, levels)
+    brackets = Brackets(
+        np.where(begins, start + brackets.stable, 0.0), start + brackets.unstable, brackets.observations
+    )
     if not trial.linear:
-        found, _ = _recheck(trial, B, found, least, tolerance * np.minimum(start, found.stable))
-    return list(zip(B.tolist(), found.stable.tolist(), np.isfinite(found.unstable).tolist(), strict=True))
+        brackets, _ = _recheck(trial, B, brackets, least, tolerance * np.minimum(start, brackets.stable))
+    return list(zip(B.tolist(), brackets.stable.tolist(), np.isfinite(brackets.unstable).tolist(), strict=True))
 
 
 def _recheck(
-    trial: StabilityTrial, damping: Floats, found: Brackets, least: float, tolerance: Floats
+    trial: StabilityTrial, damping: Floats, brackets: Brackets, least: float, tolerance: Floats
 ) -> tuple[Brackets, NDArray[np.bool_]]:
     """The stiffnesses found at dampings (m,), or else the lowest at which the verdict changes.
 
     least    no softer wall is looked at [N/m]
-    Returns  as `found` [N/m], stable 0 where no stable wall was met; and at which dampings the verdict changed
+    Returns  as `brackets` [N/m], stable 0 where no stable wall was met; and at which dampings the verdict changed
     """
     ways = stiffness_lines(damping, least)
-    first = Brackets(found.stable - least, found.unstable - least, found.observations)
+    first = Brackets(brackets.stable - least, brackets.unstable - least, brackets.observations)
     lower = nearest_change(trial, ways, first, tolerance, start_stable=False)
     stable = np.where(lower.stable > 0.0, least + lower.stable, 0.0)
     unsure = lower.stable < first.stable
@@ -290,12 +294,14 @@ def measure_edges(
 ) -> list[EdgePoint]:
     """Lower and upper edge at each stiffness (k,), from the damping of the tip outwards.
 
-    Of what is not linear: the change of the verdict nearest to that damping.
+    Of a nonlinear device: the change of the verdict nearest to that damping.
     Returns  lower edges first; a stiffness at which that damping is not stable has none
     """
     k = len(stiffness)
     inside = np.full(k, place.damping)
-    begins = np.array([seen.stable for seen in observe(trial, np.column_stack([stiffness, inside]))], dtype=bool)
+    begins = np.array(
+        [observation.stable for observation in observe(trial, np.column_stack([stiffness, inside]))], dtype=bool
+    )
     stiffness, inside, k = stiffness[begins], inside[begins], int(begins.sum())
     if not k:
         return []
@@ -306,21 +312,23 @@ def measure_edges(
     low, high = (-np.inf, np.inf) if box is None else box.damping
     farthest = np.where(sign < 0.0, starts[:, 1] - low, high - starts[:, 1])
     farthest = np.minimum(np.maximum(farthest, 0.0), 1e3 * scale)
-    found = march(trial, lines, np.full(2 * k, 0.25 * scale), farthest)
-    width = np.nan_to_num(found.unstable, nan=scale).reshape(2, k).sum(axis=0)
+    brackets = march(trial, lines, np.full(2 * k, 0.25 * scale), farthest)
+    width = np.nan_to_num(brackets.unstable, nan=scale).reshape(2, k).sum(axis=0)
     tolerance = np.tile(ACCURACY * width, 2)
-    found = bisect(trial, lines, found, tolerance)
+    brackets = bisect(trial, lines, brackets, tolerance)
     unsure = np.zeros(2 * k, dtype=bool)
     if not trial.linear:
-        nearer = nearest_change(trial, lines, found, tolerance, start_stable=True)
-        unsure = (nearer.stable < found.stable) | stable_beyond(trial, lines, nearer.unstable)
-        found = nearer
-    middle = lines.at(0.5 * (found.stable + found.unstable))[:, 1]
+        nearer = nearest_change(trial, lines, brackets, tolerance, start_stable=True)
+        unsure = (nearer.stable < brackets.stable) | stable_beyond(trial, lines, nearer.unstable)
+        brackets = nearer
+    middle = lines.at(0.5 * (brackets.stable + brackets.unstable))[:, 1]
     kinds: tuple[EdgeKind, EdgeKind] = ("lower", "upper")
     edges = [kind for kind in kinds for _ in range(k)]
     return [
-        _point(float(K), float(B), edge, seen, bool(doubt))
-        for (K, _), B, edge, seen, doubt in zip(starts, middle, edges, found.observations, unsure, strict=True)
+        _point(float(K), float(B), edge, observation, bool(doubt))
+        for (K, _), B, edge, observation, doubt in zip(
+            starts, middle, edges, brackets.observations, unsure, strict=True
+        )
     ]
 
 
@@ -329,7 +337,7 @@ def measure_tips(
 ) -> list[EdgePoint]:
     """The largest stable stiffness at each damping (k,), from a stiffness somewhat below the tip's upwards.
 
-    Of what is not linear: from a lower one where that is not stable, and the lowest change of the verdict.
+    Of a nonlinear device: from a lower one where that is not stable, and the lowest change of the verdict.
     """
     least, most = _within(box)
     start = np.full(len(damping), (TIP_SHARE - 0.03) * place.stiffness)
@@ -337,26 +345,26 @@ def measure_tips(
     B, start = damping[start > 0.0], start[start > 0.0]
     lines = Lines(np.column_stack([start, B]), np.tile([1.0, 0.0], (len(B), 1)))
     most = min(most, 1e3 * place.stiffness)
-    found = march(trial, lines, (1.0 / (TIP_SHARE - 0.03) - 1.0) * start, np.maximum(most - start, 0.0))
+    brackets = march(trial, lines, (1.0 / (TIP_SHARE - 0.03) - 1.0) * start, np.maximum(most - start, 0.0))
     tolerance = np.full(len(B), 0.1 * ACCURACY * place.stiffness)
-    found = bisect(trial, lines, found, tolerance)
-    found = Brackets(start + found.stable, start + found.unstable, found.observations)
+    brackets = bisect(trial, lines, brackets, tolerance)
+    brackets = Brackets(start + brackets.stable, start + brackets.unstable, brackets.observations)
     unsure = np.zeros(len(B), dtype=bool)
     if not trial.linear:
-        found, unsure = _recheck(trial, B, found, least, tolerance)
-        unsure |= stable_beyond(trial, stiffness_lines(B, least), found.unstable - least)
-    middle = np.where(found.stable > 0.0, 0.5 * (found.stable + found.unstable), np.nan)
-    ends = zip(middle.tolist(), B.tolist(), found.observations, unsure.tolist(), strict=True)
-    return [_point(K, b, "tip", seen if isfinite(K) else None, doubt) for K, b, seen, doubt in ends]
+        brackets, unsure = _recheck(trial, B, brackets, least, tolerance)
+        unsure |= stable_beyond(trial, stiffness_lines(B, least), brackets.unstable - least)
+    middle = np.where(brackets.stable > 0.0, 0.5 * (brackets.stable + brackets.unstable), np.nan)
+    ends = zip(middle.tolist(), B.tolist(), brackets.observations, unsure.tolist(), strict=True)
+    return [_point(K, b, "tip", observation if isfinite(K) else None, doubt) for K, b, observation, doubt in ends]
 
 
 def _lowered(trial: StabilityTrial, damping: Floats, start: Floats, least: float) -> Floats:
-    """Stiffnesses halved until their walls are stable, for what is not linear; 0 where none is."""
+    """Stiffnesses halved until their walls are stable, for a nonlinear device; 0 where none is."""
     start = start.copy()
     lanes = np.arange(len(damping))
     for _ in range(1 if trial.linear else HALVED):
         looks = observe(trial, np.column_stack([start[lanes], damping[lanes]]))
-        lanes = lanes[[not seen.stable for seen in looks]]
+        lanes = lanes[[not observation.stable for observation in looks]]
         if not len(lanes):
             break
         start[lanes] = least + 0.5 * (start[lanes] - least)
@@ -364,10 +372,10 @@ def _lowered(trial: StabilityTrial, damping: Floats, start: Floats, least: float
     return start
 
 
-def _point(K: float, B: float, edge: EdgeKind, seen: Observation | None, unsure: bool = False) -> EdgePoint:
-    if seen is None:
+def _point(K: float, B: float, edge: EdgeKind, observation: Observation | None, unsure: bool = False) -> EdgePoint:
+    if observation is None:
         return EdgePoint(K, B, edge, None, float("nan"), float("nan"), unsure)
-    return EdgePoint(K, B, edge, seen.behaviour, seen.amplitude, seen.frequency, unsure)
+    return EdgePoint(K, B, edge, observation.behaviour, observation.amplitude, observation.frequency, unsure)
 
 
 def tip_dampings(edges: list[EdgePoint], place: StableExtent, count: int) -> Floats:

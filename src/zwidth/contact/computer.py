@@ -103,8 +103,8 @@ def estimate_parameters(controller: Controller) -> EstimateParameters:
     """Velocity estimate of the computer, as numbers for the kernels."""
     own = controller.velocity
     if not isinstance(own, Foaw | Levant):
-        found = velocity_estimator(controller)
-        return EstimateParameters(LINEAR, np.zeros(1), len(found.window), found)
+        estimator = velocity_estimator(controller)
+        return EstimateParameters(LINEAR, np.zeros(1), len(estimator.window), estimator)
     factors = low_pass_factors(controller.velocity_filter, controller.sampling_period)
     rows = (np.array(part, dtype=np.float64).reshape(-1, 3) for part in factors)
     return EstimateParameters(
@@ -115,16 +115,18 @@ def estimate_parameters(controller: Controller) -> EstimateParameters:
 def computers(controllers: Sequence[Controller], limits: Sequence[float]) -> Computers:
     """The computers of these controllers, whose largest forces are `limits` [N]."""
     estimates = [estimate_parameters(controller) for controller in controllers]
-    windows = [found.linear.window for found in estimates]
-    factors = [np.stack([found.linear.numerator, found.linear.denominator], axis=1) for found in estimates]
+    windows = [estimate.linear.window for estimate in estimates]
+    factors = [
+        np.stack([estimate.linear.numerator, estimate.linear.denominator], axis=1) for estimate in estimates
+    ]
     low_passes = [force_filter(controller) for controller in controllers]
-    filters = [np.stack([found.numerator, found.denominator], axis=1) for found in low_passes]
+    filters = [np.stack([low_pass.numerator, low_pass.denominator], axis=1) for low_pass in low_passes]
     return Computers(
         period=np.array([float(controller.sampling_period) for controller in controllers]),
         delay=np.array([controller.whole_delay for controller in controllers], dtype=np.int64),
-        method=np.array([found.method for found in estimates], dtype=np.int64),
-        tuning=_stacked([found.tuning for found in estimates]),
-        memory=np.array([max(found.memory, 1) for found in estimates], dtype=np.int64),
+        method=np.array([estimate.method for estimate in estimates], dtype=np.int64),
+        tuning=_stacked([estimate.tuning for estimate in estimates]),
+        memory=np.array([max(estimate.memory, 1) for estimate in estimates], dtype=np.int64),
         window=_stacked(windows),
         window_size=np.array([len(window) for window in windows], dtype=np.int64),
         estimator=_stacked(factors),

@@ -61,19 +61,19 @@ def environment_with_values(
     >>> environment_with_values("slot", {"width": 0.01}, stiffness=500.0)[1].tolist()
     [0.01, 500.0, 0.0, 0.0]
     """
-    found = _environment(environment)
+    chosen = _environment(environment)
     given = dict(parameters)
     for name, value in {"stiffness": stiffness, "damping": damping, "no_pull": float(no_pull) or None}.items():
         if value is None:
             continue
-        if name not in found.names:
-            has = ", ".join(found.names) or "none"
-            raise ContactArgumentError(name, f"{found.name} has no such parameter; it has {has}")
+        if name not in chosen.names:
+            has = ", ".join(chosen.names) or "none"
+            raise ContactArgumentError(name, f"{chosen.name} has no such parameter; it has {has}")
         if name in given:
             raise ContactArgumentError("parameters", f"{name} is given twice")
         given[name] = value
     try:
-        return found, found.values(**given)
+        return chosen, chosen.values(**given)
     except ValueError as error:
         raise ContactArgumentError("parameters", *str(error).splitlines()) from None
 

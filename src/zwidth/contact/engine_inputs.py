@@ -24,7 +24,7 @@ Element = tuple[int, tuple[float, ...], Floats]
 
 
 class HeldDevice:
-    """One device with who holds it: the plant that moves, where the hand pushes, and what is not linear.
+    """One device with who holds it: the plant that moves, where the hand pushes, and the nonlinear parts.
 
     attached_plant  the plant with the operator attached;   shapes (n, n)  its undamped modes
     modal_plant     the same in the coordinates of these modes
@@ -91,16 +91,16 @@ def in_modes(plant: Plant, squared: Floats, shapes: Floats) -> Plant:
 
 
 def _own_elements(plant: Plant) -> list[Element]:
-    own, found = plant.nonlinear, list[Element]()
+    own, elements = plant.nonlinear, list[Element]()
     for dry in own.friction:
         bent = dry.bristles
         if bent is not None and max(bent[:2]) > 0.0:
-            found.append((BRISTLES, bent, dry.along))
+            elements.append((BRISTLES, bent, dry.along))
         elif bent is None and dry.coulomb > 0.0:
-            found.append((COULOMB, (dry.coulomb,), dry.along))
-    found += [(SPRING, (spring.cubic, spring.backward_excess), spring.along) for spring in own.springs]
-    found += [(VARYING, (BRAKE, brake.damping, brake.time_constant), brake.along) for brake in own.brakes]
-    return found
+            elements.append((COULOMB, (dry.coulomb,), dry.along))
+    elements += [(SPRING, (spring.cubic, spring.backward_excess), spring.along) for spring in own.springs]
+    elements += [(VARYING, (BRAKE, brake.damping, brake.time_constant), brake.along) for brake in own.brakes]
+    return elements
 
 
 def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArrays:
@@ -111,9 +111,9 @@ def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArray
         max(held_device.modal_plant.size for held_device in held_devices),
     )
     own = [_dynamics(held_device) for held_device in held_devices]
-    N = max(len(found.generator) for found in own)
+    N = max(len(arrays.generator) for arrays in own)
     F, R = 2 + E, N + 2 * E
-    found = PlantArrays(
+    arrays = PlantArrays(
         transition=np.zeros((D, 2, R, N)),
         inputs=np.zeros((D, 2, F, R)),
         substeps=np.zeros((D, 2), dtype=np.int64),
@@ -136,15 +136,15 @@ def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArray
     )
     for d, (held_device, moving) in enumerate(zip(held_devices, own, strict=True)):
         m = len(moving.generator)
-        found.energy[d, :m, :m] = moving.energy
-        _fill_motions(found, d, held_device)
+        arrays.energy[d, :m, :m] = moving.energy
+        _fill_motions(arrays, d, held_device)
         T, f = held_device.loop.period, held_device.loop.fractional_delay
         early = min(max(1, round(f * substeps)), max(substeps - 1, 1)) if f > 0.0 else 0
         for part, (share, count) in enumerate(((f, early), (1.0 - f, max(substeps - early, 1)))):
             if count:
-                found.substeps[d, part], found.length[d, part] = count, share * T / count
-                _fill_part(found, d, part, substep(moving, share * T / count))
-    return found
+                arrays.substeps[d, part], arrays.length[d, part] = count, share * T / count
+                _fill_part(arrays, d, part, substep(moving, share * T / count))
+    return arrays
 
 
 def _dynamics(held_device: HeldDevice) -> LinearDynamics:
@@ -153,39 +153,39 @@ def _dynamics(held_device: HeldDevice) -> LinearDynamics:
     return dynamics(held_device.modal_plant, held_device.loop.controller.actuator_time_constant, motions)
 
 
-def _fill_motions(found: PlantArrays, d: int, held_device: HeldDevice) -> None:
+def _fill_motions(arrays: PlantArrays, d: int, held_device: HeldDevice) -> None:
     n = held_device.modal_plant.size
-    found.sensor[d, :n], found.handle[d, :n], found.push[d, :n] = (
+    arrays.sensor[d, :n], arrays.handle[d, :n], arrays.push[d, :n] = (
         held_device.modal_plant.sensor,
         held_device.handle,
         held_device.push,
     )
     for e, (kind, numbers, along) in enumerate(held_device.elements):
-        found.kind[d, e], found.along[d, e, :n] = kind, along
-        found.numbers[d, e, : len(numbers)] = numbers
+        arrays.kind[d, e], arrays.along[d, e, :n] = kind, along
+        arrays.numbers[d, e, : len(numbers)] = numbers
     for c, counter in enumerate(held_device.counters):
-        found.channel[d, c, :n] = counter.along
-        found.step[d, c], found.weight[d, c], found.noise[d, c] = counter.step, counter.weight, counter.noise
-        found.encoder[d, c] = c if counter.channel is None else counter.channel
+        arrays.channel[d, c, :n] = counter.along
+        arrays.step[d, c], arrays.weight[d, c], arrays.noise[d, c] = counter.step, counter.weight, counter.noise
+        arrays.encoder[d, c] = c if counter.channel is None else counter.channel
 
 
-def _fill_part(found: PlantArrays, d: int, part: int, step: Substep) -> None:
+def _fill_part(arrays: PlantArrays, d: int, part: int, step: Substep) -> None:
     """Matrices of a substep of one part; the ledger's forms take the states first, then the forces, padded."""
     m, F = step.inputs.shape
-    N = found.transition.shape[-1]
+    N = arrays.transition.shape[-1]
     at, last = np.concatenate([np.arange(m), np.arange(N, N + F)]), N + 2 * (F - 2)
-    found.transition[d, part, :m, :m] = step.transition
-    found.inputs[d, part, :F, :m] = step.inputs.T
-    found.loss[d, part][np.ix_(at, at)] = step.loss
-    found.work[d, part][np.ix_(at, at)] = step.work
-    seen = motions_of(found, d, m)[: last - N]
-    found.transition[d, part, N:last, :m] = seen @ step.transition
-    found.inputs[d, part, :F, N:last] = (seen @ step.inputs).T
+    arrays.transition[d, part, :m, :m] = step.transition
+    arrays.inputs[d, part, :F, :m] = step.inputs.T
+    arrays.loss[d, part][np.ix_(at, at)] = step.loss
+    arrays.work[d, part][np.ix_(at, at)] = step.work
+    motions = motions_of(arrays, d, m)[: last - N]
+    arrays.transition[d, part, N:last, :m] = motions @ step.transition
+    arrays.inputs[d, part, :F, N:last] = (motions @ step.inputs).T
 
 
-def motions_of(found: PlantArrays, d: int, m: int) -> Floats:
+def motions_of(arrays: PlantArrays, d: int, m: int) -> Floats:
     """Rows (2 E, m) that read place and speed of each element's motion from m states."""
-    E, n = found.kind.shape[1], int(found.size[d])
+    E, n = arrays.kind.shape[1], int(arrays.size[d])
     rows = np.zeros((E, 2, m))
-    rows[:, 0, :n] = rows[:, 1, n : 2 * n] = found.along[d, :, :n]
+    rows[:, 0, :n] = rows[:, 1, n : 2 * n] = arrays.along[d, :, :n]
     return rows.reshape(2 * E, m)

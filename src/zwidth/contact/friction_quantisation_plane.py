@@ -115,7 +115,7 @@ def resting_limit(coulomb_friction: ArrayLike, resolution: ArrayLike) -> Floats:
     At rest the wall's force is K n Delta with a whole n, whatever B, the delay and the filters are. Friction holds
     a mass under a push f where |f - K n Delta| <= f_c; over all f the nearest n leaves up to K Delta/2. Beyond the
     limit a push between two counts lets nothing rest: a limit cycle for certain. Below it every push can be rested
-    under; that no vibration keeps itself up beside the rest is another matter (see docs/limit-cycles.md).
+    under; it does not say that no vibration is sustained beside the state of rest (see docs/limit-cycles.md).
 
     coulomb_friction  (...)  f_c between wall and ground [N];  resolution  (...)  Delta [m], positive
 

@@ -1,4 +1,4 @@
-"""Limit cycles of the sampled loop by harmonic balance: which vibrations keep themselves up, and are they met?
+"""Limit cycles of the sampled loop by harmonic balance: which vibrations are sustained, and which are stable?
 
 Dry friction, encoder steps and saturation are replaced by their effect on a sine of amplitude A
 (`contact.describing_functions`). Where the linear loop so made (`contact.quasi_linear`) has its root on the unit
@@ -121,7 +121,7 @@ def limit_cycles(
     '2.02 mm at 10.06 Hz, stable: False'
     """
     require("loop", loop, Loop)
-    found = harmonic_balance(
+    balance = harmonic_balance(
         loop,
         wall_stiffness,
         wall_damping,
@@ -131,7 +131,7 @@ def limit_cycles(
         offset=offset,
         largest_motion=largest_motion,
     )
-    return list(found.cycles)
+    return list(balance.cycles)
 
 
 def harmonic_balance(
@@ -178,7 +178,7 @@ def harmonic_balance(
         return _nothing(largest_motion)
     tell, steps = progress or (lambda stage, done, of: None), 2 * len(at) + 1
     swings = _followed(own, at, lambda done: tell(STAGE, done, steps))
-    found = HarmonicBalance(
+    balance = HarmonicBalance(
         at,
         np.array([_growth(own, swing) for swing in swings]),
         np.array([_frequency(own, swing) if swing else np.nan for swing in swings]),
@@ -186,7 +186,7 @@ def harmonic_balance(
         largest_motion,
     )
     tell(STAGE, steps, steps)
-    return found
+    return balance
 
 
 def _nothing(largest_motion: float) -> HarmonicBalance:
@@ -286,7 +286,7 @@ def _frequency(loop: EquivalentLoop, swing: Vibration) -> float:
 
 def _crossings(loop: EquivalentLoop, at: Floats, swings: list[Vibration | None]) -> list[LimitCycle]:
     """Where growth changes sign, and by which way."""
-    found = []
+    crossings = []
     for one, two in pairwise(swings):
         if two is None or (one is None and abs(two.root) <= 1.0):
             continue
@@ -297,8 +297,10 @@ def _crossings(loop: EquivalentLoop, at: Floats, swings: list[Vibration | None])
             root = _folded(loop, two)
         if root is not None:
             stable = one is not None and abs(one.root) > 1.0
-            found.append(LimitCycle(root.amplitude, _frequency(loop, root), stable, root.force, root.velocities))
-    return sorted(found, key=lambda cycle: cycle.amplitude)
+            crossings.append(
+                LimitCycle(root.amplitude, _frequency(loop, root), stable, root.force, root.velocities)
+            )
+    return sorted(crossings, key=lambda cycle: cycle.amplitude)
 
 
 def _bisect(loop: EquivalentLoop, low: Vibration, high: Vibration, measure: SizeFunction) -> Vibration | None:
@@ -311,9 +313,11 @@ def _bisect(loop: EquivalentLoop, low: Vibration, high: Vibration, measure: Size
         size = float(np.exp(logarithm))
         below = max((swing for swing in known if measure(swing) <= size), key=measure, default=low)
         above = min((swing for swing in known if measure(swing) > size), key=measure, default=high)
-        found = _faster(loop.fastest_vibration(size, below, measure), loop.fastest_vibration(size, above, measure))
-        known.extend([found] if found else [])
-        return found
+        vibration = _faster(
+            loop.fastest_vibration(size, below, measure), loop.fastest_vibration(size, above, measure)
+        )
+        known.extend([vibration] if vibration else [])
+        return vibration
 
     ends = np.log([measure(low), measure(high)])
     # at its ends a search started from both could find another kind of vibration, and growth would keep its sign
@@ -322,12 +326,12 @@ def _bisect(loop: EquivalentLoop, low: Vibration, high: Vibration, measure: Size
     def growth(logarithm: float) -> float:
         if logarithm in at_ends:
             return at_ends[logarithm]
-        found = grown(logarithm)
-        return float(np.log(abs(found.root))) if found else -1.0
+        vibration = grown(logarithm)
+        return float(np.log(abs(vibration.root))) if vibration else -1.0
 
     where = brentq(growth, *ends, xtol=1e-13, rtol=1e-13)
-    found = grown(where)
-    return found if found is not None and abs(abs(found.root) - 1.0) < ON_CIRCLE else None
+    vibration = grown(where)
+    return vibration if vibration is not None and abs(abs(vibration.root) - 1.0) < ON_CIRCLE else None
 
 
 def _folded(loop: EquivalentLoop, start: Vibration) -> Vibration | None:

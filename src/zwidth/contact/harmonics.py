@@ -60,7 +60,7 @@ def with_harmonics(
     sensor = np.zeros(len(gain))
     sensor[: loop.plant.size] = loop.plant.sensor
     cut = _OpenLoop(transition, gain, np.stack([command, sensor]))
-    T, found = loop.period, cycle
+    T, refined = loop.period, cycle
     start = np.array([np.log(cycle.force_amplitude / limit), np.log(2.0 * np.pi * cycle.frequency_Hz * T)])
     for count in COUNTS:
         solution = cut.solve(_longer(start, count), count)
@@ -68,13 +68,13 @@ def with_harmonics(
             break
         start = solution
         force, position, angle = cut.vibration(solution, count)
-        found = replace(
+        refined = replace(
             cycle,
             amplitude=position * limit,
             force_amplitude=force * limit,
             frequency_Hz=angle / (2.0 * np.pi * T),
         )
-    return found
+    return refined
 
 
 def _longer(start: Floats, count: int) -> Floats:
@@ -102,9 +102,9 @@ class _OpenLoop:
             return np.concatenate([rest.real, rest.imag])
 
         with np.errstate(all="ignore"):
-            found = root(left, start, tol=1e-12)
-            good = np.all(np.isfinite(found.x)) and np.max(np.abs(left(found.x))) < SOLVED
-        return np.asarray(found.x) if good else None
+            solution = root(left, start, tol=1e-12)
+            good = np.all(np.isfinite(solution.x)) and np.max(np.abs(left(solution.x))) < SOLVED
+        return np.asarray(solution.x) if good else None
 
     def vibration(self, solution: Floats, count: int) -> tuple[float, float, float]:
         """Half of peak to peak of the commanded force and of the position, and the angle per sample."""

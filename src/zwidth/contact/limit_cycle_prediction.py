@@ -87,10 +87,10 @@ class LimitCyclePrediction(Result):
     def simulation_disagrees(self) -> bool:
         """Whether a simulation has a limit cycle at another frequency than predicted; it is right then."""
         return any(
-            found is not None
-            and found.behaviour != "converged"
-            and not 1.0 / OTHERWISE < found.frequency / cycle.frequency_Hz < OTHERWISE
-            for cycle, found in zip(self.cycles, self.simulated, strict=True)
+            vibration is not None
+            and vibration.behaviour != "converged"
+            and not 1.0 / OTHERWISE < vibration.frequency / cycle.frequency_Hz < OTHERWISE
+            for cycle, vibration in zip(self.cycles, self.simulated, strict=True)
         )
 
     def document(self) -> dict[str, Any]:
@@ -104,8 +104,8 @@ class LimitCyclePrediction(Result):
             "nonlinear": list(self.nonlinear),
             "predicted_by": self.predicted_by,
             "limit_cycles": [
-                _cycle_document(cycle) | {"simulated": found and found.document()}
-                for cycle, found in zip(self.cycles, self.simulated, strict=True)
+                _cycle_document(cycle) | {"simulated": vibration and vibration.document()}
+                for cycle, vibration in zip(self.cycles, self.simulated, strict=True)
             ],
             "otherwise": self.small_start_vibration and self.small_start_vibration.document(),
             "largest_motion_m": self.largest_motion,
@@ -123,25 +123,25 @@ class LimitCyclePrediction(Result):
         """The limit cycles as columns, one a row."""
         rows = [_cycle_document(cycle) for cycle in self.cycles]
         columns: dict[str, list[Any]] = {key: [_as_cell(row[key]) for row in rows] for key in CYCLE_KEYS}
-        found = [simulated.document() if simulated else {} for simulated in self.simulated]
+        documents = [simulated.document() if simulated else {} for simulated in self.simulated]
         for key in ("behaviour", "amplitude_m", "frequency_Hz"):
-            columns[f"simulated_{key}"] = [own.get(key) for own in found]
+            columns[f"simulated_{key}"] = [own.get(key) for own in documents]
         return columns
 
     def __repr__(self) -> str:
-        told = [
+        lines = [
             f"  {cycle.amplitude:.4g} m at {cycle.frequency_Hz:.4g} Hz, "
             + ("stable" if cycle.stable else "unstable")
             + ("" if cycle.within_range else ", beyond the range")
             for cycle in self.cycles
         ]
-        if len(told) > MOST_TOLD:
-            told = [*told[: MOST_TOLD - 1], f"  and {len(told) - MOST_TOLD + 1} more limit cycles"]
+        if len(lines) > MOST_TOLD:
+            lines = [*lines[: MOST_TOLD - 1], f"  and {len(lines) - MOST_TOLD + 1} more limit cycles"]
         return "\n".join(
             [
                 f"LimitCyclePrediction: wall of {self.wall_stiffness:.6g} N/m, {self.wall_damping:.6g} N s/m, "
                 f"{self.verdict} if linear; {', '.join(self.nonlinear)}",
-                *(told or ["  no limit cycle is predicted"]),
+                *(lines or ["  no limit cycle is predicted"]),
             ]
         )
 

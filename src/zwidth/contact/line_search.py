@@ -59,32 +59,32 @@ def march(
         if not lanes.any():
             break
         looks = observe(trial, lines.only(lanes).at(at[lanes]), levels)
-        for i, seen in zip(np.flatnonzero(lanes), looks, strict=True):
-            if seen.stable:
+        for i, observation in zip(np.flatnonzero(lanes), looks, strict=True):
+            if observation.stable:
                 stable[i] = at[i]
             else:
-                unstable[i], beyond[i] = at[i], seen
+                unstable[i], beyond[i] = at[i], observation
         step = 2.0 * step
         at = np.minimum(stable + step, farthest)
     return Brackets(stable, unstable, beyond)
 
 
 def bisect(
-    trial: StabilityTrial, lines: Lines, found: Brackets, tolerance: Floats, levels: int | None = None
+    trial: StabilityTrial, lines: Lines, brackets: Brackets, tolerance: Floats, levels: int | None = None
 ) -> Brackets:
     """Halve the gap between stable and unstable until it is below the tolerance (m,)."""
-    stable, unstable, beyond = found.stable.copy(), found.unstable.copy(), list(found.observations)
+    stable, unstable, beyond = brackets.stable.copy(), brackets.unstable.copy(), list(brackets.observations)
     while True:
         lanes = unstable - stable > np.maximum(tolerance, 1e-12 * np.abs(unstable))
         if not lanes.any():
             return Brackets(stable, unstable, beyond)
         middle = 0.5 * (stable + unstable)
         looks = observe(trial, lines.only(lanes).at(middle[lanes]), levels)
-        for i, seen in zip(np.flatnonzero(lanes), looks, strict=True):
-            if seen.stable:
+        for i, observation in zip(np.flatnonzero(lanes), looks, strict=True):
+            if observation.stable:
                 stable[i] = middle[i]
             else:
-                unstable[i], beyond[i] = middle[i], seen
+                unstable[i], beyond[i] = middle[i], observation
 
 
 def stiffness_lines(damping: Floats, least: float) -> Lines:
@@ -94,16 +94,16 @@ def stiffness_lines(damping: Floats, least: float) -> Lines:
 
 
 def nearest_change(
-    trial: StabilityTrial, lines: Lines, found: Brackets, tolerance: Floats, *, start_stable: bool
+    trial: StabilityTrial, lines: Lines, brackets: Brackets, tolerance: Floats, *, start_stable: bool
 ) -> Brackets:
     """Move the end of each line back to the first change of the verdict; ends with a stable way to them stay.
 
-    found         along the lines, as `march` and `bisect` leave it;   tolerance  (m,)  of a change
+    brackets      along the lines, as `march` and `bisect` leave it;   tolerance  (m,)  of a change
     start_stable  is the start of each line known to be stable? If not, the way begins at the first stable wall
-    Returns       as `found`; stable 0 where no stable wall was met
+    Returns       as `brackets`; stable 0 where no stable wall was met
     """
-    stable, unstable, beyond = found.stable.copy(), found.unstable.copy(), list(found.observations)
-    top, changed = found.stable.copy(), np.zeros(len(stable), dtype=bool)
+    stable, unstable, beyond = brackets.stable.copy(), brackets.unstable.copy(), list(brackets.observations)
+    top, changed = brackets.stable.copy(), np.zeros(len(stable), dtype=bool)
     lanes = np.flatnonzero(stable > 0.0)
     for _ in range(LOWERED):
         if not len(lanes):
@@ -114,7 +114,7 @@ def nearest_change(
         open_ones = []
         for n, i in enumerate(lanes):
             own = looks[n * len(SHARES) : (n + 1) * len(SHARES)]
-            stable_flags = [start_stable, *(seen.stable for seen in own)]
+            stable_flags = [start_stable, *(observation.stable for observation in own)]
             places = [0.0, *t[n]]
             if not any(stable_flags):
                 open_ones.append(i)
@@ -137,5 +137,5 @@ def stable_beyond(trial: StabilityTrial, lines: Lines, unstable: Floats) -> NDAr
     again = np.zeros(len(unstable), dtype=bool)
     t = np.outer(unstable[known], AFTER)
     looks = observe(trial, lines.only(known.repeat(len(AFTER))).at(t.ravel()))
-    again[known] = np.array([seen.stable for seen in looks], dtype=bool).reshape(t.shape).any(axis=1)
+    again[known] = np.array([observation.stable for observation in looks], dtype=bool).reshape(t.shape).any(axis=1)
     return again

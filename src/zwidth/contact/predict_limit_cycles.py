@@ -174,9 +174,9 @@ def _limits(loop: Loop, K: float, B: float) -> tuple[float | None, float | None]
 def _simulated(loop: Loop, K: float, B: float, offset: float, cycle: LimitCycle) -> SimulatedVibration:
     """Simulate from both sides of a cycle; the vibration that ends nearer to it."""
     starts = [share * cycle.amplitude for share in STARTS]
-    found = _runs(loop, K, B, offset, starts, cycle.frequency_Hz)
-    alive = [run for run in found if run.amplitude > 0.0 and run.behaviour != "converged"]
-    return min(alive or found, key=lambda run: abs(log(max(run.amplitude, 1e-300) / cycle.amplitude)))
+    runs = _runs(loop, K, B, offset, starts, cycle.frequency_Hz)
+    alive = [run for run in runs if run.amplitude > 0.0 and run.behaviour != "converged"]
+    return min(alive or runs, key=lambda run: abs(log(max(run.amplitude, 1e-300) / cycle.amplitude)))
 
 
 def _simulate_small_start(
@@ -208,7 +208,7 @@ def _runs(
         )
         for start in starts
     ]
-    found = []
+    simulations = []
     for start, response in zip(starts, simulate_batch(runs, wall, duration=seconds), strict=True):
         judged = judge_response(response)
         last = slice(-(len(response.truth) // 4), None)
@@ -216,8 +216,8 @@ def _runs(
         hunts = judged.behaviour == "converged" and np.ptp(response.reading[last]) > 0.0
         behaviour = "limit cycle" if hunts else judged.behaviour
         amplitude = float(np.ptp(response.truth[last]) / 2.0)
-        found.append(SimulatedVibration(start, seconds, behaviour, amplitude, judged.frequency))
-    return found
+        simulations.append(SimulatedVibration(start, seconds, behaviour, amplitude, judged.frequency))
+    return simulations
 
 
 def _middle(loop: Loop, offset: float) -> tuple[Floats, float]:

@@ -89,7 +89,7 @@ class EquivalentLoop:
     ) -> Vibration | None:
         """The fastest growing vibration of this size, near a start; None where nothing swings.
 
-        measure  what is meant by size: amplitude at the sensor [m], or velocity at the frictions [m/s]
+        measure  quantity whose size is given: amplitude at the sensor [m], or velocity at the frictions [m/s]
         same     relative change at which shape and gains agree
         """
         by_velocity = measure is friction_velocity_of
@@ -112,7 +112,7 @@ class EquivalentLoop:
         """A vibration of the linear loop to start from."""
         guess = self.seed(amplitude, 0.2 * np.pi)
         roots, sizes = vibrations(self._arrays, self._unbent, amplitude, False)
-        swings = [self._swing(*found) for found in zip(roots, sizes, strict=True)]
+        swings = [self._swing(*root_and_size) for root_and_size in zip(roots, sizes, strict=True)]
         return max(swings, key=lambda other: abs(other.root), default=guess)
 
     @property

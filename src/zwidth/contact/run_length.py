@@ -113,9 +113,9 @@ def run_length(
         samples = max(tenfold, fast, NEEDED)
         reason = "a tenfold change at the predicted rate" if tenfold >= max(fast, NEEDED) else "it changes fast"
         most = GROWN * tenfold if growth and growth > 0.0 else inf
-        for own, said in ((_periods(frequency) / period, f"{PERIODS} periods"), (sound / period, "to be heard")):
+        for own, why in ((_periods(frequency) / period, f"{PERIODS} periods"), (sound / period, "to be heard")):
             if min(own, most) > samples:
-                samples, reason = min(own, most), said
+                samples, reason = min(own, most), why
         seconds = ceil(min(samples, 1e18)) * period
         return _capped(seconds + busy_until, f"{reason}, once the hand is done" if busy_until else reason, period)
     least = max(LEAST + busy_until, 2 * FEWEST * period)

@@ -73,7 +73,7 @@ def simulate(
 
     environment    what is touched;   values (P,) of its parameters, as `Environment.values` gives them
     duration       [s]
-    substeps       between samples, for what is not linear; a linear plant is exact with any
+    substeps       between samples, where something is nonlinear; a linear plant is exact with any
     trail          keep the handle's position after each substep
     ledger         keep the energies
     circumstances  hand, start_position [m], wall_position [m] and so on: see `Run`
@@ -107,7 +107,7 @@ def simulate_batch(
 
     runs      of any loops, hands and starts;   environment  the one thing that all of them touch
     duration  of all runs, or of each [s]
-    substeps  between samples, for what is not linear; a linear plant is exact with any
+    substeps  between samples, where something is nonlinear; a linear plant is exact with any
     Returns   one response for each run, in their order
     Raises    ValueError  for a duration or a number of substeps that cannot be meant, starts of a wrong shape
               TooLarge    where the result would not fit into memory
@@ -186,16 +186,16 @@ def _check(lengths: Floats, substeps: int) -> None:
 
 def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], NDArray[np.int64]]:
     """One apparatus for runs with the same loop and arm, and which run has which."""
-    found: dict[tuple[object, ...], int] = {}
+    numbers: dict[tuple[object, ...], int] = {}
     held_devices: list[HeldDevice] = []
     index = []
     for run in runs:
         key = (id(run.loop), run.hand.operator, run.hand.reflex is not None)
-        if key not in found:
-            found[key] = len(held_devices)
+        if key not in numbers:
+            numbers[key] = len(held_devices)
             _ = run.loop.sections  # refuses plants that cannot be moved, or not in time
             held_devices.append(HeldDevice(run.loop, run.hand))
-        index.append(found[key])
+        index.append(numbers[key])
     return held_devices, np.array(index, dtype=np.int64)
 
 

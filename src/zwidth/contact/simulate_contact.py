@@ -98,7 +98,7 @@ def simulate_contact(
                        the same run is made without it, too
     duration           [s]; None: a tenfold change at the predicted rate and at least eight periods, at most 60 s;
                        2 s and more where something is not linear (see `run_length`)
-    substeps           between samples, for what is not linear
+    substeps           between samples, where something is nonlinear
     seed               of the encoders' noise
     trail              keep the handle's position after each substep
     seconds_to_hear    of a run that is to be heard: seconds that it lasts at least, by its frequency [Hz]

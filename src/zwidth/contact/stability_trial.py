@@ -71,7 +71,7 @@ class StabilityTrial:
     speed        of the handle at the start, towards the inside [m/s]
     visible      amplitude of the handle up to which a vibration that does not die away counts as none [m]
     seed         of the noise
-    substeps     between samples, for what is not linear
+    substeps     between samples, where something is nonlinear
     Raises       TrialError  for numbers that cannot be meant
     """
 
@@ -164,10 +164,10 @@ def observe(trial: StabilityTrial, walls: ArrayLike, levels: int | None = None) 
     """
     walls = np.asarray(walls, dtype=float).reshape(-1, 2)
     most = levels or LEVELS
-    seen: list[Observation | None] = [None] * len(walls)
+    observations: list[Observation | None] = [None] * len(walls)
     for level in range(most):
         samples = trial.first_samples * LONGER**level
-        open_ones = [i for i, found in enumerate(seen) if found is None]
+        open_ones = [i for i, observation in enumerate(observations) if observation is None]
         at_once = max(AT_ONCE // samples, 1)
         for start in range(0, len(open_ones), at_once):
             some = open_ones[start : start + at_once]
@@ -175,8 +175,8 @@ def observe(trial: StabilityTrial, walls: ArrayLike, levels: int | None = None) 
                 judged = judge_response(response)
                 stable = _verdict(trial, response, judged, level, last=level + 1 == most)
                 if stable is not None:
-                    seen[i] = Observation(stable, judged.behaviour, judged.amplitude, judged.frequency)
-    return [found for found in seen if found is not None]
+                    observations[i] = Observation(stable, judged.behaviour, judged.amplitude, judged.frequency)
+    return [observation for observation in observations if observation is not None]
 
 
 def _responses(trial: StabilityTrial, walls: Floats, samples: int) -> list[TimeResponse]:

@@ -136,8 +136,8 @@ class TimeResponse(Result):
 
     def table(self) -> dict[str, Floats]:
         """The motion in time as columns; where it is kept, each entry of the energy ledger with its own."""
-        kept = enumerate(SOURCES if self.energies.size else ())
-        return self.series | {f"{as_key(name)}_J": self.energies[:, i] for i, name in kept}
+        entries = enumerate(SOURCES if self.energies.size else ())
+        return self.series | {f"{as_key(name)}_J": self.energies[:, i] for i, name in entries}
 
     @property
     def series(self) -> dict[str, Floats]:

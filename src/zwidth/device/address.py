@@ -36,10 +36,10 @@ EXCLUSIVE: Final[dict[tuple[str, ...], tuple[frozenset[str], ...]]] = {
 def get(document: dict[str, Any], path: str) -> Any:
     """The value at a path. Raises DeviceError, naming the nearest right path, if there is none."""
     steps = resolve(document, path)
-    found = _value(document, steps)
-    if found is UNSET:
+    value = _value(document, steps)
+    if value is UNSET:
         raise fail(SETTINGS, path, "is not given in this file, although it may be; give it a value first")
-    return found
+    return value
 
 
 def exists(document: dict[str, Any], path: str) -> bool:
@@ -235,7 +235,9 @@ def _choices(place: Any, steps: KeyPath) -> list[str]:
 
 def _free(steps: list[str | int]) -> bool:
     """Whether the table here takes keys of any name, as assemblies do."""
-    return any(isinstance(found.get("additionalProperties"), dict) for found in schema.subschemas(tuple(steps)))
+    return any(
+        isinstance(subschema.get("additionalProperties"), dict) for subschema in schema.subschemas(tuple(steps))
+    )
 
 
 def _element(elements: list[Any], part: str) -> int | None:

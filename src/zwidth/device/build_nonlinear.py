@@ -1,4 +1,4 @@
-"""From the checked file to what is not linear: dry friction, encoder steps, bent springs, brakes."""
+"""From the checked file to the nonlinear parts: dry friction, encoder steps, bent springs, brakes."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ words. An encoder's resolution_m is not among them: a Kalman filter reads it."""
 
 
 def nonlinear_kind(path: KeyPath) -> str:
-    """What of what is not linear the key at a path is; "" for a key that linear answers read.
+    """The nonlinear part that the key at a path describes; "" for a key that linear answers read.
 
     >>> nonlinear_kind(("friction", "coulomb_N", 1)), nonlinear_kind(("plant", "mass_kg"))
     ('dry friction', '')
@@ -102,7 +102,7 @@ def _counters(sensor: Floats, encoder: EncoderSection) -> tuple[Counter, ...]:
 
 def drive_nonlinearity(drives: Sequence[DriveSection], friction: DriveFrictionSection) -> DriveNonlinearity | None:
     """What the file says of a mechanism's drives, at the motor; None where it says nothing."""
-    found = DriveNonlinearity(
+    nonlinearity = DriveNonlinearity(
         coulomb=per_drive(drives, "coulomb_Nm", 0.0),
         friction_model=friction.model,
         breakaway=per_drive(drives, "breakaway_Nm", math.nan),
@@ -115,8 +115,8 @@ def drive_nonlinearity(drives: Sequence[DriveSection], friction: DriveFrictionSe
         brake_time_constant=per_drive(drives, "brake_time_constant_s", 0.0),
         encoder_noise=per_drive(drives, "encoder_noise_rad", 0.0),
     )
-    told = (found.coulomb, found.hardening, found.brake_damping, found.encoder_noise)
-    return found if any(map(np.any, told)) or np.isfinite(found.backward_stiffness).any() else None
+    parts = (nonlinearity.coulomb, nonlinearity.hardening, nonlinearity.brake_damping, nonlinearity.encoder_noise)
+    return nonlinearity if any(map(np.any, parts)) or np.isfinite(nonlinearity.backward_stiffness).any() else None
 
 
 def per_drive(drives: Sequence[DriveSection], key: str, omitted: float) -> Floats:

@@ -118,10 +118,10 @@ def _response(document: dict[str, Any]) -> KeyMessages:
         return
     response, loop = table(document, "response"), table(document, "loop")
     if isinstance(document["response"], dict) and ("file" in response) == ("files" in response):
-        told = "names both file and files" if "file" in response else "names no file"
-        yield ("response",), f"{told}; give file for one measurement, or files for repetitions of it"
+        fault = "names both file and files" if "file" in response else "names no file"
+        yield ("response",), f"{fault}; give file for one measurement, or files for repetitions of it"
     if "operator" in document:
-        yield ("operator",), "cannot be attached to a measured [response], which knows no handle; leave it out"
+        yield ("operator",), "cannot be attached to a measured [response], which has no handle; leave it out"
     if "actuator" in loop:
         yield ("loop", "actuator"), "is part of a measured [response] already; leave it out"
     period = loop.get("sampling_period_s")
@@ -181,13 +181,13 @@ def _circle(name: Any, parents: dict[str, Any]) -> list[str]:
 
 
 def _twice(mechanism: dict[str, Any], group: str) -> KeyMessages:
-    seen: set[str] = set()
+    names_so_far: set[str] = set()
     for index, entry in tables(mechanism, group):
         name = entry.get("name")
-        if isinstance(name, str) and name in seen:
+        if isinstance(name, str) and name in names_so_far:
             yield ("mechanism", group, index, "name"), f"'{name}' is given twice; names must differ"
         elif isinstance(name, str):
-            seen.add(name)
+            names_so_far.add(name)
 
 
 def _references(mechanism: dict[str, Any]) -> KeyMessages:
@@ -274,7 +274,7 @@ def _damping(mechanism: dict[str, Any]) -> KeyMessages:
         ways += [" and ".join(sorted(proportional))] * bool(proportional) + ["given"] * ("given" in damping)
         choice = "mode_ratio, or mass_coefficient_1_per_s and stiffness_coefficient_s, or given = true"
         if not ways:
-            yield path, f"says nothing; give {choice}"
+            yield path, f"is empty; give {choice}"
         elif len(ways) > 1:
             yield path, f"has {', '.join(ways)}; exactly one way is allowed: {choice}"
     given = isinstance(damping, dict) and "given" in damping

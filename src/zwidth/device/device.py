@@ -248,10 +248,10 @@ class Device:
         return _verbs.device_with(self, settings)
 
     def position(self, position: Position | ArrayLike | None = None, assembly: str | None = None) -> Floats:
-        """The handle's position meant, (..., 3) [m]; left out: that of the file.
+        """The requested position of the handle, (..., 3) [m]; left out: that of the file.
 
         position, assembly  as for `at`
-        Raises  DeviceError   if the arguments cannot be meant
+        Raises  DeviceError   for arguments that do not apply to this device
                 PostureError  (model.posture) for joints that cannot be turned to these angles
         """
         mechanism = self._mechanism(at=position)
@@ -272,7 +272,7 @@ class Device:
         return unit_vectors(self.label, "direction", self.reference_direction if direction is None else direction)
 
     def _requested_position(self, position: Position | ArrayLike | Posture | None) -> Position | Floats | None:
-        """The requested position and direction that a point keeps, so that another device can be put there."""
+        """The requested position that a point keeps, so that another device can be put there."""
         from zwidth.model.posture import Posture
 
         if position is None or isinstance(position, Mapping):

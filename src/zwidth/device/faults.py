@@ -21,7 +21,7 @@ class Fault:
     """One thing that is wrong.
 
     file     the file (or bundled name, or option) it stands in
-    key      dotted path of the key, "" if the whole file is meant
+    key      dotted path of the key, "" for the whole file
     message  what is wrong, the value, what is allowed, what to do
     """
 

@@ -26,8 +26,8 @@ def newer_version_message(version: object, known: int) -> str:
 
 def refuse_newer(document: Mapping[str, Any], label: str) -> None:
     """Raise DeviceError for a file of a newer version, whose other keys nobody can judge."""
-    if said := newer_version_message(document.get(KEY), FILE_VERSION):
-        raise fail(label, KEY, said)
+    if message := newer_version_message(document.get(KEY), FILE_VERSION):
+        raise fail(label, KEY, message)
 
 
 def without_version(document: Mapping[str, Any]) -> dict[str, Any]:

@@ -100,21 +100,21 @@ def from_document(
         raise fail(
             label, "", f"is a study of designs, not a device; sweep it, or give the device that it names{named}"
         )
-    cleaned, found = unsupported.refuse(document)
+    cleaned, faults = unsupported.refuse(document)
     checked: DeviceFile | None = None
     try:
         checked = DeviceFile.model_validate(cleaned)
     except ValidationError as error:
-        found += validation_messages(error, cleaned)
-    found += inconsistencies(cleaned, document)
-    if found or checked is None:
-        raise DeviceError(in_order(found, document, label))
+        faults += validation_messages(error, cleaned)
+    faults += inconsistencies(cleaned, document)
+    if faults or checked is None:
+        raise DeviceError(in_order(faults, document, label))
     device = _device(checked, without_version(document), label)
     if device.mechanism is not None and checked.mechanism is not None and not skip_assembly_check:
         assembled = compiled and _assembled(device)
-        found += mechanism_check.mechanism_faults(device.mechanism, checked.mechanism, assembled=assembled)
-    if found:
-        raise DeviceError(in_order(found, document, label))
+        faults += mechanism_check.mechanism_faults(device.mechanism, checked.mechanism, assembled=assembled)
+    if faults:
+        raise DeviceError(in_order(faults, document, label))
     return device
 
 
@@ -151,10 +151,10 @@ def _device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device
     )
 
 
-def in_order(found: Iterable[tuple[KeyPath, str]], document: dict[str, Any], label: str) -> list[Fault]:
+def in_order(faults: Iterable[tuple[KeyPath, str]], document: dict[str, Any], label: str) -> list[Fault]:
     """The faults in the order of the file's keys; of several about one key, each is kept."""
     order = {path: place for place, path in enumerate(_paths(document))}
-    ranked = sorted(found, key=lambda item: _rank(item[0], order))
+    ranked = sorted(faults, key=lambda item: _rank(item[0], order))
     return [Fault(label, dotted(path, document), message) for path, message in ranked]
 
 

@@ -238,7 +238,7 @@ def _null_space(A: Floats) -> Floats:
 
 
 def _size(mechanism: Mechanism) -> float:
-    """A length to judge gaps by: the largest offset of anything from the joint it hangs on [m]."""
+    """A length to judge gaps by: the largest offset of anything from the joint that carries it [m]."""
     lengths = [
         mechanism.links.origin,
         mechanism.links.tip,

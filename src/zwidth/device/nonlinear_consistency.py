@@ -105,7 +105,11 @@ def _breakaway(place: KeyPath, static: Any, level: Any, key: str) -> KeyMessages
     if not (is_number(static) and is_number(level)) or static < 0 or level < 0:
         return
     if static > 0 and level == 0:
-        yield place, f"must be 0 where {key} is 0, got {static:.10g}; what grips at rest rubs when it slides, too"
+        yield (
+            place,
+            f"must be 0 where {key} is 0, got {static:.10g}; friction at rest needs friction in sliding: "
+            f"give {key}",
+        )
     elif static < level:
         yield place, f"must be at least {key} = {level:.10g}, got {static:.10g}"
 
@@ -145,7 +149,11 @@ def _spring(place: KeyPath, spring: dict[str, Any], size: int | None) -> KeyMess
             f"is missing; with {size} coordinates give {size} numbers, such as 1 and -1 for two ends",
         )
     if not {"hardening_N_per_m3", "backward_excess_N_per_m"} & spring.keys():
-        yield place, "says nothing; give hardening_N_per_m3 or backward_excess_N_per_m"
+        yield (
+            place,
+            "is an ordinary spring; give hardening_N_per_m3 or backward_excess_N_per_m, or move it to "
+            "stiffness_N_per_m",
+        )
 
 
 def _drive_friction(mechanism: dict[str, Any]) -> KeyMessages:
@@ -172,7 +180,7 @@ def _drive_friction(mechanism: dict[str, Any]) -> KeyMessages:
     if section and not any("coulomb_Nm" in drive for _, drive in tables(mechanism, "drives")):
         yield (
             ("mechanism", "friction"),
-            "says how friction grips, and no drive has coulomb_Nm; give it or remove this",
+            "describes dry friction, but no drive has coulomb_Nm; give it, or remove this table",
         )
         return
     yield from _grip(("mechanism", "friction"), section, rubs, above, "_Nm_per_rad", "_rad_per_s")
@@ -188,11 +196,11 @@ def _drive(place: KeyPath, drive: dict[str, Any], T: float) -> KeyMessages:
         yield (
             (*place, "continuous_torque_Nm"),
             f"must be at most torque_limit_Nm = {limit:.10g}, got {continuous:.10g}; "
-            "what a motor bears without end it bears for a moment",
+            "the continuous torque cannot exceed the peak torque",
         )
     if "brake_time_constant_s" in drive and "brake_damping_max_Nms_per_rad" not in drive:
         yield (
             (*place, "brake_time_constant_s"),
-            "is of a brake; give brake_damping_max_Nms_per_rad, or remove this",
+            "needs a brake; give brake_damping_max_Nms_per_rad, or remove this",
         )
     yield from lag_fault((*place, "brake_time_constant_s"), drive.get("brake_time_constant_s"), T)

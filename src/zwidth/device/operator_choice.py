@@ -74,7 +74,7 @@ def operator_table(name_or_path: str | os.PathLike[str]) -> dict[str, Any]:
     others = sorted(document.keys() - {"operator"})
     if "operator" not in document:
         if {"plant", "mechanism", "response", "loop"} & document.keys():
-            raise fail(label, "operator", "is missing; a device file without an [operator] holds none")
+            raise fail(label, "operator", "is missing; this device file has no operator; add an [operator] table")
         document = {"operator": document}
     elif others and "loop" not in document:
         raise DeviceError(
@@ -82,11 +82,11 @@ def operator_table(name_or_path: str | os.PathLike[str]) -> dict[str, Any]:
         )
     table = document["operator"]
     document = {"operator": table} | version
-    found = list(operator_inconsistencies(document))
+    faults = list(operator_inconsistencies(document))
     try:
         OperatorFile.model_validate(document)
     except ValidationError as error:
-        found += validation_messages(error, document)
-    if found:
-        raise DeviceError(Fault(label, dotted(path), message) for path, message in found)
+        faults += validation_messages(error, document)
+    if faults:
+        raise DeviceError(Fault(label, dotted(path), message) for path, message in faults)
     return {"name": label, **table}

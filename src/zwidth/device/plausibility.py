@@ -58,15 +58,15 @@ def warn_of_implausible(device: Device, stacklevel: int = 2) -> None:
 def implausible(device: Device) -> list[Fault]:
     """The numbers of a device that look wrong: which, why, and what to type if a unit has slipped."""
     document = device.document
-    found = [*_loop(table(document, "loop")), *_plant(table(document, "plant"))]
-    found += _operator(table(document, "operator"))
+    numbers = [*_loop(table(document, "loop")), *_plant(table(document, "plant"))]
+    numbers += _operator(table(document, "operator"))
     mechanism = table(document, "mechanism")
     if mechanism:
         size = _size(mechanism)
-        found += [*_lengths(mechanism), *_angles(mechanism), *_links(mechanism, size), *_drives(mechanism, size)]
+        numbers += [*_lengths(mechanism), *_angles(mechanism), *_links(mechanism, size), *_drives(mechanism, size)]
     if device.response is not None:
-        found += _response(device.response)
-    return [Fault(device.label, dotted(path, document), message) for path, message in found]
+        numbers += _response(device.response)
+    return [Fault(device.label, dotted(path, document), message) for path, message in numbers]
 
 
 def _loop(loop: dict[str, Any]) -> KeyMessages:
@@ -130,14 +130,14 @@ def _size(mechanism: dict[str, Any]) -> float:
 
 
 def _angles(mechanism: dict[str, Any]) -> KeyMessages:
-    turned: list[tuple[KeyPath, Any]] = [
+    angles: list[tuple[KeyPath, Any]] = [
         (("mechanism", "links", n, "orientation_rad"), link.get("orientation_rad"))
         for n, link in tables(mechanism, "links")
     ]
     for name, assembly in table(mechanism, "assemblies").items():
         path = ("mechanism", "assemblies", name, "joints_rad")
-        turned += [((*path, joint), angle) for joint, angle in assembly["joints_rad"].items()]
-    for place, value in turned:
+        angles += [((*path, joint), angle) for joint, angle in assembly["joints_rad"].items()]
+    for place, value in angles:
         largest = max(_flat(value), key=abs, default=0.0)
         if abs(largest) > FULL_TURN:
             yield (

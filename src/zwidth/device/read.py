@@ -63,7 +63,7 @@ def read(
     """The document of a bundled device (or operator) or of a file, and what to call it in messages.
 
     A bundled name wins over a file of the same name; write ./name for the file.
-    pipes  are read, too: where the user names the file himself
+    pipes  are read, too: where the user names the file on the command line
     Raises DeviceError  if there is no such file, it cannot be read, or it is not TOML
     """
     label = os.fspath(name_or_path)

@@ -97,8 +97,8 @@ def _spectrum(path: Path, table: Table, section: ResponseSection, period: float)
     low, twice, falling = f <= 0.0, np.diff(f) == 0.0, np.diff(f) < 0.0
     above = np.flatnonzero(f > half * (1.0 + 1e-9))
     causes: list[Cause] = [
-        ("frequency_Hz", [(lines[i], text.format(f[i], f[i - 1])) for i in found])
-        for found, text in (
+        ("frequency_Hz", [(lines[i], text.format(f[i], f[i - 1])) for i in rows])
+        for rows, text in (
             (np.flatnonzero(low), "must be greater than 0, got {:.10g}; leave the static value out"),
             (np.flatnonzero(twice) + 1, "{:.10g} is there twice; keep one of them"),
             (np.flatnonzero(falling) + 1, "{:.10g} follows {:.10g}; sort the lines by rising frequency"),
@@ -181,8 +181,8 @@ def _table(path: Path) -> Table:
         wrong: dict[str, list[tuple[int, str]]] = {name: [] for name in columns}
         for row in non_blank_rows(rows):
             if len(row) > len(header):
-                told = f"has {len(row)} cells, but the header names {len(header)} columns"
-                uneven.append((rows.line_num, f"{told}; write a decimal point, not a comma"))
+                text = f"has {len(row)} cells, but the header names {len(header)} columns"
+                uneven.append((rows.line_num, f"{text}; write a decimal point, not a comma"))
                 continue
             cells = [row[place].strip() if place < len(row) else "" for place in places]
             numbers = [_number(cell) for cell in cells]
@@ -221,8 +221,8 @@ def _raise(path: Path, causes: Iterable[Cause]) -> None:
         ]
         more = len(places) - MOST_LINES
         if more > 0:
-            told = f"and {more} more line{'s' if more > 1 else ''}, the last of them line {places[-1][0]}"
-            faults.append(Fault(str(path), column, told))
+            text = f"and {more} more line{'s' if more > 1 else ''}, the last of them line {places[-1][0]}"
+            faults.append(Fault(str(path), column, text))
     if faults:
         raise DeviceError(faults)
 
@@ -241,7 +241,7 @@ def _got(cell: str) -> str:
 def _lies_in(folder: Path, path: Path) -> bool:
     """Whether a file lies in a folder or below it, all links followed.
 
-    Who opens a device file from somebody else must not have other files of his own read by it, nor through a link
+    A device file from somebody else must not read other files of the user who opens it, nor through a link
     that came with it.
     """
     try:
@@ -255,5 +255,5 @@ def _text(path: Path) -> str:
     try:
         return read_text(path, LARGEST_TABLE)
     except UnreadableFileError as error:
-        hint = "response.file is meant beside the device file" if error.missing else "give a CSV file"
+        hint = "response.file is a path from the device file's folder" if error.missing else "give a CSV file"
         raise fail(str(path), "", f"{error}; {hint}") from None

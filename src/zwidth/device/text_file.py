@@ -27,8 +27,8 @@ def read_plain(path: str | os.PathLike[str], largest: int, *, pipes: bool = Fals
     """Bytes of a plain file, found by its path, of at most `largest` bytes; links are followed.
 
     pipes   are waited for, too: only where the user names the file, as in `--points <(program)`
-    Raises  Unreadable  where there is none, for anything else than a plain file, for one that is larger, and
-                        where the system refuses to read it
+    Raises  UnreadableFileError  where there is none, for anything else than a plain file, for one that is larger,
+                                 and where the system refuses to read it
     """
     try:
         if wrong := _no_plain_file(os.stat(path).st_mode, pipes):
@@ -63,13 +63,13 @@ def read_text(path: str | os.PathLike[str], largest: int, *, pipes: bool = False
     """Text of a plain file in UTF-8, with or without a byte order mark.
 
     pipes   as in `read_plain`
-    Raises  Unreadable  as `read_plain`, and for what is not such text
+    Raises  UnreadableFileError  as `read_plain`, and for what is not such text
     """
     return decode(read_plain(path, largest, pipes=pipes))
 
 
 def decode(data: bytes) -> str:
-    """Text of bytes in UTF-8, with or without a byte order mark. Raises Unreadable for what is not such text."""
+    """Text of bytes in UTF-8, with or without a byte order mark. Raises UnreadableFileError for anything else."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise UnreadableFileError("is UTF-16 text, not UTF-8")
     try:
@@ -98,17 +98,17 @@ def header_fault(header: Sequence[str], needed: Sequence[str], optional: Collect
     """
     missing = [name for name in needed if name not in header]
     twice = [name for name in (*needed, *optional) if header.count(name) > 1]
-    told = []
+    faults = []
     if missing:
-        told.append(f"{_columns(missing)} missing")
+        faults.append(f"{_columns(missing)} missing")
     if twice:
-        told.append(f"{_columns(twice)} there more than once")
-    if not told:
+        faults.append(f"{_columns(twice)} there more than once")
+    if not faults:
         return ""
     other = next((name for mark, name in SEPARATORS.items() if len(header) == 1 and mark in header[0]), None)
     if missing and other:
-        return f"{' and '.join(told)}: the cells are separated by {other}; use commas"
-    return f"{' and '.join(told)}; needed are {', '.join(needed)}"
+        return f"{' and '.join(faults)}: the cells are separated by {other}; use commas"
+    return f"{' and '.join(faults)}; needed are {', '.join(needed)}"
 
 
 def _columns(names: Sequence[str]) -> str:

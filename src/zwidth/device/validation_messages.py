@@ -51,14 +51,14 @@ def validation_messages(
     details = error.errors(include_url=False)
     located = [(_where(detail, document), detail) for detail in details]
     missing = {path for path, detail in located if detail["type"] == "missing"}
-    meant = {
+    misspelt = {
         (*path[:-1], near)
         for path, detail in located
         if detail["type"] == "extra_forbidden"
         and (near := nearest(str(path[-1]), [str(p[-1]) for p in missing if p[:-1] == path[:-1]]))
     }
     for path, detail in located:
-        is_misspelt = detail["type"] == "missing" and path in meant
+        is_misspelt = detail["type"] == "missing" and path in misspelt
         if not is_misspelt and not _long_enough(detail):
             if detail["type"] == "extra_forbidden":
                 yield path, unknown(path) if unknown else _unknown(path, document)
@@ -173,9 +173,9 @@ def _in_si(key: str, value: Any, allowed: Collection[str]) -> str:
         frequency = value * (1e3 if key.endswith("kHz") else 1.0) if known else 0.0
         return "give sampling_period_s" + (f" = {1.0 / frequency:.10g}" if frequency > 0.0 else ", in seconds")
     for unit, (base, factor) in OTHER_UNITS.items():
-        meant = key.removesuffix(unit) + base
-        if key.endswith(f"_{unit}") and meant in allowed:
-            return f"give {meant}" + (f" = {value * factor:.10g}" if known else "")
+        si_key = key.removesuffix(unit) + base
+        if key.endswith(f"_{unit}") and si_key in allowed:
+            return f"give {si_key}" + (f" = {value * factor:.10g}" if known else "")
     return ""
 
 

@@ -34,8 +34,8 @@ class FilterStates:
         resolvent = away[..., None, None] * np.eye(len(self.A)) - self.A
         inner = np.linalg.solve(resolvent, np.broadcast_to(self.input[:, None], (*z.shape, len(self.A), 1)))
         slope = -np.linalg.solve(resolvent, inner)
-        found = self.direct + (self.output @ inner)[..., 0], (self.output @ slope)[..., 0]
-        return np.asarray(found[0], dtype=complex), np.asarray(found[1], dtype=complex)
+        value_and_slope = self.direct + (self.output @ inner)[..., 0], (self.output @ slope)[..., 0]
+        return np.asarray(value_and_slope[0], dtype=complex), np.asarray(value_and_slope[1], dtype=complex)
 
 
 def filter_states(numerator: Floats, denominator: Floats, window: Floats) -> FilterStates:

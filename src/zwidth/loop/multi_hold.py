@@ -136,8 +136,8 @@ def _equal_poles(
     rank = int(np.sum(strength[: len(inputs)] * _reach(squared, drag, *sampling) > level))
     root = np.sqrt(strength[:rank])
     enters, leaves = root[:, None] * right[:rank], left[:, :rank] * root
-    found = _pairs(np.full(rank, squared), drag * np.eye(rank), enters, leaves, period)
-    return ContinuousPlant(found.A, found.B, found.C, (motion_name(squared, decay),) * (len(inputs) - rank))
+    states = _pairs(np.full(rank, squared), drag * np.eye(rank), enters, leaves, period)
+    return ContinuousPlant(states.A, states.B, states.C, (motion_name(squared, decay),) * (len(inputs) - rank))
 
 
 def _reach(squared: float, drag: float, period: float, fraction: float) -> float:
@@ -156,9 +156,9 @@ def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, 
     if np.linalg.cond(right) > DEFECTIVE:
         return whole
     source = np.linalg.solve(right, whole.B.astype(complex))
-    seen = whole.C @ right
+    readings = whole.C @ right
     reach = np.abs(np.expm1(poles * period) / np.where(poles == 0.0, 1.0, poles)) + period * (poles == 0.0)
-    strength = np.linalg.norm(source, axis=1) * np.linalg.norm(seen, axis=0) * reach
+    strength = np.linalg.norm(source, axis=1) * np.linalg.norm(readings, axis=0) * reach
     keep = strength > UNOBSERVED * float(np.sum(strength))
     if keep.all():
         return whole
@@ -195,5 +195,5 @@ def _integrals(A: Floats, time: float) -> tuple[Floats, Floats]:
     whole[:N, :N], whole[:N, N:] = A * time, np.eye(N)
     from scipy.linalg import expm
 
-    found = expm(whole)
-    return found[:N, :N], found[:N, N:] * time
+    exponential = expm(whole)
+    return exponential[:N, :N], exponential[:N, N:] * time

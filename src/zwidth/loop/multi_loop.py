@@ -63,10 +63,10 @@ class MultiLoop:
     @cached_property
     def continuous_plant(self) -> ContinuousPlant:
         """The part of the plant that walls move, in continuous time. Raises UnmovedError where there is none."""
-        found = continuous_plant(self.plant, self.period, self.fractional_delay)
-        if not len(found.A):
+        plant = continuous_plant(self.plant, self.period, self.fractional_delay)
+        if not len(plant.A):
             raise UnmovedError("the wall forces move nothing that the sensors read; check actuators and sensors")
-        return found
+        return plant
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
@@ -130,14 +130,14 @@ class MultiLoop:
         whole[..., N:, :N] = held.reading
         wanted = np.zeros((*z.shape, N + m, m), dtype=complex)
         wanted[..., N:, :] = np.eye(m)
-        found = np.linalg.solve(whole, wanted)
+        solution = np.linalg.solve(whole, wanted)
         change = np.zeros_like(wanted)
-        change[..., :N, :] = -found[..., :N, :] - (held.old / at**2) @ found[..., N:, :]
+        change[..., :N, :] = -solution[..., :N, :] - (held.old / at**2) @ solution[..., N:, :]
         slope = np.linalg.solve(whole, change)[..., N:, :]
         F, dF = self.force_filter.response(z, d)
         lead = (z**self.whole_delay / F)[..., None, None]
         dlead = lead * (self.whole_delay / z - dF / F)[..., None, None]
-        return lead * found[..., N:, :], lead * slope + dlead * found[..., N:, :]
+        return lead * solution[..., N:, :], lead * slope + dlead * solution[..., N:, :]
 
     @cached_property
     def affine(self) -> tuple[Floats, Floats, Floats, Floats]:

@@ -486,7 +486,7 @@ class OperatingPoint:
         simulate: bool = True,
         progress: Progress | None = None,
     ) -> LimitCyclePrediction:
-        """Vibrations that keep themselves up on a wall, and what simulations find of them; see
+        """Limit cycles on a wall, predicted and simulated; see
         `contact.predict_limit_cycles`."""
         return _verbs.limit_cycles(self, stiffness, damping, offset, simulate, progress).about(self)
 

@@ -26,7 +26,7 @@ class UnmovedError(ValueError):
 
 
 class HysteresisError(ValueError):
-    """A plant with a loss factor, which speaks of steady vibration and not of motion in time."""
+    """A plant with a loss factor, which describes steady vibration and not motion in time."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ that of the actuator is the structural deformation ratio
 
     S(w) = x_h/x_a = (h^T D^-1 a)/(a^T D^-1 a),      D = -w^2 M + jw B + K + lagged dampers
 
-1 where the structure moves as one body, of growing size towards the first resonance of what hangs on the actuator,
+1 where the structure moves as one body, of growing size towards the first resonance of what the actuator carries,
 and less and less above it. Two masses and a spring: S = (k + jw b)/(k - w^2 m_link + jw b). Its poles are the
 resonances with the actuator held (its antiresonances), not those of the free device.
 

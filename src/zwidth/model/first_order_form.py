@@ -83,14 +83,14 @@ def _motions(plant: Plant) -> tuple[Floats, Floats, Floats]:
     return rigid @ axes[:, slides], rigid @ axes[:, ~slides], elastic
 
 
-def _state_matrices(plant: Plant, braked: Floats, kept: Floats, period: float) -> tuple[Floats, Floats, Floats]:
+def _state_matrices(plant: Plant, braked: Floats, basis: Floats, period: float) -> tuple[Floats, Floats, Floats]:
     """A, input and output on [what is read of the braked motions, elastic coordinates, velocities of both, forces
     of the lagged dampers]."""
-    k, b, lags = kept.shape[1], braked.shape[1], plant.lagged_dampers
-    elastic = kept[:, b:]
+    k, b, lags = basis.shape[1], braked.shape[1], plant.lagged_dampers
+    elastic = basis[:, b:]
     read = braked.T @ plant.sensor
     size = float(np.linalg.norm(read))
-    if size <= UNREAD * float(np.linalg.norm(kept.T @ plant.sensor)):
+    if size <= UNREAD * float(np.linalg.norm(basis.T @ plant.sensor)):
         read, size = read[:0], 0.0
     x = int(size > 0.0) + k - b  # coordinates come first, then k velocities
     n = x + k + len(lags)
@@ -99,14 +99,14 @@ def _state_matrices(plant: Plant, braked: Floats, kept: Floats, period: float) -
         A[0, x : x + b], reading[0] = read / size / period, size
     at = slice(x - (k - b), x)
     A[at, x + b : x + k] = np.eye(k - b) / period
-    A[x : x + k, at] = -(kept.T @ plant.stiffness @ elastic) * period
-    A[x : x + k, x : x + k] = -(kept.T @ plant.damping @ kept)
+    A[x : x + k, at] = -(basis.T @ plant.stiffness @ elastic) * period
+    A[x : x + k, x : x + k] = -(basis.T @ plant.damping @ basis)
     for i, damper in enumerate(lags):
-        along, own = kept.T @ damper.along, x + k + i
+        along, own = basis.T @ damper.along, x + k + i
         A[x : x + k, own] = -damper.damping * along
         A[own, x : x + k] = along / damper.time_constant
         A[own, own] = -1.0 / damper.time_constant
-    source[x : x + k] = kept.T @ plant.actuator * period
+    source[x : x + k] = basis.T @ plant.actuator * period
     reading[at] = elastic.T @ plant.sensor
     return A, source, reading
 

@@ -38,13 +38,13 @@ def check_mobility(mechanism: Mechanism, mech: MechanismArrays, design: int, ref
     """
     rng = np.random.default_rng(0)
     near = reference + NEARBY * rng.uniform(-1.0, 1.0, (2, reference.size))
-    found = _misfit(mechanism, mech, design, [reference, *closed_configurations(mech, design, near)])
-    if found is None:
+    misfit = _misfit(mechanism, mech, design, [reference, *closed_configurations(mech, design, near)])
+    if misfit is None:
         return None
     far = rng.uniform(-np.pi, np.pi, (ELSEWHERE, reference.size))
     if all(_misfit(mechanism, mech, design, [angles]) for angles in closed_configurations(mech, design, far)):
-        raise ValueError(f"{found.reason}; {found.advice}")
-    return found.reason
+        raise ValueError(f"{misfit.reason}; {misfit.advice}")
+    return misfit.reason
 
 
 def closed_configurations(mech: MechanismArrays, design: int, rough: Floats) -> Floats:
@@ -54,8 +54,8 @@ def closed_configurations(mech: MechanismArrays, design: int, rough: Floats) -> 
     gaps = np.zeros((len(angles), mech.a.size))
     goals = np.zeros((len(angles), 3))
     assemble_batch(mech, np.full(len(angles), design), goals, False, angles, gaps)
-    found: Floats = angles[gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size[design]]
-    return found
+    closed: Floats = angles[gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size[design]]
+    return closed
 
 
 def _misfit(

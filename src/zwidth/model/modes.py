@@ -68,9 +68,9 @@ def least_deforming_motion(plant: Plant) -> Floats:
     reads it, else the static deflection under a force at the sensor."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     rigid = shapes[:, squared == 0.0]
-    seen = rigid.T @ plant.sensor
-    if np.linalg.norm(seen) > 1e-9 * np.linalg.norm(shapes.T @ plant.sensor):
-        motion = rigid @ seen
+    readings = rigid.T @ plant.sensor
+    if np.linalg.norm(readings) > 1e-9 * np.linalg.norm(shapes.T @ plant.sensor):
+        motion = rigid @ readings
     else:
         elastic = squared != 0.0
         motion = shapes[:, elastic] @ ((shapes[:, elastic].T @ plant.sensor) / squared[elastic])

@@ -148,7 +148,7 @@ class Nonlinear:
     @property
     def kinds(self) -> tuple[str, ...]:
         """The nonlinear parts that a linear answer leaves out, in words."""
-        found = {
+        present = {
             "dry friction": any(part.coulomb > 0.0 for part in self.friction),
             "encoder steps": any(part.step > 0.0 for part in self.counters),
             "noise": any(part.noise > 0.0 for part in self.counters),
@@ -156,7 +156,7 @@ class Nonlinear:
             "programmable brakes": bool(self.brakes),
             "the force limit": isfinite(self.force_limit),
         }
-        return tuple(name for name, there in found.items() if there)
+        return tuple(name for name, there in present.items() if there)
 
 
 def _projected(parts: tuple[NonlinearElement, ...], motions: Floats) -> tuple[NonlinearElement, ...]:

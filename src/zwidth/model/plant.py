@@ -45,7 +45,7 @@ class Plant:
     names      (n,)    coordinates, for people
     lagged_dampers     electrical damping and the like
     hysteresis (n, n)  imaginary part of the stiffness at positive frequencies, K (1 + i eta) for a loss factor eta
-                       [N/m]; it speaks of steady vibration only, so that such a plant has no transition matrix
+                       [N/m]; it describes steady vibration only, so that such a plant has no transition matrix
                        (see `chart.hysteretic`); None: none
     nonlinear          friction, encoder steps and the like: what only `contact` knows of
     """

@@ -215,14 +215,14 @@ def joint_position(mechanism: Mechanism, angles: Mapping[str, float], assembly: 
     if set(angles) != set(driven):
         raise ValueError(f"give the angle of every driven joint, {', '.join(driven)}; got {', '.join(angles)}")
     mech, reference = _single(mechanism, name, "postures are given by their joints for one design at a time")
-    found = position_of_angles(mech, reference, np.array([angles[joint] for joint in driven]))
-    if found is None:
-        told = ", ".join(f"{joint} = {angles[joint]:.6g} rad" for joint in driven)
+    position = position_of_angles(mech, reference, np.array([angles[joint] for joint in driven]))
+    if position is None:
+        requested = ", ".join(f"{joint} = {angles[joint]:.6g} rad" for joint in driven)
         raise OutOfReach(
-            f"the joints cannot be turned to {told} in assembly {name!r} without passing a singularity; "
+            f"the joints cannot be turned to {requested} in assembly {name!r} without passing a singularity; "
             "ask for angles nearer to those of the reference"
         )
-    return found
+    return position
 
 
 def handle_motions(posture: Posture) -> Floats:

@@ -60,9 +60,9 @@ def solve_batch(mech: MechanismArrays, design: Ints, reference: Floats, goals: F
         return solved
     # the way round, where there is one, is taken by the first design; the others start from its postures
     first = by_roadmap(mech, 0, reference[0], goals[failed])
-    found = first.status == OK
-    retry = failed[found]
-    starts = np.ascontiguousarray(first.angles[found])
+    solved_rows = first.status == OK
+    retry = failed[solved_rows]
+    starts = np.ascontiguousarray(first.angles[solved_rows])
     solved.overwrite(retry, solve_from_starts(mech, design[retry], starts, np.arange(len(retry)), goals[retry]))
     return solved
 

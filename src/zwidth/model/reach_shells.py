@@ -43,11 +43,11 @@ def outside_shells(mech: MechanismArrays, design: int, goals: Floats) -> NDArray
 
 def shells(mech: MechanismArrays, design: int) -> list[Shell]:
     """The shells of one design's chains, one for each way from base to handle that visits no link twice."""
-    found = []
+    all_shells = []
     for centre, lengths in _chains(_shared_points(mech, design), mech.handle_link, mech.handle[design, 0]):
         total = sum(lengths)
-        found.append(Shell(centre, max(0.0, 2.0 * max(lengths) - total), total))
-    return found
+        all_shells.append(Shell(centre, max(0.0, 2.0 * max(lengths) - total), total))
+    return all_shells
 
 
 def _shared_points(mech: MechanismArrays, design: int) -> list[SharedPoint]:
@@ -65,7 +65,7 @@ def _chains(
     handle: Floats,
     link: int = BASE,
     at: Floats | None = None,
-    seen: frozenset[int] = frozenset({BASE}),
+    visited: frozenset[int] = frozenset({BASE}),
 ) -> Iterator[tuple[Floats, list[float]]]:
     """Where each chain leaves the base, and the lengths of its segments; `at` is where it entered `link`."""
     if at is not None and link == last:
@@ -73,9 +73,9 @@ def _chains(
         return
     both_ways = [*meetings, *((b, q, a, p) for a, p, b, q in meetings)]
     for here, leaves, there, enters in both_ways:
-        if here != link or there in seen:
+        if here != link or there in visited:
             continue
-        for start, rest in _chains(meetings, last, handle, there, enters, seen | {there}):
+        for start, rest in _chains(meetings, last, handle, there, enters, visited | {there}):
             if at is None:
                 yield leaves, rest
             else:

@@ -111,7 +111,7 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
     rigid       1/(a^T Z (Z^T M Z)^-1 Z^T a), damper x^T B x of the rigid motion x of one metre at
                 the actuator
 
-    Sensor, lagged dampers and what is not linear are what these motions move them by: W^T sensor, W^T along.
+    Sensor, lagged dampers and nonlinear parts are moved by these motions: W^T sensor, W^T along.
 
     Returns  Plant; `full` gives the plant itself, and so does the model it already is
     Raises   ModelError  where the model does not apply, with the reason; for hysteresis all but `full`
@@ -329,7 +329,7 @@ def _motions(plant: Plant, model: Model) -> Floats:
 
 
 def _with_sensor_and_elements(reduced: Plant, plant: Plant, model: Model) -> Plant:
-    """The reduced plant with the sensor, the lagged dampers and what is not linear of the one it stands for."""
+    """The reduced plant with the sensor, lagged dampers and nonlinear parts of the plant that it replaces."""
     if not plant.lagged_dampers and not plant.nonlinear and np.array_equal(plant.sensor, plant.actuator):
         return reduced
     motions = _motions(plant, model)
@@ -344,15 +344,15 @@ def _reduced_nonlinear(reduced: Plant, plant: Plant, motions: Floats) -> Nonline
     A single counter of the whole reading counts the reduced sensor, which is known even where springs tie the
     plant to the ground; there the readings of several counters are not known.
     """
-    found, counters = plant.nonlinear.project(motions), plant.nonlinear.counters
+    projected, counters = plant.nonlinear.project(motions), plant.nonlinear.counters
     if len(counters) == 1 and np.array_equal(counters[0].weight * counters[0].along, plant.sensor):
-        return replace(found, counters=(replace(counters[0], along=reduced.sensor / counters[0].weight),))
-    summed_reading = sum((part.weight * part.along for part in found.counters), np.zeros(reduced.size))
+        return replace(projected, counters=(replace(counters[0], along=reduced.sensor / counters[0].weight),))
+    summed_reading = sum((part.weight * part.along for part in projected.counters), np.zeros(reduced.size))
     if counters and not np.allclose(
         summed_reading, reduced.sensor, rtol=0.0, atol=READING_TOLERANCE * np.max(np.abs(summed_reading))
     ):
         raise ModelError("the plant is tied to the ground, and what encoders count of two masses is not known")
-    return found
+    return projected
 
 
 def _with_handle(reduced: Plant, plant: Plant, motion: Floats) -> Plant:

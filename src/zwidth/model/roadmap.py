@@ -51,8 +51,8 @@ class Roadmap:
         """Node near each target (N, 3): that of its cell, in constant time."""
         finite = np.nan_to_num((target - self.low) / self.pitch, nan=0.0, posinf=0.0, neginf=0.0)
         cell = np.clip(finite, 0, self.counts - 1).astype(np.int64)
-        found: Ints = self.nearest[(cell[:, 0] * self.counts[1] + cell[:, 1]) * self.counts[2] + cell[:, 2]]
-        return found
+        nodes: Ints = self.nearest[(cell[:, 0] * self.counts[1] + cell[:, 1]) * self.counts[2] + cell[:, 2]]
+        return nodes
 
     def nearest_nodes(self, target: Floats, count: int) -> Ints:
         """The nodes truly nearest to each target, (N, count), for targets that the first node missed."""

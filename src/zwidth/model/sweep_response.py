@@ -60,12 +60,12 @@ def sweep_response(
         value = cross / of_force / (np.exp(2j * np.pi * f * period) - 1.0) ** m
     excited = (of_force > EXCITED * np.max(of_force)) & np.isfinite(coherence)
     count = 1 + (len(force_samples) - length) // (length - length // 2)
-    kept = slice(2, None)  # the window mixes the mean into the first frequency
+    usable = slice(2, None)  # the window mixes the mean into the first frequency
     return Response(
-        frequency=f[kept],
-        value=np.where(np.isfinite(value), value, 0.0)[kept],
+        frequency=f[usable],
+        value=np.where(np.isfinite(value), value, 0.0)[usable],
         integrators=integrators,
-        coherence=np.where(excited, np.clip(coherence, 0.0, 1.0), 0.0)[kept],
+        coherence=np.where(excited, np.clip(coherence, 0.0, 1.0), 0.0)[usable],
         averages=count / OVERLAP_KEPT,
         note=f"from {len(force)} samples by {count} Hann segments of {length}",
     )

@@ -25,5 +25,5 @@ def member_text(index: int, values: Mapping[str, Any]) -> str:
     >>> member_text(3, {"plant.mass_kg": 0.1})
     '3 (plant.mass_kg = 0.1)'
     """
-    told = ", ".join(f"{path} = {printable(value_text(value))}" for path, value in values.items())
-    return f"{index} ({told})"
+    pairs = ", ".join(f"{path} = {printable(value_text(value))}" for path, value in values.items())
+    return f"{index} ({pairs})"

@@ -22,8 +22,8 @@ Faults = list[Fault]
 SetNumbers = dict[KeyPath, tuple[str, str]]  # what is set: as it is written, and the axis that sets it
 
 
-def axes_of(document: dict[str, Any], device: Device | None, found: Faults) -> tuple[Axis, ...]:
-    """The axes of a study that have no fault; the faults of the others are added to `found`.
+def axes_of(document: dict[str, Any], device: Device | None, faults_of_axes: Faults) -> tuple[Axis, ...]:
+    """The axes of a study that have no fault; the faults of the others are added to `faults_of_axes`.
 
     document  the study as read. Values of the wrong type are left out here: `study_schema` reports them
     device    None if it could not be loaded; paths are then not looked up
@@ -32,7 +32,7 @@ def axes_of(document: dict[str, Any], device: Device | None, found: Faults) -> t
     axes, taken = [], SetNumbers()
     for n, table in tables(document, "axis"):
         here = ("axis", n)
-        found += [((*here, *path), said) for path, said in _values_faults(table, hypercube)]
+        faults_of_axes += [((*here, *path), message) for path, message in _values_faults(table, hypercube)]
         key = table.get("key")
         if not isinstance(key, str) or not key:
             continue
@@ -44,12 +44,12 @@ def axes_of(document: dict[str, Any], device: Device | None, found: Faults) -> t
             if table.get("tie"):
                 faults.append((("tie",), f"goes with a number of the device file, not with {key}; remove it"))
         elif device is not None:
-            said = list(_key_faults(device.document, key, _values(table)))
-            faults += said
-            if not said:
+            message = list(_key_faults(device.document, key, _values(table)))
+            faults += message
+            if not message:
                 ties = list(_ties(table, key, device, taken, faults))
                 axis = _axis(table, key, unit_of(device.document, key), tuple(ties))
-        found += [((*here, *path), said) for path, said in faults]
+        faults_of_axes += [((*here, *path), message) for path, message in faults]
         if axis is not None and not faults:
             axes.append(axis)
     return tuple(axes)
@@ -76,11 +76,11 @@ def _values_faults(table: dict[str, Any], hypercube: bool) -> Iterator[Fault]:
     if span is not None and values is not None:
         yield (("values",), "and range exclude each other; remove one of them")
     elif values is not None:
-        said = [repr(value) for value in values] if isinstance(values, list) else []
+        shown = [repr(value) for value in values] if isinstance(values, list) else []
         yield from (
             (("values", n), f"{quote(values[n])} is listed already; remove it")
-            for n, text in enumerate(said)
-            if text in said[:n]
+            for n, text in enumerate(shown)
+            if text in shown[:n]
         )
         for key in ("count", "scale"):
             if key in table:
@@ -190,7 +190,7 @@ def _key_faults(document: dict[str, Any], key: str, values: list[tuple[KeyPath, 
     else:
         texts = _texts(steps)
         yield from (
-            ((*where,), said) for where, value in values if (said := _value_fault(value, kinds, key, texts))
+            ((*where,), message) for where, value in values if (message := _value_fault(value, kinds, key, texts))
         )
 
 
@@ -224,8 +224,10 @@ def _value_fault(value: Any, kinds: set[Any], key: str, texts: list[str]) -> str
     return "" if fits else f"must be {wanted} for '{key}', got {quote(value)}"
 
 
-def _ties(table: dict[str, Any], key: str, device: Device, taken: SetNumbers, found: Faults) -> Iterator[Tie]:
-    """The ties without a fault, and a matrix element's tie to its mirror image; faults are added to `found`."""
+def _ties(
+    table: dict[str, Any], key: str, device: Device, taken: SetNumbers, faults_of_axes: Faults
+) -> Iterator[Tie]:
+    """The ties without a fault, and a matrix element's tie to its mirror image; faults go to `faults_of_axes`."""
     document, given = device.document, table.get("tie")
     for n, tied in enumerate(given if isinstance(given, list) else []):
         tie: dict[str, Any] = {"key": tied} if isinstance(tied, str) else tied if isinstance(tied, dict) else {}
@@ -234,7 +236,7 @@ def _ties(table: dict[str, Any], key: str, device: Device, taken: SetNumbers, fo
             continue
         faults = list(_tie_faults(document, key, to, factor, power, table))
         faults += [] if faults else list(_overlap_faults(to, (), key, device, taken))
-        found += [(("tie", n, *path), said) for path, said in faults]
+        faults_of_axes += [(("tie", n, *path), message) for path, message in faults]
         if faults:
             continue
         if power is None:
@@ -278,7 +280,9 @@ def _tie_faults(
         yield (("factor",), "and power exclude each other; remove one of them")
     elif power is None:
         values: list[tuple[KeyPath, Any]] = [(("key",), value) for _, value in _values(table)[:1]]
-        yield from (((), said.replace(f"'{key}'", f"'{to}'")) for _, said in _key_faults(document, to, values))
+        yield from (
+            ((), message.replace(f"'{key}'", f"'{to}'")) for _, message in _key_faults(document, to, values)
+        )
         if factor is not None and any(isinstance(value, str) for _, value in _values(table)):
             yield (("factor",), "cannot multiply texts, and the values of this axis are texts; remove it")
     else:
@@ -310,8 +314,8 @@ def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None)
     if "range" in table:
         yield (("range",), f"cannot be used: {key} is not a number; write values = [...]")
     for where, value in _values(table):
-        if where[0] == "values" and (said := circumstance_fault(key, value, device)):
-            yield (where, said)
+        if where[0] == "values" and (message := circumstance_fault(key, value, device)):
+            yield (where, message)
 
 
 def circumstance_fault(key: str, value: Any, device: Device | None) -> str:

@@ -81,7 +81,7 @@ class Column:
         return f"{self.statistic}_{self.measure.key if self.unit or not self.measure.unit else self.measure.name}"
 
     def reduce(
-        self, found: MeasureValues, point: OperatingPoint, weights: NDArray[np.float64] | None = None
+        self, values: MeasureValues, point: OperatingPoint, weights: NDArray[np.float64] | None = None
     ) -> tuple[float, int, str]:
         """Value, status and reason of a design, from the measure's values over its workspace.
 
@@ -92,21 +92,21 @@ class Column:
         assert self.statistic is not None
         try:
             if self.statistic == "conditioning_index":
-                value = global_conditioning_index(found.values, found.status, weights)
+                value = global_conditioning_index(values.values, values.status, weights)
             elif self.statistic == "isotropy_index":
-                value = global_isotropy_index(point.jacobian, found.status, len(point.drives.names))
+                value = global_isotropy_index(point.jacobian, values.status, len(point.drives.names))
             else:
-                whole = overall(found.values, found.status, weights, self.measure.better)
+                whole = overall(values.values, values.status, weights, self.measure.better)
                 value = float(getattr(whole, self.statistic))
         except ValueError as error:
             return float("nan"), FAILED, str(error)
         if not np.isnan(value):
             return value, OK, ""
-        if (found.status == OK).any():
+        if (values.status == OK).any():
             return value, NO_VALUE, f"has no {self.statistic} here"
-        kinds, counts = np.unique(found.status, return_counts=True)
+        kinds, counts = np.unique(values.status, return_counts=True)
         status = int(kinds[np.argmax(counts)])
-        return value, status, next((note.reason for note in found.notes if note.status == status), "")
+        return value, status, next((note.reason for note in values.notes if note.status == status), "")
 
 
 def column_named(name: str, user_measures: Mapping[str, Measure] | None = None) -> Column:

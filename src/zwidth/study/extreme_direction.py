@@ -102,17 +102,17 @@ class _Goal:
         """The function to minimise; inf where there is no value."""
         return np.where(np.isnan(values), np.inf, self.sign * values)
 
-    def status(self, found: MeasureValues, status: NDArray[np.uint8], which: Ints) -> NDArray[np.uint8]:
+    def status(self, values: MeasureValues, status: NDArray[np.uint8], which: Ints) -> NDArray[np.uint8]:
         """Status (n,) of points, from the status of their samples; reasons are kept for `notes`.
 
-        found   the measure at all samples
+        values  the measure at all samples
         status  (s, n)  its status at s directions of n points
         which   (n,)    indices of the points
         """
         none = status != OK
         if not none.any():
             return np.full(len(which), OK, dtype=np.uint8)
-        reasons = {note.status: note.reason for note in reversed(found.notes)}
+        reasons = {note.status: note.reason for note in reversed(values.notes)}
         everywhere = none.all(axis=0)
         # of several kinds the least: a point has no value rather than an undecided one
         kind = np.where(none, status, MISSING).min(axis=0)

@@ -183,7 +183,7 @@ class BeyondTip(NamedTuple):
     damping: tuple[float, float]
 
 
-def edges_beyond_tips(found: Experiment) -> list[BeyondTip]:
+def edges_beyond_tips(experiment: Experiment) -> list[BeyondTip]:
     """For each tip that edges lie beyond, the stiffest of them; the tip that lies lowest against its edge first.
 
     An edge at a stiffness says that the walls on its inner side are stable. A tip says that no stiffer wall is, at
@@ -193,8 +193,8 @@ def edges_beyond_tips(found: Experiment) -> list[BeyondTip]:
 
     Of several trials only what holds in all of them counts: the highest tip, the narrowest range of damping.
     """
-    ranges = _stable_ranges(found)
-    tips = [point for point in found.points if point.edge == "tip"]
+    ranges = _stable_ranges(experiment)
+    tips = [point for point in experiment.points if point.edge == "tip"]
     stiffest = max(tips, key=lambda tip: tip.high, default=None)
     pairs = []
     for tip in tips:

@@ -34,8 +34,8 @@ from zwidth.study.sensitivity_result import Group, Sensitivities, Sensitivity
 # Numbers of a device file that choose a posture, or help to find it, and are no property of the device.
 NO_PROPERTY: Final = {
     "assemblies": "an approximate angle from which the posture is found",
-    "reference": "where the device is asked about, not what it is",
-    "workspace": "where the device is asked about, not what it is",
+    "reference": "the operating point, not a property of the device",
+    "workspace": "the operating point, not a property of the device",
 }
 ZERO: Final = "0 has no logarithm; the derivative by the number itself is given instead"
 WORTHLESS: Final = 1e-3  # largest estimated error of a derivative, per relative change; above it none is given
@@ -194,7 +194,7 @@ def _obstacle(steps: KeyPath, value: float) -> str:
     """Why a number has no derivative whatever the device; "" if it may have one."""
     if not isfinite(value):
         return "it is infinite, and one per cent of it is no change"
-    whole = any(found.get("type") == "integer" for found in schema.subschemas(steps))
+    whole = any(subschema.get("type") == "integer" for subschema in schema.subschemas(steps))
     return "it is a whole number, which has no derivative" if whole else ""
 
 
@@ -243,8 +243,8 @@ def _with(document: dict[str, Any], steps: KeyPath, value: float) -> dict[str, A
 def _unit(steps: KeyPath) -> str:
     """The unit that the schema states for the number, or for the list that it stands in."""
     while steps:
-        if found := re.search(r" \[([^\]]*)\]$", schema.key_description(steps)):
-            return found[1]
+        if match := re.search(r" \[([^\]]*)\]$", schema.key_description(steps)):
+            return match[1]
         if isinstance(steps[-1], str):
             return ""
         steps = steps[:-1]

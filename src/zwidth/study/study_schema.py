@@ -142,12 +142,12 @@ def description(path: KeyPath) -> str:
     >>> description(("workspace", "x_m"))
     'lowest and highest coordinate along its first axis [m]'
     """
-    found = _table(path).model_fields.get(str(path[-1]))
-    if found is None or not found.description:
+    field = _table(path).model_fields.get(str(path[-1]))
+    if field is None or not field.description:
         return ""
-    extra = found.json_schema_extra
+    extra = field.json_schema_extra
     unit = extra.get("unit") if isinstance(extra, dict) else None
-    return f"{found.description} [{unit}]" if unit else str(found.description)
+    return f"{field.description} [{unit}]" if unit else str(field.description)
 
 
 def unknown(path: KeyPath) -> str:

@@ -23,7 +23,7 @@ DESIGN: Final = "design"
 COMPONENTS: Final = "xyz"
 
 
-def as_dataset(found: Sweep) -> xr.Dataset:
+def as_dataset(sweep: Sweep) -> xr.Dataset:
     """A study's values over its axes.
 
     A grid has a dimension for each axis, called by its key; a Latin hypercube has one, `design`. For each column
@@ -33,11 +33,11 @@ def as_dataset(found: Sweep) -> xr.Dataset:
     """
     import xarray as xr
 
-    sampling = found.job.sampling
+    sampling = sweep.job.sampling
     grid = sampling.size is None
     dims = tuple(axis.key for axis in sampling.axes) if grid else (DESIGN,)
     data: dict[str, Any] = {}
-    for n, one in enumerate(found.job.columns):
+    for n, one in enumerate(sweep.job.columns):
         attributes = {
             **unit_attributes(one.unit),
             "title": one.title,
@@ -45,20 +45,20 @@ def as_dataset(found: Sweep) -> xr.Dataset:
             "source": one.measure.source,
             "better": one.better or "",
             "key": one.key,
-            "notes": "\n".join(_sentence(found, note) for note in found.cells.notes[n]),
+            "notes": "\n".join(_sentence(sweep, note) for note in sweep.cells.notes[n]),
         }
-        data[one.name] = (dims, found.cells.values[:, n].reshape(sampling.shape), attributes)
-        data[f"{one.name}_status"] = (dims, found.cells.status[:, n].reshape(sampling.shape), _flags())
+        data[one.name] = (dims, sweep.cells.values[:, n].reshape(sampling.shape), attributes)
+        data[f"{one.name}_status"] = (dims, sweep.cells.status[:, n].reshape(sampling.shape), _flags())
     coordinates: dict[str, Any] = {} if grid else {DESIGN: np.arange(sampling.count)}
     rows = None if grid else [sampling.values(n) for n in range(sampling.count)]
     for n, axis in enumerate(sampling.axes):
         values = list(axis.values) if rows is None else [row[n] for row in rows]
         dim = axis.key if grid else DESIGN
-        coordinates |= {name: (dim, *column) for name, column in _columns(found, axis, values)}
-    return xr.Dataset(data, coordinates, _attributes(found))
+        coordinates |= {name: (dim, *column) for name, column in _columns(sweep, axis, values)}
+    return xr.Dataset(data, coordinates, _attributes(sweep))
 
 
-def _columns(found: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str, tuple[Any, dict[str, str]]]]:
+def _columns(sweep: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str, tuple[Any, dict[str, str]]]]:
     """The coordinates of an axis: its values, their components, and the numbers tied to it."""
     attributes = {**unit_attributes(axis.unit), "long_name": axis.key, "scale": "log" if axis.log else "linear"}
     if values and isinstance(values[0], tuple):
@@ -72,7 +72,7 @@ def _columns(found: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str,
         yield axis.key, (np.array(values), attributes | {"role": "axis"})
     for tie in axis.ties:
         tied = np.array([tie.value(value) for value in values])
-        unit = unit_of(found.study.device.document, tie.key)
+        unit = unit_of(sweep.study.device.document, tie.key)
         for place in np.ndindex(tied.shape[1:]):
             path = ".".join([tie.key, *map(str, place)])
             yield path, (tied[(slice(None), *place)], {**unit_attributes(unit), "long_name": path})
@@ -89,10 +89,10 @@ def axis_value_text(value: Any) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
-def sweep_document(found: Sweep) -> dict[str, Any]:
+def sweep_document(sweep: Sweep) -> dict[str, Any]:
     """The designs, with values, status and notes of each measure, by key and unit; see `Sweep.document`."""
-    sampling, names = found.job.sampling, found.job.measures
-    status = ([STATUS[int(s)] for s in row] for row in found.cells.status)
+    sampling, names = sweep.job.sampling, sweep.job.measures
+    status = ([STATUS[int(s)] for s in row] for row in sweep.cells.status)
     return {
         "sampling": "grid" if sampling.size is None else "latin-hypercube",
         "seed": None if sampling.size is None else sampling.seed,
@@ -102,39 +102,39 @@ def sweep_document(found: Sweep) -> dict[str, Any]:
             | {"tied": [tie.key for tie in axis.ties]}
             for axis in sampling.axes
         ],
-        "units": {column.name: column.unit or None for column in found.job.columns},
-        "designs": [found.design(n) for n in range(found.job.count)],
-        "values": [dict(zip(names, map(float, row), strict=True)) for row in found.cells.values],
+        "units": {column.name: column.unit or None for column in sweep.job.columns},
+        "designs": [sweep.design(n) for n in range(sweep.job.count)],
+        "values": [dict(zip(names, map(float, row), strict=True)) for row in sweep.cells.values],
         "status": [dict(zip(names, row, strict=True)) for row in status],
-        "notes": [f"{name}: {sentence}" for name, sentence in note_sentences(found)],
+        "notes": [f"{name}: {sentence}" for name, sentence in note_sentences(sweep)],
     }
 
 
-def sweep_table(found: Sweep) -> dict[str, list[Any]]:
+def sweep_table(sweep: Sweep) -> dict[str, list[Any]]:
     """Column -> one entry for each design: its numbers, the values under names with units, the status."""
-    designs = [found.design(n) for n in range(found.job.count)]
+    designs = [sweep.design(n) for n in range(sweep.job.count)]
     settings = {path: [_cell(design[path]) for design in designs] for path in (designs[0] if designs else {})}
-    columns = {one.key: list(found.cells.values[:, n]) for n, one in enumerate(found.job.columns)}
+    columns = {one.key: list(sweep.cells.values[:, n]) for n, one in enumerate(sweep.job.columns)}
     status = {
-        f"{one.name}_status": [STATUS[int(s)] for s in found.cells.status[:, n]]
-        for n, one in enumerate(found.job.columns)
+        f"{one.name}_status": [STATUS[int(s)] for s in sweep.cells.status[:, n]]
+        for n, one in enumerate(sweep.job.columns)
     }
     return settings | columns | status
 
 
-def note_sentences(found: Sweep) -> Iterator[tuple[str, str]]:
+def note_sentences(sweep: Sweep) -> Iterator[tuple[str, str]]:
     """Name of a column, and why designs have no value in it: a sentence for each reason."""
-    for name, notes in zip(found.job.measures, found.cells.notes, strict=True):
-        yield from ((name, _sentence(found, note)) for note in notes)
+    for name, notes in zip(sweep.job.measures, sweep.cells.notes, strict=True):
+        yield from ((name, _sentence(sweep, note)) for note in notes)
 
 
 def _cell(value: Any) -> Any:
     return json.dumps(value) if isinstance(value, list | tuple) else value
 
 
-def _sentence(found: Sweep, note: Note) -> str:
+def _sentence(sweep: Sweep, note: Note) -> str:
     """A reason, how many designs it is of, and the first of them."""
-    sampling = found.job.sampling
+    sampling = sweep.job.sampling
     values = sampling.values(note.first[0])
     where = ", ".join(
         f"{axis.key} = {axis_value_text(value)}" for axis, value in zip(sampling.axes, values, strict=True)
@@ -148,15 +148,15 @@ def _flags() -> dict[str, Any]:
     return {"flag_values": np.array(list(STATUS), dtype=np.uint8), "flag_meanings": meanings}
 
 
-def _attributes(found: Sweep) -> dict[str, Any]:
+def _attributes(sweep: Sweep) -> dict[str, Any]:
     """The study and its device, as attributes that any file can hold."""
     from zwidth._version import __version__
 
-    device = found.study.device
+    device = sweep.study.device
     return {
         "name": device.name,
         "device": device.label,
-        "study": json.dumps(found.study.document),
+        "study": json.dumps(sweep.study.document),
         "device_file": json.dumps(device.document),
         "operator": device.operator_name or "none",
         "zwidth": __version__,

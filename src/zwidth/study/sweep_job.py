@@ -163,7 +163,7 @@ class SweepJob:
 
 
 class Design:
-    """One design; its operating points are solved once, when they are first asked for."""
+    """One design; its operating points are solved once, when they are first needed."""
 
     def __init__(self, job: SweepJob, number: int) -> None:
         self.job = job

@@ -113,18 +113,18 @@ class PointsComparison:
     @property
     def counts(self) -> dict[str, int]:
         """How many points there are of each kind, and how many of them could be compared."""
-        found = {
+        counts_by_key = {
             "edge_points": len(self.edges),
             "edge_points_compared": sum(not isnan(one.deviation) for one in self.edges),
         }
         for verdict in ("stable", "unstable"):
             walls = self.walls(verdict)
-            found[f"{verdict}_walls"] = len(walls)
-            found[f"{verdict}_walls_agreeing"] = sum(one.agrees is True for one in walls)
-            found[f"{verdict}_walls_disagreeing"] = sum(one.agrees is False for one in walls)
-        found["unnamed_points"] = len(self.unnamed)
-        found["unnamed_points_inside"] = sum(one.exact_verdict == "stable" for one in self.unnamed)
-        return found
+            counts_by_key[f"{verdict}_walls"] = len(walls)
+            counts_by_key[f"{verdict}_walls_agreeing"] = sum(one.agrees is True for one in walls)
+            counts_by_key[f"{verdict}_walls_disagreeing"] = sum(one.agrees is False for one in walls)
+        counts_by_key["unnamed_points"] = len(self.unnamed)
+        counts_by_key["unnamed_points_inside"] = sum(one.exact_verdict == "stable" for one in self.unnamed)
+        return counts_by_key
 
     def document(self) -> dict[str, Any]:
         """The points and their counts by key and unit."""

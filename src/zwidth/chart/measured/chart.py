@@ -177,14 +177,14 @@ def _credible(loop: MeasuredLoop, cells: StableRegions) -> StableRegions:
     """The cells that are not made by noise: loops of the curve between a few points, or all in doubt."""
     K0, K1, B0, B1 = cells.box
     scale = np.array([K1 - K0, B1 - B0])
-    kept = []
+    credible = []
     for cell in cells.polygons:
         unit = shapely.transform(cell, lambda xy: xy / scale)
         on_it = np.count_nonzero(_edge_distances(loop, cell, scale) < ON_IT)
         deepest = shapely.get_coordinates(shapely.maximum_inscribed_circle(unit))[0] * scale
         doubtful = judge_measured(loop, cells.edge, *deepest).verdict == UNDECIDED
-        kept.append(on_it >= FEWEST_ON_EDGE and not doubtful)
-    return cells.select(np.array(kept, dtype=bool))
+        credible.append(on_it >= FEWEST_ON_EDGE and not doubtful)
+    return cells.select(np.array(credible, dtype=bool))
 
 
 def _edge_distances(loop: MeasuredLoop, cell: shapely.Polygon, scale: Floats) -> Floats:

@@ -37,8 +37,8 @@ def refine_peak(loop: MeasuredLoop, cells: StableRegions) -> tuple[tuple[float, 
 def _stiffest(cells: StableRegions) -> tuple[float, float]:
     """The corner or crossing of B = 0 of largest K, with K > 0 and B >= 0; nan where there is none."""
     # corners are noded to 1e-11 of the window: what is stiff by less than 1e-9 of it may be no wall
-    found = find_peak(cells.edge_arcs, (), 10.0 * (cells.box[1] - cells.box[0]))
-    return (found.stiffness, found.damping) if found else (nan, nan)
+    peak = find_peak(cells.edge_arcs, (), 10.0 * (cells.box[1] - cells.box[0]))
+    return (peak.stiffness, peak.damping) if peak else (nan, nan)
 
 
 def _around(wall: tuple[float, float], box: Window, of_K: float, of_B: float) -> Window:
@@ -59,27 +59,27 @@ def angles_at_wall(cells: StableRegions, wall: tuple[float, float]) -> list[floa
     length = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
     share = np.clip(-np.einsum("ij,ij->i", a, along) / length, 0.0, 1.0)
     away = np.hypot(*(a + share[:, None] * along).T)
-    found: list[float] = []
+    angles: list[float] = []
     near = np.flatnonzero(away < 1e-4)
     for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else []:
         k = run[np.argmin(away[run])]
         at = cells.edge.angle_index[k]
         if at >= 0:
             low, high = cells.edge.angles[at], cells.edge.angles[at + 1]
-            found.append(float(low + share[k] * (high - low)))
+            angles.append(float(low + share[k] * (high - low)))
         elif at > -3:
-            found.append(0.0 if at == -1 else float(np.pi))
-    return sorted(found)
+            angles.append(0.0 if at == -1 else float(np.pi))
+    return sorted(angles)
 
 
 def largest_damping(loop: MeasuredLoop, cells: StableRegions) -> float:
     """Supremum of B >= 0 stable for all small K > 0: on a line close to K = 0, then in a window there."""
-    found, nearby = 0.0, cells
+    largest, nearby = 0.0, cells
     for _ in range(2):
         _, walls = nearby.edge_arcs.crossings(STIFFNESS, 1e-6 * (nearby.box[1] - nearby.box[0]))
         top = float(np.max(walls[:, DAMPING], initial=0.0))
         if top <= 0.0:
             break
-        found = top
-        nearby = regions_within(loop, cells.edge, _around((0.0, found), cells.box, 1e-3, 1e-3))
-    return found
+        largest = top
+        nearby = regions_within(loop, cells.edge, _around((0.0, largest), cells.box, 1e-3, 1e-3))
+    return largest

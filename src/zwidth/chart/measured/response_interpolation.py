@@ -52,11 +52,11 @@ class ResponseInterpolation:
         step = self.nodes[i + 1] - self.nodes[i]
         t = (theta - self.nodes[i]) / step
         u = 1.0 - t
-        found = u * u * ((1.0 + 2.0 * t) * self.values[kind, i] + t * step * self.slopes[kind, i])
-        found += t * t * ((1.0 + 2.0 * u) * self.values[kind, i + 1] - u * step * self.slopes[kind, i + 1])
+        value = u * u * ((1.0 + 2.0 * t) * self.values[kind, i] + t * step * self.slopes[kind, i])
+        value += t * t * ((1.0 + 2.0 * u) * self.values[kind, i + 1] - u * step * self.slopes[kind, i + 1])
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            inverse = np.where(kind == 0, 1.0 / found, np.where(kind == 1, found, 0.0))
-        inverse = np.where(kind == 2, np.exp(-np.where(kind == 2, found, 0.0)), inverse)
+            inverse = np.where(kind == 0, 1.0 / value, np.where(kind == 1, value, 0.0))
+        inverse = np.where(kind == 2, np.exp(-np.where(kind == 2, value, 0.0)), inverse)
         return np.asarray(inverse * around_one(theta) ** self.integrators * np.exp(1j * self.delay * theta))
 
     def relative_error(self, theta: Floats) -> Floats:

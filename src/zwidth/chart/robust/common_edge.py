@@ -82,17 +82,17 @@ def _segments(members: Sequence[Member], unit: float) -> _OutlineChords:
 
 def _runs(points: Floats, members: Sequence[Member], segments: _OutlineChords, near: float) -> list[ArcRun]:
     """The walk round a polygon (k, 2), grouped by arc; it begins where one arc gives way to another."""
-    found = _nearest_segments(points, segments, near)
-    origins = segments.origin[found]
-    angles = np.array([[_angle(segments, k, point) for point in points[i : i + 2]] for i, k in enumerate(found)])
+    nearest = _nearest_segments(points, segments, near)
+    origins = segments.origin[nearest]
+    angles = np.array([[_angle(segments, k, point) for point in points[i : i + 2]] for i, k in enumerate(nearest)])
     changes = np.any(origins != np.roll(origins, 1, axis=0), axis=1)
     for i in np.flatnonzero(~changes):  # an arc that ends where it begins: past its own corner it is another run
         number, arc = origins[i]
         changes[i] = _starts_anew(members[number].edge.arcs[arc], angles[i - 1, 1], angles[i, 0])
     starts = np.flatnonzero(changes) if changes.any() else np.array([0])
     runs = []
-    for one, following in zip(starts, np.append(starts[1:], starts[0] + len(found)), strict=True):
-        edges = np.arange(one, following) % len(found)
+    for one, following in zip(starts, np.append(starts[1:], starts[0] + len(nearest)), strict=True):
+        edges = np.arange(one, following) % len(nearest)
         number, arc = origins[edges[0]].tolist()
         first, last = points[edges[0]], points[edges[-1] + 1]
         ends = (float(angles[edges[0], 0]), float(angles[edges[-1], 1]))

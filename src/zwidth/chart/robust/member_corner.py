@@ -97,9 +97,9 @@ def solve_corner(one: ArcRun, two: ArcRun, unit: float, size: float) -> Corner:
     follows = one.member is two.member and two.arc_number == one.member.edge.arcs.next_arc[one.arc_number]
     if follows and np.hypot(*(one.last - np.multiply(one.arc.last, (unit, 1.0)))) <= 1e-6 * size:
         return Corner(one.arc.last, (one.arc.end, two.arc.start), 0.0)
-    found = _solve_crossing(one, two, unit, size)
-    if found is not None:
-        return found
+    crossing = _solve_crossing(one, two, unit, size)
+    if crossing is not None:
+        return crossing
     K, B = one.last / (unit, 1.0)
     return Corner((float(K), float(B)), (one.angles[1], two.angles[0]), 1e-6 * size)
 

@@ -77,13 +77,13 @@ def member_polygons(member: Member, unit: float) -> shapely.MultiPolygon:
     scaled = [outline * (unit, 1.0) for outline in member.edge.outlines]
     solid = [outline for outline in scaled if signed_area(outline) > 0.0]
     holes = [outline for outline in scaled if signed_area(outline) < 0.0]
-    found: list[shapely.Polygon] = []
+    polygons: list[shapely.Polygon] = []
     for outline in solid:
         cell = shapely.Polygon(outline)
         inside = [hole for hole in holes if shapely.contains_xy(cell, *hole[0])]
         cell = shapely.Polygon(outline, inside) if inside else cell
-        found += [cell] if cell.is_valid else polygonal(shapely.make_valid(cell))
-    return shapely.MultiPolygon(found)
+        polygons += [cell] if cell.is_valid else polygonal(shapely.make_valid(cell))
+    return shapely.MultiPolygon(polygons)
 
 
 def polygonal(geometry: shapely.Geometry) -> list[shapely.Polygon]:

@@ -161,16 +161,16 @@ def refine_loci(loci: Loci, low: Floats, high: Floats, tolerance: float) -> Loci
         middles = (0.5 * (loci.thetas[1:] + loci.thetas[:-1]))[inside]
         g = eigenvalues_of_plant(loci.loop, middles)
         thetas, every = _merged(loci.thetas, loci.g, middles, g)
-        found = Loci(loci.loop, thetas, _match_branches(every))
+        refined = Loci(loci.loop, thetas, _match_branches(every))
         at = np.searchsorted(thetas, middles)
-        points = found.walls
+        points = refined.walls
         with np.errstate(invalid="ignore", over="ignore"):
             sag = np.abs(points[at] - 0.5 * (points[at - 1] + points[at + 1])) / (high - low)
             here = (near[1:] | near[:-1])[inside]
             loose = (np.where(here[..., None], sag, 0.0) > tolerance).any(axis=(-1, -2))
         keep = np.ones(len(thetas), dtype=bool)
         keep[at[~loose]] = False
-        loci = Loci(loci.loop, thetas[keep], found.g[keep])
+        loci = Loci(loci.loop, thetas[keep], refined.g[keep])
         if not loose.any() or len(loci.thetas) > MOST:
             return loci
     return loci
@@ -208,15 +208,15 @@ def _match_branches(g: Complexes) -> Complexes:
 def _ambiguous(g: Complexes) -> NDArray[np.bool_]:
     """Intervals (N - 1,) in which an eigenvalue moves more than half of the way to another one."""
     m = g.shape[1]
-    found = np.zeros(len(g) - 1, dtype=bool)
+    ambiguous = np.zeros(len(g) - 1, dtype=bool)
     for i in range(m):
         for j in range(m):
             if i != j:
                 gap, size = np.abs(g[:, i] - g[:, j]), np.abs(g[:, i]) + np.abs(g[:, j])
                 apart = np.minimum(gap[1:], gap[:-1])
                 distinct = np.maximum(gap[1:] / size[1:], gap[:-1] / size[:-1]) > EQUAL
-                found |= distinct & (np.abs(np.diff(g[:, i])) > 0.5 * apart)
-    return found
+                ambiguous |= distinct & (np.abs(np.diff(g[:, i])) > 0.5 * apart)
+    return ambiguous
 
 
 def _bent(loci: Loci) -> NDArray[np.bool_]:

@@ -71,22 +71,26 @@ def _runs(loci: Loci, lines: list[Line], ring: Floats) -> list[_CurveRun]:
     curve, sample = segments.curve[nearest], segments.sample[nearest]
     breaks = (curve[1:] != curve[:-1]) | (np.abs(sample[1:] - sample[:-1]) > NEIGHBOURS)
     cuts = [0, *(np.flatnonzero(breaks) + 1).tolist(), len(curve)]
-    found = []
+    runs = []
     for a, b in pairwise(cuts):
         start, end = segments.angle(nearest[a], ring[a]), segments.angle(nearest[b - 1], ring[b])
         between = int(sample[a]), int(sample[b - 1])
-        found.append(_CurveRun(int(curve[a]), start, end, between, ring[b], float(length[a:b].sum())))
-    return found
+        runs.append(_CurveRun(int(curve[a]), start, end, between, ring[b], float(length[a:b].sum())))
+    return runs
 
 
 def _long_runs(runs: list[_CurveRun], shortest: float) -> list[_CurveRun]:
     """Without runs that rounding made, and with what they parted joined, across the ring's first point too."""
-    kept: list[_CurveRun] = []
+    long_runs: list[_CurveRun] = []
     for run in (run for run in runs if run.length > shortest):
-        kept = [*kept[:-1], _joined(kept[-1], run)] if kept and _continues(kept[-1], run) else [*kept, run]
-    if len(kept) > 1 and _continues(kept[-1], kept[0]):
-        kept = [_joined(kept[-1], kept[0]), *kept[1:-1]]
-    return kept
+        long_runs = (
+            [*long_runs[:-1], _joined(long_runs[-1], run)]
+            if long_runs and _continues(long_runs[-1], run)
+            else [*long_runs, run]
+        )
+    if len(long_runs) > 1 and _continues(long_runs[-1], long_runs[0]):
+        long_runs = [_joined(long_runs[-1], long_runs[0]), *long_runs[1:-1]]
+    return long_runs
 
 
 def _continues(one: _CurveRun, other: _CurveRun) -> bool:

@@ -131,9 +131,9 @@ def box_half_extents(loci: Loci, lines: list[Line]) -> Floats:
     ]
     walls = np.vstack([walls[(np.abs(walls) < FAR).all(axis=-1)], *crossings])
     edges = np.abs(np.linalg.eigvals(loop.transition_matrix(*(walls / (loop.period, 1.0)).T))).max(axis=-1)
-    seen = np.abs(walls[edges < 1.0 + ON_CIRCLE])
+    extents = np.abs(walls[edges < 1.0 + ON_CIRCLE])
     most = 1.5 * np.array(wall_bounds(loop))
-    return np.minimum(most, ROOM * seen.max(axis=0)) if len(seen) else most
+    return np.minimum(most, ROOM * extents.max(axis=0)) if len(extents) else most
 
 
 def cut_lines(loci: Loci, lines: list[Line], low: Floats, high: Floats) -> list[shapely.LineString]:
@@ -173,8 +173,8 @@ def _runs(points: Floats, low: Floats, high: Floats) -> list[Floats]:
         sound: NDArray[np.bool_] = np.asarray((np.abs(points) < FAR).all(axis=-1))
         inside = sound & (points >= low).all(axis=-1) & (points <= high).all(axis=-1)
         # both beyond the same side, or a chord longer than the box: it does not belong to the box
-        kept = sound[1:] & sound[:-1] & (inside[1:] | inside[:-1] | _passes(points, low, high))
-    cuts = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(int)))
+        on_edge = sound[1:] & sound[:-1] & (inside[1:] | inside[:-1] | _passes(points, low, high))
+    cuts = np.flatnonzero(np.diff(np.concatenate([[False], on_edge, [False]]).astype(int)))
     return [points[a : b + 1] for a, b in zip(cuts[::2], cuts[1::2], strict=True)]
 
 

@@ -39,12 +39,12 @@ def load_environment(source: str) -> Environment:
     if not file.is_file():
         raise ValueError(f"{path} is not an ordinary file" if file.exists() else f"no such file: {path}")
     module = _run(file)
-    found = getattr(module, name, None)
-    if not isinstance(found, Environment):
-        raise ValueError(_missing(file, name, module, found))
-    _try(found)
-    found.force  # noqa: B018  compiles, so that what numba says against it is said here
-    return found
+    environment = getattr(module, name, None)
+    if not isinstance(environment, Environment):
+        raise ValueError(_missing(file, name, module, environment))
+    _try(environment)
+    environment.force  # noqa: B018  compiles, so that what numba says against it is said here
+    return environment
 
 
 def _run(file: Path) -> ModuleType:
@@ -76,26 +76,24 @@ def _line(error: BaseException, file: Path) -> int:
     return line
 
 
-def _missing(file: Path, name: str, module: ModuleType, found: object) -> str:
+def _missing(file: Path, name: str, module: ModuleType, attribute: object) -> str:
     own = [key for key, value in vars(module).items() if isinstance(value, Environment)]
-    if found is not None:
+    if attribute is not None:
         return f"{name} in {file.name} is not an environment; put @environment(...) above it"
     near = get_close_matches(name, own, n=1)
     hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(own) or 'none'}"
     return f"{file.name} has no environment {name}; {hint}"
 
 
-def _try(found: Environment) -> None:
+def _try(environment: Environment) -> None:
     """Machine code does not check how far it reads into an array: let Python do it once, inside and outside."""
-    values = np.array([1.0 if np.isnan(p.default) else p.default for p in found.parameters])
+    values = np.array([1.0 if np.isnan(p.default) else p.default for p in environment.parameters])
     memory = np.zeros(MEMORY)
     for position, velocity in ((1e-3, 0.1), (1e-3, -0.1), (-1e-3, 0.1), (0.0, 0.0)):
         try:
-            found.function(position, velocity, 0.0, 1e-3, values, memory)
+            environment.function(position, velocity, 0.0, 1e-3, values, memory)
         except IndexError:
-            raise ValueError(
-                f"{found.where}: {found.name} reads beyond its {len(values)} parameters or the {MEMORY} numbers "
-                "of its memory"
-            ) from None
+            limits = f"its {len(values)} parameters or the {MEMORY} numbers of its memory"
+            raise ValueError(f"{environment.where}: {environment.name} reads beyond {limits}") from None
         except Exception:  # what only Python minds, numba decides
             return

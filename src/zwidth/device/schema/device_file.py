@@ -68,56 +68,60 @@ def schema() -> dict[str, Any]:
 
 def subschemas(path: tuple[str | int, ...]) -> list[dict[str, Any]]:
     """Every subschema that may describe the value at a path of keys and indices; none: no such key."""
-    found = list(_alternatives(schema()))
+    alternatives = list(_alternatives(schema()))
     for part in path:
-        found = [inner for outer in found for step in _step(outer, part) for inner in _alternatives(step)]
-    return found
+        alternatives = [
+            inner for outer in alternatives for step in _step(outer, part) for inner in _alternatives(step)
+        ]
+    return alternatives
 
 
 def keys(path: tuple[str | int, ...]) -> set[str]:
     """The keys that the table at a path may hold."""
     if not path:  # needed for every device; the whole JSON Schema takes 20 ms
         return set(DeviceFile.model_fields)
-    return {key for found in subschemas(path) for key in found.get("properties", {})}
+    return {key for subschema in subschemas(path) for key in subschema.get("properties", {})}
 
 
 def kinds(path: tuple[str | int, ...]) -> tuple[str, dict[str, set[str]]]:
     """For a table that comes in kinds: the key that tells them apart, and the keys of each kind; "", {} for any
     other."""
-    tables = [found.get("properties", {}) for found in subschemas(path)]
+    tables = [subschema.get("properties", {}) for subschema in subschemas(path)]
     for tag in TAGS:
-        found = {table[tag]["const"]: set(table) for table in tables if "const" in table.get(tag, {})}
-        if len(found) > 1:
-            return tag, found
+        keys_by_kind = {table[tag]["const"]: set(table) for table in tables if "const" in table.get(tag, {})}
+        if len(keys_by_kind) > 1:
+            return tag, keys_by_kind
     return "", {}
 
 
 def key_description(path: tuple[str | int, ...]) -> str:
     """What the key at a path means, with its unit; "" if the schema says nothing."""
-    outer = [step for found in subschemas(path[:-1]) for step in _step(found, path[-1])]
-    for found in outer:
-        if "description" in found:
-            unit = found.get("unit")
-            return f"{found['description']} [{unit}]" if unit and unit != "1" else str(found["description"])
+    outer = [step for subschema in subschemas(path[:-1]) for step in _step(subschema, path[-1])]
+    for subschema in outer:
+        if "description" in subschema:
+            unit = subschema.get("unit")
+            return (
+                f"{subschema['description']} [{unit}]" if unit and unit != "1" else str(subschema["description"])
+            )
     return ""
 
 
-def _step(found: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
+def _step(subschema: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
     if isinstance(part, int):
-        if isinstance(found.get("items"), dict):
-            yield found["items"]
-    elif part in found.get("properties", {}):
-        yield found["properties"][part]
-    elif isinstance(found.get("additionalProperties"), dict):
-        yield found["additionalProperties"]
+        if isinstance(subschema.get("items"), dict):
+            yield subschema["items"]
+    elif part in subschema.get("properties", {}):
+        yield subschema["properties"][part]
+    elif isinstance(subschema.get("additionalProperties"), dict):
+        yield subschema["additionalProperties"]
 
 
-def _alternatives(found: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    if "$ref" in found:
-        yield from _alternatives(schema()["$defs"][found["$ref"].removeprefix("#/$defs/")])
+def _alternatives(subschema: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    if "$ref" in subschema:
+        yield from _alternatives(schema()["$defs"][subschema["$ref"].removeprefix("#/$defs/")])
         return
-    branches = found.get("anyOf", []) + [b for b in found.get("oneOf", []) if "required" not in b]
-    if not branches or "properties" in found:
-        yield found
+    branches = subschema.get("anyOf", []) + [b for b in subschema.get("oneOf", []) if "required" not in b]
+    if not branches or "properties" in subschema:
+        yield subschema
     for branch in branches:
         yield from _alternatives(branch)

@@ -98,12 +98,12 @@ class AssemblySection(Section):
 
 
 class ReferenceSection(Section):
-    """The posture and the direction that are meant where none is given."""
+    """The posture and the direction that are used where none is given."""
 
     position_m: Position = documented_key("position of the handle, x, y or x, y, z", "m")
     direction: Direction = documented_key("rendered direction, any length", "1")
     assembly: Name | None = documented_key(
-        "the assembly that is meant; omitted only where one is named", default=None
+        "the assembly used by default; omitted only where one is named", default=None
     )
 
 

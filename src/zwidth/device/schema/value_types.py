@@ -163,12 +163,12 @@ def _possible_body(rows: Rows) -> Rows:
         raise ValueError(f"must be {INERTIA_FORMS}, got {len(rows)} rows")
     moments = np.linalg.eigvalsh(np.array(rows))
     slack = SYMMETRY_TOLERANCE * float(np.abs(moments).max())
-    said = ", ".join(f"{moment:.6g}" for moment in moments)
+    listed = ", ".join(f"{moment:.6g}" for moment in moments)
     if moments[0] < -slack:
-        raise ValueError(f"must have no negative principal moment, got {said}; no body has one")
+        raise ValueError(f"must have no negative principal moment, got {listed}; no body has one")
     if moments[2] > moments[0] + moments[1] + slack:
         raise ValueError(
-            f"must have no principal moment above the sum of the other two, got {said}; no body has such "
+            f"must have no principal moment above the sum of the other two, got {listed}; no body has such "
             "moments: check the units, or give one number, the moment about the joint axis"
         )
     return rows

@@ -1,9 +1,9 @@
 """One command of `zwidth` as a declaration, and the runner that carries it out.
 
-A command says which options it has, what it computes, which keys its answer has, how that is told to people and
-how it is drawn. The runner does the rest, the same for all: it finds the file to be written writable first, loads
-the device, turns what cannot be answered into nulls with a reason, prints pages or one JSON object, writes data or
-a figure, and chooses the exit code. A command that does not fit overrides the one step in which it differs.
+A command says which options it has, what it computes, which keys its answer has, how that is printed, and how it
+is drawn. The runner does the rest, the same for all: it first checks that the output file can be written, loads
+the device, turns what cannot be answered into nulls with a reason, prints pages or one JSON object, writes data
+or a figure, and chooses the exit code. A command that does not fit overrides the one step in which it differs.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ NO_MODEL: Final = (
 class CommandLine:
     """What one command line asks for.
 
-    question  the device and the circumstances that it is asked about, as typed
+    question  the device and the circumstances of the answer, as typed
     options   the command's own, by name
     path      file to be written; None: none
     """
@@ -55,7 +55,7 @@ class CommandLine:
 
     @cached_property
     def point(self) -> OperatingPoint:
-        """Where it is asked about. Raises what `Device.at` raises."""
+        """Its operating point. Raises what `Device.at` raises."""
         return self.question.point(self.device)
 
     def __getitem__(self, option: str) -> Any:
@@ -77,7 +77,7 @@ class Command:
     outputs           endings that --output takes;   output_help  what they are
     size              of the figure [inches]
     keys              of its answer, beside the circumstances: null where there is no answer
-    linear            does the answer leave out what is not linear?
+    linear            does the answer leave out the nonlinear parts?
     may_be_undecided  may double precision leave it undecided? Then the answer has the key `decided`
     takes_responses   does it answer for a measured response, too?
     """
@@ -203,9 +203,9 @@ class Command:
         return Answer(self.circumstances(case) | dict.fromkeys(self.keys) | decided, reason=str(none))
 
     def answer(self, case: CommandLine) -> Answer:
-        """Compute, and write the file that is asked for. Raises BadInput."""
+        """Compute, and write the output file where one is named. Raises BadInput."""
         if not self.takes_responses and case.device.response is not None:
-            case.question.point(case.device)  # refuses what is asked of a [response] that needs a model
+            case.question.point(case.device)  # refuses options that need a model for a [response]
             none = self.unanswered(case, NoAnswer(NO_MODEL))
             return replace(none, document=case.question.linear_circumstances(case.device) | none.document)
         try:

@@ -31,11 +31,11 @@ def compile_command(as_json: bool) -> int:
         raise BadInput("no folder for compiled kernels can be written; set NUMBA_CACHE_DIR to a folder of yours")
     began = monotonic()
     count = compile_kernels()
-    found = {"kernels": count, "seconds": monotonic() - began, "folder": str(folder)}
+    document = {"kernels": count, "seconds": monotonic() - began, "folder": str(folder)}
 
     def pages() -> list[str]:
         if not count:
             return ["all kernels are compiled already"]
-        return [f"{count} kernel{'s' * (count != 1)} compiled in {found['seconds']:.0f} s; kept in {folder}"]
+        return [f"{count} kernel{'s' * (count != 1)} compiled in {document['seconds']:.0f} s; kept in {folder}"]
 
-    return deliver(Answer(found, pages), as_json)
+    return deliver(Answer(document, pages), as_json)

@@ -17,12 +17,14 @@ def devices(as_json: bool) -> int:
     from zwidth.device.read import DEVICES, OPERATORS, bundled
 
     keys = ("name", "description", "source")
-    found = {
+    document = {
         what: [dict(zip(keys, entry, strict=True)) for entry in bundled(shelf)]
         for what, shelf in (("devices", DEVICES), ("operators", OPERATORS))
     }
 
     def pages() -> list[Any]:
-        return [table([what[:-1], *keys[1:]], [tuple(one.values()) for one in found[what]]) for what in found]
+        return [
+            table([what[:-1], *keys[1:]], [tuple(one.values()) for one in document[what]]) for what in document
+        ]
 
-    return deliver(Answer(found, pages), as_json)
+    return deliver(Answer(document, pages), as_json)

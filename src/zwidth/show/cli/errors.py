@@ -31,7 +31,7 @@ class BadInput(Exception):
 
 
 class UnfinishedRun(Exception):
-    """A run that could not be finished, through no fault of what was asked; the text says why."""
+    """A run that could not be finished although its input is valid; the text says why."""
 
 
 class NoAnswer(Exception):

@@ -128,9 +128,9 @@ def _gaps(points: list[MeasuredPoint]) -> str:
     """The largest distances of edges and of tips."""
     edges = [abs(p.damping - p.exact) for p in points if p.edge != "tip"]
     tips = [abs(p.stiffness - p.exact) for p in points if p.edge == "tip"]
-    told = [amount(max(edges), "Ns/m")] if edges else []
-    told += [f"{amount(max(tips), 'N/m')}{' at the tips' if edges else ''}"] if tips else []
-    return " and ".join(told)
+    gaps = [amount(max(edges), "Ns/m")] if edges else []
+    gaps += [f"{amount(max(tips), 'N/m')}{' at the tips' if edges else ''}"] if tips else []
+    return " and ".join(gaps)
 
 
 def _cause(cause: Cause, width: float) -> str:

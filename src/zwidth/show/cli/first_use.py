@@ -1,4 +1,4 @@
-"""The wait at first use: kernels are compiled once for each processor, and the user is told what the wait is for.
+"""The wait at first use: kernels are compiled once for each processor, and a message says what the wait is for.
 
 all kernels           `zwidth compile`, and setting up by make: processes beside each other
 those of one command  as they are wanted: announced when the first is, and every few seconds what remains
@@ -44,8 +44,8 @@ class KernelTimes(NamedTuple):
         """Those of the kernels that are not on disk, with their times."""
         from zwidth.machine_code import kept_kernels
 
-        kept = kept_kernels()
-        return {name: self.seconds.get(name, USUAL_SECONDS) for name in names if name not in kept}
+        on_disk = kept_kernels()
+        return {name: self.seconds.get(name, USUAL_SECONDS) for name in names if name not in on_disk}
 
 
 class Progress:

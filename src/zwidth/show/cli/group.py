@@ -51,8 +51,8 @@ class LazyCommands(MutableMapping[str, click.Command]):
     def __getitem__(self, name: str) -> click.Command:
         if name not in self._made:
             module, attribute = COMMANDS[name]
-            found = getattr(import_module(f"zwidth.show.cli.{module}"), attribute)
-            self._made[name] = found if isinstance(found, click.Command) else found().for_click()
+            command = getattr(import_module(f"zwidth.show.cli.{module}"), attribute)
+            self._made[name] = command if isinstance(command, click.Command) else command().for_click()
         return self._made[name]
 
     def __setitem__(self, name: str, command: click.Command) -> None:

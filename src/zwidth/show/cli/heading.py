@@ -19,7 +19,7 @@ ROUNDING: Final = 1e-9  # m, that a position may be projected by without a word
 def heading(question: Question, device: Device, *, linear: bool = True) -> str:
     """Two lines: the device and its posture; the computer. And where something is left out, one that says what.
 
-    linear  does the answer leave out what is not linear?
+    linear  does the answer leave out the nonlinear parts?
     """
     facts = question.linear_circumstances(device)
     kind = "[response]" if device.response is not None else "[plant]"

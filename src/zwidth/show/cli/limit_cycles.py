@@ -1,4 +1,4 @@
-"""`zwidth limit-cycles`: which vibrations keep themselves up on a wall?"""
+"""`zwidth limit-cycles`: the sustained vibrations on a wall."""
 
 from __future__ import annotations
 

@@ -174,7 +174,7 @@ class MapCommand(Command):
         return {"measure": first.name, "title": first.title, "unit": first.unit}
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        # no posture is meant more than another; a direction, or which of all of them
+        # the answer has no single posture, but one direction or one rule that chooses it
         facts = super().circumstances(case)
         del facts["position_m"]
         linear = any(measure.linear for measure in case["measures"])
@@ -279,12 +279,12 @@ def _measures(case: CommandLine) -> tuple[list[Measure], list[Requirement]]:
         option = "--measure"
         if NAME in names and not shares:
             raise ValueError(f"{NAME} needs --share NAME>=VALUE, which says what the directions must meet")
-        found = [find_measure(name, user_measures) for name in names]
+        chosen = [find_measure(name, user_measures) for name in names]
         option = "--require"
         required = [parse_requirement(text, user_measures) for text in case["requirements"]]
     except ValueError as error:
         raise BadInput(f"{option}: {error}") from None
-    every = {one.name: one for one in (*found, *shares, *(r.measure for r in required))}
+    every = {one.name: one for one in (*chosen, *shares, *(r.measure for r in required))}
     if not every:
         raise BadInput("--measure: is missing; name a measure to map (`zwidth map --help` lists the measures)")
     return list(every.values()), required

@@ -1,4 +1,4 @@
-"""What is asked of a whole mechanism's motion: the surface that it meets, and what drives it."""
+"""Command-line options of `zwidth move`: the surface that the handle meets, and what drives the mechanism."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ def _check_sizes(options: Mapping[str, Any]) -> None:
     for name, most, unit in (("push", LARGEST_FORCE, "N"), ("start_velocity", FASTEST, "m/s")):
         value = options[name] or ()
         if any(abs(part) > most for part in value):
-            told = ",".join(f"{part:g}" for part in value)
-            raise usage_error(f"{_option(name)}: must lie from -{most:g} to {most:g} {unit}, got {told}")
+            numbers = ",".join(f"{part:g}" for part in value)
+            raise usage_error(f"{_option(name)}: must lie from -{most:g} to {most:g} {unit}, got {numbers}")
 
 
 def _check_question(options: Mapping[str, Any], question: Question) -> None:

@@ -107,12 +107,12 @@ def _when(value: float, unit: str, course: Any, time: Any) -> str:
 
 def _limits(motion: MechanismMotion) -> str:
     limits = motion.mechanism.drives.torque_limit
-    told = [
+    shares = [
         f"{printable(name)} {_share(share)}"
         for (name, share), limit in zip(motion.torque_limit_share.items(), limits, strict=True)
         if isfinite(limit)
     ]
-    return "; ".join(told) or "none in the file"
+    return "; ".join(shares) or "none in the file"
 
 
 def _share(share: float) -> str:

@@ -1,4 +1,4 @@
-"""What is asked on the command line: the device, its posture, the direction, the model."""
+"""Command-line options of every question about a device: posture, direction, model, operator, settings."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Callback = Callable[..., int]
 
 @dataclass(frozen=True)
 class Question:
-    """A device and the circumstances it is asked about, as typed; None where left out."""
+    """A device and the circumstances of a question about it, as typed; None where left out."""
 
     name: str
     settings: tuple[str, ...] = ()
@@ -50,7 +50,7 @@ class Question:
         return load(self.name, self.settings, self.operator)
 
     def point(self, device: Device) -> OperatingPoint:
-        """Where the device is asked about. Raises what `Device.at` raises."""
+        """The device's operating point. Raises what `Device.at` raises."""
         return device.at(self.at, self.direction, assembly=self.assembly, model=self.model)
 
     def refuse_unsupported(self, device: Device) -> None:
@@ -74,7 +74,7 @@ class Question:
             raise BadInput(*lines) from None
 
     def model_of(self, device: Device) -> str:
-        """The model's name, also where none was asked for."""
+        """The model's name, also where none was typed."""
         return self.model or ("full" if device.mechanism else AS_GIVEN)
 
     def operator_of(self, device: Device) -> str | None:
@@ -86,7 +86,7 @@ class Question:
         return self.circumstances(device) | {"left_out": list(device.linear_omissions)}
 
     def _where(self, device: Device) -> tuple[Floats | None, float | None]:
-        """Position of the handle [m], and how far it was projected; as asked for, and None, where it cannot be."""
+        """Position of the handle [m], and how far it was projected; as typed, and None, if out of reach."""
         from zwidth.model.posture import PostureError
 
         try:
@@ -198,7 +198,7 @@ class DirectionType(Numbers):
 
 
 def about_a_device(command: Callback) -> Callback:
-    """Give a command DEVICE and the options that say what of it is meant, as one `Question`."""
+    """Give a command DEVICE and the options of posture, direction, model and operator, as one `Question`."""
     return _with_device_options(
         command,
         click.option(

@@ -65,7 +65,7 @@ class PolarCommand(Command):
         return {"plane": case["plane"]}
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        # no direction is meant more than another
+        # the answer has no single direction
         return {key: value for key, value in super().circumstances(case).items() if key != "direction"}
 
     def compute(self, case: CommandLine) -> ByDirection:

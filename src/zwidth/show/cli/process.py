@@ -34,5 +34,5 @@ def say(*lines: str) -> None:
 
 
 def time_text(seconds: float) -> str:
-    """A span of time as an estimate is told: 5 s, 40 s, 2 min."""
+    """A span of time, rounded as an estimate: 5 s, 40 s, 2 min."""
     return f"{seconds / 60.0:.0f} min" if seconds >= 90.0 else f"{max(5, 5 * round(seconds / 5.0))} s"

@@ -35,7 +35,7 @@ class ReportCommand(Command):
             return write_report(case.device, case.path, case.point, progress)
 
     def document(self, case: CommandLine, result: dict[str, Any]) -> dict[str, Any]:
-        # what the command line was asked for is stated as typed
+        # the circumstances are stated as typed on the command line
         return result | self.circumstances(case)
 
     def reason(self, case: CommandLine, result: dict[str, Any]) -> str | None:

@@ -164,7 +164,7 @@ class RobustCommand(Command):
 def _ranges(texts: tuple[str, ...]) -> tuple[Range, ...]:
     from zwidth.study.robust_family import Range
 
-    found, lines = [], []
+    ranges, lines = [], []
     for text in texts:
         path, equals, values = (part.strip() for part in text.partition("="))
         parts = [part.strip() for part in values.split(",")]
@@ -176,10 +176,10 @@ def _ranges(texts: tuple[str, ...]) -> tuple[Range, ...]:
         if not equals or not path:
             lines.append(f"--range: must be PATH=LOW,HIGH or PATH=LOW,HIGH,log with two numbers, got {text!r}")
             continue
-        found.append(Range(path, low, high, logarithmic))
+        ranges.append(Range(path, low, high, logarithmic))
     if lines:
         raise BadInput(*lines)
-    return tuple(found)
+    return tuple(ranges)
 
 
 def _operators(single: str | None, names: str | None, file: str | None) -> tuple[str, ...]:
@@ -199,12 +199,12 @@ def _operators(single: str | None, names: str | None, file: str | None) -> tuple
         except UnreadableFileError as error:
             raise BadInput(f"--operator-list: {file}: {error}; give a text file, one name a line") from None
         listed = [line.split("#")[0].strip() for line in lines]
-        found = tuple(dict.fromkeys(name for name in listed if name))
+        operators = tuple(dict.fromkeys(name for name in listed if name))
     else:
-        found = tuple(dict.fromkeys(name.strip() for name in str(names).split(",")))
-    if not found or "" in found:
+        operators = tuple(dict.fromkeys(name.strip() for name in str(names).split(",")))
+    if not operators or "" in operators:
         raise BadInput(f"--operators: must be names with commas between them, got {names or file!r}")
-    return found
+    return operators
 
 
 def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:

@@ -51,29 +51,29 @@ class ShowCommand(Command):
         return entries(json_value(document))
 
     def pages(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> Iterator[Any]:
-        found = json_value(document)
+        values = json_value(document)
         yield two_columns(
             [
-                ("link side", amount(found["link_side_mass_kg"], "kg")),
-                ("motor side", amount(found["motor_side_mass_kg"], "kg")),
-                ("both, rigid", amount(found["rigid_mass_kg"], "kg")),
-                ("stiffness between", amount(found["stiffness_N_per_m"], "N/m")),
-                ("natural frequencies", ", ".join(_modes(found))),
+                ("link side", amount(values["link_side_mass_kg"], "kg")),
+                ("motor side", amount(values["motor_side_mass_kg"], "kg")),
+                ("both, rigid", amount(values["rigid_mass_kg"], "kg")),
+                ("stiffness between", amount(values["stiffness_N_per_m"], "N/m")),
+                ("natural frequencies", ", ".join(_modes(values))),
             ]
         )
         if result.jacobian is not None:
             units = _dexterity_units(result.jacobian)
             yield two_columns(
                 [
-                    ("manipulability", amount(found["manipulability"], units[0])),
-                    ("dynamic manipulability", amount(found["dynamic_manipulability"], units[1])),
-                    ("isotropy (1 is best)", amount(found["isotropy"])),
+                    ("manipulability", amount(values["manipulability"], units[0])),
+                    ("dynamic manipulability", amount(values["dynamic_manipulability"], units[1])),
+                    ("isotropy (1 is best)", amount(values["isotropy"])),
                 ]
             )
-            angles = [(name, amount(angle)) for name, angle in found["joints_rad"].items()]
+            angles = [(name, amount(angle)) for name, angle in values["joints_rad"].items()]
             yield table(["joint", "angle [rad]"], angles)
-        if found["sources"]:
-            yield table(["numbers", "source"], list(found["sources"].items()))
+        if values["sources"]:
+            yield table(["numbers", "source"], list(values["sources"].items()))
 
 
 def _dexterity_units(jacobian: Floats) -> tuple[str, str]:

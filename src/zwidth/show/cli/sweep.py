@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from zwidth.study.sweep import Sweep
 
 LISTED: Final = 12  # designs up to which all are listed
-SHOWN_REASONS: Final = 6  # told to people
+SHOWN_REASONS: Final = 6  # printed for people
 
 
 @dataclass(frozen=True)
@@ -205,11 +205,11 @@ def _reasons(sweep: Sweep) -> Iterator[str]:
     """Why designs have no value, once for all columns that say the same."""
     from zwidth.study.sweep_data import note_sentences
 
-    told: dict[str, list[str]] = {}
+    names_by_sentence: dict[str, list[str]] = {}
     for name, sentence in note_sentences(sweep):
-        told.setdefault(sentence, []).append(name)
-    for sentence, names in list(told.items())[:SHOWN_REASONS]:
+        names_by_sentence.setdefault(sentence, []).append(name)
+    for sentence, names in list(names_by_sentence.items())[:SHOWN_REASONS]:
         every = len(names) == len(sweep.job.measures)
         yield printable(sentence if every else f"{', '.join(names)}: {sentence}")
-    if len(told) > SHOWN_REASONS:
-        yield f"and {len(told) - SHOWN_REASONS} more reasons; --json or --output holds them"
+    if len(names_by_sentence) > SHOWN_REASONS:
+        yield f"and {len(names_by_sentence) - SHOWN_REASONS} more reasons; --json or --output holds them"

@@ -144,8 +144,8 @@ def _entries(
         limit = f", at most {quantity(bound.stiffness_max, 'N/m')}: strictest" if strictest else ""
         text = "\n".join(wrap(f"{n}\u00a0 {bound.name}{limit}", LETTERS, break_long_words=False))
         entries.append(Line2D([], [], label=text, **look))
-    seen = [bound for _, bound, _ in drawn]
-    unseen = (bound for bound in known if bound.holds == met and bound not in seen)
+    drawn_bounds = [bound for _, bound, _ in drawn]
+    unseen = (bound for bound in known if bound.holds == met and bound not in drawn_bounds)
     texts = (f"{bound.name}: no line in view" for bound in unseen)
     return entries + [_without_line("\n".join(wrap(text, LETTERS))) for text in texts]
 

@@ -29,8 +29,8 @@ LEADING: Final = 1.25  # of a line, in heights of its letters
 MARGIN: Final = 0.08  # inches to the left and right of the caption, and above it
 PLANES: Final = ("xy", "xz", "yz")
 WALL_UNITS: Final = {"stiffness": "N_per_m", "damping": "Ns_per_m"}
-ROUND_A_PLANE: Final = ("ByDirection",)  # results in which no direction is meant more than another
-# Results whose answer holds what is not linear.
+ROUND_A_PLANE: Final = ("ByDirection",)  # results that have no single direction
+# Results whose answer includes the nonlinear parts.
 NONLINEAR: Final = ("ContactSimulation", "TimeResponse", "MechanismMotion", "LimitCyclePrediction", "Experiment")
 
 

@@ -44,8 +44,8 @@ def levels_of(values: Floats) -> Floats:
         return np.array([middle - reach, middle + reach])
     if low > 0.0 and high / low > WIDE:
         return _ratios(low, high)
-    found = MaxNLocator(nbins=LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    return np.asarray(found, dtype=np.float64)
+    levels = MaxNLocator(nbins=LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+    return np.asarray(levels, dtype=np.float64)
 
 
 def _ratios(low: float, high: float) -> Floats:
@@ -107,8 +107,8 @@ def _bar_label(bar: Any, title: str, unit: str, levels: Floats) -> None:
     bar.ax.set_yticks(levels, labels=[text.replace("-", MINUS) for text in texts])
     bar.ax.tick_params(labelsize=8.0)
     name = scaled(exponent, unit).strip("\u00a0")
-    said = f"{title} [{name}]" if name else title
-    bar.set_label("\n".join(wrap(said, LETTERS, break_long_words=False)), fontsize=9.0)
+    measure = f"{title} [{name}]" if name else title
+    bar.set_label("\n".join(wrap(measure, LETTERS, break_long_words=False)), fontsize=9.0)
 
 
 def _common_exponent(levels: Floats, unit: str) -> int:

@@ -59,14 +59,14 @@ def corners(chart: StabilityChart) -> list[tuple[float, float, float, float]]:
         [np.ptp(np.vstack([arc.stiffness, arc.damping]), axis=1) for arc in chart.boundary], 0
     )
     nyquist = 0.5 / chart.loop.period
-    found = []
+    pairs = []
     for i in range(len(ends)):
         for j in range(i + 1, len(ends)):
             together = abs(K[i] - K[j]) <= near[0] and abs(B[i] - B[j]) <= near[1]
             if together and abs(f[i] - f[j]) > 1e-6 * nyquist and K[i] > 1e3 * near[0] and B[i] >= 0.0:
                 low, high = sorted((float(f[i]), float(f[j])))
-                found.append((float(K[i]), float(B[i]), low, high))
-    return sorted(found, reverse=True)
+                pairs.append((float(K[i]), float(B[i]), low, high))
+    return sorted(pairs, reverse=True)
 
 
 def _ends(arc: BoundaryArc) -> list[tuple[float, float, float]]:

@@ -75,11 +75,11 @@ def _scale_growth(ax: Axes, visible: NDArray[np.float64], *, crossings: bool) ->
 def _amplitude_range(balance: HarmonicBalance) -> tuple[float, float]:
     """Amplitudes that are drawn."""
     at, farthest = balance.amplitude, BEYOND * balance.largest_motion
-    found = [cycle.amplitude for cycle in balance.cycles if cycle.within_range]
+    amplitudes = [cycle.amplitude for cycle in balance.cycles if cycle.within_range]
     swings = at[np.isfinite(balance.growth)]
     low, high = (float(swings[0]), float(swings[-1])) if len(swings) > 1 else (float(at[0]), float(at[-1]))
-    if found:
-        low, high = max(low, min(found) / AROUND), min(high, AROUND * max(found))
+    if amplitudes:
+        low, high = max(low, min(amplitudes) / AROUND), min(high, AROUND * max(amplitudes))
     return (low, min(high, farthest)) if farthest > 2.0 * low else (low, high)
 
 
@@ -103,12 +103,12 @@ def draw_plane(ax: Axes, device: DevicePlane) -> None:
     for text, (across, up, side, height) in places.items():
         ax.text(across, up, text, transform=ax.transAxes, ha=side, va=height, fontsize=8.0, color=GREY)
     # a device without one of the frictions lies at the border of the figure
-    seen = np.maximum(x, left), np.maximum(y, low)
+    places_in_view = np.maximum(x, left), np.maximum(y, low)
     lacking = " and ".join(word for word, part in (("viscous", x), ("dry", y)) if not np.all(part > 0.0))
     text = f"the device has no {lacking} friction: at the border" if lacking else "the device, by wall stiffness"
-    ax.plot(*seen, color=BLUE, marker="o", markersize=4.0, label=text, clip_on=False)
+    ax.plot(*places_in_view, color=BLUE, marker="o", markersize=4.0, label=text, clip_on=False)
     places_of_walls: dict[tuple[float, float], list[float]] = {}
-    for K, across, up in zip(device.wall_stiffness, *map(np.ndarray.tolist, seen), strict=True):
+    for K, across, up in zip(device.wall_stiffness, *map(np.ndarray.tolist, places_in_view), strict=True):
         places_of_walls.setdefault((across, up), []).append(float(K))
     for (across, up), walls in places_of_walls.items():
         before = left < across < corner  # its label keeps off the corner's line

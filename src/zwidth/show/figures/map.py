@@ -173,11 +173,11 @@ def _direction_strokes(ax: Axes, dataset: xr.Dataset, name: str) -> list[Any]:
     columns, rows = _spaced_indices(x, apart), _spaced_indices(y, apart)
     u = dataset[name].values[np.ix_(rows, columns)]
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
-    seen = u @ axes.T
+    on_plane = u @ axes.T
     length = 0.36 * apart
     middle = np.stack(np.meshgrid(x[columns], y[rows]), axis=-1)
-    keep = np.isfinite(seen).all(axis=-1)
-    ends = np.stack([middle - length * seen, middle + length * seen], axis=-2)[keep]
+    keep = np.isfinite(on_plane).all(axis=-1)
+    ends = np.stack([middle - length * on_plane, middle + length * on_plane], axis=-2)[keep]
     if not len(ends):
         return []
     halo = [withStroke(linewidth=2.4, foreground="white")]
@@ -226,13 +226,13 @@ def draw_areas(ax: Axes, area: CommonArea) -> list[Any]:
 
 def _paths(shape: Any) -> list[Path]:
     """The outlines of a shapely geometry's polygons, holes and all."""
-    found = []
+    paths = []
     for part in getattr(shape, "geoms", [shape]):
         if part.geom_type != "Polygon" or part.is_empty:
             continue
         rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
-        found.append(Path.make_compound_path(*(Path(ring, closed=True) for ring in rings)))
-    return found
+        paths.append(Path.make_compound_path(*(Path(ring, closed=True) for ring in rings)))
+    return paths
 
 
 def _mechanism(dataset: xr.Dataset, device: Device | None) -> ProjectedMechanism | None:
@@ -268,12 +268,12 @@ def _arrow(ax: Axes, mechanism: ProjectedMechanism, dataset: xr.Dataset) -> None
     """Along the rendered direction, from the handle; none where it points at the viewer."""
     strokes, _, handle = mechanism
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
-    seen = axes @ np.asarray(dataset.attrs["direction"], dtype=float)
-    if not np.linalg.norm(seen) > 1e-6:
+    on_plane = axes @ np.asarray(dataset.attrs["direction"], dtype=float)
+    if not np.linalg.norm(on_plane) > 1e-6:
         return
     size = 0.13 * float(np.ptp(np.vstack([*strokes, handle[None]]), axis=0).max())
     look = {"arrowstyle": "-|>", "color": VERMILION, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
-    ax.annotate("", xy=tuple(handle + size * seen), xytext=tuple(handle), arrowprops=look, zorder=3.3)
+    ax.annotate("", xy=tuple(handle + size * on_plane), xytext=tuple(handle), arrowprops=look, zorder=3.3)
 
 
 def _view(x: Floats, y: Floats, mechanism: ProjectedMechanism | None) -> tuple[float, ...]:

@@ -58,7 +58,7 @@ def projection_axes(points: Floats) -> list[int]:
 
 
 def link_stroke(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> Floats:
-    """The points that a link joins, (k, 3), from its joint to where other things hang on it."""
+    """The points that a link joins, (k, 3), from its joint to the joints and points that it carries."""
     links, closures = mechanism.links, mechanism.closures
     start = points_of_links.origin[link]
     points = [points_of_links.tip[link]]
@@ -67,11 +67,11 @@ def link_stroke(mechanism: Mechanism, points_of_links: LinkPoints, link: int) ->
         points += [points_of_links.of(link, at[k]) for k in np.flatnonzero(owners == link)]
     if mechanism.handle_link == link:
         points.append(points_of_links.of(link, mechanism.handle_point))
-    kept = [start]
+    stroke = [start]
     for point in points:
-        if all(np.linalg.norm(point - other) > SAME_POINT for other in kept):
-            kept += [point, start]  # out and back: a link may branch
-    return np.array(kept)
+        if all(np.linalg.norm(point - other) > SAME_POINT for other in stroke):
+            stroke += [point, start]  # out and back: a link may branch
+    return np.array(stroke)
 
 
 def _link(ax: Axes, stroke: Floats, name: str, n: int) -> None:

@@ -75,10 +75,10 @@ def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
         _draw_posture(ax, mechanism, pose, lines, flat, faint)
     ax.plot(*motion.position[:, flat].T, color=VERMILION, linewidth=1.3, zorder=4.0, label="path")
     points = np.vstack([np.zeros((1, 3)), *(stroke for lines in strokes for stroke in lines), motion.position])
-    seen = points[:, flat]
-    size = max(float(np.max(np.ptp(seen, axis=0))), 1e-9)
+    projection = points[:, flat]
+    size = max(float(np.max(np.ptp(projection, axis=0))), 1e-9)
     own = _bounds(motion.surface, size)
-    view = _view(seen if own is None else np.vstack([seen, own[:, flat]]), size * LEAST)
+    view = _view(projection if own is None else np.vstack([projection, own[:, flat]]), size * LEAST)
     _draw_surface(ax, view, flat, motion)
     _frame(ax, view, flat)
     legend_above(ax, columns=4)
@@ -96,9 +96,9 @@ def draw_close_up(ax: Axes, motion: MechanismMotion) -> None:
         ax.set_title("\n".join(wrap(motion.reason, TITLE)), fontsize=8.0, loc="left")
         _frame(ax, _view(place, size), flat)
         return
-    true, seen = motion.position[:, flat], motion.counted_position[:, flat]
-    if np.max(np.abs(true - seen)) > 2e-3 * max(float(np.max(np.ptp(true, axis=0))), 1e-12):
-        ax.plot(*seen.T, color=BLUE, linewidth=0.8, alpha=0.8, label="as read", zorder=3.0)
+    true, readings = motion.position[:, flat], motion.counted_position[:, flat]
+    if np.max(np.abs(true - readings)) > 2e-3 * max(float(np.max(np.ptp(true, axis=0))), 1e-12):
+        ax.plot(*readings.T, color=BLUE, linewidth=0.8, alpha=0.8, label="as read", zorder=3.0)
     ax.plot(*true.T, color=VERMILION, linewidth=1.3, label="path", zorder=4.0)
     ax.plot(*true[0][:, None], marker="o", markerfacecolor="white", label="start", **mark)
     ax.plot(*true[-1][:, None], marker="s", markerfacecolor=BLACK, label="end", **mark)
@@ -112,12 +112,12 @@ def _last(motion: MechanismMotion) -> Posture | None:
     """The posture at the end; None where it is not found again, as next to a singularity."""
     mechanism = motion.mechanism
     try:
-        found = solve_posture(mechanism, motion.position[-1], motion.start.assembly)
+        posture = solve_posture(mechanism, motion.position[-1], motion.start.assembly)
     except PostureError:
         return None
-    turned = found.angles[mechanism.drives.joint] - motion.joints[-1]
+    turned = posture.angles[mechanism.drives.joint] - motion.joints[-1]
     off = np.abs(turned - 2.0 * np.pi * np.round(turned / (2.0 * np.pi)))
-    return found if np.max(off) < NEAR else None
+    return posture if np.max(off) < NEAR else None
 
 
 def _strokes(mechanism: Mechanism, posture: Posture) -> list[Floats]:

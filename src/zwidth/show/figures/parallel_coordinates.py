@@ -61,10 +61,10 @@ def draw_parallel(ax: Axes, dataset: xr.Dataset, keys: Sequence[str], names: Seq
     heights = np.stack([one.heights for one in uprights], axis=1)
     _draw_lines(ax, heights, heights[:, len(keys)])
     _draw_uprights(ax, uprights, len(keys))
-    said = (
+    text = (
         f"colour: {str(dataset[names[0]].attrs['title'])[:1].lower()}{str(dataset[names[0]].attrs['title'])[1:]}"
     )
-    ax.text(len(uprights) - 1, -0.035, said, ha="right", va="center", fontsize=7.0)
+    ax.text(len(uprights) - 1, -0.035, text, ha="right", va="center", fontsize=7.0)
     ax.set_xlim(-0.25, len(uprights) - 0.55)
     ax.set_ylim(-0.06, 1.03)
     ax.axis("off")
@@ -114,8 +114,8 @@ def _pieces(across: Any, heights: Floats) -> list[Floats]:
     """The parts of a line between missing numbers."""
     there = np.isfinite(heights)
     cuts = np.flatnonzero(np.diff(there.astype(int))) + 1
-    found = np.split(np.column_stack([across, heights]), cuts)
-    return [part for part in found if len(part) > 1 and np.isfinite(part).all()]
+    pieces = np.split(np.column_stack([across, heights]), cuts)
+    return [part for part in pieces if len(part) > 1 and np.isfinite(part).all()]
 
 
 def _draw_uprights(ax: Axes, uprights: Sequence[ParallelAxis], keys: int) -> None:

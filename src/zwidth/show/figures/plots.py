@@ -88,22 +88,22 @@ def _polar(ax: Axes, by_direction: Any) -> None:
     )
 
 
-def _bounds(ax: Axes, found: Any) -> None:
+def _bounds(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.bounds import draw_bounds
 
-    draw_bounds(ax, found.bounds, found.chart)
+    draw_bounds(ax, result.bounds, result.chart)
 
 
-def _guarantees(ax: Axes, found: Any) -> None:
+def _guarantees(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.guarantees import draw_guarantees
 
-    draw_guarantees(ax, found)
+    draw_guarantees(ax, result)
 
 
-def _sensitivities(ax: Axes, found: Any) -> None:
+def _sensitivities(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.sensitivity import draw_sensitivities
 
-    draw_sensitivities(ax, found)
+    draw_sensitivities(ax, result)
 
 
 def _verdicts(ax: Axes, verdicts: Any) -> None:
@@ -122,9 +122,9 @@ def _verdicts(ax: Axes, verdicts: Any) -> None:
     ax.legend(frameon=False, fontsize=8.0)
 
 
-def _measure_values(ax: Axes, found: Any) -> None:
+def _measure_values(ax: Axes, result: Any) -> None:
     """A measure's values: marks in order for one or a row, colours for a plane of points."""
-    values = np.asarray(found.values, dtype=float)
+    values = np.asarray(result.values, dtype=float)
     if values.ndim == 2:
         image = ax.imshow(values, origin="lower", aspect="auto", cmap=colormaps["viridis"])
         assert ax.figure is not None
@@ -149,11 +149,11 @@ def _description(ax: Axes, description: Any) -> None:
     label(ax.xaxis, "Natural frequency", "Hz")
 
 
-def _felt(ax: Axes, found: Any) -> None:
+def _felt(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.felt import draw_impedance
 
-    felt = np.full(len(found.frequency), np.nan + 0j) if found.felt_impedance is None else found.felt_impedance
-    draw_impedance(ax, found.frequency, felt, found.commanded_impedance, found.free_motion_impedance)
+    felt = np.full(len(result.frequency), np.nan + 0j) if result.felt_impedance is None else result.felt_impedance
+    draw_impedance(ax, result.frequency, felt, result.commanded_impedance, result.free_motion_impedance)
 
 
 def _experiment(ax: Axes, experiment: Any) -> None:
@@ -164,20 +164,20 @@ def _experiment(ax: Axes, experiment: Any) -> None:
     draw_experiment(ax, measured_bars(experiment.points), experiment.chart, own)
 
 
-def _limit_cycles(ax: Axes, found: Any) -> None:
+def _limit_cycles(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.limit_cycles import draw_balance
 
-    draw_balance(ax, found.balance)
+    draw_balance(ax, result.balance)
 
 
-def _couplings(ax: Axes, found: Any) -> None:
+def _couplings(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.guarantees import draw_couplings
 
-    draw_couplings(ax, found)
+    draw_couplings(ax, result)
 
 
-def _contact(ax: Axes, found: Any) -> None:
-    _response(ax, found.response)
+def _contact(ax: Axes, result: Any) -> None:
+    _response(ax, result.response)
 
 
 def _response(ax: Axes, response: Any) -> None:
@@ -199,32 +199,32 @@ def _region(ax: Axes, region: Any) -> None:
     draw_region(ax, region)
 
 
-def _eigenvalue_paths(ax: Axes, found: Any) -> None:
+def _eigenvalue_paths(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.eigenvalues import draw_eigenvalue_paths
 
-    draw_eigenvalue_paths(ax, found)
+    draw_eigenvalue_paths(ax, result)
 
 
-def _validity(ax: Axes, found: Any) -> None:
+def _validity(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.validity import draw_validity
 
-    draw_validity(ax, found)
+    draw_validity(ax, result)
 
 
-def _sweep(ax: Axes, found: Any) -> None:
+def _sweep(ax: Axes, result: Any) -> None:
     """The first column; `zwidth sweep --output` draws all columns."""
     from zwidth.show.figures.study import draw_first_column
 
-    draw_first_column(ax, found.dataset())
+    draw_first_column(ax, result.dataset())
 
 
-def _common_area(ax: Axes, found: Any) -> None:
+def _common_area(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.map import draw_areas
 
-    handles = draw_areas(ax, found)
+    handles = draw_areas(ax, result)
     ax.autoscale_view()
     ax.set_aspect("equal")
-    for axis, name in ((ax.xaxis, found.axes[0]), (ax.yaxis, found.axes[1])):
+    for axis, name in ((ax.xaxis, result.axes[0]), (ax.yaxis, result.axes[1])):
         label(axis, name, "m", plain=True)
     ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.02), fontsize=8.0, frameon=False)
 

@@ -43,7 +43,7 @@ def draw_models(ax: Axes, charts: Mapping[str, StabilityChart], window: Window |
     window  what to show; left out: the box of the first that has stable walls, and 5 %
     """
     first = next(iter(charts.values()))
-    seen = next((chart for chart in charts.values() if chart.regions), first)
+    shown = next((chart for chart in charts.values() if chart.regions), first)
     for ring in first.regions:
         ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none"))
     # the first on top: where models agree it is the one to be seen
@@ -52,7 +52,7 @@ def draw_models(ax: Axes, charts: Mapping[str, StabilityChart], window: Window |
         text = name if chart.regions else f"{name}: nothing stable"
         for k, ring in enumerate(edges_of(chart.regions) or (np.full((1, 2), np.nan),)):
             ax.plot(*ring.T, color=colour, linestyle=dashes, label="" if k else text, zorder=4.0 - 0.1 * n)
-    frame(ax, window or seen.box, empty=not seen.regions)
+    frame(ax, window or shown.box, empty=not shown.regions)
     legend_above(ax, columns=2)
 
 

@@ -151,9 +151,9 @@ def draw_curves(ax: Axes, dataset: xr.Dataset, name: str, along: str) -> list[in
         ax.set_yticks([])
     elif constant := constant_text(column, np.asarray(column.values, dtype=float)):
         ax.set_yticks([])
-        said = constant.splitlines()[-1]
+        text = constant.splitlines()[-1]
         ax.annotate(
-            said,
+            text,
             (0.5, 0.5),
             (0, 5),
             xycoords="axes fraction",

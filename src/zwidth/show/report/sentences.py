@@ -47,7 +47,7 @@ NUMBERS_OF_CHANGE: Final = {
 
 def summary(facts: Facts) -> list[str]:
     """The most important results, one sentence each."""
-    found = [
+    lines = [
         warning(facts),
         largest_stiffness(facts),
         limit(facts),
@@ -55,8 +55,8 @@ def summary(facts: Facts) -> list[str]:
         next_best(facts),
         regions(facts),
     ]
-    found += [unobserved(facts), left_out(facts)]
-    return [sentence for sentence in found if sentence]
+    lines += [unobserved(facts), left_out(facts)]
+    return [sentence for sentence in lines if sentence]
 
 
 def warning(facts: Facts) -> str:
@@ -148,8 +148,8 @@ def _cause(facts: Facts, best: Variant) -> str:
         return "that the sensor is not where the wall acts"
     if best.key == "half-period":
         mass = float(facts.effective.rigid_mass)
-        moved = "its mass" if isnan(mass) else f"its mass of {quantity(mass, 'kg')}"
-        return f"the sampling of {moved} at {as_written(1.0 / controller.sampling_period, 'Hz')}"
+        mass_text = "its mass" if isnan(mass) else f"its mass of {quantity(mass, 'kg')}"
+        return f"the sampling of {mass_text} at {as_written(1.0 / controller.sampling_period, 'Hz')}"
     return "its low structural damping" if flexible else "its low friction"
 
 

@@ -118,7 +118,7 @@ def document(facts: Facts) -> dict[str, Any]:
     """All numbers of the report by the keys of the command line's --json; None for what is not known."""
     chart, e = facts.chart, facts.effective
     fastest, buildable = chart.fastest_decay, chart.fastest_decay_in_first_quadrant
-    found = {
+    values = {
         "device": facts.device.name,
         "summary": sentences.summary(facts),
         "position_m": None if facts.posture is None else facts.posture.position.tolist(),
@@ -162,7 +162,7 @@ def document(facts: Facts) -> dict[str, Any]:
         ],
     }
     reason = {} if facts.renders else {"reason": sentences.NO_WALL}
-    return {key: _known(value) for key, value in {**found, **reason}.items()}
+    return {key: _known(value) for key, value in {**values, **reason}.items()}
 
 
 def _walls(variant: Variant) -> dict[str, Any]:
