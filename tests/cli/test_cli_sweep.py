@@ -153,7 +153,7 @@ def test_everything_wrong_is_told_at_once(folder):
     (folder / "study.toml").write_text(wrong)
     assert [line.split(";")[0] for line in refusal_lines("sweep", "study.toml")] == [
         "study.toml: measures.0: no measure is named 'rigd_mass'",
-        "study.toml: axis.0.tie.0: 'links.upper-left.lenght_m' is no key of a device file",
+        "study.toml: axis.0.tie.0: 'links.upper-left.lenght_m' is not a key of a device file",
     ]
 
 
@@ -162,7 +162,7 @@ def test_everything_wrong_is_told_at_once(folder):
     [
         (["none.toml"], "none.toml: no such file; give a study file"),
         (["."], ".: is a directory; give a study file"),
-        (["study.toml", "--output", "a.txt"], "a.txt: must end in .png or .svg or .pdf"),
+        (["study.toml", "--output", "a.txt"], "a.txt: must end in one of .png, .svg, .pdf"),
         (["study.toml", "--output", "there.zarr"], "there.zarr: exists already; remove it, or name another"),
         (["study.toml", "--workers", "0"], "0 is not in the range x>=1"),
         (["study.toml", "--resume", "slow.py"], "slow.py: is not the store of a study; name another folder"),

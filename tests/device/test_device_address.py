@@ -155,8 +155,8 @@ def test_unset_removes_and_what_is_not_there_is_no_fault():
         ("links.upper.length_m", "must be PATH=VALUE"),
         ("=3", "must be PATH=VALUE"),
         ("", "must be PATH=VALUE"),
-        (".=3", "is no key"),
-        ("links..length_m=1", "is no key"),
+        (".=3", "is not a key"),
+        ("links..length_m=1", "is not a key"),
         (f"links.upper.length_m={'[' * 3000}", "nested too deeply"),
         (f"name={'[' * 30}{']' * 30}", "nested too deeply"),
     ],
@@ -166,7 +166,7 @@ def test_a_path_that_leads_nowhere_names_the_nearest_right_one(setting, words):
 
 
 def test_a_plant_has_no_shorthand():
-    assert "is no key" in error_message("links.upper.length_m=1", PLANT_FILE)
+    assert "is not a key" in error_message("links.upper.length_m=1", PLANT_FILE)
 
 
 def test_all_settings_at_fault_are_reported_together():

@@ -30,9 +30,9 @@ def test_a_position_that_is_had_is_not_moved(device):
 
 
 def test_far_off_the_nearest_position_is_named(device):
-    with pytest.raises(OutOfReach, match=r"the nearest that it has is \(0.054, 0.072, 0\) m, 10 mm away"):
+    with pytest.raises(OutOfReach, match=r"the nearest position it reaches is \(0.054, 0.072, 0\) m, 10 mm away"):
         device.at((0.06, 0.08))
-    with pytest.raises(OutOfReach, match="the nearest that it has"):
+    with pytest.raises(OutOfReach, match="the nearest position it reaches"):
         solve_posture(device.mechanism, (0.0, LENGTH + 1e-6))  # without a tolerance
 
 
@@ -48,7 +48,7 @@ def test_of_many_each_is_projected_or_marked(device):
 def test_beyond_the_edge_of_a_plane_nothing_is_projected_and_what_is_named_can_be_had():
     """At the edge the drives lose the handle: the nearest is a little within."""
     arms = load("five-bar")
-    with pytest.raises(OutOfReach, match="the nearest that it has is") as caught:
+    with pytest.raises(OutOfReach, match="the nearest position it reaches is") as caught:
         arms.at((0.02, 0.35))
     named = str(caught.value).split("is (")[1].split(")")[0]
     nearest = np.array([float(number) for number in named.split(",")])

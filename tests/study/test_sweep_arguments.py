@@ -130,8 +130,8 @@ def test_a_folder_keeps_what_is_done(device, tmp_path):
 
 
 WRONG = [
-    ({"axes": {"loop.samplingperiod": [0.1]}}, "axes: 'loop.samplingperiod' is no key", f"mean '{PERIOD}'?"),
-    ({"axes": {"asembly": ["elbows-in"]}}, "axes: 'asembly' is no key of a device file", "or is it 'assembly'"),
+    ({"axes": {"loop.samplingperiod": [0.1]}}, "axes: 'loop.samplingperiod' is not a key", f"mean '{PERIOD}'?"),
+    ({"axes": {"asembly": ["elbows-in"]}}, "axes: 'asembly' is not a key of a device file", "or is it 'assembly'"),
     ({"axes": {"position": [(0.0, 0.25)]}}, "axes: 'position' as an axis is called 'at'", ""),
     ({"axes": {"stiffness": [1.0]}}, "axes: 'stiffness' as an axis is called 'stiffness_N_per_m'", ""),
     ({"axes": {"links": [1.0]}}, "axes: 'links' is not a single number; the numbers in it are", ""),

@@ -200,14 +200,14 @@ def _unknown(
 ) -> DeviceError:
     first, *rest = path.split(".")
     if steps in ([], ["mechanism"]) and parts[depth:] == [first, *rest]:
-        return fail(SETTINGS, path, f"is no key of a device file; {_from_the_top(document, first, rest)}")
+        return fail(SETTINGS, path, f"is not a key of a device file; {_from_the_top(document, first, rest)}")
     here, choices = dotted(tuple(steps), document), _choices(place, tuple(steps))
     near = nearest(parts[depth], choices)
     if near:
         right = ".".join([here, near, *parts[depth + 1 :]])
-        return fail(SETTINGS, path, f"is no key of a device file; did you mean '{right}'?")
+        return fail(SETTINGS, path, f"is not a key of a device file; did you mean '{right}'?")
     return fail(
-        SETTINGS, path, f"is no key of a device file; {here} has: {comma_list(choices) or 'nothing inside'}"
+        SETTINGS, path, f"is not a key of a device file; {here} has: {comma_list(choices) or 'nothing inside'}"
     )
 
 

@@ -23,19 +23,25 @@ class BundledFiles:
     noun       what each describes
     file_noun  the same with "file" and its article
     needs      what a file of this kind must hold, as a sentence
+    else_name  another name that is allowed, with its meaning; "" for none
     """
 
     folder: str
     noun: str
     file_noun: str
     needs: str
+    else_name: str = ""
 
 
 DEVICES: Final[BundledFiles] = BundledFiles(
     "zoo", "device", "a device file", "a device needs a name, [loop], and [mechanism], [plant] or [response]"
 )
 OPERATORS: Final[BundledFiles] = BundledFiles(
-    "operators", "operator", "an operator file", "an operator needs an [operator] table"
+    "operators",
+    "operator",
+    "an operator file",
+    "an operator needs an [operator] table",
+    "none (for an ungripped device)",
 )
 LARGEST_FILE: Final = 10_000_000  # bytes; the bundled ones have a few thousand
 DEEPEST: Final = 20  # tables and lists within each other; a mechanism needs 5
@@ -121,7 +127,8 @@ def _not_found(label: str, shelf: BundledFiles) -> str:
     names = bundled_names(shelf)
     near = nearest(Path(label).name.removesuffix(".toml"), names)
     hint = f"did you mean '{near}'? " if near else ""
-    return f"is neither a file nor a bundled {shelf.noun}; {hint}bundled: {comma_list(names)}"
+    other = f"; or {shelf.else_name}" if shelf.else_name else ""
+    return f"is neither a file nor a bundled {shelf.noun}; {hint}bundled: {comma_list(names)}{other}"
 
 
 def _bundled_text(name: str, shelf: BundledFiles) -> str:

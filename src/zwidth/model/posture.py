@@ -351,7 +351,7 @@ def _check_single(posture: Posture, reference: Floats, near: Floats | None) -> N
     if near is not None:
         away = float(np.linalg.norm(near - posture.position))
         distance = f"{away:.4g} m" if away >= 1.0 else f"{1e3 * away:.4g} mm"
-        instead = f"the nearest that it has is {_vector(near)}, {distance} away"
+        instead = f"the nearest position it reaches is {_vector(near)}, {distance} away"
     if posture.status == OUT_OF_REACH and np.array_equal(posture.position, reference):
         raise OutOfReach(
             f"the handle cannot reach its own reference position {where} in assembly {posture.assembly!r}; "

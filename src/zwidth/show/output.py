@@ -70,7 +70,8 @@ def destination(file: str | os.PathLike[str], kinds: Collection[str]) -> Path:
     ending = Path(name).suffix.lower()
     if ending not in kinds:
         other = f"{ending} is for maps and sweeps: the name " if ending in ARRAYS else ""
-        raise OutputError(f"{printable(name)}: {other}must end in {' or '.join(kinds)}")
+        allowed = f"{'one of ' if len(kinds) > 1 else ''}{', '.join(kinds)}"
+        raise OutputError(f"{printable(name)}: {other}must end in {allowed}")
     try:
         path = Path(os.path.realpath(name))
         _check_place(path, name)

@@ -112,7 +112,8 @@ def _usage(error: click.ClickException) -> str:
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "zwidth"
     text = printable(" ".join(error.format_message().split())).rstrip(".")
-    return f"{command}: {text[:1].lower() + text[1:]}; `{command} --help` shows what is allowed"
+    mark = "" if text.endswith("?") else ";"
+    return f"{command}: {text[:1].lower() + text[1:]}{mark} `{command} --help` shows what is allowed"
 
 
 def _internal(error: Exception) -> list[str]:

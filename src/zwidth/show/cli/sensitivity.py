@@ -16,6 +16,14 @@ if TYPE_CHECKING:
 
     from zwidth.study.sensitivity_result import Sensitivities, Sensitivity
 
+# Kind of optimum (see `study.optimum`) -> where on the edge the stiffest wall lies.
+PLACES: Final = {
+    "smooth maximum": ", at a smooth maximum of the edge",
+    "corner": ", at a corner of the edge",
+    "edge at B = 0": ", where the edge crosses B = 0",
+    "end of the curve": ", at an end of the edge's curve",
+    None: "",
+}
 NO_WALL: Final = "no stable wall has K > 0 and B >= 0, so that there is no largest stiffness to change"
 
 
@@ -60,7 +68,7 @@ class SensitivityCommand(Command):
         if peak is None:
             return
         stiffest = f"{amount(peak.stiffness, 'N/m')} at {amount(peak.damping, 'Ns/m')} of damping"
-        yield f"largest stiffness {stiffest}; held by: {result.kind or 'not known'}"
+        yield f"largest stiffness {stiffest}{PLACES[result.kind]}"
         known = [number for number in result.numbers if number.logarithmic == number.logarithmic]
         shown = [number for number in known if number.logarithmic != 0.0][: case["top"]]
         yield table(["number", "value", "sensitivity", "+1 % gives"], [_row(result, number) for number in shown])
