@@ -37,7 +37,7 @@ def no_progress_messages() -> Iterator[None]:
     """A command line on a slow machine, or one that has to compile, says no more than another, also where tests
     share what it said. That no command compiles after the set-up is for `make compile-check`."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("zwidth.show.cli.progress.PATIENCE", 1e6)
+        patch.setenv("ZWIDTH_QUIET", "1")
         patch.setattr("zwidth.show.cli.command.announce_compiling", lambda command: nullcontext())
         yield
 

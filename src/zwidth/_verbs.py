@@ -53,10 +53,10 @@ def device_held_by(device: Device, operator: Any) -> Device:
     return device_held_by(device, operator)
 
 
-def device_sensitivities(device: Device, point: OperatingPoint) -> Sensitivities:
+def device_sensitivities(device: Device, point: OperatingPoint, progress: Progress | None) -> Sensitivities:
     from zwidth.study.sensitivity import sensitivities
 
-    return sensitivities(device, point)
+    return sensitivities(device, point, progress)
 
 
 def device_report(device: Device, path: Any, point: OperatingPoint) -> dict[str, Any]:
@@ -83,16 +83,18 @@ def chart(point: OperatingPoint, radius: float, decay: bool) -> Chart:
     return chart_at(point, radius, decay=decay)
 
 
-def check(point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
+def check(
+    point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayLike, progress: Progress | None
+) -> WallVerdicts:
     from zwidth.chart.point_chart import check_at
 
-    return check_at(point, wall_stiffness, wall_damping)
+    return check_at(point, wall_stiffness, wall_damping, progress)
 
 
-def by_direction(point: OperatingPoint, plane: str | None, count: int) -> ByDirection:
+def by_direction(point: OperatingPoint, plane: str | None, count: int, progress: Progress | None) -> ByDirection:
     from zwidth.chart.polar import largest_stiffness_around
 
-    return largest_stiffness_around(point, plane, count)
+    return largest_stiffness_around(point, plane, count, progress)
 
 
 def bounds(point: OperatingPoint, damping: float | None) -> BoundsComparison:

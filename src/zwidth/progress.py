@@ -1,9 +1,37 @@
-"""The function by which a long computation reports its progress."""
+"""The function by which a long computation reports its progress, and how compiled code is watched."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeAlias
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Event, Thread
+from typing import Final, TypeAlias
 
-# Called with the name of the stage, the number of its steps done, and the number of its steps.
+# Called with the name of the stage, the number of its steps done, and the number of its steps; 0 of 0: not known.
 Progress: TypeAlias = Callable[[str, int, int], None]
+
+INTERVAL: Final = 0.5  # s between two looks at how far compiled code is
+
+
+@contextmanager
+def watched(progress: Progress | None, stage: str, done: Callable[[], int], of: int) -> Iterator[None]:
+    """Report the progress of compiled code that runs inside this block, from a thread beside it.
+
+    done  reads the number of steps done from an array that the code fills without the interpreter's lock
+    """
+    if progress is None:
+        yield
+        return
+    ended = Event()
+
+    def watch() -> None:
+        while not ended.wait(INTERVAL):
+            progress(stage, min(done(), of), of)
+
+    thread = Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()

@@ -179,6 +179,7 @@ def test_tips_beyond_all_edges_or_beside_them_contradict_nothing(tips):
 
 
 def test_a_run_that_takes_its_time_says_what_it_does(folder, monkeypatch):
+    monkeypatch.delenv("ZWIDTH_QUIET")
     monkeypatch.setattr("zwidth.show.cli.progress.PATIENCE", 0.0)
     ran = run_command("experiment", TWO_MASS, *FEWEST)
     assert "looking for stable walls" in ran.err

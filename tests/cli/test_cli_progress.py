@@ -2,32 +2,46 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+from importlib import import_module
+from threading import Event
+
 import pytest
 
+from zwidth.progress import watched
 from zwidth.show.cli import progress
+from zwidth.show.cli.main import run
 from zwidth.show.cli.progress import show_progress
 
 
 @pytest.fixture
 def clock(monkeypatch):
-    """The time that the lines go by; the timer of the first line never fires."""
+    """The time that the lines go by; the thread that looks after it never runs."""
 
     class Clock:
         now = 100.0
 
-    class NoTimer:
-        def __init__(self, *_):
+    class NoThread:
+        def __init__(self, **_):
             pass
 
         def start(self):
             pass
 
-        cancel = start
+        join = start
 
-    monkeypatch.setattr(progress, "PATIENCE", 2.0)
+    monkeypatch.delenv(progress.QUIET)
     monkeypatch.setattr(progress, "monotonic", lambda: Clock.now)
-    monkeypatch.setattr(progress, "Timer", NoTimer)
+    monkeypatch.setattr(progress, "Thread", NoThread)
     return Clock
+
+
+def test_who_wants_quiet_hears_nothing(clock, capsys, monkeypatch):
+    monkeypatch.setenv("ZWIDTH_QUIET", "1")
+    with show_progress() as tell:
+        clock.now += 100.0
+        tell("cells", 1, 2)
+    assert capsys.readouterr().err == ""
 
 
 def test_a_short_run_says_nothing(clock, capsys):
@@ -71,5 +85,91 @@ def test_a_run_that_has_told_nothing_says_that_it_computes(clock, capsys):
         clock.now += 2.0
         waiting = progress._Lines()
         clock.now += 2.0
-        waiting.print_line()
+        waiting.look()
     assert capsys.readouterr().err == "zwidth: computing\n"
+
+
+def test_a_stage_of_unknown_length_is_not_mentioned_while_another_message_explains_the_wait(clock, capsys):
+    busy = True
+    with show_progress(lambda: busy):
+        lines = progress._Lines(lambda: busy)
+        clock.now += 3.0
+        lines.look()
+        lines.update("cells", 1, 100)
+        busy = False
+        clock.now += 5.0
+        lines.update("writing a.csv", 0, 0)
+        lines.look()
+    assert capsys.readouterr().err == "zwidth: cells, 1 of 100\nzwidth: writing a.csv\n"
+
+
+def test_bars_begin_after_two_seconds_and_leave_nothing(clock, capsys):
+    bars = progress._Bars()
+    bars.update("cells", 1, 100)
+    clock.now += 1.9
+    bars.look()
+    bars.close()
+    assert capsys.readouterr().err == ""
+    clock.now += 0.2
+    bars.look()
+    bars.update("writing a.csv", 0, 0)
+    tasks = {task.description: (task.completed, task.total) for task in bars._bar.tasks}
+    bars.close()
+    assert tasks == {"cells": (1, 100), "writing a.csv": (0, None)}
+
+
+@pytest.mark.parametrize(
+    ("words", "stage", "steps"),
+    [
+        (["polar", "five-bar", "--count", "8"], "directions", 8),
+        (["check", "five-bar", "--stiffness", "100", "--damping", "1"], "walls", 1),
+        (["sensitivity", "published-two-mass"], "numbers", 17),
+    ],
+)
+def test_a_command_reports_its_steps_and_what_it_writes(tmp_path, monkeypatch, words, stage, steps):
+    told = []
+
+    @contextmanager
+    def record(_):
+        yield lambda *step: told.append(step)
+
+    monkeypatch.setattr("zwidth.show.cli.command.show_progress", record)
+    assert run([*words, "--output", str(tmp_path / "a.csv")]) == 0
+    assert (stage, steps, steps) in told
+    assert told[-1] == ("writing a.csv", 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("words", "module"),
+    [
+        (["simulate", "five-bar", "--stiffness", "1000", "--damping", "2", "--duration", "0.05"], "simulate"),
+        (["move", "five-bar", "--push", "0,1", "--duration", "0.05"], "mechanism.simulate_mechanism"),
+    ],
+)
+def test_how_far_a_simulation_is_can_be_read_from_its_records(monkeypatch, words, module):
+    seen = []
+
+    @contextmanager
+    def watch(progress, stage, done, of):
+        before = done()
+        yield
+        seen.append((stage, before, done(), of))
+
+    monkeypatch.setattr(import_module(f"zwidth.contact.{module}"), "watched", watch)
+    assert run(words) == 0
+    assert seen == [("simulating", 0, 41, 41)]
+
+
+def test_compiled_code_is_watched_from_beside_it(monkeypatch):
+    told, looked = [], Event()
+
+    def take(*step):
+        told.append(step)
+        looked.set()
+
+    monkeypatch.setattr("zwidth.progress.INTERVAL", 0.001)
+    with watched(take, "steps", lambda: 7, 5):
+        assert looked.wait(60.0)
+    assert set(told) == {("steps", 5, 5)}
+    with watched(None, "steps", lambda: 7, 5):
+        pass

@@ -1,4 +1,4 @@
-"""Where to sample the curve: as densely as its nearest singularity is near.
+"""Angles at which the curve of walls is sampled: the nearer a singularity, the denser.
 
 K(theta) and B(theta) are analytic except at zeros of P (where -1/P has a pole), poles of the velocity estimate
 and points where the estimate is in phase with the position. A function varies on the scale of its distance to
@@ -28,7 +28,7 @@ MOST_ANGLES = 20000
 
 
 def singular_points(factors: Factors, radius: float) -> Complexes:
-    """Poles and zeros of P without its delay, poles of w and real w on the circle; Im z >= 0, z plane."""
+    """Points z, Im z >= 0: poles and zeros of P without its delay, poles of w, real w on the circle."""
     s = _roots(plant_numerator(factors, radius))
     with np.errstate(divide="ignore", invalid="ignore"):
         zeros = radius * (1.0 + s) / (1.0 - s)
@@ -37,7 +37,7 @@ def singular_points(factors: Factors, radius: float) -> Complexes:
 
 
 def computer_points(factors: Factors, radius: float) -> Complexes:
-    """Those of them that the computer has, whatever the plant."""
+    """Those of the singular points that come from filters and velocity estimate, whatever the plant."""
     points = np.concatenate(
         [
             _factor_roots(factors.force_denominator),
@@ -100,10 +100,10 @@ def sample_angles(points: Complexes, radius: float, share: float, longest: float
 def fill_sample_angles(
     points: Complexes, radius: float, share: float, longest: float, near_end: float, floors: Floats, out: Floats
 ) -> int:
-    """The same into `out`, as many as it holds; returns their number.
+    """`sample_angles` into `out`, as many as it holds; returns their number.
 
     near_end  how near to the ends 0 and pi to begin and end, in shares of the distance of the nearest point there
-    floors    working room (len(points),)
+    floors    working memory (len(points),)
     """
     first, last = 1.0, 1.0
     for k in range(len(points)):

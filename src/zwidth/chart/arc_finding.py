@@ -25,8 +25,9 @@ Floats = NDArray[np.float64]
 class ArcSet:
     """All arcs found, and the angles of every branch that meets another in a corner.
 
-    extents  largest distance of each arc's points from its first corner, in K T and B [N s/m]
-    size     largest |K T|, |B| of the whole edge
+    partners  angles of the branches that meet an arc in a corner; 0 or pi for a real root
+    extents   largest distance of each arc's points from its first corner, in K T and B [N s/m]
+    size      largest |K T|, |B| of the whole edge [N s/m]
     """
 
     arcs: tuple[Arc, ...]

@@ -141,7 +141,7 @@ def join(edges: ArcSet, period: float, blur: float) -> Arcs | None:
 
 
 def _cluster(points: Floats, reach: float) -> NDArray[np.int64]:
-    """Numbers the distinct corners among points (k, 2)."""
+    """A number (k,) for each of points (k, 2) [K T, B], the same for points within `reach` of each other."""
     labels = np.full(len(points), -1)
     for i in range(len(points)):
         if labels[i] < 0:

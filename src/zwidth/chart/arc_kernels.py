@@ -1,4 +1,4 @@
-"""Compiled along a piece of the curve: points dense enough that chords lie on it, sign changes, the integral."""
+"""Kernels along a piece of the curve: angles so dense that chords lie on it, sign changes, integral of K dB."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def quadrant_integral(factors: Factors, radius: float, nodes: Floats) -> float:
 
     Round a region with the region on the left this sums to its area within K > 0, B > 0 (Green). Intervals are
     halved until the rule and its two halves agree to 1e-12 of the whole, or for HALVINGS times: one in which K or
-    B changes sign asks for rounding, and rounding itself asks for ever.
+    B changes sign would be halved down to rounding, and rounding never agrees.
     """
     total, size = 0.0, 0.0
     low, high, value = np.empty(64), np.empty(64), np.empty(64)

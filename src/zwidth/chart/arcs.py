@@ -31,7 +31,7 @@ ArcPoints = tuple[Floats, Floats, Floats]  # angles, K and B along an arc
 PAIR, PLUS, MINUS, CHORD = range(4)
 # Components of walls, and dK/dtheta along a curve.
 STIFFNESS, DAMPING, SLOPE = range(3)
-# By this share of a step an arc's ends are drawn in where sign changes are looked for: there it may touch an axis.
+# Sign changes are looked for between an arc's ends, moved inwards by this share of a step: they may touch an axis.
 END_MARGIN: Final = 1e-6
 
 
@@ -94,7 +94,7 @@ class Arcs:
     start, end    (n,)    angles there; nan where they are not known
     next_arc      (n,)    number of the arc that the ring goes on with
     thetas        (m,)    angles strictly between the ends, arc after arc
-    offsets       (n + 1,)  where each arc's begin in these
+    offsets       (n + 1,)  index in `thetas` of each arc's first angle
     """
 
     kind: Whole

@@ -49,7 +49,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
 
     loop    plant, sampling, delay and filter
     radius  1 for stability; less for the walls whose slowest motion shrinks at least by that factor per sample
-    decay   False skips the search for the fastest-decaying walls, most of the time
+    decay   False skips the search for the fastest-decaying walls, which takes most of the time
     Raises  ChartError if the edge cannot be closed (a sliver finer than double precision resolves)
 
     >>> from zwidth.loop.controller import Controller
@@ -77,7 +77,10 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
 
 
 def largest_stiffness(loop: Loop) -> Peak | None:
-    """Only the stiffest stable wall with K > 0, B >= 0; None if there is none."""
+    """The stiffest stable wall with K > 0, B >= 0, without the rest of the chart; None if there is none.
+
+    Raises  ChartError  as `stability_chart`
+    """
     require("loop", loop, Loop)
     edge, _ = trace_edge(Tracer.of(loop))
     return edge.peak
@@ -95,10 +98,10 @@ def boundary_points(
 def trace_edge(tracer: Tracer, member: int = 0) -> tuple[TracedEdge, float]:
     """The edge of a loop's stable set, and the share of its size to which corners are known.
 
-    An outline that crosses itself has passed a small loop of the curve between two samples: then the curve is
-    traced again through all the angles seen.
+    An outline crosses itself where a small loop of the curve lies between two samples: then the curve is traced
+    again, also at the angles of the outline's points.
 
-    member  number of the loop among others
+    member  index of the loop, given to its arcs
     """
     extra_angles = None
     for _ in range(2):

@@ -1,4 +1,4 @@
-"""What every chart tells: the stable walls, their edge, and the numbers read off them."""
+"""The base of all charts: the stable walls, their edge, and the numbers read off them."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class Chart(Result, ABC):
     frequencies_at_stiffness_max [Hz] one, or two at a corner, ascending; () if there is none
     damping_max     supremum of B >= 0 stable for all sufficiently small K > 0 [N s/m]; 0 if there is none
     stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
-    fastest_decay   the wall of smallest spectral radius over the whole set; None if nothing is stable, and where
-                    it is not searched for: over one direction of one modelled loop it is
+    fastest_decay   the wall of smallest spectral radius over the whole set; None if nothing is stable, or if it
+                    was not searched for: only charts of one direction of one modelled loop have it
     fastest_decay_in_first_quadrant   the same over K >= 0, B >= 0
     """
 
@@ -78,7 +78,7 @@ class Chart(Result, ABC):
 
     @property
     def box(self) -> Window:
-        """KMIN, KMAX, BMIN, BMAX of the regions and 5 %; (0, 1, 0, 1) where nothing is stable."""
+        """KMIN, KMAX, BMIN, BMAX of the regions with a margin of 5 %; (0, 1, 0, 1) where nothing is stable."""
         return window_of(self.regions)
 
     @abstractmethod

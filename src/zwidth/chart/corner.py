@@ -72,9 +72,9 @@ def cross_line(tracer: Tracer, root: RealRoot, low: float, high: float) -> float
 def wall_on_line(tracer: Tracer, root: RealRoot, theta: float) -> Wall:
     """The wall where the curve crosses a line of real roots, at the angle that `cross_line` gives.
 
-    A mode that the wall hardly moves passes far between one angle and the next that a double can hold. The rest of
-    the way to the line is gone along the curve's tangent, by less than those last digits of the angle. Where the
-    curve changes sides through infinity there is no such wall, and the curve's own is returned.
+    On the branch of a mode that the wall hardly moves, walls at two neighbouring double-precision angles are far
+    apart. The rest of the way to the line is taken along the curve's tangent, by less than the angle's last
+    digits. Where the curve changes sides through infinity there is no such wall, and the curve's own is returned.
     """
     a, s, v = tracer.line(root).tolist()
     K, B, dK, dB = tracer.wall(theta)
@@ -107,7 +107,7 @@ def _partner(tracer: Tracer, theta: float, wall: Wall) -> float:
 
 
 def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, float]:
-    """Angle and wall of the corner between an edge sample and one that is none, and the partner's angle.
+    """Angle and wall of the corner between a sample on the edge and one that is not, and the partner's angle.
 
     The partner is 0 or pi where a real root reaches the circle. Where two branches touch without crossing the
     bisection's angle stands.

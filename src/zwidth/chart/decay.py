@@ -1,9 +1,10 @@
 """The fastest-decaying wall: the smallest spectral radius over the stable set, or over its part with K, B >= 0.
 
-That part's optimum is the whole set's where that has K, B >= 0. Else it lies inside the quadrant, or on one of its
-two axes: the search moves in the quadrant, walls outside it being taken for the nearest ones inside, and each axis
-is searched separately. A cell of walls that decay faster than the best found is bounded and the quadrant is not,
-so that a cell which reaches into the quadrant has some of its edge there. The search ends by looking for those.
+If the optimum of the whole set has K, B >= 0, it is that part's too. Else that part's lies inside the quadrant, or
+on one of its two axes: the search moves in the quadrant, walls outside it being taken for the nearest ones inside,
+and each axis is searched separately. A cell of walls that decay faster than the best found is bounded and the
+quadrant is not, so that a cell which reaches into the quadrant has some of its edge there. The search ends by
+looking for such edges.
 """
 
 from __future__ import annotations
@@ -32,19 +33,19 @@ FASTER = (3e-3, 3e-4, 3e-5)
 # How far from the radius found (in shares of 1 - radius) a coalesced root is looked for: where three roots meet,
 # the search sees them miss by a cube root of rounding.
 REACHES = (0.02, 0.1, 0.3)
-STARTS = 3  # of each search
-ROUNDS = 20  # of looking for faster walls, at each
+STARTS = 3  # walls from which each search starts
+ROUNDS = 20  # most searches for faster walls at each of these shares
 ALL = np.full(2, -np.inf)  # least K and B of the walls that are searched
 QUADRANT = np.zeros(2)
 # Walls along an axis, as shares of its stable part; dense near its origin, where the walls of a light device are.
 AXIS_SHARES = np.union1d(np.linspace(0.0, 1.0, 200), np.logspace(-6.0, 0.0, 60))
-ZOOMS, ZOOMED = 9, 33  # how often a minimum along an axis is closed in on, and walls in each
-VALLEYS = 4  # minima along an axis that are
+ZOOMS, ZOOMED = 9, 33  # how often the interval round a minimum along an axis is narrowed, and walls tried in each
+VALLEYS = 4  # minima along an axis whose intervals are narrowed
 
 
 @dataclass(frozen=True)
 class FastestDecay:
-    """The wall whose slowest motion decays fastest, and its spectral radius.
+    """The wall K [N/m], B [N s/m] whose slowest motion decays fastest, and its spectral radius.
 
     Its slowest root is mostly a double one: the eigenvalues of the wall rounded to double precision then differ
     from the radius by the square root of the rounding, about 1e-8 (a triple root: 1e-5).
@@ -65,6 +66,7 @@ class FastestDecay:
 
 @compiled
 def _radius_of_wall(polynomials: Floats, radius: float, K: float, B: float, p: Floats, roots: Complexes) -> float:
+    """Spectral radius of one wall; p and roots are working memory, roots the start of the search for them."""
     for i in range(len(p)):
         p[i] = polynomials[0, i] + K * polynomials[1, i] + B * polynomials[2, i]
     return polynomial_radius(p, radius, roots)
@@ -148,6 +150,7 @@ def _sort_corners(x: Floats, f: Floats) -> None:
 def _bounded(
     polynomials: Floats, radius: float, K: float, B: float, least: Floats, p: Floats, roots: Complexes
 ) -> float:
+    """Spectral radius of the wall, or of the nearest one with K and B not below `least`."""
     return _radius_of_wall(polynomials, radius, max(K, least[0]), max(B, least[1]), p, roots)
 
 
@@ -194,9 +197,9 @@ def double_root_wall(factors: Factors, positive: bool, low: float, high: float) 
 def fastest_decay(tracer: Tracer, outlines: list[Floats]) -> FastestDecay | None:
     """Smallest spectral radius over the cells with these outlines (k, 2), both signs of K and B.
 
-    A simplex search can end in a narrow valley's wall. So the curve is traced on a smaller circle: whatever edge
-    it finds there encloses walls that decay faster, and the search goes on among them until none is left. Where
-    the best wall has a double real root, as it mostly has, its place is then solved for.
+    A simplex search can stop on the side of a narrow valley. So the curve is traced on a smaller circle: any edge
+    that it has there encloses walls that decay faster, and the search goes on among them until none is left. Where
+    the best wall has a double real root, as it mostly has, that wall is then solved for.
     """
     best = _fastest(tracer, outlines, ALL)
     return _refine_at_double_root(tracer, best, ALL) if best else None
@@ -216,6 +219,7 @@ def fastest_decay_in_first_quadrant(
 
 
 def _fastest(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDecay | None:
+    """The fastest-decaying wall with K, B >= least by simplex searches, repeated until no faster wall is found."""
     best: FastestDecay | None = None
     for outline in outlines:
         best = _search(tracer, outline, least, best)
@@ -232,7 +236,7 @@ def _fastest(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDe
 
 
 def _refine_at_double_root(tracer: Tracer, best: FastestDecay, least: Floats) -> FastestDecay:
-    """The wall with a coalesced real root next to a found one if there is one no worse; else the found one."""
+    """The wall with a double real root near the best one if it decays as fast or faster, else the best one."""
     for reach in REACHES if tracer.degree > 2 else ():
         away = reach * (1.0 - best.spectral_radius)
         low, high = max(best.spectral_radius - away, 1e-6), min(best.spectral_radius + away, 1.0)
@@ -261,8 +265,10 @@ def _on_axes(loop: Loop, best: FastestDecay) -> FastestDecay:
 
 
 def _search(tracer: Tracer, outline: Floats, least: Floats, best: FastestDecay | None) -> FastestDecay | None:
-    """A search from the best of the middles between points of an outline, no softer or less damped than the least;
-    the better of its end and `best`."""
+    """Search a cell among walls with K, B >= least, from the best middles between points of its outline.
+
+    Returns  the faster-decaying of the wall found and `best`
+    """
     points = outline if least is ALL else _in_quadrant(outline)
     if not len(points):
         return best

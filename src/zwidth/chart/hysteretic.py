@@ -1,7 +1,7 @@
 """The chart of a plant with hysteretic damping, K (1 + i eta): exact where the loop vibrates steadily.
 
 A loss factor has no motion in time (it would begin before its cause), so there is no transition matrix. But the
-boundary of the stable set asks for the steady response to the held force at one frequency alone, which
+boundary of the stable set needs only the steady response to the held force at one frequency, which
 `chart.hysteretic_response` gives. It is sampled until what is interpolated between its angles is right too. From
 there on it is treated as a measured response, and cells are counted by Nyquist's criterion.
 
@@ -33,8 +33,8 @@ Complexes = NDArray[np.complex128]
 
 STEP = 0.1  # first angles, in shares of the distance to the nearest singularity of the viscous plant
 INTERPOLATION_ERROR = 1e-9  # relative error of P that interpolation may leave
-FINEST = 1e-7  # shares of an angle between two; and how near to pi one may lie
-TOO_SMALL = "too small for this loop to be charted; leave it out (0), give a larger one, or give damping"
+FINEST = 1e-7  # least step between two angles, as a share of the angle; least distance of an angle from pi, in pi
+TOO_SMALL = "too small for this loop to be charted; set it to 0, give a larger one, or give damping instead"
 MOST_SAMPLES = 100_000  # angles
 LEAST_LOSS_FACTOR = 1e-5  # of the stiffness: with less the response turns too fast to be followed along the circle
 

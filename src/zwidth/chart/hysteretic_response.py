@@ -6,10 +6,10 @@
     H(s) = e^{-f s T} (1 - e^{-sT}) / (s (tau s + 1))
 
 with a delay of f samples and an actuator lag tau. The sum is taken as the exact response of a plant with viscous
-damping instead, plus the difference of the two, which falls off like k^-4. Aliases with a natural frequency among
-their own are summed at each angle. All others together are analytic in theta to two lengths beyond either end of
-[0, pi], and so a polynomial in theta. G is taken in modal coordinates, where a rigid
-motion is exactly free: in the plant's own, rounding of the stiffest spring would hold it.
+damping instead, plus the difference of the two, which falls off like k^-4. Aliases whose frequencies lie near a
+natural frequency are summed at each angle. The sum of all others is analytic in theta to two lengths beyond either
+end of [0, pi], and so a polynomial in theta. G is taken in modal coordinates, where a rigid motion is exactly
+free: in the plant's own, rounding of the stiffest spring would hold it.
 """
 
 from __future__ import annotations
@@ -35,15 +35,16 @@ Whole = NDArray[np.int64]
 # Pairs of aliases summed, and how many for each that the highest natural frequency lies above: what is left out
 # falls off with the third power.
 FEWEST, PER_FOLD = 400, 20
-# An alias is smooth if all natural frequencies are farther from the middle of its own, in aliases: 2.5 pi are five
-# half-lengths of [0, pi], by which Chebyshev's coefficients fall by 5 + sqrt 24 each.
+# An alias is smooth if all natural frequencies are farther than this from the middle of its frequencies, in
+# sampling rates: 2.5 pi are five half-lengths of [0, pi], by which Chebyshev's coefficients fall by 5 + sqrt 24
+# each.
 SMOOTH, DEGREE = 1.25, 18
 UNIT = 1e-14  # a few roundings
 CHUNK = 2000  # angles at a time, for memory's sake
 
 
 def viscous_equivalent(plant: Plant) -> Plant:
-    """The plant with dampers in place of its hysteresis, which lose as much in each mode at its own frequency.
+    """The plant with dampers in place of its hysteresis, with the same loss in each mode at its own frequency.
 
     M V diag(l_i / |w_i|) V^T M, with mass-normalised modes V and l_i = v_i^T L v_i; rigid modes lose nothing.
     """
@@ -78,7 +79,7 @@ class ModalPlant:
 
     @classmethod
     def of(cls, plant: Plant) -> ModalPlant:
-        """The plant's own, with hysteresis or without."""
+        """The modal form of a plant, with hysteresis or without."""
         squared, V = undamped_modes(plant.mass, plant.stiffness)
         loss = np.zeros_like(plant.mass) if plant.hysteresis is None else V.T @ plant.hysteresis @ V
         loss[np.abs(loss) <= RIGID * np.max(np.abs(loss))] = 0.0
@@ -119,10 +120,10 @@ class ModalPlant:
 class SampledResponse:
     """P(e^{i theta}) [m/N] of a loop whose plant has hysteresis.
 
-    hysteretic, viscous  the plant with hysteresis, and with dampers instead (`viscous`)
+    hysteretic, viscous  the plant with hysteresis, and with dampers instead (`viscous_equivalent`)
     reference            the loop with the latter, whose response is known in closed form
-    near                 aliases that are summed at each angle
-    far                  sum of all others
+    near                 numbers k of the aliases that are summed at each angle
+    far                  sum of all other aliases, by theta in [0, pi]
     """
 
     loop: Loop
@@ -143,14 +144,14 @@ class SampledResponse:
         k = np.arange(-most, most + 1)
         sharp = np.any(np.abs(np.abs(k + 0.25)[:, None] - folds) < SMOOTH, axis=1)
         far = Chebyshev.interpolate(
-            lambda theta: _extra(loop, lossy, damped, theta, k[~sharp]), DEGREE, domain=[0.0, np.pi]
+            lambda theta: _response_difference(loop, lossy, damped, theta, k[~sharp]), DEGREE, domain=[0.0, np.pi]
         )
         return cls(loop, lossy, damped, reference, k[sharp], far)
 
     def __call__(self, thetas: Floats) -> Complexes:
         """P (n,) at angles (n,) in (0, pi]."""
         parts = np.array_split(thetas, 1 + len(thetas) // CHUNK)
-        near = [_extra(self.loop, self.hysteretic, self.viscous, part, self.near) for part in parts]
+        near = [_response_difference(self.loop, self.hysteretic, self.viscous, part, self.near) for part in parts]
         low_pass, z = force_filter(self.loop.controller), np.exp(1j * thetas)
         passed = factor_response(low_pass.numerator, low_pass.denominator, z - 1.0) / z**self.loop.whole_delay
         A, AP, _ = terms_along(factor_arrays(self.reference), 1.0, thetas).T
@@ -163,8 +164,8 @@ class SampledResponse:
         return np.asarray(UNIT * sizes * np.abs(np.expm1(-1j * thetas)) / thetas)
 
 
-def _extra(loop: Loop, lossy: ModalPlant, damped: ModalPlant, thetas: Floats, k: Whole) -> Complexes:
-    """What the hysteretic plant answers more than the viscous one (n,) by aliases k, without whole delays."""
+def _response_difference(loop: Loop, lossy: ModalPlant, damped: ModalPlant, thetas: Floats, k: Whole) -> Complexes:
+    """Response of the hysteretic plant less the viscous one's (n,) [m/N], over aliases k, without whole delay."""
     w = (thetas[:, None] + 2.0 * np.pi * k) / loop.period
     s = 1j * w
     lag = loop.controller.actuator_time_constant * s + 1.0

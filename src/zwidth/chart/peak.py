@@ -22,8 +22,9 @@ AS_STIFF: Final = 1e-13
 class Peak:
     """The stiffest wall of the closure of the stable set with K > 0, B >= 0.
 
-    angles   of the roots on the circle there: one, or two at a corner, ascending
-    members  that have them, in the same order (`Arcs.member`)
+    stiffness, damping  K [N/m], B [N s/m]
+    angles              of the roots on the circle there: one, or two at a corner, ascending
+    members             index of the loop that has each of these roots (`Arcs.member`)
     """
 
     stiffness: float
@@ -57,7 +58,7 @@ def find_peak(arcs: Arcs, curves: Curves, stiffness_scale: float) -> Peak | None
     It is attained on the edge: at a smooth maximum of K (dK/dtheta = 0), at a corner, or where the edge crosses
     B = 0.
 
-    stiffness_scale  largest |K| on the edge: what is stiff by rounding of this is no wall
+    stiffness_scale  largest |K| on the edge [N/m]; below 1e-10 of it K is taken as rounding of 0
     """
     crossed, crossings = arcs.crossings(DAMPING)
     crossings[:, DAMPING] = 0.0
@@ -91,13 +92,13 @@ def find_peak(arcs: Arcs, curves: Curves, stiffness_scale: float) -> Peak | None
 def largest_damping(
     arcs: Arcs, curves: Curves, stiffness_scale: float, stable: Callable[[float, float], bool]
 ) -> float:
-    """Supremum of B >= 0 that is stable for all sufficiently small K > 0; 0 if there is none.
+    """Supremum of B >= 0 [N s/m] that is stable for all sufficiently small K > 0; 0 if there is none.
 
     The stable intervals of the line K = 0+ end where the edge crosses or touches K = 0; each interval is tested at
     its middle.
 
-    stiffness_scale  largest |K| on the edge
-    stable           whether a wall (K, B) is
+    stiffness_scale  largest |K| on the edge [N/m]
+    stable           function that tells whether a wall (K, B) is stable
     """
     corners: list[list[float]] = [*arcs.first.tolist(), *arcs.last.tolist()]
     stops = {0.0, *(B for K, B in corners if abs(K) <= 1e-8 * stiffness_scale)}

@@ -1,4 +1,4 @@
-"""The chart of an operating point, whatever it is charted by, and verdicts on single walls there."""
+"""The chart of an operating point, by the method that its device needs, and verdicts on single walls there."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from zwidth.model.argument_checks import require
 if TYPE_CHECKING:
     from zwidth.chart.chart_base import Chart
     from zwidth.chart.verdict import WallVerdicts
+    from zwidth.progress import Progress
 
 
 def chart_at(point: OperatingPoint, radius: float = 1.0, *, decay: bool = True) -> Chart:
@@ -21,7 +22,7 @@ def chart_at(point: OperatingPoint, radius: float = 1.0, *, decay: bool = True) 
     together under one wall law; all else by D-decomposition of the loop.
 
     radius  less than 1 for the walls whose slowest motion shrinks at least by that factor per sample
-    decay   False skips the search for the fastest-decaying walls, most of the time
+    decay   False skips the search for the fastest-decaying walls, which takes most of the time
     Returns StabilityChart, MultiChart or MeasuredChart
     Raises  what `OperatingPoint.loop` raises; ChartError if the edge cannot be closed, ResponseError for what
             cannot be a device's response, ValueError for another radius than 1 where only 1 is charted
@@ -47,9 +48,12 @@ def chart_at(point: OperatingPoint, radius: float = 1.0, *, decay: bool = True) 
     return stability_chart(point.loop, radius, decay)
 
 
-def check_at(point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
+def check_at(
+    point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: ArrayLike, progress: Progress | None = None
+) -> WallVerdicts:
     """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, at a single operating point.
 
+    progress  called with "walls", the walls judged, and all walls
     Returns Verdicts by eigenvalues; MeasuredVerdicts by the count of roots for what has a frequency response only
     Raises  what `chart_at` raises
     """
@@ -59,4 +63,4 @@ def check_at(point: OperatingPoint, wall_stiffness: ArrayLike, wall_damping: Arr
     from zwidth.chart.verdict import verdicts
 
     loop = point.loop if point.direction_count == 1 else point.loop_of_directions
-    return verdicts(loop, wall_stiffness, wall_damping)
+    return verdicts(loop, wall_stiffness, wall_damping, progress)

@@ -20,6 +20,7 @@ from zwidth.model.argument_checks import check_choice, require
 from zwidth.model.multi_plant import DEPENDENT
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import DirectionError, ModelError
+from zwidth.progress import Progress
 from zwidth.result import Result
 
 Floats = NDArray[np.float64]
@@ -42,7 +43,7 @@ class ByDirection(Result):
     damping     (k,)    B there [N s/m]
     frequency   (k,)    of the vibration there, the lower one at a corner [Hz]
     status      (k,)    "ok", "no stable wall", "out of motion: ...", or why the direction has no answer
-    plane       "xy", "xz" or "yz" where the directions go evenly round that plane; "" where they are any
+    plane       "xy", "xz" or "yz" where the directions go evenly round that plane; "" for other directions
     """
 
     directions: Floats
@@ -54,13 +55,13 @@ class ByDirection(Result):
 
     @property
     def angles(self) -> Floats:
-        """(k,) from the plane's first axis towards its second [deg]; nan where the directions are any."""
+        """(k,) from the plane's first axis towards its second [deg]; nan for directions round no plane."""
         count = len(self.stiffness)
         return 360.0 * np.arange(count) / count if self.plane else np.full(count, np.nan)
 
     @property
     def reason(self) -> str | None:
-        """Why no direction has a stable wall: what they share, or all of it; None where one has."""
+        """Why no direction has a stable wall: every reason once; None where a direction has one."""
         if np.isfinite(self.stiffness).any():
             return None
         reasons = sorted(set(self.status))
@@ -100,15 +101,18 @@ def circle(count: int, first: ArrayLike = (1.0, 0.0, 0.0), second: ArrayLike = (
     """
     angles = 2.0 * np.pi * np.arange(count)[:, None] / count
     turned = np.cos(angles) * np.asarray(first, float) + np.sin(angles) * np.asarray(second, float)
-    return np.asarray(np.round(turned, 15) + 0.0)  # what rounding leaves of a zero is none
+    return np.asarray(np.round(turned, 15) + 0.0)  # so that zeros are exact, and none is -0.0
 
 
-def largest_stiffness_around(point: OperatingPoint, plane: str | None = None, count: int = 72) -> ByDirection:
+def largest_stiffness_around(
+    point: OperatingPoint, plane: str | None = None, count: int = 72, progress: Progress | None = None
+) -> ByDirection:
     """The largest stiffness along directions spread evenly round a plane; see `largest_stiffness_by_direction`.
 
-    plane   "xy", "xz" or "yz"; left out: xy, or where the handle cannot move all over it, one where it can
-    count   of the directions, at least 3
-    Raises  ValueError  for another plane or count, and what `largest_stiffness_by_direction` raises
+    plane     "xy", "xz" or "yz"; left out: xy, or where the handle cannot move all over it, one where it can
+    count     number of directions, at least 3
+    progress  as for `largest_stiffness_by_direction`
+    Raises    ValueError  for another plane or count, and what `largest_stiffness_by_direction` raises
     """
     require("point", point, OperatingPoint)
     if plane is not None:
@@ -117,7 +121,8 @@ def largest_stiffness_around(point: OperatingPoint, plane: str | None = None, co
         raise ValueError(f"count must be at least 3 directions, got {count}")
     chosen = plane or _movable_plane(point.jacobian)
     first, second = np.eye(3)[list(PLANES[chosen])]
-    return replace(largest_stiffness_by_direction(point, circle(count, first, second)), plane=chosen)
+    directions = circle(count, first, second)
+    return replace(largest_stiffness_by_direction(point, directions, progress), plane=chosen)
 
 
 def _movable_plane(jacobian: Floats) -> str:
@@ -130,23 +135,31 @@ def _movable_plane(jacobian: Floats) -> str:
     return "xy"
 
 
-def largest_stiffness_by_direction(point: OperatingPoint, directions: ArrayLike) -> ByDirection:
+def largest_stiffness_by_direction(
+    point: OperatingPoint, directions: ArrayLike, progress: Progress | None = None
+) -> ByDirection:
     """The largest stiffness along each direction, each traced exactly as `largest_stiffness` does.
 
     A direction and its opposite render the same walls: actuator and sensor both change sign, the loop does not.
     Each such pair is computed once. A direction that has no answer is data: nan, and a status that says why. One
-    that leaves the motions of the handle, the range of its Jacobian, has none: only its shadow within them could
-    be rendered, whose stiffness 1/cos^2 would let appear as large as one likes.
+    that leaves the motions of the handle, the range of its Jacobian, has none: only its projection onto them could
+    be rendered, and the factor 1/cos^2 would make its stiffness arbitrarily large.
 
     point       a single posture of a mechanism, whatever its own direction
     directions  (k, 3)  of any length but zero
+    progress    called with "directions", those that are done, and all of them
     Raises      ValueError  for a direction without length, and what `OperatingPoint.plant_of_directions` raises
     """
     require("point", point, OperatingPoint)
     given = np.atleast_2d(np.asarray(directions, dtype=float))
     length = np.linalg.norm(given, axis=1, keepdims=True)
-    if given.shape[1] != 3 or not (length > 0.0).all():
-        raise ValueError("directions must be an array (k, 3) of vectors that have a length")
+    if given.shape[1] != 3:
+        raise ValueError(
+            f"directions must be vectors (k, 3), got shape {given.shape}; write [[1, 0, 0], [0, 1, 0]]"
+        )
+    if not (length > 0.0).all():
+        wrong = given[np.flatnonzero(~(length > 0.0))[0]].tolist()
+        raise ValueError(f"directions must have a length above 0, got {wrong}; leave this one out")
     units = given / length
     plant = _plants(point)
     motions = _motions(point.jacobian)
@@ -159,12 +172,14 @@ def largest_stiffness_by_direction(point: OperatingPoint, directions: ArrayLike)
             none = float("nan")
             results[key] = (none, none, none, OUT_OF_MOTION) if off else _stiffest(plant, unit, point.controller)
         rows.append(results[key])
+        if progress is not None:
+            progress("directions", len(rows), len(units))
     stiffness, damper, frequency, status = zip(*rows, strict=True)
     return ByDirection(units, np.array(stiffness), np.array(damper), np.array(frequency), status)
 
 
 def _direction_key(unit: Floats) -> tuple[float, ...]:
-    """One name for a direction and its opposite."""
+    """A key that is the same for a direction and its opposite."""
     rounded = np.round(unit, 13) + 0.0
     lead = next(x for x in rounded if x != 0.0)
     return tuple((rounded * np.sign(lead) + 0.0).tolist())
@@ -177,7 +192,10 @@ def _motions(jacobian: Floats) -> Floats:
 
 
 def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
-    """The plant along a unit vector. Directions share the full model's matrices and differ in their actuator."""
+    """A function that gives the plant along a unit vector (3,).
+
+    Directions share the full model's matrices and differ in their actuator.
+    """
     check_several_directions(point.mechanism, point.operator, point.encoders)
     if point.model != "full":
         return lambda unit: point.towards(unit).plant

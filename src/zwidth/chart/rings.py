@@ -20,7 +20,7 @@ Window = tuple[float, float, float, float]  # KMIN, KMAX, BMIN, BMAX
 
 
 def window_of(regions: Sequence[Floats]) -> Window:
-    """KMIN, KMAX, BMIN, BMAX of rings and 5 %; (0, 1, 0, 1) where there are none."""
+    """KMIN, KMAX, BMIN, BMAX of rings with a margin of 5 %; (0, 1, 0, 1) where there are none."""
     if not regions:
         return 0.0, 1.0, 0.0, 1.0
     walls = np.vstack(regions)

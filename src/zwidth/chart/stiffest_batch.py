@@ -46,7 +46,7 @@ NEAR_END: Final = 0.02
 # Trial walls: stiffer than the stiffest by these factors, with so many dampings each.
 BEYOND: Final = (1.0001, 1.02, 1.3)
 TRIALS: Final = 6
-# A stiffness this small against that of the plant itself, some m/T^2, may be what rounding leaves of none.
+# A stiffness below this share of the plant's own, some m/T^2, may be rounding of 0.
 NOTHING: Final = 1e-10
 # What could be the stiffest wall is refined unless it misses the stiffest found by more than this.
 SLACK: Final = 1.01
@@ -57,7 +57,7 @@ class StiffestWalls:
     """The stiffest stable wall with K > 0, B >= 0 of each of N loops.
 
     stiffness, damping  (N,)    nan unless the status is FOUND
-    angles              (N, 2)  of the roots on the circle there, ascending; twice the same but at a corner
+    angles              (N, 2)  of the roots on the circle there, ascending; equal except at a corner
     status              (N,)    FOUND, NO_WALL, or DOUBTFUL: to be computed alone
     """
 
@@ -68,7 +68,7 @@ class StiffestWalls:
 
 
 class Samples(NamedTuple):
-    """Working room for the samples of one curve."""
+    """Working memory for the samples of one curve."""
 
     thetas: Floats
     K: Floats
@@ -174,6 +174,7 @@ def stiffest_wall(
     thetas, K, B, flags = samples
     best, at, partner, unsure, widest = 0.0, 0.0, 0.0, 0.0, 0.0
     damping = 0.0
+    # the stiffest sample on the edge, and the stiffest whose flag rounding hides
     for i in range(n):
         if flags[i] == 0 and B[i] >= 0.0:
             unsure = max(unsure, K[i])
@@ -181,6 +182,7 @@ def stiffest_wall(
             widest = max(widest, B[i])
             if is_stiffer(K[i], B[i], best, damping):
                 best, damping, at, partner = K[i], B[i], thetas[i], thetas[i]
+    # between each edge sample and its neighbours: a crossing of B = 0, a smooth maximum of K, or a corner
     for i in range(n):
         if flags[i] <= 0:
             continue

@@ -67,10 +67,10 @@ class TracedEdge:
     def chart_fields(
         self, period: float | Mapping[int, float], stable: Callable[[float, float], bool]
     ) -> ChartFields:
-        """What every chart tells.
+        """The fields that all charts share.
 
         period  sampling period [s]; of each member, where the arcs are those of several loops
-        stable  whether a wall (K, B) is
+        stable  function that tells whether a wall (K, B) is stable
         """
         members = self.arcs.member.tolist()
         if isinstance(period, Mapping):

@@ -50,7 +50,7 @@ class Tracer:
 
     @property
     def period(self) -> float:
-        """T; K T and B have one unit, in which distances between walls are taken."""
+        """Sampling period T [s]; K T and B have the same unit, in which distances between walls are taken."""
         return self.loop.period
 
     @property
@@ -59,7 +59,7 @@ class Tracer:
         return int(self.polynomials.shape[1]) - 1
 
     def features(self) -> NDArray[np.complex128]:
-        """Where the curve's shape comes from: see `angle_sampling.singular_points`."""
+        """Singular points of the curve in the z plane, see `angle_sampling.singular_points`."""
         return singular_points(self.factors, self.radius)
 
     def wall(self, theta: float) -> tuple[float, float, float, float]:
@@ -90,7 +90,7 @@ class Tracer:
         phase along the circle, leave it open, too (several roots on the circle within rounding), it is that of the
         nearest decided sample before, or after if there is none.
         """
-        K, B, flags = self._flagged(thetas)
+        K, B, flags = self._walls_and_flags(thetas)
         unsure = np.flatnonzero(flags == 0)
         if len(unsure):
             if not self.is_high_degree:
@@ -100,12 +100,12 @@ class Tracer:
                 flags = flags[sure[np.maximum(np.searchsorted(sure, np.arange(len(flags)), "right") - 1, 0)]]
         return K, B, flags > 0
 
-    def _flagged(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    def _walls_and_flags(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.int64]]:
         """K, B and flag 1, -1, or 0 where eigenvalues must decide."""
         if not self.is_high_degree:
             return trace(self.factors, self.polynomials, self.radius, thetas)
         K, B = walls(self.factors, self.radius, thetas)
-        return K, B, self._by_phase(np.column_stack([K, B]), thetas, 0)
+        return K, B, self._flags_by_phase(np.column_stack([K, B]), thetas, 0)
 
     @property
     def is_high_degree(self) -> bool:
@@ -121,23 +121,24 @@ class Tracer:
         thetas = np.concatenate([closer * thetas[0], thetas, np.pi - closer[::-1] * (np.pi - thetas[-1])])
         return thetas, terms_along(self.factors, self.radius, thetas)
 
-    def _by_phase(self, points: Floats, pairs: Floats, real: int) -> NDArray[np.int64]:
+    def _flags_by_phase(self, points: Floats, pairs: Floats, real: int) -> NDArray[np.int64]:
+        """Flags of walls (n, 2) by the phase along the circle, see `nyquist.phase_flags`."""
         return phase_flags(self.factors, self.radius, *self._circle, self.degree, points, pairs, real)
 
     @property
     def longest_step(self) -> float:
-        """Between samples of the circle: what is late by n samples turns n times as fast as z."""
+        """Largest step of theta between samples of the circle: a delay of n samples turns n times as fast as z."""
         late = self.factors.whole_delay + len(self.factors.window)
         return min(LONGEST_STEP, 0.5 / late)
 
     def polynomials_decide(self, theta: float) -> bool:
         """Whether polynomials alone can tell if the wall at one angle edges the stable set."""
-        return not self.is_high_degree and bool(self._flagged(np.array([theta]))[2][0])
+        return not self.is_high_degree and bool(self._walls_and_flags(np.array([theta]))[2][0])
 
     def edge_flag(self, theta: float) -> int:
         """Whether the wall at one angle edges the stable set: 1, -1, or 0 where nothing can tell."""
         one = np.array([theta])
-        K, B, flags = self._flagged(one)
+        K, B, flags = self._walls_and_flags(one)
         return int(flags[0] or self._edge_by_eigenvalues(one, K, B)[0])
 
     def _edge_by_eigenvalues(self, thetas: Floats, K: Floats, B: Floats) -> NDArray[np.int64]:
@@ -157,7 +158,7 @@ class Tracer:
     def stable(self, K: float, B: float) -> bool:
         """Whether all roots of a wall lie inside the circle; False too where rounding hides it."""
         if self.is_high_degree:
-            flag = int(self._by_phase(np.array([[K, B]]), np.zeros(1), 0)[0])
+            flag = int(self._flags_by_phase(np.array([[K, B]]), np.zeros(1), 0)[0])
         else:
             flag = is_stable(self.polynomials, K, B, work_array(self.degree))
         if flag == 0:
@@ -183,7 +184,7 @@ class Tracer:
     def edge_on_line(self, root: RealRoot, K: float, B: float) -> bool:
         """Whether a wall on that line has all its other roots inside."""
         if self.is_high_degree:
-            flag = int(self._by_phase(np.array([[K, B]]), np.zeros(1), 1)[0])
+            flag = int(self._flags_by_phase(np.array([[K, B]]), np.zeros(1), 1)[0])
         else:
             flag = edges_on_line(self.polynomials, int(root == "plus"), K, B, work_array(self.degree))
         if flag == 0:

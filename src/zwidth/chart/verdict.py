@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
 from zwidth.model.argument_checks import broadcast_walls, require
+from zwidth.progress import Progress
 from zwidth.result import Result
 
 Floats = NDArray[np.float64]
@@ -69,7 +70,7 @@ class WallVerdicts(Result):
 
 @dataclass(frozen=True, repr=False)
 class Verdicts(WallVerdicts):
-    """What eigenvalues say of walls (...); the frequency is that of the largest root, |arg z| / (2 pi T).
+    """Verdicts on walls (...) by eigenvalues; the frequency is that of the largest root, |arg z| / (2 pi T).
 
     spectral_radius  largest |z|
     uncertainty      half-width of the undecided band: 1e-9, more where the root is ill-conditioned
@@ -90,7 +91,7 @@ def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) 
 
 
 def spectral_radius(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
-    """Largest |z| (...) of walls K, B (...) that broadcast; nan among many for one that is not finite."""
+    """Largest |z| (...) of walls K, B (...) that broadcast; nan for one of many that is not finite."""
     return judge(loop, wall_stiffness, wall_damping).spectral_radius
 
 
@@ -107,13 +108,23 @@ def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Ver
     return verdicts(loop, wall_stiffness, wall_damping)
 
 
-def verdicts(loop: Loop | MultiLoop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
-    """`judge`, for loops of several directions, too."""
+def verdicts(
+    loop: Loop | MultiLoop,
+    wall_stiffness: ArrayLike,
+    wall_damping: ArrayLike,
+    progress: Progress | None = None,
+) -> Verdicts:
+    """`judge`, for loops of several directions, too.
+
+    progress  called with "walls", the walls judged, and all walls
+    """
     K, B = broadcast_walls(wall_stiffness, wall_damping)
-    judged = [
-        _judged(loop, K.ravel()[first : first + BATCH_SIZE], B.ravel()[first : first + BATCH_SIZE])
-        for first in range(0, max(K.size, 1), BATCH_SIZE)
-    ]
+    judged = []
+    for first in range(0, max(K.size, 1), BATCH_SIZE):
+        walls = slice(first, first + BATCH_SIZE)
+        judged.append(_judged(loop, K.ravel()[walls], B.ravel()[walls]))
+        if progress is not None:
+            progress("walls", min(first + BATCH_SIZE, K.size), K.size)
     verdict, frequency, radius, width = (
         np.concatenate(parts).reshape(K.shape) for parts in zip(*judged, strict=True)
     )

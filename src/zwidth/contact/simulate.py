@@ -23,6 +23,7 @@ from zwidth.loop.estimators import Foaw, Levant
 from zwidth.loop.loop import Loop
 from zwidth.memory_limit import check_memory
 from zwidth.model.argument_checks import require
+from zwidth.progress import Progress, watched
 from zwidth.threads import in_chunks
 
 Floats = NDArray[np.float64]
@@ -102,12 +103,14 @@ def simulate_batch(
     substeps: int = SUBSTEPS,
     trail: bool = False,
     ledger: bool = False,
+    progress: Progress | None = None,
 ) -> list[TimeResponse]:
     """Many runs at once, spread over the cores; each comes out as if it were alone.
 
     runs      of any loops, hands and starts;   environment  the one thing that all of them touch
     duration  of all runs, or of each [s]
     substeps  between samples, where something is nonlinear; a linear plant is exact with any
+    progress  called with "simulating", the samples done, and those of all runs
     Returns   one response for each run, in their order
     Raises    ValueError  for a duration or a number of substeps that cannot be meant, starts of a wrong shape
               TooLarge    where the result would not fit into memory
@@ -139,7 +142,8 @@ def simulate_batch(
         np.zeros((m, S if ledger else 0, ENTRIES)),
     )
     members = _members(runs, held_devices, index, plants)
-    in_chunks(partial(run_several, plants, own, members, samples, environment.address, records), m)
+    with watched(progress, "simulating", lambda: int(records.samples.sum()), int(samples.sum())):
+        in_chunks(partial(run_several, plants, own, members, samples, environment.address, records), m)
     return [
         TimeResponse.of(
             _plan(run, held_devices[index[i]], plants, index[i], int(samples[i]), environment), records, i

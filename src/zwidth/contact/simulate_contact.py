@@ -34,6 +34,7 @@ from zwidth.contact.time_response import TimeResponse
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_choice, check_number, require
 from zwidth.model.posture import PostureError
+from zwidth.progress import Progress
 
 WallSides = Literal["two-sided", "one-sided"]
 
@@ -78,6 +79,7 @@ def simulate_contact(
     seed: int = 0,
     trail: bool = True,
     seconds_to_hear: Callable[[float], float] | None = None,
+    progress: Progress | None = None,
 ) -> ContactSimulation:
     """Simulate what happens when a device touches a wall, or something else.
 
@@ -102,6 +104,7 @@ def simulate_contact(
     seed               of the encoders' noise
     trail              keep the handle's position after each substep
     seconds_to_hear    of a run that is to be heard: seconds that it lasts at least, by its frequency [Hz]
+    progress           called with "simulating", the samples done, and all samples
     Raises  ContactArgumentError  for arguments that do not go together, that the environment does not take, or
                                   that need an operator
             OutOfWorkspaceError   (one of these) for a start or a wall that the handle cannot be moved to
@@ -155,7 +158,9 @@ def simulate_contact(
         runs.insert(0, replace(run, passivity=PassivityController(passivity_damping)))
     controlled = len(runs) > 1
     substeps = needed_substeps(loop, hand, substeps)
-    simulate = partial(simulate_batch, runs, touched, substeps=substeps, trail=trail, ledger=True)
+    simulate = partial(
+        simulate_batch, runs, touched, substeps=substeps, trail=trail, ledger=True, progress=progress
+    )
     if duration is not None:
         length = RunLength(duration, "as requested")
         responses = simulate(duration=duration)

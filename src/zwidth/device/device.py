@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from zwidth.model.operator import Operator
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model
+    from zwidth.progress import Progress
     from zwidth.study.sensitivity_result import Sensitivities
 
 
@@ -221,13 +222,15 @@ class Device:
         """A measure by its name, or one of your own, at the device's reference; see `OperatingPoint.measure`."""
         return self.at().measure(measure, stiffness=stiffness, damping=damping, frequency=frequency)
 
-    def sensitivities(self, point: OperatingPoint | None = None) -> Sensitivities:
+    def sensitivities(
+        self, point: OperatingPoint | None = None, progress: Progress | None = None
+    ) -> Sensitivities:
         """How the largest stiffness answers to each number of the device; see `study.sensitivity.sensitivities`.
 
         point  where: `device.at(...)`; left out: the reference
         """
         point = point or self.at()
-        return _verbs.device_sensitivities(self, point).about(point)
+        return _verbs.device_sensitivities(self, point, progress).about(point)
 
     def report(self, path: str | os.PathLike[str], point: OperatingPoint | None = None) -> dict[str, Any]:
         """Write everything about the device into one HTML file; returns the numbers in it. See `write_report`.

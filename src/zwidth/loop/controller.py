@@ -49,9 +49,9 @@ class Controller:
     velocity                how the velocity is estimated
     force_filter            F, acts on the whole force; None: none
     actuator_time_constant  tau of the actuator, tau a' + a = held force [s]; 0: none
-    force_limit              largest force that is commanded [N]; charts know nothing of it
-    Raises  TypeError   for an estimate or a filter that is none
-            ValueError  for a number out of range, a prewarped cutoff from half the sampling frequency on
+    force_limit             largest force that is commanded [N]; charts leave it out
+    Raises  TypeError   for a velocity estimate or a filter of another type
+            ValueError  for a number out of range, or a prewarped cutoff at or above half the sampling frequency
     """
 
     sampling_period: float
@@ -76,7 +76,7 @@ class Controller:
                 raise wrong_type(name, "a FirstOrder, a Butterworth or None", low_pass)
             if not isinstance(low_pass, Butterworth) or low_pass.discretisation == "tustin":
                 continue
-            if low_pass.cutoff_Hz >= 0.5 / T:  # which prewarping would send beyond infinity
+            if low_pass.cutoff_Hz >= 0.5 / T:  # tan(pi cutoff T) is infinite or negative there
                 raise ValueError(
                     f"{name}: cutoff_Hz must be below half the sampling frequency, {0.5 / T:.10g} Hz, got "
                     f"{low_pass.cutoff_Hz:.10g}"

@@ -1,4 +1,4 @@
-"""A first-order form between samples: exact hold, as one chain of second-order factors and as states."""
+"""A plant in first-order form, sampled with an exact hold: as states, and as one chain of second-order factors."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from zwidth.model.first_order_form import FirstOrderForm, invariant_subspace
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-# Ratio of rates from which what rounding leaves of fast motions can spoil the slow ones.
+# Motions slower than this share of the fast ones' rate can lose digits to what rounding leaves of the fast ones.
 MUCH_SLOWER = 0.3
-SLOW = 0.03  # rates below this share of the sampling rate creep all alike
+SLOW = 0.03  # rates below this share of the sampling rate count as equally slow
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ class SampledForm:
     """X_{j+1} = X_j + growth X_j + new u + old u_before,   y = output . X + direct_new u + direct_old u_before
 
     growth      (k, k)  E = exp(A T) - 1
-    new, old    (k,)    what this interval's force, and the one before it, leave; with an actuator lag u is
-                        the force after the factor 1/(d + s) of `loop.hold`
-    output      (k,)
+    new, old    (k,)    change of the states per unit of this interval's force, and of the one before it; with an
+                        actuator lag u is the force after the factor 1/(d + s) of `loop.hold`
+    output      (k,)    reading per unit of each state
     direct_new, direct_old   0 without lag
     """
 
@@ -38,9 +38,9 @@ class SampledForm:
 
 
 def sample_form(form: FirstOrderForm, period: float, fraction: float = 0.0, lag: float = 0.0) -> SampledForm:
-    """The form sampled: exact hold, split by the fractional delay f, through an actuator lag [s].
+    """Sample a form: exact hold over a period T [s], split by a fraction f [samples], through an actuator lag [s].
 
-    With lag the states also feel the force left from before, P a, and with Q what a command leaves
+    With lag, P are the states after T from a unit lagged force without command, Q those from a unit command:
 
         (d + s) y = output Q + output (d - E)^-1 [ s_in P + (s + E) Q ]
     """
@@ -58,12 +58,12 @@ def sample_form(form: FirstOrderForm, period: float, fraction: float = 0.0, lag:
 def form_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floats:
     """The chain as rows (m, 8), each but the first divided by the denominators of those before it too.
 
-    With quadratics D_i of its sampled poles less 1 two by two
+    With the quadratics D_i in d whose roots are two of the sampled poles each
 
         c (d - E)^-1 G = sum_i [ c G_i d + c (E + d1_i) G_i ] / (D_1 ... D_i),     G_1 = G,  G_{i+1} = D_i(E) G_i
 
     (Newton's form: D(d) - D(E) = (d - E)(d + E + d1), and the product of all D_i(E) is zero). Nothing cancels
-    where poles coincide; fast poles come first, so that each row adds what is slower. Hidden poles would come
+    where poles coincide; fast poles come first, so that each row adds slower motions. Hidden poles would come
     last, with rows that nothing reaches. D_i(E) shrinks slow motions, while rounding leaves something of the fast
     ones that it should have removed: where the rest is much slower, G is cleared of them.
     """
@@ -76,7 +76,7 @@ def form_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floa
         if rate < MUCH_SLOWER * fastest:
             if i:
                 fast = invariant_subspace(form, np.concatenate(pairs[:i]))
-                parts = [(direct, _cleared(G, *fast)) for direct, G in parts]
+                parts = [(direct, _without_subspace(G, *fast)) for direct, G in parts]
             fastest = rate
         e = sampled_poles(pair, period)
         d1, d0 = float(-np.sum(e).real), float(np.prod(e).real)
@@ -90,8 +90,8 @@ def form_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floa
     return np.array(rows).reshape(-1, 8)
 
 
-def _cleared(G: Floats, right: Floats, left: Floats) -> Floats:
-    """G without its part in a subspace, wherever that part is more than the rounding of this product."""
+def _without_subspace(G: Floats, right: Floats, left: Floats) -> Floats:
+    """G without its part in a subspace, in entries where that part is more than the rounding of this product."""
     part = right @ (left.T @ G)
     rounding = 1e-15 * (np.abs(right) @ (np.abs(left.T) @ np.abs(G)))
     return G - np.where(np.abs(part) > rounding, part, 0.0)

@@ -30,7 +30,7 @@ class Estimator:
 class NonlinearError(ValueError):
     """A velocity estimate that is not linear has no transfer function w(z).
 
-    estimate  what it is called
+    estimate  its name, such as "Levant's differentiator"
     """
 
     def __init__(self, estimate: str) -> None:
@@ -41,5 +41,5 @@ class NonlinearError(ValueError):
         )
 
     def __reduce__(self) -> tuple[type[NonlinearError], tuple[str]]:
-        """Made again from the estimate's name: an error that a worker raises is sent as what it was made of."""
+        """How pickle rebuilds the error in another process: from the estimate's name."""
         return type(self), (self.estimate,)

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 
 class Factors(NamedTuple):
-    """A loop as the kernels take it.
+    """A loop as arrays and numbers, the form in which the kernels take it.
 
     rows                                     (m, 9)  plant sections, see `loop.sections`
     whole_delay, split                       whole samples of delay, and 1 if the rest of the delay splits the hold
@@ -46,7 +46,7 @@ class Factors(NamedTuple):
 
 
 def factor_arrays(loop: Loop) -> Factors:
-    """The loop's factors."""
+    """The factors of a loop. Raises what `loop.sections.sampled_sections` raises."""
     return computer_factors(loop.controller)._replace(rows=loop.sections.rows)
 
 
@@ -95,7 +95,7 @@ def plant_response(factors: Factors, z: complex, d: complex) -> tuple[complex, c
     rows = factors.rows
     P = 0.0 + 0.0j
     slope = 0.0 + 0.0j
-    before = 1.0 + 0.0j  # what the denominators of a chain's earlier rows divide by, and its slope
+    before = 1.0 + 0.0j  # 1 / the product of the denominators of a chain's earlier rows, and its slope
     before_slope = 0.0 + 0.0j
     back = divide(1.0 + 0.0j, z)
     for k in range(rows.shape[0]):
@@ -238,7 +238,7 @@ def _plant_numerator(
             if j < first or j > k:
                 bilinear(1.0, rows[j, 0], rows[j, 1], 2, radius, factor)
                 at = _times(part, at, factor, 2, spare)
-        for _ in range(k - first):  # divided by more than its own pair of poles
+        for _ in range(k - first):  # a pair of poles more each: (1 - s)^2 for the common degree
             for _ in range(2):
                 at = _times(part, at, np.array([1.0, -1.0, 0.0]), 1, spare)
         for i in range(at + 1):
@@ -274,8 +274,11 @@ def _window_polynomial(window: Floats, radius: float, N: int, spare: Floats) -> 
 
 @compiled
 def _wall_polynomials(factors: Factors, N: int, radius: float, plant: Floats, degree: int, out: Floats) -> None:
-    """N_P, of some degree in `plant`, times D_w into out[0] and times N_w into out[1], both with the force path's
-    numerators and times the power of (1 - s) that is missing."""
+    """S = N_P D_w into out[0] and V = N_P N_w into out[1], both with the force path's numerators and times the
+    power of (1 - s) that brings them to degree N.
+
+    plant, degree  N_P and its degree; `plant` is overwritten
+    """
     spare, n = np.zeros(N + 3), factors.window.shape[0]
     for _ in range(factors.whole_delay):
         degree = _times(plant, degree, np.array([1.0, -1.0, 0.0]), 1, spare)

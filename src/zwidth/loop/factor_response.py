@@ -10,7 +10,7 @@ Complexes = NDArray[np.complex128]
 
 
 def factor_response(numerator: Floats, denominator: Floats, d: Complexes) -> Complexes:
-    """Product of factors (c2 d^2 + c1 d + c0) at d = z - 1."""
+    """Product of factors numerator / denominator, rows (k, 3) of c2 d^2 + c1 d + c0, at d = z - 1 (...)."""
     out = np.ones_like(d)
     for top, bottom in zip(numerator, denominator, strict=True):
         out *= np.polyval(top, d) / np.polyval(bottom, d)
@@ -18,17 +18,17 @@ def factor_response(numerator: Floats, denominator: Floats, d: Complexes) -> Com
 
 
 def window_response(window: Floats, z: Complexes) -> Complexes:
-    """sum_k window_k z^-k"""
+    """sum_k window_k z^-k at complex z (...)."""
     return np.asarray(np.polyval(window[::-1], 1.0 / z), dtype=complex)
 
 
 def rows_response(rows: Floats, split: bool, z: Complexes) -> Complexes:
-    """Sum over sections, see `loop.sections`."""
+    """Response (...) of plant sections (`loop.sections`) at complex z (...), without force path, whole delay."""
     d = z - 1.0
     out, over = np.zeros_like(d), np.ones_like(d)
     for row in rows:
-        own = (d + row[0]) * d + row[1]
-        over = over / own if row[8] else 1.0 / own
+        quadratic = (d + row[0]) * d + row[1]
+        over = over / quadratic if row[8] else 1.0 / quadratic
         top = (row[2] * d + row[3]) * d + row[4]
         if split:
             top += ((row[5] * d + row[6]) * d + row[7]) / z

@@ -1,4 +1,4 @@
-"""A discrete filter written as factors, as states: y = c x + d u, x_{j+1} = (1 + A) x_j + b u_j."""
+"""A discrete filter, given by factors, in states: x_{j+1} = (1 + A) x_j + input u_j,  y = output x + direct u."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class FilterStates:
 
 
 def filter_states(numerator: Floats, denominator: Floats, window: Floats) -> FilterStates:
-    """The product of factors and of a window, each factor behind the one before it.
+    """States of a window and a product of factors in series, the window first.
 
     numerator, denominator  (k, 3)  rows c2, c1, c0 of  c2 d^2 + c1 d + c0;  denominators monic, of at least the
                                     numerator's degree

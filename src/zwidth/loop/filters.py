@@ -54,7 +54,7 @@ def butterworth_factors(low_pass: Butterworth, period: float) -> tuple[Rows, Row
 
 
 def low_pass_factors(low_pass: FirstOrder | Butterworth | None, period: float) -> tuple[Rows, Rows]:
-    """The factors of any low pass; none for None."""
+    """Numerator and denominator factors of a low pass; two empty lists for None."""
     match low_pass:
         case FirstOrder():
             return first_order_factors(low_pass, period)
@@ -64,29 +64,34 @@ def low_pass_factors(low_pass: FirstOrder | Butterworth | None, period: float) -
             return [], []
 
 
-def _stacked(rows: Rows) -> Floats:
+def _factor_array(rows: Rows) -> Floats:
+    """Rows as an array (k, 3), for no rows too."""
     return np.array(rows, dtype=float).reshape(-1, 3)
 
 
 def force_filter(controller: Controller) -> Filter:
     """Filter of the whole force, F(z)."""
     top, bottom = low_pass_factors(controller.force_filter, controller.sampling_period)
-    return Filter(_stacked(top), _stacked(bottom))
+    return Filter(_factor_array(top), _factor_array(bottom))
 
 
 def force_path(controller: Controller) -> Filter:
-    """The force filter, then the actuator's lag 1/(d + s), whose numerators `loop.hold` has."""
-    own, lag = force_filter(controller), controller.actuator_time_constant
+    """The force filter, then the actuator's lag 1/(d + s); the lag's numerators are in the rows of `loop.hold`."""
+    low_pass, lag = force_filter(controller), controller.actuator_time_constant
     if not lag > 0.0:
-        return own
+        return low_pass
     share = lag_share(controller.sampling_period, lag)
-    return Filter(np.vstack([own.numerator, [[0.0, 0.0, 1.0]]]), np.vstack([own.denominator, [[0.0, 1.0, share]]]))
+    return Filter(
+        np.vstack([low_pass.numerator, [[0.0, 0.0, 1.0]]]), np.vstack([low_pass.denominator, [[0.0, 1.0, share]]])
+    )
 
 
 def velocity_estimator(controller: Controller) -> Estimator:
     """The controller's velocity estimate through its velocity filter."""
-    own = controller.velocity.estimator(controller.sampling_period)
+    estimate = controller.velocity.estimator(controller.sampling_period)
     top, bottom = low_pass_factors(controller.velocity_filter, controller.sampling_period)
     return Estimator(
-        np.vstack([own.numerator, _stacked(top)]), np.vstack([own.denominator, _stacked(bottom)]), own.window
+        np.vstack([estimate.numerator, _factor_array(top)]),
+        np.vstack([estimate.denominator, _factor_array(bottom)]),
+        estimate.window,
     )

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-_INSTEAD = {
+# What to write instead, by the type given as a plant.
+_HINTS = {
     "Device": "write device.at().loop",
     "MultiPlant": "write MultiLoop(plant, controller) for several directions",
 }
@@ -35,7 +36,7 @@ _INSTEAD = {
 
 @dataclass(frozen=True, init=False, repr=False)
 class Loop:
-    """A plant under a sampled wall law. Everything that a chart needs is derived once and kept.
+    """A plant under a sampled wall law. What a chart needs of it is computed once, at first use.
 
     >>> Loop(Plant.one_mass(0.3), sampling_period=0.001).transition_matrix(1000.0, 1.0).shape
     (3, 3)
@@ -55,16 +56,19 @@ class Loop:
         """Close the loop of a plant with a controller, or with a plain one of this period and delay.
 
         sampling_period  T [s];   delay  from reading to force [samples], any real >= 0
-        Raises  TypeError   for anything but a plant and a controller, or neither controller nor period
+        Raises  TypeError   for anything but a plant and a controller, or for neither a controller nor a period
                 ValueError  for a plant that holds nan, a controller beside a period or delay, numbers out of range
         """
-        require("plant", plant, Plant, _INSTEAD.get(type(plant).__name__, ""))
+        require("plant", plant, Plant, _HINTS.get(type(plant).__name__, ""))
         if controller is None:
             if sampling_period is None:
                 raise TypeError("Loop needs a controller or a sampling period; write sampling_period=0.001")
             controller = Controller(sampling_period, delay)
         elif sampling_period is not None or delay:
-            raise ValueError("the controller has a sampling period and a delay of its own; leave these out")
+            raise ValueError(
+                "the controller has its own sampling period and delay; leave out sampling_period and delay, or "
+                "write Controller(sampling_period, delay)"
+            )
         require("controller", controller, Controller)
         plant.check_numbers()
         object.__setattr__(self, "plant", plant)
@@ -102,8 +106,8 @@ class Loop:
     def nonlinear(self) -> Nonlinear:
         """The nonlinear parts of plant and computer, except a nonlinear velocity estimate; the force limit is
         the smaller of the actuator's and the computer's."""
-        own = self.plant.nonlinear
-        return replace(own, force_limit=min(own.force_limit, self.controller.force_limit))
+        parts = self.plant.nonlinear
+        return replace(parts, force_limit=min(parts.force_limit, self.controller.force_limit))
 
     @cached_property
     def sections(self) -> Sections:
@@ -122,19 +126,17 @@ class Loop:
         return velocity_estimator(self.controller)
 
     def plant_response(self, z: ArrayLike) -> Complexes:
-        """P(z) (...) from force command to reading, at complex z (...): hold, delay, filter and lag included."""
+        """P(z) (...) from force command to reading [m/N], at complex z (...), with hold, delay, filter and lag."""
         at: Complexes = np.asarray(z, dtype=complex)
         force, split = self.force_path, self.fractional_delay > 0.0
         passed = factor_response(force.numerator, force.denominator, at - 1.0) / at**self.whole_delay
         return np.asarray(rows_response(self.sections.rows, split, at) * passed)
 
     def velocity_response(self, z: ArrayLike) -> Complexes:
-        """w(z) (...), the velocity estimate per reading, at complex z (...)."""
+        """w(z) (...), the velocity estimate per reading [1/s], at complex z (...)."""
         at: Complexes = np.asarray(z, dtype=complex)
-        own = self.estimator
-        return np.asarray(
-            factor_response(own.numerator, own.denominator, at - 1.0) * window_response(own.window, at)
-        )
+        w = self.estimator
+        return np.asarray(factor_response(w.numerator, w.denominator, at - 1.0) * window_response(w.window, at))
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:

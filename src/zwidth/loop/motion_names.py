@@ -1,4 +1,4 @@
-"""Names for people of motions that no wall moves."""
+"""Names, in results and messages, of motions that no wall moves."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from math import pi, sqrt
 
 
 def motion_name(squared: float, decay: float) -> str:
-    """A motion's name for people."""
+    """Name of a motion by its natural frequency and damping.
+
+    squared  natural frequency squared [1/s^2]; negative for a negative stiffness
+    decay    rate at which it decays [1/s], the damping ratio times the natural frequency
+    """
     if squared <= 0.0:
         return "rigid motion (0 Hz)" if squared == 0.0 else "unstable motion (negative stiffness)"
     rate = sqrt(squared)
@@ -16,7 +20,7 @@ def motion_name(squared: float, decay: float) -> str:
 
 
 def pole_name(pole: complex) -> str:
-    """Name of a motion with a pole of its own; a braked free motion stays where it is left, at 0 Hz."""
+    """Name of a motion by its pole [1/s]; a free motion with damping stays where it is left: its pole is 0."""
     if pole == 0.0:
         return motion_name(0.0, 0.0)
     if pole.imag != 0.0:
@@ -25,15 +29,16 @@ def pole_name(pole: complex) -> str:
 
 
 def group_names(names: Sequence[str]) -> list[str]:
-    """Names of motions, equal ones together under their number.
+    """Names of motions, equal ones as one name with their number.
 
     >>> group_names(["rigid motion (0 Hz)", "mode at 101 Hz", "rigid motion (0 Hz)"])
     ['2 rigid motions (0 Hz)', 'mode at 101 Hz']
     """
-    return [_many(name, count) if count > 1 else name for name, count in Counter(names).items()]
+    return [_plural(name, count) if count > 1 else name for name, count in Counter(names).items()]
 
 
-def _many(name: str, count: int) -> str:
+def _plural(name: str, count: int) -> str:
+    """A name for several equal motions."""
     for noun in ("motion", "mode"):
         name = name.replace(noun, f"{noun}s", 1)
     return f"{count} {name}"

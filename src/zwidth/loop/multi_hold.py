@@ -1,9 +1,9 @@
-"""A plant with several rendered directions between samples: what walls move of it, held exactly.
+"""A plant with several rendered directions, sampled with an exact hold: the part of it that walls move.
 
 The mechanical states are undamped modes, each with its velocity in units of its own rate, so that slow and fast
-modes have entries of one size. What no wall moves or no encoder sees is left out: of modes with equal poles the
-m x m residue says how many motions the walls know of (its rank), of modes coupled by damping each damped mode's
-residue does.
+modes have entries of one size. Motions that no wall moves or no encoder reads are left out: of modes with equal
+poles as many remain as the rank of their m x m residue; of modes coupled by damping, those remain whose own
+residue is more than rounding.
 
 A delay of l + f samples splits the interval: the older force acts for f T, the newer for (1 - f) T. With
 Gamma(t) the integral of exp(A s) over [0, t], one exponential of the augmented matrix [A, 1; 0, 0] each,
@@ -26,13 +26,13 @@ from zwidth.model.multi_plant import MultiPlant
 
 Floats = NDArray[np.float64]
 
-# Condition of damped modes beyond which their residues say nothing.
+# Condition number of the damped modes' eigenvectors above which their residues are only rounding.
 DEFECTIVE = 1e7
 
 
 @dataclass(frozen=True)
 class ContinuousPlant:
-    """x' = A x + B f,  y = C x: what walls move of a plant.
+    """x' = A x + B f,  y = C x: the part of a plant that walls move.
 
     A (N, N), B (N, m), C (m, N)
     unobserved  names of the motions that were left out
@@ -60,7 +60,8 @@ class SampledPlant:
 def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> ContinuousPlant:
     """The motions that walls move and encoders read, in states of comparable size.
 
-    What moves them is a force held for a sampling period T [s], after the fraction f of a delay.
+    period    T [s], for which each force is held
+    fraction  f, fractional part of the delay [samples]
     """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
@@ -74,18 +75,18 @@ def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> Conti
     inputs, outputs = shapes.T @ plant.actuators.T, plant.sensors @ shapes
     total = float(np.linalg.norm(inputs, axis=1).sum() * np.linalg.norm(outputs, axis=0).sum())
     coupled = np.abs(damping - np.diag(np.diag(damping))) > REPEATED * level
-    from scipy.sparse.csgraph import connected_components  # heavy: a fifth of a second with what it imports
+    from scipy.sparse.csgraph import connected_components  # imported here: it takes 0.2 s
 
-    count, of = connected_components(coupled, directed=False)
-    alone = np.array([int(np.sum(of == of[k])) == 1 for k in range(len(of))], dtype=bool)
-    same = [float(REPEATED * scale), float(REPEATED * level)]
+    count, block_of = connected_components(coupled, directed=False)
+    alone = np.array([int(np.sum(block_of == number)) == 1 for number in block_of], dtype=bool)
+    tolerances = [float(REPEATED * scale), float(REPEATED * level)]
     parts = [
         _equal_poles(squared[k], damping[k, k], inputs[group], outputs[:, group], (period, fraction), total)
-        for group in _groups(squared, np.diag(damping), np.flatnonzero(alone), same)
+        for group in _groups(squared, np.diag(damping), np.flatnonzero(alone), tolerances)
         for k in group[:1]
     ]
     for c in range(count):
-        members = np.flatnonzero(of == c)
+        members = np.flatnonzero(block_of == c)
         if len(members) > 1:
             block = damping[np.ix_(members, members)]
             parts.append(_coupled(squared[members], block, inputs[members], outputs[:, members], period))
@@ -100,13 +101,13 @@ def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> Conti
     )
 
 
-def _groups(squared: Floats, drag: Floats, members: NDArray[np.int64], same: list[float]) -> list[list[int]]:
-    """Members of equal frequency and damping."""
+def _groups(squared: Floats, drag: Floats, members: NDArray[np.int64], tolerances: list[float]) -> list[list[int]]:
+    """Modes in groups of equal frequency squared and damping, within tolerances [1/s^2] and [1/s]."""
     groups: list[list[int]] = []
     for k in members.tolist():
         for group in groups:
             g = group[0]
-            if abs(squared[k] - squared[g]) <= same[0] and abs(drag[k] - drag[g]) <= same[1]:
+            if abs(squared[k] - squared[g]) <= tolerances[0] and abs(drag[k] - drag[g]) <= tolerances[1]:
                 group.append(k)
                 break
         else:
@@ -129,7 +130,7 @@ def _pairs(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, pe
 def _equal_poles(
     squared: float, drag: float, inputs: Floats, outputs: Floats, sampling: tuple[float, float], total: float
 ) -> ContinuousPlant:
-    """Modes of one pair of poles: as many as the rank of their residue, by its singular values."""
+    """States of modes with equal poles: as many modes as the rank of their residue, by its singular values."""
     period, decay = sampling[0], drag / 2.0
     left, strength, right = np.linalg.svd(outputs @ inputs)
     level = total * (UNOBSERVED_UNDAMPED if abs(decay) * period < 1e-9 else UNOBSERVED)
@@ -141,7 +142,7 @@ def _equal_poles(
 
 
 def _reach(squared: float, drag: float, period: float, fraction: float) -> float:
-    """How far a held force moves a mode, in shares of a free mass: none at multiples of the sampling rate."""
+    """Motion of a mode by a held force, as a share of a free mass's; 0 at multiples of the sampling rate."""
     one = np.ones((1, 1))
     mode = _pairs(np.array([squared]), np.array([[drag]]), one, one, period)
     held = sample_plant(mode, period, fraction, 0.0)
@@ -164,7 +165,7 @@ def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, 
         return whole
     names = [pole_name(poles[k]) for k in np.flatnonzero(~keep & (poles.imag >= 0.0))]
     chosen = np.flatnonzero(keep & (poles.imag >= 0.0))
-    # real and imaginary parts of the kept eigenvectors span what stays
+    # real and imaginary parts of the chosen eigenvectors span the part that remains
     basis = np.hstack([np.column_stack([right[:, k].real, right[:, k].imag]) for k in chosen])
     basis = basis[:, np.linalg.norm(basis, axis=0) > 0.0]
     dual = np.linalg.inv(right)
@@ -175,7 +176,7 @@ def _coupled(squared: Floats, damping: Floats, inputs: Floats, outputs: Floats, 
 
 
 def sample_plant(motion: ContinuousPlant, period: float, fraction: float, lag: float) -> SampledPlant:
-    """The motion under forces held for a period T [s], with a fraction f of delay and a lag tau [s]."""
+    """Sample a motion: forces held for a period T [s], a fractional delay f [samples], an actuator lag tau [s]."""
     A, B, C = motion.A, motion.B, motion.C
     N, m = B.shape
     if lag > 0.0:

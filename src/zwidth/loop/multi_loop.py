@@ -82,21 +82,21 @@ class MultiLoop:
     @cached_property
     def estimator(self) -> FilterStates:
         """The velocity estimate w(z), the same along each direction."""
-        own = velocity_estimator(self.controller)
-        return filter_states(own.numerator, own.denominator, own.window)
+        w = velocity_estimator(self.controller)
+        return filter_states(w.numerator, w.denominator, w.window)
 
     @cached_property
     def force_filter(self) -> FilterStates:
-        """F(z), what the force of each direction passes before the hold."""
-        own = force_filter(self.controller)
-        return filter_states(own.numerator, own.denominator, np.ones(1))
+        """F(z), the filter of each direction's force before the hold."""
+        F = force_filter(self.controller)
+        return filter_states(F.numerator, F.denominator, np.ones(1))
 
     def plant_response(self, z: ArrayLike) -> Complexes:
-        """P(z) (..., m, m) from force commands to readings at complex z (...), hold to filter included."""
+        """P(z) (..., m, m) from force commands to readings [m/N] at complex z (...), hold to filter included."""
         return self.plant_slope(z)[0]
 
     def velocity_response(self, z: ArrayLike) -> Complexes:
-        """w(z) (...), the velocity estimate per reading, at complex z (...)."""
+        """w(z) (...), the velocity estimate per reading [1/s], at complex z (...)."""
         return self.estimator.response(z)[0]
 
     def plant_slope(self, z: ArrayLike, d: ArrayLike | None = None) -> tuple[Complexes, Complexes]:
@@ -107,7 +107,7 @@ class MultiLoop:
         resolvent = away[..., None, None] * np.eye(len(held.step)) - held.step
         try:
             inner = np.linalg.solve(resolvent, held.new + held.old / at)
-        except np.linalg.LinAlgError:  # on an undamped pole: step aside by a rounding
+        except np.linalg.LinAlgError:  # z is an undamped pole: move it by one rounding error
             return self.plant_slope(z * (1.0 + 1e-15j), away + 1e-15j * z)
         slope = -np.linalg.solve(resolvent, inner + held.old / at**2)
         F, dF = self.force_filter.response(z, away)
@@ -117,7 +117,8 @@ class MultiLoop:
         return gain * P, gain * dP + dgain * P
 
     def inverse_slope(self, z: Complexes, d: Complexes) -> tuple[Complexes, Complexes]:
-        """P^-1 and its derivative, (..., m, m), without forming P: near z = 1 a free motion's 1/d^2 hides others.
+        """P^-1 and its derivative, (..., m, m), without forming P: near z = 1 the 1/d^2 of a free motion
+        hides the others in rounding.
 
         The forces f that give the readings y solve  [d - A, -G; C, 0] [x; f] = [0; y].
         Raises LinAlgError where the readings are not independent.
@@ -128,10 +129,10 @@ class MultiLoop:
         whole[..., :N, :N] = d[..., None, None] * np.eye(N) - held.step
         whole[..., :N, N:] = -(held.new + held.old / at)
         whole[..., N:, :N] = held.reading
-        wanted = np.zeros((*z.shape, N + m, m), dtype=complex)
-        wanted[..., N:, :] = np.eye(m)
-        solution = np.linalg.solve(whole, wanted)
-        change = np.zeros_like(wanted)
+        right_side = np.zeros((*z.shape, N + m, m), dtype=complex)
+        right_side[..., N:, :] = np.eye(m)
+        solution = np.linalg.solve(whole, right_side)
+        change = np.zeros_like(right_side)
         change[..., :N, :] = -solution[..., :N, :] - (held.old / at**2) @ solution[..., N:, :]
         slope = np.linalg.solve(whole, change)[..., N:, :]
         F, dF = self.force_filter.response(z, d)
@@ -151,7 +152,7 @@ class MultiLoop:
         states = np.eye(N)
         position = held.reading @ states[x]
         velocity = w.direct * position + np.kron(w.output[None], one) @ states[e]
-        # the command: `direct` times the wall's own force, and what the filter holds of its past
+        # the command: `direct` times the wall's force now, plus the filter's states
         past = np.kron(F.output[None], one) @ states[f]
         open_, enters = np.zeros((N, N)), np.zeros((N, m))
         open_[x] = states[x] + held.step @ states[x]
@@ -171,7 +172,8 @@ class MultiLoop:
     def transition_matrix(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
         """The map Z_{j+1} = L Z_j (thesis eq. 2.38) for walls K, B of any shape (...): (..., N, N).
 
-        N = moved states + m (delayed forces + states of estimator and filter). Unobserved motions are left out.
+        N = states that walls move + m (delayed forces + states of estimator and filter). Unobserved motions are
+        left out.
         """
         K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
         open_, enters, position, velocity = self.affine

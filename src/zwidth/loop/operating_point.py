@@ -1,4 +1,4 @@
-"""The operating point: where a device is linearised, with all that a question adds to the device."""
+"""The operating point: a device in one posture or in many, with direction, model, computer and operator."""
 
 from __future__ import annotations
 
@@ -58,10 +58,10 @@ PROJECTION_TOLERANCE: Final = 0.01
 
 @dataclass(frozen=True, repr=False)
 class OperatingPoint:
-    """A device in one posture or in many, rendering one direction or several at once in each, and who holds it.
+    """A device in one posture or in many, rendering one direction or several at once in each, and its operator.
 
-    Just one of mechanism, given_plant and response is there. A mechanism comes with postures and directions, whose
-    leading axes broadcast to `shape`; a given plant and a response have one posture, of shape ().
+    Exactly one of mechanism, given_plant and response is given. A mechanism comes with postures and directions,
+    whose leading axes broadcast to `shape`; a given plant and a response have one posture, of shape ().
 
     controller          the computer that closes the loop
     mechanism           links, joints, loops and drives
@@ -74,9 +74,9 @@ class OperatingPoint:
     damping             of the mechanism's flexible modes
     encoders            what a mechanism's encoders read: "motor" or "link"
     operator            the arm and grasp at the handle; None: nobody
-    operator_name       what he is called; None: nobody
+    operator_name       the operator's name in results; None: nobody
     friction_known, resolution_known   whether the dry friction, and the encoders' step, are given, 0 included
-    name                what the device is called in results and figures
+    name                the device's name in results and figures
     requested_position  position as requested, before it was projected; None: the device's reference
     """
 
@@ -97,17 +97,20 @@ class OperatingPoint:
     requested_position: Position | Floats | None = None
 
     def __post_init__(self) -> None:
-        """Raise ValueError for what does not go together."""
+        """Raise ValueError for arguments that exclude each other."""
         check_choice("encoders", self.encoders, get_args(Encoders))
         kinds = (self.mechanism, self.given_plant, self.response)
         if sum(kind is not None for kind in kinds) != 1:
             raise ValueError(
-                "an operating point has a mechanism, a given plant or a response, and just one of them"
+                "an operating point takes exactly one of mechanism, given_plant and response, got "
+                f"{sum(kind is not None for kind in kinds)} of them; device.at() gives an operating point"
             )
         if (self.mechanism is None) != (self.posture is None) or (self.posture is None) != (
             self.directions is None
         ):
-            raise ValueError("postures and directions are those of a mechanism, which has both")
+            raise ValueError(
+                "postures and directions must both be given with a mechanism, and left out without one"
+            )
 
     def __repr__(self) -> str:
         held = f", held by {self.operator_name or 'an operator'}" if self.operator is not None else ""
@@ -130,7 +133,7 @@ class OperatingPoint:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Leading axes of everything; () for a single posture with its directions."""
+        """Shape of the leading axes of all arrays; () for a single posture with its directions."""
         return () if self.posture is None else self.posture.status.shape
 
     @property
@@ -151,22 +154,22 @@ class OperatingPoint:
             raise NoMechanismError
         if self.direction_count > 1:
             raise OperatingPointError(
-                f"{self.direction_count} directions are rendered together here; ask for .directions"
+                f"{self.direction_count} directions are rendered together here, not a single one; read .directions"
             )
         return np.asarray(self.directions[..., 0, :])
 
     def __getitem__(self, index: Any) -> OperatingPoint:
         """One of the points, of shape (), or several, by leading axes; a device without a mechanism has one."""
-        return self if self.posture is None else self._indexed(lambda array: array[index])
+        return self if self.posture is None else self._change_axes(lambda array: array[index])
 
     @property
     def flat(self) -> OperatingPoint:
         """All points along one leading axis. Raises NoMechanismError for a device without a mechanism."""
         axes = self._posture.status.ndim
-        return self._indexed(lambda array: array.reshape(-1, *array.shape[axes:]))
+        return self._change_axes(lambda array: array.reshape(-1, *array.shape[axes:]))
 
-    def _indexed(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> OperatingPoint:
-        """The points with a change of the leading axes made to all their arrays."""
+    def _change_axes(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> OperatingPoint:
+        """The points with `change`, which changes the leading axes of an array, applied to all their arrays."""
         assert self.directions is not None
         return replace(self, posture=self._posture.with_axes(change), directions=change(self.directions))
 
@@ -230,7 +233,10 @@ class OperatingPoint:
 
     @cached_property
     def effective(self) -> EffectiveParameters:
-        """Masses and stiffness felt along the direction (...); nan where inapplicable."""
+        """Masses [kg] and stiffness [N/m] felt along the direction (...); nan where inapplicable.
+
+        Raises  OperatingPointError  for several directions, and for a measured response
+        """
         if self.mechanism is not None:
             return effective_parameters(self.mechanism, self._posture, self.direction)
         if self.given_plant is None:
@@ -263,9 +269,9 @@ class OperatingPoint:
         if displacement == 0.0:
             return 0.0
         # without forces across, a handle with few drives moves by the part of the direction that it can move along
-        moves = handle_motions(self._posture)
-        way = moves @ (moves.T @ self.direction)
-        goal = self._posture.position + displacement / (way @ self.direction) * way
+        motions = handle_motions(self._posture)
+        along = motions @ (motions.T @ self.direction)
+        goal = self._posture.position + displacement / (along @ self.direction) * along
         reached = solve_posture(self.mechanism, goal, self._posture.assembly, tolerance=PROJECTION_TOLERANCE)
         return float(reached.projected)
 
@@ -329,11 +335,11 @@ class OperatingPoint:
         return MultiLoop(self.plant_of_directions, self.controller)
 
     def _check_single(self, what: str) -> None:
-        """Raise OperatingPointError for several points; what: each of them has, and all have not in common."""
+        """Raise OperatingPointError for several points. what: the attribute that only a single point has."""
         if self.shape:
             raise OperatingPointError(
-                f"{_counted(self.shape)} have no .{what} in common; take one of them by its index, or ask for "
-                ".measure(name), which answers for all"
+                f"{_describe_points(self.shape)} have no .{what} in common; take one of them, such as "
+                f"point[{', '.join('0' for _ in self.shape)}], or call .measure(name), which computes all"
             )
 
     # --- verbs: each forwards to the function that computes the result ---------------------------------
@@ -342,20 +348,25 @@ class OperatingPoint:
         """The stable walls at a single point, exactly; see `chart.point_chart.chart_at`.
 
         radius  less than 1 for the walls whose slowest motion shrinks at least by that factor per sample
-        decay   False skips the search for the fastest-decaying walls, most of the time
+        decay   False skips the search for the fastest-decaying walls, which takes most of the time
         """
         return _verbs.chart(self, radius, decay).about(self)
 
-    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> WallVerdicts:
+    def check(
+        self, wall_stiffness: ArrayLike, wall_damping: ArrayLike, *, progress: Progress | None = None
+    ) -> WallVerdicts:
         """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast; see `chart.point_chart`."""
-        return _verbs.check(self, wall_stiffness, wall_damping).about(self)
+        return _verbs.check(self, wall_stiffness, wall_damping, progress).about(self)
 
-    def by_direction(self, plane: str | None = None, count: int = 72) -> ByDirection:
+    def by_direction(
+        self, plane: str | None = None, count: int = 72, *, progress: Progress | None = None
+    ) -> ByDirection:
         """The largest stiffness along directions round a plane; see `chart.polar.largest_stiffness_around`.
 
-        plane  "xy", "xz" or "yz"; left out: one that the handle can move all over
+        plane  "xy", "xz" or "yz"; left out: one in which the handle can move in every direction
+        count  number of directions, at least 3
         """
-        return _verbs.by_direction(self, plane, count).about(self)
+        return _verbs.by_direction(self, plane, count, progress).about(self)
 
     def describe(self) -> Description:
         """Masses, stiffness, frequencies and dexterity of the device without operator at a single point."""
@@ -390,10 +401,11 @@ class OperatingPoint:
         wall: tuple[float, float] | None = None,
         progress: Progress | None = None,
     ) -> Guarantees:
-        """The walls that are stable with every passive operator, every spring, and as they are; see
+        """The walls that are stable with every passive operator, with every spring, and without an operator; see
         `guarantees.loop_guarantees.guarantees_of`.
 
-        coupling  also virtual couplings;   wall  K, B that one of them is to render [N/m], [N s/m]
+        coupling  whether to compute virtual couplings too
+        wall      K, B of a wall that a virtual coupling is to render [N/m], [N s/m]
         """
         return _verbs.guarantees(self, coupling, wall, progress).about(self.without_operator)
 
@@ -422,6 +434,7 @@ class OperatingPoint:
         duration: float | None = None,
         substeps: int = 20,
         seed: int = 0,
+        progress: Progress | None = None,
     ) -> ContactSimulation:
         """Simulate contact with a wall, or another environment; see `contact.simulate_contact`, which has all
         arguments, for their meaning."""
@@ -445,6 +458,7 @@ class OperatingPoint:
             duration=duration,
             substeps=substeps,
             seed=seed,
+            progress=progress,
         )
 
     def move(
@@ -460,6 +474,7 @@ class OperatingPoint:
         counted: bool = True,
         torque_limits: Literal["each", "together"] = "each",
         seed: int = 0,
+        progress: Progress | None = None,
     ) -> MechanismMotion:
         """The large motion of the whole mechanism from here, at a surface or free; see
         `contact.simulate_mechanism`, which says what each argument means."""
@@ -475,6 +490,7 @@ class OperatingPoint:
             counted=counted,
             torque_limits=torque_limits,
             seed=seed,
+            progress=progress,
         )
 
     def limit_cycles(
@@ -486,8 +502,7 @@ class OperatingPoint:
         simulate: bool = True,
         progress: Progress | None = None,
     ) -> LimitCyclePrediction:
-        """Limit cycles on a wall, predicted and simulated; see
-        `contact.predict_limit_cycles`."""
+        """Limit cycles on a wall [N/m], [N s/m], predicted and simulated; see `contact.predict_limit_cycles`."""
         return _verbs.limit_cycles(self, stiffness, damping, offset, simulate, progress).about(self)
 
     def measure_boundary(
@@ -498,14 +513,14 @@ class OperatingPoint:
         file: str | Path | None = None,
         progress: Progress | None = None,
     ) -> Experiment:
-        """A stability boundary as it is measured on a device; see `study.experiment.measure_boundary`."""
+        """Simulate how a stability boundary is measured on a device; see `study.experiment.measure_boundary`."""
         return _verbs.measure_boundary(self, plan, user_points, file, progress).about(self)
 
     def validity(self, tolerance: float = 0.1) -> Validity:
         """Find where along the edge of the full model the simpler ones agree with it; see `study.validity`."""
         return _verbs.validity(self, tolerance).about(self)
 
-    # --- what results say of it -----------------------------------------------------------------------
+    # --- properties that results report ---------------------------------------------------------------
 
     @property
     def linear_omissions(self) -> tuple[str, ...]:
@@ -519,9 +534,9 @@ class OperatingPoint:
         return self.response is not None or hysteretic
 
 
-_NO_MODEL: Final = "the device has a measured response and no model; ask for .chart(), or .check(...)"
+_NO_MODEL: Final = "the device has a measured response and no model; call .chart() or .check(...)"
 
 
-def _counted(shape: tuple[int, ...]) -> str:
+def _describe_points(shape: tuple[int, ...]) -> str:
     """Operating points by their number: 12 operating points of shape (3, 4)."""
     return f"{int(np.prod(shape))} operating points of shape {shape}"

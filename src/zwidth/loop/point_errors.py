@@ -10,7 +10,7 @@ from zwidth.model.reduction import Encoders
 
 
 class OperatingPointError(ValueError):
-    """An operating point does not have this for its device; the text says what it has."""
+    """An operating point does not have the requested quantity; the message names what to use instead."""
 
 
 class NoMechanismError(OperatingPointError):
@@ -21,18 +21,20 @@ class NoMechanismError(OperatingPointError):
 
 
 class SeveralDirectionsError(OperatingPointError):
-    """Several directions rendered together leave out something that the device has.
+    """The device has something that several directions rendered together cannot include.
 
-    obstacles  what: "an operator", "an encoder on the link", "electrical damping"
+    obstacles  its names: "an operator", "an encoder on the link", "electrical damping"
     """
 
     def __init__(self, obstacles: Sequence[str]) -> None:
         self.obstacles = tuple(obstacles)
-        super().__init__(f"{' and '.join(obstacles)} cannot be rendered over several directions; ask for one")
+        super().__init__(
+            f"not supported over several directions: {' and '.join(obstacles)}; render one direction instead"
+        )
 
 
 def check_several_directions(mechanism: Mechanism | None, operator: Operator | None, encoders: Encoders) -> None:
-    """Raise SeveralDirectionsError for all that a device has and several directions together leave out."""
+    """Raise SeveralDirectionsError if the device has something that several directions together cannot include."""
     windings = None if mechanism is None else mechanism.drives.winding_damping
     present = {
         "an operator": operator is not None,
@@ -40,4 +42,4 @@ def check_several_directions(mechanism: Mechanism | None, operator: Operator | N
         "electrical damping": windings is not None and bool(windings.any()),
     }
     if any(present.values()):
-        raise SeveralDirectionsError([what for what, there in present.items() if there])
+        raise SeveralDirectionsError([name for name, is_present in present.items() if is_present])

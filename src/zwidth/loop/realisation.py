@@ -74,23 +74,27 @@ class _Signal:
 
 
 def _orders(denominator: Floats) -> list[int]:
+    """Degree, 1 or 2, of each factor."""
     return [2 if row[0] != 0.0 else 1 for row in denominator]
 
 
 def realise(sections: Sections, whole_delay: int, split: bool, force: Filter, estimator: Estimator) -> StateSpace:
-    """Assemble plant sections, force path, delayed forces and the estimate's factors into one state vector."""
+    """Assemble plant sections, force path, delayed forces and the estimate's factors into one state vector.
+
+    split  whether the fractional part of the delay splits the hold
+    """
     queue = whole_delay + split
     sizes = (_plant_states(sections), sum(_orders(force.denominator)), queue, len(estimator.window) - 1)
     N = sum(sizes) + sum(_orders(estimator.denominator))
     space = StateSpace(np.zeros((N, N)), np.zeros(N), np.zeros(N), np.zeros(N))
     first = np.cumsum((0, *sizes))
-    command = _through(space, _Signal(np.zeros(N), 1.0), force.numerator, force.denominator, int(first[1]))
-    late = _queued(space, command, queue, int(first[2]))
-    reading = _plant(space, sections, late[whole_delay], late[whole_delay + 1] if split else None)
+    command = _cascade(space, _Signal(np.zeros(N), 1.0), force.numerator, force.denominator, int(first[1]))
+    late = _delay_line(space, command, queue, int(first[2]))
+    reading = _plant_reading(space, sections, late[whole_delay], late[whole_delay + 1] if split else None)
     space.position[:] = reading
-    past = _queued(space, _Signal(reading, 0.0), len(estimator.window) - 1, int(first[3]))
+    past = _delay_line(space, _Signal(reading, 0.0), len(estimator.window) - 1, int(first[3]))
     window = _Signal(sum(w * signal.states for w, signal in zip(estimator.window, past, strict=True)), 0.0)
-    velocity = _through(space, window, estimator.numerator, estimator.denominator, int(first[4]))
+    velocity = _cascade(space, window, estimator.numerator, estimator.denominator, int(first[4]))
     space.velocity[:] = velocity.states
     return space
 
@@ -99,15 +103,15 @@ def _plant_states(sections: Sections) -> int:
     """Number of states of the plant."""
     if sections.sampled_form is None:
         return 2 * len(sections.rows)
-    return 2 * _leading(sections) + len(sections.sampled_form.output)
+    return 2 * _rows_before_chain(sections) + len(sections.sampled_form.output)
 
 
-def _leading(sections: Sections) -> int:
-    """How many rows stand before the chain, which begins at the last row that is not chained."""
+def _rows_before_chain(sections: Sections) -> int:
+    """Number of rows before the chain, which begins at the last row that is not chained."""
     return int(np.flatnonzero(sections.rows[:, 8] == 0.0)[-1]) if sections.sampled_form else len(sections.rows)
 
 
-def _queued(space: StateSpace, signal: _Signal, count: int, start: int) -> list[_Signal]:
+def _delay_line(space: StateSpace, signal: _Signal, count: int, start: int) -> list[_Signal]:
     """The signal and its `count` past values, newest first."""
     signals = [signal]
     for at in range(start, start + count):
@@ -116,10 +120,10 @@ def _queued(space: StateSpace, signal: _Signal, count: int, start: int) -> list[
     return signals
 
 
-def _plant(space: StateSpace, sections: Sections, new: _Signal, old: _Signal | None) -> Floats:
-    """How the reading follows from the states, once the signals drive them."""
+def _plant_reading(space: StateSpace, sections: Sections, new: _Signal, old: _Signal | None) -> Floats:
+    """Let the forces `new` and `old` drive the plant's states; returns the states' weights (N,) in the reading."""
     reading = np.zeros(len(space.open))
-    leading = _leading(sections)
+    leading = _rows_before_chain(sections)
     _row_states(space, sections.rows[:leading], new, old, reading)
     if sections.sampled_form is not None:
         _chain_states(space, sections.sampled_form, slice(2 * leading, _plant_states(sections)), new, old, reading)
@@ -127,7 +131,10 @@ def _plant(space: StateSpace, sections: Sections, new: _Signal, old: _Signal | N
 
 
 def _row_states(space: StateSpace, rows: Floats, new: _Signal, old: _Signal | None, reading: Floats) -> None:
-    """In a chain each row drives the one before it, through that one's 1/(d^2 + d1 d + d0)."""
+    """Add two states for each row, and their weights to the reading.
+
+    In a chain each row drives the one before it, through that one's 1/(d^2 + d1 d + d0).
+    """
     before = np.zeros(2)
     for k, (d1, d0, n2, n1, n0, o2, o1, o0, chained) in enumerate(rows):
         at = slice(2 * k, 2 * k + 2)
@@ -146,7 +153,7 @@ def _row_states(space: StateSpace, rows: Floats, new: _Signal, old: _Signal | No
 def _chain_states(
     space: StateSpace, sampled: SampledForm, at: slice, new: _Signal, old: _Signal | None, reading: Floats
 ) -> None:
-    """The states that the chained rows come from."""
+    """Add the states from which the chained rows are made, and their weights to the reading."""
     space.open[at, at] = np.eye(len(sampled.output)) + sampled.growth
     reading[at] += sampled.output
     for signal, source, direct in ((new, sampled.new, sampled.direct_new), (old, sampled.old, sampled.direct_old)):
@@ -155,7 +162,7 @@ def _chain_states(
             reading += direct * signal.states
 
 
-def _through(space: StateSpace, signal: _Signal, numerator: Floats, denominator: Floats, start: int) -> _Signal:
+def _cascade(space: StateSpace, signal: _Signal, numerator: Floats, denominator: Floats, start: int) -> _Signal:
     """The signal after a cascade of factors, whose states begin at `start`."""
     at = start
     for (c2, c1, c0), (lead, d1, d0) in zip(numerator, denominator, strict=True):

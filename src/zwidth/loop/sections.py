@@ -17,7 +17,7 @@ from zwidth.model.plant import Plant
 Floats = NDArray[np.float64]
 
 
-# Relative distance within which two pairs of poles of a chain are one, rounding split them.
+# Two pairs of poles of a chain within this relative distance are equal poles that rounding has set apart.
 SAME_POLES = 1e-6
 
 
@@ -35,9 +35,9 @@ class Sections:
 
     rows          (m, 9)  d1, d0, n2, n1, n0, o2, o1, o0 as in `loop.hold`, and 1 where the row is divided by the
                           denominators of the row before it too (and of those that one is divided by), else 0
-    unobserved    motions that the wall force does not move or the sensor does not read
-    sampled_form  states that the chained rows, which come last, are made from; None: rows have no better than
-                  their own
+    unobserved    names of motions that the wall force does not move or the sensor does not read
+    sampled_form  states from which the chained rows, the last ones, are made; None: each row has two states of
+                  its own
     """
 
     rows: Floats
@@ -54,11 +54,11 @@ def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: fl
     """
     if plant.hysteresis is not None:
         raise HysteresisError(
-            "a loss factor describes steady vibration, not motion in time: the chart and its checks can be given, "
-            "nothing else; describe the damping by damping_Ns_per_m instead"
+            "a loss factor describes steady vibration, not motion in time: only the chart and verdicts on walls "
+            "can be computed with it; describe the damping by damping_Ns_per_m instead"
         )
     modes = real_modes(plant)
-    # two motions that are braked only come to rest somewhere: where, is one pole at z = 1 that both share
+    # each free motion with damping has a pole at z = 1, for the place where it comes to rest: two share this pole
     if modes is not None and np.count_nonzero((modes.frequency_squared == 0.0) & (modes.decay != 0.0)) < 2:
         sections = _modal_sections(modes, period, fraction, lag)
     else:

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 def modal_rows_batch(modes: RenderedModes, controller: Controller) -> tuple[Floats, NDArray[np.int64]]:
     """The rows (N, m, 9) of each plant, and how many of them are used (N,): 0 where the modes are nan.
 
-    As `sections.sampled_sections` makes them of one plant; an actuator that lags is not known here.
+    The same as `sections.sampled_sections` makes of one plant, but without an actuator lag.
     """
     rows = np.zeros((*modes.frequency_squared.shape, 9))
     used = np.empty(len(rows), dtype=np.int64)
@@ -45,6 +45,7 @@ def _rows(
     rows: Floats,
     used: NDArray[np.int64],
 ) -> None:
+    """Fill in `rows` and `used` from each plant's modes (N, m)."""
     N, m = squared.shape
     residue, taken = np.empty(m), np.empty(m, dtype=np.bool_)
     for i in range(N):
@@ -71,7 +72,7 @@ def _rows(
                     weight += residue[j]
             row = held_row(decay[i, k], squared[i, k], period, fraction)
             still = abs(decay[i, k]) * period < 1e-9
-            # a mode that the wall does not move, or the sensor does not see, is left out, as rounding is all of it
+            # a mode that the wall does not move, or the sensor does not read, is only rounding: it is left out
             level = total * period**2 * (UNOBSERVED_UNDAMPED if still else UNOBSERVED)
             size = 0.0
             for c in range(2, 8):

@@ -12,7 +12,7 @@ from zwidth.model.modes import real_modes
 from zwidth.model.plant import Plant
 
 Complex = NDArray[np.complex128]
-GROWS = 1e-12  # growth of |z|^2 - 1 in one sample that is no rounding
+GROWS = 1e-12  # |z|^2 - 1 above which a pole lies outside the unit circle by more than rounding
 
 
 def unobserved_instability(loop: Loop) -> bool:
@@ -23,8 +23,8 @@ def unobserved_instability(loop: Loop) -> bool:
     """
     if not loop.unobserved_modes:
         return False
-    observed_poles = _of_sections(loop.sections.rows[:, :2])
-    return _growing(_poles(loop.plant, loop.period)) > _growing(observed_poles)
+    observed_poles = _section_poles(loop.sections.rows[:, :2])
+    return _unstable_count(_poles(loop.plant, loop.period)) > _unstable_count(observed_poles)
 
 
 def _poles(plant: Plant, period: float) -> Complex:
@@ -34,15 +34,15 @@ def _poles(plant: Plant, period: float) -> Complex:
         form = first_order_form(plant, period)
         return np.expm1(np.concatenate([form.poles, form.hidden_poles]) * period)
     pairs = zip(modes.decay.tolist(), modes.frequency_squared.tolist(), strict=True)
-    return _of_sections(np.array([denominator(decay, squared, period) for decay, squared in pairs]))
+    return _section_poles(np.array([denominator(decay, squared, period) for decay, squared in pairs]))
 
 
-def _of_sections(denominators: NDArray[np.float64]) -> Complex:
+def _section_poles(denominators: NDArray[np.float64]) -> Complex:
     """Roots e of e^2 + d1 e + d0 for each row d1, d0."""
     roots = [np.roots([1.0, *row]) for row in denominators]
     return np.concatenate([np.zeros(0, dtype=complex), *roots])
 
 
-def _growing(e: Complex) -> int:
-    """How many z = 1 + e lie outside the unit circle."""
+def _unstable_count(e: Complex) -> int:
+    """Number of poles z = 1 + e outside the unit circle."""
     return int(np.sum(2.0 * e.real + np.abs(e) ** 2 > GROWS))

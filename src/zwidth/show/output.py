@@ -27,6 +27,8 @@ def json_value(value: Any) -> Any:
     >>> json_value({"radius": float("nan"), "box": (0.0, 1.0)})
     {'radius': None, 'box': [0.0, 1.0]}
     """
+    if _is_vector(value):
+        return [x if x - x == 0.0 else None for x in value.tolist()]
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, Mapping):
@@ -50,8 +52,20 @@ def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
 
     columns  name -> values (k,), all of one length
     """
-    rows = zip(*(json_value(values) for values in columns.values()), strict=True)
-    return "".join(",".join(map(_cell, row)) + "\n" for row in [tuple(columns), *rows])
+    rows = zip(*map(_cells, columns.values()), strict=True)
+    return "".join(",".join(row) + "\n" for row in [tuple(map(_cell, columns)), *rows])
+
+
+def _cells(values: Sequence[Any]) -> list[str]:
+    """A column's values as texts; numbers need no quotation marks."""
+    if _is_vector(values):
+        return [repr(x) if x - x == 0.0 else "" for x in values.tolist()]  # type: ignore[attr-defined]
+    return [_cell(value) for value in json_value(values)]
+
+
+def _is_vector(value: Any) -> bool:
+    """Whether this is a NumPy array of numbers in a row, known without importing NumPy; there may be millions."""
+    return getattr(getattr(value, "dtype", None), "kind", "") == "f" and value.ndim == 1
 
 
 def _cell(value: Any) -> str:

@@ -27,6 +27,7 @@ from zwidth.device.schema import device_file as schema
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
+from zwidth.progress import Progress
 from zwidth.study.derivative import Derivative, central_derivative, one_sided_derivative
 from zwidth.study.optimum import Optimum, OptimumError, optimum, second_peak_stiffness
 from zwidth.study.sensitivity_result import Group, Sensitivities, Sensitivity
@@ -41,12 +42,15 @@ ZERO: Final = "0 has no logarithm; the derivative by the number itself is given 
 WORTHLESS: Final = 1e-3  # largest estimated error of a derivative, per relative change; above it none is given
 
 
-def sensitivities(device: Device, point: OperatingPoint | None = None) -> Sensitivities:
+def sensitivities(
+    device: Device, point: OperatingPoint | None = None, progress: Progress | None = None
+) -> Sensitivities:
     """Sensitivity of the largest stiffness to every number of the device file, and to the delay if it gives none.
 
-    point  the operating point, one posture and one direction; left out: the device's reference. While a link's
-           length changes, a posture given by the handle's position keeps the position, one given by joint angles
-           keeps the angles
+    point     the operating point, one posture and one direction; left out: the device's reference. While a link's
+              length changes, a posture given by the handle's position keeps the position, one given by joint
+              angles keeps the angles
+    progress  called with "numbers", those that are done, and all of them
 
     Numbers that cannot be varied, such as whole ones, are reported with the reason. Accuracy: derivatives are
     extrapolated differences at relative steps of 2e-3 and less, good to about 1e-9 of d ln K_max / d ln p where
@@ -75,7 +79,11 @@ def sensitivities(device: Device, point: OperatingPoint | None = None) -> Sensit
     except OptimumError as error:
         stiffest, obstacle = None, str(error)
     derivatives = _StiffnessDerivatives(device, loop_of, stiffest, obstacle)
-    numbers = [derivatives.sensitivity(*number) for number in _numbers(device.document)]
+    numbers, varied = [], list(_numbers(device.document))
+    for number in varied:
+        numbers.append(derivatives.sensitivity(*number))
+        if progress is not None:
+            progress("numbers", len(numbers), len(varied))
     groups = derivatives.groups({number.path: number for number in numbers})
     return Sensitivities(
         peak=peak,

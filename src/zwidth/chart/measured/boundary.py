@@ -18,10 +18,10 @@ Complexes = NDArray[np.complex128]
 Whole = NDArray[np.int64]
 
 NEAREST = 1e-5  # to an end of the curve or an asymptote, of the spacing there
-FAR = 1e9  # how far lines are drawn, in `sizes`
-COARSE = 0.02  # of its distance from K = B = 0, to which the whole curve is kept
+FAR = 1e9  # how far lines are drawn, in `large_wall_scale`
+COARSE = 0.02  # distance of a coarse chord from the curve, in shares of the curve's distance from K = B = 0
 CLEAR = 0.2  # least |1 + L| / (1 + |L|) of a wall that is clear of the boundary
-LIKELY, SURE = 28, 7  # clearest walls: counted at every angle; counts of which must agree
+LIKELY, SURE = 28, 7  # numbers of walls: counted at every angle; the clearest, whose counts must agree
 MOST = 200_000  # angles on the curve
 
 
@@ -33,7 +33,7 @@ class Boundary:
     segments     (k, 4) and jumps (k,): curve, real-root lines and what closes an open end, for `roots_outside`
     angle_index  (k,) index of the angle where a segment begins; -1, -2: lines of z = 1, z = -1; -3: beyond the
                  data
-    reference, reference_count  a wall far from the boundary and its roots outside
+    reference, reference_count  a wall far from the boundary and the number of its roots outside the circle
     """
 
     angles: Floats
@@ -46,7 +46,7 @@ class Boundary:
     reference_count: int
 
     def outside(self, walls: Floats) -> Whole:
-        """Roots outside the circle at walls (n, 2): (n,)."""
+        """Numbers (n,) of roots outside the circle of walls (n, 2)."""
         return roots_outside(
             self.segments, self.jumps, self.reference, self.reference_count, np.ascontiguousarray(walls)
         )
@@ -83,43 +83,44 @@ def _sign_changes(loop: MeasuredLoop, angles: Floats) -> list[tuple[float, float
 
 
 def refine_angles(loop: MeasuredLoop, angles: Floats, box: Window, tolerance: float) -> Floats:
-    """Angles at which chords within the box keep to the curve, to a share of the box."""
+    """Angles at which chords within the box follow the curve to a tolerance, in shares of the box."""
     K0, K1, B0, B1 = box
     scale, low = np.array([K1 - K0, B1 - B0]), np.array([K0, B0])
 
     def scales(theta: Floats) -> Floats:
         return np.broadcast_to(scale, (len(theta), 2))
 
-    def wanted(a: Floats, b: Floats, middle: Floats) -> Floats:
+    def tolerances(a: Floats, b: Floats, middle: Floats) -> Floats:
         touches = np.all((np.maximum(a, b) >= 0.0) & (np.minimum(a, b) <= 1.0), axis=1)
         return np.where(touches, tolerance, np.inf)
 
-    return _bisected(loop, angles, low, scales, wanted)
+    return _bisect_chords(loop, angles, low, scales, tolerances)
 
 
 def coarse_angles(loop: MeasuredLoop) -> Floats:
-    """Angles at which chords keep to the curve to a share of its own distance from no wall, wherever it runs."""
+    """Angles at which chords follow the whole curve, within a share COARSE of its distance from K = B = 0."""
 
     def scales(theta: Floats) -> Floats:
         return wall_scales(loop, theta)
 
-    def wanted(a: Floats, b: Floats, middle: Floats) -> Floats:
+    def tolerances(a: Floats, b: Floats, middle: Floats) -> Floats:
         return np.asarray(COARSE * np.hypot(*middle.T))
 
-    return _bisected(loop, first_angles(loop), np.zeros(2), scales, wanted)
+    return _bisect_chords(loop, first_angles(loop), np.zeros(2), scales, tolerances)
 
 
-def _bisected(
+def _bisect_chords(
     loop: MeasuredLoop,
     angles: Floats,
     low: Floats,
     scales: Callable[[Floats], Floats],
-    wanted: Callable[[Floats, Floats, Floats], Floats],
+    tolerances: Callable[[Floats, Floats, Floats], Floats],
 ) -> Floats:
-    """The angles, with those between added until each chord passes its middle on the curve as closely as wanted.
+    """The angles, and middles between them added until each chord passes its middle on the curve closely enough.
 
-    scales  of angles (n,), what counts as one unit of K and of B there (n, 2)
-    wanted  of the ends (n, 2) and middles (n, 2), (walls - low) / scale, the distances allowed (n,)
+    scales      function of angles (n,): what counts as one unit of K and of B there (n, 2)
+    tolerances  function of both ends and the middle of chords, (n, 2) each, in (walls - low) / scale: the
+                distances allowed (n,)
     """
     for _ in range(40):
         K, B, orientation = loop.walls(angles)
@@ -136,7 +137,7 @@ def _bisected(
         length = np.maximum(np.hypot(*along.T), 1e-150)
         off = np.abs(along[:, 0] * to[:, 1] - along[:, 1] * to[:, 0]) / length
         reach = np.einsum("ij,ij->i", to, along) / length**2
-        allowed = wanted(a, b, m)
+        allowed = tolerances(a, b, m)
         bent = (off > allowed) | ((np.abs(reach - 0.5) > 0.6) & np.isfinite(allowed) & (length > 1e-3 * allowed))
         if not np.any(bent) or len(angles) > MOST:
             break
@@ -155,7 +156,7 @@ def wall_scales(loop: MeasuredLoop, theta: Floats) -> Floats:
 
 
 def large_wall_scale(loop: MeasuredLoop) -> Floats:
-    """(2,) what is large for |h| and |h / w|: exceeded at a tenth of the measured frequencies."""
+    """Values (2,) of |h| and |h / w| that are exceeded at a tenth of the measured frequencies."""
     return np.asarray(np.quantile(wall_scales(loop, loop.angles_below_pi), 0.9, axis=0))
 
 
@@ -226,7 +227,7 @@ def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[
 
 
 def _open_end(segments: Floats, jumps: Whole, far: float) -> tuple[Floats, Whole, Whole]:
-    """Where the data stop, the curve is led straight on to infinity: what fails beyond them is not seen."""
+    """The curve continued straight to infinity where the data end: higher frequencies are not seen."""
     Ka, Ba, Kb, Bb = segments[-1]
     reach = far / max(abs(Kb - Ka), abs(Bb - Ba))
     onward = [[Kb, Bb, Kb + reach * (Kb - Ka), Bb + reach * (Bb - Ba)]]
@@ -240,7 +241,7 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Wh
     by -pi times the number of roots outside. Assumed: no open-loop pole outside, none on the circle but the
     integrators.
 
-    Returns  (n,) counts, and the least |1 + L| / (1 + |L|) along the way: near 0 a wall too close to the boundary
+    Returns  (n,) counts, and the least |1 + L| / (1 + |L|) along the way (n,): near 0 the count is not sure
     """
     L = -(walls[:, :1] + walls[:, 1:] * loop.w(angles)) / loop.h(angles)
     F = 1.0 + L
@@ -260,10 +261,12 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Wh
 
 
 def _with_reference(loop: MeasuredLoop, curve: Boundary) -> Boundary:
-    """The boundary with the smallest clear one of many walls as its reference, the clearest counted against it.
+    """The boundary with a reference wall: the smallest of many walls that are clear of the boundary.
 
-    From a small one, since the way from a wall many powers of ten beyond the stable ones loses their digits; where
-    the data end early, the clearest one.
+    A small one, since on the way from a wall many powers of ten beyond the stable ones their digits are lost; the
+    clearest one where the data end early. The counts of the clearest walls must agree with it.
+
+    Raises  ResponseError  where most of them do not
     """
     h, w = np.abs(loop.h(loop.angles_below_pi)), np.abs(loop.w(loop.angles_below_pi))
     sizes = np.geomspace(1e-3, 3.0, 9)

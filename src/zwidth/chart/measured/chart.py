@@ -35,9 +35,9 @@ from zwidth.model.response import Response, ResponseError
 
 Floats = NDArray[np.float64]
 
-ON_IT = 1e-9  # of the window, from a cell's edge: a measured point that is a corner of its polygon
-ZOOMED = 2e-8  # of the stiffest wall: chords in the window round it
-FEWEST_ON_EDGE = 3  # measured frequencies, without which the edge is guesswork
+ON_IT = 1e-9  # distance from a cell's edge, in windows, of a measured point that is a corner of its polygon
+ZOOMED = 2e-8  # relative error of the stiffest wall by chords in the window round it
+FEWEST_ON_EDGE = 3  # measured frequencies that a cell's edge needs to be credible
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -52,8 +52,8 @@ class MeasuredChart(Chart):
     band                  walls whose verdict the measurement's error leaves open; None where no error is known
     stiffness_max_of_sweeps  of each repeated sweep alone [N/m]; () for one measurement
     unusable              stretches of frequency that cannot be relied on
-    open                  whether the edge does not close, for lack of data: regions then end at a window not their
-                          own, and what would be read off them is nan
+    open                  whether the edge does not close, for lack of data: regions then end at the window's edge,
+                          and the numbers that would be read off them are nan
     """
 
     loop: MeasuredLoop
@@ -86,7 +86,7 @@ class MeasuredChart(Chart):
 
     @property
     def box(self) -> Window:
-        """KMIN, KMAX, BMIN, BMAX of the regions (or the measured points, if they are open) and 5 %."""
+        """KMIN, KMAX, BMIN, BMAX of the regions (of measured points, if they are open) with a margin of 5 %."""
         if not (self.regions and self.open):
             return super().box
         inner = [arc for arc in self.boundary if 0.0 < arc.frequency[0] < 0.5 / self.loop.period]
@@ -141,11 +141,11 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
     loop = MeasuredLoop(response, controller)
     cells, closed = _stable_regions(loop)
     if cells is None:
-        return _empty(loop)
+        return _empty_chart(loop)
     chart = _chart(loop, cells, not closed)
     if response.sweeps is None:
         return chart
-    each = [measured_chart(_single(response, k), controller).stiffness_max for k in range(len(response.sweeps))]
+    each = [measured_chart(_one_sweep(response, k), controller).stiffness_max for k in range(len(response.sweeps))]
     return replace(chart, stiffness_max_of_sweeps=tuple(each))
 
 
@@ -168,12 +168,13 @@ def edge_frequencies(chart: MeasuredChart) -> EdgeFrequencies | None:
     return EdgeFrequencies(np.vstack(pieces), np.concatenate(frequencies), high - low)
 
 
-def _single(response: Response, sweep: int) -> Response:
+def _one_sweep(response: Response, sweep: int) -> Response:
+    """One of the repeated sweeps as a response of its own."""
     assert response.sweeps is not None
     return replace(response, value=response.sweeps[sweep], sweeps=None, coherence=None)
 
 
-def _credible(loop: MeasuredLoop, cells: StableRegions) -> StableRegions:
+def _credible_cells(loop: MeasuredLoop, cells: StableRegions) -> StableRegions:
     """The cells that are not made by noise: loops of the curve between a few points, or all in doubt."""
     K0, K1, B0, B1 = cells.box
     scale = np.array([K1 - K0, B1 - B0])
@@ -207,21 +208,21 @@ def _stable_regions(loop: MeasuredLoop) -> tuple[StableRegions | None, bool]:
         K0, K1, B0, B1 = box
         box = (K0 - (K1 - K0), K1 + (K1 - K0), B0 - (B1 - B0), B1 + (B1 - B0))
         cells = regions_within(loop, known, box)
-    credible = _credible(loop, cells)
+    credible = _credible_cells(loop, cells)
     if 0 < len(credible.polygons) < len(cells.polygons):
         low_K, low_B, high_K, high_B = shapely.union_all(credible.polygons).bounds
         room_K, room_B = 0.1 * (high_K - low_K), 0.1 * (high_B - low_B)
         near = (low_K - room_K, high_K + room_K, low_B - room_B, high_B + room_B)
-        credible = _credible(loop, regions_within(loop, known, near))
+        credible = _credible_cells(loop, regions_within(loop, known, near))
     if cells.polygons and not credible.polygons:
-        raise ResponseError(_nothing_near(loop))
+        raise ResponseError(_no_edge_message(loop))
     return (credible if credible.polygons else None), not credible.open
 
 
-def _empty(loop: MeasuredLoop) -> MeasuredChart:
+def _empty_chart(loop: MeasuredLoop) -> MeasuredChart:
     """The chart of a device without a stable wall. Raises ResponseError where the data cannot tell."""
     if any(stretch.low == loop.response.frequency[loop.usable][-1] for stretch in loop.unusable):
-        raise ResponseError(_nothing_near(loop))
+        raise ResponseError(_no_edge_message(loop))
     none = TracedEdge.of(Arcs.of(()), ())
     return MeasuredChart(
         **none.chart_fields(loop.period, lambda K, B: False),
@@ -237,7 +238,8 @@ def _empty(loop: MeasuredLoop) -> MeasuredChart:
     )
 
 
-def _nothing_near(loop: MeasuredLoop) -> str:
+def _no_edge_message(loop: MeasuredLoop) -> str:
+    """The text of the error for data that hold no edge of the stable walls."""
     f = loop.response.frequency[loop.usable]
     return (
         f"has no frequencies near the boundary's: {f[0]:.6g} to {f[-1]:.6g} Hz, within which no edge of the "
@@ -275,7 +277,7 @@ def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredCh
 
 
 def _widen_to_peak(band: Band | None, stiffest: float) -> Band | None:
-    """The band with the largest stiffness in it: that is found by a closer look than the band's ellipses."""
+    """The band, widened to hold the largest stiffness: that is found with finer chords than the ellipses."""
     if band is None or isnan(stiffest):
         return band
     # where no wall is stable beyond doubt, nan stays

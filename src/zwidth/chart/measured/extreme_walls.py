@@ -18,7 +18,7 @@ from zwidth.chart.rings import Window
 
 
 def refine_peak(loop: MeasuredLoop, cells: StableRegions) -> tuple[tuple[float, float], StableRegions]:
-    """The wall of the largest stiffness with K > 0, B >= 0, nan if there is none, and the cells it was seen in."""
+    """The wall of the largest stiffness with K > 0, B >= 0, nan if there is none, and the cells round it."""
     peak, nearby = _stiffest(cells), cells
     for _ in range(2):
         if isnan(peak[0]):

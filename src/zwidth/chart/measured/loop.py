@@ -55,8 +55,8 @@ class MeasuredLoop:
         good = is_usable(self.response)
         if np.count_nonzero(good) < FEWEST:
             raise ResponseError(
-                f"has {np.count_nonzero(good)} usable frequencies of {len(f)}; a chart needs at least {FEWEST}, "
-                "and some hundreds to be exact"
+                f"has {np.count_nonzero(good)} usable frequencies of {len(f)}; at least {FEWEST} are needed, "
+                "a few hundred for an accurate chart"
             )
         object.__setattr__(self, "usable", good)
 
@@ -72,13 +72,13 @@ class MeasuredLoop:
 
     @cached_property
     def angles(self) -> Floats:
-        """theta of the usable frequencies (n,)."""
+        """theta = 2 pi f T (n,) of the usable frequencies, in (0, pi]."""
         theta = 2.0 * np.pi * self.response.frequency[self.usable] * self.period
         return np.where(theta > np.pi * (1.0 - 1e-9), np.pi, theta)
 
     @property
     def angles_below_pi(self) -> Floats:
-        """Those below pi, where K and B are defined."""
+        """Those of `angles` below pi, where K and B are defined."""
         return self.angles[self.angles < np.pi]
 
     @cached_property
@@ -121,7 +121,7 @@ class MeasuredLoop:
 
     @cached_property
     def errors(self) -> Floats | None:
-        """Radius (n,) of the disk round each h of `angles` that holds the true one, over |h|; None: nothing known.
+        """Radius (n,) of the disk round each h of `angles` that holds the true one, over |h|; None: unknown.
 
         From coherence: 95 % of the error. From repeated sweeps: the farthest of them.
         """
@@ -133,7 +133,7 @@ class MeasuredLoop:
         return None
 
     def error(self, theta: Floats) -> Floats:
-        """The radius (...) of the disk round h at any angle; 0 where nothing is known of it."""
+        """The radius (...) of the disk round h at any angle; 0 where no error is known."""
         if self.errors is None:
             return np.zeros(np.shape(theta))
         return np.asarray(np.interp(theta, self.angles, self.errors) * np.abs(self.h(theta)))

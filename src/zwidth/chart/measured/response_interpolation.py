@@ -43,6 +43,7 @@ class ResponseInterpolation:
     closed: bool
 
     def _at(self, theta: Floats) -> NDArray[np.int64]:
+        """Number (...) of the interval that holds each angle."""
         return np.clip(np.searchsorted(self.nodes, theta, side="right") - 1, 0, len(self.nodes) - 2)
 
     def inverse(self, theta: Floats) -> Complexes:
@@ -89,7 +90,8 @@ def interpolate_response(
     """
     if len(theta) < FEWEST:
         raise ResponseError(
-            f"has {len(theta)} usable frequencies; a chart needs at least {FEWEST}, and some hundreds to be exact"
+            f"has {len(theta)} usable frequencies; at least {FEWEST} are needed, a few hundred for an "
+            "accurate chart"
         )
     G, delay = smooth_part(theta, P, integrators)
     nodes, values = [-theta[MIRRORED - 1 :: -1], theta], [np.conj(G[MIRRORED - 1 :: -1]), G]

@@ -42,7 +42,7 @@ def curve_segments(K: Floats, B: Floats, orientation: Floats) -> tuple[Floats, W
 
 @compiled
 def roots_outside(segments: Floats, jumps: Whole, reference: Floats, count: int, walls: Floats) -> Whole:
-    """Roots outside the circle at walls (n, 2): (n,).
+    """Numbers (n,) of roots outside the circle of walls (n, 2).
 
     segments   (k, 4) the boundary as directed segments: the curve (`curve_segments`) and the lines of real roots
     jumps      (k,) roots outside on the left of each segment less those on its right

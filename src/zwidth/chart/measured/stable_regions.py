@@ -20,7 +20,7 @@ Whole = NDArray[np.int64]
 
 CHORD = 1e-5  # a chord's distance from the curve, as a share of the window
 GRID = 1e-11  # to which lines are noded, as a share of the window
-LARGEST = 1e3  # stable walls, in `wall_scales` that a tenth of the stable set's edge exceeds
+LARGEST = 1e3  # size of the largest stable walls, in `wall_scales` that a tenth of the stable set's edge exceeds
 TICK = 1e-9  # by which the curve's ends are drawn across the lines they end on
 BESIDE = 1e-4  # distance from a chord, in its lengths, of the walls whose roots are counted on its two sides
 
@@ -46,7 +46,7 @@ class StableRegions:
 
     @property
     def edge_arcs(self) -> Arcs:
-        """The edge of the cells, side by side."""
+        """The edges of the cells as arcs, each side of a polygon a chord."""
         return Arcs.chords(
             [np.array(ring.coords) for cell in self.polygons for ring in (cell.exterior, *cell.interiors)]
         )
@@ -64,7 +64,10 @@ class StableRegions:
 
 
 def regions_within(loop: MeasuredLoop, known: Boundary, box: Window) -> StableRegions:
-    """Stable cells within a window: the boundary refined there, noded, and one wall of each cell counted."""
+    """Stable cells within a window: the boundary refined there, noded, and one wall of each cell counted.
+
+    known  the boundary as sampled before, with its reference wall
+    """
     edge = sample_boundary(loop, refine_angles(loop, known.angles, box, CHORD), known)
     K0, K1, B0, B1 = box
     low, scale = np.array([K0, B0]), np.array([K1 - K0, B1 - B0])
@@ -128,7 +131,7 @@ def window_of_regions(loop: MeasuredLoop, edge: Boundary) -> Window | None:
     near = np.all(scale[flags] < LARGEST * np.quantile(scale[flags], 0.9, axis=0), axis=1)
     flagged = curve[flags][near]
     walls = edge.segments[flagged].reshape(-1, 2)
-    sectors = _lines_cross(loop, 1e-3 * float(np.ptp(walls[:, 1])))
+    sectors = _walls_in_sectors(loop, 1e-3 * float(np.ptp(walls[:, 1])))
     if len(sectors) and np.any(edge.outside(sectors) == 0):
         walls = np.vstack([walls, np.mean(sectors, axis=0)])
     low, high = walls.min(axis=0), walls.max(axis=0)
@@ -136,7 +139,7 @@ def window_of_regions(loop: MeasuredLoop, edge: Boundary) -> Window | None:
     return float(K0), float(K1), float(B0), float(B1)
 
 
-def _lines_cross(loop: MeasuredLoop, beside: float) -> Floats:
+def _walls_in_sectors(loop: MeasuredLoop, beside: float) -> Floats:
     """Four walls (4, 2), one in each sector that the lines of real roots cut round their crossing; or (0, 2).
 
     beside  their distance from it, in damping

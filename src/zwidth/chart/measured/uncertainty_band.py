@@ -30,7 +30,7 @@ class Band:
     regions         rings (k, 2) of [stiffness, damping] that cover them
     stiffness_low   the largest stiffness (K > 0, B >= 0) that is stable beyond doubt [N/m]; nan: none
     stiffness_high  the largest that may be stable [N/m]
-    meaning         what the band covers, for people
+    meaning         what the band covers, in words
     """
 
     regions: tuple[Floats, ...]
@@ -49,7 +49,7 @@ class Band:
 
 
 def uncertainty_band(loop: MeasuredLoop, cells: StableRegions) -> Band | None:
-    """The band along the stable set's edge; None where nothing is known of the error.
+    """The band along the stable set's edge; None where no error is known.
 
     With an error of radius r in h, a wall is in doubt where |K + B w - h| <= r: an ellipse round each point of the
     curve. The band is the ellipses along the edge, neighbours joined.

@@ -16,11 +16,11 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 LEAST_COHERENCE: Final = 0.5  # below it more of the reading is noise than is answer to the force
-LARGEST_PHASE: Final = np.radians(30.0)  # at the lowest frequency, that of the integrators apart
+LARGEST_PHASE: Final = np.radians(30.0)  # at the lowest frequency, beyond that of the integrators
 COARSEST: Final = 0.02  # relative error of P that interpolation may be expected to leave
 WIDEST_GAP: Final = 4.0  # times the spacing around it, and
 WIDEST_RATIO: Final = 1.25  # of the frequencies on both sides
-SAME_STRETCH: Final = 10  # frequencies between two that noise makes uncertain
+SAME_STRETCH: Final = 10  # most frequencies from one uncertain frequency to the next in one stretch
 SHORT_OF_END: Final = 2.0  # times the last spacing: near enough to half the sampling rate
 CONTINUED: Final = 0.8  # of half the sampling rate: from here on the response is continued to it
 

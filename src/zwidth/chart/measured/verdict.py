@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False)
 class MeasuredVerdicts(WallVerdicts):
-    """What the count of roots says of walls (...).
+    """Verdicts on walls (...) by the count of their roots outside the unit circle.
 
     The frequency is that of the nearest point of the stable set's edge; of the least |1 + L| where nothing is
     stable.
@@ -61,8 +61,8 @@ def judge_measured(
     """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast.
 
     A wall is undecided where, at any measured frequency, K + B w lies within the disk round h that the
-    measurement's error leaves: there the device may have a root on the circle for it. So is, among many, one not
-    finite; alone it raises ValueError.
+    measurement's error leaves: there the device may have a root on the circle for it. So is one of many walls
+    that is not finite; a single one raises ValueError.
     """
     K, B = broadcast_walls(wall_stiffness, wall_damping)
     walls = np.column_stack([K.ravel(), B.ravel()])

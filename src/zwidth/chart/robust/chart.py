@@ -34,7 +34,7 @@ class RobustChart(Chart):
     binding         indices of the members that bind anywhere on the edge, ascending; of several on one edge the
                     one of the smallest set
     members_at_stiffness_max     the members that bind there, ascending: one, or two at a corner between them
-    best_by_area, best_by_stiffness  members that would have the most of each if they were the only ones
+    best_by_area, best_by_stiffness  members with the largest stable_area, and stiffness_max, if charted alone
     lost_share      1 - stable_area / that of the best by area
     lost_stiffness_share  1 - stiffness_max / that of the best by stiffness
     excluding       members that leave no wall in common (see `common_set.incompatible_members`); () where there is
@@ -133,7 +133,7 @@ def robust_chart(members: Sequence[Loop]) -> RobustChart:
 
 
 def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) -> RobustChart:
-    """The same for members that are charted already. Raises ChartError if there are none."""
+    """`robust_chart` for members that are charted already. Raises ChartError if there are none."""
     if not charted:
         reason = next(iter(failed.values()), "there is none")
         raise ChartError(f"no member could be charted; the first: {reason}")
@@ -143,7 +143,7 @@ def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) 
     arcs, blur = common_edge(shape, cutters, unit)
     tracers = {index: member.tracer for index, member in charted.items()}
     edge = TracedEdge.of(arcs, tracers)
-    if _passed_over(edge.arc_points, list(charted.values()), unit):
+    if _has_small_cut(edge.arc_points, list(charted.values()), unit):
         blur = max(blur, CHORD)
     by_area, largest_area = _best_by_area(charted, shapes)
     by_stiffness = max(charted, key=lambda index: (_stiffness(charted[index].edge), -index))
@@ -166,7 +166,7 @@ def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) 
     )
 
 
-def _passed_over(samples: list[ArcPoints], members: list[Member], unit: float) -> bool:
+def _has_small_cut(samples: list[ArcPoints], members: list[Member], unit: float) -> bool:
     """Whether a member makes walls unstable just inside a piece of edge, tested at its quarters at a depth of 1e-9
     of its length; such cuts are too small for the chords of the outlines."""
     for _, K, B in samples:
@@ -182,6 +182,7 @@ def _passed_over(samples: list[ArcPoints], members: list[Member], unit: float) -
 
 
 def _stiffness(edge: TracedEdge) -> float:
+    """Largest stiffness on an edge [N/m]; 0 without a stable wall."""
     return edge.peak.stiffness if edge.peak else 0.0
 
 

@@ -1,8 +1,8 @@
-"""The edge of what many loops have in common, as pieces of their own arcs between exact corners.
+"""The edge of the stable walls that many loops have in common, as pieces of their own arcs between exact corners.
 
 The polygons say only which arcs follow each other round the common set. Where two arcs run closer to each other
-than chords follow them, polygons change from one to the other and back; such runs are found out by asking at their
-middle whether the other members are stable there. Where one member's arc gives way to another's, the corner is
+than chords follow them, polygons change from one to the other and back; such runs are left out if another
+member is unstable at their middle. Where one member's arc gives way to another's, the corner is
 solved for (`member_corner`).
 """
 
@@ -54,22 +54,23 @@ def common_edge(shape: shapely.MultiPolygon, members: Sequence[Member], unit: fl
         return Arcs.of(()), 0.0
     low, bottom, right, top = shape.bounds
     size = max(right - low, top - bottom)
-    segments = _segments(members, unit)
+    segments = _outline_chords(members, unit)
     rings, blur = [], 0.0
     for cell in shapely.get_parts(shape):
         cell = cell.normalize()  # exterior clockwise, holes counter-clockwise
         for line in (cell.exterior, *cell.interiors):
             points = shapely.get_coordinates(line)[::-1]
             runs = _runs(points, members, segments, SAME * size)
-            runs = _merged([run for run in runs if len(runs) < 3 or run.length > SHORTEST * size])
-            runs = _merged(_runs_on_edge(runs, members, unit, INSIDE * size))
-            ring, blurred = _joined(runs, unit, size)
+            runs = _merge_runs([run for run in runs if len(runs) < 3 or run.length > SHORTEST * size])
+            runs = _merge_runs(_runs_on_edge(runs, members, unit, INSIDE * size))
+            ring, blurred = _arcs_between_corners(runs, unit, size)
             rings.append(ring)
             blur = max(blur, blurred / size)
     return Arcs.of(rings), blur
 
 
-def _segments(members: Sequence[Member], unit: float) -> _OutlineChords:
+def _outline_chords(members: Sequence[Member], unit: float) -> _OutlineChords:
+    """The chords of all members' outlines."""
     ends, angles, origin = [], [], []
     for number, member in enumerate(members):
         for arc, (thetas, K, B) in enumerate(member.edge.arc_points):
@@ -166,10 +167,11 @@ def _runs_on_edge(runs: list[ArcRun], members: Sequence[Member], unit: float, de
 
 
 def _continues(one: ArcRun, two: ArcRun) -> bool:
+    """Whether the second run goes on along the arc of the first."""
     return one.same_arc(two) and not _starts_anew(one.arc, one.angles[1], two.angles[0])
 
 
-def _merged(runs: list[ArcRun]) -> list[ArcRun]:
+def _merge_runs(runs: list[ArcRun]) -> list[ArcRun]:
     """Runs with successive ones on one arc joined."""
     out = runs[:1]
     for run in runs[1:]:
@@ -182,7 +184,7 @@ def _merged(runs: list[ArcRun]) -> list[ArcRun]:
     return out
 
 
-def _joined(runs: list[ArcRun], unit: float, size: float) -> tuple[list[Arc], float]:
+def _arcs_between_corners(runs: list[ArcRun], unit: float, size: float) -> tuple[list[Arc], float]:
     """Runs as arcs between exact corners; and how far a corner that could not be solved for may be off."""
     if len(runs) == 1:
         return [runs[0].arc], 0.0

@@ -19,29 +19,29 @@ def intersect_members(
 
     shapes  index -> the member's stable set in [K unit, B]
 
-    The smallest set comes first. Most of the others then contain what is left, and are passed over: their edge
-    does not enter it, and a point of each of its cells is theirs.
+    The smallest set comes first. Most of the others then contain what remains, and are skipped: their edge does
+    not enter it, and a point of each of its cells is theirs.
     """
     ordered = sorted(members, key=lambda member: (shapes[member.index].area, member.index))
-    left = shapes[ordered[0].index]
+    remaining = shapes[ordered[0].index]
     cutters = [ordered[0]]
     for member in ordered[1:]:
-        if left.is_empty:
+        if remaining.is_empty:
             break
-        shapely.prepare(left)
-        if _cuts(member, shapes[member.index], left, unit):
-            left = shapely.MultiPolygon(polygonal(shapely.intersection(left, shapes[member.index])))
+        shapely.prepare(remaining)
+        if _cuts(member, shapes[member.index], remaining, unit):
+            remaining = shapely.MultiPolygon(polygonal(shapely.intersection(remaining, shapes[member.index])))
             cutters.append(member)
-    return left, cutters
+    return remaining, cutters
 
 
-def _cuts(member: Member, shape: shapely.MultiPolygon, left: shapely.MultiPolygon, unit: float) -> bool:
-    """Whether a member takes something from what is left (prepared)."""
-    if shape.is_empty or shapely.intersects(left, curved_edges(member, unit)):
+def _cuts(member: Member, shape: shapely.MultiPolygon, remaining: shapely.MultiPolygon, unit: float) -> bool:
+    """Whether a member's stable set `shape` leaves out a part of `remaining`, a prepared geometry."""
+    if shape.is_empty or shapely.intersects(remaining, curved_edges(member, unit)):
         return True
-    if beyond_lines(member, shapely.get_coordinates(left) / (unit, 1.0)):
+    if beyond_lines(member, shapely.get_coordinates(remaining) / (unit, 1.0)):
         return True
-    points = [cell.representative_point() for cell in shapely.get_parts(left)]
+    points = [cell.representative_point() for cell in shapely.get_parts(remaining)]
     return not bool(np.all(shapely.contains(shape, points)))
 
 
@@ -59,12 +59,13 @@ def incompatible_members(members: Mapping[int, Member], shapes: Shapes, unit: fl
                 return tuple(sorted((one.index, other.index)))
     group = list(shapes)
     for index in tuple(group):
-        rest = [shapes[kept] for kept in group if kept != index]
+        rest = [shapes[other] for other in group if other != index]
         if rest and not polygonal(shapely.intersection_all(rest)):
             group.remove(index)
     return tuple(sorted(group))
 
 
 def _quadrant(shape: shapely.MultiPolygon) -> shapely.Geometry:
+    """The part of a set with K >= 0, B >= 0."""
     right, top = np.maximum(shape.bounds[2:], 0.0)
     return shapely.intersection(shape, shapely.box(0.0, 0.0, right, top))

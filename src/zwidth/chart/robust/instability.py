@@ -1,4 +1,4 @@
-"""How far a loop is from rendering walls stably that it was promised to."""
+"""Whether walls are unstable for a loop, and how much softer a wall must be to be stable."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def unstable(polynomials: Floats, K: Floats, B: Floats) -> NDArray[np.bool_]:
 
 @compiled
 def softening(polynomials: Floats, K: float, B: float) -> float:
-    """By how much [N/m] an unstable wall must be softened at its damping until it is stable; K itself, the wall
-    given up, if none in between is.
+    """By how much [N/m] an unstable wall must be softened at its damping until it is stable; K itself if no
+    softer wall is.
 
     The next stable stiffness below is looked for in steps that grow by a quarter from 1e-8 of K, then bisected.
     """

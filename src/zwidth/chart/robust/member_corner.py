@@ -27,8 +27,8 @@ SETTLED, ROUNDING, BLURRED = 1e-14, 1e-11, 1e-7
 class ArcRun:
     """Successive edges of a polygon on one arc, from the point `first` to the point `last` [K unit, B].
 
-    arc_number  of the arc among the member's
-    arc         the arc
+    member, arc_number, arc  the member, and the arc with its number among the member's arcs
+    angles                   theta at both points
     """
 
     member: Member
@@ -68,6 +68,7 @@ class ArcRun:
         return float((point - first) @ (last - first) / ((last - first) @ (last - first)))
 
     def _middle(self, unit: float) -> tuple[float, float]:
+        """Parameter half way along the run, and the sign with which it changes along it."""
         start = self.parameter(self.angles[0], self.first, unit)
         end = self.parameter(self.angles[1], self.last, unit)
         return 0.5 * (start + end), np.sign(end - start)
@@ -93,7 +94,10 @@ class Corner:
 
 
 def solve_corner(one: ArcRun, two: ArcRun, unit: float, size: float) -> Corner:
-    """Where one run gives way to the next."""
+    """The corner where one run ends and the next begins; size: of the set [K unit, B].
+
+    Where it cannot be solved for, the polygons' corner, with a blur of 1e-6 of the size.
+    """
     follows = one.member is two.member and two.arc_number == one.member.edge.arcs.next_arc[one.arc_number]
     if follows and np.hypot(*(one.last - np.multiply(one.arc.last, (unit, 1.0)))) <= 1e-6 * size:
         return Corner(one.arc.last, (one.arc.end, two.arc.start), 0.0)

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 # Parts of a polygon smaller than this share of it are rounding.
 ROUNDING_AREA = 1e-12
-# An arc is looked at but for this share of its first and last chord, where it touches its neighbours.
+# Share of an arc's first and last chord that is left out of intersections: there it touches its neighbours.
 TRIM = 1e-7
 # An eigenvalue this far outside the circle is outside.
 BEYOND_DOUBT = 1e-11
@@ -35,7 +35,7 @@ class Member:
 
     index     its place among the loops
     tracer    the loop on the unit circle
-    edge      of its stable set, this index the member of its arcs
+    edge      of its stable set; `member` of its arcs is this index
     """
 
     index: int

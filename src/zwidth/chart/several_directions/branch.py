@@ -73,7 +73,7 @@ class Branch:
         inside = _inside(arc.angles)
         inner = arc.angles[inside]
         if len(inner) < 2:
-            return _straight(arc.first, arc.last)
+            return _straight_integral(arc.first, arc.last)
         stops = np.unique(np.concatenate([inner, self.zeros(arc, STIFFNESS), self.zeros(arc, DAMPING)]))
         stops = stops if inner[0] < inner[-1] else stops[::-1]
         centre, half = 0.5 * (stops[1:] + stops[:-1]), 0.5 * (stops[1:] - stops[:-1])
@@ -83,9 +83,9 @@ class Branch:
         total = float(np.sum(half * (value @ WEIGHTS)))
         first, last = np.column_stack(self.walls(inner[[0, -1]]))
         if not inside[0]:
-            total += _straight(arc.first, first)
+            total += _straight_integral(arc.first, first)
         if not inside[-1]:
-            total += _straight(last, arc.last)
+            total += _straight_integral(last, arc.last)
         return total
 
 
@@ -94,5 +94,6 @@ def _inside(thetas: Floats) -> NDArray[np.bool_]:
     return np.asarray((thetas > 0.0) & (thetas < np.pi))
 
 
-def _straight(first: Floats | tuple[float, float], last: Floats | tuple[float, float]) -> float:
+def _straight_integral(first: Floats | tuple[float, float], last: Floats | tuple[float, float]) -> float:
+    """Integral of K dB over the part with K > 0 and B > 0 of a straight edge [N^2 s/m^2]."""
     return float(straight_integrals(np.array([first]), np.array([last]))[0])

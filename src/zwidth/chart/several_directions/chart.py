@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 
 # How closely branches are sampled round the stable set before its corners are solved, in shares of its size.
 CLOSE = 1e-5
-# Margin about the stable set in which it is looked at again, and how often.
+# Margin about the stable set within which branches are sampled again, and the fewest and most rounds of that.
 MARGIN = 0.25
 LOOKS, MOST_LOOKS = 2, 6
 # Walls tried along each side of the set's box, and how far outside the circle a root shows that one is unstable.
@@ -95,9 +95,9 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
 
 
 def _missed_angles(loop: MultiLoop, polygons: list[shapely.Polygon]) -> Floats:
-    """Angles about roots outside the circle of walls in cells taken as stable: there a branch fell between two.
+    """Angles about roots outside the circle of walls in cells taken as stable: samples there missed a branch.
 
-    A mode that walls hardly move draws its whole branch within a sliver of angle.
+    A mode that walls hardly move runs through its whole branch within a very small interval of angles.
     """
     cells = shapely.MultiPolygon(polygons)
     low, high = np.array(cells.bounds).reshape(2, 2)

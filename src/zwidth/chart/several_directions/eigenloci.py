@@ -35,7 +35,7 @@ NARROWEST = 1e-8
 # Largest distance of a chord from its curve, in shares of the chord.
 SAG = 0.02
 ROUNDS = 24
-# Angles beyond which no more are added: what still bends then is rounding.
+# Number of angles beyond which no more are added: a curve that still bends then is rounding.
 MOST = 20000
 
 
@@ -43,7 +43,7 @@ MOST = 20000
 class Loci:
     """Eigenvalues of P(exp(i theta)), each column one branch.
 
-    loop
+    loop    the loop of m directions
     thetas  (N,)    ascending in (0, pi)
     g       (N, m)  eigenvalues followed by continuity
     """
@@ -62,7 +62,7 @@ class Loci:
     def at(self, branch: int, thetas: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """K, B, dK/dtheta, dB/dtheta (k,) on a branch at angles in (0, pi)."""
         z, d = on_circle(thetas)
-        expected = self._expected(branch, thetas)
+        expected = self._interpolate(branch, thetas)
         g, dg = _nearest(*self.loop.plant_slope(z, d), expected)
         h, dh = -1.0 / g, dg / g**2
         if self.loop.count > 1:
@@ -76,7 +76,7 @@ class Loci:
         dB = (dh.imag - B * dw.imag) / w.imag
         return h.real - B * w.real, B, dh.real - dB * w.real - B * dw.real, dB
 
-    def _expected(self, branch: int, thetas: Floats) -> Complexes:
+    def _interpolate(self, branch: int, thetas: Floats) -> Complexes:
         """The branch's eigenvalue between samples: g is taken as linear, and past a pole 1/g."""
         g = self.g[:, branch]
         straight, inverse = np.interp(thetas, self.thetas, g), np.interp(thetas, self.thetas, 1.0 / g)
@@ -97,6 +97,7 @@ def on_circle(thetas: Floats) -> tuple[Complexes, Complexes]:
 
 
 def _walls(g: Complexes, w: Complexes) -> Floats:
+    """Walls (..., 2) of [K, B] with a root on the circle, of eigenvalues g and velocity estimates w (...)."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         h = -1.0 / g
         B = h.imag / w.imag
@@ -145,7 +146,7 @@ def trace_loci(loop: MultiLoop) -> Loci:
         middles = middles[wide & (_ambiguous(loci.g) | _bent(loci))]
         if not len(middles) or len(thetas) > MOST:
             break
-        thetas, g = _merged(loci.thetas, loci.g, middles, eigenvalues_of_plant(loop, middles))
+        thetas, g = _with_samples(loci.thetas, loci.g, middles, eigenvalues_of_plant(loop, middles))
     return Loci(loop, thetas, _match_branches(g))
 
 
@@ -160,7 +161,7 @@ def refine_loci(loci: Loci, low: Floats, high: Floats, tolerance: float) -> Loci
         inside = (near[1:] | near[:-1]).any(axis=-1) & (np.diff(loci.thetas) > NARROWEST * loci.thetas[1:])
         middles = (0.5 * (loci.thetas[1:] + loci.thetas[:-1]))[inside]
         g = eigenvalues_of_plant(loci.loop, middles)
-        thetas, every = _merged(loci.thetas, loci.g, middles, g)
+        thetas, every = _with_samples(loci.thetas, loci.g, middles, g)
         refined = Loci(loci.loop, thetas, _match_branches(every))
         at = np.searchsorted(thetas, middles)
         points = refined.walls
@@ -179,14 +180,15 @@ def refine_loci(loci: Loci, low: Floats, high: Floats, tolerance: float) -> Loci
 def with_angles(loci: Loci, more: Floats) -> Loci:
     """More samples, at these angles."""
     more = np.setdiff1d(more[(more > loci.thetas[0]) & (more < loci.thetas[-1])], loci.thetas)
-    thetas, g = _merged(loci.thetas, loci.g, more, eigenvalues_of_plant(loci.loop, more))
+    thetas, g = _with_samples(loci.thetas, loci.g, more, eigenvalues_of_plant(loci.loop, more))
     return Loci(loci.loop, thetas, _match_branches(g))
 
 
-def _merged(thetas: Floats, g: Complexes, more: Floats, h: Complexes) -> tuple[Floats, Complexes]:
-    every = np.concatenate([thetas, more])
-    order = np.argsort(every)
-    return every[order], np.concatenate([g, h])[order]
+def _with_samples(thetas: Floats, g: Complexes, more: Floats, h: Complexes) -> tuple[Floats, Complexes]:
+    """Angles and eigenvalues g with those at more angles, h, in ascending order of angle."""
+    together = np.concatenate([thetas, more])
+    order = np.argsort(together)
+    return together[order], np.concatenate([g, h])[order]
 
 
 def _match_branches(g: Complexes) -> Complexes:

@@ -29,7 +29,7 @@ NEIGHBOURS = 3
 
 @dataclass(frozen=True)
 class _CurveRun:
-    """Sides of a ring on one curve: its number (branches first, then lines), and the angles where it was met."""
+    """Sides of a ring on one curve: its number (branches first, then lines), and the angles of their two ends."""
 
     curve: int
     start: float
@@ -80,16 +80,16 @@ def _runs(loci: Loci, lines: list[Line], ring: Floats) -> list[_CurveRun]:
 
 
 def _long_runs(runs: list[_CurveRun], shortest: float) -> list[_CurveRun]:
-    """Without runs that rounding made, and with what they parted joined, across the ring's first point too."""
+    """Runs longer than `shortest`; those with only shorter ones between are joined, also across its start."""
     long_runs: list[_CurveRun] = []
     for run in (run for run in runs if run.length > shortest):
         long_runs = (
-            [*long_runs[:-1], _joined(long_runs[-1], run)]
+            [*long_runs[:-1], _join(long_runs[-1], run)]
             if long_runs and _continues(long_runs[-1], run)
             else [*long_runs, run]
         )
     if len(long_runs) > 1 and _continues(long_runs[-1], long_runs[0]):
-        long_runs = [_joined(long_runs[-1], long_runs[0]), *long_runs[1:-1]]
+        long_runs = [_join(long_runs[-1], long_runs[0]), *long_runs[1:-1]]
     return long_runs
 
 
@@ -98,14 +98,20 @@ def _continues(one: _CurveRun, other: _CurveRun) -> bool:
     return one.curve == other.curve and abs(other.samples[0] - one.samples[1]) <= NEIGHBOURS
 
 
-def _joined(one: _CurveRun, other: _CurveRun) -> _CurveRun:
+def _join(one: _CurveRun, other: _CurveRun) -> _CurveRun:
+    """Two successive runs on one curve as one."""
     samples = one.samples[0], other.samples[1]
     return _CurveRun(one.curve, one.start, other.end, samples, other.corner, one.length + other.length)
 
 
 @dataclass(frozen=True)
 class _CurveSteps:
-    """Steps between samples of each branch, and the lines: ends (k, 2), whose they are, which step, angles."""
+    """Steps between samples of each branch, and the lines.
+
+    first, last  (k, 2)  ends [K T, B];  start, end  (k,)  angles there
+    curve        (k,)    number of the branch, or of the line after all branches
+    sample       (k,)    number of the step on its branch; 0 for a line
+    """
 
     first: Floats
     last: Floats
@@ -122,7 +128,7 @@ class _CurveSteps:
 
 
 def _segments(loci: Loci, lines: list[Line], ring: Floats) -> _CurveSteps:
-    """All that can be a side of the ring."""
+    """Steps of branches, and lines, on which a side of the ring can lie."""
     walls, thetas = loci.walls, loci.thetas
     m, size = walls.shape[1], np.ptp(ring, axis=0)
     centre = 0.5 * (ring.max(axis=0) + ring.min(axis=0))
@@ -132,7 +138,7 @@ def _segments(loci: Loci, lines: list[Line], ring: Floats) -> _CurveSteps:
             sound: NDArray[np.bool_] = np.asarray(np.isfinite(walls[:, i]).all(axis=-1))
             near = sound & (np.abs(walls[:, i] - centre) <= size).all(axis=-1)
             use = (near[1:] & sound[:-1]) | (near[:-1] & sound[1:])
-            for j in range(i):  # the same curve twice
+            for j in range(i):  # two branches that are the same curve
                 use &= ~(np.abs(walls[1:, i] - walls[1:, j]) <= 1e-9 * size).all(axis=-1)
         k = np.flatnonzero(use)
         parts.append((walls[k, i], walls[k + 1, i], np.full(len(k), i), k, thetas[k], thetas[k + 1]))
@@ -149,25 +155,25 @@ def _corner(
 ) -> tuple[Wall, float, float]:
     """The wall where a run ends and another begins, and the angles of both there."""
     m, T = loci.g.shape[1], loci.loop.period
-    solved: tuple[Floats, float, float] | None = None
+    solution: tuple[Floats, float, float] | None = None
     if one.curve >= m and other.curve >= m:
         L = [lines[run.curve - m] for run in (one, other)]
         across = np.stack([line.across for line in L])
         if abs(np.linalg.det(across)) > 1e-12:
-            solved = np.linalg.solve(across, [line.offset for line in L]), L[0].angle, L[1].angle
+            solution = np.linalg.solve(across, [line.offset for line in L]), L[0].angle, L[1].angle
     elif one.curve >= m:
         line = lines[one.curve - m]
-        met = _meet_line(loci, line, other.curve, other.start)
-        solved = None if met is None else (met[0], line.angle, met[1])
+        crossing = _meet_line(loci, line, other.curve, other.start)
+        solution = None if crossing is None else (crossing[0], line.angle, crossing[1])
     elif other.curve >= m:
         line = lines[other.curve - m]
-        met = _meet_line(loci, line, one.curve, one.end)
-        solved = None if met is None else (met[0], met[1], line.angle)
+        crossing = _meet_line(loci, line, one.curve, one.end)
+        solution = None if crossing is None else (crossing[0], crossing[1], line.angle)
     else:
-        solved = _meet(loci, one, other)
-    if solved is None or not np.max(np.abs(solved[0] - one.corner)) <= stray:
-        solved = one.corner, one.end, other.start
-    (x, y), end, start = solved
+        solution = _meet(loci, one, other)
+    if solution is None or not np.max(np.abs(solution[0] - one.corner)) <= stray:
+        solution = one.corner, one.end, other.start
+    (x, y), end, start = solution
     return (float(x / T), float(y)), float(end), float(start)
 
 

@@ -1,7 +1,7 @@
 """Which cells between the eigenloci and the lines of real roots are stable: one eigenvalue problem in each.
 
 All in walls [K T, B]. The plane is cut by every branch, by the lines of walls with a root at z = +-1 and by a box
-that no stable wall leaves; a wall inside each piece is judged by the transition matrix, which knows nothing of
+that holds all stable walls; a wall inside each piece is judged by the transition matrix, independently of the
 eigenloci.
 """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -25,6 +26,7 @@ from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture import OK, Posture
 from zwidth.model.reduction import reduce_mechanism
+from zwidth.progress import Progress, watched
 
 REASONS: Final = {
     kernel.DONE: ("done", ""),
@@ -51,6 +53,7 @@ def simulate_mechanism(
     counted: bool = True,
     torque_limits: Literal["each", "together"] = "each",
     seed: int = 0,
+    progress: Progress | None = None,
 ) -> MechanismMotion:
     """Simulate how a mechanism moves on its flexible drives at a surface of any shape, or free.
 
@@ -72,6 +75,7 @@ def simulate_mechanism(
     torque_limits   "each": every motor's torque is cut at its own limit; "together": all are scaled alike, so that
                     the force keeps its direction
     seed            of the encoders' noise
+    progress        called with "simulating", the samples done, and all samples
     Returns  MechanismMotion; a motion that meets a singularity ends there, and says so
     Raises   SurfaceOutOfReach  (a ValueError) for a surface that the handle never touches in this assembly
              MotionError  (a ValueError) for inputs that cannot be meant
@@ -124,10 +128,11 @@ def simulate_mechanism(
     law = rendering_inputs(
         mechanism.drives, shape, address, values, read, counted, seed, torque_limits == "together"
     )
-    status, reached = kernel.run_motion(
-        system, law, computers([controller], [controller.force_limit]), start, posture.angles.copy(), inputs.push,
-        controller.fractional_delay, substeps, trace,
-    )  # fmt: skip
+    with watched(progress, "simulating", partial(_samples_done, trace), len(trace.position)):
+        status, reached = kernel.run_motion(
+            system, law, computers([controller], [controller.force_limit]), start, posture.angles.copy(),
+            inputs.push, controller.fractional_delay, substeps, trace,
+        )  # fmt: skip
     motion = MechanismMotion(
         point=point,
         surface=surface,
@@ -159,11 +164,16 @@ def _start(mechanism: Mechanism, posture: Posture, system: System, rates: Floats
     return start
 
 
+def _samples_done(trace: kernel.Trace) -> int:
+    """Number of samples that a running motion has recorded."""
+    return int(np.count_nonzero(np.isfinite(trace.position[:, 0])))
+
+
 def _empty_trace(samples: int, states: int, drives: int) -> kernel.Trace:
     k = samples
     return kernel.Trace(
         state=np.empty((k, states)),
-        position=np.empty((k, 3)),
+        position=np.full((k, 3), np.nan),  # which says how far a run is
         counted_position=np.empty((k, 3)),
         velocity=np.empty((k, 3)),
         force=np.empty((k, 3)),

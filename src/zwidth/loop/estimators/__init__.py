@@ -1,8 +1,9 @@
 """Velocity estimates from positions: one method per file, most a discrete transfer function w(z).
 
-Every linear method has `estimator(period)`, its factors at a sampling period; `delay(period)`, how late it is at
-low frequencies; and `noise_gain(period)`, how much of the position's white noise it passes. None takes or keeps a
-unit but metres and seconds. Their frequency responses are in `zwidth.loop.estimators.frequency_response`.
+Every linear method has `estimator(period)`, its factors at a sampling period [s]; `delay(period)`, how late it is
+at low frequencies [s]; and `noise_gain(period)`, the standard deviation of the estimate per that of white noise in
+the position [1/s]. All lengths are in metres, all times in seconds. Their frequency responses are in
+`zwidth.loop.estimators.frequency_response`.
 
 Two methods are not linear, `Foaw` and `Levant`: they have no w(z), `estimator` raises NonlinearError, and a loop
 with them is simulated instead. `zwidth.loop.estimators.run_estimator` runs any method over recorded positions.

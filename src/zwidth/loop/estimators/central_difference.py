@@ -17,7 +17,7 @@ class CentralDifference:
 
         w(z) = (1 - z^-2)/(2 T)
 
-    The same as the windowed difference over two samples. Deaf at half the sampling rate, w(-1) = 0.
+    The same as the windowed difference over two samples. At half the sampling rate it gives 0, w(-1) = 0.
 
     >>> CentralDifference().delay(0.001)
     0.001

@@ -18,8 +18,8 @@ Fit = Literal["end-fit", "best-fit"]
 LONGEST_WINDOW = 100
 # Share of the noise bound left for rounding: counts often lie on the bound itself, half a step from the line.
 ROUNDING_MARGIN = 1e-9
-# Where the memory holds the number of readings, the first of them, and the newest ones in a ring; the ring stands
-# there twice, so that every window is one stretch of it.
+# Places in the memory of the number of readings, of the first reading, and of a ring of the newest readings. The
+# ring is stored twice, one copy behind the other, so that every window is contiguous.
 COUNT, ORIGIN, RING = 0, 1, 2
 
 

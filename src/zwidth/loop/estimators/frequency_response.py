@@ -37,7 +37,7 @@ def relative_response(method: VelocityMethod | Estimator, period: float, frequen
     >>> abs(relative_response(WindowedDifference(4), 0.001, [0.0, 250.0])).round(3)
     array([1., 0.])
     """
-    estimator, angle = _prepared(method, period, frequency_Hz)
+    estimator, angle = _factors_and_angles(method, period, frequency_Hz)
     d = _distance(angle)
     ratio = np.ones_like(d)
     for top, bottom in zip(estimator.numerator, estimator.denominator, strict=True):
@@ -69,7 +69,7 @@ def phase_delay(method: VelocityMethod | Estimator, period: float, frequency_Hz:
     >>> phase_delay(Kalman(10.0, 1e-6), 0.001, [0.0, 100.0]).round(7)
     array([0.0001708, 0.0001798])
     """
-    estimator, angle = _prepared(method, period, frequency_Hz)
+    estimator, angle = _factors_and_angles(method, period, frequency_Hz)
     limit = low_frequency_delay(estimator, period)
     phase = _window_phase(estimator.window, angle)
     for rows, sign in ((estimator.numerator, 1.0), (estimator.denominator, -1.0)):
@@ -88,14 +88,18 @@ def low_frequency_delay(estimator: Estimator, period: float) -> float:
     return float(samples + estimator.window @ np.arange(estimator.window.size)) * period
 
 
-def _prepared(
+def _factors_and_angles(
     method: VelocityMethod | Estimator, period: float, frequency_Hz: ArrayLike
 ) -> tuple[Estimator, Floats]:
-    """Factors, and the angles theta = 2 pi f T."""
+    """Factors of the estimator, and the angles theta = 2 pi f T (...) of frequencies f (...) [Hz]."""
     estimator = method if isinstance(method, Estimator) else method.estimator(period)
     share = np.asarray(frequency_Hz, dtype=float) * (2.0 * period)
-    if not np.all((share >= 0.0) & (share <= 1.0 + 1e-12)):
-        raise ValueError(f"frequency_Hz must be from 0 to half the sampling rate, {0.5 / period:g} Hz")
+    allowed = (share >= 0.0) & (share <= 1.0 + 1e-12)
+    if not np.all(allowed):
+        wrong = float(share[~allowed][0]) / (2.0 * period)
+        raise ValueError(
+            f"frequency_Hz must be from 0 to half the sampling rate, {0.5 / period:g} Hz, got {wrong:g}"
+        )
     return estimator, np.asarray(np.pi * np.minimum(share, 1.0))
 
 

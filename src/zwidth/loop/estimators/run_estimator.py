@@ -71,8 +71,8 @@ def _run_linear(
 ) -> None:
     """The factors one behind the other, each in powers of d = z - 1, then the window.
 
-    Of (c2 d^2 + c1 d + c0)/(d^2 + d1 d + d0) the states w1 and w2 hold what dividing by d is yet to give:
-    y = c2 u + w1,  d w1 = w2 + c1 u - d1 y,  d w2 = c0 u - d0 y; a lower degree leaves out the first of these.
+    (c2 d^2 + c1 d + c0)/(d^2 + d1 d + d0), from u to y, has the states w1 and w2:
+    y = c2 u + w1,  d w1 = w2 + c1 u - d1 y,  d w2 = c0 u - d0 y; a factor of lower degree has fewer of them.
     """
     state, latest = np.zeros((numerator.shape[0], 2)), np.zeros(window.size)
     for j in range(positions.size):

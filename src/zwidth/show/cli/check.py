@@ -49,7 +49,7 @@ class CheckCommand(Command):
 
     def compute(self, case: CommandLine) -> WallVerdicts:
         stiffness, damping = zip(*case["walls"], strict=True)
-        return case.point.check(stiffness, damping)
+        return case.point.check(stiffness, damping, progress=case.progress)
 
     def pages(self, case: CommandLine, result: WallVerdicts, document: Mapping[str, Any]) -> Iterator[Any]:
         points = document["points"]

@@ -21,13 +21,15 @@ from zwidth.show.cli.errors import NoAnswer, translate_errors
 from zwidth.show.cli.first_use import announce_compiling
 from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
-from zwidth.show.output import DATA, FIGURES, destination, write_data
+from zwidth.show.cli.progress import show_progress
+from zwidth.show.output import DATA, FIGURES, destination, printable, write_data
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.device.device import Device
     from zwidth.loop.operating_point import OperatingPoint
+    from zwidth.progress import Progress
 
 NO_MODEL: Final = (
     "a measured response has no masses, stiffnesses, modes or postures to show; `zwidth chart` and `zwidth check` "
@@ -42,11 +44,13 @@ class CommandLine:
     question  the device and the circumstances of the answer, as typed
     options   the command's own, by name
     path      file to be written; None: none
+    progress  reports how far a long computation is
     """
 
     question: Question
     options: Mapping[str, Any]
     path: Path | None
+    progress: Progress
 
     @cached_property
     def device(self) -> Device:
@@ -218,6 +222,7 @@ class Command:
         document |= {"decided": True} if self.may_be_undecided and "decided" not in document else {}
         if case.path is not None:
             document["file"] = str(case.path)
+            case.progress(f"writing {printable(case.path.name)}", 0, 0)
             reason = self.write(case, result, document, reason)
         others = {key: str(path) for key, path in self.write_others(case, result).items()}
         document |= others
@@ -233,11 +238,14 @@ class Command:
     def run(self, question: Question, as_json: bool, output: str | None = None, **options: Any) -> int:
         """Carry out one command line; returns the exit code."""
         named = output or self.default_output(question)
-        case = CommandLine(question, options, None if named is None else destination(named, self.outputs))
-        self.check(case)
-        case = replace(case, options={**options, **self.parse(case)})
-        with announce_compiling(self.name):
-            return deliver(self.answer(case), as_json)
+        path = None if named is None else destination(named, self.outputs)
+        with announce_compiling(self.name) as compiling:
+            with show_progress(compiling) as progress:
+                case = CommandLine(question, options, path, progress)
+                self.check(case)
+                case = replace(case, options={**options, **self.parse(case)})
+                answer = self.answer(case)
+            return deliver(answer, as_json)
 
     def epilog(self) -> str:
         """What stands below its help."""

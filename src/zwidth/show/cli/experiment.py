@@ -15,7 +15,6 @@ from zwidth.show.cli.errors import BadInput, NoAnswer
 from zwidth.show.cli.experiment_page import explanation, point_rows, sentences, warning
 from zwidth.show.cli.options import Numbers, refuse_empty
 from zwidth.show.cli.process import say
-from zwidth.show.cli.progress import show_progress
 from zwidth.study.points_file import read_points
 
 if TYPE_CHECKING:
@@ -193,8 +192,10 @@ class ExperimentCommand(Command):
 
         file = _journal(case)
         try:
-            with show_progress() as progress, _report_kept_work(file):
-                return measure_boundary(case.point, case["plan"], case["measured"], file=file, progress=progress)
+            with _report_kept_work(file):
+                return measure_boundary(
+                    case.point, case["plan"], case["measured"], file=file, progress=case.progress
+                )
         except TrialError as error:
             raise BadInput(f"--{error.argument}: {error.reason}") from None
         except JournalError as error:

@@ -10,7 +10,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib.resources import files
@@ -81,8 +81,11 @@ class Progress:
 
 
 @contextmanager
-def announce_compiling(command: str) -> Iterator[None]:
-    """Have a command say so when it has to compile, how long that takes and what remains."""
+def announce_compiling(command: str) -> Iterator[Callable[[], bool]]:
+    """Have a command say so when it has to compile, how long that takes and what remains.
+
+    Yields whether kernels are being compiled now
+    """
     progress: list[Progress] = []
 
     def listen(name: str, ended: bool) -> None:
@@ -96,7 +99,7 @@ def announce_compiling(command: str) -> Iterator[None]:
             progress[0].finish(name)
 
     with listening(listen):
-        yield
+        yield lambda: bool(progress and progress[0].missing)
 
 
 def compile_kernels() -> int:

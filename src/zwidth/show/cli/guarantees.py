@@ -10,7 +10,6 @@ import click
 from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite
-from zwidth.show.cli.progress import show_progress
 from zwidth.show.units import amount
 
 if TYPE_CHECKING:
@@ -70,8 +69,7 @@ class GuaranteesCommand(Command):
 
     def compute(self, case: CommandLine) -> Guarantees:
         wall = None if case["stiffness"] is None else (case["stiffness"], case["damping"] or 0.0)
-        with show_progress() as progress:
-            return case.point.guarantees(coupling=case["coupling"], wall=wall, progress=progress)
+        return case.point.guarantees(coupling=case["coupling"], wall=wall, progress=case.progress)
 
     def reason(self, case: CommandLine, result: Guarantees) -> str | None:
         return NOTHING if result.is_empty else None

@@ -13,7 +13,6 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.contact_options import BoundedNumber, wall_options
 from zwidth.show.cli.errors import BadInput, NoAnswer
 from zwidth.show.cli.options import refuse_empty
-from zwidth.show.cli.progress import show_progress
 from zwidth.show.output import FIGURES, destination
 from zwidth.show.units import amount, as_written
 
@@ -109,15 +108,14 @@ class LimitCyclesCommand(Command):
             if "encoder steps" not in parts:
                 raise BadInput(f"--plane: {name} has no encoder steps; give {_device_key(ENCODER_KEYS, case)}")
             _plane(case)  # whether it can be drawn, before the long computation
-        with show_progress() as progress:
-            return predict_limit_cycles(
-                case.point,
-                case["stiffness"],
-                case["damping"],
-                offset=offset,
-                simulate=not case["no_simulation"],
-                progress=progress,
-            )
+        return predict_limit_cycles(
+            case.point,
+            case["stiffness"],
+            case["damping"],
+            offset=offset,
+            simulate=not case["no_simulation"],
+            progress=case.progress,
+        )
 
     def pages(self, case: CommandLine, result: LimitCyclePrediction, document: Mapping[str, Any]) -> Iterator[Any]:
         yield two_columns(list(_circumstances(case, result)))

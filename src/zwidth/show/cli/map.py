@@ -15,7 +15,6 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Finite, Numbers, ParamType, about_a_workspace, refuse_empty
-from zwidth.show.cli.progress import show_progress
 from zwidth.show.output import ARRAYS, DATA, FIGURES
 
 if TYPE_CHECKING:
@@ -193,17 +192,16 @@ class MapCommand(Command):
             raise BadInput(f"{question.name}: has no [mechanism], and so no workspace to map; use zwidth chart")
         try:
             plane = _plane(case)
-            with show_progress() as progress:
-                dataset = workspace_map(
-                    device,
-                    case["measures"],
-                    plane,
-                    case["extreme"] or question.direction,
-                    question.assembly,
-                    question.model,
-                    case["wall"],
-                    progress=progress,
-                )
+            dataset = workspace_map(
+                device,
+                case["measures"],
+                plane,
+                case["extreme"] or question.direction,
+                question.assembly,
+                question.model,
+                case["wall"],
+                progress=case.progress,
+            )
         except MeasureError as error:
             raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
         except PlaneError as error:

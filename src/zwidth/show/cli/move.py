@@ -114,6 +114,7 @@ class MoveCommand(Command):
                 counted=not case["exact"],
                 torque_limits=case["torque_limits"],
                 seed=case["seed"],
+                progress=case.progress,
             )
         except TooLarge as error:
             raise BadInput(f"--duration: {error}") from None

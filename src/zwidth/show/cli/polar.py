@@ -73,7 +73,7 @@ class PolarCommand(Command):
         if case.device.mechanism is None:
             raise BadInput(f"{question.name}: has no [mechanism], and so one direction only; use zwidth chart")
         question.refuse_unsupported(case.device)
-        return case.point.by_direction(case["plane"], case["count"])
+        return case.point.by_direction(case["plane"], case["count"], progress=case.progress)
 
     def reason(self, case: CommandLine, result: ByDirection) -> str | None:
         return result.reason

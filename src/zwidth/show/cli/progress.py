@@ -1,63 +1,97 @@
-"""Progress of a long computation on standard error."""
+"""Progress of a long command on standard error."""
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Lock, Timer
+from threading import Event, Lock, Thread
 from time import monotonic
 from typing import Any, Final
 
-from zwidth.progress import Progress
+from zwidth.progress import INTERVAL, Progress
 from zwidth.show.cli.process import say, time_text
 
+QUIET: Final = "ZWIDTH_QUIET"
 PATIENCE: Final = 2.0  # s without a word
 LONGER: Final = 2.0  # each pause between two lines is longer than the one before by this factor
 AN_ESTIMATE: Final = 0.02  # share of a stage that must be done before the rest can be estimated
 
 
 @contextmanager
-def show_progress() -> Iterator[Progress]:
-    """What a long run is at, how much of it is done and about how long the rest takes, on standard error: a bar
-    where somebody watches, else a line after two seconds, then ever more rarely."""
-    with _bar() if sys.stderr is not None and sys.stderr.isatty() else _lines() as progress:
-        yield progress
+def show_progress(busy: Callable[[], bool] | None = None) -> Iterator[Progress]:
+    """Show what a command does, how much of it is done and about how long the rest takes, if it takes longer than
+    two seconds: as bars on a terminal, else as lines, ever more rarely. Nothing where ZWIDTH_QUIET is set.
 
+    busy  whether another message says what is waited for; a stage of unknown length is then not mentioned
+    """
+    if os.environ.get(QUIET):
+        yield lambda stage, done, of: None
+        return
+    terminal = sys.stderr is not None and sys.stderr.isatty()
+    shown = _Bars(busy) if terminal else _Lines(busy)
+    ended = Event()
 
-@contextmanager
-def _bar() -> Iterator[Progress]:
-    from rich.console import Console
-    from rich.progress import Progress as Bar
+    def look() -> None:
+        while not ended.wait(INTERVAL):
+            shown.look()
 
-    with Bar(console=Console(stderr=True), transient=True) as bar:
-        tasks: dict[str, Any] = {}
-
-        def progress(stage: str, done: int, of: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=of)
-            bar.update(tasks[stage], completed=done, total=of)
-
-        yield progress
-
-
-@contextmanager
-def _lines() -> Iterator[Progress]:
-    lines = _Lines()
-    # the first stage may be one long step
-    waiting = Timer(PATIENCE, lines.print_line)
-    waiting.daemon = True
-    waiting.start()
+    thread = Thread(target=look, daemon=True)
+    thread.start()
     try:
-        yield lines.update
+        yield shown.update
     finally:
-        waiting.cancel()
+        ended.set()
+        thread.join()
+        shown.close()
+
+
+class _Bars:
+    """A bar for each stage, from the time on when the user has waited long enough."""
+
+    def __init__(self, busy: Callable[[], bool] | None = None) -> None:
+        self._busy = busy or (lambda: False)
+        self._began, self._stage, self._lock = monotonic(), ("computing", 0, 0), Lock()
+        self._bar: Any = None
+        self._tasks: dict[str, Any] = {}
+
+    def update(self, stage: str, done: int, of: int) -> None:
+        """Take what the computation says."""
+        with self._lock:
+            self._stage = stage, done, of
+            if self._bar is not None:
+                self._draw()
+
+    def look(self) -> None:
+        """Begin to show bars if it is time."""
+        with self._lock:
+            if self._bar is not None or monotonic() - self._began < PATIENCE or self._busy():
+                return
+            from rich.console import Console
+            from rich.progress import Progress as Bar
+
+            self._bar = Bar(console=Console(stderr=True), transient=True)
+            self._bar.start()
+            self._draw()
+
+    def close(self) -> None:
+        """Take the bars away."""
+        if self._bar is not None:
+            self._bar.stop()
+
+    def _draw(self) -> None:
+        stage, done, of = self._stage
+        if stage not in self._tasks:
+            self._tasks[stage] = self._bar.add_task(stage, total=of or None)
+        self._bar.update(self._tasks[stage], completed=done, total=of or None)
 
 
 class _Lines:
     """Lines that say how far a run is."""
 
-    def __init__(self) -> None:
+    def __init__(self, busy: Callable[[], bool] | None = None) -> None:
+        self._busy = busy or (lambda: False)
         self._pause, self._printed = PATIENCE, monotonic()
         self._stage, self._done, self._of, self._began = "computing", 0, 0, monotonic()
         self._lock = Lock()
@@ -68,16 +102,19 @@ class _Lines:
             self._began = monotonic()
         self._stage, self._done, self._of = stage, done, of
         if done < of:
-            self.print_line()
+            self.look()
 
-    def print_line(self) -> None:
-        """Print a line, unless one was printed a moment ago: the timer and the computation may come together."""
+    def look(self) -> None:
+        """Print a line, unless one was printed a moment ago: the thread and the computation may come together."""
         with self._lock:
             now = monotonic()
-            if now - self._printed < 0.99 * self._pause:
+            if now - self._printed < 0.99 * self._pause or (not self._of and self._busy()):
                 return
             self._printed, self._pause = now, LONGER * self._pause
             say(f"zwidth: {self._line(now)}")
+
+    def close(self) -> None:
+        """Nothing is left to be taken away."""
 
     def _line(self, now: float) -> str:
         """Stage, count, and an estimate by how fast the stage has been so far."""

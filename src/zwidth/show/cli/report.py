@@ -8,7 +8,6 @@ from typing import Any
 
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Question
-from zwidth.show.cli.progress import show_progress
 from zwidth.show.units import typed
 
 
@@ -31,8 +30,7 @@ class ReportCommand(Command):
         from zwidth.show.report.report import write_report
 
         assert case.path is not None
-        with show_progress() as progress:
-            return write_report(case.device, case.path, case.point, progress)
+        return write_report(case.device, case.path, case.point, case.progress)
 
     def document(self, case: CommandLine, result: dict[str, Any]) -> dict[str, Any]:
         # the circumstances are stated as typed on the command line

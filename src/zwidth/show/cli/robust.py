@@ -14,7 +14,6 @@ from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, NoAnswer
 from zwidth.show.cli.options import refuse_empty
-from zwidth.show.cli.progress import show_progress
 from zwidth.show.member_text import member_text, value_text
 from zwidth.show.output import printable
 from zwidth.show.units import amount, percent, radius, typed, uncertain
@@ -124,8 +123,7 @@ class RobustCommand(Command):
             )
         family = Family(case.device, case["ranges"], case["operators"], case.point)
         try:
-            with show_progress() as progress:
-                return robust_study(family, case["members"], case["unseen"], case["seed"], progress=progress)
+            return robust_study(family, case["members"], case["unseen"], case["seed"], progress=case.progress)
         except RangeError as error:
             faults = (fault.spelled(lambda name, _: ARGUMENT_NAMES[name]) for fault in error.faults)
             raise BadInput(*(f"--range: {fault}" for fault in faults)) from None

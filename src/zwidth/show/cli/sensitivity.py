@@ -58,7 +58,7 @@ class SensitivityCommand(Command):
     may_be_undecided = True
 
     def compute(self, case: CommandLine) -> Sensitivities:
-        return case.device.sensitivities(case.point)
+        return case.device.sensitivities(case.point, case.progress)
 
     def reason(self, case: CommandLine, result: Sensitivities) -> str | None:
         return None if result.peak is not None else NO_WALL

@@ -161,6 +161,7 @@ class SimulateCommand(Command):
                 **contact_arguments(case.options),
                 **{name: case[name] for name in run_options},
                 trail=case.writes(FIGURES + SOUND),
+                progress=case.progress,
                 seconds_to_hear=partial(seconds_to_hear, pitch=case["sound_pitch"])
                 if case.writes(SOUND)
                 else None,

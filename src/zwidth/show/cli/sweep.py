@@ -14,7 +14,6 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Question, refuse_empty
-from zwidth.show.cli.progress import show_progress
 from zwidth.show.cli.resumable import open_store, report_kept_work, resume_options
 from zwidth.show.output import ARRAYS, DATA, FIGURES, FOLDERS, printable
 from zwidth.show.units import number, typed
@@ -105,8 +104,8 @@ class SweepCommand(Command):
         try:
             job = sweep_job(question.study)
             store = open_store(job, case.path, case["resume"])
-            with report_kept_work(store), show_progress() as progress:
-                return compute_designs(question.study, job, store, progress, case["workers"])
+            with report_kept_work(store):
+                return compute_designs(question.study, job, store, case.progress, case["workers"])
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
         except MeasureError as error:
