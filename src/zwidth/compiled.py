@@ -121,8 +121,9 @@ class _EntryLibrary(JITCodeLibrary):
     def _optimize_final_module(self) -> None:
         """Once, where numba optimises twice; without the passes that look for vectors: the loops here run over the
         few bodies of a mechanism or the few poles of a loop, and gain nothing from them."""
-        passes, builder = self._codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=False)
-        passes.run(self._final_module, builder)
+        manager = self._codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=False)
+        passes, *builder = manager if isinstance(manager, tuple) else (manager,)  # numba 0.61 has no builder
+        passes.run(self._final_module, *builder)
 
 
 class _PartCompiler(compiler.CompilerBase):
