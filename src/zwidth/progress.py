@@ -10,7 +10,25 @@ from typing import Final, TypeAlias
 # Called with the name of the stage, the number of its steps done, and the number of its steps; 0 of 0: not known.
 Progress: TypeAlias = Callable[[str, int, int], None]
 
-INTERVAL: Final = 0.5  # s between two looks at how far compiled code is
+INTERVAL: Final = 0.5  # s between two looks at how far a computation is
+
+
+@contextmanager
+def repeated(call: Callable[[], None]) -> Iterator[None]:
+    """Call a function every `INTERVAL` seconds while this block runs, from a thread beside it."""
+    ended = Event()
+
+    def repeat() -> None:
+        while not ended.wait(INTERVAL):
+            call()
+
+    thread = Thread(target=repeat, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 @contextmanager
@@ -22,16 +40,5 @@ def watched(progress: Progress | None, stage: str, done: Callable[[], int], of: 
     if progress is None:
         yield
         return
-    ended = Event()
-
-    def watch() -> None:
-        while not ended.wait(INTERVAL):
-            progress(stage, min(done(), of), of)
-
-    thread = Thread(target=watch, daemon=True)
-    thread.start()
-    try:
+    with repeated(lambda: progress(stage, min(done(), of), of)):
         yield
-    finally:
-        ended.set()
-        thread.join()

@@ -32,7 +32,7 @@ def clock(monkeypatch):
 
     monkeypatch.delenv(progress.QUIET)
     monkeypatch.setattr(progress, "monotonic", lambda: Clock.now)
-    monkeypatch.setattr(progress, "Thread", NoThread)
+    monkeypatch.setattr("zwidth.progress.Thread", NoThread)
     return Clock
 
 
@@ -116,6 +116,16 @@ def test_bars_begin_after_two_seconds_and_leave_nothing(clock, capsys):
     tasks = {task.description: (task.completed, task.total) for task in bars._bar.tasks}
     bars.close()
     assert tasks == {"cells": (1, 100), "writing a.csv": (0, None)}
+
+
+@pytest.mark.parametrize(("of", "shown"), [(0, False), (100, True)])
+def test_bars_leave_a_wait_of_unknown_length_to_the_message_that_explains_it(clock, of, shown):
+    bars = progress._Bars(lambda: True)
+    bars.update("cells", 0, of)
+    clock.now += 3.0
+    bars.look()
+    bars.close()
+    assert (bars._bar is not None) is shown
 
 
 @pytest.mark.parametrize(

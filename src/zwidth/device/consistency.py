@@ -20,6 +20,9 @@ from zwidth.device.toml_access import is_number, row_count, table, tables
 KeyMessages = Iterator[tuple[KeyPath, str]]
 
 KINDS: Final = ("mechanism", "plant", "response")
+# Tables that only device files have, and keys that only studies have: they tell which of the two a file is.
+DEVICE_KEYS: Final = frozenset({*KINDS, "loop"})
+STUDY_KEYS: Final = frozenset({"measures", "axis"})
 
 
 def inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMessages:

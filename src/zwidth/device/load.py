@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 from pydantic import ValidationError
 
 from zwidth.device import address, build, mechanism_check, unsupported
-from zwidth.device.consistency import inconsistencies
+from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS, inconsistencies
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
 from zwidth.device.format_version import refuse_newer, without_version
@@ -95,7 +95,7 @@ def from_document(
         hint = f"write load({document!r})" if isinstance(document, str) else ""
         raise wrong_type("document", "a dictionary", document, hint)
     refuse_newer(document, label)
-    if {"measures", "axis"} & document.keys() and not {"loop", "plant", "mechanism", "response"} & document.keys():
+    if STUDY_KEYS & document.keys() and not DEVICE_KEYS & document.keys():
         named = f", {document['device']}" if isinstance(document.get("device"), str) else ""
         raise fail(
             label, "", f"is a study of designs, not a device; sweep it, or give the device that it names{named}"

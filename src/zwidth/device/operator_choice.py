@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from zwidth.device.consistency import operator_inconsistencies
+from zwidth.device.consistency import DEVICE_KEYS, operator_inconsistencies
 from zwidth.device.faults import DeviceError, Fault, dotted, fail
 from zwidth.device.format_version import KEY, without_version
 from zwidth.device.read import OPERATORS, read
@@ -73,7 +73,7 @@ def operator_table(name_or_path: str | os.PathLike[str]) -> dict[str, Any]:
     version, document = {KEY: whole[KEY]} if KEY in whole else {}, without_version(whole)
     others = sorted(document.keys() - {"operator"})
     if "operator" not in document:
-        if {"plant", "mechanism", "response", "loop"} & document.keys():
+        if DEVICE_KEYS & document.keys():
             raise fail(label, "operator", "is missing; this device file has no operator; add an [operator] table")
         document = {"operator": document}
     elif others and "loop" not in document:

@@ -8,7 +8,7 @@ from pathlib import Path as File
 from typing import Any, Final
 
 from zwidth.device import address
-from zwidth.device.consistency import KINDS
+from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, fail
 from zwidth.device.format_version import refuse_newer
@@ -50,7 +50,7 @@ def study_of(document: dict[str, Any], label: str = "study") -> Study:
             TooLarge     where its designs would not fit into memory
     """
     refuse_newer(document, label)
-    if {*KINDS, "loop"} & document.keys() and not {"measures", "axis"} & document.keys():
+    if DEVICE_KEYS & document.keys() and not STUDY_KEYS & document.keys():
         raise _device_instead(label, "a device")
     faults: Faults = []
     file_faults: list[Fault] = []  # of the files that the study names

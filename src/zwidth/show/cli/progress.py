@@ -6,11 +6,11 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Event, Lock, Thread
+from threading import Lock
 from time import monotonic
 from typing import Any, Final
 
-from zwidth.progress import INTERVAL, Progress
+from zwidth.progress import Progress, repeated
 from zwidth.show.cli.process import say, time_text
 
 QUIET: Final = "ZWIDTH_QUIET"
@@ -31,19 +31,10 @@ def show_progress(busy: Callable[[], bool] | None = None) -> Iterator[Progress]:
         return
     terminal = sys.stderr is not None and sys.stderr.isatty()
     shown = _Bars(busy) if terminal else _Lines(busy)
-    ended = Event()
-
-    def look() -> None:
-        while not ended.wait(INTERVAL):
-            shown.look()
-
-    thread = Thread(target=look, daemon=True)
-    thread.start()
     try:
-        yield shown.update
+        with repeated(shown.look):
+            yield shown.update
     finally:
-        ended.set()
-        thread.join()
         shown.close()
 
 
@@ -66,7 +57,8 @@ class _Bars:
     def look(self) -> None:
         """Begin to show bars if it is time."""
         with self._lock:
-            if self._bar is not None or monotonic() - self._began < PATIENCE or self._busy():
+            unknown = not self._stage[2]
+            if self._bar is not None or monotonic() - self._began < PATIENCE or (unknown and self._busy()):
                 return
             from rich.console import Console
             from rich.progress import Progress as Bar

@@ -10,6 +10,7 @@ import click
 from zwidth.device.read import LARGEST_FILE
 from zwidth.device.text_file import UnreadableFileError, read_text
 from zwidth.loop.motion_names import group_names
+from zwidth.show.circumstances import operator_text
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, NoAnswer
@@ -248,7 +249,7 @@ def _member(study: RobustStudy, member: int) -> str:
     if list(values) != ["operator"]:
         return f"member {member}"
     operator = values["operator"]
-    return "the ungripped device" if operator == NOBODY else f"the device held by {printable(str(operator))}"
+    return "the ungripped device" if operator == NOBODY else f"the device held by {operator_text(str(operator))}"
 
 
 def _members_text(study: RobustStudy) -> str:

@@ -9,15 +9,23 @@ from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION, text_width, wrapped
+from zwidth.show.figures.style import (
+    AXIS_SIZE,
+    BLACK,
+    BLUE,
+    GREY,
+    TICK_SIZE,
+    VERMILION,
+    figure_width,
+    text_width,
+    wrapped,
+)
 from zwidth.show.units import MINUS, NONE, signed
 from zwidth.study.sensitivity_result import Sensitivities
 
 NUMBER_ROOM: Final = 0.24  # of what the bars span, for the numbers beside them
 NUMBER_WIDTH: Final = 40.0  # points that such a number takes at least
 MARGINS: Final = 20.0  # points beside axes and labels
-TICK_SIZE: Final = 8.0
-AXIS_SIZE: Final = 9.0
 
 
 def draw_sensitivities(ax: Axes, sensitivities: Sensitivities, top: int = 12, *, grouped: bool = False) -> None:
@@ -57,8 +65,8 @@ def draw_sensitivities(ax: Axes, sensitivities: Sensitivities, top: int = 12, *,
         )
     ax.axvline(0.0, color=BLACK, linewidth=0.8)
     low, high = min([0.0, *values]), max([0.0, *values])
-    labels = [_fitted(_short(path), 0.45 * _width(ax)) for path, _ in shown]
-    beside = _width(ax) - _widest(labels) - MARGINS
+    labels = [_fitted(_short(path), 0.45 * figure_width(ax)) for path, _ in shown]
+    beside = figure_width(ax) - _widest(labels) - MARGINS
     # numbers stand outside of the bars: both sides have room for the longest, whatever the bars span
     sides = (low < 0.0) + (high > 0.0)
     share = max(NUMBER_ROOM, NUMBER_WIDTH / max(beside - sides * NUMBER_WIDTH, NUMBER_WIDTH))
@@ -74,12 +82,6 @@ def draw_sensitivities(ax: Axes, sensitivities: Sensitivities, top: int = 12, *,
     if not shown:
         ax.set_yticks([])
         ax.text(0.5, 0.5, NONE, transform=ax.transAxes, ha="center", va="center", color=GREY)
-
-
-def _width(ax: Axes) -> float:
-    """Width of the figure [points]."""
-    assert ax.figure is not None
-    return 72.0 * float(ax.figure.get_figwidth())  # type: ignore[union-attr]
 
 
 def _widest(labels: list[str]) -> float:

@@ -49,6 +49,8 @@ LINES: Final[tuple[tuple[str, Any], ...]] = (
 )
 
 FAMILY: Final = "DejaVu Sans"  # comes with matplotlib: the same glyphs on every machine
+TICK_SIZE: Final = 8.0  # points, of letters, as the next two
+AXIS_SIZE: Final = 9.0
 LEGEND_SIZE: Final = 8.0
 HANDLE: Final = 3.4  # widths of a letter that a legend's line takes before its text
 BESIDE_AXES: Final = 0.7  # inches beside axes that a legend above them cannot use: the labels of the upright axis
@@ -64,13 +66,13 @@ _STYLE: Final[dict[str, Any]] = {
     "font.family": FAMILY,
     "font.size": 9.0,
     "axes.titlesize": 9.0,
-    "axes.labelsize": 9.0,
+    "axes.labelsize": AXIS_SIZE,
     "axes.linewidth": 0.8,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "lines.linewidth": 1.4,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
+    "xtick.labelsize": TICK_SIZE,
+    "ytick.labelsize": TICK_SIZE,
     "figure.dpi": 100.0,
     "savefig.dpi": 200.0,
     "svg.fonttype": "path",
@@ -223,10 +225,15 @@ def wrapped(text: str, room: float, size: float) -> list[str]:
     return [line for line in lines if line]
 
 
+def figure_width(ax: Axes) -> float:
+    """Width of the figure that holds the axes [points]."""
+    assert ax.figure is not None
+    return 72.0 * float(ax.figure.get_figwidth())  # type: ignore[union-attr]
+
+
 def room_above(ax: Axes) -> float:
     """Width of what stands above axes and does not leave the figure [points]."""
-    assert ax.figure is not None
-    return 72.0 * (float(ax.figure.get_figwidth()) - BESIDE_AXES)  # type: ignore[union-attr]
+    return figure_width(ax) - 72.0 * BESIDE_AXES
 
 
 def fitted_columns(ax: Axes, labels: Sequence[str], columns: int, size: float = LEGEND_SIZE) -> int:
