@@ -85,7 +85,7 @@ def relative_path(path: Path) -> str:
 
 def test_every_way_of_importing_is_seen():
     source = """
-import zwidth.chart.arc_joining as r, numpy
+import zwidth.chart.edge_by_eigenvalues as r, numpy
 from zwidth import show
 from ..loop import hold
 from . import closure
@@ -95,7 +95,7 @@ if TYPE_CHECKING:
     from zwidth.show import output
 """
     assert set(imports(source, "zwidth.model.posture")) == {
-        "zwidth.chart.arc_joining",
+        "zwidth.chart.edge_by_eigenvalues",
         "numpy",
         "zwidth.show",
         "zwidth.loop.hold",

@@ -7,10 +7,10 @@ from . import loop as loop
 from . import measures as measures
 from . import model as model
 from . import study as study
-from .chart.arc_joining import ChartError as ChartError
 from .chart.chart import StabilityChart as StabilityChart
 from .chart.chart import largest_stiffness as largest_stiffness
 from .chart.chart import stability_chart as stability_chart
+from .chart.edge_by_eigenvalues import ChartError as ChartError
 from .chart.robust.chart import robust_chart as robust_chart
 from .chart.verdict import judge as judge
 from .contact.environments.environment import Parameter as Parameter

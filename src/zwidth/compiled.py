@@ -31,6 +31,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 OPTIONS: Final[dict[str, Any]] = {"nopython": True, "error_model": "numpy"}
 NO_REFERENCE_COUNTS: Final[dict[str, Any]] = {"_nrt": False}  # a flag of numba's that its stubs do not name
 INLINED: Final[dict[str, Any]] = {**NO_REFERENCE_COUNTS, "forceinline": True}
+APART: Final = "zwidth_apart"  # an option of ours: the kernel is never inlined
 # First and last release of numba whose internal classes are known to work as they are used below. With any other
 # release, kernels are compiled by plain `numba.jit`: the same results, a longer wait at first use.
 TAKEN_APART: Final = ((0, 61), (0, 68))
@@ -61,6 +62,14 @@ def compiled_inline(function: Function) -> Function:
     return _kernel(function, INLINED)
 
 
+def compiled_apart(function: Function) -> Function:
+    """Like `compiled_lean`, for a larger kernel that is called from several places: never inlined.
+
+    Where its work outweighs a call, copies of it only take time to compile.
+    """
+    return _kernel(function, {**NO_REFERENCE_COUNTS, APART: True})
+
+
 def compiled_for(signature: Any, function: Callable[..., Any]) -> Any:
     """Compile `function` for one signature now, for callers that use only its address.
 
@@ -83,9 +92,10 @@ def can_be_taken_apart() -> bool:
 
 def _kernel(function: Function, options: dict[str, Any]) -> Function:
     options = {**OPTIONS, **options}
+    apart = bool(options.pop(APART, False))
     if not can_be_taken_apart():
         return cast(Function, numba.jit(cache=True, nogil=True, **options)(function))
-    return cast(Function, _Kernel(function, options))
+    return cast(Function, _Kernel(function, options, apart))
 
 
 class _PartLibrary(JITCodeLibrary):
@@ -115,13 +125,24 @@ class _PartLibrary(JITCodeLibrary):
         return 0
 
 
+class _ApartLibrary(_PartLibrary):
+    """The same of a kernel that is never inlined."""
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Mark the module's own functions before numba adds it."""
+        for function in ir_module.functions:
+            if not function.is_declaration:
+                function.attributes.add("noinline")
+        super().add_ir_module(ir_module)
+
+
 class _EntryLibrary(JITCodeLibrary):
     """Machine code of a kernel that Python calls, with all that it calls in turn, optimised once."""
 
     def _optimize_final_module(self) -> None:
-        """Once, where numba optimises twice; without the passes that look for vectors: the loops here run over the
-        few bodies of a mechanism or the few poles of a loop, and gain nothing from them."""
-        manager = self._codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=False)
+        """Optimise once, where numba optimises twice; with the pass that computes several turns of a loop at once,
+        from which samples of a curve gain, but without the one that looks for vectors in straight code."""
+        manager = self._codegen._module_pass_manager(loop_vectorize=True, slp_vectorize=False)
         passes, *builder = manager if isinstance(manager, tuple) else (manager,)  # numba 0.61 has no builder
         passes.run(self._final_module, *builder)
 
@@ -135,6 +156,12 @@ class _PartCompiler(compiler.CompilerBase):
         self.state.library = self.library(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
         self.state.library.enable_object_caching()
         return [compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)]
+
+
+class _ApartCompiler(_PartCompiler):
+    """The same pipeline, with the library of a kernel that is never inlined."""
+
+    library = _ApartLibrary
 
 
 class _EntryCompiler(_PartCompiler):
@@ -191,9 +218,10 @@ def rare_garbage_collection() -> Iterator[None]:
 class _Kernel(registry.CPUDispatcher):
     """A kernel as other kernels call it; a call from Python goes to its `_Entry`."""
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any], apart: bool) -> None:
         part_options = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        super().__init__(function, targetoptions=part_options, pipeline_class=_PartCompiler)
+        compiler_class = _ApartCompiler if apart else _PartCompiler
+        super().__init__(function, targetoptions=part_options, pipeline_class=compiler_class)
         self.kernel_options = options
         self._entry: _Entry | None = None
 

@@ -33,7 +33,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
 from numba.misc.appdirs import AppDirs
 
-FORMAT: Final = 1  # version of the files; to be increased when their content or their naming changes
+FORMAT: Final = 2  # version of the files; to be increased when their content or their naming changes
 PACKAGE: Final = Path(__file__).parent
 SHIPPED: Final = PACKAGE / "kernels"  # folder of a wheel's kernels; a clone has none
 GENERIC: Final = ("generic", "")  # the processor that a wheel's kernels are compiled for, and its features

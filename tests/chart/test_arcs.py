@@ -9,7 +9,7 @@ import shapely
 from tests.systems import published, random_loop
 from zwidth.chart.arcs import CHORD, DAMPING, MINUS, PAIR, PLUS, SLOPE, STIFFNESS, Arc, Arcs
 from zwidth.chart.area import quadrant_area
-from zwidth.chart.chart import trace_edge
+from zwidth.chart.loop_edge import trace_edge
 from zwidth.chart.peak import find_peak, largest_damping, stiffest_index
 from zwidth.chart.several_directions.branch import Branch
 from zwidth.chart.several_directions.eigenloci import trace_loci
@@ -139,7 +139,7 @@ def test_stops_that_rounding_parted_are_one():
 
 def test_what_is_stiff_by_rounding_alone_has_no_area():
     ring = np.array([[-1.0, 0.0], [1e-12, 0.0], [1e-12, 1.0], [-1.0, 1.0], [-1.0, 0.0]])
-    edge = TracedEdge.of(Arcs.chords([ring]), ())
+    edge = TracedEdge(Arcs.chords([ring]), ())
     assert (edge.stiffness_scale, edge.peak, edge.area) == (1.0, None, 0.0)
     assert quadrant_area(edge.arcs, ()) == pytest.approx(1e-12)
 
@@ -153,7 +153,7 @@ def test_an_outline_has_each_corner_once_unless_it_is_blurred():
         [(0.0, 0.98), (0.0, 0.0)],
     )
     arcs = Arcs.of([[Arc(CHORD, first, last, 0.0, 0.0, np.empty(0)) for first, last in ends]])
-    (outline,) = TracedEdge.of(arcs, ()).outlines
+    (outline,) = TracedEdge(arcs, ()).outlines
     corners = [(0.0, 0.0), (2.0, 0.0), (2.0 - 2e-7, 1.0), (0.0, 1.0), (0.0, 0.98), (0.0, 0.0)]
     assert list(map(tuple, outline.tolist())) == corners
 
@@ -173,8 +173,8 @@ def test_of_walls_as_stiff_as_each_other_the_most_damped_prevails():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_zeros_and_integrals_along_a_curve_are_those_of_its_points(seed):
-    tracer = Tracer.of(published() if seed == 0 else random_loop(np.random.default_rng(seed)))
-    edge, _ = trace_edge(tracer)
+    tracer = Tracer(published() if seed == 0 else random_loop(np.random.default_rng(seed)))
+    edge = trace_edge(tracer)
     for arc, (thetas, K, B) in zip(edge.arcs, edge.arc_points, strict=True):
         if not arc.curved:
             continue
@@ -200,8 +200,8 @@ def branch_of_one_direction(loop, size):
 @pytest.mark.parametrize("seed", [0, 3, 9, 12])
 def test_a_branch_of_one_direction_is_the_curve_of_the_single_loop(seed):
     loop = published() if seed == 0 else random_loop(np.random.default_rng(seed))
-    tracer = Tracer.of(loop)
-    edge, _ = trace_edge(tracer)
+    tracer = Tracer(loop)
+    edge = trace_edge(tracer)
     size = np.ptp(np.vstack(edge.outlines), axis=0)
     branch = branch_of_one_direction(loop, size)
     curved = [edge.arcs[k] for k in edge.arcs.curved]
@@ -211,14 +211,17 @@ def test_a_branch_of_one_direction_is_the_curve_of_the_single_loop(seed):
             np.column_stack(tracer.walls(arc.thetas)), rel=1e-6, abs=1e-7 * size.max()
         )
         for component in (STIFFNESS, DAMPING, SLOPE):
-            assert np.sort(branch.zeros(arc, component)) == pytest.approx(tracer.zeros(arc, component), rel=1e-7)
+            # a corner can lie on an axis: whether K is 0 just before it is rounding
+            zeros = [np.sort(each.zeros(arc, component)) for each in (branch, tracer)]
+            inner, wanted = (each[np.abs(each - arc.end) > 1e-9] for each in zeros)
+            assert inner == pytest.approx(wanted, rel=1e-7)
         assert branch.integral(arc) == pytest.approx(tracer.integral(arc), rel=1e-6, abs=1e-9 * size.prod())
 
 
 def test_a_branch_is_straight_beside_its_end():
     """There its evaluation is all rounding; the first step, 1e-12 of the area, is added all the same."""
-    tracer = Tracer.of(published())
-    edge, _ = trace_edge(tracer)
+    tracer = Tracer(published())
+    edge = trace_edge(tracer)
     size = np.ptp(np.vstack(edge.outlines), axis=0)
     (arc,) = (edge.arcs[k] for k in edge.arcs.curved if edge.arcs[k].start == 0.0)
     branch = branch_of_one_direction(published(), size)

@@ -7,8 +7,8 @@ import pytest
 import shapely
 
 from tests.systems import mass, random_loop, reference_transition_matrix, two_mass
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import boundary_points, stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.hurwitz import QUOTIENT, hurwitz, work_array
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import CentralDifference

@@ -2,54 +2,63 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tests.systems import mass, published
-from zwidth.chart.angle_sampling import sample_angles
-from zwidth.chart.arc_finding import find_arcs
-from zwidth.chart.arc_joining import bridge_gaps
-from zwidth.chart.arcs import CHORD, PLUS
+from zwidth.chart.arcs import CHORD, PAIR, PLUS
+from zwidth.chart.edge_arcs import SAME_CORNER
+from zwidth.chart.edge_by_eigenvalues import MOST_SAMPLES, bridge_gaps, find_arcs, join
+from zwidth.chart.edge_memory import ARCS, edge_memory
 from zwidth.chart.tracer import Tracer
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 
 
-def tracer_and_edges(loop):
-    tracer = Tracer.of(loop)
-    return tracer, find_arcs(tracer, sample_angles(tracer.features(), tracer.radius, 0.1, tracer.longest_step))
+def tracer_and_memory(loop):
+    tracer = Tracer(loop)
+    memory = edge_memory(tracer.table, tracer.degree, MOST_SAMPLES)
+    find_arcs(tracer, memory, 0.1, np.empty(0))
+    assert join(tracer, memory, SAME_CORNER)
+    return tracer, memory
 
 
-def without(edges, arc):
-    """The edges without one arc, as `bridge_gaps` takes them: corners have numbers."""
-    rest = tuple(other for other in edges.arcs if other is not arc)
-    ends = np.array([[other.first, other.last] for other in rest]).reshape(-1, 2)
-    near = np.max(np.abs(ends[:, None] - ends[None]), axis=2) < 1e-6 * np.max(np.abs(ends))
-    left = replace(edges, arcs=rest, extents=(1.0,) * len(rest))
-    return left, np.argmax(near, axis=1).reshape(-1, 2), list(range(len(rest)))
+def take_out(tracer, memory, k):
+    """Leave the edge without one arc; its walls."""
+    arcs, n = memory.arcs, int(memory.counts[ARCS])
+    walls = arcs.first[k].copy(), arcs.last[k].copy()
+    for array in (arcs.kind, arcs.first, arcs.last, arcs.start, arcs.end, arcs.samples):
+        array[k : n - 1] = array[k + 1 : n].copy()
+    memory.counts[ARCS] = n - 1
+    assert not join(tracer, memory, SAME_CORNER)
+    return walls
 
 
 @pytest.mark.parametrize(
     "loop", [published(), Loop(mass(0.1, damping=2.0, stiffness=2e4), Controller(0.001))], ids=["free", "grounded"]
 )
 def test_a_straight_piece_is_put_back(loop):
-    tracer, edges = tracer_and_edges(loop)
-    (line,) = (arc for arc in edges.arcs if arc.kind == PLUS)
-    closed, longest = bridge_gaps(tracer, *without(edges, line))
-    chord = closed.arcs[-1]
-    assert chord.kind == CHORD
-    assert np.array([chord.first, chord.last]) == pytest.approx(np.array([line.first, line.last]), abs=1e-9)
-    assert longest == pytest.approx(abs(line.last[1] - line.first[1]) / edges.size)
+    tracer, memory = tracer_and_memory(loop)
+    kinds = memory.arcs.kind[: memory.counts[ARCS]]
+    (k,) = np.flatnonzero((kinds == PLUS) & (memory.arcs.next_arc[: len(kinds)] >= 0))
+    first, last = take_out(tracer, memory, k)
+    longest = bridge_gaps(tracer, memory)
+    chord = int(memory.counts[ARCS]) - 1
+    assert memory.arcs.kind[chord] == CHORD
+    assert memory.arcs.first[chord] == pytest.approx(first, abs=1e-9)
+    assert memory.arcs.last[chord] == pytest.approx(last, abs=1e-9)
+    assert longest == pytest.approx(abs(last[1] - first[1]) / memory.size[0])
+    assert join(tracer, memory, SAME_CORNER)
 
 
 def test_a_bent_piece_is_not():
-    tracer, edges = tracer_and_edges(published())
-    bent = max((arc for arc in edges.arcs if arc.curved), key=lambda arc: len(arc.thetas))
-    assert bridge_gaps(tracer, *without(edges, bent)) is None
+    tracer, memory = tracer_and_memory(published())
+    lengths = np.ptp(memory.arcs.samples[: memory.counts[ARCS]], axis=1)
+    k = int(np.argmax(np.where(memory.arcs.kind[: memory.counts[ARCS]] == PAIR, lengths, -1)))
+    take_out(tracer, memory, k)
+    assert bridge_gaps(tracer, memory) is None
 
 
 def test_nothing_is_bridged_where_nothing_is_open():
-    tracer, edges = tracer_and_edges(published())
-    assert bridge_gaps(tracer, *without(edges, None)) is None
+    tracer, memory = tracer_and_memory(published())
+    assert bridge_gaps(tracer, memory) is None

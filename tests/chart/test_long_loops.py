@@ -5,10 +5,11 @@ import pytest
 
 from tests.chart.test_chart_against_eigenvalues import DAMPED, disagreements
 from tests.systems import published, random_plant
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError, decided_trace
 from zwidth.chart.nyquist import phase_flags, terms_along
-from zwidth.chart.tracer import HIGH_DEGREE, Tracer
+from zwidth.chart.tracer import Tracer
+from zwidth.chart.wall_samples import MOST_DEGREE
 from zwidth.loop.controller import Controller
 from zwidth.loop.estimators import LeastSquaresSlope, SavitzkyGolay, WindowedDifference
 from zwidth.loop.loop import Loop
@@ -48,14 +49,12 @@ def test_the_phase_along_the_circle_counts_what_polynomials_count():
     rng = np.random.default_rng(32)
     for _ in range(20):
         rate = 10.0 ** rng.uniform(2.3, 4.3)
-        tracer = Tracer.of(
-            Loop(random_plant(rng, rate, DAMPED), Controller(1.0 / rate, float(rng.integers(0, 4))))
-        )
+        tracer = Tracer(Loop(random_plant(rng, rate, DAMPED), Controller(1.0 / rate, float(rng.integers(0, 4)))))
         assert not tracer.is_high_degree
         thetas, terms = tracer._circle
-        K, B, edge = tracer.trace(thetas)
+        K, B, edge = decided_trace(tracer, thetas)
         walls = np.column_stack([K, B])
-        flags = phase_flags(tracer.factors, 1.0, thetas, terms, tracer.degree, walls, thetas, 0)
+        flags = phase_flags(tracer.circle, thetas, terms, tracer.degree, walls, thetas, 0)
         sure = flags != 0
         assert np.mean(sure) > 0.9
         assert np.array_equal(flags[sure] > 0, edge[sure])
@@ -63,9 +62,9 @@ def test_the_phase_along_the_circle_counts_what_polynomials_count():
 
 def test_terms_along_the_circle_are_those_of_the_loop():
     loop = published(delay=2.3)
-    tracer = Tracer.of(loop)
+    tracer = Tracer(loop)
     thetas = np.linspace(0.1, 3.0, 7)
-    A, S, V = terms_along(tracer.factors, 1.0, thetas).T
+    A, S, V = terms_along(tracer.circle, thetas).T
     z = np.exp(1j * thetas)
     assert pytest.approx(loop.plant_response(z), rel=1e-12) == S / A
     assert pytest.approx(loop.velocity_response(z), rel=1e-12) == V / S
@@ -73,7 +72,7 @@ def test_terms_along_the_circle_are_those_of_the_loop():
 
 def test_a_chart_of_a_hundred_samples_of_delay_is_that_of_its_roots():
     loop = published(delay=100.0)
-    assert Tracer.of(loop).degree > HIGH_DEGREE
+    assert Tracer(loop).degree > MOST_DEGREE
     chart = stability_chart(loop, decay=False)
     K, B = chart.stiffness_max, chart.damping_at_stiffness_max
     inside, outside = (np.abs(np.linalg.eigvals(loop.transition_matrix(s * K, B))).max() for s in (0.9999, 1.0001))

@@ -222,7 +222,7 @@ def test_an_error_of_our_own_is_one_line_and_code_70(monkeypatch):
 
 @pytest.mark.parametrize("command", ["chart", "report"])
 def test_a_chart_that_cannot_be_closed_is_undecided(tmp_path, monkeypatch, command):
-    from zwidth.chart.arc_joining import ChartError
+    from zwidth.chart.edge_by_eigenvalues import ChartError
 
     def open_edge(*_):
         raise ChartError("the edge could not be closed")

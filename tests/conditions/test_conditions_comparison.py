@@ -6,8 +6,8 @@ from math import isnan
 
 import pytest
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.conditions import compare
 from zwidth.conditions.comparison import bounds_of, compare_bounds
 from zwidth.device.load import from_document

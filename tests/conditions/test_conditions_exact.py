@@ -7,8 +7,8 @@ import pytest
 import shapely
 from systems import published, random_loop
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.verdict import STABLE, judge
 from zwidth.conditions.comparison import exact_stiffness_limit
 

@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from tests.frozen.devices import random_devices
 from tests.guarantees.test_guarantees_passive import random_device, random_operator
 from tests.systems import mass, published
-from zwidth.chart.arc_joining import ChartError
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.instability import unstable
 from zwidth.chart.verdict import spectral_radius
 from zwidth.device.load import load

@@ -10,8 +10,8 @@ import pytest
 from tests.guarantees.test_guarantees_nested import scaled
 from tests.guarantees.test_guarantees_passive import random_operator, resonators_at
 from tests.systems import random_controller, random_method, random_plant
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.instability import unstable
 from zwidth.chart.verdict import UNSTABLE, eigenvalues, judge
 from zwidth.guarantees.disks import response_disks

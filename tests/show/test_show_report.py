@@ -13,7 +13,7 @@ from html.parser import HTMLParser
 import pytest
 from markupsafe import Markup
 
-from zwidth.chart.arc_joining import ChartError
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.load import from_document, load
 from zwidth.model.posture import OutOfReach
 from zwidth.show.output import json_text

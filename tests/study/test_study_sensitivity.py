@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from tests.systems import random_loop
-from zwidth.chart.arc_joining import ChartError, closed_rings
 from zwidth.chart.arcs import MINUS, PAIR, PLUS
 from zwidth.chart.chart import largest_stiffness, stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError, closed_rings
 from zwidth.chart.peak import Peak
 from zwidth.chart.tracer import Tracer
 from zwidth.device import address
@@ -186,7 +186,7 @@ def test_a_wall_held_by_a_real_root_moves_with_it(damping, kind):
 
 def corners(loop):
     """Every corner of a pair's arc with the line of a real root: the wall, and the angles there."""
-    arcs, _ = closed_rings(Tracer.of(loop))
+    arcs, _ = closed_rings(Tracer(loop))
     for arc, number in zip(arcs, arcs.next_arc, strict=True):
         following = arcs[number]
         kinds = {arc.kind, following.kind}

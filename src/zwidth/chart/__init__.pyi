@@ -1,9 +1,9 @@
-from .arc_joining import ChartError as ChartError
 from .chart import StabilityChart as StabilityChart
 from .chart import largest_stiffness as largest_stiffness
 from .chart import stability_chart as stability_chart
 from .chart_base import BoundaryArc as BoundaryArc
 from .decay import FastestDecay as FastestDecay
+from .edge_by_eigenvalues import ChartError as ChartError
 from .hysteretic import hysteretic_chart as hysteretic_chart
 from .measured.chart import MeasuredChart as MeasuredChart
 from .measured.chart import measured_chart as measured_chart

@@ -1,4 +1,4 @@
-"""Kernels along a piece of the curve: angles so dense that chords lie on it, sign changes, integral of K dB."""
+"""Kernels along a piece of the curve: angles so dense that chords lie on it, and sign changes."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import END_MARGIN
-from zwidth.chart.curve import OF_B, OF_K, OF_SLOPE, wall_at, zero_between
+from zwidth.chart.area import end_value
+from zwidth.chart.curve import NO_LINE, OF_SLOPE, wall_at, zero_between
 from zwidth.compiled import compiled
-from zwidth.loop.factor_kernels import Factors
+from zwidth.loop.circle_factors import CircleFactors, wall_with_slopes
 
 Floats = NDArray[np.float64]
 
 # Largest distance of a chord from its arc, in shares of the arc's own extent in K and in B.
 CHORD = 1e-6
 MOST_POINTS = 4000
-HALVINGS = 60
 
 
 @compiled
-def refined_angles(factors: Factors, radius: float, nodes: Floats, tolerance: float, most: int) -> Floats:
+def refined_angles(circle: CircleFactors, nodes: Floats, tolerance: float, most: int) -> Floats:
     """Angles strictly between the first and last node, each interval cut so that chords stay within tolerance.
 
     The sag of a chord over a step h is h^2/8 times the second derivative; the middle of each interval measures it,
@@ -31,7 +31,7 @@ def refined_angles(factors: Factors, radius: float, nodes: Floats, tolerance: fl
         theta = nodes[i // 2] if i % 2 == 0 else 0.5 * (nodes[i // 2] + nodes[i // 2 + 1])
         # the ends may be 0 or pi, where the curve is even: just inside is as good
         inside = min(max(theta, 1e-7 * nodes[1]), np.pi - 1e-7 * (np.pi - nodes[n - 2]))
-        K[i], B[i], _, _ = wall_at(factors, radius, inside)
+        K[i], B[i], _, _ = wall_at(circle, inside)
     width, height = K.max() - K.min(), B.max() - B.min()
     out, count = np.empty(most + 2 * n), 0
     for i in range(n - 1):
@@ -50,63 +50,28 @@ def refined_angles(factors: Factors, radius: float, nodes: Floats, tolerance: fl
 
 
 @compiled
-def sign_changes(factors: Factors, radius: float, nodes: Floats, component: int) -> Floats:
-    """Angles between ascending nodes, the outermost drawn in, where K (0), B (1) or dK/dtheta (2) changes sign."""
-    out, n = np.empty(len(nodes)), 0
-    low = nodes[0] + END_MARGIN * (nodes[1] - nodes[0])
-    before = wall_at(factors, radius, low)[component]
-    for i in range(1, len(nodes)):
-        last = i == len(nodes) - 1
-        high = nodes[i] - (END_MARGIN * (nodes[i] - nodes[i - 1]) if last else 0.0)
-        after = wall_at(factors, radius, high)[component]
-        if before * after < 0.0:
-            weights = OF_K if component == 0 else (OF_B if component == 1 else OF_SLOPE)
-            out[n] = zero_between(factors, radius, weights, low, high)
-            n += 1
-        low, before = high, after
-    return out[:n].copy()
+def sign_changes(circle: CircleFactors, t: Floats, ends: Floats, component: int) -> Floats:
+    """The t on an arc at which K (0), B (1) or dK/dtheta (2) changes sign.
 
-
-@compiled
-def _gauss(factors: Factors, radius: float, low: float, high: float) -> float:
-    """Six-point Gauss rule for the integral of K dB over angles from low to high."""
-    x = (0.2386191860831969, 0.6612093864662645, 0.932469514203152)
-    weight = (0.467913934572691, 0.3607615730481386, 0.1713244923791704)
-    centre, half, total = 0.5 * (low + high), 0.5 * (high - low), 0.0
-    for g in range(3):
-        for side in (-1.0, 1.0):
-            theta = centre + side * x[g] * half
-            K, B, _, dB = wall_at(factors, radius, theta)
-            if K > 0.0 and B > 0.0:
-                total += weight[g] * half * K * dB
-    return total
-
-
-@compiled
-def quadrant_integral(factors: Factors, radius: float, nodes: Floats) -> float:
-    """Integral of max(K, 0) dB over the part with B > 0 of an arc of the curve, in the order of its angles.
-
-    Round a region with the region on the left this sums to its area within K > 0, B > 0 (Green). Intervals are
-    halved until the rule and its two halves agree to 1e-12 of the whole, or for HALVINGS times: one in which K or
-    B changes sign would be halved down to rounding, and rounding never agrees.
+    t     (n,)    tan(theta/2) from end to end
+    ends  (2, 2)  the walls at both ends
     """
-    total, size = 0.0, 0.0
-    low, high, value = np.empty(64), np.empty(64), np.empty(64)
-    for i in range(len(nodes) - 1):
-        low[0], high[0] = nodes[i], nodes[i + 1]
-        value[0] = _gauss(factors, radius, low[0], high[0])
-        depth, halvings = 0, 0
-        while depth >= 0:
-            halvings += 1
-            middle = 0.5 * (low[depth] + high[depth])
-            left = _gauss(factors, radius, low[depth], middle)
-            right = _gauss(factors, radius, middle, high[depth])
-            size = max(size, abs(total) + abs(left) + abs(right))
-            if abs(left + right - value[depth]) <= 1e-12 * size or halvings > HALVINGS:
-                total += left + right
-                depth -= 1
-            else:
-                low[depth + 1], high[depth + 1], value[depth + 1] = (low[depth], middle, left)
-                low[depth], value[depth] = middle, right
-                depth += 1
-    return total
+    n, m = len(t), 0
+    out, values = np.empty(n), np.empty(n)
+    for i in range(1, n - 1):
+        values[i] = wall_with_slopes(circle, t[i])[component]
+    if component == OF_SLOPE:
+        low, high = t[0] + END_MARGIN * (t[1] - t[0]), t[n - 1] - END_MARGIN * (t[n - 1] - t[n - 2])
+        low, high = max(low, END_MARGIN * t[1]), min(high, t[n - 2] / END_MARGIN)
+        before, after = wall_with_slopes(circle, low)[2], wall_with_slopes(circle, high)[2]
+    else:
+        values[0], values[n - 1] = ends[0, component], ends[1, component]
+        low, before = end_value(circle, component, values, t, n, False)
+        high, after = end_value(circle, component, values, t, n, True)
+    for i in range(1, n):
+        at, value = (t[i], values[i]) if i < n - 1 else (high, after)
+        if before * value < 0.0:
+            out[m] = zero_between(circle, component, NO_LINE, low, at)
+            m += 1
+        low, before = at, value
+    return out[:m].copy()

@@ -1,14 +1,63 @@
-"""The area of a stable set within K >= 0, B >= 0: Green's integral of K dB along its edge."""
+"""The area of a stable set within K >= 0, B >= 0: Green's integral of K dB along its edge.
+
+Over a panel of a curve the integral of K dB is that of the polynomials through its walls at ten Gauss-Lobatto
+points. What they miss of B oscillates, and cancels: the error falls as that of Gauss's rule with as many points.
+"""
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Final, NamedTuple
+
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import Arcs, Curves
-from zwidth.compiled import compiled
+from zwidth.chart.arcs import END_MARGIN, Arcs, Curves
+from zwidth.chart.curve import NO_LINE, OF_B, OF_K, zero_between
+from zwidth.chart.wall_samples import LANES_SIZE, walls_of_samples
+from zwidth.compiled import compiled, compiled_apart, compiled_lean
+from zwidth.loop.circle_factors import CircleFactors, wall_on_circle
 
 Floats = NDArray[np.float64]
+
+POINTS: Final = 10  # of a panel's rule
+PANEL: Final = 3  # intervals between samples that are one panel at first
+ACCURACY: Final = 1e-10  # difference, as a share of the whole, between a panel's integral and that of its halves
+HALVINGS, DEEPEST = 60, 24  # of one panel: all together, and one within the other
+ON_AXIS: Final = 1e-10  # a wall that is this small a share of the largest is on an axis
+
+
+class AreaMemory(NamedTuple):
+    """Working memory of the integral of K dB along a curve.
+
+    rule    (POINTS + 1, POINTS)  see `lobatto_rule`
+    panels  (DEEPEST, 6)          t, K and B at both ends of panels that wait
+    walls   (3, POINTS)           t, K and B within one
+    """
+
+    rule: Floats
+    panels: Floats
+    walls: Floats
+
+
+def area_memory() -> AreaMemory:
+    """The memory of `curve_integral`."""
+    return AreaMemory(lobatto_rule(), np.empty((DEEPEST, 6)), np.empty((3, POINTS)))
+
+
+@cache
+def lobatto_rule(points: int = POINTS) -> Floats:
+    """Gauss-Lobatto points in row 0, and weights w_i d l_j/dx(x_i) in the rows i + 1, with the Lagrange
+    polynomials l_j of the points: the integral of K dB is the sum of K_i rule[i + 1, j] B_j."""
+    basis = legendre.Legendre.basis(points - 1)
+    x = np.concatenate([[-1.0], np.sort(basis.deriv().roots().real), [1.0]])
+    weights = 2.0 / (points * (points - 1) * basis(x) ** 2)
+    values, slopes = np.empty((points, points)), np.empty((points, points))
+    for n in range(points):
+        one = legendre.Legendre.basis(n)
+        values[:, n], slopes[:, n] = one(x), one.deriv()(x)
+    return np.vstack([x, weights[:, None] * (slopes @ np.linalg.inv(values))])
 
 
 def quadrant_area(arcs: Arcs, curves: Curves) -> float:
@@ -27,16 +76,185 @@ def quadrant_area(arcs: Arcs, curves: Curves) -> float:
 @compiled
 def straight_integrals(first: Floats, last: Floats) -> Floats:
     """Integral of K dB over the part with K > 0 and B > 0 of straight edges between walls (n, 2): (n,)."""
-    out = np.zeros(len(first))
+    out = np.empty(len(first))
     for i in range(len(first)):
-        K0, B0, K1, B1 = first[i, 0], first[i, 1], last[i, 0], last[i, 1]
-        low, high = 0.0, 1.0  # the part, in shares of the way
-        for a, b in ((K0, K1), (B0, B1)):
-            if a * b < 0.0:
-                share = a / (a - b)
-                low, high = (max(low, share), high) if a < 0.0 else (low, min(high, share))
-        middle = 0.5 * (low + high)
-        K, B = K0 + middle * (K1 - K0), B0 + middle * (B1 - B0)
-        if low < high and K > 0.0 and B > 0.0:
-            out[i] = K * (B1 - B0) * (high - low)
+        out[i] = straight_integral(first[i, 0], first[i, 1], last[i, 0], last[i, 1])
     return out
+
+
+@compiled
+def arc_integral(circle: CircleFactors, area: AreaMemory, t: Floats, first: Floats, last: Floats) -> float:
+    """Integral of K dB over the part with K > 0 and B > 0 of an arc of the curve.
+
+    t            (n,)  ascending or falling tan(theta/2) from end to end, so dense that a few are one panel
+    first, last  (2,)  the walls at its ends
+    """
+    n = len(t)
+    K, B, lanes = np.empty(n), np.empty(n), np.empty(LANES_SIZE)
+    walls_of_samples(circle, t[1:], n - 2, K[1:], B[1:], lanes)
+    K[0], B[0], K[n - 1], B[n - 1] = first[0], first[1], last[0], last[1]
+    return curve_integral(circle, area, lanes, t, K, B, n)
+
+
+@compiled_lean
+def straight_integral(K0: float, B0: float, K1: float, B1: float) -> float:
+    """Integral of K dB over the part with K > 0 and B > 0 of a straight edge."""
+    low, high = 0.0, 1.0  # the part, in shares of the way
+    for a, b in ((K0, K1), (B0, B1)):
+        if a * b < 0.0:
+            share = a / (a - b)
+            low, high = (max(low, share), high) if a < 0.0 else (low, min(high, share))
+    middle = 0.5 * (low + high)
+    K, B = K0 + middle * (K1 - K0), B0 + middle * (B1 - B0)
+    return K * (B1 - B0) * (high - low) if low < high and K > 0.0 and B > 0.0 else 0.0
+
+
+@compiled_lean
+def end_value(
+    circle: CircleFactors, of: int, values: Floats, t: Floats, n: int, last: bool
+) -> tuple[float, float]:
+    """Where, and with which value, the first or last of n walls of a curve counts for changes of sign: at its own
+    t; but if it lies on an axis, or at t = 0 or inf, drawn in towards its neighbour by END_MARGIN of the step.
+
+    of      OF_K or OF_B
+    values  K or B of the walls
+    """
+    end, neighbour = (n - 1, n - 2) if last else (0, 1)
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, abs(values[i]))
+    at, beside = t[end], t[neighbour]
+    if 0.0 < at < np.inf and abs(values[end]) > ON_AXIS * largest:
+        return at, values[end]
+    if at == 0.0:
+        drawn = END_MARGIN * beside
+    elif at == np.inf:
+        drawn = beside / END_MARGIN
+    else:
+        step = (1.0 if beside == np.inf else -1.0) * at if beside in (0.0, np.inf) else beside - at
+        drawn = at + END_MARGIN * step
+    if not 0.0 < drawn < np.inf:  # from one end of the circle to the other without a sample
+        return at, values[end]
+    K, B = wall_on_circle(circle, drawn)
+    return drawn, K if of == OF_K else B
+
+
+@compiled_lean
+def curve_integral(
+    circle: CircleFactors, area: AreaMemory, lanes: Floats, t: Floats, K: Floats, B: Floats, n: int
+) -> float:
+    """Integral of K dB over the part with K > 0 and B > 0 of the curve through its first n walls.
+
+    It is split where the curve crosses an axis, so that each panel lies within the quadrant or outside.
+    """
+    total = 0.0
+    from_t, from_K, from_B, intervals = t[0], K[0], B[0], 0
+    K_t, K_value = end_value(circle, OF_K, K, t, n, False)
+    B_t, B_value = end_value(circle, OF_B, B, t, n, False)
+    for i in range(1, n):
+        at = t[i - 1]
+        next_K_t, next_K, next_B_t, next_B = t[i], K[i], t[i], B[i]
+        if i == n - 1:
+            next_K_t, next_K = end_value(circle, OF_K, K, t, n, True)
+            next_B_t, next_B = end_value(circle, OF_B, B, t, n, True)
+        of_K = zero_between(circle, OF_K, NO_LINE, K_t, next_K_t) if K_value * next_K < 0.0 else np.nan
+        of_B = zero_between(circle, OF_B, NO_LINE, B_t, next_B_t) if B_value * next_B < 0.0 else np.nan
+        K_t, K_value, B_t, B_value = next_K_t, next_K, next_B_t, next_B
+        for nearer in (True, False):
+            # of two crossings first the one nearer to where the interval begins
+            first_is_K = not abs(of_B - at) < abs(of_K - at)
+            zero = of_K if first_is_K == nearer else of_B
+            if zero == zero:
+                x, y = wall_on_circle(circle, zero)
+                x, y = (0.0, y) if zero == of_K else (x, 0.0)
+                total += _panel(circle, area, lanes, total, from_t, from_K, from_B, zero, x, y)
+                from_t, from_K, from_B, intervals = zero, x, y, 0
+        intervals += 1
+        if intervals >= PANEL or i == n - 1:
+            total += _panel(circle, area, lanes, total, from_t, from_K, from_B, t[i], K[i], B[i])
+            from_t, from_K, from_B, intervals = t[i], K[i], B[i], 0
+    return total
+
+
+@compiled_apart
+def _panel(
+    circle: CircleFactors,
+    area: AreaMemory,
+    lanes: Floats,
+    so_far: float,
+    a: float,
+    Ka: float,
+    Ba: float,
+    b: float,
+    Kb: float,
+    Bb: float,
+) -> float:
+    """Integral of K dB over the curve from the wall Ka, Ba at t = a to Kb, Bb at b, within which neither changes
+    its sign; 0 outside of K > 0, B > 0.
+
+    so_far  the integral up to there, by whose size ACCURACY counts
+    """
+    if a == b:
+        return 0.0
+    stack, total = area.panels, 0.0
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3], stack[0, 4], stack[0, 5] = a, Ka, Ba, b, Kb, Bb
+    depth, halvings = 0, 0
+    while depth >= 0:
+        row = stack[depth]
+        a, Ka, Ba, b, Kb, Bb = row[0], row[1], row[2], row[3], row[4], row[5]
+        far = a + b > 2.0
+        middle = _between(a, b, 0.0, far)
+        Km, Bm = wall_on_circle(circle, middle)
+        if halvings == 0 and not (Km > 0.0 and Bm > 0.0):  # the ends may lie on an axis
+            return 0.0
+        whole = _rule(circle, area, lanes, a, Ka, Ba, b, Kb, Bb, far)
+        left = _rule(circle, area, lanes, a, Ka, Ba, middle, Km, Bm, far)
+        right = _rule(circle, area, lanes, middle, Km, Bm, b, Kb, Bb, far)
+        size = max(abs(so_far + total), abs(left + right))
+        halvings += 1
+        # rounding, and what is no number, never agree
+        if abs(left + right - whole) <= ACCURACY * size or halvings > HALVINGS or depth + 1 == DEEPEST:
+            total += left + right
+            depth -= 1
+        else:
+            row[0], row[1], row[2] = middle, Km, Bm
+            depth += 1
+            row = stack[depth]
+            row[0], row[1], row[2], row[3], row[4], row[5] = a, Ka, Ba, middle, Km, Bm
+    return total
+
+
+@compiled_lean
+def _between(a: float, b: float, x: float, far: bool) -> float:
+    """The t at x in [-1, 1] of a panel from a to b: linear in t, or far from 0 in 1/t."""
+    if far:
+        return 2.0 / ((1.0 - x) / a + (1.0 + x) / b)
+    return 0.5 * ((1.0 - x) * a + (1.0 + x) * b)
+
+
+@compiled_apart
+def _rule(
+    circle: CircleFactors,
+    area: AreaMemory,
+    lanes: Floats,
+    a: float,
+    Ka: float,
+    Ba: float,
+    b: float,
+    Kb: float,
+    Bb: float,
+    far: bool,
+) -> float:
+    """The rule for the integral of K dB over one panel."""
+    rule, t, K, B = area.rule, area.walls[0], area.walls[1], area.walls[2]
+    n, total = rule.shape[1], 0.0
+    for i in range(1, n - 1):
+        t[i - 1] = _between(a, b, rule[0, i], far)
+    walls_of_samples(circle, t, n - 2, K[1:], B[1:], lanes)
+    K[0], B[0], K[n - 1], B[n - 1] = Ka, Ba, Kb, Bb
+    for i in range(n):
+        slope = 0.0
+        for j in range(n):
+            slope += rule[i + 1, j] * B[j]
+        total += K[i] * slope
+    return total

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.chart.arc_joining import closed_rings
-from zwidth.chart.chart_base import Chart
+from zwidth.chart.chart_base import BoundaryArc, Chart
 from zwidth.chart.decay import fastest_decay, fastest_decay_in_first_quadrant
+from zwidth.chart.edge_by_eigenvalues import decided_trace
+from zwidth.chart.loop_edge import LoopEdge
 from zwidth.chart.peak import Peak
-from zwidth.chart.traced_edge import TracedEdge
+from zwidth.chart.traced_edge import peak_fields
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
@@ -23,16 +24,28 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class StabilityChart(Chart):
-    """The stable walls of a loop.
+    """The stable walls of a loop. Its regions and its boundary are drawn when they are first read.
 
-    loop, radius    of the chart: walls whose roots all have |z| < radius (1: stable)
-    corner_blur     share of the set's size to which its corners are known: 1e-7, more where a mode that the wall
-                    hardly moves hides one in rounding
+    loop, radius  of the chart: walls whose roots all have |z| < radius (1: stable)
+    edge          of the set
+    corner_blur   share of the set's size to which its corners are known: 1e-7, more where a mode that the wall
+                  hardly moves hides one in rounding
     """
 
     loop: Loop
     radius: float
+    edge: LoopEdge
     corner_blur: float
+
+    @cached_property
+    def regions(self) -> tuple[Floats, ...]:
+        """Closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set."""
+        return self.edge.traced.regions
+
+    @cached_property
+    def boundary(self) -> tuple[BoundaryArc, ...]:
+        """Arcs of the set's edge, with frequency."""
+        return self.edge.traced.boundary(self.loop.period)
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
@@ -63,16 +76,20 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     require("loop", loop, Loop)
     if not 0.0 < radius <= 1.0:
         raise ValueError(f"radius must be a number with 0 < radius <= 1, got {radius:g}")
-    tracer = Tracer.of(loop, radius)
-    edge, blur = trace_edge(tracer)
-    fastest = fastest_decay(tracer, edge.outlines) if decay else None
+    tracer = Tracer(loop, radius)
+    edge = LoopEdge.of(tracer)
+    fastest = fastest_decay(tracer, edge.traced.outlines) if decay else None
+    in_quadrant = fastest_decay_in_first_quadrant(tracer, edge.traced.outlines, fastest) if decay else None
     return StabilityChart(
         loop=loop,
         radius=radius,
-        **edge.chart_fields(loop.period, tracer.stable),
+        edge=edge,
+        corner_blur=edge.blur,
+        **peak_fields(edge.peak, loop.period),
+        damping_max=edge.largest_damping,
+        stable_area=edge.area,
         fastest_decay=fastest,
-        fastest_decay_in_first_quadrant=fastest_decay_in_first_quadrant(tracer, edge.outlines, fastest),
-        corner_blur=blur,
+        fastest_decay_in_first_quadrant=in_quadrant,
     )
 
 
@@ -82,8 +99,7 @@ def largest_stiffness(loop: Loop) -> Peak | None:
     Raises  ChartError  as `stability_chart`
     """
     require("loop", loop, Loop)
-    edge, _ = trace_edge(Tracer.of(loop))
-    return edge.peak
+    return LoopEdge.of(Tracer(loop)).peak
 
 
 def boundary_points(
@@ -91,23 +107,5 @@ def boundary_points(
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
     """K, B, frequency [Hz] and stable-edge flag at `count` angles spread over (0, pi), denser at low frequency."""
     thetas = np.pi * np.linspace(0.0, 1.0, count + 2)[1:-1] ** 2
-    K, B, edge = Tracer.of(loop, radius).trace(thetas)
+    K, B, edge = decided_trace(Tracer(loop, radius), thetas)
     return K, B, thetas / (2.0 * np.pi * loop.period), edge
-
-
-def trace_edge(tracer: Tracer, member: int = 0) -> tuple[TracedEdge, float]:
-    """The edge of a loop's stable set, and the share of its size to which corners are known.
-
-    An outline crosses itself where a small loop of the curve lies between two samples: then the curve is traced
-    again, also at the angles of the outline's points.
-
-    member  index of the loop, given to its arcs
-    """
-    extra_angles = None
-    for _ in range(2):
-        arcs, blur = closed_rings(tracer, extra_angles)
-        edge = TracedEdge.of(replace(arcs, member=np.full(len(arcs), member)), {member: tracer})
-        if all(shapely.Polygon(outline).is_valid for outline in edge.outlines):
-            break
-        extra_angles = np.concatenate([thetas[1:-1] for thetas, _, _ in edge.arc_points])
-    return edge, blur

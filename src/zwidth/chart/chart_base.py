@@ -42,8 +42,6 @@ class BoundaryArc:
 class Chart(Result, ABC):
     """A set of stable walls, both signs of K and B, never clipped.
 
-    regions         closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set
-    boundary        arcs of its edge, with frequency
     stiffness_max   supremum of K over its walls with K > 0, B >= 0 [N/m]; nan if there is none
     damping_at_stiffness_max     [N s/m]; nan if there is none
     frequencies_at_stiffness_max [Hz] one, or two at a corner, ascending; () if there is none
@@ -54,8 +52,6 @@ class Chart(Result, ABC):
     fastest_decay_in_first_quadrant   the same over K >= 0, B >= 0
     """
 
-    regions: tuple[Floats, ...]
-    boundary: tuple[BoundaryArc, ...]
     stiffness_max: float
     damping_at_stiffness_max: float
     frequencies_at_stiffness_max: tuple[float, ...]
@@ -70,6 +66,16 @@ class Chart(Result, ABC):
         "damping_Ns_per_m": "damping",
         "frequency_Hz": "frequency",
     }
+
+    @property
+    @abstractmethod
+    def regions(self) -> tuple[Floats, ...]:
+        """Closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set."""
+
+    @property
+    @abstractmethod
+    def boundary(self) -> tuple[BoundaryArc, ...]:
+        """Arcs of the set's edge, with frequency."""
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
@@ -136,6 +142,25 @@ class Chart(Result, ABC):
             f"largest damping    {self.damping_max:.6g} N s/m",
             f"stable area        {self.stable_area:.6g} N^2 s/m^2",
         ]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class DrawnChart(Chart, ABC):
+    """A chart that is drawn when it is made.
+
+    drawn_regions, drawn_boundary  `regions` and `boundary`
+    """
+
+    drawn_regions: tuple[Floats, ...]
+    drawn_boundary: tuple[BoundaryArc, ...]
+
+    @property
+    def regions(self) -> tuple[Floats, ...]:
+        return self.drawn_regions
+
+    @property
+    def boundary(self) -> tuple[BoundaryArc, ...]:
+        return self.drawn_boundary
 
 
 def _plain(value: Floats | float | None) -> Any:

@@ -1,130 +1,245 @@
-"""Corners of the stable set to rounding, from a sample on either side."""
+"""Corners of the stable set to rounding: where the curve stops, or begins, to be its edge.
+
+A corner is a wall with more than one pair of roots, or a pair and a real root, on the circle. The flag changes
+there from one sample to the next. The curve then crosses another piece of itself, or a straight line of walls with
+a real root at z = rho or z = -rho.
+"""
 
 from __future__ import annotations
+
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import Wall
-from zwidth.chart.curve import wall_alone, wall_at, zero_between
-from zwidth.chart.hurwitz import edges_stable_set, work_array
-from zwidth.chart.tracer import ROOTS, RealRoot, Tracer
-from zwidth.compiled import compiled
-from zwidth.loop.factor_kernels import Factors
+from zwidth.chart.curve import OF_LINE, zero_between
+from zwidth.chart.edge_memory import NONE, OPEN, SAMPLES, SETTLED, EdgeMemory
+from zwidth.chart.edge_samples import edge_flag
+from zwidth.chart.hurwitz import QUOTIENT, combine, deflate
+from zwidth.chart.roots import divide, find_roots, spread_roots
+from zwidth.chart.wall_samples import EDGE
+from zwidth.compiled import compiled_apart, compiled_lean
+from zwidth.loop.circle_factors import DEGREE, CircleFactors, wall_on_circle, wall_with_slopes
 
 Floats = NDArray[np.float64]
-LAST_DIGITS = 1e-14  # of an angle
+LAST_DIGITS: Final = 1e-14  # of an angle
+NEAR: Final = 0.1  # longest step of Newton's method, as a share of t
+# Where the flags on both sides of a corner are looked at, as a share of t.
+BESIDE_CORNER: Final = 1e-7
+# How far a corner may be from where halving on the flag has it, as a share of t.
+SAME_PLACE: Final = 1e-5
+HALVINGS: Final = 36  # leave a step of rounding size
 
 
-@compiled
-def _bisect_flag(factors: Factors, polynomials: Floats, radius: float, on: float, off: float) -> float:
-    """The last angle from `on` towards `off` that is an edge."""
-    room = work_array(polynomials.shape[1] - 1)
-    for _ in range(60):
-        middle = 0.5 * (on + off)
-        if middle in (on, off):
-            break
-        K, B = wall_alone(factors, radius, middle)
-        if edges_stable_set(polynomials, middle, K, B, room) > 0:
-            on = middle
+@compiled_lean
+def fill_corners(memory: EdgeMemory) -> int:
+    """All corners between samples that are edges and samples that are none; the number of those left OPEN."""
+    samples, left_open = memory.samples, 0
+    for i in range(memory.counts[SAMPLES] - 1):
+        if (samples.flag[i] == EDGE) != (samples.flag[i + 1] == EDGE):
+            left_open += fill_corner(memory, i) == OPEN
+    if left_open > 0:
+        for i in range(memory.counts[SAMPLES] - 1):
+            left_open -= samples.corner[i] == OPEN and _fill_from_partner(memory, i)
+    return left_open
+
+
+@compiled_lean
+def _fill_from_partner(memory: EdgeMemory, i: int) -> bool:
+    """Settle an open corner between samples i and i + 1 if the other branch's corner is known."""
+    samples = memory.samples
+    for k in range(memory.counts[SAMPLES] - 1):
+        if samples.corner[k] == SETTLED and samples.t[i] < samples.corner_partner[k] < samples.t[i + 1]:
+            _copy_corner(memory, k, i)
+            return True
+    return False
+
+
+@compiled_lean
+def _copy_corner(memory: EdgeMemory, k: int, i: int) -> None:
+    """Let the corner after sample i be that after sample k, on its other branch."""
+    samples = memory.samples
+    samples.corner[i] = SETTLED
+    samples.corner_t[i], samples.corner_partner[i] = samples.corner_partner[k], samples.corner_t[k]
+    samples.corner_K[i], samples.corner_B[i] = samples.corner_K[k], samples.corner_B[k]
+
+
+@compiled_apart
+def fill_corner(memory: EdgeMemory, i: int) -> int:
+    """The corner between samples i and i + 1, of which one is an edge, unless it is known; its state."""
+    samples, circle = memory.samples, memory.circle
+    if samples.corner[i] != NONE:
+        return int(samples.corner[i])
+    on, off = (i, i + 1) if samples.flag[i] == EDGE else (i + 1, i)
+    t, partner, state = _corner_between(memory, on, off)
+    samples.corner[i], samples.corner_t[i], samples.corner_partner[i] = state, t, partner
+    known = _same_corner(memory, i) if state == SETTLED else -1
+    if known >= 0:
+        _copy_corner(memory, known, i)
+    elif state == SETTLED:
+        if 0.0 < partner < np.inf:
+            K, B = wall_on_circle(circle, better_conditioned(circle, t, partner))
         else:
-            off = middle
-    return on
+            K, B = wall_on_line(circle, line_of(memory, partner), t)
+        samples.corner_K[i], samples.corner_B[i] = K, B
+    return state
 
 
-@compiled
-def solve_crossing(factors: Factors, radius: float, one: float, other: float) -> tuple[float, float, bool]:
-    """Newton for wall(one) = wall(other), from close by; False if it wanders off or does not settle."""
+@compiled_lean
+def _same_corner(memory: EdgeMemory, i: int) -> int:
+    """A settled corner, on the other of its two branches, that is the corner after sample i; -1 for none.
+
+    On a branch that passes all its walls within a sliver of angle, the last digit of the angle moves the wall: the
+    corner is then solved for once, so that both arcs end in one wall.
+    """
+    samples = memory.samples
+    t, partner = samples.corner_t[i], samples.corner_partner[i]
+    for k in range(i):
+        if (
+            samples.corner[k] == SETTLED
+            and abs(samples.corner_t[k] - partner) <= SAME_PLACE * partner
+            and abs(samples.corner_partner[k] - t) <= SAME_PLACE * t
+        ):
+            return k
+    return -1
+
+
+@compiled_lean
+def line_of(memory: EdgeMemory, root: float) -> tuple[float, float, float]:
+    """Coefficients a, s, v of  a + s K + v B = 0, the walls with a real root at s = 0 (z = rho) or at infinity
+    (z = -rho); > 0 on the stable side.
+
+    These are the lowest and the highest coefficient of p, which a Hurwitz polynomial has positive.
+    """
+    column = 0 if root == 0.0 else memory.circle.sizes[DEGREE]
+    polynomials = memory.polynomials.coefficients
+    return polynomials[0, column], polynomials[1, column], polynomials[2, column]
+
+
+@compiled_lean
+def _corner_between(memory: EdgeMemory, i: int, j: int) -> tuple[float, float, int]:
+    """The t of the corner between an edge sample i and its neighbour j that is none, that of its partner (0 or inf
+    for a real root), and SETTLED or OPEN."""
+    circle, samples = memory.circle, memory.samples
+    t, K, B = samples.t, samples.K, samples.B
+    low, high = min(t[i], t[j]), max(t[i], t[j])
+    for root in (0.0, np.inf):
+        line = line_of(memory, root)
+        at_i, at_j = line[0] + line[1] * K[i] + line[2] * B[i], line[0] + line[1] * K[j] + line[2] * B[j]
+        if at_i * at_j < 0.0:
+            crossing = zero_between(circle, OF_LINE, line, low, high)
+            if _flag_changes(memory, crossing, t[i], t[j]):
+                return crossing, root, SETTLED
+    dK, dB = K[j] - K[i], B[j] - B[i]
+    for k in range(memory.counts[SAMPLES] - 1):
+        if k in (i - 1, i, j - 1, j):
+            continue
+        off = (K[k] - K[i]) * dB - (B[k] - B[i]) * dK
+        next_off = (K[k + 1] - K[i]) * dB - (B[k + 1] - B[i]) * dK
+        if not off * next_off < 0.0:
+            continue
+        # chords k, k + 1 and i, j cross, or nearly
+        eK, eB = K[k + 1] - K[k], B[k + 1] - B[k]
+        share = ((K[k] - K[i]) * eB - (B[k] - B[i]) * eK) / (dK * eB - dB * eK)
+        if not -0.2 <= share <= 1.2:
+            continue
+        other_share = off / (off - next_off)
+        guess = t[i] + share * (t[j] - t[i]), t[k] + other_share * (t[k + 1] - t[k])
+        one, other, met = solve_crossing(circle, guess[0], guess[1])
+        if met and low < one < high and _flag_changes(memory, one, t[i], t[j]):
+            return one, other, SETTLED
+    return _corner_by_halving(memory, t[i], t[j])
+
+
+@compiled_lean
+def _flag_changes(memory: EdgeMemory, at: float, on: float, off: float) -> bool:
+    """Whether the edge ends at a corner: the wall just before it, on the side of `on`, is an edge, that just
+    behind it is none."""
+    beside = BESIDE_CORNER if off > on else -BESIDE_CORNER
+    return bool(edge_flag(memory, at * (1.0 - beside)) > 0 and edge_flag(memory, at * (1.0 + beside)) <= 0)
+
+
+@compiled_lean
+def _corner_by_halving(memory: EdgeMemory, on: float, off: float) -> tuple[float, float, int]:
+    """`_corner_between` by halving on the flag, where no sampled piece of the curve crosses there."""
+    circle, room = memory.circle, memory.room
+    N, edge, none = circle.sizes[DEGREE], on, off
+    for _ in range(HALVINGS):
+        middle = 0.5 * (edge + none)
+        if edge_flag(memory, middle) == EDGE:
+            edge = middle
+        else:
+            none = middle
+    K, B = wall_on_circle(circle, edge)
+    if N < 4:
+        return edge, 0.0, OPEN
+    # a second pair of roots is on the circle: it is what remains nearest to it without the first pair
+    combine(memory.polynomials.coefficients, N, K, B, room)
+    deflate(room, N, edge * edge)
+    roots = memory.features.roots[: N - 2]
+    spread_roots(roots)
+    find_roots(room[QUOTIENT, : N - 1], roots, 1e-9)
+    nearest, partner = np.inf, 0.0
+    for root in roots:
+        z = divide(1.0 + root, 1.0 - root)
+        if abs(abs(z) - 1.0) < nearest:
+            nearest, partner = abs(abs(z) - 1.0), abs(root.imag)
+    one, other, met = solve_crossing(circle, edge, partner)
+    if met and abs(one - edge) <= SAME_PLACE * edge:
+        return one, other, SETTLED
+    return edge, partner, OPEN
+
+
+@compiled_apart
+def solve_crossing(circle: CircleFactors, one: float, other: float) -> tuple[float, float, bool]:
+    """Newton for wall(one) = wall(other), angles given as t = tan(theta/2), from close by; False if it wanders off
+    or does not settle."""
     a, b = one, other
     settled = False
     for _ in range(30):
-        Ka, Ba, dKa, dBa = wall_at(factors, radius, a)
-        Kb, Bb, dKb, dBb = wall_at(factors, radius, b)
+        Ka, Ba, dKa, dBa = wall_with_slopes(circle, a)
+        Kb, Bb, dKb, dBb = wall_with_slopes(circle, b)
         det = dKb * dBa - dKa * dBb
-        step_a = ((Ka - Kb) * dBb - (Ba - Bb) * dKb) / det
-        step_b = ((Ka - Kb) * dBa - (Ba - Bb) * dKa) / det
-        if not (abs(step_a) < 0.01 * a and abs(step_b) < 0.01 * b):
+        # steps of theta; t moves by half of (1 + t^2) times as much
+        step_a = ((Ka - Kb) * dBb - (Ba - Bb) * dKb) / det * 0.5 * (1.0 + a * a)
+        step_b = ((Ka - Kb) * dBa - (Ba - Bb) * dKa) / det * 0.5 * (1.0 + b * b)
+        if not (abs(step_a) < NEAR * a and abs(step_b) < NEAR * b):
             return one, other, False
         a, b = a + step_a, b + step_b
         settled = abs(step_a) <= 4e-15 * a and abs(step_b) <= 4e-15 * b
         if settled:
             break
-    return a, b, settled and a < np.pi and b < np.pi and abs(a - b) > 1e-6 * a
+    return a, b, settled and abs(a - b) > 1e-6 * a
 
 
-@compiled
-def better_conditioned(factors: Factors, radius: float, one: float, other: float) -> float:
-    """Of the two angles of a corner the one on whose branch the wall moves less with the angle's last digits."""
-    _, _, dK, dB = wall_at(factors, radius, one)
-    _, _, eK, eB = wall_at(factors, radius, other)
+@compiled_lean
+def better_conditioned(circle: CircleFactors, one: float, other: float) -> float:
+    """Of the two t of a corner the one on whose branch the wall moves less with the angle's last digits."""
+    _, _, dK, dB = wall_with_slopes(circle, one)
+    _, _, eK, eB = wall_with_slopes(circle, other)
     # each in shares of the corner's slopes together, so that K and B count alike
-    first = one * (abs(dK) / (abs(dK) + abs(eK)) + abs(dB) / (abs(dB) + abs(eB)))
-    second = other * (abs(eK) / (abs(dK) + abs(eK)) + abs(eB) / (abs(dB) + abs(eB)))
+    first = (abs(dK) / (abs(dK) + abs(eK)) + abs(dB) / (abs(dB) + abs(eB))) * np.arctan(one)
+    second = (abs(eK) / (abs(dK) + abs(eK)) + abs(eB) / (abs(dB) + abs(eB))) * np.arctan(other)
     return one if not first > second else other
 
 
-def cross_line(tracer: Tracer, root: RealRoot, low: float, high: float) -> float:
-    """The angle in (low, high) where the curve crosses a line of real roots."""
-    a, s, v = tracer.line(root).tolist()
-    return zero_between(tracer.factors, tracer.radius, (a, s, v, 0.0, 0.0), low, high)
-
-
-def wall_on_line(tracer: Tracer, root: RealRoot, theta: float) -> Wall:
-    """The wall where the curve crosses a line of real roots, at the angle that `cross_line` gives.
+@compiled_lean
+def wall_on_line(circle: CircleFactors, line: tuple[float, float, float], t: float) -> tuple[float, float]:
+    """The wall where the curve crosses a line of real roots, a + s K + v B = 0, at t.
 
     On the branch of a mode that the wall hardly moves, walls at two neighbouring double-precision angles are far
     apart. The rest of the way to the line is taken along the curve's tangent, by less than the angle's last
     digits. Where the curve changes sides through infinity there is no such wall, and the curve's own is returned.
     """
-    a, s, v = tracer.line(root).tolist()
-    K, B, dK, dB = tracer.wall(theta)
+    a, s, v = line
+    K, B, dK, dB = wall_with_slopes(circle, t)
+    theta = 2.0 * np.arctan(t)
     off, slope = a + s * K + v * B, s * dK + v * dB
-    for beside in (theta * (1.0 - LAST_DIGITS), theta * (1.0 + LAST_DIGITS)):
-        k, b, _, _ = tracer.wall(beside)
+    for beside in (t * (1.0 - LAST_DIGITS), t * (1.0 + LAST_DIGITS)):
+        k, b = wall_on_circle(circle, beside)
         if not abs(a + s * k + v * b) > abs(off):
             return K, B
-    step = -off / slope if slope else 0.0
-    return (K + step * dK, B + step * dB) if abs(step) <= LAST_DIGITS * theta else (K, B)
-
-
-def _last_edge(tracer: Tracer, on: float, off: float) -> float:
-    """The last angle from `on` towards `off` that is an edge."""
-    if tracer.polynomials_decide(on) and tracer.polynomials_decide(off):
-        return _bisect_flag(tracer.factors, tracer.polynomials, tracer.radius, on, off)
-    for _ in range(50):  # polynomials cannot tell: a long delay, or roots that stay close to the circle
-        middle = 0.5 * (on + off)
-        if tracer.edge_flag(middle) > 0:
-            on = middle
-        else:
-            off = middle
-    return on
-
-
-def _partner(tracer: Tracer, theta: float, wall: Wall) -> float:
-    """Angle of the root nearest the circle apart from the pair at theta, for a wall on the curve."""
-    z = tracer.roots_without_pair(np.array(theta), np.array(wall[0]), np.array(wall[1]))
-    return float(abs(np.angle(z[np.argmin(np.abs(np.abs(z) - tracer.radius))]))) if len(z) else 0.0
-
-
-def refine_corner(tracer: Tracer, on: float, off: float) -> tuple[float, Wall, float]:
-    """Angle and wall of the corner between a sample on the edge and one that is not, and the partner's angle.
-
-    The partner is 0 or pi where a real root reaches the circle. Where two branches touch without crossing the
-    bisection's angle stands.
-    """
-    theta = _last_edge(tracer, on, off)
-    low, high = min(on, off), max(on, off)
-    for root, partner in zip(ROOTS, (0.0, np.pi), strict=True):
-        a, s, v = tracer.line(root)
-        ends = [a + s * K + v * B for K, B, *_ in (tracer.wall(low), tracer.wall(high))]
-        if ends[0] * ends[1] < 0.0:
-            crossing = cross_line(tracer, root, low, high)
-            if abs(crossing - theta) <= 1e-6 * theta:
-                return crossing, wall_on_line(tracer, root, crossing), partner
-    wall = tracer.wall(theta)[:2]
-    partner = _partner(tracer, theta, wall)
-    if 0.0 < partner < np.pi:
-        one, other, settled = solve_crossing(tracer.factors, tracer.radius, theta, partner)
-        if settled and abs(one - theta) <= 1e-5 * theta:
-            return one, tracer.wall(better_conditioned(tracer.factors, tracer.radius, one, other))[:2], other
-    return theta, wall, partner
+    step = -off / slope if slope != 0.0 else 0.0
+    if abs(step) <= LAST_DIGITS * theta:
+        return K + step * dK, B + step * dB
+    return K, B

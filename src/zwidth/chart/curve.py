@@ -1,4 +1,4 @@
-"""The curve of walls with a root on a circle |z| = rho, and which of its points edge the stable set.
+"""The curve of walls with a root on a circle |z| = rho.
 
 The characteristic equation 1 + P(z)(K + B w(z)) = 0 is one complex equation in two real unknowns, so that each
 z = rho exp(i theta) gives one wall (D-decomposition, Neimark 1949):
@@ -15,74 +15,47 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.hurwitz import edges_stable_set, work_array
-from zwidth.compiled import compiled, compiled_inline, compiled_lean
-from zwidth.loop.factor_kernels import Factors, divide, plant_response, velocity_response
+from zwidth.chart.hurwitz import work_array
+from zwidth.chart.wall_samples import LANES_SIZE, flag_walls, walls_of_samples
+from zwidth.compiled import compiled, compiled_apart, compiled_lean
+from zwidth.loop.circle_factors import CircleFactors, wall_on_circle, wall_with_slopes
 
 Floats = NDArray[np.float64]
 
-# Weights of `zero_between` for K, B and dK/dtheta alone.
-OF_K, OF_B, OF_SLOPE = ((0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0, 0.0))
-
-
-@compiled_inline
-def on_circle(theta: float, radius: float) -> tuple[complex, complex]:
-    """z = rho exp(i theta) and d = z - 1, the latter without cancellation near theta = 0."""
-    s, c = np.sin(0.5 * theta), np.cos(0.5 * theta)
-    away = complex(-2.0 * s * s, 2.0 * s * c)
-    return complex(radius + radius * away.real, radius * away.imag), (radius - 1.0) + radius * away
-
-
-@compiled_inline
-def plant_on_circle(factors: Factors, radius: float, theta: float) -> tuple[complex, complex, complex, complex]:
-    """z, d = z - 1, P and dP/dz at rho exp(i theta)."""
-    z, d = on_circle(theta, radius)
-    P, dP = plant_response(factors, z, d)
-    aside = 4e-16
-    while not np.isfinite(P.real + P.imag) and aside < 1e-12:  # on an undamped pole: step aside by a rounding
-        z, d = on_circle(theta * (1.0 + aside), radius)
-        P, dP = plant_response(factors, z, d)
-        aside *= 10.0
-    return z, d, P, dP
+# What `zero_between` looks for: a zero of K, of B, of dK/dtheta, of dB/dtheta, or of a + s K + v B.
+OF_K, OF_B, OF_SLOPE, OF_SLOPE_B, OF_LINE = range(5)
+Line = tuple[float, float, float]
+NO_LINE: Line = (0.0, 0.0, 0.0)
 
 
 @compiled_lean
-def wall_at(factors: Factors, radius: float, theta: float) -> tuple[float, float, float, float]:
+def wall_at(circle: CircleFactors, theta: float) -> tuple[float, float, float, float]:
     """K, B of the wall with a root at rho exp(i theta), and dK/dtheta, dB/dtheta."""
-    z, d, P, dP = plant_on_circle(factors, radius, theta)
-    w, dw = velocity_response(factors, z, d)
-    turn = 1j * z
-    h = divide(-1.0 + 0.0j, P)
-    dh = turn * dP * h * h
-    dw = turn * dw
-    B = h.imag / w.imag
-    K = h.real - B * w.real
-    dB = (dh.imag - B * dw.imag) / w.imag
-    dK = dh.real - dB * w.real - B * dw.real
-    return K, B, dK, dB
+    return wall_with_slopes(circle, np.tan(0.5 * theta))
 
 
 @compiled_lean
-def wall_alone(factors: Factors, radius: float, theta: float) -> tuple[float, float]:
-    """K and B of `wall_at` in a third of its time: the compiler leaves out what only the slopes need."""
-    z, d, P, _ = plant_on_circle(factors, radius, theta)
-    w, _ = velocity_response(factors, z, d)
-    h = divide(-1.0 + 0.0j, P)
-    B = h.imag / w.imag
-    return h.real - B * w.real, B
+def _value(circle: CircleFactors, of: int, line: Line, t: float) -> float:
+    """K, B, dK/dtheta, dB/dtheta or a + s K + v B at t = tan(theta/2)."""
+    if of in (OF_SLOPE, OF_SLOPE_B):
+        return wall_with_slopes(circle, t)[2 + of - OF_SLOPE]
+    K, B = wall_on_circle(circle, t)
+    if of == OF_LINE:
+        return line[0] + line[1] * K + line[2] * B
+    return K if of == OF_K else B
 
 
-@compiled_lean
-def zero_between(
-    factors: Factors, radius: float, weights: tuple[float, float, float, float, float], low: float, high: float
-) -> float:
-    """The angle at which w0 + w1 K + w2 B + w3 dK/dtheta + w4 dB/dtheta changes sign, to rounding.
+@compiled_apart
+def zero_between(circle: CircleFactors, of: int, line: Line, low: float, high: float) -> float:
+    """The t = tan(theta/2) between two others at which K, B, dK/dtheta or a + s K + v B changes sign, to rounding.
 
     By false position, the retained end's value halved (Illinois), with a bisection wherever three steps have not
     halved the bracket: at a pole, where signs change too, nothing else is left.
+
+    line  a, s, v
     """
     a, b = low, high
-    at_a, at_b = weighted(factors, radius, weights, a), weighted(factors, radius, weights, b)
+    at_a, at_b = _value(circle, of, line, a), _value(circle, of, line, b)
     last, width = 0, abs(b - a)
     for step in range(100):
         least = 4e-16 * max(abs(a), abs(b))
@@ -91,16 +64,16 @@ def zero_between(
         x = b - at_b * (b - a) / (at_b - at_a)
         if step % 3 == 2:
             if not abs(b - a) <= 0.5 * width:
-                x = 0.5 * (a + b)
+                x = _middle(a, b)
             width = abs(b - a)
         if not min(a, b) + least < x < max(a, b) - least:  # also where it is no number
             if abs(x - a) <= least or abs(x - b) <= least:
                 x = a + np.copysign(least, b - a) if abs(x - a) < abs(x - b) else b + np.copysign(least, a - b)
             else:
-                x = 0.5 * (a + b)
+                x = _middle(a, b)
             if not min(a, b) < x < max(a, b):
                 break
-        value = weighted(factors, radius, weights, x)
+        value = _value(circle, of, line, x)
         if value == 0.0:
             return x
         if (value > 0.0) == (at_a > 0.0):
@@ -115,33 +88,26 @@ def zero_between(
 
 
 @compiled_lean
-def weighted(
-    factors: Factors, radius: float, weights: tuple[float, float, float, float, float], theta: float
-) -> float:
-    """w0 + w1 K + w2 B + w3 dK/dtheta + w4 dB/dtheta."""
-    K, B, dK, dB = wall_at(factors, radius, theta)
-    w0, w1, w2, w3, w4 = weights
-    return w0 + w1 * K + w2 * B + w3 * dK + w4 * dB
+def _middle(a: float, b: float) -> float:
+    """Middle of two positive numbers, of their logarithms where they are far apart."""
+    return float(np.sqrt(a * b)) if max(a, b) > 4.0 * min(a, b) else 0.5 * (a + b)
 
 
 @compiled
-def walls(factors: Factors, radius: float, thetas: Floats) -> tuple[Floats, Floats]:
+def walls(circle: CircleFactors, thetas: Floats) -> tuple[Floats, Floats]:
     """K and B at angles in (0, pi)."""
     K, B = np.empty(len(thetas)), np.empty(len(thetas))
-    for i in range(len(thetas)):
-        K[i], B[i] = wall_alone(factors, radius, thetas[i])
+    walls_of_samples(circle, np.tan(0.5 * thetas), len(thetas), K, B, np.empty(LANES_SIZE))
     return K, B
 
 
 @compiled
-def trace(
-    factors: Factors, polynomials: Floats, radius: float, thetas: Floats
-) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """K, B and whether the wall edges the stable set (1 yes, -1 no, 0 lost in rounding) at angles in (0, pi)."""
-    n = len(thetas)
-    K, B, edge = np.empty(n), np.empty(n), np.empty(n, dtype=np.int64)
-    room = work_array(polynomials.shape[1] - 1)
-    for i in range(n):
-        K[i], B[i] = wall_alone(factors, radius, thetas[i])
-        edge[i] = edges_stable_set(polynomials, thetas[i], K[i], B[i], room)
-    return K, B, edge
+def trace(circle: CircleFactors, polynomials: Floats, t: Floats) -> tuple[Floats, Floats, NDArray[np.int8]]:
+    """K, B and whether the wall edges the stable set (1 yes, -1 no, 0 lost in rounding) at ascending t =
+    tan(theta/2)."""
+    n, N = len(t), polynomials.shape[1] - 1
+    K, B, flags = np.empty(n), np.empty(n), np.empty(n, dtype=np.int8)
+    work = np.empty(LANES_SIZE)
+    walls_of_samples(circle, t, n, K, B, work)
+    flag_walls(polynomials, N, n, t, K, B, flags, work, work_array(N))
+    return K, B, flags

@@ -14,12 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.angle_sampling import sample_angles
+from zwidth.chart.edge_by_eigenvalues import decided_trace
+from zwidth.chart.loop_polynomials import LoopPolynomials, polynomials_of_loop
 from zwidth.chart.roots import polynomial_radius, spread_roots
 from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.loop.factor_kernels import Factors, characteristic, degree_of_loop
+from zwidth.loop.circle_factors import DEGREE, CircleFactors, fill_first
 from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import LoopTable, table_of_loop
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -155,14 +157,18 @@ def _bounded(
 
 
 @compiled
-def double_root_wall(factors: Factors, positive: bool, low: float, high: float) -> tuple[float, float, float]:
+def double_root_wall(
+    loops: LoopTable, circle: CircleFactors, polynomials: LoopPolynomials, positive: bool, low: float, high: float
+) -> tuple[float, float, float]:
     """K, B and radius of the wall with a double real root at +rho (or -rho) and another root of the same modulus.
 
     A double root makes the two outermost coefficients of p vanish: K and B follow from rho. The modulus of the
     largest other root less rho is brought to zero by the Illinois rule (Dowell and Jarratt 1971) between low and
     high; the radius is inf if there is no sign change.
+
+    circle, polynomials  memory of the loop's size, which is overwritten
     """
-    N = degree_of_loop(factors)
+    N = circle.sizes[DEGREE]
     rest, roots = np.empty(N - 1), np.empty(N - 2, dtype=np.complex128)
     spread_roots(roots)
     ends, values = np.array([low, high]), np.empty(2)
@@ -170,7 +176,9 @@ def double_root_wall(factors: Factors, positive: bool, low: float, high: float) 
     for i in range(60):
         # the two ends first, then false position
         radius = ends[i] if i < 2 else (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0])
-        A, S, V = characteristic(factors, radius)[:3]
+        fill_first(loops, radius, circle)
+        polynomials_of_loop(circle, polynomials)
+        A, S, V = polynomials.coefficients[0], polynomials.coefficients[1], polynomials.coefficients[2]
         m, n = (0, 1) if positive else (N, N - 1)
         det = S[m] * V[n] - S[n] * V[m]
         K, B = (A[n] * V[m] - A[m] * V[n]) / det, (A[m] * S[n] - A[n] * S[m]) / det
@@ -228,7 +236,7 @@ def _fastest(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDe
             radius = 1.0 - (1.0 - best.spectral_radius) * (1.0 + share) if best else 0.0
             if not 0.0 < radius < 1.0:
                 break
-            walls = _edge_walls(Tracer.of(tracer.loop, radius))
+            walls = _edge_walls(Tracer(tracer.loop, radius))
             previous, best = best, _search(tracer, walls, least, best) if len(walls) else best
             if best is previous:
                 break
@@ -237,12 +245,15 @@ def _fastest(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDe
 
 def _refine_at_double_root(tracer: Tracer, best: FastestDecay, least: Floats) -> FastestDecay:
     """The wall with a double real root near the best one if it decays as fast or faster, else the best one."""
+    other, loops = Tracer(tracer.loop), table_of_loop(tracer.loop)
     for reach in REACHES if tracer.degree > 2 else ():
         away = reach * (1.0 - best.spectral_radius)
         low, high = max(best.spectral_radius - away, 1e-6), min(best.spectral_radius + away, 1.0)
         for positive in (True, False):
             K, B, radius = (
-                double_root_wall(tracer.factors, positive, low, high) if low < high else (0.0, 0.0, np.inf)
+                double_root_wall(loops, other.circle, other.all_polynomials, positive, low, high)
+                if low < high
+                else (0.0, 0.0, np.inf)
             )
             inside = bool(np.all(np.array([K, B]) >= least))
             if inside and radius <= best.spectral_radius + 1e-12:
@@ -330,5 +341,5 @@ def _best_on_axis(tracer: Tracer, points: Floats, axis: int) -> Floats:
 
 def _edge_walls(tracer: Tracer) -> Floats:
     """Walls (k, 2) on whatever edge the curve has on the tracer's circle."""
-    K, B, edge = tracer.trace(sample_angles(tracer.features(), tracer.radius, 0.2, tracer.longest_step))
+    K, B, edge = decided_trace(tracer, tracer.sample_angles(0.2))
     return np.column_stack([K[edge], B[edge]])

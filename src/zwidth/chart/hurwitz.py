@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.compiled import compiled, compiled_lean
+from zwidth.compiled import compiled, compiled_apart, compiled_lean
 
 Floats = NDArray[np.float64]
 
@@ -28,9 +28,9 @@ def work_array(degree: int) -> Floats:
 
 
 @compiled_lean
-def combine(polynomials: Floats, K: float, B: float, room: Floats) -> None:
-    """p = A + K S + B V and its sizes, into rows 0 and 1."""
-    for i in range(polynomials.shape[1]):
+def combine(polynomials: Floats, N: int, K: float, B: float, room: Floats) -> None:
+    """p = A + K S + B V of degree N and its sizes, into rows 0 and 1."""
+    for i in range(N + 1):
         a, s, v = polynomials[0, i], K * polynomials[1, i], B * polynomials[2, i]
         room[0, i] = a + s + v
         room[1, i] = abs(a) + abs(s) + abs(v) + abs(K * polynomials[3, i]) + abs(B * polynomials[4, i])
@@ -109,7 +109,7 @@ def _hurwitz_by_one_bound(room: Floats, row: int, degree: int) -> int:
     return 1
 
 
-@compiled_lean
+@compiled_apart
 def hurwitz(room: Floats, row: int, degree: int) -> int:
     """Whether all roots of the polynomial in `row` (P or QUOTIENT) have Re s < 0: 1 yes, -1 no, 0 unsure.
 
@@ -151,32 +151,30 @@ def hurwitz(room: Floats, row: int, degree: int) -> int:
     return 1
 
 
-@compiled_lean
-def edges_stable_set(polynomials: Floats, theta: float, K: float, B: float, room: Floats) -> int:
-    """Whether all roots but the pair at exp(+-i theta) lie inside the circle that `polynomials` were built for:
+@compiled_apart
+def edges_stable_set(polynomials: Floats, N: int, t: float, K: float, B: float, room: Floats) -> int:
+    """Whether all roots but the pair at s = +-i t lie inside the circle that `polynomials` were built for:
     1 yes, -1 no, 0 lost in rounding."""
     if not (np.isfinite(K) and np.isfinite(B)):
         return -1
-    N = polynomials.shape[1] - 1
     if N == 2:
         return 1
-    combine(polynomials, K, B, room)
-    deflate(room, N, np.tan(0.5 * theta) ** 2)
+    combine(polynomials, N, K, B, room)
+    deflate(room, N, t * t)
     return hurwitz(room, QUOTIENT, N - 2)
 
 
 @compiled_lean
-def edges_on_line(polynomials: Floats, low_end: int, K: float, B: float, room: Floats) -> int:
+def edges_on_line(polynomials: Floats, N: int, low_end: int, K: float, B: float, room: Floats) -> int:
     """The same for a real root: without the lowest coefficient (low_end 1, root at s = 0) or the highest (0)."""
-    N = polynomials.shape[1] - 1
-    combine(polynomials, K, B, room)
+    combine(polynomials, N, K, B, room)
     for i in range(N):
         room[2, i], room[3, i] = room[0, i + low_end], room[1, i + low_end]
     return hurwitz(room, QUOTIENT, N - 1)
 
 
 @compiled_lean
-def is_stable(polynomials: Floats, K: float, B: float, room: Floats) -> int:
+def is_stable(polynomials: Floats, N: int, K: float, B: float, room: Floats) -> int:
     """Whether the wall K, B has all its roots inside the circle that `polynomials` were built for: 1, -1 or 0."""
-    combine(polynomials, K, B, room)
-    return hurwitz(room, P, polynomials.shape[1] - 1)
+    combine(polynomials, N, K, B, room)
+    return hurwitz(room, P, N)

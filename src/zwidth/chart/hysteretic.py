@@ -17,7 +17,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.angle_sampling import sample_angles
 from zwidth.chart.hysteretic_response import SampledResponse
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.response_interpolation import interpolate_response
@@ -76,8 +75,7 @@ def _response(loop: Loop) -> Response:
     sampled = SampledResponse.of(loop)
     squared, _ = undamped_modes(loop.plant.mass, loop.plant.stiffness)
     braked = loop.plant.damping.any() or loop.plant.lagged_dampers
-    tracer = Tracer.of(sampled.reference)
-    thetas = sample_angles(tracer.features(), 1.0, STEP, tracer.longest_step)
+    thetas = Tracer(sampled.reference).sample_angles(STEP)
     thetas = np.append(thetas[thetas < np.pi * (1.0 - FINEST)], np.pi)
     response = Response(
         frequency=thetas / (2.0 * np.pi * loop.period),

@@ -13,9 +13,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.curve import plant_on_circle
+from zwidth.chart.roots import divide
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.loop.factor_kernels import Factors, velocity_response
+from zwidth.loop.circle_factors import (
+    DEGREE,
+    FORCE,
+    SECTIONS,
+    SPLIT,
+    VELOCITY,
+    WHOLE_DELAY,
+    WINDOW,
+    CircleFactors,
+    half_angle,
+    minus_inverse_plant,
+    quadratic,
+    scaled,
+    velocity_on_circle,
+)
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -27,36 +41,46 @@ CLEAR = 0.2  # how far from a whole number of half turns the phase may end
 
 
 @compiled_lean
-def terms_at(factors: Factors, radius: float, theta: float) -> tuple[complex, complex, complex]:
-    """A, A P and A P w at one angle in (0, pi), scaled alike so that the largest is of size 1."""
-    z, d, P, _ = plant_on_circle(factors, radius, theta)
-    w, _ = velocity_response(factors, z, d)
-    A = 1.0 + 0.0j
-    for k in range(factors.rows.shape[0]):
-        A *= (d + factors.rows[k, 0]) * d + factors.rows[k, 1]
-        A /= abs(A)
-    for k in range(factors.force_denominator.shape[0]):
-        A *= (
-            factors.force_denominator[k, 0] * d + factors.force_denominator[k, 1]
-        ) * d + factors.force_denominator[k, 2]
-        A /= abs(A)
-    for k in range(factors.velocity_denominator.shape[0]):
-        A *= (
-            factors.velocity_denominator[k, 0] * d + factors.velocity_denominator[k, 1]
-        ) * d + factors.velocity_denominator[k, 2]
-        A /= abs(A)
-    late = factors.whole_delay + factors.split + factors.window.shape[0] - 1
-    A *= complex(np.cos(late * theta), np.sin(late * theta))
+def terms_at(circle: CircleFactors, theta: float) -> tuple[complex, complex, complex]:
+    """A, A P and A P w at one angle in (0, pi), scaled alike so that the largest is of size 1.
+
+    Each factor of A is known times exp(-i theta/2) once for each of its roots: A is turned back by all N of them.
+    """
+    cc, ss, sc = half_angle(np.tan(0.5 * theta))
+    X, _, top, _ = minus_inverse_plant(circle, cc, ss, sc)
+    Y, _, size, _ = velocity_on_circle(circle, cc, ss, sc)
+    P, w = divide(-top, X), scaled(Y, 1.0 / size)
+    turns = 0.5 * circle.sizes[DEGREE] * theta
+    A = complex(np.cos(turns), np.sin(turns))
+    for k in range(circle.sizes[SECTIONS]):
+        den, _ = quadratic(circle.plant[k, 0], circle.plant[k, 1], circle.plant[k, 2], cc, ss, sc)
+        A *= scaled(den, 1.0 / abs(den))
+    A = _times_denominators(A, circle.force, circle.sizes[FORCE], cc, ss, sc)
+    A = _times_denominators(A, circle.velocity, circle.sizes[VELOCITY], cc, ss, sc)
+    late = circle.sizes[WHOLE_DELAY] + circle.sizes[SPLIT] + circle.sizes[WINDOW] - 1
+    A *= complex(np.cos(0.5 * late * theta), np.sin(0.5 * late * theta))
     scale = 1.0 / max(1.0, abs(P), abs(P * w))
     return A * scale, A * P * scale, A * P * w * scale
 
 
+@compiled_lean
+def _times_denominators(A: complex, rows: Floats, count: int, cc: float, ss: float, sc: float) -> complex:
+    """A times the denominators of a computer's factors, of size 1."""
+    for k in range(count):
+        if rows[k, 0] == 1.0:
+            den = complex(rows[k, 4] * np.sqrt(cc), rows[k, 5] * np.sqrt(ss))
+        else:
+            den, _ = quadratic(rows[k, 4], rows[k, 5], rows[k, 6], cc, ss, sc)
+        A *= scaled(den, 1.0 / abs(den))
+    return A
+
+
 @compiled
-def terms_along(factors: Factors, radius: float, thetas: Floats) -> Complexes:
+def terms_along(circle: CircleFactors, thetas: Floats) -> Complexes:
     """(n, 3): A, A P, A P w at angles in (0, pi)."""
     out = np.empty((len(thetas), 3), dtype=np.complex128)
     for i in range(len(thetas)):
-        out[i, 0], out[i, 1], out[i, 2] = terms_at(factors, radius, thetas[i])
+        out[i, 0], out[i, 1], out[i, 2] = terms_at(circle, thetas[i])
     return out
 
 
@@ -76,8 +100,7 @@ def _side(theta: float, pair: float) -> float:
 
 @compiled_lean
 def _halved(
-    factors: Factors,
-    radius: float,
+    circle: CircleFactors,
     wall: tuple[float, float, float],
     low: float,
     high: float,
@@ -95,7 +118,7 @@ def _halved(
             return np.nan
         after = end
         if position + step < high:
-            a, s, v = terms_at(factors, radius, position + step)
+            a, s, v = terms_at(circle, position + step)
             after = (a + K * s + B * v) * _side(position + step, pair)
         turn = _phase_change(value, after)
         # too large a turn to be sure of its sheet: the same step again, half as long
@@ -111,7 +134,7 @@ def _halved(
 
 @compiled_lean
 def roots_inside(
-    factors: Factors, radius: float, thetas: Floats, terms: Complexes, wall: tuple[float, float, float], real: int
+    circle: CircleFactors, thetas: Floats, terms: Complexes, wall: tuple[float, float, float], real: int
 ) -> int:
     """Roots of a wall inside the circle, by the phase along samples; -1 where rounding hides the number.
 
@@ -131,7 +154,7 @@ def roots_inside(
         else:
             turn = _phase_change(before, after)
             if abs(turn) > FAR / 2.0:
-                turn = _halved(factors, radius, wall, thetas[at], thetas[i], before, after)
+                turn = _halved(circle, wall, thetas[at], thetas[i], before, after)
             total += turn
         before, at = after, i
     # the pair turns as z does, z - rho and z + rho half as fast
@@ -145,8 +168,7 @@ def roots_inside(
 
 @compiled
 def phase_flags(
-    factors: Factors,
-    radius: float,
+    circle: CircleFactors,
     thetas: Floats,
     terms: Complexes,
     degree: int,
@@ -165,7 +187,7 @@ def phase_flags(
     for k in range(len(walls)):
         K, B = walls[k]
         if np.isfinite(K) and np.isfinite(B):
-            inside = roots_inside(factors, radius, thetas, terms, (K, B, pairs[k]), real)
+            inside = roots_inside(circle, thetas, terms, (K, B, pairs[k]), real)
             left = degree - real - (2 if pairs[k] > 0.0 else 0)
             if inside < 0 or inside > left:
                 out[k] = 0

@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import largest_stiffness
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint

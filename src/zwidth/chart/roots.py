@@ -5,11 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.compiled import compiled
-from zwidth.loop.factor_kernels import divide
+from zwidth.compiled import compiled, compiled_apart, compiled_inline
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+
+@compiled_inline
+def divide(a: complex, b: complex) -> complex:
+    """a / b, inf or nan where b is 0: plain arithmetic, several times faster than guarded complex division."""
+    scale = 1.0 / (b.real * b.real + b.imag * b.imag)
+    return complex((a.real * b.real + a.imag * b.imag) * scale, (a.imag * b.real - a.real * b.imag) * scale)
 
 
 @compiled
@@ -22,7 +28,7 @@ def spread_roots(roots: Complexes) -> None:
         roots[k] = (z - 1.0) / (z + 1.0)
 
 
-@compiled
+@compiled_apart
 def find_roots(p: Floats, roots: Complexes, tolerance: float) -> None:
     """The roots of p(s), ascending coefficients, by Aberth's iteration until no root moves by more than its share.
 

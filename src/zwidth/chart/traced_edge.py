@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import nan
 from typing import TypedDict
 
 import numpy as np
@@ -19,14 +20,19 @@ from zwidth.chart.rings import outline, simple_rings
 Floats = NDArray[np.float64]
 
 
-class ChartFields(TypedDict):
-    """Fields of a `Chart`."""
+class PeakFields(TypedDict):
+    """Fields of a `Chart` about its stiffest wall."""
 
-    regions: tuple[Floats, ...]
-    boundary: tuple[BoundaryArc, ...]
     stiffness_max: float
     damping_at_stiffness_max: float
     frequencies_at_stiffness_max: tuple[float, ...]
+
+
+class ChartFields(PeakFields):
+    """Fields of a `DrawnChart`."""
+
+    drawn_regions: tuple[Floats, ...]
+    drawn_boundary: tuple[BoundaryArc, ...]
     damping_max: float
     stable_area: float
 
@@ -37,12 +43,11 @@ class TracedEdge:
 
     arcs: Arcs
     curves: Curves
-    arc_points: list[ArcPoints]
 
-    @classmethod
-    def of(cls, arcs: Arcs, curves: Curves) -> TracedEdge:
-        """The edge with its points."""
-        return cls(arcs, curves, sample_arcs(arcs, curves))
+    @cached_property
+    def arc_points(self) -> list[ArcPoints]:
+        """Points along each arc so dense that chords lie on it."""
+        return sample_arcs(self.arcs, self.curves)
 
     @cached_property
     def outlines(self) -> list[Floats]:
@@ -64,31 +69,54 @@ class TracedEdge:
         """Area within K >= 0, B >= 0 [N^2 s/m^2]."""
         return quadrant_area(self.arcs, self.curves) if self.peak else 0.0
 
+    def largest_damping(self, stable: Callable[[float, float], bool]) -> float:
+        """Supremum of B >= 0 stable for all sufficiently small K > 0 [N s/m].
+
+        stable  function that tells whether a wall (K, B) is stable
+        """
+        return largest_damping(self.arcs, self.curves, self.stiffness_scale, stable)
+
+    @cached_property
+    def regions(self) -> tuple[Floats, ...]:
+        """The cells as simple closed rings (k, 2)."""
+        return simple_rings(self.outlines)
+
+    def boundary(self, period: float | Mapping[int, float]) -> tuple[BoundaryArc, ...]:
+        """The arcs with their frequencies; period as for `chart_fields`."""
+        members = self.arcs.member.tolist()
+        several = isinstance(period, Mapping)
+        periods = period if isinstance(period, Mapping) else dict.fromkeys(members, period)
+        return tuple(
+            BoundaryArc(K, B, thetas / (2.0 * np.pi * periods[member]), member if several else 0)
+            for member, (thetas, K, B) in zip(members, self.arc_points, strict=True)
+        )
+
     def chart_fields(
         self, period: float | Mapping[int, float], stable: Callable[[float, float], bool]
     ) -> ChartFields:
-        """The fields that all charts share.
+        """The fields that all charts drawn at once share.
 
         period  sampling period [s]; of each member, where the arcs are those of several loops
         stable  function that tells whether a wall (K, B) is stable
         """
-        members = self.arcs.member.tolist()
-        if isinstance(period, Mapping):
-            periods, binding = period, members
-        else:
-            periods, binding = dict.fromkeys(members, period), [0] * len(members)
-        in_hertz = {member: 1.0 / (2.0 * np.pi * T) for member, T in periods.items()}
-        peak = self.peak
-        roots = zip(peak.angles, peak.members, strict=True) if peak else ()
         return ChartFields(
-            regions=simple_rings(self.outlines),
-            boundary=tuple(
-                BoundaryArc(K, B, thetas * in_hertz[member], binds)
-                for member, binds, (thetas, K, B) in zip(members, binding, self.arc_points, strict=True)
-            ),
-            stiffness_max=peak.stiffness if peak else float("nan"),
-            damping_at_stiffness_max=peak.damping if peak else float("nan"),
-            frequencies_at_stiffness_max=tuple(sorted({angle * in_hertz[member] for angle, member in roots})),
-            damping_max=largest_damping(self.arcs, self.curves, self.stiffness_scale, stable),
+            drawn_regions=self.regions,
+            drawn_boundary=self.boundary(period),
+            **peak_fields(self.peak, period),
+            damping_max=self.largest_damping(stable),
             stable_area=self.area,
         )
+
+
+def peak_fields(peak: Peak | None, period: float | Mapping[int, float]) -> PeakFields:
+    """The fields of a chart about its stiffest wall; period as for `TracedEdge.chart_fields`."""
+    if peak is None:
+        return PeakFields(stiffness_max=nan, damping_at_stiffness_max=nan, frequencies_at_stiffness_max=())
+    roots = zip(peak.angles, peak.members, strict=True)
+    periods = (period[member] if isinstance(period, Mapping) else period for member in peak.members)
+    frequencies = {angle / (2.0 * np.pi * T) for (angle, _), T in zip(roots, periods, strict=True)}
+    return PeakFields(
+        stiffness_max=peak.stiffness,
+        damping_at_stiffness_max=peak.damping,
+        frequencies_at_stiffness_max=tuple(sorted(frequencies)),
+    )

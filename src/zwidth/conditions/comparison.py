@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.verdict import spectral_radius
 from zwidth.conditions.bound import Bound
 from zwidth.conditions.friction_and_resolution import ground_friction, reading_step

@@ -19,7 +19,7 @@ from zwidth.chart.curve import wall_at
 from zwidth.compiled import compiled
 from zwidth.guarantees.port import Floats
 from zwidth.guarantees.spring_family import SpringFamily
-from zwidth.loop.factor_kernels import Factors, velocity_response
+from zwidth.loop.circle_factors import CircleFactors
 
 # Largest distance of a touching point from the cubic through its neighbours, and of chords from the cubic, in
 # shares of the set's size.
@@ -54,16 +54,16 @@ class TouchingPoint:
 
 
 @compiled
-def _turning(own: Factors, beside: Factors, theta: float) -> float:
+def _turning(own: CircleFactors, beside: CircleFactors, theta: float) -> float:
     """Determinant of the derivatives by theta and by the spring, up to a positive factor."""
-    K, B, dK, dB = wall_at(own, 1.0, theta)
-    K1, B1, _, _ = wall_at(beside, 1.0, theta)
+    K, B, dK, dB = wall_at(own, theta)
+    K1, B1, _, _ = wall_at(beside, theta)
     turning: float = dK * (B1 - B) - dB * (K1 - K)
     return turning
 
 
 @compiled
-def _touches(own: Factors, beside: Factors, first: float, last: float, pieces: int) -> Floats:
+def _touches(own: CircleFactors, beside: CircleFactors, first: float, last: float, pieces: int) -> Floats:
     """Angles between two others at which the curve turns back, poles left out."""
     out, n = np.empty(pieces), 0
     step = (last - first) / pieces
@@ -94,14 +94,13 @@ def touching_points(
     pair = springs.neighbour_pair(share)
     if pair is None:
         return []
-    own, beside = pair[0].factors, pair[1].factors
+    own, beside = pair[0].circle, pair[1].circle
     first, last = max(min(first, last), 1e-7), min(max(first, last), np.pi - 1e-7)
     points = []
     for theta in _touches(own, beside, first, last, pieces):
-        K, B, dK, dB = wall_at(own, 1.0, float(theta))
+        K, B, dK, dB = wall_at(own, float(theta))
         unit = springs.unit
-        z = complex(np.exp(1j * theta))
-        left = 1.0 if velocity_response(own, z, z - 1.0)[0].imag > 0.0 else -1.0
+        left = 1.0 if pair[0].stable_on_left(float(theta)) else -1.0
         along = left * np.array([dK * unit, dB])
         points.append(
             TouchingPoint(share, float(theta), np.array([K * unit, B]), along / max(np.hypot(*along), 1e-300))

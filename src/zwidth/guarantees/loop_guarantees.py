@@ -9,8 +9,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.guarantees.coupling import Couplings, couplings, without_handle
 from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import Floats

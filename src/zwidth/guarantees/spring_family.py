@@ -106,7 +106,7 @@ class SpringFamily:
             return None
         loop = Loop(plant, self.loop.controller)
         try:
-            return Tracer.of(loop) if len(loop.sections.rows) else None
+            return Tracer(loop) if len(loop.sections.rows) else None
         except UnmovedError:
             return None
 

@@ -1,4 +1,4 @@
-"""P(z) and w(z) at many points at once: the arithmetic of `loop.factor_kernels`, over arrays."""
+"""P(z) and w(z) at many points at once: whatever z."""
 
 from __future__ import annotations
 
@@ -22,9 +22,12 @@ def window_response(window: Floats, z: Complexes) -> Complexes:
     return np.asarray(np.polyval(window[::-1], 1.0 / z), dtype=complex)
 
 
-def rows_response(rows: Floats, split: bool, z: Complexes) -> Complexes:
-    """Response (...) of plant sections (`loop.sections`) at complex z (...), without force path, whole delay."""
-    d = z - 1.0
+def rows_response(rows: Floats, split: bool, z: Complexes, z_minus_1: Complexes | None = None) -> Complexes:
+    """Response (...) of plant sections (`loop.sections`) at complex z (...), without force path and whole delay.
+
+    z_minus_1  (...)  z - 1, where it is known to more digits than the difference has
+    """
+    d = z - 1.0 if z_minus_1 is None else z_minus_1
     out, over = np.zeros_like(d), np.ones_like(d)
     for row in rows:
         quadratic = (d + row[0]) * d + row[1]

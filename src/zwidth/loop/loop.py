@@ -125,18 +125,23 @@ class Loop:
         """The velocity estimate w(z)."""
         return velocity_estimator(self.controller)
 
-    def plant_response(self, z: ArrayLike) -> Complexes:
-        """P(z) (...) from force command to reading [m/N], at complex z (...), with hold, delay, filter and lag."""
-        at: Complexes = np.asarray(z, dtype=complex)
-        force, split = self.force_path, self.fractional_delay > 0.0
-        passed = factor_response(force.numerator, force.denominator, at - 1.0) / at**self.whole_delay
-        return np.asarray(rows_response(self.sections.rows, split, at) * passed)
+    def plant_response(self, z: ArrayLike, z_minus_1: ArrayLike | None = None) -> Complexes:
+        """P(z) (...) from force command to reading [m/N], at complex z (...), with hold, delay, filter and lag.
 
-    def velocity_response(self, z: ArrayLike) -> Complexes:
-        """w(z) (...), the velocity estimate per reading [1/s], at complex z (...)."""
+        z_minus_1  (...)  z - 1, where it is known to more digits than the difference has
+        """
         at: Complexes = np.asarray(z, dtype=complex)
+        d = at - 1.0 if z_minus_1 is None else np.asarray(z_minus_1, dtype=complex)
+        force, split = self.force_path, self.fractional_delay > 0.0
+        passed = factor_response(force.numerator, force.denominator, d) / at**self.whole_delay
+        return np.asarray(rows_response(self.sections.rows, split, at, d) * passed)
+
+    def velocity_response(self, z: ArrayLike, z_minus_1: ArrayLike | None = None) -> Complexes:
+        """w(z) (...), the velocity estimate per reading [1/s], at complex z (...); z_minus_1 as before."""
+        at: Complexes = np.asarray(z, dtype=complex)
+        d = at - 1.0 if z_minus_1 is None else np.asarray(z_minus_1, dtype=complex)
         w = self.estimator
-        return np.asarray(factor_response(w.numerator, w.denominator, at - 1.0) * window_response(w.window, at))
+        return np.asarray(factor_response(w.numerator, w.denominator, d) * window_response(w.window, at))
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:

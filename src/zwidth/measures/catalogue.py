@@ -104,7 +104,6 @@ _MEASURES: Final = (
         "N s/m",
         "higher",
         "exact, by D-decomposition",
-        each=True,
     ),
     _measure(
         "impedance",
@@ -113,7 +112,6 @@ _MEASURES: Final = (
         "N^2 s/m^2",
         "higher",
         "exact, by D-decomposition",
-        each=True,
     ),
     _measure(
         "impedance",

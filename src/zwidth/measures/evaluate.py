@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arc_joining import ChartError
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import NoMechanismError

@@ -29,7 +29,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.loop.factor_kernels import factor_arrays, plant_response, velocity_response
 from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
@@ -191,11 +190,8 @@ def _hold_response(loop: Loop, s: Complex) -> Complex:
 
 def _sampled(loop: Loop, log_z: Complex) -> tuple[Complex, Complex]:
     """P and w at z = exp(log_z)."""
-    factors = factor_arrays(loop)
-    at = list(zip(np.exp(log_z).ravel(), np.expm1(log_z).ravel(), strict=True))
-    P = [plant_response(factors, z, d)[0] for z, d in at]
-    w = [velocity_response(factors, z, d)[0] for z, d in at]
-    return np.array(P).reshape(log_z.shape), np.array(w).reshape(log_z.shape)
+    z, d = np.exp(log_z), np.expm1(log_z)
+    return loop.plant_response(z, d), loop.velocity_response(z, d)
 
 
 def _stiffness(A: Floats, h: Floats) -> Floats:

@@ -18,8 +18,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.conditions.friction_and_resolution import reading_noise, reading_step
 from zwidth.contact.boundary_experiment import (
     TIP_SHARE,

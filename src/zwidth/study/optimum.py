@@ -76,7 +76,7 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
     >>> stiffest.kind, round((heavier - lighter) / (0.002 * 68629.15), 6)
     ('smooth maximum', 1.0)
     """
-    tracer = Tracer.of(loop)
+    tracer = Tracer(loop)
     inside = [angle for angle in peak.angles if 0.0 < angle < pi]
     real: list[RealRoot] = ["plus" if angle == 0.0 else "minus" for angle in peak.angles if angle not in inside]
     pieces = [_curve(tracer, angle) for angle in inside] + [_line(tracer, root, peak) for root in real]
@@ -90,7 +90,7 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
             raise OptimumError(
                 "rounding hides the edge where the largest stiffness lies, so that it has no derivative"
             )
-        return Optimum(peak, "smooth maximum", lambda other: Tracer.of(other).wall(angle)[0])
+        return Optimum(peak, "smooth maximum", lambda other: Tracer(other).wall(angle)[0])
     return Optimum(peak, "end of the curve", lambda other: _end(other, real[0]))
 
 
@@ -127,7 +127,7 @@ def _crossing(peak: Peak, kind: Kind, pieces: list[Piece], period: float) -> Opt
     readers = [read for _, read in pieces]
 
     def stiffness(other: Loop) -> float:
-        tracer = Tracer.of(other)
+        tracer = Tracer(other)
         return float(weights @ [read(tracer) for read in readers])
 
     return Optimum(peak, kind, stiffness)
@@ -142,7 +142,7 @@ def _is_maximum(tracer: Tracer, angle: float) -> bool:
 
 
 def _end(loop: Loop, root: RealRoot) -> float:
-    end = Tracer.of(loop).curve_end(root)
+    end = Tracer(loop).curve_end(root)
     if end is None:
         raise OptimumError("the curve's end goes to infinity")
     return end[0]

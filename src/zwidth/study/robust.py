@@ -19,7 +19,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.arc_joining import ChartError
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.chart import RobustChart, robust_chart_of_members
 from zwidth.chart.robust.instability import softening, unstable
 from zwidth.chart.robust.members import Member, chart_member
@@ -340,7 +340,7 @@ def _violation(charted: _Members, chart: RobustChart, unseen: int, seed: int) ->
         operator = int(random.integers(max(len(family.operators), 1)))
         point = _point(family, operator, random.random(len(family.free)))
         try:
-            tracer = Tracer.of(family.loop(point))
+            tracer = Tracer(family.loop(point))
         except (ValueError, np.linalg.LinAlgError):
             continue
         tested_members += 1

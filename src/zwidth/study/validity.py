@@ -21,8 +21,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.tracer import Tracer
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
@@ -41,6 +41,7 @@ WALLS: Final = 160  # walls of the full model's edge that are compared; ends of 
 NEGLIGIBLE: Final = (
     1e-4  # share of the edge's extent; a smaller K or B counts as 0, where a relative error means nothing
 )
+BISECTIONS: Final = 24  # of a range's end between two walls of the edge
 NEAR: Final = 0.2  # error at the same frequency below which no farther piece of a model's edge can be nearer
 CLOSE: Final = np.linspace(
     -1.0, 1.0, 33
@@ -211,23 +212,35 @@ def _nearest(points: Floats) -> float:
 
 
 class _Edge:
-    """Up to about WALLS walls with K > 0, B > 0 along the pair curve of a chart's edge, by ascending frequency."""
+    """Up to WALLS walls with K > 0, B > 0 along the pair curve of a chart's edge, by ascending frequency."""
 
     def __init__(self, chart: StabilityChart) -> None:
-        self.tracer = Tracer.of(chart.loop)
+        self.tracer = Tracer(chart.loop)
         self.hertz = 1.0 / (2.0 * pi * chart.loop.period)
         nyquist = 0.5 / chart.loop.period
         arcs = [arc for arc in chart.boundary if np.ptp(arc.frequency) > 0.0]
-        K, B, f = (
-            np.concatenate([np.zeros(0), *(getattr(arc, name) for arc in arcs)])
-            for name in ("stiffness", "damping", "frequency")
-        )
-        least_K, least_B = (NEGLIGIBLE * np.max(np.abs(values), initial=0.0) for values in (K, B))
-        inside = (least_K < K) & (least_B < B) & (f > 0.0) & (f < nyquist)
-        order = np.flatnonzero(inside)[np.argsort(f[inside], kind="stable")]
-        order = order[:: max(1, len(order) // WALLS)]
-        self.frequency, self.walls = f[order], np.column_stack([K, B, f])[order]
-        self.arc = np.repeat(np.arange(len(arcs)), [len(arc.frequency) for arc in arcs])[order]
+        extents = [[np.max(np.abs(arc.stiffness)), np.max(np.abs(arc.damping))] for arc in arcs]
+        self.least = NEGLIGIBLE * np.max(extents, axis=0, initial=0.0) if arcs else np.zeros(2)
+        points = [np.column_stack([arc.stiffness, arc.damping, arc.frequency]) for arc in arcs]
+        points = [self._within(arc[(arc[:, 2] > 0.0) & (arc[:, 2] < nyquist)]) for arc in points]
+        walls = np.concatenate([np.zeros((0, 3)), *points])
+        order = np.argsort(walls[:, 2], kind="stable")
+        order = order[_spread(len(order), WALLS)]
+        self.frequency, self.walls = walls[order, 2], walls[order]
+        self.arc = np.repeat(np.arange(len(arcs)), [len(arc) for arc in points])[order]
+
+    def _within(self, points: Floats) -> Floats:
+        """The points of one arc whose K and B are not negligible, and between them and the others the last such
+        wall, so that the ends hang on the curve and not on where its points happen to lie."""
+        inside = np.all(points[:, :2] > self.least, axis=1)
+        ends = []
+        for n in np.flatnonzero(np.diff(inside)):
+            good, bad = (n, n + 1) if inside[n] else (n + 1, n)
+            frequency = _last_fitting(
+                lambda f: bool(np.all(self.wall(f)[0, :2] > self.least)), points[good, 2], points[bad, 2]
+            )
+            ends.append(self.wall(frequency))
+        return np.concatenate([points[inside], *ends])
 
     def wall(self, frequency: float) -> Floats:
         """K, B and frequency of the curve at a frequency, (1, 3)."""
@@ -243,7 +256,7 @@ def _fit(
         return Fit(key, label, none, none, (), reason)
     try:
         model = Loop(plant, controller)
-        chart, tracer = stability_chart(model, decay=False), Tracer.of(model)
+        chart, tracer = stability_chart(model, decay=False), Tracer(model)
     except ChartError as problem:
         return Fit(key, label, none, none, (), str(problem))
 
@@ -260,14 +273,22 @@ def _fit(
 
 def _range_end(frequency: Floats, fits: Callable[[float], bool], good: int, bad: int) -> float:
     """The frequency between two neighbours at which a model ceases to fit, by bisection."""
-    fitting = float(frequency[good])
     if not 0 <= bad < len(frequency):
-        return fitting
-    outside = float(frequency[bad])
-    for _ in range(20):
+        return float(frequency[good])
+    return _last_fitting(fits, float(frequency[good]), float(frequency[bad]))
+
+
+def _last_fitting(fits: Callable[[float], bool], fitting: float, outside: float) -> float:
+    """The frequency next to `outside` for which `fits` still holds, by bisection."""
+    for _ in range(BISECTIONS):
         middle = 0.5 * (fitting + outside)
         fitting, outside = (middle, outside) if fits(middle) else (fitting, middle)
     return fitting
+
+
+def _spread(count: int, at_most: int) -> NDArray[np.int64]:
+    """Evenly spread indices among `count`, the first and the last with them."""
+    return np.unique(np.linspace(0, count - 1, min(count, at_most)).round().astype(np.int64))
 
 
 def _runs(good: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:

@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.device import Device
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop

@@ -9,8 +9,8 @@ import pytest
 import shapely
 from systems import mass, random_loop, reference_transition_matrix, two_mass
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.chart import robust_chart
 from zwidth.chart.robust.instability import softening, unstable
 from zwidth.chart.tracer import Tracer
@@ -263,7 +263,7 @@ def test_softened_by_less_a_wall_is_unstable_and_by_more_stable(seed):
     loop = random_loop(np.random.default_rng(seed))
     chart = stability_chart(loop, decay=False)
     K, B = (1.0 + 0.5 / (seed + 1)) * chart.stiffness_max, chart.damping_at_stiffness_max
-    polynomials = Tracer.of(loop).polynomials
+    polynomials = Tracer(loop).polynomials
     assert unstable(polynomials, np.array([K]), np.array([B])).all()
     by = softening(polynomials, K, B)
     assert 0.0 < by < K
@@ -273,6 +273,6 @@ def test_softened_by_less_a_wall_is_unstable_and_by_more_stable(seed):
 
 def test_a_wall_that_no_softening_helps_is_given_up():
     loop = random_loop(np.random.default_rng(0))
-    polynomials = Tracer.of(loop).polynomials
+    polynomials = Tracer(loop).polynomials
     beyond = 1.5 * stability_chart(loop, decay=False).damping_max
     assert softening(polynomials, 10.0, beyond) == 10.0

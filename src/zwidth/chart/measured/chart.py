@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.area import quadrant_area
-from zwidth.chart.chart_base import BoundaryArc, Chart
+from zwidth.chart.chart_base import BoundaryArc, Chart, DrawnChart
 from zwidth.chart.measured.boundary import Boundary, coarse_angles, real_root, sample_boundary
 from zwidth.chart.measured.extreme_walls import angles_at_wall, largest_damping, refine_peak
 from zwidth.chart.measured.loop import MeasuredLoop
@@ -41,7 +41,7 @@ FEWEST_ON_EDGE = 3  # measured frequencies that a cell's edge needs to be credib
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class MeasuredChart(Chart):
+class MeasuredChart(DrawnChart):
     """The stable walls of a measured device.
 
     edge                  every wall with a root on the circle, as far as it was measured
@@ -223,7 +223,7 @@ def _empty_chart(loop: MeasuredLoop) -> MeasuredChart:
     """The chart of a device without a stable wall. Raises ResponseError where the data cannot tell."""
     if any(stretch.low == loop.response.frequency[loop.usable][-1] for stretch in loop.unusable):
         raise ResponseError(_no_edge_message(loop))
-    none = TracedEdge.of(Arcs.of(()), ())
+    none = TracedEdge(Arcs.of(()), ())
     return MeasuredChart(
         **none.chart_fields(loop.period, lambda K, B: False),
         loop=loop,
@@ -259,8 +259,10 @@ def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredCh
     return MeasuredChart(
         loop=loop,
         edge=cells.edge,
-        regions=tuple(np.array(piece.exterior.coords) for cell in cells.polygons for piece in cut_at_holes(cell)),
-        boundary=arcs,
+        drawn_regions=tuple(
+            np.array(piece.exterior.coords) for cell in cells.polygons for piece in cut_at_holes(cell)
+        ),
+        drawn_boundary=arcs,
         stiffness_max=peak[0],
         damping_at_stiffness_max=peak[1],
         frequencies_at_stiffness_max=tuple(a / (2.0 * np.pi * loop.period) for a in angles),

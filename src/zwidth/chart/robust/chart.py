@@ -10,10 +10,10 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.arc_kernels import CHORD
 from zwidth.chart.arcs import ArcPoints
-from zwidth.chart.chart_base import Chart
+from zwidth.chart.chart_base import Chart, DrawnChart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.common_edge import common_edge
 from zwidth.chart.robust.common_set import Shapes, incompatible_members, intersect_members
 from zwidth.chart.robust.members import Member, chart_members, member_polygons
@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class RobustChart(Chart):
+class RobustChart(DrawnChart):
     """The walls that are stable for every member, each arc of the edge with the member that binds there.
 
     members         index -> loop, of those that could be charted
@@ -142,7 +142,7 @@ def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) 
     shape, cutters = intersect_members(list(charted.values()), shapes, unit)
     arcs, blur = common_edge(shape, cutters, unit)
     tracers = {index: member.tracer for index, member in charted.items()}
-    edge = TracedEdge.of(arcs, tracers)
+    edge = TracedEdge(arcs, tracers)
     if _has_small_cut(edge.arc_points, list(charted.values()), unit):
         blur = max(blur, CHORD)
     by_area, largest_area = _best_by_area(charted, shapes)

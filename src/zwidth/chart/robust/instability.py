@@ -15,9 +15,10 @@ Floats = NDArray[np.float64]
 def unstable(polynomials: Floats, K: Floats, B: Floats) -> NDArray[np.bool_]:
     """Which walls (k,) are certainly unstable for a loop, given by `Tracer.polynomials`."""
     out = np.empty(len(K), dtype=np.bool_)
-    room = work_array(polynomials.shape[1] - 1)
+    N = polynomials.shape[1] - 1
+    room = work_array(N)
     for i in range(len(K)):
-        out[i] = is_stable(polynomials, K[i], B[i], room) < 0
+        out[i] = is_stable(polynomials, N, K[i], B[i], room) < 0
     return out
 
 
@@ -28,19 +29,20 @@ def softening(polynomials: Floats, K: float, B: float) -> float:
 
     The next stable stiffness below is looked for in steps that grow by a quarter from 1e-8 of K, then bisected.
     """
-    room = work_array(polynomials.shape[1] - 1)
+    N = polynomials.shape[1] - 1
+    room = work_array(N)
     bad, step = 0.0, 1e-8
     while True:
         good = min(bad + step, 1.0)
         if good >= 1.0:
             return K
-        if is_stable(polynomials, K * (1.0 - good), B, room) > 0:
+        if is_stable(polynomials, N, K * (1.0 - good), B, room) > 0:
             break
         bad = good
         step = 0.25 * bad
     for _ in range(40):
         middle = 0.5 * (bad + good)
-        if is_stable(polynomials, K * (1.0 - middle), B, room) > 0:
+        if is_stable(polynomials, N, K * (1.0 - middle), B, room) > 0:
             good = middle
         else:
             bad = middle

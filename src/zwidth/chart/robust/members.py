@@ -9,10 +9,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.arcs import MINUS, PLUS
-from zwidth.chart.chart import trace_edge
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.hurwitz import is_stable, work_array
+from zwidth.chart.loop_edge import trace_edge
 from zwidth.chart.rings import signed_area
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import ROOTS, Tracer
@@ -44,9 +44,10 @@ class Member:
 
     def unstable(self, K: float, B: float) -> bool:
         """Whether a wall is unstable beyond doubt: by its polynomial, and by its eigenvalues, too."""
-        if is_stable(self.tracer.polynomials, K, B, work_array(self.tracer.degree)) >= 0:
+        tracer = self.tracer
+        if is_stable(tracer.polynomials, tracer.degree, K, B, work_array(tracer.degree)) >= 0:
             return False
-        radius = np.abs(np.linalg.eigvals(self.tracer.loop.transition_matrix(K, B))).max()
+        radius = np.abs(np.linalg.eigvals(tracer.loop.transition_matrix(K, B))).max()
         return bool(radius > 1.0 + BEYOND_DOUBT)
 
 
@@ -64,9 +65,8 @@ def chart_members(loops: Sequence[Loop]) -> tuple[dict[int, Member], dict[int, s
 
 def chart_member(index: int, loop: Loop) -> Member:
     """One loop with its edge. Raises ChartError."""
-    tracer = Tracer.of(loop)
-    edge, _ = trace_edge(tracer, index)
-    return Member(index, tracer, edge)
+    tracer = Tracer(loop)
+    return Member(index, tracer, trace_edge(tracer, index))
 
 
 def member_polygons(member: Member, unit: float) -> shapely.MultiPolygon:

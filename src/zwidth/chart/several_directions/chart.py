@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.polygon import orient
 
 from zwidth.chart.arcs import Arcs
-from zwidth.chart.chart_base import Chart
+from zwidth.chart.chart_base import DrawnChart
 from zwidth.chart.several_directions.branch import Branch
 from zwidth.chart.several_directions.eigenloci import Loci, refine_loci, trace_loci, with_angles
 from zwidth.chart.several_directions.polygon_arcs import ring_arcs
@@ -40,7 +40,7 @@ OUTSIDE = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class MultiChart(Chart):
+class MultiChart(DrawnChart):
     """The stable walls of several directions under one law."""
 
     loop: MultiLoop
@@ -117,7 +117,7 @@ def _missed_angles(loop: MultiLoop, polygons: list[shapely.Polygon]) -> Floats:
 def _edge(loop: MultiLoop, loci: Loci, lines: list[Line], polygons: list[shapely.Polygon]) -> TracedEdge:
     """The edge of the stable polygons as arcs of the curves that made it."""
     if not polygons:
-        return TracedEdge.of(Arcs.of(()), ())
+        return TracedEdge(Arcs.of(()), ())
     arcs = Arcs.of(
         [
             ring_arcs(loci, lines, np.array(ring.coords))
@@ -126,7 +126,7 @@ def _edge(loop: MultiLoop, loci: Loci, lines: list[Line], polygons: list[shapely
         ]
     )
     size = np.ptp(shapely.get_coordinates(np.array(polygons)) / (loop.period, 1.0), axis=0)
-    return TracedEdge.of(arcs, [Branch(loci, number, size) for number in range(loop.count)])
+    return TracedEdge(arcs, [Branch(loci, number, size) for number in range(loop.count)])
 
 
 def _is_stable(loop: MultiLoop, wall_stiffness: float, wall_damping: float) -> bool:

@@ -20,7 +20,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from zwidth.chart.angle_sampling import sample_angles
+from zwidth.chart.circle_sampling import sample_angles
 from zwidth.loop.multi_loop import MultiLoop
 
 Floats = NDArray[np.float64]
@@ -137,7 +137,7 @@ def trace_loci(loop: MultiLoop) -> Loci:
     """All branches, sampled so that chords follow them wherever they go."""
     # what is late by n samples turns n times as fast as z
     late = 1 + loop.whole_delay + len(loop.estimator.A)
-    thetas = sample_angles(features(loop), 1.0, SHARE, min(LONGEST, 0.5 / late))
+    thetas = sample_angles(features(loop), SHARE, min(LONGEST, 0.5 / late))
     g = eigenvalues_of_plant(loop, thetas)
     for _ in range(ROUNDS):
         loci = Loci(loop, thetas, _match_branches(g))

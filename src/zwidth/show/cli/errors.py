@@ -52,7 +52,7 @@ def translate_errors(question: Question) -> Iterator[None]:
     Raises  NoAnswer  where the posture does not exist, or double precision cannot decide
             BadInput  where the model, or the loop, does not fit the device
     """
-    from zwidth.chart.arc_joining import ChartError
+    from zwidth.chart.edge_by_eigenvalues import ChartError
     from zwidth.loop.estimator import NonlinearError
     from zwidth.loop.sections import HysteresisError, UnmovedError
     from zwidth.model.posture import PostureError

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.decay import FastestDecay
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.loop.loop import Loop
 from zwidth.show.figures.stability import Window, edges_of, frame
 from zwidth.show.figures.style import BLACK, LINES, VERMILION, legend_above

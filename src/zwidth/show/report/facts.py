@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import StabilityChart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.conditions import Bound
 from zwidth.conditions.comparison import bounds_of
 from zwidth.device.device import Device

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from systems import FEATURES, mass, published, random_loop
 
-from zwidth.chart.arc_joining import ChartError
 from zwidth.chart.chart import largest_stiffness
-from zwidth.chart.stiffest_batch import DOUBTFUL, FOUND, NO_WALL, stiffest_walls
+from zwidth.chart.chart_batch import STIFFEST, chart_numbers
+from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
 from zwidth.loop.controller import Controller
-from zwidth.loop.factor_kernels import factor_arrays
 from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import loop_table, table_of_loop
 from zwidth.loop.sections import UnmovedError
 
 KINDS = ("chain", "dense", "coupled", "apart")
@@ -21,12 +22,11 @@ KINDS = ("chain", "dense", "coupled", "apart")
 
 def stiffest_of(*loops):
     """Loops of one computer, together."""
-    every = [factor_arrays(loop) for loop in loops]
-    most = max(len(factors.rows) for factors in every)
-    rows = np.zeros((len(every), most, 9))
-    for i, factors in enumerate(every):
-        rows[i, : len(factors.rows)] = factors.rows
-    return stiffest_walls(every[0], rows, np.array([len(factors.rows) for factors in every]))
+    counts = [len(loop.sections.rows) for loop in loops]
+    rows = np.zeros((len(loops), max(counts), 9))
+    for i, loop in enumerate(loops):
+        rows[i, : counts[i]] = loop.sections.rows
+    return chart_numbers(loop_table(rows, counts, [loops[0].controller], np.zeros(len(loops))), STIFFEST)
 
 
 def compare_with_charts(seed, count, features=()):
@@ -109,8 +109,8 @@ def test_a_loop_without_stable_wall_has_none_or_is_in_doubt():
 
 
 def test_a_plant_that_no_wall_moves_is_in_doubt():
-    factors = factor_arrays(published())
-    found = stiffest_walls(factors, np.zeros((1, 3, 9)), np.zeros(1, dtype=int))
+    loops = table_of_loop(published())
+    found = chart_numbers(loops._replace(rows=np.zeros((1, 3, 9)), section_count=np.zeros(1, dtype=int)), STIFFEST)
     assert found.status[0] == DOUBTFUL
     assert np.isnan(found.stiffness[0])
 

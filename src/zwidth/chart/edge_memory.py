@@ -1,0 +1,181 @@
+"""Working memory in which a loop's curve becomes the edge of its stable set, stage by stage.
+
+    samples of the curve -> flags -> corners -> arcs -> rings          (`edge_samples`, `corner`, `edge_arcs`,
+    `rings`)
+
+The caller owns it, kernels fill it and allocate nothing; what does not fit is an overflow, which they report.
+Where rounding leaves a question open (a flag, a corner, a piece of a line of real roots) the stage says so by
+HIDDEN or OPEN in its place: who asked for one chart answers by eigenvalues and goes on from there; in a batch the
+loop is in doubt.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.area import AreaMemory, area_memory
+from zwidth.chart.circle_sampling import Features, feature_memory
+from zwidth.chart.hurwitz import work_array
+from zwidth.chart.loop_polynomials import LoopPolynomials, polynomial_memory
+from zwidth.chart.wall_samples import LANES_SIZE
+from zwidth.loop.circle_factors import CircleFactors, factor_memory
+from zwidth.loop.loop_table import LoopTable
+
+Floats = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Small = NDArray[np.int8]
+
+MOST_ARCS: Final = 256
+MOST_PIECES: Final = 256  # of the two lines of real roots
+MOST_SAMPLES: Final = 4096
+# What becomes of a loop: a stiffest wall; no stable wall with K > 0, B >= 0; to be charted alone, by eigenvalues.
+FOUND, NO_WALL, DOUBTFUL = range(3)
+# States of a corner.
+NONE, SETTLED, OPEN = range(3)
+# Places in `EdgeMemory.counts`.
+SAMPLES, ARCS, PIECES, RINGS, STOPS, CROSSINGS = range(6)
+# Places in `EdgeMemory.numbers`.
+LARGEST_DAMPING, AREA = range(2)
+
+
+class Samples(NamedTuple):
+    """Samples of the curve in ascending order, and the corners between them; memory for n.
+
+    t, K, B, flag   (n,)  t = tan(theta/2), the wall, and whether it edges the stable set (`wall_samples`)
+    corner          (n,)  state of the corner between this sample and the next: NONE where both flags are alike
+    corner_t, corner_partner, corner_K, corner_B  (n,)  its t; that of the other root on the circle, 0 or inf for a
+    real
+                          root; its wall
+    """
+
+    t: Floats
+    K: Floats
+    B: Floats
+    flag: Small
+    corner: Small
+    corner_t: Floats
+    corner_partner: Floats
+    corner_K: Floats
+    corner_B: Floats
+
+
+class EdgeArcs(NamedTuple):
+    """Arcs of the edge; memory for MOST_ARCS.
+
+    kind          (a,)    PAIR, PLUS or MINUS of `arcs`
+    first, last   (a, 2)  their walls [K, B], the stable side on the left from first to last
+    start, end    (a,)    t there; 0 or inf for a real root
+    samples       (a, 2)  the samples strictly between the ends: index of the first, and behind the last
+    extent        (a,)    largest distance of its walls from its first, in K T and B
+    node          (a, 2)  numbers of the corners that it begins and ends in
+    order         (a,)    arcs ring after ring
+    next_arc      (a,)    the arc after each; -1 for one that is no more than a corner
+    """
+
+    kind: Small
+    first: Floats
+    last: Floats
+    start: Floats
+    end: Floats
+    samples: Whole
+    extent: Floats
+    node: Whole
+    order: Whole
+    next_arc: Whole
+
+
+class LinePieces(NamedTuple):
+    """Pieces of the lines of real roots between places where another root meets the circle.
+
+    root   (p,)    PLUS or MINUS
+    ends   (p, 4)  walls K, B at both ends, the stable side on the left
+    flag   (p,)    whether it edges the stable set
+    nodes  (p, 3)  working memory: K, B and place along the line
+    crossing_t  (p,)  t at which the curve crosses one of the lines
+    """
+
+    root: Small
+    ends: Floats
+    flag: Small
+    nodes: Floats
+    crossing_t: Floats
+
+
+class EdgeMemory(NamedTuple):
+    """Working memory for one loop after the other.
+
+    counts  (6,)  samples, arcs, pieces, rings, stops and crossings of lines in use
+    size    (2,)  largest |K T|, |B| of the whole edge, and T
+    picked  (3, n), (n,), (n,)  working memory for samples that are flagged: t, K and B, number, flag
+    peak    (4,)  the stiffest wall so far: stiffness, damping and t of both roots on the circle
+    stops   (s,)  dampings at which the edge meets K = 0
+    numbers (2,)  largest damping and area
+    """
+
+    circle: CircleFactors
+    polynomials: LoopPolynomials
+    features: Features
+    lanes: Floats
+    room: Floats
+    samples: Samples
+    arcs: EdgeArcs
+    pieces: LinePieces
+    counts: Whole
+    size: Floats
+    picked: Floats
+    picked_number: Whole
+    picked_flag: Small
+    peak: Floats
+    stops: Floats
+    numbers: Floats
+    area: AreaMemory
+
+
+def edge_memory(loops: LoopTable, most_degree: int, most_samples: int) -> EdgeMemory:
+    """Memory for any one of these loops, up to a degree and so many samples."""
+    n, a, p = most_samples + 2, MOST_ARCS, MOST_PIECES
+    return EdgeMemory(
+        circle=factor_memory(loops),
+        polynomials=polynomial_memory(most_degree),
+        features=feature_memory(most_degree, loops.window.shape[1]),
+        lanes=np.empty(LANES_SIZE),
+        room=work_array(most_degree),
+        samples=Samples(
+            t=np.empty(n),
+            K=np.empty(n),
+            B=np.empty(n),
+            flag=np.empty(n, np.int8),
+            corner=np.empty(n, np.int8),
+            corner_t=np.empty(n),
+            corner_partner=np.empty(n),
+            corner_K=np.empty(n),
+            corner_B=np.empty(n),
+        ),
+        arcs=EdgeArcs(
+            kind=np.empty(a, np.int8),
+            first=np.empty((a, 2)),
+            last=np.empty((a, 2)),
+            start=np.empty(a),
+            end=np.empty(a),
+            samples=np.empty((a, 2), np.int64),
+            extent=np.empty(a),
+            node=np.empty((a, 2), np.int64),
+            order=np.empty(a, np.int64),
+            next_arc=np.empty(a, np.int64),
+        ),
+        pieces=LinePieces(
+            np.empty(p, np.int8), np.empty((p, 4)), np.empty(p, np.int8), np.empty((p, 3)), np.empty(2 * p)
+        ),
+        counts=np.zeros(6, np.int64),
+        size=np.zeros(2),
+        picked=np.empty((3, n)),
+        picked_number=np.empty(n, np.int64),
+        picked_flag=np.empty(n, np.int8),
+        peak=np.empty(4),
+        stops=np.empty(2 * MOST_ARCS),
+        numbers=np.empty(2),
+        area=area_memory(),
+    )

@@ -1,0 +1,187 @@
+"""From a loop to flagged samples of its curve: the first stage of its edge (`edge_memory`)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.circle_sampling import (
+    add_samples_around_crossings,
+    fill_computer_features,
+    fill_features,
+    fill_samples,
+)
+from zwidth.chart.curve import NO_LINE, OF_SLOPE, OF_SLOPE_B, zero_between
+from zwidth.chart.edge_memory import NONE, SAMPLES, EdgeMemory
+from zwidth.chart.hurwitz import edges_stable_set
+from zwidth.chart.loop_polynomials import fill_computer_polynomials, fill_polynomials
+from zwidth.chart.wall_samples import UNKNOWN, flag_walls, walls_of_samples
+from zwidth.compiled import compiled_apart, compiled_lean
+from zwidth.loop.circle_factors import (
+    COMPUTER,
+    DEGREE,
+    FORCE,
+    VELOCITY,
+    WHOLE_DELAY,
+    WINDOW,
+    fill_computer,
+    fill_plant,
+    wall_on_circle,
+    wall_with_slopes,
+)
+from zwidth.loop.loop_table import LoopTable
+
+Floats = NDArray[np.float64]
+
+# Steps along the curve for a whole edge, in shares of the distance to its nearest singularity, and the longest.
+SHARE: Final = 0.2
+LONGEST: Final = 0.05
+
+
+@compiled_lean
+def fill_loop(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> None:
+    """The factors, polynomials and singular points of loop i on |z| = radius. What its computer alone decides is
+    kept from the loop before, if that has the same one."""
+    circle, computer = memory.circle, loops.computer[i]
+    if circle.sizes[COMPUTER] != computer or circle.radius[0] != radius:
+        fill_computer(loops, computer, radius, circle)
+        fill_computer_polynomials(circle, memory.polynomials)
+        fill_computer_features(circle, memory.features)
+    fill_plant(loops, i, circle)
+    fill_polynomials(circle, memory.polynomials)
+    fill_features(circle, memory.polynomials, memory.features)
+    memory.size[1] = loops.period[computer]
+
+
+@compiled_apart
+def fill_curve(memory: EdgeMemory, share: float, longest: float, near_end: float) -> bool:
+    """Samples of the curve with their walls, not yet flagged; False where memory does not hold them.
+
+    share, longest, near_end  as for `circle_sampling.fill_samples`
+    """
+    circle = memory.circle
+    sizes, t = circle.sizes, memory.samples.t
+    late = sizes[WHOLE_DELAY] + sizes[WINDOW]
+    n = fill_samples(memory.features, circle.radius[0], share, min(longest, 0.5 / late), near_end, t)
+    # a plain backward difference is nowhere blind
+    if 2 <= n < len(t) and (sizes[WINDOW] > 1 or sizes[VELOCITY] > 1 or sizes[FORCE] > 0):
+        n = add_samples_around_crossings(circle, n, t)
+    memory.counts[SAMPLES] = n
+    if not 2 <= n < len(t):
+        return False
+    walls_again(memory)
+    return _add_excursions(memory)
+
+
+@compiled_lean
+def _add_excursions(memory: EdgeMemory) -> bool:
+    """Add a sample where the curve crosses an axis and comes back between two others; False where memory is full.
+
+    A parabola is farther from its ends by an eighth of its second difference at most: four times that is allowed.
+    """
+    samples, circle, i = memory.samples, memory.circle, 1
+    while i < memory.counts[SAMPLES]:
+        n = memory.counts[SAMPLES]
+        for of, values in ((OF_SLOPE, samples.K), (OF_SLOPE_B, samples.B)):
+            a, b = values[i - 1], values[i]
+            bend = 0.0
+            if i > 1:
+                bend = max(bend, abs(b - 2.0 * a + values[i - 2]))
+            if i < n - 1:
+                bend = max(bend, abs(values[i + 1] - 2.0 * b + a))
+            if not (a * b > 0.0 and min(abs(a), abs(b)) < 0.5 * bend):
+                continue
+            towards = -1.0 if a > 0.0 else 1.0
+            which = 2 + of - OF_SLOPE
+            begins = towards * wall_with_slopes(circle, samples.t[i - 1])[which]
+            ends = towards * wall_with_slopes(circle, samples.t[i])[which]
+            if not (begins > 0.0 and ends < 0.0):
+                continue
+            t = zero_between(circle, of, NO_LINE, samples.t[i - 1], samples.t[i])
+            wall = wall_on_circle(circle, t)
+            if not (wall[which - 2] * a < 0.0 and samples.t[i - 1] < t < samples.t[i]):
+                continue
+            if n + 1 >= len(samples.t):
+                return False
+            for k in range(n, i, -1):
+                samples.t[k], samples.K[k], samples.B[k] = samples.t[k - 1], samples.K[k - 1], samples.B[k - 1]
+            samples.t[i], samples.K[i], samples.B[i] = t, wall[0], wall[1]
+            samples.flag[n], samples.corner[n] = UNKNOWN, NONE
+            memory.counts[SAMPLES] = n + 1
+            break
+        i += 1
+    return True
+
+
+@compiled_lean
+def walls_again(memory: EdgeMemory) -> None:
+    """The walls of samples that stand, not yet flagged."""
+    samples, n = memory.samples, memory.counts[SAMPLES]
+    walls_of_samples(memory.circle, samples.t, n, samples.K, samples.B, memory.lanes)
+    for i in range(n):
+        samples.flag[i], samples.corner[i] = UNKNOWN, NONE
+
+
+@compiled_lean
+def flag_all(memory: EdgeMemory) -> None:
+    """Flags of all samples."""
+    samples, n = memory.samples, memory.counts[SAMPLES]
+    flag_walls(
+        memory.polynomials.coefficients,
+        memory.circle.sizes[DEGREE],
+        n,
+        samples.t,
+        samples.K,
+        samples.B,
+        samples.flag,
+        memory.lanes,
+        memory.room,
+    )
+
+
+@compiled_lean
+def flag_quadrant(memory: EdgeMemory) -> None:
+    """Flags of samples with K > 0 and B >= 0 and of their neighbours; UNKNOWN for all others."""
+    samples, n = memory.samples, memory.counts[SAMPLES]
+    K, B, picked, number = samples.K, samples.B, memory.picked, memory.picked_number
+    m, before, here = 0, False, K[0] > 0.0 and B[0] >= 0.0
+    for i in range(n):
+        after = i < n - 1 and K[i + 1] > 0.0 and B[i + 1] >= 0.0
+        if before or here or after:
+            number[m], picked[0, m], picked[1, m], picked[2, m] = i, samples.t[i], K[i], B[i]
+            m += 1
+        before, here = here, after
+    flag_walls(
+        memory.polynomials.coefficients,
+        memory.circle.sizes[DEGREE],
+        m,
+        picked[0],
+        picked[1],
+        picked[2],
+        memory.picked_flag,
+        memory.lanes,
+        memory.room,
+    )
+    for k in range(m):
+        samples.flag[number[k]] = memory.picked_flag[k]
+
+
+@compiled_apart
+def edge_flag(memory: EdgeMemory, t: float) -> int:
+    """Flag of the wall at one t."""
+    K, B = wall_on_circle(memory.circle, t)
+    return edges_stable_set(memory.polynomials.coefficients, memory.circle.sizes[DEGREE], t, K, B, memory.room)
+
+
+@compiled_lean
+def degree_of(loops: LoopTable, i: int) -> int:
+    """Degree of a loop's characteristic polynomial."""
+    c = loops.computer[i]
+    N = 2 * loops.section_count[i] + loops.whole_delay[c] + loops.split[c] + loops.window_count[c] - 1
+    for k in range(loops.force_count[c]):
+        N += 2 if loops.force[c, k, 3] != 0.0 else 1
+    for k in range(loops.velocity_count[c]):
+        N += 2 if loops.velocity[c, k, 3] != 0.0 else 1
+    return int(N)

@@ -1,0 +1,99 @@
+"""The edge of one loop's stable set: by compiled stages, and where these are in doubt by eigenvalues."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from threading import local
+from typing import Final
+
+import numpy as np
+import shapely
+
+from zwidth.chart.arcs import Arcs
+from zwidth.chart.chart_batch import read_first
+from zwidth.chart.edge_arcs import SAME_CORNER
+from zwidth.chart.edge_by_eigenvalues import ChartError, arcs_of, closed_rings
+from zwidth.chart.edge_memory import AREA, DOUBTFUL, FOUND, LARGEST_DAMPING, MOST_SAMPLES, EdgeMemory, edge_memory
+from zwidth.chart.peak import Peak
+from zwidth.chart.traced_edge import TracedEdge
+from zwidth.chart.tracer import Tracer
+from zwidth.chart.wall_samples import MOST_DEGREE
+from zwidth.loop.loop_table import LoopTable
+
+_OWN: Final = local()  # each thread's working memory
+
+
+@dataclass(frozen=True)
+class LoopEdge:
+    """The edge of one loop's stable set, and what is read off it.
+
+    tracer          the loop on the circle
+    arcs            rings of arcs
+    blur            share of the set's size to which corners are known
+    peak            the stiffest wall with K > 0, B >= 0; None if there is none
+    largest_damping [N s/m]
+    area            within K >= 0, B >= 0 [N^2 s/m^2]
+    """
+
+    tracer: Tracer
+    arcs: Arcs
+    blur: float
+    peak: Peak | None
+    largest_damping: float
+    area: float
+
+    @classmethod
+    def of(cls, tracer: Tracer) -> LoopEdge:
+        """The edge of a loop on a circle. Raises ChartError if it cannot be closed."""
+        memory = _memory(tracer.table)
+        status = read_first(tracer.table, memory, tracer.radius)
+        if status == DOUBTFUL:
+            arcs, blur = closed_rings(tracer)
+            traced = TracedEdge(arcs, {0: tracer})
+            return cls(tracer, arcs, blur, traced.peak, traced.largest_damping(tracer.stable), traced.area)
+        peak = None
+        if status == FOUND:
+            stiffness, damping, *t = memory.peak.tolist()
+            angles = tuple(sorted({float(2.0 * np.arctan(one)) for one in t}))
+            peak = Peak(stiffness, damping, angles, (0,) * len(angles))
+        numbers = memory.numbers
+        return cls(
+            tracer, arcs_of(memory), SAME_CORNER, peak, float(numbers[LARGEST_DAMPING]), float(numbers[AREA])
+        )
+
+    @cached_property
+    def traced(self) -> TracedEdge:
+        """The edge with points so dense that chords lie on it.
+
+        An outline crosses itself where a small loop of the curve lies between two samples: then the curve is
+        traced again, also at the angles of the outline's points.
+        """
+        edge = TracedEdge(self.arcs, {0: self.tracer})
+        if all(shapely.Polygon(outline).is_valid for outline in edge.outlines):
+            return edge
+        try:
+            arcs, _ = closed_rings(self.tracer, np.concatenate([thetas[1:-1] for thetas, _, _ in edge.arc_points]))
+        except ChartError:
+            return edge
+        return TracedEdge(arcs, {0: self.tracer})
+
+
+def trace_edge(tracer: Tracer, member: int = 0) -> TracedEdge:
+    """The edge of a loop's stable set with its points.
+
+    member  index of the loop, given to its arcs
+    """
+    edge = LoopEdge.of(tracer).traced
+    if member == 0:
+        return edge
+    return TracedEdge(replace(edge.arcs, member=np.full(len(edge.arcs), member)), {member: tracer})
+
+
+def _memory(loops: LoopTable) -> EdgeMemory:
+    """This thread's working memory for loops of this size."""
+    sizes = tuple(array.shape[1] for array in (loops.rows, loops.force, loops.velocity, loops.window))
+    if getattr(_OWN, "sizes", None) != sizes:
+        _OWN.sizes, _OWN.memory = sizes, edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
+    memory: EdgeMemory = _OWN.memory
+    return memory

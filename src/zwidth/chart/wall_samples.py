@@ -1,0 +1,302 @@
+"""Walls of the curve at many samples of a circle, and which of them edge the stable set: arithmetic over lanes.
+
+A sample is t = tan(theta/2), s = i t in the bilinear variable (`loop.circle_factors`). A wall edges the stable set
+if p(s) = A + K S + B V divided by s^2 + t^2 is Hurwitz. With p_i t^i in place of p_i the divisor is s^2 + 1, and
+the division takes no multiplication.
+
+Samples are computed LANES at a time, the loop over them innermost, for the compiler to take several at once. All
+lanes lie in one working array (LANES_SIZE), a fixed distance apart: only so does the compiler know that they do
+not overlap.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.hurwitz import ROUNDING, edges_stable_set
+from zwidth.compiled import compiled_apart, compiled_lean
+from zwidth.loop.circle_factors import (
+    FORCE,
+    SECTIONS,
+    SPLIT,
+    VELOCITY,
+    WHOLE_DELAY,
+    WINDOW,
+    CircleFactors,
+)
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.int8]
+
+EDGE, HIDDEN, NO_EDGE, UNKNOWN = 1, 0, -1, 2
+LANES: Final = 128  # samples that are computed together
+PROBED: Final = 16  # lanes from one test to the next of where a division from both ends meets
+# Degree above which coefficients have too few digits left for flags.
+MOST_DEGREE: Final = 24
+
+# Where the rows of the working array begin.
+T, K_, B_, POWER = 0 * LANES, 1 * LANES, 2 * LANES, 3 * LANES
+OUTSIDE, UNSURE, SHARE, RATIO, BEFORE = 4 * LANES, 5 * LANES, 6 * LANES, 7 * LANES, 8 * LANES
+COEFFICIENTS: Final = 9 * LANES
+ERRORS: Final = COEFFICIENTS + (MOST_DEGREE + 3) * LANES
+LANES_SIZE: Final = ERRORS + (MOST_DEGREE + 3) * LANES
+# and again for the walls themselves
+CC, SS, SC, X, Y = 1 * LANES, 2 * LANES, 3 * LANES, 4 * LANES, 5 * LANES
+TOP_X, TOP_Y, LOW_X, LOW_Y = 6 * LANES, 7 * LANES, 8 * LANES, 9 * LANES
+BESIDE_X, BESIDE_Y, W_X, W_Y, W = 10 * LANES, 11 * LANES, 12 * LANES, 13 * LANES, 14 * LANES
+
+
+@compiled_apart
+def walls_of_samples(f: CircleFactors, t: Floats, count: int, K: Floats, B: Floats, work: Floats) -> None:
+    """K and B at the first `count` samples; as `wall_on_circle`, but quicker."""
+    for first in range(0, count, LANES):
+        n = min(LANES, count - first)
+        for k in range(n):
+            work[T + k] = t[first + k]
+        _walls_of_lanes(f, n, work)
+        for k in range(n):
+            K[first + k] = work[X + k]
+        for k in range(n):
+            B[first + k] = work[Y + k]
+
+
+@compiled_lean
+def _walls_of_lanes(f: CircleFactors, n: int, w: Floats) -> None:
+    """K into row X and B into row Y for the samples in row T: the sums of `circle_factors.minus_inverse_plant`."""
+    radius, split = f.radius[0], f.sizes[SPLIT]
+    for k in range(n):
+        t = w[T + k]
+        cc = 1.0 / (1.0 + t * t)
+        w[CC + k], w[SC + k], w[SS + k] = cc, t * cc, t * t * cc
+        w[X + k], w[Y + k] = cc - t * t * cc, 2.0 * t * cc
+        w[TOP_X + k], w[TOP_Y + k], w[LOW_X + k], w[LOW_Y + k] = 0.0, 0.0, 1.0, 0.0
+        w[BESIDE_X + k], w[BESIDE_Y + k] = 1.0, 0.0
+    for i in range(f.sizes[SECTIONS]):
+        row = f.plant[i]
+        d0, d1, d2, n0, n1, n2, o0, o1, o2 = row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8]
+        if row[9] != 0.0:
+            for k in range(n):
+                x, y, a, b = w[X + k], w[Y + k], w[BESIDE_X + k], w[BESIDE_Y + k]
+                w[BESIDE_X + k], w[BESIDE_Y + k] = a * x + b * y, b * x - a * y
+        else:
+            for k in range(n):
+                w[BESIDE_X + k], w[BESIDE_Y + k] = w[LOW_X + k], w[LOW_Y + k]
+        if split:
+            o0, o1, o2 = o0 / radius, o1 / radius, o2 / radius
+            for k in range(n):
+                cc, ss, sc, x, y = w[CC + k], w[SS + k], w[SC + k], w[X + k], w[Y + k]
+                old_x, old_y = o0 * cc - o2 * ss, o1 * sc
+                w[W_X + k] = n0 * cc - n2 * ss + old_x * x + old_y * y
+                w[W_Y + k] = n1 * sc + old_y * x - old_x * y
+        else:
+            for k in range(n):
+                cc, ss, sc = w[CC + k], w[SS + k], w[SC + k]
+                w[W_X + k], w[W_Y + k] = n0 * cc - n2 * ss, n1 * sc
+        for k in range(n):
+            cc, ss, sc, a, b = w[CC + k], w[SS + k], w[SC + k], w[BESIDE_X + k], w[BESIDE_Y + k]
+            den_x, den_y, num_x, num_y = d0 * cc - d2 * ss, d1 * sc, w[W_X + k], w[W_Y + k]
+            p, q, r, s = w[TOP_X + k], w[TOP_Y + k], w[LOW_X + k], w[LOW_Y + k]
+            w[TOP_X + k] = p * den_x - q * den_y + num_x * a - num_y * b
+            w[TOP_Y + k] = p * den_y + q * den_x + num_x * b + num_y * a
+            w[LOW_X + k], w[LOW_Y + k] = r * den_x - s * den_y, r * den_y + s * den_x
+    for i in range(f.sizes[FORCE]):
+        for k in range(n):
+            w[W_X + k], w[W_Y + k], w[W + k] = w[TOP_X + k], w[TOP_Y + k], 1.0
+        _times_factor(f.force[i], n, w)
+        for k in range(n):
+            w[TOP_X + k], w[TOP_Y + k] = w[W_X + k], w[W_Y + k]
+            w[LOW_X + k], w[LOW_Y + k] = w[LOW_X + k] * w[W + k], w[LOW_Y + k] * w[W + k]
+    for _ in range(f.sizes[WHOLE_DELAY]):
+        for k in range(n):
+            x, y, a, b = radius * w[X + k], radius * w[Y + k], w[LOW_X + k], w[LOW_Y + k]
+            w[LOW_X + k], w[LOW_Y + k] = a * x - b * y, a * y + b * x
+    # w by Horner's scheme in 1/z, oldest sample first
+    past = f.sizes[WINDOW] - 1
+    oldest = f.window[past]
+    for k in range(n):
+        w[W_X + k], w[W_Y + k], w[W + k] = oldest, 0.0, 1.0
+    for i in range(past - 1, -1, -1):
+        weight = f.window[i]
+        for k in range(n):
+            x, y, a, b = w[X + k] / radius, w[Y + k] / radius, w[W_X + k], w[W_Y + k]
+            w[W_X + k], w[W_Y + k] = a * x + b * y + weight, b * x - a * y
+    for i in range(f.sizes[VELOCITY]):
+        _times_factor(f.velocity[i], n, w)
+    for k in range(n):
+        a, b, p, q, y = w[LOW_X + k], w[LOW_Y + k], w[TOP_X + k], w[TOP_Y + k], w[W_Y + k]
+        h_x, h_y = -(a * p + b * q), a * q - b * p
+        over = 1.0 / ((p * p + q * q) * y)
+        w[X + k], w[Y + k] = (h_x * y - h_y * w[W_X + k]) * over, h_y * w[W + k] * over
+
+
+@compiled_lean
+def _times_factor(row: Floats, n: int, w: Floats) -> None:
+    """Rows W_X, W_Y over W times one factor, as in `circle_factors.factor_product`."""
+    n0, n1, n2, d0, d1, d2 = row[1], row[2], row[3], row[4], row[5], row[6]
+    if row[0] == 1.0:
+        a, b, c, p, q = n0 * d0, n1 * d1, n1 * d0 - n0 * d1, d0 * d0, d1 * d1
+        for k in range(n):
+            cc, ss, sc, x, y = w[CC + k], w[SS + k], w[SC + k], w[W_X + k], w[W_Y + k]
+            re, im = a * cc + b * ss, c * sc
+            w[W_X + k], w[W_Y + k], w[W + k] = x * re - y * im, x * im + y * re, w[W + k] * (p * cc + q * ss)
+    else:
+        for k in range(n):
+            cc, ss, sc, x, y = w[CC + k], w[SS + k], w[SC + k], w[W_X + k], w[W_Y + k]
+            num_x, num_y, den_x, den_y = n0 * cc - n2 * ss, n1 * sc, d0 * cc - d2 * ss, d1 * sc
+            re, im = num_x * den_x + num_y * den_y, num_y * den_x - num_x * den_y
+            w[W_X + k], w[W_Y + k] = x * re - y * im, x * im + y * re
+            w[W + k] *= den_x * den_x + den_y * den_y
+
+
+@compiled_apart
+def flag_walls(
+    polynomials: Floats,
+    N: int,
+    count: int,
+    t: Floats,
+    K: Floats,
+    B: Floats,
+    flags: Flags,
+    work: Floats,
+    room: Floats,
+) -> None:
+    """Flags of walls on the curve at samples t in ascending order: EDGE, NO_EDGE, or HIDDEN where rounding leaves
+    it open. A wall at infinity is no edge."""
+    first = 0
+    while first < count:
+        middle = _meeting(polynomials, N, t[first], K[first], B[first])
+        last = min(first + PROBED, count)
+        # the same place serves for its neighbours, as long as probes find it there
+        while last < min(count, first + LANES):
+            if _meeting(polynomials, N, t[last], K[last], B[last]) != middle:
+                break
+            last = min(last + PROBED, count, first + LANES)
+        n = last - first
+        for k in range(n):
+            work[T + k] = t[first + k]
+        for k in range(n):
+            work[K_ + k] = K[first + k]
+        for k in range(n):
+            work[B_ + k] = B[first + k]
+        _divide_pair(polynomials, N, middle, n, work)
+        _hurwitz_lanes(N - 2, n, work)
+        for k in range(n):
+            unsure = HIDDEN if work[UNSURE + k] > 0.0 else EDGE
+            flags[first + k] = NO_EDGE if work[OUTSIDE + k] > 0.0 else unsure
+        first = last
+    for k in range(count):
+        if flags[k] == HIDDEN:  # with a bound for each entry, or beyond numbers
+            flags[k] = edges_stable_set(polynomials, N, t[k], K[k], B[k], room)
+
+
+@compiled_lean
+def any_stable(polynomials: Floats, N: int, K: Floats, B: Floats, count: int, work: Floats) -> bool:
+    """Whether one of up to LANES walls is stable beyond doubt."""
+    for k in range(count):
+        work[T + k] = 1.0
+    for k in range(count):
+        work[K_ + k] = K[k]
+    for k in range(count):
+        work[B_ + k] = B[k]
+    _sum_polynomials(polynomials, N, count, work)
+    _hurwitz_lanes(N, count, work)
+    stable = 0
+    for k in range(count):
+        stable += work[OUTSIDE + k] == 0.0 and work[UNSURE + k] == 0.0
+    return stable > 0
+
+
+@compiled_lean
+def _meeting(polynomials: Floats, N: int, t: float, K: float, B: float) -> int:
+    """Index of the largest p_i t^i: a pair of roots +-i t is divided out from both ends up to there (Peters and
+    Wilkinson 1971)."""
+    top, middle, power = -1.0, 0, 1.0
+    for i in range(N + 1):
+        term = abs(polynomials[0, i] + K * polynomials[1, i] + B * polynomials[2, i]) * power
+        power *= t
+        if term > top:
+            top, middle = term, i
+    return min(middle, N - 1)
+
+
+@compiled_lean
+def _sum_polynomials(polynomials: Floats, N: int, n: int, w: Floats) -> None:
+    """Coefficients of p times t^i, and the rounding of the sums that they are."""
+    for k in range(n):
+        w[POWER + k] = 1.0
+    for i in range(N + 1):
+        a, s, v = polynomials[0, i], polynomials[1, i], polynomials[2, i]
+        ra = ROUNDING * abs(a)
+        rs, rv = ROUNDING * (abs(s) + polynomials[3, i]), ROUNDING * (abs(v) + polynomials[4, i])
+        p, e = COEFFICIENTS + i * LANES, ERRORS + i * LANES
+        for k in range(n):
+            K, B, power = w[K_ + k], w[B_ + k], w[POWER + k]
+            w[p + k] = (a + K * s + B * v) * power
+            w[e + k] = (ra + abs(K) * rs + abs(B) * rv) * power
+            w[POWER + k] = power * w[T + k]
+
+
+@compiled_lean
+def _divide_pair(polynomials: Floats, N: int, middle: int, n: int, w: Floats) -> None:
+    """The quotient of p by its pair of roots on the circle, and bounds of its errors."""
+    _sum_polynomials(polynomials, N, n, w)
+    # p_i = q_i + q_{i-2}: from below that gives q_i in row i; from above, q_{i-2} in row i
+    for i in range(2, middle):
+        p, e = COEFFICIENTS + i * LANES, ERRORS + i * LANES
+        for k in range(n):
+            w[p + k] -= w[p - 2 * LANES + k]
+            w[e + k] += w[e - 2 * LANES + k]
+    for i in range(N - 2, middle + 1, -1):
+        p, e = COEFFICIENTS + i * LANES, ERRORS + i * LANES
+        for k in range(n):
+            w[p + k] -= w[p + 2 * LANES + k]
+            w[e + k] += w[e + 2 * LANES + k]
+    for i in range(middle, N - 1):
+        p, e = COEFFICIENTS + i * LANES, ERRORS + i * LANES
+        for k in range(n):
+            w[p + k] = w[p + 2 * LANES + k]
+            w[e + k] = w[e + 2 * LANES + k]
+
+
+@compiled_lean
+def _hurwitz_lanes(degree: int, n: int, w: Floats) -> None:
+    """`hurwitz.hurwitz` by one bound for the whole of Routh's array: OUTSIDE is 1 where a root is outside for
+    certain, else UNSURE 1 where that does not settle it."""
+    top = COEFFICIENTS + degree * LANES
+    for k in range(n):
+        w[RATIO + k] = np.copysign(1.0, w[top + k])
+        w[SHARE + k], w[OUTSIDE + k], w[UNSURE + k] = ROUNDING, 0.0, 0.0
+    for i in range(degree + 1):
+        p, e = COEFFICIENTS + i * LANES, ERRORS + i * LANES
+        for k in range(n):
+            value, terms = w[p + k] * w[RATIO + k], w[e + k]
+            outside, unsure, most, share = w[OUTSIDE + k], w[UNSURE + k], w[SHARE + k], terms / value
+            w[p + k] = value
+            w[OUTSIDE + k] = 1.0 if value < -terms else outside
+            w[UNSURE + k] = unsure if value > 1e3 * terms else 1.0
+            w[SHARE + k] = share if share > most else most
+    for step in range(degree - 1):
+        top = COEFFICIENTS + (degree - step) * LANES
+        for k in range(n):
+            w[RATIO + k] = w[top + k] / w[top - LANES + k]
+            w[BEFORE + k] = w[top - 2 * LANES + k]
+        for i in range(degree - step - 2, 0, -2):
+            p = COEFFICIENTS + i * LANES
+            for k in range(n):
+                w[p + k] -= w[RATIO + k] * w[p - LANES + k]
+        for k in range(n):
+            value, before, most = w[top - 2 * LANES + k], w[BEFORE + k], w[SHARE + k]
+            outside, unsure = w[OUTSIDE + k], w[UNSURE + k]
+            left = abs(value)
+            grown = most * (before / left)
+            # a sign within rounding decides nothing, nor does what comes after it; nor what comes after a root
+            # outside
+            more = unsure if left > most * before else 1.0
+            still = unsure if outside > 0.0 else more
+            found = 1.0 if value < 0.0 else outside
+            w[OUTSIDE + k] = outside if still > 0.0 else found
+            w[UNSURE + k] = still
+            w[SHARE + k] = grown if left < before else most
