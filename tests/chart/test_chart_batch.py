@@ -18,7 +18,7 @@ from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.wall_samples import HIDDEN, MOST_DEGREE
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import loop_table, table_of_loop
+from zwidth.loop.loop_table import table_of_loops
 from zwidth.loop.sections import UnmovedError
 
 KINDS = ("chain", "dense", "coupled", "apart")
@@ -43,17 +43,8 @@ def many_loops(seed, count):
     """A table of plants with several computers, in no order."""
     rng = np.random.default_rng(seed)
     controllers = [random_controller(rng, rate) for rate in 10.0 ** rng.uniform(2.5, 4.0, 3)]
-    sections, computer = [], []
-    while len(sections) < count:
-        c = int(rng.integers(3))
-        loop = Loop(random_plant(rng, 1.0 / controllers[c].sampling_period), controllers[c])
-        sections.append(loop.sections.rows)
-        computer.append(c)
-    counts = [len(rows) for rows in sections]
-    rows = np.zeros((count, max(counts), 9))
-    for i, own in enumerate(sections):
-        rows[i, : len(own)] = own
-    return loop_table(rows, counts, controllers, computer)
+    chosen = [controllers[int(rng.integers(3))] for _ in range(count)]
+    return table_of_loops(*(Loop(random_plant(rng, 1.0 / one.sampling_period), one) for one in chosen))
 
 
 @pytest.mark.parametrize("what", [STIFFEST, ALL_NUMBERS])
@@ -75,7 +66,7 @@ def test_numbers_are_those_of_edges_that_eigenvalues_were_asked_about():
     """The other way to an edge: each open question decided in Python, numbers read off its curves one by one."""
     certain = 0
     for loop in some_loops(42, 60):
-        numbers = chart_numbers(table_of_loop(loop))
+        numbers = chart_numbers(table_of_loops(loop))
         if numbers.status[0] == DOUBTFUL:
             continue
         certain += 1
@@ -95,7 +86,7 @@ def test_numbers_are_those_of_edges_that_eigenvalues_were_asked_about():
 
 def test_a_chart_alone_is_a_table_of_one():
     for loop in some_loops(43, 20):
-        numbers = chart_numbers(table_of_loop(loop))
+        numbers = chart_numbers(table_of_loops(loop))
         if numbers.status[0] != DOUBTFUL:
             chart = stability_chart(loop, decay=False)
             assert (chart.damping_max, chart.stable_area) == (numbers.largest_damping[0], numbers.area[0])
@@ -118,7 +109,7 @@ def test_an_excursion_between_two_samples_counts():
 
 def test_a_loop_without_stable_wall_has_an_area_of_nothing():
     loop = published(structural=0.0, delay=1.0)
-    numbers = chart_numbers(table_of_loop(loop))
+    numbers = chart_numbers(table_of_loops(loop))
     assert numbers.status[0] in (NO_WALL, DOUBTFUL)
     assert stability_chart(loop, decay=False).stable_area == 0.0
 
@@ -157,7 +148,7 @@ def test_walls_on_the_curve_have_a_root_there():
 
 def test_memory_that_is_too_small_is_an_answer(monkeypatch):
     monkeypatch.setattr("zwidth.chart.chart_batch.MOST_SAMPLES", 40)
-    numbers = chart_numbers(table_of_loop(published()))
+    numbers = chart_numbers(table_of_loops(published()))
     assert numbers.status[0] == DOUBTFUL
     assert np.isnan(numbers.area[0])
 
@@ -166,6 +157,6 @@ def test_a_plant_heavier_a_thousand_times_bears_walls_as_much_stiffer():
     loop = Loop(mass(0.3, 0.02, 50.0), published().controller)
     scaled = {name: 1000.0 * getattr(loop.plant, name) for name in ("mass", "damping", "stiffness")}
     heavy = Loop(replace(loop.plant, **scaled), loop.controller)
-    light, more = (chart_numbers(table_of_loop(each)) for each in (loop, heavy))
+    light, more = (chart_numbers(table_of_loops(each)) for each in (loop, heavy))
     assert more.stiffness[0] == pytest.approx(1e3 * light.stiffness[0], rel=1e-12)
     assert more.area[0] == pytest.approx(1e6 * light.area[0], rel=1e-11)

@@ -14,7 +14,7 @@ from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import loop_table, table_of_loop
+from zwidth.loop.loop_table import table_of_loops
 from zwidth.loop.sections import UnmovedError
 
 KINDS = ("chain", "dense", "coupled", "apart")
@@ -22,11 +22,7 @@ KINDS = ("chain", "dense", "coupled", "apart")
 
 def stiffest_of(*loops):
     """Loops of one computer, together."""
-    counts = [len(loop.sections.rows) for loop in loops]
-    rows = np.zeros((len(loops), max(counts), 9))
-    for i, loop in enumerate(loops):
-        rows[i, : counts[i]] = loop.sections.rows
-    return chart_numbers(loop_table(rows, counts, [loops[0].controller], np.zeros(len(loops))), STIFFEST)
+    return chart_numbers(table_of_loops(*loops), STIFFEST)
 
 
 def compare_with_charts(seed, count, features=()):
@@ -109,7 +105,7 @@ def test_a_loop_without_stable_wall_has_none_or_is_in_doubt():
 
 
 def test_a_plant_that_no_wall_moves_is_in_doubt():
-    loops = table_of_loop(published())
+    loops = table_of_loops(published())
     found = chart_numbers(loops._replace(rows=np.zeros((1, 3, 9)), section_count=np.zeros(1, dtype=int)), STIFFEST)
     assert found.status[0] == DOUBTFUL
     assert np.isnan(found.stiffness[0])

@@ -58,7 +58,7 @@ def test_places_without_a_stable_wall_say_so():
     found = evaluate(find_measure("stiffness_max"), device.at(AT))
     assert (found.status[found.status != OUT_OF_REACH] == NO_VALUE).all()
     (note,) = found.notes
-    assert (note.reason, note.count, note.first) == (impedance.NO_WALL, 3, (0, 0))
+    assert (note.reason, note.count, note.first) == (impedance.NONE_STABLE, 3, (0, 0))
 
 
 def test_a_direction_in_which_the_handle_cannot_move_has_no_value_and_says_why():

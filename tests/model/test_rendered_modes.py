@@ -69,8 +69,10 @@ def test_dampers_that_couple_the_modes_are_left_to_the_single_plant():
     mechanism = replace(mechanism, drives=replace(mechanism.drives, damping=uneven))
     posture = some_postures(mechanism, rng, 2)
     direction = np.broadcast_to([1.0, 0.0, 0.0], (2, 3))
-    assert rendered_modes(mechanism, posture, direction, "full", GivenDamping()) is None
-    assert rendered_modes(mechanism, posture, direction, "full", ModalDamping(0.1)) is not None
+    coupled = rendered_modes(mechanism, posture, direction, "full", GivenDamping())
+    assert np.isnan(coupled.input).all()
+    assert modal_rows_batch(coupled, Controller(0.001))[1].tolist() == [0, 0]
+    assert np.isfinite(rendered_modes(mechanism, posture, direction, "full", ModalDamping(0.1)).input).all()
 
 
 def test_a_direction_without_motion_has_no_modes():

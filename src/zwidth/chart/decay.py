@@ -21,7 +21,7 @@ from zwidth.chart.tracer import Tracer
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, CircleFactors, fill_first
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import LoopTable, table_of_loop
+from zwidth.loop.loop_table import LoopTable, table_of_loops
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -245,7 +245,7 @@ def _fastest(tracer: Tracer, outlines: list[Floats], least: Floats) -> FastestDe
 
 def _refine_at_double_root(tracer: Tracer, best: FastestDecay, least: Floats) -> FastestDecay:
     """The wall with a double real root near the best one if it decays as fast or faster, else the best one."""
-    other, loops = Tracer(tracer.loop), table_of_loop(tracer.loop)
+    other, loops = Tracer(tracer.loop), table_of_loops(tracer.loop)
     for reach in REACHES if tracer.degree > 2 else ():
         away = reach * (1.0 - best.spectral_radius)
         low, high = max(best.spectral_radius - away, 1e-6), min(best.spectral_radius + away, 1.0)

@@ -25,7 +25,7 @@ from zwidth.loop.circle_factors import circle_factors
 from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import table_of_loop
+from zwidth.loop.loop_table import table_of_loops
 from zwidth.model.modes import RIGID, undamped_modes
 from zwidth.model.plant import Plant
 
@@ -155,7 +155,7 @@ class SampledResponse:
         near = [_response_difference(self.loop, self.hysteretic, self.viscous, part, self.near) for part in parts]
         low_pass, z = force_filter(self.loop.controller), np.exp(1j * thetas)
         passed = factor_response(low_pass.numerator, low_pass.denominator, z - 1.0) / z**self.loop.whole_delay
-        A, AP, _ = terms_along(circle_factors(table_of_loop(self.reference)), thetas).T
+        A, AP, _ = terms_along(circle_factors(table_of_loops(self.reference)), thetas).T
         return np.asarray(AP / A + passed * (np.concatenate(near) + self.far(thetas)))
 
     def rounding(self, thetas: Floats) -> Floats:

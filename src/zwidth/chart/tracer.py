@@ -25,7 +25,7 @@ from zwidth.chart.nyquist import phase_flags, terms_along
 from zwidth.chart.wall_samples import EDGE, HIDDEN, MOST_DEGREE, NO_EDGE
 from zwidth.loop.circle_factors import DEGREE, WHOLE_DELAY, WINDOW, CircleFactors, circle_factors
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import LoopTable, table_of_loop
+from zwidth.loop.loop_table import LoopTable, table_of_loops
 
 Floats = NDArray[np.float64]
 # A root this near the circle is on neither side of it.
@@ -50,7 +50,7 @@ class Tracer:
     @cached_property
     def table(self) -> LoopTable:
         """The loop as arrays. Raises what `loop.sections.sampled_sections` raises."""
-        return table_of_loop(self.loop)
+        return table_of_loops(self.loop)
 
     @cached_property
     def circle(self) -> CircleFactors:

@@ -4,21 +4,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import floor, inf
-from typing import Literal, get_args
+from typing import Final, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.loop.estimators import BackwardDifference, VelocityMethod
 from zwidth.model.argument_checks import check_choice, check_number, describe_value, wrong_type
+from zwidth.model.design_axes import Number
 
 Discretisation = Literal["tustin", "tustin-prewarped"]
+
+
+ROUNDING: Final = 1e-12  # samples by which a delay may fall short of a whole number by rounding
+
+
+def whole_samples(delay: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Whole samples of delays (...), as `Controller.whole_delay` of one."""
+    return np.floor(delay + ROUNDING).astype(np.int64)
 
 
 @dataclass(frozen=True)
 class FirstOrder:
     """First-order low pass by backward Euler: y_j = a y_{j-1} + (1 - a) x_j, a = tau / (tau + T)."""
 
-    time_constant: float  # tau [s]
+    time_constant: Number  # tau [s]
 
     def __post_init__(self) -> None:
         check_number("time_constant", self.time_constant, "s", least=0.0)
@@ -29,7 +39,7 @@ class Butterworth:
     """Butterworth low pass of any order by the bilinear (Tustin) rule, plain or prewarped at the cutoff."""
 
     order: int
-    cutoff_Hz: float
+    cutoff_Hz: Number
     discretisation: Discretisation = "tustin"
 
     def __post_init__(self) -> None:
@@ -50,17 +60,20 @@ class Controller:
     force_filter            F, acts on the whole force; None: none
     actuator_time_constant  tau of the actuator, tau a' + a = held force [s]; 0: none
     force_limit             largest force that is commanded [N]; charts leave it out
+
+    Numbers may be arrays over designs: such controllers have no delays of their own, and are sampled together
+    (`loop_table`).
     Raises  TypeError   for a velocity estimate or a filter of another type
             ValueError  for a number out of range, or a prewarped cutoff at or above half the sampling frequency
     """
 
-    sampling_period: float
-    delay: float = 0.0
+    sampling_period: Number
+    delay: Number = 0.0
     velocity_filter: FirstOrder | Butterworth | None = None
     velocity: VelocityMethod = field(default_factory=BackwardDifference)
     force_filter: FirstOrder | Butterworth | None = None
-    actuator_time_constant: float = 0.0
-    force_limit: float = inf
+    actuator_time_constant: Number = 0.0
+    force_limit: Number = inf
 
     def __post_init__(self) -> None:
         T = self.sampling_period
@@ -76,16 +89,16 @@ class Controller:
                 raise wrong_type(name, "a FirstOrder, a Butterworth or None", low_pass)
             if not isinstance(low_pass, Butterworth) or low_pass.discretisation == "tustin":
                 continue
-            if low_pass.cutoff_Hz >= 0.5 / T:  # tan(pi cutoff T) is infinite or negative there
+            if np.any(low_pass.cutoff_Hz >= 0.5 / T):  # tan(pi cutoff T) is infinite or negative there
                 raise ValueError(
-                    f"{name}: cutoff_Hz must be below half the sampling frequency, {0.5 / T:.10g} Hz, got "
-                    f"{low_pass.cutoff_Hz:.10g}"
+                    f"{name}: cutoff_Hz must be below half the sampling frequency, {0.5 / np.max(T):.10g} Hz, got "
+                    f"{np.max(low_pass.cutoff_Hz):.10g}"
                 )
 
     @property
     def whole_delay(self) -> int:
         """Whole samples l of the delay."""
-        return floor(self.delay + 1e-12)
+        return floor(self.delay + ROUNDING)
 
     @property
     def fractional_delay(self) -> float:

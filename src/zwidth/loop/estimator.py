@@ -17,9 +17,10 @@ Floats = NDArray[np.float64]
 class Estimator:
     """w(z) = product of numerators / product of denominators * sum_k window_k z^-k.
 
-    numerator, denominator  (k, 3)  rows c2, c1, c0 of  c2 d^2 + c1 d + c0,  d = z - 1; every denominator monic and
-                                    of at least its numerator's degree
-    window                  (n,)    weights of the newest to the oldest sample
+    numerator, denominator  (..., k, 3)  rows c2, c1, c0 of  c2 d^2 + c1 d + c0,  d = z - 1; every denominator
+                                         monic and of at least its numerator's degree; with axes of designs where
+                                         the sampling period or a parameter has them
+    window                  (n,)         weights of the newest to the oldest sample
     """
 
     numerator: Floats

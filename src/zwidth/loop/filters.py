@@ -1,8 +1,12 @@
-"""Low passes as factors in d = z - 1, and what the controller's signals pass: force path and velocity estimate."""
+"""Low passes as factors in d = z - 1, and what the controller's signals pass: force path and velocity estimate.
+
+All numbers may have leading axes of designs (`model.design_axes`); the factors then have them, too.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,14 +14,15 @@ from numpy.typing import NDArray
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.hold import lag_share
+from zwidth.model.design_axes import stack_numbers
 
 Floats = NDArray[np.float64]
-Rows = list[list[float]]
+Rows = list[list[Any]]  # numbers, or arrays over designs
 
 
 @dataclass(frozen=True)
 class Filter:
-    """product of numerators / product of denominators, (k, 3) rows c2, c1, c0 of  c2 d^2 + c1 d + c0."""
+    """product of numerators / product of denominators, (..., k, 3) rows c2, c1, c0 of  c2 d^2 + c1 d + c0."""
 
     numerator: Floats
     denominator: Floats
@@ -65,8 +70,16 @@ def low_pass_factors(low_pass: FirstOrder | Butterworth | None, period: float) -
 
 
 def _factor_array(rows: Rows) -> Floats:
-    """Rows as an array (k, 3), for no rows too."""
-    return np.array(rows, dtype=float).reshape(-1, 3)
+    """Rows as an array (..., k, 3), for no rows too."""
+    return stack_numbers(rows) if rows else np.zeros((0, 3))
+
+
+def _in_series(first: Floats, second: Floats) -> Floats:
+    """Factors (..., k, 3), then others (..., m, 3)."""
+    if first.ndim == second.ndim == 2:
+        return np.concatenate([first, second])
+    designs = np.broadcast_shapes(first.shape[:-2], second.shape[:-2])
+    return np.concatenate([np.broadcast_to(one, (*designs, *one.shape[-2:])) for one in (first, second)], axis=-2)
 
 
 def force_filter(controller: Controller) -> Filter:
@@ -78,11 +91,12 @@ def force_filter(controller: Controller) -> Filter:
 def force_path(controller: Controller) -> Filter:
     """The force filter, then the actuator's lag 1/(d + s); the lag's numerators are in the rows of `loop.hold`."""
     low_pass, lag = force_filter(controller), controller.actuator_time_constant
-    if not lag > 0.0:
+    if not np.any(lag):
         return low_pass
     share = lag_share(controller.sampling_period, lag)
     return Filter(
-        np.vstack([low_pass.numerator, [[0.0, 0.0, 1.0]]]), np.vstack([low_pass.denominator, [[0.0, 1.0, share]]])
+        _in_series(low_pass.numerator, _factor_array([[0.0, 0.0, 1.0]])),
+        _in_series(low_pass.denominator, _factor_array([[0.0, 1.0, share]])),
     )
 
 
@@ -91,7 +105,7 @@ def velocity_estimator(controller: Controller) -> Estimator:
     estimate = controller.velocity.estimator(controller.sampling_period)
     top, bottom = low_pass_factors(controller.velocity_filter, controller.sampling_period)
     return Estimator(
-        np.vstack([estimate.numerator, _factor_array(top)]),
-        np.vstack([estimate.denominator, _factor_array(bottom)]),
+        _in_series(estimate.numerator, _factor_array(top)),
+        _in_series(estimate.denominator, _factor_array(bottom)),
         estimate.window,
     )

@@ -64,7 +64,9 @@ def step_response(decay: float, squared: float, time: float) -> tuple[float, flo
 
 
 def lag_share(period: float, lag: float) -> float:
-    """s = 1 - exp(-T/tau): how much of a new command the force has reached after T; 1 without lag."""
+    """s = 1 - exp(-T/tau): how much of a new command the force has reached after T; 1 without lag. Arrays, too."""
+    if np.ndim(period) or np.ndim(lag):
+        return np.asarray(-np.expm1(-period / lag))  # type: ignore[return-value]
     return -expm1(-period / lag) if lag > 0.0 else 1.0
 
 

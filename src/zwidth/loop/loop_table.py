@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from zwidth.loop.controller import Controller
+from zwidth.loop.controller import Controller, whole_samples
 from zwidth.loop.filters import force_path, velocity_estimator
 from zwidth.loop.loop import Loop
+from zwidth.model.design_axes import design_shape
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -43,34 +44,51 @@ class LoopTable(NamedTuple):
     window_count: Whole
 
 
-def table_of_loop(loop: Loop) -> LoopTable:
-    """A single loop. Raises what `loop.sections.sampled_sections` raises."""
-    rows = loop.sections.rows
-    return loop_table(rows[None], [len(rows)], [loop.controller], [0])
+def table_of_loops(*loops: Loop) -> LoopTable:
+    """Loops of any kinds, each with its own computer. Raises what `loop.sections.sampled_sections` raises."""
+    each = [loop.sections.rows for loop in loops]
+    count = np.array([len(rows) for rows in each], dtype=np.int64)
+    table = np.zeros((len(each), count.max(), 9))
+    for line, rows in zip(table, each, strict=True):
+        line[: len(rows)] = rows
+    return _table(table, count, np.arange(len(each)), [loop.controller for loop in loops])
 
 
-def loop_table(
-    rows: Floats, section_count: ArrayLike, controllers: Sequence[Controller], computer: ArrayLike
-) -> LoopTable:
-    """Plants by their sections, each with one of several controllers.
+def loop_table(rows: Floats, section_count: Whole, controller: Controller) -> LoopTable:
+    """N plants by their sections, all with one controller, or each with its own of N designs of it.
 
-    rows, section_count, computer  as in `LoopTable`
+    rows, section_count  as in `LoopTable`
     """
+    several = len(design_shape(controller)) > 0
+    computer = np.arange(len(rows)) if several else np.zeros(len(rows), dtype=np.int64)
+    return _table(rows, section_count, computer, [controller])
+
+
+def _table(rows: Floats, section_count: Whole, computer: Whole, controllers: Sequence[Controller]) -> LoopTable:
+    """Controllers in their order, one for each computer or all computers of several designs together."""
     paths = [force_path(controller) for controller in controllers]
     estimators = [velocity_estimator(controller) for controller in controllers]
-    force, force_count = _factors([(path.numerator, path.denominator) for path in paths])
-    velocity, velocity_count = _factors([(each.numerator, each.denominator) for each in estimators])
+    period, delay = (
+        np.concatenate([np.ravel(value) for value in values])
+        for values in zip(*(_timing(controller) for controller in controllers), strict=True)
+    )
+    whole_delay = whole_samples(delay)
+    C = len(period)
+    force, force_count = _factors([(path.numerator, path.denominator) for path in paths], C)
+    velocity, velocity_count = _factors([(each.numerator, each.denominator) for each in estimators], C)
     window_count = np.array([len(each.window) for each in estimators], dtype=np.int64)
     window = np.zeros((len(controllers), window_count.max()))
     for line, each in zip(window, estimators, strict=True):
         line[: len(each.window)] = each.window
+    if len(controllers) < C:
+        window, window_count = np.repeat(window, C, axis=0), np.repeat(window_count, C)
     return LoopTable(
         np.ascontiguousarray(rows),
         np.asarray(section_count, dtype=np.int64),
         np.asarray(computer, dtype=np.int64),
-        np.array([controller.sampling_period for controller in controllers]),
-        np.array([controller.whole_delay for controller in controllers], dtype=np.int64),
-        np.array([controller.fractional_delay > 0.0 for controller in controllers], dtype=np.int64),
+        period,
+        whole_delay,
+        (delay - whole_delay > 0.0).astype(np.int64),
         force,
         force_count,
         velocity,
@@ -80,10 +98,24 @@ def loop_table(
     )
 
 
-def _factors(pairs: list[tuple[Floats, Floats]]) -> tuple[Floats, Whole]:
-    """Numerators and denominators (k, 3) of several computers side by side, and how many factors each has."""
-    counts = np.array([len(bottom) for _, bottom in pairs], dtype=np.int64)
-    out = np.zeros((len(pairs), counts.max(), 6))
+def _timing(controller: Controller) -> tuple[Floats, Floats]:
+    """Sampling periods [s] and delays [samples] of all designs of a controller."""
+    designs = design_shape(controller)
+    return (
+        np.broadcast_to(np.asarray(controller.sampling_period, dtype=np.float64), designs),
+        np.broadcast_to(np.asarray(controller.delay, dtype=np.float64), designs),
+    )
+
+
+def _factors(pairs: list[tuple[Floats, Floats]], computers: int) -> tuple[Floats, Whole]:
+    """Numerators and denominators (..., k, 3) of several computers side by side, and how many factors each has."""
+    counts = np.array([bottom.shape[-2] for _, bottom in pairs], dtype=np.int64)
+    out = np.zeros((computers, counts.max(), 6))
+    if len(pairs) < computers:  # designs of one controller
+        counts = np.repeat(counts, computers)
+        ((top, bottom),) = pairs
+        out[..., :3], out[..., 3:] = top, bottom
+        return out, counts
     for line, (top, bottom) in zip(out, pairs, strict=True):
-        line[: len(top), :3], line[: len(top), 3:] = top, bottom
+        line[: top.shape[-2], :3], line[: top.shape[-2], 3:] = top, bottom
     return out, counts

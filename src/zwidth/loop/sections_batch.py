@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.compiled import compiled
-from zwidth.loop.controller import Controller
+from zwidth.loop.controller import Controller, whole_samples
 from zwidth.loop.hold import held_row
 from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED
 from zwidth.model.rendered_modes import RenderedModes
+from zwidth.threads import in_chunks
 
 Floats = NDArray[np.float64]
 
@@ -17,20 +18,23 @@ Floats = NDArray[np.float64]
 def modal_rows_batch(modes: RenderedModes, controller: Controller) -> tuple[Floats, NDArray[np.int64]]:
     """The rows (N, m, 9) of each plant, and how many of them are used (N,): 0 where the modes are nan.
 
+    controller  the same for all plants, or one of N designs for each
+
     The same as `sections.sampled_sections` makes of one plant, but without an actuator lag.
     """
     rows = np.zeros((*modes.frequency_squared.shape, 9))
     used = np.empty(len(rows), dtype=np.int64)
-    _rows(
-        modes.decay,
-        modes.frequency_squared,
-        modes.input,
-        modes.output,
-        controller.sampling_period,
-        controller.fractional_delay,
-        rows,
-        used,
-    )
+    delay = np.ravel(np.asarray(controller.delay, dtype=np.float64))
+    fraction = np.maximum(delay - whole_samples(delay), 0.0)
+    period = np.array(np.ravel(controller.sampling_period), dtype=np.float64)
+
+    def several(first: int, last: int) -> None:
+        _rows(
+            modes.decay, modes.frequency_squared, modes.input, modes.output, period, fraction, rows, used,
+            first, last,
+        )  # fmt: skip
+
+    in_chunks(several, len(rows))
     return rows, used
 
 
@@ -40,15 +44,19 @@ def _rows(
     squared: Floats,
     enter: Floats,
     leave: Floats,
-    period: float,
-    fraction: float,
+    periods: Floats,
+    fractions: Floats,
     rows: Floats,
     used: NDArray[np.int64],
+    first: int,
+    last: int,
 ) -> None:
-    """Fill in `rows` and `used` from each plant's modes (N, m)."""
-    N, m = squared.shape
+    """Fill in `rows` and `used` from the modes (N, m) of plants first to last - 1; one period is that of all."""
+    m = squared.shape[1]
     residue, taken = np.empty(m), np.empty(m, dtype=np.bool_)
-    for i in range(N):
+    for i in range(first, last):
+        period = periods[i if len(periods) > 1 else 0]
+        fraction = fractions[i if len(fractions) > 1 else 0]
         used[i] = 0
         entering, leaving, stiffest, fastest = 0.0, 0.0, 0.0, 0.0
         for k in range(m):

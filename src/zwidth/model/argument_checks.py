@@ -85,6 +85,7 @@ def check_number(
 ) -> None:
     """Raise ValueError unless the value is a number in a range; `hint` is added to the sentence.
 
+    value         or an array of such numbers, of several designs
     least, above  the number must be at least, or greater than this
     infinite      may it be inf?
 
@@ -92,6 +93,10 @@ def check_number(
     Traceback (most recent call last):
     ValueError: mass must be a finite number greater than 0 [kg], got -1
     """
+    if getattr(value, "ndim", 0) and getattr(value, "size", 0):
+        for extreme in (value.min(), value.max()):  # type: ignore[attr-defined]
+            check_number(name, extreme, unit, least=least, above=above, infinite=infinite, hint=hint)
+        return
     if _is_number(value):
         number = float(value)  # type: ignore[arg-type]
         if number >= least and number > above and (isfinite(number) or (infinite and number == inf)):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from zwidth.model.design_axes import Number
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import undamped_modes
 
@@ -21,7 +22,7 @@ from zwidth.model.modes import undamped_modes
 class ModalDamping:
     """Damping ratio zeta of every flexible mode, 0.05 for 5 %; at least 0."""
 
-    ratio: float
+    ratio: Number
 
     def __post_init__(self) -> None:
         _check("damping ratio", self.ratio)
@@ -31,8 +32,8 @@ class ModalDamping:
 class ProportionalDamping:
     """B = r_m M + r_k K, both coefficients at least 0 (thesis eq. 3.2)."""
 
-    mass_coefficient_1_per_s: float
-    stiffness_coefficient_s: float
+    mass_coefficient_1_per_s: Number
+    stiffness_coefficient_s: Number
 
     def __post_init__(self) -> None:
         _check("mass coefficient", self.mass_coefficient_1_per_s)
@@ -56,5 +57,5 @@ def modal_matrix(mass: Floats, stiffness: Floats, ratio: float) -> Floats:
 
 
 def _check(what: str, value: float) -> None:
-    if not (np.isfinite(value) and value >= 0.0):
+    if not np.all(np.isfinite(value) & (np.asarray(value) >= 0.0)):
         raise ValueError(f"the {what} must be a finite number of at least 0, got {value}")

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from zwidth.compiled import compiled
 from zwidth.model.mechanism import Floats, Ints, Mechanism
-from zwidth.model.mechanism_arrays import per_design
+from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.posture import Posture
 
 
@@ -43,7 +43,7 @@ def effective_parameters(mechanism: Mechanism, posture: Posture, direction: Arra
     rotor = ratio**2 * per_design(mechanism, drives.motor_inertia, 1)
     spring = ratio**2 * per_design(mechanism, drives.stiffness, 1)
     shape = np.broadcast_shapes(posture.status.shape, u.shape[:-1])
-    design = np.broadcast_to(np.arange(len(rotor)).reshape(mechanism.design_shape), shape).ravel().astype(np.int64)
+    design = design_of_each(mechanism, shape)
     d = rotor.shape[1]
     M = np.array(np.broadcast_to(posture.mass_matrix, (*shape, d, d)).reshape(-1, d, d), order="C")
     J = np.array(np.broadcast_to(posture.jacobian, (*shape, 3, d)).reshape(-1, 3, d), order="C")

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.design_axes import Array1, Array2, Array3, design_shape
 from zwidth.model.nonlinear import FrictionModel
 
 Floats = NDArray[np.float64]
@@ -41,13 +42,13 @@ class Links:
     names: tuple[str, ...]
     parent: Ints
     joint: Ints
-    origin: Floats
-    rotation: Floats
-    axis: Floats
-    mass: Floats
-    center_of_mass: Floats
-    inertia: Floats
-    tip: Floats
+    origin: Array2
+    rotation: Array3
+    axis: Array2
+    mass: Array1
+    center_of_mass: Array2
+    inertia: Array3
+    tip: Array2
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ class Closures:
     names: tuple[str, ...]
     a: Ints
     b: Ints
-    point_a: Floats
-    point_b: Floats
+    point_a: Array2
+    point_b: Array2
 
 
 @dataclass(frozen=True)
@@ -82,17 +83,17 @@ class DriveNonlinearity:
     encoder_noise       (..., d)  standard deviation of the motor's angle before it is counted [rad]
     """
 
-    coulomb: Floats
+    coulomb: Array1
     friction_model: FrictionModel
-    breakaway: Floats
+    breakaway: Array1
     bristle_stiffness: float
     bristle_damping: float
     stribeck_velocity: float
-    hardening: Floats
-    backward_stiffness: Floats
-    brake_damping: Floats
-    brake_time_constant: Floats
-    encoder_noise: Floats
+    hardening: Array1
+    backward_stiffness: Array1
+    brake_damping: Array1
+    brake_time_constant: Array1
+    encoder_noise: Array1
 
 
 @dataclass(frozen=True)
@@ -115,16 +116,16 @@ class Drives:
 
     names: tuple[str, ...]
     joint: Ints
-    motor_inertia: Floats
-    transmission: Floats
-    stiffness: Floats
-    damping: Floats
-    torque_constant: Floats
-    torque_limit: Floats
-    encoder_counts: Floats
-    continuous_torque: Floats | None = None
-    winding_damping: Floats | None = None
-    winding_time_constant: Floats | None = None
+    motor_inertia: Array1
+    transmission: Array1
+    stiffness: Array1
+    damping: Array1
+    torque_constant: Array1
+    torque_limit: Array1
+    encoder_counts: Array1
+    continuous_torque: Array1 | None = None
+    winding_damping: Array1 | None = None
+    winding_time_constant: Array1 | None = None
     nonlinearity: DriveNonlinearity | None = None
 
 
@@ -142,21 +143,12 @@ class Mechanism:
     closures: Closures
     drives: Drives
     handle_link: int
-    handle_point: Floats
-    assemblies: dict[str, Floats]
-    reference_position: Floats
+    handle_point: Array1
+    assemblies: dict[str, Array1]
+    reference_position: Array1
     workspace: Floats
 
     @cached_property
     def design_shape(self) -> tuple[int, ...]:
         """Leading axes of all numbers: () for one design."""
-        links, closures, drives = self.links, self.closures, self.drives
-        return np.broadcast_shapes(
-            *(array.shape[:-2] for array in (links.origin, links.axis, links.center_of_mass, links.tip)),
-            *(array.shape[:-3] for array in (links.rotation, links.inertia)),
-            *(array.shape[:-2] for array in (closures.point_a, closures.point_b)),
-            *(array.shape[:-1] for array in (links.mass, drives.motor_inertia, drives.transmission)),
-            *(array.shape[:-1] for array in (drives.stiffness, drives.damping)),
-            *(array.shape[:-1] for array in (self.handle_point, self.reference_position)),
-            *(np.shape(angles)[:-1] for angles in self.assemblies.values()),
-        )
+        return design_shape(self)

@@ -59,6 +59,14 @@ def per_design(mechanism: Mechanism, array: Floats, trailing: int) -> Floats:
     return np.array(full.reshape((int(np.prod(shape)), *tail)), order="C")
 
 
+def design_of_each(mechanism: Mechanism, shape: tuple[int, ...]) -> Ints:
+    """Index of the design of each of many postures, flat; their shape is one to which that of the designs
+    broadcasts."""
+    designs = mechanism.design_shape
+    numbers = np.arange(int(np.prod(designs)), dtype=np.int64).reshape(designs)
+    return np.broadcast_to(numbers, shape).ravel()
+
+
 def pack(mechanism: Mechanism) -> MechanismArrays:
     """The mechanism as `MechanismArrays`; every call packs anew, nothing is kept."""
     links, closures = mechanism.links, mechanism.closures

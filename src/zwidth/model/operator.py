@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from zwidth.model.argument_checks import check_number, require
+from zwidth.model.design_axes import Number
 from zwidth.model.plant import Plant
 
 
@@ -26,11 +27,11 @@ class Operator:
                                           damper act on the handle itself (Hulin, Preusche and Hirzinger 2006)
     """
 
-    arm_mass: float
-    arm_stiffness: float
-    arm_damping: float
-    grasp_stiffness: float | None = None
-    grasp_damping: float | None = None
+    arm_mass: Number
+    arm_stiffness: Number
+    arm_damping: Number
+    grasp_stiffness: Number | None = None
+    grasp_damping: Number | None = None
 
     def __post_init__(self) -> None:
         units = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.model.argument_checks import check_number
+from zwidth.model.design_axes import Array1, Array2, Number
 from zwidth.model.nonlinear import Nonlinear
 
 Floats = NDArray[np.float64]
@@ -25,9 +26,9 @@ class LaggedDamper:
     time_constant  tau = L/R [s], positive; a damper without lag belongs into the damping matrix
     """
 
-    along: Floats
-    damping: float
-    time_constant: float
+    along: Array1
+    damping: Number
+    time_constant: Number
 
 
 @dataclass(frozen=True)
@@ -48,17 +49,20 @@ class Plant:
                        [N/m]; it describes steady vibration only, so that such a plant has no transition matrix
                        (see `chart.hysteretic`); None: none
     nonlinear          friction, encoder steps and the like: what only `contact` knows of
+
+    Arrays may have leading axes of designs (`model.design_axes`); such plants are computed together, see
+    `plant_modes`.
     """
 
-    mass: Floats
-    damping: Floats
-    stiffness: Floats
-    actuator: Floats
-    sensor: Floats
-    handle: Floats | None = None
+    mass: Array2
+    damping: Array2
+    stiffness: Array2
+    actuator: Array1
+    sensor: Array1
+    handle: Array1 | None = None
     names: tuple[str, ...] = ()
     lagged_dampers: tuple[LaggedDamper, ...] = ()
-    hysteresis: Floats | None = None
+    hysteresis: Array2 | None = None
     nonlinear: Nonlinear = field(default_factory=Nonlinear)
 
     def __post_init__(self) -> None:

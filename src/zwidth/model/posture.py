@@ -16,7 +16,7 @@ from zwidth.model.continuation import ASSEMBLY_TOLERANCE, OK, OUT_OF_REACH, SING
 from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.handle_position import arm_length, nearest_position, position_of_angles
 from zwidth.model.mechanism import Floats, Ints, Mechanism
-from zwidth.model.mechanism_arrays import MechanismArrays, pack, per_design
+from zwidth.model.mechanism_arrays import MechanismArrays, design_of_each, pack, per_design
 from zwidth.model.mobility import check_mobility
 from zwidth.model.posture_batch import failed_batch, solve_batch
 from zwidth.model.roadmap import roadmap
@@ -140,8 +140,7 @@ def solve_posture(
     shape = np.broadcast_shapes(designs, target.shape[:-1])
     # a copy that can be written to, as all that is solved for: one that cannot is another type, compiled anew
     goals = np.array(np.broadcast_to(target, (*shape, 3)).reshape(-1, 3), dtype=np.float64, order="C")
-    count = int(np.prod(designs))
-    design = np.broadcast_to(np.arange(count).reshape(designs), shape).ravel().astype(np.int64)
+    design = design_of_each(mechanism, shape)
 
     reference, gaps = _references(mechanism, mech, name)
     if not designs:
@@ -257,7 +256,7 @@ def inertia_terms(mechanism: Mechanism, posture: Posture, driven_rates: ArrayLik
     shape = np.broadcast_shapes(designs, posture.status.shape, rates.shape[:-1])
     angles = np.broadcast_to(posture.angles, (*shape, mech.parent.size)).reshape(-1, mech.parent.size)
     flat = np.broadcast_to(rates, (*shape, mech.driven)).reshape(-1, mech.driven)
-    design = np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
+    design = design_of_each(mechanism, shape)
     out = np.empty(flat.shape)
     still = np.zeros(3)
     bias_batch(mech, design, np.array(angles, order="C"), np.array(flat, order="C"), still, out)
@@ -270,7 +269,7 @@ def link_points(mechanism: Mechanism, posture: Posture) -> LinkPoints:
     shape = np.broadcast_shapes(designs, posture.status.shape)
     n = mech.parent.size
     angles = np.array(np.broadcast_to(posture.angles, (*shape, n)).reshape(-1, n), order="C")
-    design = np.broadcast_to(np.arange(int(np.prod(designs))).reshape(designs), shape).ravel().astype(np.int64)
+    design = design_of_each(mechanism, shape)
     rotation, origin = np.empty((len(design), n, 3, 3)), np.empty((len(design), n, 3))
     _place_batch(mech, design, angles, rotation, origin)
     tip = origin + np.einsum("knij,knj->kni", rotation, per_design(mechanism, mechanism.links.tip, 2)[design])

@@ -13,7 +13,7 @@ whole plant is ever decomposed; `reduction` and `modes` say the same of one post
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,11 @@ from numpy.typing import NDArray
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
 from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, inverse_form
-from zwidth.model.mechanism import Drives, Mechanism
+from zwidth.model.mechanism import Ints, Mechanism
+from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import Encoders, Model
+from zwidth.threads import in_chunks
 
 Floats = NDArray[np.float64]
 
@@ -51,47 +53,70 @@ def rendered_modes(
     damping: Damping,
     encoders: Encoders = "motor",
 ) -> RenderedModes | None:
-    """The modes of each posture's model along its direction; None where they are not such modes.
+    """The modes of each posture's model along its direction, of one design or of many; None for readings behind
+    the drives in a reduced model.
 
-    posture    (...), flattened to N
+    posture    (...), flattened to N; the designs of the mechanism broadcast with it
     direction  (..., 3)  unit vectors
-    Returns    None for a batch of designs, windings closed through resistors, given dampers that couple the modes,
-               and readings behind the drives in a reduced model
+    Returns    nan as input where there are no such modes: given dampers that couple them, windings closed through
+               resistors, rigid drives in a model that needs flexible ones
     """
+    if encoders != "motor" and model != "full":
+        return None
     drives = mechanism.drives
-    if drives.transmission.ndim > 1 or (drives.winding_damping is not None and drives.winding_damping.any()):
-        return None
+    shape = np.broadcast_shapes(posture.status.shape, direction.shape[:-1], mechanism.design_shape)
+    design = design_of_each(mechanism, shape)
+    ratio = per_design(mechanism, drives.transmission, 1)
+    spring = ratio**2 * per_design(mechanism, drives.stiffness, 1)
     # B = r_m M + r_k K and a ratio on every flexible mode: a = (r_m + r_k w^2)/2 + ratio w
-    coefficients = _coefficients(drives, damping)
-    if coefficients is None:
-        return None
+    coefficients = _coefficients(mechanism, damping)
+    if drives.winding_damping is not None:
+        braked = per_design(mechanism, drives.winding_damping, 1).any(axis=1)
+        coefficients[braked] = np.nan
     if model == "full":
-        return _of_full(drives, posture, direction, coefficients, encoders)
-    numbers = effective_parameters(mechanism, posture, direction)
-    if encoders != "motor" or (model != "rigid" and not np.isfinite(drives.stiffness).any()):
-        return None
-    return _of_reduced(numbers, model, coefficients)
+        rotor = ratio**2 * per_design(mechanism, drives.motor_inertia, 1)
+        modes = _of_full(rotor, spring, posture, direction, design, shape, encoders)
+        r_m, r_k, share = coefficients[design].T[:, :, None]
+        decay = 0.5 * (r_m + r_k * modes.frequency_squared) + share * np.sqrt(modes.frequency_squared)
+        modes = replace(modes, decay=decay)
+    else:
+        if model != "rigid":
+            coefficients[~np.isfinite(spring).any(axis=1)] = np.nan
+        numbers = effective_parameters(mechanism, posture, direction)
+        modes = _of_reduced(numbers, model, coefficients[design])
+    modes.input[np.isnan(modes.decay).any(axis=-1)] = np.nan
+    return modes
 
 
-def _coefficients(drives: Drives, damping: Damping) -> tuple[float, float, float] | None:
+def _coefficients(mechanism: Mechanism, damping: Damping) -> Floats:
+    """r_m, r_k and the damping ratio of each design, (P, 3); nan where given dampers couple the modes."""
+    P = int(np.prod(mechanism.design_shape))
+    out = np.zeros((P, 3))
     if isinstance(damping, ModalDamping):
-        return 0.0, 0.0, damping.ratio
-    if isinstance(damping, ProportionalDamping):
-        return damping.mass_coefficient_1_per_s, damping.stiffness_coefficient_s, 0.0
-    flexible = np.isfinite(drives.stiffness)
-    share = drives.damping[flexible] / drives.stiffness[flexible]
-    if len(share) == 0 or np.all(share == share[0]):
-        return 0.0, float(share[0]) if len(share) else 0.0, 0.0
-    return None
+        out[:, 2] = np.ravel(damping.ratio)
+    elif isinstance(damping, ProportionalDamping):
+        out[:, 0], out[:, 1] = (
+            np.ravel(damping.mass_coefficient_1_per_s),
+            np.ravel(damping.stiffness_coefficient_s),
+        )
+    else:
+        stiffness, damper = (
+            per_design(mechanism, each, 1) for each in (mechanism.drives.stiffness, mechanism.drives.damping)
+        )
+        flexible = np.isfinite(stiffness)
+        share = np.where(flexible, damper / np.where(flexible, stiffness, 1.0), np.nan)
+        first = np.argmax(flexible, axis=1)
+        common = np.where(flexible.any(axis=1), share[np.arange(P), first], 0.0)
+        alike = np.where(flexible, share == common[:, None], True).all(axis=1)
+        out[:, 1] = np.where(alike, common, np.nan)
+    return out
 
 
-def _of_reduced(
-    numbers: EffectiveParameters, model: Model, coefficients: tuple[float, float, float]
-) -> RenderedModes:
+def _of_reduced(numbers: EffectiveParameters, model: Model, coefficients: Floats) -> RenderedModes:
     """Of masses and a spring: with the pair's reduced mass mu, w^2 = k/mu.
 
     The two masses' own ratio is that of their mode; the motor mass keeps the damper of the pair (`reduction`)."""
-    r_m, r_k, ratio = coefficients
+    r_m, r_k, ratio = coefficients.T
     m1, m2 = numbers.link_side_mass.ravel(), numbers.motor_side_mass.ravel()
     k, mass = numbers.stiffness.ravel(), numbers.rigid_mass.ravel()
     if model == "rigid":
@@ -109,47 +134,65 @@ def _of_reduced(
             ]
     decay, squared, participation = (np.stack(part, axis=-1) for part in zip(*modes, strict=True))
     participation = np.where(np.isfinite(participation) & np.isfinite(squared), participation, np.nan)
-    return RenderedModes(decay, squared, participation, participation)
+    return RenderedModes(decay, squared, participation, participation.copy())
 
 
 def _of_full(
-    drives: Drives,
+    rotor: Floats,
+    spring: Floats,
     posture: Posture,
     direction: Floats,
-    coefficients: tuple[float, float, float],
+    design: Ints,
+    shape: tuple[int, ...],
     encoders: Encoders,
 ) -> RenderedModes:
-    n2 = drives.transmission**2
-    rotor, spring = n2 * drives.motor_inertia, n2 * drives.stiffness
-    shape, d = posture.status.shape, len(rotor)
-    h = np.einsum("...i,...id->...d", direction, posture.jacobian)
-    N, m = int(np.prod(shape)), int(np.isfinite(spring).sum()) + 1
+    """Undamped modes of the full model; rotor inertias and springs (P, d) at the joints."""
+    d = rotor.shape[1]
+    N, m = len(design), int(np.isfinite(spring).sum(axis=1).max(initial=0)) + 1
+    J = np.broadcast_to(posture.jacobian, (*shape, 3, d)).reshape(N, 3, d)
+    u = np.broadcast_to(direction, (*shape, 3)).reshape(N, 3)
+    h = np.einsum("ni,nid->nd", u, J)
+    mass = np.array(np.broadcast_to(posture.mass_matrix, (*shape, d, d)).reshape(N, d, d), order="C")
     squared, enter, leave = np.empty((N, m)), np.empty((N, m)), np.empty((N, m))
-    mass = np.ascontiguousarray(posture.mass_matrix).reshape(N, d, d)
-    _full_modes(mass, h.reshape(N, d), rotor, spring, encoders == "motor", squared, enter, leave)
-    r_m, r_k, ratio = coefficients
-    decay = 0.5 * (r_m + r_k * squared) + ratio * np.sqrt(squared)
-    return RenderedModes(decay, squared, enter, leave)
+
+    def several(first: int, last: int) -> None:
+        _full_modes(mass, h, design, rotor, spring, encoders == "motor", squared, enter, leave, first, last)
+
+    in_chunks(several, N)
+    return RenderedModes(np.zeros((N, m)), squared, enter, leave)
 
 
 @compiled
 def _full_modes(
     mass: Floats,
     along: Floats,
-    rotor: Floats,
-    spring: Floats,
+    design: Ints,
+    rotors: Floats,
+    springs: Floats,
     at_motor: bool,
     squared: Floats,
     enter: Floats,
     leave: Floats,
+    first: int,
+    last: int,
 ) -> None:
-    """The flexible modes of each posture and, last, the free motion; nan where no number comes out."""
-    N, d = along.shape
-    flexible = np.flatnonzero(np.isfinite(spring))
-    f = len(flexible)
-    M, inverse, S, V = np.empty((d, d)), np.empty((d, d)), np.empty((f, f)), np.empty((f, f))
-    h, shape = np.empty(d), np.empty(d)
-    for i in range(N):
+    """The flexible modes of postures first to last - 1 and, last of each, the free motion; nan where no number
+    comes out. A design with rigid drives has fewer modes than others: the rest do not move."""
+    d, most = along.shape[1], squared.shape[1] - 1
+    M, inverse, h, shape = np.empty((d, d)), np.empty((d, d)), np.empty(d), np.empty(d)
+    flexible = np.empty(d, dtype=np.int64)
+    f, previous = 0, -1
+    S, V = np.empty((f, f)), np.empty((f, f))
+    for i in range(first, last):
+        rotor, spring = rotors[design[i]], springs[design[i]]
+        if design[i] != previous:
+            before, f, previous = f, 0, design[i]
+            for s in range(d):
+                if np.isfinite(spring[s]):
+                    flexible[f] = s
+                    f += 1
+            if f != before:
+                S, V = np.empty((f, f)), np.empty((f, f))
         for s in range(d):
             h[s] = along[i, s]
             for t in range(d):
@@ -186,13 +229,15 @@ def _full_modes(
                 p = flexible[a]
                 moved += along[i, p] * np.sqrt(spring[p]) * V[a, k] / (w * rotor[p])
             squared[i, k], enter[i, k], leave[i, k] = S[k, k], moved, moved if at_motor else read
-        squared[i, f], enter[i, f], leave[i, f] = 0.0, np.sqrt(free), np.sqrt(free)
+        for k in range(f, most):
+            squared[i, k], enter[i, k], leave[i, k] = 0.0, 0.0, 0.0
+        squared[i, most], enter[i, most], leave[i, most] = 0.0, np.sqrt(free), np.sqrt(free)
         # a posture with one nan has no modes at all
         known = free > 0.0
-        for k in range(f + 1):
+        for k in range(most + 1):
             known = known and np.isfinite(squared[i, k] + enter[i, k] + leave[i, k])
         if not known:
-            for k in range(f + 1):
+            for k in range(most + 1):
                 enter[i, k] = np.nan
 
 

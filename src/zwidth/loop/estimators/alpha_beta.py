@@ -9,6 +9,7 @@ import numpy as np
 
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators.parameter_checks import LONGEST, check_period
+from zwidth.model.design_axes import Number, stack_numbers
 
 
 @dataclass(frozen=True)
@@ -35,10 +36,16 @@ class AlphaBeta:
     0.004
     """
 
-    alpha: float
-    beta: float
+    alpha: Number
+    beta: Number
 
     def __post_init__(self) -> None:
+        if np.ndim(self.alpha) or np.ndim(self.beta):
+            a, b = np.broadcast_arrays(self.alpha, self.beta)
+            inside = (a > 0.0) & (b > 0.0) & (2.0 * a + b < 4.0) & (a * LONGEST >= 1.0) & (a <= LONGEST * b)
+            if not inside.all():
+                AlphaBeta(float(a[~inside][0]), float(b[~inside][0]))  # says what is wrong with it
+            return
         for name, value in (("alpha", self.alpha), ("beta", self.beta)):
             if not (value > 0.0 and isfinite(value)):
                 raise ValueError(f"{name} must be positive and finite, got {value!r}; else the filter is unstable")
@@ -58,7 +65,9 @@ class AlphaBeta:
         """w(z) at a sampling period [s]."""
         check_period(period)
         gain = self.beta / period
-        return Estimator(np.array([[gain, gain, 0.0]]), np.array([[1.0, self.alpha + self.beta, self.beta]]))
+        return Estimator(
+            stack_numbers([[gain, gain, 0.0]]), stack_numbers([[1.0, self.alpha + self.beta, self.beta]])
+        )
 
     def delay(self, period: float) -> float:
         """Delay of the estimate at low frequencies [s]: (alpha/beta - 1/2) T; early where negative."""

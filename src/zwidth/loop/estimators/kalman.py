@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import sqrt
 
+import numpy as np
+
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators.alpha_beta import AlphaBeta
 from zwidth.loop.estimators.parameter_checks import check_period, check_positive, quantisation_noise
+from zwidth.model.design_axes import Number
 
 # Tracking indices that make a usable filter. Below, it is late by eight hundred samples and more; above, it is the
 # trapezoidal rule but for rounding, and never stops ringing.
@@ -39,8 +42,8 @@ class Kalman:
     (0.4096, 0.9156)
     """
 
-    acceleration_noise: float
-    position_noise: float
+    acceleration_noise: Number
+    position_noise: Number
 
     def __post_init__(self) -> None:
         check_positive("acceleration_noise", self.acceleration_noise, "m/s^2")
@@ -73,6 +76,8 @@ class Kalman:
         check_period(period)
         index = self.acceleration_noise * period**2 / self.position_noise
         low, high = INDEX
+        if getattr(index, "ndim", 0):
+            return np.asarray(2.0 * index / (index + np.sqrt(index * (index + 8.0))))  # type: ignore[return-value]
         if not low <= index <= high:
             much, change = ("little", "raise") if index < low else ("much", "lower")
             raise ValueError(

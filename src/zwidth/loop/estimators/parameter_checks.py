@@ -19,7 +19,11 @@ def check_whole(name: str, value: object, least: int, most: int, reason: str) ->
 
 
 def check_positive(name: str, value: float, unit: str) -> None:
-    """Raise ValueError unless value is positive and finite."""
+    """Raise ValueError unless value, or each of an array of several designs, is positive and finite."""
+    if getattr(value, "ndim", 0):
+        for extreme in (value.min(), value.max()):  # type: ignore[attr-defined]
+            check_positive(name, float(extreme), unit)
+        return
     if not (value > 0.0 and isfinite(value)):
         raise ValueError(f"{name} must be positive and finite, got {value!r} {unit}".rstrip())
 

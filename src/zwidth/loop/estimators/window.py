@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators.parameter_checks import check_period
+from zwidth.model.design_axes import stack_numbers
 
 Floats = NDArray[np.float64]
 
@@ -29,4 +30,4 @@ def mean_difference(weights: Floats, period: float) -> Estimator:
     Raises  ValueError  unless the sampling period [s] is positive and finite
     """
     check_period(period)
-    return Estimator(np.array([[0.0, 1.0 / period, 0.0]]), np.array([[0.0, 1.0, 1.0]]), weights)
+    return Estimator(stack_numbers([[0.0, 1.0 / period, 0.0]]), np.array([[0.0, 1.0, 1.0]]), weights)

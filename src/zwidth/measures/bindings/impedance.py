@@ -61,7 +61,7 @@ def _numbers(point: OperatingPoint, what: int) -> ChartNumbers | None:
     if modes is None:
         return None
     rows, section_count = modal_rows_batch(modes, controller)
-    return chart_numbers(loop_table(rows, section_count, [controller], np.zeros(len(rows))), what)
+    return chart_numbers(loop_table(rows, section_count, controller), what)
 
 
 def _completed(

@@ -1,0 +1,124 @@
+"""Designs side by side: numbers with leading axes, and how one design is taken out of them.
+
+A field of a dataclass whose numbers may differ from design to design is declared as `Number`, `Array1`, `Array2`
+or `Array3`: an array has so many axes of its own, and before them those of the designs where there are several.
+What has no axes of designs is the same for all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Annotated, Any, TypeAlias, TypeVar, get_args, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Change: TypeAlias = Callable[[NDArray[Any]], NDArray[Any]]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class OwnAxes:
+    """How many trailing axes an array has of its own; the rest are axes of designs."""
+
+    count: int
+
+
+Number = Annotated[float, OwnAxes(0)]
+Array1 = Annotated[Floats, OwnAxes(1)]
+Array2 = Annotated[Floats, OwnAxes(2)]
+Array3 = Annotated[Floats, OwnAxes(3)]
+
+_own_axes: dict[type, dict[str, int | None]] = {}  # of each field of a class, read from its annotations once
+
+
+def design_shape(value: object) -> tuple[int, ...]:
+    """Axes of designs that all numbers of a dataclass, and of what it holds, have together; () for one design."""
+    return np.broadcast_shapes(*(array.shape[: array.ndim - own] for array, own in _arrays(value)))
+
+
+def change_designs(value: T, change: Change, shape: tuple[int, ...]) -> T:
+    """A dataclass with a change of the axes of designs, such as an index, made to all numbers that have any.
+
+    change  gets arrays whose leading axes are `shape`
+    shape   of the designs, or one to which theirs broadcasts
+    """
+    return value if not design_shape(value) else _changed(value, change, shape)
+
+
+def _changed(value: Any, change: Change, shape: tuple[int, ...]) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_changed(one, change, shape) for one in value)
+    if not is_dataclass(value) or isinstance(value, type):
+        return value
+    made = {
+        name: _changed(inner, change, shape) if own is None else _changed_numbers(inner, own, change, shape)
+        for name, inner, own in _fields(value)
+    }
+    return replace(value, **{name: new for name, new in made.items() if new is not getattr(value, name)})
+
+
+def _changed_numbers(numbers: Any, own: int, change: Change, shape: tuple[int, ...]) -> Any:
+    if isinstance(numbers, Mapping):
+        return {name: _changed_numbers(one, own, change, shape) for name, one in numbers.items()}
+    if not isinstance(numbers, np.ndarray) or numbers.ndim <= own:
+        return numbers
+    made = np.asarray(change(np.broadcast_to(numbers, (*shape, *numbers.shape[numbers.ndim - own :]))))
+    # one number of one design is a plain one, as everywhere else
+    return made.item() if made.ndim == 0 else np.array(made)
+
+
+def _arrays(value: Any) -> Iterator[tuple[NDArray[Any], int]]:
+    """Every array of designs in a dataclass, with the number of its own axes."""
+    if isinstance(value, tuple):
+        for one in value:
+            yield from _arrays(one)
+    elif is_dataclass(value) and not isinstance(value, type):
+        for _, inner, own in _fields(value):
+            if own is None:
+                yield from _arrays(inner)
+                continue
+            for numbers in inner.values() if isinstance(inner, Mapping) else [inner]:
+                if isinstance(numbers, np.ndarray) and numbers.ndim > own:
+                    yield numbers, own
+
+
+def _fields(value: Any) -> Iterator[tuple[str, Any, int | None]]:
+    """Name and value of each field, and how many axes of its own it has; None where it is no number."""
+    kind = type(value)
+    if kind not in _own_axes:
+        hints = get_type_hints(kind, include_extras=True)
+        _own_axes[kind] = {one.name: _stated(hints[one.name]) for one in fields(value)}
+    for name, own in _own_axes[kind].items():
+        yield name, getattr(value, name), own
+
+
+def stack_numbers(nested: Any) -> Floats:
+    """Nested lists of numbers, some with axes of designs, as one array: those axes, then those of the lists.
+
+    >>> stack_numbers([[1.0, np.array([2.0, 3.0])]]).tolist()
+    [[[1.0, 2.0]], [[1.0, 3.0]]]
+    """
+    if not isinstance(nested, list | tuple):
+        return np.asarray(nested, dtype=np.float64)
+    parts = [stack_numbers(one) for one in nested]
+    depth = _depth(nested) - 1
+    designs = np.broadcast_shapes(*(part.shape[: part.ndim - depth] for part in parts))
+    parts = [np.broadcast_to(part, (*designs, *part.shape[part.ndim - depth :])) for part in parts]
+    return np.stack(parts, axis=len(designs)) if parts else np.zeros(0)
+
+
+def _depth(nested: Any) -> int:
+    return 1 + max(map(_depth, nested), default=0) if isinstance(nested, list | tuple) else 0
+
+
+def _stated(hint: Any) -> int | None:
+    """The axes that a field's type states, also inside `| None` and a dictionary's values."""
+    for part in get_args(hint):
+        if isinstance(part, OwnAxes):
+            return part.count
+        if (inner := _stated(part)) is not None:
+            return inner
+    return None

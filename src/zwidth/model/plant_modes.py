@@ -1,0 +1,144 @@
+"""The modes of many given plants at once; `modes.real_modes` says the same of one, with its special cases."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from zwidth.compiled import compiled
+from zwidth.model.design_axes import design_shape
+from zwidth.model.mechanism import Floats
+from zwidth.model.modes import REPEATED, RIGID
+from zwidth.model.plant import Plant
+from zwidth.model.rendered_modes import RenderedModes, jacobi
+from zwidth.threads import in_chunks
+
+STILL = 1e-14  # share of the largest damping below which a mode's own is rounding
+
+
+def plant_modes(plant: Plant) -> RenderedModes:
+    """The modes of each of N designs of a plant, in the form of those of a mechanism's postures.
+
+    Returns  nan as input where a plant is to be looked at alone: damping that couples the modes, or lags; a loss
+             factor; two modes of one frequency; two free motions with damping; masses that are not positive
+    """
+    shape = design_shape(plant)
+    N, n = int(np.prod(shape)), plant.size
+    M, B, K = (_flat(each, shape, 2) for each in (plant.mass, plant.damping, plant.stiffness))
+    actuator, sensor = (_flat(each, shape, 1) for each in (plant.actuator, plant.sensor))
+    decay, squared, enter, leave = (np.empty((N, n)) for _ in range(4))
+    if plant.lagged_dampers or plant.hysteresis is not None:
+        for numbers in (decay, squared, enter, leave):
+            numbers.fill(np.nan)
+        return RenderedModes(decay, squared, enter, leave)
+
+    def several(first: int, last: int) -> None:
+        _modes(M, B, K, actuator, sensor, decay, squared, enter, leave, first, last)
+
+    in_chunks(several, N)
+    return RenderedModes(decay, squared, enter, leave)
+
+
+def _flat(array: Floats, shape: tuple[int, ...], own: int) -> Floats:
+    """One axis of designs, as an array that can be written to: kernels are compiled once for these."""
+    tail = array.shape[array.ndim - own :]
+    return np.array(np.broadcast_to(array, (*shape, *tail)).reshape(-1, *tail), dtype=np.float64, order="C")
+
+
+@compiled
+def _modes(
+    mass: Floats,
+    damping: Floats,
+    stiffness: Floats,
+    actuator: Floats,
+    sensor: Floats,
+    decay: Floats,
+    squared: Floats,
+    enter: Floats,
+    leave: Floats,
+    first: int,
+    last: int,
+) -> None:
+    """Modes of plants first to last - 1, as in `plant_modes`."""
+    n = mass.shape[1]
+    root, A, V, shapes = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    damper = np.empty(n)
+    for i in range(first, last):
+        alone = not cholesky(mass[i], root)
+        relative(root, stiffness[i], A)
+        jacobi(A, V)
+        # mass-normalised shapes: the columns of root^-T V
+        for k in range(n):
+            for r in range(n - 1, -1, -1):
+                value = V[r, k]
+                for s in range(r + 1, n):
+                    value -= root[s, r] * shapes[s, k]
+                shapes[r, k] = value / root[r, r]
+        scale = 0.0
+        for k in range(n):
+            scale = max(scale, abs(A[k, k]))
+        largest, off, free = 0.0, 0.0, 0
+        for k in range(n):
+            value = A[k, k]
+            squared[i, k] = 0.0 if abs(value) <= RIGID * max(scale, 2.3e-308) else value
+            for j in range(k):
+                alone = alone or abs(A[k, k] - A[j, j]) <= REPEATED * scale
+            for j in range(k + 1):
+                value = 0.0
+                for r in range(n):
+                    for s in range(n):
+                        value += shapes[r, k] * damping[i, r, s] * shapes[s, j]
+                if j == k:
+                    damper[k] = value
+                else:
+                    off = max(off, abs(value))
+                largest = max(largest, abs(value))
+        alone = alone or off > REPEATED * largest
+        for k in range(n):
+            decay[i, k] = 0.0 if abs(damper[k]) <= STILL * largest else 0.5 * damper[k]
+            free += squared[i, k] == 0.0 and decay[i, k] != 0.0
+            enter[i, k], leave[i, k] = 0.0, 0.0
+            for r in range(n):
+                enter[i, k] += shapes[r, k] * actuator[i, r]
+                leave[i, k] += shapes[r, k] * sensor[i, r]
+        if alone or free > 1:
+            for k in range(n):
+                enter[i, k] = np.nan
+
+
+@compiled
+def cholesky(A: Floats, root: Floats) -> bool:
+    """The lower triangle L of A = L L^T (n, n); whether A is positive definite."""
+    n = A.shape[0]
+    for j in range(n):
+        for r in range(j, n):
+            value = A[r, j]
+            for k in range(j):
+                value -= root[r, k] * root[j, k]
+            if r > j:
+                root[r, j] = value / root[j, j]
+            elif value > 0.0:
+                root[j, j] = np.sqrt(value)
+            else:
+                return False
+    return True
+
+
+@compiled
+def relative(root: Floats, A: Floats, out: Floats) -> None:
+    """root^-1 A root^-T of a symmetric A (n, n), root a lower triangle."""
+    n = A.shape[0]
+    for c in range(n):
+        for r in range(n):
+            value = A[r, c]
+            for k in range(r):
+                value -= root[r, k] * out[k, c]
+            out[r, c] = value / root[r, r]
+    for r in range(n):
+        for c in range(n):
+            value = out[r, c]
+            for k in range(c):
+                value -= root[c, k] * out[r, k]
+            out[r, c] = value / root[c, c]
+    for r in range(n):
+        for c in range(r):
+            out[r, c] = out[c, r] = 0.5 * (out[r, c] + out[c, r])
