@@ -1,4 +1,7 @@
-"""From the checked file to what the rest of zwidth computes with: arrays in SI units."""
+"""From the checked file to what the rest of zwidth computes with: arrays in SI units.
+
+A number of the file may be an array over designs (`device.design_batch`); what is built then has that axis first.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,7 @@ from zwidth.device.schema.response import ResponseSection
 from zwidth.device.schema.velocity import ButterworthFilter, FirstOrderFilter, FoawSection, KalmanSection
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, Foaw, Kalman, VelocityMethod
+from zwidth.model.design_axes import join_designs, stack_numbers
 from zwidth.model.electrical_damping import add_dampers
 from zwidth.model.mechanism import FIXED, REVOLUTE, Closures, Drives, Floats, Links, Mechanism
 from zwidth.model.operator import Operator
@@ -52,7 +56,7 @@ def controller(loop: LoopSection) -> Controller:
 
 def _low_pass(given: FirstOrderFilter | ButterworthFilter | None) -> FirstOrder | Butterworth | None:
     if isinstance(given, FirstOrderFilter):
-        return FirstOrder(given.time_constant_s) if given.time_constant_s > 0 else None
+        return FirstOrder(given.time_constant_s) if np.any(given.time_constant_s) else None
     return None if given is None else Butterworth(given.order, given.cutoff_Hz, given.discretisation)
 
 
@@ -70,18 +74,20 @@ def plant(
     section: PlantSection, friction: FrictionSection | None = None, encoder: EncoderSection | None = None
 ) -> Plant:
     """The plant; matrices are made symmetric to the last bit, and one coordinate is driven, read and held."""
-    M = np.array(section.mass_kg)
-    n = len(M)
+    M = stack_numbers(section.mass_kg)
+    n = M.shape[-1]
     one = (1.0,) if n == 1 else None
     handle = section.handle or one
-    actuator = np.array(section.actuator or one, dtype=np.float64)
+    actuator = stack_numbers(section.actuator or one)
     bare = Plant(
         mass=_even(M),
-        damping=_even(np.array(section.damping_Ns_per_m or np.zeros((n, n)))),
-        stiffness=_even(np.array(section.stiffness_N_per_m or np.zeros((n, n)))),
+        damping=_even(stack_numbers(section.damping_Ns_per_m) if section.damping_Ns_per_m else np.zeros((n, n))),
+        stiffness=_even(
+            stack_numbers(section.stiffness_N_per_m) if section.stiffness_N_per_m else np.zeros((n, n))
+        ),
         actuator=actuator,
-        sensor=np.array(section.sensor or one, dtype=np.float64),
-        handle=None if handle is None else np.array(handle),
+        sensor=stack_numbers(section.sensor or one),
+        handle=None if handle is None else stack_numbers(handle),
         names=tuple(f"coordinate {i}" for i in range(n)),
     )
     bare = replace(bare, nonlinear=build_nonlinear.nonlinear_of_plant(bare, section, friction, encoder))
@@ -132,7 +138,7 @@ def mechanism(section: MechanismSection) -> Mechanism:
     """The mechanism, its links sorted so that parents stand before children."""
     links = _parents_first(section.links)
     index = {"base": -1} | {link.name: i for i, link in enumerate(links)}
-    tips = {"base": np.zeros(3)} | {link.name: np.array([link.length_m, 0.0, 0.0]) for link in links}
+    tips = {"base": [0.0, 0.0, 0.0]} | {link.name: [link.length_m, 0.0, 0.0] for link in links}
     handle = section.handle
     workspace = section.workspace
     bounds = [(workspace and getattr(workspace, f"{axis}_m")) or (math.nan, math.nan) for axis in "xyz"]
@@ -141,9 +147,9 @@ def mechanism(section: MechanismSection) -> Mechanism:
         closures=_closures(section.loops, index, tips),
         drives=_drives(section, index),
         handle_link=index[handle.link],
-        handle_point=tips[handle.link] if handle.point_m is None else np.array(handle.point_m),
+        handle_point=stack_numbers(tips[handle.link] if handle.point_m is None else handle.point_m),
         assemblies={
-            name: np.array([assembly.joints_rad.get(link.name, 0.0) for link in links])
+            name: stack_numbers([assembly.joints_rad.get(link.name, 0.0) for link in links])
             for name, assembly in section.assemblies.items()
         },
         reference_position=in_space(section.reference.position_m),
@@ -152,14 +158,15 @@ def mechanism(section: MechanismSection) -> Mechanism:
 
 
 def in_space(vector: Sequence[float]) -> Floats:
-    """A vector of up to three components, (3,): those left out are 0."""
-    return np.array([*vector, 0.0, 0.0, 0.0][:3], dtype=np.float64)
+    """A vector of up to three components, (..., 3): those left out are 0."""
+    return stack_numbers([*vector, 0.0, 0.0, 0.0][:3])
 
 
 def roll_pitch_yaw(angles: Sequence[float]) -> Floats:
-    """Rotation Rz(yaw) Ry(pitch) Rx(roll): about the parent's fixed x, y, z axes in turn, (3, 3)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(angles), np.sin(angles)
-    return np.array(
+    """Rotation Rz(yaw) Ry(pitch) Rx(roll): about the parent's fixed x, y, z axes in turn, (..., 3, 3)."""
+    turns = np.moveaxis(stack_numbers(angles), -1, 0)
+    (cr, cp, cy), (sr, sp, sy) = np.cos(turns), np.sin(turns)
+    return stack_numbers(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
             [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
@@ -168,39 +175,39 @@ def roll_pitch_yaw(angles: Sequence[float]) -> Floats:
     )
 
 
-def _links(links: Sequence[LinkSection], index: dict[str, int], tips: dict[str, Floats]) -> Links:
-    axes = np.array([link.axis for link in links])
+def _links(links: Sequence[LinkSection], index: dict[str, int], tips: dict[str, list[float]]) -> Links:
+    axes = stack_numbers([link.axis for link in links])
     axes = axes / np.abs(axes).max(axis=-1, keepdims=True)  # lengths of 1e-300 have a direction, too
     axes = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
     return Links(
         names=tuple(link.name for link in links),
         parent=np.array([index[link.parent] for link in links], dtype=np.int64),
         joint=np.array([FIXED if link.joint == "fixed" else REVOLUTE for link in links], dtype=np.int64),
-        origin=np.array([tips[link.parent] if link.origin_m is None else link.origin_m for link in links]),
-        rotation=np.array([roll_pitch_yaw(link.orientation_rad) for link in links]),
+        origin=stack_numbers([tips[link.parent] if link.origin_m is None else link.origin_m for link in links]),
+        rotation=join_designs([roll_pitch_yaw(link.orientation_rad) for link in links], 2),
         axis=axes,
-        mass=np.array([link.mass_kg for link in links]),
-        center_of_mass=np.array([in_space(link.center_of_mass_m) for link in links]),
-        inertia=np.array([_inertia(link, axis) for link, axis in zip(links, axes, strict=True)]),
-        tip=np.array([tips[link.name] for link in links]),
+        mass=stack_numbers([link.mass_kg for link in links]),
+        center_of_mass=join_designs([in_space(link.center_of_mass_m) for link in links], 1),
+        inertia=join_designs([_inertia(link, axes[..., i, :]) for i, link in enumerate(links)], 2),
+        tip=stack_numbers([tips[link.name] for link in links]),
     )
 
 
 def _inertia(link: LinkSection, axis: Floats) -> Floats:
-    """(3, 3); one number is the moment about the joint axis and leaves the others open: I a a^T."""
-    rows = np.array(link.inertia_kg_m2)
-    return rows[0, 0] * np.outer(axis, axis) if rows.shape == (1, 1) else _even(rows)
+    """(..., 3, 3); one number is the moment about the joint axis and leaves the others open: I a a^T."""
+    rows = stack_numbers(link.inertia_kg_m2)
+    return rows * axis[..., :, None] * axis[..., None, :] if rows.shape[-1] == 1 else _even(rows)
 
 
-def _closures(loops: Sequence[LoopClosure], index: dict[str, int], tips: dict[str, Floats]) -> Closures:
+def _closures(loops: Sequence[LoopClosure], index: dict[str, int], tips: dict[str, list[float]]) -> Closures:
     ends = [loop.points_m or [tips[name] for name in loop.links] for loop in loops]
-    points = np.array(ends, dtype=np.float64).reshape(len(loops), 2, 3)
+    points = stack_numbers(ends) if ends else np.zeros((0, 2, 3))
     return Closures(
         names=tuple(loop.name for loop in loops),
         a=np.array([index[loop.links[0]] for loop in loops], dtype=np.int64),
         b=np.array([index[loop.links[1]] for loop in loops], dtype=np.int64),
-        point_a=points[:, 0],
-        point_b=points[:, 1],
+        point_a=points[..., 0, :],
+        point_b=points[..., 1, :],
     )
 
 
@@ -222,8 +229,8 @@ def _drives(section: MechanismSection, index: dict[str, int]) -> Drives:
         torque_limit=column("torque_limit_Nm", math.inf),
         encoder_counts=column("encoder_counts_per_rev", math.nan),
         continuous_torque=column("continuous_torque_Nm", math.nan),
-        winding_damping=np.array([damping for damping, _ in windings]),
-        winding_time_constant=np.array([lag for _, lag in windings]),
+        winding_damping=stack_numbers([damping for damping, _ in windings]),
+        winding_time_constant=stack_numbers([lag for _, lag in windings]),
         nonlinearity=build_nonlinear.drive_nonlinearity(drives, section.friction),
     )
 
@@ -250,4 +257,4 @@ def _parents_first(links: Sequence[LinkSection]) -> list[LinkSection]:
 
 
 def _even(matrix: Floats) -> Floats:
-    return 0.5 * matrix + 0.5 * matrix.T
+    return 0.5 * matrix + 0.5 * np.swapaxes(matrix, -1, -2)

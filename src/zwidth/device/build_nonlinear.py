@@ -13,6 +13,7 @@ from zwidth.device.schema.friction import DriveFrictionSection, FrictionSection
 from zwidth.device.schema.loop import EncoderSection
 from zwidth.device.schema.mechanism import DriveSection
 from zwidth.device.schema.plant import PlantSection
+from zwidth.model.design_axes import stack_numbers
 from zwidth.model.mechanism import DriveNonlinearity, Floats
 from zwidth.model.nonlinear import Brake, Counter, Friction, Nonlinear, Spring
 from zwidth.model.plant import Plant
@@ -120,9 +121,9 @@ def drive_nonlinearity(drives: Sequence[DriveSection], friction: DriveFrictionSe
 
 
 def per_drive(drives: Sequence[DriveSection], key: str, omitted: float) -> Floats:
-    """One number of every drive, (d,)."""
+    """One number of every drive, (..., d)."""
     values: list[Any] = [getattr(drive, key) for drive in drives]
-    return np.array([omitted if value is None else value for value in values], dtype=np.float64)
+    return stack_numbers([omitted if value is None else value for value in values])
 
 
 def _or(value: float | None, omitted: float) -> float:

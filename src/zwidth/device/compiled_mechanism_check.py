@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import OK, Posture, solve_posture
@@ -18,12 +19,13 @@ def assembles(mechanism: Mechanism, assembly: str | None) -> bool:
         posture = solve_posture(mechanism, mechanism.reference_position, assembly)
     except ValueError:
         return False
-    return moves_mass(posture)
+    return bool(masses_moved(posture).all())
 
 
-def moves_mass(posture: Posture) -> bool:
-    """Whether every motion has a mass in each posture."""
-    M = posture.mass_matrix[posture.status == OK]
+def masses_moved(posture: Posture) -> NDArray[np.bool_]:
+    """Marks (...) of the postures in which every motion has a mass, and of those that are not OK."""
+    known = posture.status == OK
+    M = np.where(known[..., None, None], posture.mass_matrix, np.eye(posture.mass_matrix.shape[-1]))
     eigenvalues = np.linalg.eigvalsh(M)
     least = M.shape[-1] * np.finfo(float).eps * eigenvalues[..., -1]
-    return bool((eigenvalues[..., 0] > least).all())
+    return np.asarray(eigenvalues[..., 0] > least)

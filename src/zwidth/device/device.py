@@ -265,7 +265,7 @@ class Device:
             from zwidth.model.posture import joint_position
 
             angles = joint_angles(self.label, mechanism, position)
-            with self._solving(assembly) as name:
+            with self.solving(assembly) as name:
                 return joint_position(mechanism, angles, name)
         return positions(self.label, position, float(self.reference_position[2]))
 
@@ -299,11 +299,11 @@ class Device:
             return position
         mechanism, goal = self._mechanism(), self.position(position, assembly)
         single = goal.ndim == 1 and not mechanism.design_shape
-        with self._solving(assembly) as name:
+        with self.solving(assembly) as name:
             return solve_posture(mechanism, goal, name, tolerance=PROJECTION_TOLERANCE if single else 0.0)
 
     @contextmanager
-    def _solving(self, assembly: str | None) -> Iterator[str | None]:
+    def solving(self, assembly: str | None) -> Iterator[str | None]:
         """The name of the assembly, and what goes wrong in it as faults of the file where it is one."""
         mechanism = self._mechanism(assembly=assembly)
         if assembly is not None and assembly not in mechanism.assemblies:

@@ -91,6 +91,20 @@ def from_document(
     compiled             True: ask compiled code first, which takes a tenth of the time and half a second to load
     Raises DeviceError  with all faults found
     """
+    checked, document = check(document, label)
+    device = build_device(checked, document, label)
+    if device.mechanism is not None and checked.mechanism is not None and not skip_assembly_check:
+        assembled = compiled and _assembled(device)
+        faults = list(mechanism_check.mechanism_faults(device.mechanism, checked.mechanism, assembled=assembled))
+        if faults:
+            raise DeviceError(in_order(faults, document, label))
+    return device
+
+
+def check(document: dict[str, Any], label: str) -> tuple[DeviceFile, dict[str, Any]]:
+    """The checked sections of a document, and the document without its format's version; whether its mechanism can
+    be put together is not looked at. Raises DeviceError with all faults found.
+    """
     if not isinstance(document, dict):
         hint = f"write load({document!r})" if isinstance(document, str) else ""
         raise wrong_type("document", "a dictionary", document, hint)
@@ -109,13 +123,7 @@ def from_document(
     faults += inconsistencies(cleaned, document)
     if faults or checked is None:
         raise DeviceError(in_order(faults, document, label))
-    device = _device(checked, without_version(document), label)
-    if device.mechanism is not None and checked.mechanism is not None and not skip_assembly_check:
-        assembled = compiled and _assembled(device)
-        faults += mechanism_check.mechanism_faults(device.mechanism, checked.mechanism, assembled=assembled)
-    if faults:
-        raise DeviceError(in_order(faults, document, label))
-    return device
+    return checked, without_version(document)
 
 
 def _assembled(device: Device) -> bool:
@@ -125,7 +133,8 @@ def _assembled(device: Device) -> bool:
     return assembles(device.mechanism, device.reference_assembly)
 
 
-def _device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device:
+def build_device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device:
+    """The device of checked sections; their numbers may be arrays over designs (`design_batch`)."""
     section, controller = checked.mechanism, build.controller(checked.loop)
     reference = section.reference if section else None
     return Device(

@@ -50,7 +50,17 @@ def lag_fault(place: KeyPath, tau: Any, T: float) -> KeyMessages:
 
 def _no_lag(tau: float, T: float) -> bool:
     """Whether a time constant is too short or too long for the sampling period, or for any device."""
-    return (0 < tau < SHORTEST_LAG * T) or (tau > LONGEST_LAG * T and math.isfinite(tau))
+    return bool(lags_wrongly(tau, T)) and math.isfinite(tau)
+
+
+def lags_wrongly(tau: Any, T: Any) -> Any:
+    """Whether time constants [s] are neither 0 nor within the bounds for sampling periods [s], elementwise."""
+    return ((tau > 0) & (tau < SHORTEST_LAG * T)) | (tau > LONGEST_LAG * T)
+
+
+def reaches_nyquist(cutoff_Hz: Any, T: Any) -> Any:
+    """Whether cutoffs are not below half the sampling frequency of sampling periods [s], elementwise."""
+    return cutoff_Hz * T >= 0.5
 
 
 def _lags(T: float) -> str:
@@ -77,7 +87,7 @@ def _delay(loop: dict[str, Any], T: float) -> KeyMessages:
 
 def _cutoff(place: KeyPath, low_pass: dict[str, Any], T: float) -> KeyMessages:
     cutoff = low_pass.get("cutoff_Hz")
-    if is_number(cutoff) and math.isfinite(cutoff) and cutoff * T >= 0.5:
+    if is_number(cutoff) and math.isfinite(cutoff) and reaches_nyquist(cutoff, T):
         yield (
             ("loop", *place, "cutoff_Hz"),
             f"must be below half the sampling frequency, {0.5 / T:.10g} Hz, got {cutoff:.10g}; "

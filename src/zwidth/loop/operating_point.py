@@ -19,6 +19,7 @@ from zwidth.loop.multi_loop import MultiLoop
 from zwidth.loop.point_errors import NoMechanismError, OperatingPointError, check_several_directions
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.damping import Damping, GivenDamping
+from zwidth.model.design_axes import change_designs, design_shape
 from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters
 from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.multi_plant import MultiPlant, reduce_directions
@@ -52,6 +53,8 @@ if TYPE_CHECKING:
 # Where the handle is: x, y or x, y, z [m], or the angle of every driven joint by the name of its link [rad].
 Position: TypeAlias = Sequence[float] | Mapping[str, float]
 
+_OF_DESIGNS: Final = ("mechanism", "given_plant", "controller", "damping", "operator")
+
 # Share of the arm's length within which a single position is projected onto the nearest that the handle has.
 PROJECTION_TOLERANCE: Final = 0.01
 
@@ -61,7 +64,9 @@ class OperatingPoint:
     """A device in one posture or in many, rendering one direction or several at once in each, and its operator.
 
     Exactly one of mechanism, given_plant and response is given. A mechanism comes with postures and directions,
-    whose leading axes broadcast to `shape`; a given plant and a response have one posture, of shape ().
+    whose leading axes are `shape`; a given plant and a response have one posture, of shape (). Numbers of
+    mechanism, plant, controller, damping and operator may have axes of designs (`model.design_axes`), which
+    broadcast to `shape`, too.
 
     controller          the computer that closes the loop
     mechanism           links, joints, loops and drives
@@ -114,6 +119,8 @@ class OperatingPoint:
 
     def __repr__(self) -> str:
         held = f", held by {self.operator_name or 'an operator'}" if self.operator is not None else ""
+        if self.differing:
+            return f"OperatingPoint of {self.name or 'a device'}: designs and postures of shape {self.shape}{held}"
         computer = (
             f"sampled every {self.controller.sampling_period:g} s, {self.controller.delay:g} samples of delay"
         )
@@ -131,15 +138,23 @@ class OperatingPoint:
 
     # --- which postures and directions ----------------------------------------------------------------
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """Shape of the leading axes of all arrays; () for a single posture with its directions."""
-        return () if self.posture is None else self.posture.status.shape
+        if self.posture is not None:
+            return self.posture.status.shape
+        return np.broadcast_shapes(*(design_shape(getattr(self, name)) for name in _OF_DESIGNS))
+
+    @cached_property
+    def differing(self) -> tuple[str, ...]:
+        """Which of mechanism, given_plant, controller, damping and operator have numbers that differ from point to
+        point, as those of several designs do."""
+        return tuple(name for name in _OF_DESIGNS if design_shape(getattr(self, name)))
 
     @property
     def status(self) -> NDArray[np.uint8]:
         """(...) OK, OUT_OF_REACH or SINGULAR (model.posture)."""
-        return np.array(OK, dtype=np.uint8) if self.posture is None else self.posture.status
+        return np.full(self.shape, OK, dtype=np.uint8) if self.posture is None else self.posture.status
 
     @property
     def direction_count(self) -> int:
@@ -159,19 +174,26 @@ class OperatingPoint:
         return np.asarray(self.directions[..., 0, :])
 
     def __getitem__(self, index: Any) -> OperatingPoint:
-        """One of the points, of shape (), or several, by leading axes; a device without a mechanism has one."""
-        return self if self.posture is None else self._change_axes(lambda array: array[index])
+        """One of the points, of shape (), or several, by leading axes; a single device without a mechanism is its
+        only one."""
+        return self if self.posture is None and not self.shape else self._change_axes(lambda array: array[index])
 
     @property
     def flat(self) -> OperatingPoint:
         """All points along one leading axis. Raises NoMechanismError for a device without a mechanism."""
-        axes = self._posture.status.ndim
+        if not self.differing:
+            self._posture  # noqa: B018  raises for a device without a mechanism
+        axes = len(self.shape)
         return self._change_axes(lambda array: array.reshape(-1, *array.shape[axes:]))
 
     def _change_axes(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> OperatingPoint:
         """The points with `change`, which changes the leading axes of an array, applied to all their arrays."""
-        assert self.directions is not None
-        return replace(self, posture=self._posture.with_axes(change), directions=change(self.directions))
+        parts: dict[str, Any] = {
+            name: change_designs(getattr(self, name), change, self.shape) for name in self.differing
+        }
+        if self.posture is not None and self.directions is not None:
+            parts |= {"posture": self.posture.with_axes(change), "directions": change(self.directions)}
+        return replace(self, **parts)
 
     def towards(self, direction: Floats) -> OperatingPoint:
         """The same postures rendering another direction, unit vectors (..., 3)."""

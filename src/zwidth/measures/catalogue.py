@@ -27,7 +27,11 @@ def _measure(
 ) -> Measure:
     linear = file not in _OF_THE_MECHANISM
     function = f"{_BINDINGS}.{file}:{name}"
-    return Measure(name, title, unit, better, source, function, each, along, linear, of_wall=file == _WALL_FILE)
+    of_designs = file in (*_OF_THE_MECHANISM, "impedance") and not each
+    wall = file == _WALL_FILE
+    return Measure(
+        name, title, unit, better, source, function, each, along, linear, of_wall=wall, of_designs=of_designs
+    )
 
 
 _YOSHIKAWA = "Yoshikawa 1985"

@@ -172,6 +172,7 @@ class Measure:
     linear    whether it is computed from the linear loop, without friction, encoder steps and limits
     of_wall   whether it is about a wanted wall, which its function takes as a second argument
     wall      the wanted wall
+    of_designs  whether it also takes points whose mechanism, plant or computer differ, all at once
     """
 
     name: str
@@ -185,6 +186,7 @@ class Measure:
     linear: bool = True
     of_wall: bool = False
     wall: WantedWall = WantedWall()
+    of_designs: bool = False
 
     @property
     def key(self) -> str:

@@ -48,7 +48,7 @@ def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
     """
     require("measure", measure, Measure)
     require("point", point, OperatingPoint)
-    if measure.each:
+    if not measured_together(measure, point):
         return evaluate_pointwise(measure.compute, point)
     try:
         result = measure.compute(point)
@@ -68,6 +68,13 @@ def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
     if values.dtype.kind not in NUMBERS:
         return _same_status(point, FAILED, f"returned {values.dtype} instead of numbers")
     return with_status(point, values.astype(np.float64))
+
+
+def measured_together(measure: Measure, point: OperatingPoint) -> bool:
+    """Whether a measure is computed for all points at once, and not for one after the other."""
+    if measure.each or not point.differing:
+        return not measure.each
+    return measure.of_designs and (measure.linear or point.mechanism is not None)
 
 
 def measure_at(

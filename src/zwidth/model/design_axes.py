@@ -7,7 +7,8 @@ What has no axes of designs is the same for all of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Annotated, Any, TypeAlias, TypeVar, get_args, get_type_hints
 
@@ -101,17 +102,21 @@ def stack_numbers(nested: Any) -> Floats:
     >>> stack_numbers([[1.0, np.array([2.0, 3.0])]]).tolist()
     [[[1.0, 2.0]], [[1.0, 3.0]]]
     """
-    if not isinstance(nested, list | tuple):
-        return np.asarray(nested, dtype=np.float64)
-    parts = [stack_numbers(one) for one in nested]
-    depth = _depth(nested) - 1
-    designs = np.broadcast_shapes(*(part.shape[: part.ndim - depth] for part in parts))
-    parts = [np.broadcast_to(part, (*designs, *part.shape[part.ndim - depth :])) for part in parts]
-    return np.stack(parts, axis=len(designs)) if parts else np.zeros(0)
+    depth, first = 0, nested
+    while isinstance(first, list | tuple) and first:
+        depth, first = depth + 1, first[0]
+    with suppress(ValueError):  # of arrays among numbers
+        plain = np.array(nested, dtype=np.float64)
+        if not depth or plain.ndim == depth:
+            return plain
+    return join_designs([stack_numbers(one) for one in nested], depth - 1)
 
 
-def _depth(nested: Any) -> int:
-    return 1 + max(map(_depth, nested), default=0) if isinstance(nested, list | tuple) else 0
+def join_designs(arrays: Sequence[Floats], own: int) -> Floats:
+    """Arrays (..., own axes) as one, with a new axis between the axes of designs and the own ones."""
+    designs = np.broadcast_shapes(*(array.shape[: array.ndim - own] for array in arrays))
+    full = [np.broadcast_to(array, (*designs, *array.shape[array.ndim - own :])) for array in arrays]
+    return np.stack(full, axis=len(designs))
 
 
 def _stated(hint: Any) -> int | None:

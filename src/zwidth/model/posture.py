@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -18,7 +18,7 @@ from zwidth.model.handle_position import arm_length, nearest_position, position_
 from zwidth.model.mechanism import Floats, Ints, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, design_of_each, pack, per_design
 from zwidth.model.mobility import check_mobility
-from zwidth.model.posture_batch import failed_batch, solve_batch
+from zwidth.model.posture_batch import PostureBatch, failed_batch, solve_batch, solve_from_starts
 from zwidth.model.roadmap import roadmap
 
 __all__ = [
@@ -34,6 +34,7 @@ __all__ = [
     "handle_motions",
     "handle_range",
     "inertia_terms",
+    "join_postures",
     "joint_position",
     "link_points",
     "reachable_positions",
@@ -115,7 +116,12 @@ class LinkPoints:
 
 
 def solve_posture(
-    mechanism: Mechanism, position: ArrayLike, assembly: str | None = None, *, tolerance: float = 0.0
+    mechanism: Mechanism,
+    position: ArrayLike,
+    assembly: str | None = None,
+    *,
+    tolerance: float = 0.0,
+    straight: bool = False,
 ) -> Posture:
     """The posture with the handle at a position, in a named assembly (None: the first).
 
@@ -127,6 +133,8 @@ def solve_posture(
     position  (..., 3), or (..., 2) in the plane of the reference position [m]; it broadcasts with the leading
               axes of the mechanism's numbers
     tolerance how far a position may be projected, as a share of the arm's length from base to handle
+    straight  True: take only the straight way from the reference, and leave a posture that lies on no such way
+              OUT_OF_REACH; each posture then hangs on its own design alone, and takes a microsecond
     Returns   Posture; in a batch a position that cannot be had is marked by its status
     Raises    OutOfReach, Singular  where a single posture is requested and does not exist; an assembly may be
                           singular throughout
@@ -145,6 +153,11 @@ def solve_posture(
     reference, gaps = _references(mechanism, mech, name)
     if not designs:
         _check_loops(mechanism, mech, name, gaps[0])
+    if straight:
+        solved = solve_from_starts(mech, design, reference, design, goals)
+        unclosed = gaps.max(axis=1, initial=0.0) > ASSEMBLY_TOLERANCE * mech.size
+        solved.overwrite(unclosed[design], failed_batch(mech, 1, OUT_OF_REACH))
+        return _posture(name, mech, goals, solved, np.where(solved.status == OK, 0.0, np.nan), shape)
     closed = np.flatnonzero(gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size)
     uncontrolled = check_mobility(mechanism, mech, int(closed[0]), reference[closed[0]]) if len(closed) else None
     if uncontrolled and not shape:
@@ -159,8 +172,22 @@ def solve_posture(
             continue
         solved.overwrite(np.array([i]), solve_batch(mech, design[i : i + 1], reference, near[None]))
         goals[i], projected[i] = near, np.linalg.norm(near - goals[i])
+    posture = _posture(name, mech, goals, solved, projected, shape)
+    if not shape:
+        _check_single(posture, mechanism.reference_position, near)
+    return posture
+
+
+def _posture(
+    name: str,
+    mech: MechanismArrays,
+    goals: Floats,
+    solved: PostureBatch,
+    projected: Floats,
+    shape: tuple[int, ...],
+) -> Posture:
     n, d = mech.parent.size, mech.driven
-    posture = Posture(
+    return Posture(
         assembly=name,
         position=goals.reshape(*shape, 3),
         status=solved.status.reshape(shape),
@@ -170,9 +197,16 @@ def solve_posture(
         closure_residual=solved.residual.reshape(shape),
         projected=projected.reshape(shape),
     )
-    if not shape:
-        _check_single(posture, mechanism.reference_position, near)
-    return posture
+
+
+def join_postures(postures: Sequence[Posture]) -> Posture:
+    """Postures of several designs, all of one shape (...), as one of shape (P, ...)."""
+    arrays = {
+        one.name: np.stack([getattr(posture, one.name) for posture in postures])
+        for one in fields(Posture)
+        if one.name != "assembly"
+    }
+    return Posture(postures[0].assembly, **arrays)
 
 
 def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Floats:

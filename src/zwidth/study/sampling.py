@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import exp, log, prod
@@ -131,6 +131,22 @@ class Sampling:
             return tuple(axis.at(share) for axis, share in zip(self.axes, self._shares[design], strict=True))
         places = np.unravel_index(design, self.shape)
         return tuple(axis.values[int(place)] for axis, place in zip(self.axes, places, strict=True))
+
+    def columns(self, first: int, last: int) -> list[tuple[Axis, Sequence[Any], NDArray[np.int64]]]:
+        """Of designs first to last - 1: each axis, values along it, and at which of them each design is.
+
+        >>> Sampling((Axis("a", (1, 2)), Axis("b", ("x", "y", "z")))).columns(2, 5)[0][1:]
+        ((1, 2), array([0, 1, 1]))
+        """
+        designs = np.arange(first, last)
+        if self.size is None:
+            places = np.unravel_index(designs, self.shape) if self.axes else ()
+            return [(axis, axis.values, place) for axis, place in zip(self.axes, places, strict=True)]
+        own = designs - first
+        shares = self._shares[first:last].T
+        return [
+            (axis, [axis.at(share) for share in each], own) for axis, each in zip(self.axes, shares, strict=True)
+        ]
 
     @cached_property
     def _shares(self) -> NDArray[np.float64]:

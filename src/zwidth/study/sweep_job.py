@@ -1,40 +1,43 @@
-"""The designs of a study as a job, computed one by one.
+"""The designs of a study as a job.
 
-Each design is the device file with a few numbers changed, checked and built like any other. One that has
-faults, or does not reach the handle position, has a status instead of values; the other designs are not affected.
+Each design is the device file with a few numbers changed, checked and built like any other: together with others
+where that gives its values (`design_groups`), else alone. One that has faults, or does not reach the handle
+position, has a status instead of values; the other designs are not affected.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
 from zwidth.device import address
-from zwidth.device.compiled_mechanism_check import moves_mass
+from zwidth.device.compiled_mechanism_check import masses_moved
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, plural
 from zwidth.device.load import from_document
-from zwidth.device.operator_choice import with_operator
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import (
     FAILED,
+    MISSING,
     NO_VALUE,
     OK,
     OUT_OF_REACH,
     SINGULAR,
     Measure,
     MeasureError,
+    MeasureValues,
     Note,
     Spelling,
     WantedWall,
 )
-from zwidth.measures.evaluate import evaluate, evaluate_safely
+from zwidth.measures.evaluate import evaluate, evaluate_safely, measured_together
 from zwidth.model.posture import OutOfReach, PostureError, Singular
 from zwidth.study.column import Column
+from zwidth.study.design_groups import DesignGroup, DesignGrouping
 from zwidth.study.job import CellValues
 from zwidth.study.journal import fingerprint
 from zwidth.study.sampling import CIRCUMSTANCES, Sampling, settings
@@ -44,6 +47,8 @@ from zwidth.study.workspace_summary import areas
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+MOST_CELLS: Final = 65536  # designs, or positions of their workspaces, that are in memory at once
+Found: TypeAlias = tuple[float, int, str]  # value, status and reason
 WALL: Final = ("stiffness", "damping", "frequency")  # of the wanted wall, as arguments
 
 
@@ -110,32 +115,109 @@ class SweepJob:
         )
 
     def compute(self, first: int, last: int) -> CellValues:
-        """Designs first to last - 1."""
+        """Designs first to last - 1: together; alone where a design has no value together, or has to say why."""
         shape = last - first, len(self.columns)
-        values, status = np.full(shape, np.nan), np.empty(shape, dtype=np.uint8)
-        designs_by_reason: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]
-        for row in range(last - first):
-            for column, (value, cell_status, reason) in enumerate(self._row(first + row)):
-                values[row, column], status[row, column] = value, cell_status
-                if reason:
-                    designs_by_reason[column].setdefault((cell_status, reason), []).append(first + row)
-        notes = [tuple(Note(*key, len(at), (at[0],)) for key, at in kinds.items()) for kinds in designs_by_reason]
+        values, status = np.full(shape, np.nan), np.full(shape, MISSING, dtype=np.uint8)
+        reasons: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]
+
+        def fill(row: int, column: int, found: Found) -> None:
+            values[row, column], status[row, column], reason = found
+            if reason:
+                reasons[column].setdefault((found[1], reason), []).append(first + row)
+
+        for group in self._grouping.groups(first, last):
+            for row, column, found in self._together(group, first):
+                fill(row, column, found)
+        for row, column in np.argwhere(status == MISSING):
+            fill(row, column, self._alone(first + int(row), self.columns[column]))
+        notes = [
+            tuple(
+                Note(*key, len(at), (min(at),)) for key, at in sorted(kinds.items(), key=lambda item: min(item[1]))
+            )
+            for kinds in reasons
+        ]
         return CellValues(values, status, tuple(notes))
+
+    @cached_property
+    def _grouping(self) -> DesignGrouping:
+        return DesignGrouping(self.document, self.label, self.operators, self.sampling)
+
+    def _together(self, group: DesignGroup, first: int) -> Iterator[tuple[int, int, Found]]:
+        """Row, column and value of each design of a group that need not be asked for alone."""
+        chosen = {**self.fixed_circumstances, **group.chosen}
+        circumstances = [chosen.get(key) for key in ("direction", "assembly", "model")]
+        if isinstance(chosen.get("at"), Mapping):  # joint angles are solved for one design at a time
+            return
+        for over_workspace in (False, True):
+            columns = [n for n, one in enumerate(self.columns) if (one.statistic is not None) == over_workspace]
+            cells = self.positions[..., 0].size if over_workspace and self.positions is not None else 1
+            size = max(1, MOST_CELLS // cells)
+            for start in range(0, len(group.rows) if columns else 0, size):
+                piece = slice(start, start + size)
+                at = chosen.get("at") if group.positions is None else group.positions[piece]
+                try:
+                    point, alone = group.batch[piece].at(self.positions if over_workspace else at, *circumstances)
+                except (PostureError, DeviceError, ValueError):
+                    continue  # each design alone says why
+                kept = np.flatnonzero(group.valid[piece] & ~alone)
+                if not len(kept):
+                    continue
+                rows, same = group.rows[piece][kept], not group.batch.differs
+                same = same and (over_workspace or group.positions is None)
+                point = point if same else point[kept]
+                for column in columns:
+                    found = self._measured(self.columns[column], point, first + rows, same)
+                    for row, one in zip(rows, found, strict=True):
+                        if one is not None:
+                            yield int(row), column, one
+
+    def _measured(
+        self, one: Column, point: OperatingPoint, designs: NDArray[np.int64], same: bool
+    ) -> Iterator[Found | None]:
+        """Value, status and reason of a column for each of several designs; None for one to be asked for alone.
+
+        point  of all designs along its first axis; `same`: one for all
+        """
+        measure = one.measure
+        if same and not measure.of_wall:
+            yield from [_column_value(one, measure, point, self.weights)] * len(designs)
+            return
+        if measure.of_wall or not measured_together(measure, point):
+            for place, number in enumerate(designs):
+                wanted = measure.at_wall(self.design(int(number)).wall)
+                yield _column_value(one, wanted, point if same else point[place], self.weights)
+            return
+        try:
+            result = evaluate(measure, point)
+        except MeasureError as error:
+            yield from [(np.nan, NO_VALUE, error.spelled(as_key))] * len(designs)
+            return
+        reasons: dict[int, list[str]] = {}
+        for note in result.notes:
+            reasons.setdefault(note.status, []).append(note.reason)
+        for place in range(len(designs)):
+            values, status = result.values[place], result.status[place]
+            if one.statistic is None:
+                found = float(values), int(status), ""
+            else:
+                found = one.reduce(MeasureValues(values, status), point[place], self.weights)
+            known = reasons.get(found[1], [])
+            yield None if len(known) > 1 else (*found[:2], found[2] or "".join(known))
 
     def design(self, number: int) -> Design:
         """One of the designs, by its number from 0."""
         return Design(self, number)
 
-    def _row(self, number: int) -> Iterator[tuple[float, int, str]]:
-        """Value, status and reason of each column."""
-        design = self.design(number)
-        for one in self.columns:
-            try:
-                point = design.point() if one.statistic is None else design.workspace()
-            except _NoPoint as none:
-                yield np.nan, none.status, none.reason
-                continue
-            yield _column_value(one, one.measure.at_wall(design.wall), point, self.weights)
+    def _alone(self, number: int, one: Column) -> Found:
+        """Value, status and reason of a column for a single design."""
+        if self._cache.get("design", (None, None))[0] != number:
+            self._cache["design"] = number, self.design(number)
+        design = self._cache["design"][1]
+        try:
+            point = design.point() if one.statistic is None else design.workspace()
+        except _NoPoint as none:
+            return np.nan, none.status, none.reason
+        return _column_value(one, one.measure.at_wall(design.wall), point, self.weights)
 
     @cached_property
     def _in_mechanism(self) -> frozenset[str]:
@@ -153,10 +235,7 @@ class SweepJob:
         own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
         key = (chosen.get("operator"), own)
         if self._cache.get("key") != key:
-            document = self.document
-            if "operator" in chosen:
-                document = with_operator(document, self.operators[chosen["operator"]])
-            document = address.assign_all(document, own)
+            document = self._grouping.design_document(chosen)
             # whether it can be put together shows where its posture is solved, which takes a tenth of the time
             self._cache.update(key=key, device=from_document(document, self.label, skip_assembly_check=True))
         return self._cache["device"]  # type: ignore[no-any-return]
@@ -208,7 +287,7 @@ class Design:
                 model=self._circumstance("model"),
             )
             if known[0] != same:
-                if point.posture is not None and not moves_mass(point.posture):
+                if point.posture is not None and not masses_moved(point.posture).all():
                     from_document(device.document, device.label)  # says what is wrong
                 self.job._cache[name] = same, point.posture
         except OutOfReach as error:

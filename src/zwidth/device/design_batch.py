@@ -1,0 +1,278 @@
+"""Many designs of one device together: numbers of its file as arrays, from the file's keys to operating points.
+
+What takes arrays is listed (`ARRAYS`). Other keys, and a number that is 0 or infinite in some designs, may change
+what a device consists of: designs that differ there are built apart. All designs are checked at once
+(`design_checks`); one that is not certain to be valid is built alone, and there gets its reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.compiled_mechanism_check import masses_moved
+from zwidth.device.design_checks import Marks, certainly_valid
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError, KeyPath
+from zwidth.device.load import build_device, check
+from zwidth.device.schema.value_types import Section
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.design_axes import change_designs, design_shape
+from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.posture import OK, Posture, PostureError, join_postures, solve_posture
+from zwidth.model.reduction import Model
+
+_DRIVE: Final = [
+    "motor_inertia_kg_m2",
+    "transmission_ratio",
+    "stiffness_Nm_per_rad",
+    "damping_Nms_per_rad",
+    "torque_constant_Nm_per_A",
+    "winding_resistance_ohm",
+    "winding_inductance_H",
+    "damping_resistance_ohm",
+    "torque_limit_Nm",
+    "continuous_torque_Nm",
+    "encoder_counts_per_rev",
+    "encoder_noise_rad",
+]
+_LINK: Final = ["origin_m", "orientation_rad", "axis", "length_m", "mass_kg", "center_of_mass_m", "inertia_kg_m2"]
+_FILTER: Final = ("time_constant_s", "cutoff_Hz")
+_PLANT: Final = ["mass_kg", "damping_Ns_per_m", "stiffness_N_per_m", "actuator", "sensor", "handle"]
+_OPERATOR: Final = [
+    "arm_mass_kg",
+    "arm_stiffness_N_per_m",
+    "arm_damping_Ns_per_m",
+    "grasp_stiffness_N_per_m",
+    "grasp_damping_Ns_per_m",
+]
+ARRAYS: Final[tuple[KeyPath, ...]] = (
+    *(("mechanism", "links", "*", key) for key in _LINK),
+    *(("mechanism", "drives", "*", key) for key in _DRIVE),
+    ("mechanism", "loops", "*", "points_m"),
+    ("mechanism", "handle", "point_m"),
+    ("mechanism", "assemblies", "*", "joints_rad"),
+    ("mechanism", "reference", "position_m"),
+    *(
+        ("mechanism", "damping", key)
+        for key in ("mode_ratio", "mass_coefficient_1_per_s", "stiffness_coefficient_s")
+    ),
+    *(("loop", key) for key in ("sampling_period_s", "delay_samples", "delay_s")),
+    *(("loop", path, "filter", key) for path in ("velocity", "force") for key in _FILTER),
+    ("loop", "actuator", "time_constant_s"),
+    *(("plant", key) for key in _PLANT),
+    *(("operator", key) for key in _OPERATOR),
+)
+"""Keys, with * for an element, whose numbers (or the numbers in whose lists) may be arrays over designs."""
+
+
+def takes_arrays(steps: KeyPath) -> bool:
+    """Whether the number, or the list of numbers, at a resolved path may be an array over designs."""
+    return any(
+        len(steps) >= len(pattern) and all(p in ("*", s) for p, s in zip(pattern, steps, strict=False))
+        for pattern in ARRAYS
+    )
+
+
+def kind_of(steps: KeyPath, value: Any) -> Any:
+    """What must be alike in designs that are built together: whether a number is 0 or infinite, or else the value.
+
+    >>> kind_of(("loop", "delay_samples"), 0.5), kind_of(("loop", "delay_samples"), 0.0)
+    ('number', 0.0)
+    """
+    if not takes_arrays(steps):
+        return repr(value)
+    if isinstance(value, list | tuple):
+        return tuple(kind_of(steps, inner) for inner in value)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return (
+        "number" if number and np.isfinite(value) and value != 0 else repr(value) if not number else float(value)
+    )
+
+
+_PARTS: Final = ("mechanism", "given_plant", "controller", "damping", "operator")  # of a device, that hold numbers
+
+
+@dataclass(frozen=True)
+class DesignBatch:
+    """P designs that consist of the same parts.
+
+    device  one of them, of which everything but the numbers that differ is taken
+    parts   the device with all numbers, arrays (P, ...) where they differ
+    count   P
+    """
+
+    device: Device
+    parts: Device
+    count: int
+
+    @property
+    def differs(self) -> bool:
+        """Whether any number differs."""
+        return any(design_shape(getattr(self.parts, name)) for name in _PARTS)
+
+    def __getitem__(self, piece: slice) -> DesignBatch:
+        """Some of the designs."""
+        count = len(range(*piece.indices(self.count)))
+        if count == self.count:
+            return self
+        parts: dict[str, Any] = {
+            name: change_designs(getattr(self.parts, name), lambda array: array[piece], (self.count,))
+            for name in _PARTS
+        }
+        return DesignBatch(self.device, replace(self.parts, **parts), count)
+
+    def at(
+        self,
+        position: Floats | None = None,
+        direction: Any = None,
+        assembly: str | None = None,
+        model: str | None = None,
+    ) -> tuple[OperatingPoint, Marks]:
+        """The designs with their handles at a position each, or all over a workspace.
+
+        position   (P, 2) or (P, 3), or (..., 2) or (..., 3) of a workspace that has two axes or more; None: the
+                   reference of each design
+        Returns    OperatingPoint of shape (P,) or (P, ...), without P where nothing differs; and marks (P,) of the
+                   designs to be asked for alone: there may be a way round to the position, or a reason why not
+        Raises     what `Device.at` raises, of what is the same for all designs
+        """
+        parts, none = self.parts, np.zeros(self.count, dtype=bool)
+        axes = 0 if position is None else np.ndim(position) - 1
+        if self.device.mechanism is None or not (design_shape(parts.mechanism) or axes == 1):
+            point = self.device.at(position, direction, assembly=assembly, model=model)
+            if point.posture is not None and not masses_moved(point.posture).all():
+                return point, ~none
+            return self._with_parts(point, len(point.shape)), none
+        if axes > 1:
+            return self._over_workspace(np.asarray(position), direction, assembly, model)
+        mechanism = cast(Mechanism, parts.mechanism)
+        with self.device.solving(assembly) as name:
+            goals = mechanism.reference_position if position is None else self.device.position(position)
+            posture = solve_posture(mechanism, np.broadcast_to(goals, (self.count, 3)), name, straight=True)
+        alone = (posture.status != OK) | ~masses_moved(posture)
+        return self._with_posture(posture, direction, model), alone
+
+    def _over_workspace(
+        self, position: Floats, direction: Any, assembly: str | None, model: str | None
+    ) -> tuple[OperatingPoint, Marks]:
+        """Each design by its own roadmap of postures."""
+        mechanism, alone = cast(Mechanism, self.parts.mechanism), np.zeros(self.count, dtype=bool)
+        postures: list[Posture | None] = []
+        for p in range(self.count):
+            own = change_designs(mechanism, lambda array: array[p], (self.count,))  # noqa: B023
+            try:
+                with self.device.solving(assembly) as name:
+                    postures.append(solve_posture(own, self.device.position(position), name))
+            except (PostureError, DeviceError):
+                postures.append(None)
+                alone[p] = True
+                continue
+            alone[p] = not masses_moved(cast(Posture, postures[p])).all()
+        solved = next((one for one in postures if one is not None), None)
+        if solved is None:
+            return self.device.at(model=model), alone
+        return self._with_posture(join_postures([one or solved for one in postures]), direction, model), alone
+
+    def _with_posture(self, posture: Posture, direction: Any, model: str | None) -> OperatingPoint:
+        shape = posture.status.shape
+        rendered = np.broadcast_to(self.device.direction(direction), (*shape, 3))
+        point = OperatingPoint(
+            controller=self.device.controller,
+            mechanism=self.device.mechanism,
+            posture=posture,
+            directions=rendered[..., None, :],
+            model=cast(Model, model or "full"),
+            damping=self.device.damping,
+            encoders=self.device.encoders,
+            operator=self.device.operator,
+            operator_name=self.device.operator_name,
+            friction_known=self.device.friction_known,
+            resolution_known=self.device.resolution_known,
+            name=self.device.name,
+        )
+        return self._with_parts(point, len(shape) - 1)
+
+    def _with_parts(self, point: OperatingPoint, axes: int) -> OperatingPoint:
+        """A point with the numbers of all designs; it has `axes` axes of a workspace."""
+
+        def beside(array: NDArray[Any]) -> NDArray[Any]:
+            return array.reshape(self.count, *(1,) * axes, *array.shape[1:])
+
+        parts: dict[str, Any] = {
+            name: change_designs(getattr(self.parts, name), beside, (self.count,)) for name in _PARTS
+        }
+        posture, directions = point.posture, point.directions
+        if posture is None or directions is None or posture.status.ndim > axes:
+            return replace(point, **parts)
+        if not any(design_shape(part) for part in parts.values()):
+            return point
+        shape = (self.count, *point.shape)
+        spread = np.broadcast_to(directions, (*shape, *directions.shape[-2:]))
+        return replace(point, posture=posture.broadcast_to(shape), directions=spread, **parts)
+
+
+def design_batch(
+    document: dict[str, Any], columns: Mapping[KeyPath, NDArray[np.float64]], count: int, label: str
+) -> tuple[DesignBatch, Marks]:
+    """Designs built together, and marks (P,) of those that are certain to be valid; the rest is to be built alone.
+
+    document  of one of the designs, a valid one
+    columns   resolved path -> numbers (P, ...) of all designs, for paths that take arrays
+    Raises    DeviceError  where the document is not valid
+    """
+    checked, cleaned = check(document, label)
+    leaves = dict(leaf for steps, numbers in columns.items() for leaf in _leaves(steps, numbers))
+    valid = certainly_valid(document, leaves, count)
+    with_arrays: Any = checked
+    for steps, numbers in columns.items():
+        # what is not valid stays out of the arithmetic, too
+        first = int(np.argmax(valid))
+        used = np.where(valid.reshape(-1, *(1,) * (numbers.ndim - 1)), numbers, numbers[first])
+        with_arrays = _substitute(with_arrays, document, steps, used)
+    device = build_device(checked, cleaned, label)
+    parts = build_device(with_arrays, cleaned, label) if valid.any() else device
+    return DesignBatch(device, parts, count), valid
+
+
+def _leaves(steps: KeyPath, numbers: NDArray[np.float64]) -> Iterator[tuple[KeyPath, NDArray[np.float64]]]:
+    """Path and numbers (P,) of each number in a list."""
+    if numbers.ndim == 1:
+        yield steps, numbers
+        return
+    for i in range(numbers.shape[1]):
+        yield from _leaves((*steps, i), numbers[:, i])
+
+
+def _substitute(value: Any, raw: Any, steps: KeyPath, numbers: NDArray[np.float64]) -> Any:
+    """A checked value with arrays in place of the numbers at a path; `raw` is what the document holds there."""
+    if isinstance(value, Section):
+        key = cast(str, steps[0])
+        inner = _substitute(getattr(value, key), raw[key], steps[1:], numbers)
+        return value.model_copy(update={key: inner})
+    if isinstance(value, dict):
+        return {**value, steps[0]: _substitute(value[steps[0]], raw[steps[0]], steps[1:], numbers)}
+    if steps:
+        i = cast(int, steps[0])
+        place = (i, i) if isinstance(value[0], tuple) and not isinstance(raw[0], list) else (i,)  # three moments
+        if len(place) == 2:
+            return tuple(
+                tuple(numbers if (r, c) == place else cell for c, cell in enumerate(row))
+                for r, row in enumerate(value)
+            )
+        inner = _substitute(value[i], raw[i], steps[1:], numbers)
+        return (*value[:i], inner, *value[i + 1 :])
+    if isinstance(value, tuple) and not isinstance(raw, list):  # one number that stands for a matrix or a vector
+        return ((numbers,),) if isinstance(value[0], tuple) else (numbers,)
+    if isinstance(value, tuple) and isinstance(value[0], tuple) and numbers.ndim == 2:  # three moments
+        return tuple(tuple(numbers[:, r] if r == c else 0.0 for c in range(3)) for r in range(3))
+    return _columns(numbers)
+
+
+def _columns(numbers: NDArray[np.float64]) -> Any:
+    """Numbers (P, ...) as nested tuples of arrays (P,)."""
+    return numbers if numbers.ndim == 1 else tuple(_columns(numbers[:, i]) for i in range(numbers.shape[1]))

@@ -1,0 +1,159 @@
+"""Designs of a study that are built and measured together: those that consist of the same parts.
+
+Which designs are computed together never changes a design's result: every step looks at its own numbers alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device import address
+from zwidth.device.design_batch import DesignBatch, design_batch, kind_of, takes_arrays
+from zwidth.device.faults import DeviceError, KeyPath
+from zwidth.device.load import check
+from zwidth.device.operator_choice import with_operator
+from zwidth.study.sampling import CIRCUMSTANCES, WANTED, Sampling
+
+Rows = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class DesignGroup:
+    """Designs of the same parts.
+
+    rows         (P,)  their numbers, from the first that was asked for
+    batch        all of them
+    valid        (P,)  marks of those that are certain to be valid; the rest is to be built alone
+    positions    (P, 2) or (P, 3)  of the handle, where they differ; None: the same for all
+    chosen       circumstances that are the same for all, by key
+    """
+
+    rows: Rows
+    batch: DesignBatch
+    valid: NDArray[np.bool_]
+    positions: NDArray[np.float64] | None
+    chosen: dict[str, Any]
+
+
+class DesignGrouping:
+    """How the designs of a study fall into groups.
+
+    document   of the device
+    operators  as in `Study`
+    """
+
+    def __init__(
+        self, document: dict[str, Any], label: str, operators: Mapping[str, Any], sampling: Sampling
+    ) -> None:
+        self.document, self.label, self.operators, self.sampling = document, label, operators, sampling
+        self._steps: dict[str, KeyPath | None] = {}
+        self._documents: dict[tuple[Any, ...], dict[str, Any] | None] = {}
+
+    def groups(self, first: int, last: int) -> Iterator[DesignGroup]:
+        """The groups of designs first to last - 1; designs that cannot be built together with any are in none."""
+        axes = self.sampling.columns(first, last)
+        numbers = [self._numbers(axis.key, axis.ties, values) for axis, values, _ in axes]
+        kinds = [self._kinds(by_key) for by_key in numbers]
+        codes = [np.array(code)[places] for (code, _), (_, _, places) in zip(kinds, axes, strict=True)]
+        if not codes:
+            return
+        _, index, group_of = np.unique(np.stack(codes, axis=1), axis=0, return_index=True, return_inverse=True)
+        for n, example in enumerate(index):
+            rows = np.flatnonzero(group_of.ravel() == n)
+            kind = tuple(of_code[code[example]] for (_, of_code), code in zip(kinds, codes, strict=True))
+            taken = [
+                (key, values, places[rows])
+                for by_key, (_, _, places) in zip(numbers, axes, strict=True)
+                for key, values in by_key.items()
+            ]
+            group = self._group(rows, kind, taken)
+            if group is not None:
+                yield group
+
+    def _numbers(self, key: str, ties: Sequence[Any], values: Sequence[Any]) -> dict[str, Sequence[Any]]:
+        return {key: values, **{tie.key: [tie.value(value) for value in values] for tie in ties}}
+
+    def _kinds(self, by_key: Mapping[str, Sequence[Any]]) -> tuple[list[int], list[Any]]:
+        """A number for each value of an axis that stands for its kind, and the kinds by these numbers."""
+        number_of: dict[Any, int] = {}
+        code = []
+        for values in zip(*by_key.values(), strict=True):
+            kind = tuple(self._kind(key, value) for key, value in zip(by_key, values, strict=True))
+            code.append(number_of.setdefault(kind, len(number_of)))
+        return code, list(number_of)
+
+    def _kind(self, key: str, value: Any) -> Any:
+        if key in WANTED:
+            return None
+        if key == "at" and isinstance(value, list | tuple):
+            return len(value)
+        steps = self._path(key)
+        return repr(value) if steps is None else kind_of(steps, value)
+
+    def _path(self, key: str) -> KeyPath | None:
+        """The resolved path of a key; None for a circumstance, and where the document has no such place."""
+        if key not in self._steps:
+            try:
+                self._steps[key] = None if key in CIRCUMSTANCES else address.resolve(self.document, key)
+            except DeviceError:
+                self._steps[key] = None
+        return self._steps[key]
+
+    def _group(
+        self, rows: Rows, kind: tuple[Any, ...], taken: list[tuple[str, Sequence[Any], Rows]]
+    ) -> DesignGroup | None:
+        document = self._document(kind, taken, len(rows))
+        if document is None:
+            return None
+        positions, columns = None, {}
+        example = {key: values[places[0]] for key, values, places in taken}
+        for key, values, places in taken:
+            if key == "at" and isinstance(example["at"], list | tuple):
+                positions = np.array(values, dtype=np.float64)[places]
+            steps = self._path(key)
+            if steps is not None and takes_arrays(steps) and _holds(document, steps):
+                columns[steps] = np.array(values, dtype=np.float64)[places]
+        try:
+            batch, valid = design_batch(document, columns, len(rows), self.label)
+        except (DeviceError, ValueError):
+            return None
+        chosen = {key: value for key, value in example.items() if key in CIRCUMSTANCES and key not in WANTED}
+        return DesignGroup(rows, batch, valid, positions, chosen)
+
+    def _document(
+        self, kind: tuple[Any, ...], taken: list[tuple[str, Sequence[Any], Rows]], count: int
+    ) -> dict[str, Any] | None:
+        """The document of a valid design of a kind; None where none is found among these."""
+        if self._documents.get(kind) is None:
+            for row in range(count):
+                try:
+                    document = self.design_document({key: values[places[row]] for key, values, places in taken})
+                    check(document, self.label)
+                except DeviceError:
+                    continue
+                self._documents[kind] = document
+                break
+        return self._documents.get(kind)
+
+    def design_document(self, chosen: Mapping[str, Any]) -> dict[str, Any]:
+        """The document with a design's settings. Raises DeviceError."""
+        document = self.document
+        if "operator" in chosen:
+            document = with_operator(document, self.operators[chosen["operator"]])
+        own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
+        return address.assign_all(document, own)
+
+
+def _holds(document: Any, steps: KeyPath) -> bool:
+    """Whether a document has something at a path: a key may have been dropped for another that excludes it."""
+    for step in steps:
+        places: Any = range(len(document)) if isinstance(document, list) else document
+        if not isinstance(document, list | dict) or step not in places:
+            return False
+        document = document[step]  # type: ignore[index]
+    return True
