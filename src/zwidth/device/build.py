@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from zwidth.device import build_nonlinear
+from zwidth.device.build_nonlinear import value_or
 from zwidth.device.schema.friction import FrictionSection
 from zwidth.device.schema.loop import EncoderSection, LoopSection
 from zwidth.device.schema.mechanism import (
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
 def controller(loop: LoopSection) -> Controller:
     """The sampled wall law; a delay in seconds becomes samples, a filter of no time constant none."""
     period = loop.sampling_period_s
-    delay = loop.delay_s / period if loop.delay_s is not None else loop.delay_samples or 0.0
+    delay = loop.delay_s / period if loop.delay_s is not None else value_or(loop.delay_samples, 0.0)
     return Controller(
         sampling_period=period,
         delay=delay,
@@ -112,7 +113,7 @@ def operator(section: OperatorSection) -> Operator:
         arm_stiffness=section.arm_stiffness_N_per_m,
         arm_damping=section.arm_damping_Ns_per_m,
         grasp_stiffness=None if rigid else section.grasp_stiffness_N_per_m,
-        grasp_damping=None if rigid else section.grasp_damping_Ns_per_m or 0.0,
+        grasp_damping=None if rigid else value_or(section.grasp_damping_Ns_per_m, 0.0),
     )
 
 
@@ -131,7 +132,8 @@ def damping(section: DampingSection | None) -> Damping:
         return GivenDamping()
     if section.mode_ratio is not None:
         return ModalDamping(section.mode_ratio)
-    return ProportionalDamping(section.mass_coefficient_1_per_s or 0.0, section.stiffness_coefficient_s or 0.0)
+    coefficients = section.mass_coefficient_1_per_s, section.stiffness_coefficient_s
+    return ProportionalDamping(*(value_or(one, 0.0) for one in coefficients))
 
 
 def mechanism(section: MechanismSection) -> Mechanism:
@@ -239,8 +241,10 @@ def _winding(drive: DriveSection) -> tuple[float, float]:
     """Damping k^2/R [N m s/rad] and lag L/R [s] at the motor of a winding closed through a resistor; else 0."""
     if drive.damping_resistance_ohm is None:
         return 0.0, 0.0
-    R = (drive.winding_resistance_ohm or 0.0) + drive.damping_resistance_ohm
-    return (drive.torque_constant_Nm_per_A or 0.0) ** 2 / R, (drive.winding_inductance_H or 0.0) / R
+    keys = drive.winding_resistance_ohm, drive.torque_constant_Nm_per_A, drive.winding_inductance_H
+    inside, constant, inductance = (value_or(one, 0.0) for one in keys)
+    R = inside + drive.damping_resistance_ohm
+    return constant**2 / R, inductance / R
 
 
 def _parents_first(links: Sequence[LinkSection]) -> list[LinkSection]:

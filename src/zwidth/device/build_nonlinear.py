@@ -86,10 +86,10 @@ def _friction(section: FrictionSection) -> tuple[Friction, ...]:
             along=np.eye(len(levels))[i],
             coulomb=level,
             model=section.model,
-            bristle_stiffness=_or(section.bristle_stiffness_N_per_m, math.inf),
+            bristle_stiffness=value_or(section.bristle_stiffness_N_per_m, math.inf),
             bristle_damping=section.bristle_damping_Ns_per_m or 0.0,
             breakaway=breakaway[i],
-            stribeck_velocity=_or(section.stribeck_velocity_m_per_s, math.nan),
+            stribeck_velocity=value_or(section.stribeck_velocity_m_per_s, math.nan),
         )
         for i, level in enumerate(levels)
         if level > 0.0
@@ -107,9 +107,9 @@ def drive_nonlinearity(drives: Sequence[DriveSection], friction: DriveFrictionSe
         coulomb=per_drive(drives, "coulomb_Nm", 0.0),
         friction_model=friction.model,
         breakaway=per_drive(drives, "breakaway_Nm", math.nan),
-        bristle_stiffness=_or(friction.bristle_stiffness_Nm_per_rad, math.inf),
+        bristle_stiffness=value_or(friction.bristle_stiffness_Nm_per_rad, math.inf),
         bristle_damping=friction.bristle_damping_Nms_per_rad or 0.0,
-        stribeck_velocity=_or(friction.stribeck_velocity_rad_per_s, math.nan),
+        stribeck_velocity=value_or(friction.stribeck_velocity_rad_per_s, math.nan),
         hardening=per_drive(drives, "hardening_Nm_per_rad3", 0.0),
         backward_stiffness=per_drive(drives, "backward_stiffness_Nm_per_rad", math.nan),
         brake_damping=per_drive(drives, "brake_damping_max_Nms_per_rad", 0.0),
@@ -126,5 +126,5 @@ def per_drive(drives: Sequence[DriveSection], key: str, omitted: float) -> Float
     return stack_numbers([omitted if value is None else value for value in values])
 
 
-def _or(value: float | None, omitted: float) -> float:
+def value_or(value: float | None, omitted: float) -> float:
     return omitted if value is None else value

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Final, cast
 
 import numpy as np
@@ -70,27 +71,12 @@ ARRAYS: Final[tuple[KeyPath, ...]] = (
 """Keys, with * for an element, whose numbers (or the numbers in whose lists) may be arrays over designs."""
 
 
+@cache
 def takes_arrays(steps: KeyPath) -> bool:
     """Whether the number, or the list of numbers, at a resolved path may be an array over designs."""
     return any(
         len(steps) >= len(pattern) and all(p in ("*", s) for p, s in zip(pattern, steps, strict=False))
         for pattern in ARRAYS
-    )
-
-
-def kind_of(steps: KeyPath, value: Any) -> Any:
-    """What must be alike in designs that are built together: whether a number is 0 or infinite, or else the value.
-
-    >>> kind_of(("loop", "delay_samples"), 0.5), kind_of(("loop", "delay_samples"), 0.0)
-    ('number', 0.0)
-    """
-    if not takes_arrays(steps):
-        return repr(value)
-    if isinstance(value, list | tuple):
-        return tuple(kind_of(steps, inner) for inner in value)
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return (
-        "number" if number and np.isfinite(value) and value != 0 else repr(value) if not number else float(value)
     )
 
 

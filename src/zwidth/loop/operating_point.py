@@ -83,6 +83,7 @@ class OperatingPoint:
     friction_known, resolution_known   whether the dry friction, and the encoders' step, are given, 0 included
     name                the device's name in results and figures
     requested_position  position as requested, before it was projected; None: the device's reference
+    results             what several measures of these points share, once it is computed
     """
 
     controller: Controller
@@ -100,6 +101,7 @@ class OperatingPoint:
     resolution_known: bool = True
     name: str = ""
     requested_position: Position | Floats | None = None
+    results: dict[Any, Any] = field(init=False, default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         """Raise ValueError for arguments that exclude each other."""

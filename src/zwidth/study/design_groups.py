@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device import address
-from zwidth.device.design_batch import DesignBatch, design_batch, kind_of, takes_arrays
+from zwidth.device.design_batch import DesignBatch, design_batch, takes_arrays
 from zwidth.device.faults import DeviceError, KeyPath
 from zwidth.device.load import check
 from zwidth.device.operator_choice import with_operator
-from zwidth.study.sampling import CIRCUMSTANCES, WANTED, Sampling
+from zwidth.study.sampling import CIRCUMSTANCES, WANTED, Axis, Sampling
 
 Rows = NDArray[np.int64]
 
@@ -56,44 +56,48 @@ class DesignGrouping:
 
     def groups(self, first: int, last: int) -> Iterator[DesignGroup]:
         """The groups of designs first to last - 1; designs that cannot be built together with any are in none."""
-        axes = self.sampling.columns(first, last)
-        numbers = [self._numbers(axis.key, axis.ties, values) for axis, values, _ in axes]
-        kinds = [self._kinds(by_key) for by_key in numbers]
-        codes = [np.array(code)[places] for (code, _), (_, _, places) in zip(kinds, axes, strict=True)]
-        if not codes:
+        taken = [
+            (key, values, places)
+            for axis, axis_values, places in self.sampling.columns(first, last)
+            for key, values in self._numbers(axis, axis_values)
+        ]
+        if not taken:
             return
-        _, index, group_of = np.unique(np.stack(codes, axis=1), axis=0, return_index=True, return_inverse=True)
-        for n, example in enumerate(index):
+        kinds = [self._kinds(key, values) for key, values, _ in taken]
+        codes = [code[places] for (code, _), (_, _, places) in zip(kinds, taken, strict=True)]
+        found, group_of = np.unique(np.stack(codes, axis=1), axis=0, return_inverse=True)
+        for n, own in enumerate(found):
             rows = np.flatnonzero(group_of.ravel() == n)
-            kind = tuple(of_code[code[example]] for (_, of_code), code in zip(kinds, codes, strict=True))
-            taken = [
-                (key, values, places[rows])
-                for by_key, (_, _, places) in zip(numbers, axes, strict=True)
-                for key, values in by_key.items()
-            ]
-            group = self._group(rows, kind, taken)
+            kind = tuple(names[code] for (_, names), code in zip(kinds, own, strict=True))
+            group = self._group(rows, kind, [(key, values, places[rows]) for key, values, places in taken])
             if group is not None:
                 yield group
 
-    def _numbers(self, key: str, ties: Sequence[Any], values: Sequence[Any]) -> dict[str, Sequence[Any]]:
-        return {key: values, **{tie.key: [tie.value(value) for value in values] for tie in ties}}
+    def _numbers(self, axis: Axis, values: Sequence[Any]) -> Iterator[tuple[str, Sequence[Any]]]:
+        """Each key that an axis sets, and its values where the axis has these."""
+        yield axis.key, values
+        for tie in axis.ties:
+            yield tie.key, [tie.value(value) for value in values]
 
-    def _kinds(self, by_key: Mapping[str, Sequence[Any]]) -> tuple[list[int], list[Any]]:
-        """A number for each value of an axis that stands for its kind, and the kinds by these numbers."""
-        number_of: dict[Any, int] = {}
-        code = []
-        for values in zip(*by_key.values(), strict=True):
-            kind = tuple(self._kind(key, value) for key, value in zip(by_key, values, strict=True))
-            code.append(number_of.setdefault(kind, len(number_of)))
-        return code, list(number_of)
-
-    def _kind(self, key: str, value: Any) -> Any:
-        if key in WANTED:
-            return None
-        if key == "at" and isinstance(value, list | tuple):
-            return len(value)
+    def _kinds(self, key: str, values: Sequence[Any]) -> tuple[NDArray[np.int64], Sequence[Any]]:
+        """A number for each value that stands for its kind, and the kinds by these numbers: what must be alike in
+        designs that are built together."""
         steps = self._path(key)
-        return repr(value) if steps is None else kind_of(steps, value)
+        if key in WANTED:
+            return np.zeros(len(values), dtype=np.int64), [None]
+        if steps is not None and takes_arrays(steps) and all(type(value) in (int, float) for value in values):
+            numbers = np.array(values, dtype=np.float64)
+            return np.where(numbers == 0.0, 1, np.where(np.isfinite(numbers), 0, 2)), ["number", "0", "not finite"]
+        number_of: dict[str, int] = {}
+        code = [number_of.setdefault(self._kind(key, steps, value), len(number_of)) for value in values]
+        return np.array(code), list(number_of)
+
+    def _kind(self, key: str, steps: KeyPath | None, value: Any) -> str:
+        if isinstance(value, list | tuple) and (key == "at" or (steps is not None and takes_arrays(steps))):
+            return f"[{', '.join(self._kind(key, steps, inner) for inner in value)}]"
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        free = number and (key == "at" or (steps is not None and takes_arrays(steps) and value != 0))
+        return "number" if free else repr(value)
 
     def _path(self, key: str) -> KeyPath | None:
         """The resolved path of a key; None for a circumstance, and where the document has no such place."""
@@ -120,7 +124,7 @@ class DesignGrouping:
                 columns[steps] = np.array(values, dtype=np.float64)[places]
         try:
             batch, valid = design_batch(document, columns, len(rows), self.label)
-        except (DeviceError, ValueError):
+        except DeviceError:
             return None
         chosen = {key: value for key, value in example.items() if key in CIRCUMSTANCES and key not in WANTED}
         return DesignGroup(rows, batch, valid, positions, chosen)

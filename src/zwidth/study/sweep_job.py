@@ -157,7 +157,7 @@ class SweepJob:
                 at = chosen.get("at") if group.positions is None else group.positions[piece]
                 try:
                     point, alone = group.batch[piece].at(self.positions if over_workspace else at, *circumstances)
-                except (PostureError, DeviceError, ValueError):
+                except (PostureError, DeviceError):
                     continue  # each design alone says why
                 kept = np.flatnonzero(group.valid[piece] & ~alone)
                 if not len(kept):

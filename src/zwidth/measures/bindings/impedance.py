@@ -53,10 +53,9 @@ def _computed(
 
     none_stable  the reason where no wall is stable and there is no number therefore; "": there is one
     """
-    tables = _tables(point)
-    if tables is None:
+    parts = _numbers(point, what)
+    if parts is None:
         return evaluate_pointwise(alone, point)
-    parts = [chart_numbers(table, what) for table in tables]
     values = np.concatenate([read(part) for part in parts]).reshape(point.shape)
     found = np.concatenate([part.status for part in parts]).reshape(point.shape)
     status, why = point.status.copy(), dict[tuple[int, ...], tuple[int, str]]()
@@ -71,6 +70,17 @@ def _computed(
     return MeasureValues(
         np.where(status == OK, values, np.nan), status, notes_of_points(dict(sorted(why.items())))
     )
+
+
+def _numbers(point: OperatingPoint, what: int) -> list[ChartNumbers] | None:
+    """Numbers of all points' charts, flat, some at a time; None for a device that `_tables` does not know. They
+    are kept with the points, for the other measures of them."""
+    known = point.results.get((__name__, ALL_NUMBERS)) or point.results.get((__name__, what))
+    if known is None:
+        tables = _tables(point)
+        known = None if tables is None else [chart_numbers(table, what) for table in tables]
+        point.results[__name__, what] = known
+    return known
 
 
 def _tables(point: OperatingPoint) -> Iterator[LoopTable] | None:

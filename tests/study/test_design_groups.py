@@ -1,0 +1,152 @@
+"""Designs computed together are the designs computed alone, and do not hang on which are together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from zwidth.device import address
+from zwidth.device.load import load
+from zwidth.measures.definition import FAILED, OK
+from zwidth.study.column import column_named
+from zwidth.study.sampling import Axis, Sampling, Tie
+from zwidth.study.sweep_job import SweepJob
+
+MECHANISM = ("stiffness_max", "damping_max", "stable_area", "isotropy", "rigid_mass", "acceleration_max")
+PLANT = ("stiffness_max", "damping_max", "stable_area", "rigid_mass")
+
+# Device and changes of it -> the paths that take arrays, and measures.
+DEVICES = {
+    "loops": ("five-bar", {}, MECHANISM[:5]),
+    "given dampers": (
+        "five-bar",
+        {
+            "mechanism.damping.given": True,
+            "drives.motor-right.damping_Nms_per_rad": 2e-4,
+            "drives.motor-left.damping_Nms_per_rad": 4e-4,
+        },
+        MECHANISM[:5],
+    ),
+    "a rigid drive": ("five-bar", {"drives.motor-left.stiffness_Nm_per_rad": np.inf}, MECHANISM[:5]),
+    "filters and lag": (
+        "five-bar",
+        {
+            "loop.velocity.filter": {"type": "first-order", "time_constant_s": 2e-3},
+            "loop.force.filter": {"type": "butterworth", "order": 2, "cutoff_Hz": 200.0},
+            "loop.actuator.time_constant_s": 5e-4,
+        },
+        MECHANISM[:5],
+    ),
+    "Kalman": (
+        "published-two-mass",
+        {"loop.velocity": {"method": "kalman", "acceleration_noise_m_per_s2": 50.0, "position_noise_m": 1e-5}},
+        PLANT,
+    ),
+    "masses": ("published-two-mass", {"loop.delay_samples": 0.7}, PLANT),
+    "held": (
+        "published-two-mass",
+        {
+            "operator": {
+                "arm_mass_kg": 1.0,
+                "arm_stiffness_N_per_m": 300.0,
+                "arm_damping_Ns_per_m": 5.0,
+                "grasp_stiffness_N_per_m": 4000.0,
+                "grasp_damping_Ns_per_m": 4.0,
+            }
+        },
+        PLANT,
+    ),
+    "an arm": ("hapkit-course", {}, ("stiffness_max", "stable_area", "rigid_mass")),
+}
+LEFT_OUT = ("workspace", "direction", "sources", "friction", "assemblies")
+
+
+def job_of(name, axes, size, measures):
+    device = load(name)
+    document = {key: value for key, value in device.document.items() if key != "sources"}
+    columns = tuple(column_named(one) for one in measures)
+    return SweepJob(document, device.label, {}, Sampling(axes, size), columns, None, None, {})
+
+
+def random_axes(document, rng, spread):
+    """Some numbers of a device around their values, and now and then one as it cannot be."""
+    numbers = {
+        path: value
+        for path, value in address.numeric_addresses(document).items()
+        if value and np.isfinite(value) and not any(part in LEFT_OUT for part in path.split("."))
+    }
+    chosen = rng.choice(sorted(numbers), size=min(len(numbers), int(rng.integers(2, 7))), replace=False)
+    for path in chosen:
+        value = numbers[path]
+        if isinstance(value, int):
+            yield Axis(str(path), (value, value + 1))
+        else:
+            yield Axis(str(path), (), tuple(sorted((value * (1.0 - spread), value * (1.0 + spread)))))
+
+
+def random_job(kind, seed, size):
+    name, changes, measures = DEVICES[kind]
+    rng = np.random.default_rng(seed)
+    device = load(name, changes)
+    document = {key: value for key, value in device.document.items() if key != "sources"}
+    axes = tuple(random_axes(document, rng, float(rng.choice([0.1, 0.5, 1.2]))))
+    columns = tuple(column_named(one) for one in measures)
+    return SweepJob(document, device.label, {}, Sampling(axes, size, seed), columns, None, None, {})
+
+
+def alone(job):
+    found = [[job._alone(n, one) for one in job.columns] for n in range(job.count)]
+    return np.array([[one[0] for one in row] for row in found]), np.array(
+        [[one[1] for one in row] for row in found]
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", DEVICES)
+def test_designs_together_are_the_designs_alone(kind, seed):
+    job = random_job(kind, seed, 24)
+    together = job.compute(0, job.count)
+    values, status = alone(replace(job, _cache={}))
+    assert np.array_equal(together.status, status)
+    np.testing.assert_allclose(together.values, values, rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["loops", "filters and lag", "masses"])
+def test_results_do_not_hang_on_how_designs_are_split(kind):
+    job, rng = random_job(kind, 7, 40), np.random.default_rng(1)
+    whole = job.compute(0, job.count)
+    for _ in range(4):
+        ends = [0, *sorted(rng.choice(np.arange(1, job.count), 5, replace=False)), job.count]
+        fresh = replace(job, _cache={})
+        parts = [fresh.compute(int(first), int(last)) for first, last in pairwise(ends)]
+        assert np.array_equal(np.concatenate([part.status for part in parts]), whole.status)
+        assert np.array_equal(np.concatenate([part.values for part in parts]), whole.values, equal_nan=True)
+
+
+def test_valid_designs_are_not_asked_for_alone(monkeypatch):
+    job = job_of(
+        "five-bar",
+        (
+            Axis("links.upper-right.length_m", (), (0.14, 0.155), ties=(Tie("links.upper-left.length_m"),)),
+            Axis("loop.sampling_period_s", (), (2e-4, 4e-3), log=True),
+            Axis("loop.delay_samples", (0.0, 0.5, 1.0, 2.5)),
+            Axis("model", ("full", "two-mass")),
+        ),
+        40,
+        ("stiffness_max", "stable_area"),
+    )
+    monkeypatch.setattr(SweepJob, "_alone", lambda *_: pytest.fail("asked for alone"))
+    assert (job.compute(0, job.count).status == OK).all()
+
+
+def test_some_designs_fail_and_some_do_not():
+    seen = {
+        int(one)
+        for kind in DEVICES
+        for seed in range(3)
+        for one in np.unique(random_job(kind, seed, 24).compute(0, 24).status)
+    }
+    assert {OK, FAILED} < seen
