@@ -27,11 +27,11 @@ from zwidth.chart.edge_memory import (
     STOPS,
     EdgeMemory,
 )
-from zwidth.chart.edge_samples import LONGEST, SHARE, fill_curve, flag_all
+from zwidth.chart.edge_samples import LONGEST, SHARE, add_samples_between_corners, fill_curve, flag_all
 from zwidth.chart.hurwitz import is_stable
 from zwidth.chart.peak import is_stiffer
 from zwidth.chart.wall_samples import HIDDEN
-from zwidth.compiled import compiled_lean
+from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, wall_on_circle, wall_with_slopes
 
 Floats = NDArray[np.float64]
@@ -39,6 +39,7 @@ Floats = NDArray[np.float64]
 # A stiffness below this share of the edge's largest |K| is rounding of 0; where K = 0+ is tested; a corner this
 # near to K = 0 lies on it; and how long a stable interval of K = 0+ is at least, as a share of the longest.
 NOTHING, BESIDE_AXIS, ON_AXIS, SHORTEST = 1e-10, 1e-7, 1e-8, 1e-9
+RING_OPEN = 4  # status of an edge of which an arc is missing
 
 
 @compiled_lean
@@ -215,6 +216,15 @@ def read_edge(memory: EdgeMemory) -> int:
     """The edge of the loop whose polynomials stand, with its numbers, if nothing on the way is in doubt."""
     if not fill_curve(memory, SHARE, LONGEST, NEAR_END):
         return DOUBTFUL
+    status = _read_flags(memory)
+    if status == RING_OPEN and add_samples_between_corners(memory):
+        status = _read_flags(memory)
+    return DOUBTFUL if status == RING_OPEN else status
+
+
+@compiled_apart
+def _read_flags(memory: EdgeMemory) -> int:
+    """`read_edge` from the curve's samples; RING_OPEN where an arc is missing."""
     flag_all(memory)
     for i in range(memory.counts[SAMPLES]):
         if memory.samples.flag[i] == HIDDEN:
@@ -223,6 +233,8 @@ def read_edge(memory: EdgeMemory) -> int:
         return DOUBTFUL
     if fill_line_pieces(memory) != 0 or not add_line_arcs(memory):
         return DOUBTFUL
-    if not join_arcs(memory, SAME_CORNER) or not read_numbers(memory):
+    if not join_arcs(memory, SAME_CORNER):
+        return RING_OPEN
+    if not read_numbers(memory):
         return DOUBTFUL
     return FOUND if memory.peak[0] > 0.0 else NO_WALL

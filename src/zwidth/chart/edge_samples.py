@@ -14,7 +14,7 @@ from zwidth.chart.circle_sampling import (
     fill_samples,
 )
 from zwidth.chart.curve import NO_LINE, OF_SLOPE, OF_SLOPE_B, zero_between
-from zwidth.chart.edge_memory import NONE, SAMPLES, EdgeMemory
+from zwidth.chart.edge_memory import CROSSINGS, NONE, SAMPLES, SETTLED, EdgeMemory
 from zwidth.chart.hurwitz import edges_stable_set
 from zwidth.chart.loop_polynomials import fill_computer_polynomials, fill_polynomials
 from zwidth.chart.wall_samples import UNKNOWN, flag_walls, walls_of_samples
@@ -38,6 +38,7 @@ Floats = NDArray[np.float64]
 # Steps along the curve for a whole edge, in shares of the distance to its nearest singularity, and the longest.
 SHARE: Final = 0.2
 LONGEST: Final = 0.05
+CLOSEST: Final = 1e-9  # share of t within which two places on the curve are one
 
 
 @compiled_lean
@@ -112,6 +113,52 @@ def _add_excursions(memory: EdgeMemory) -> bool:
             memory.counts[SAMPLES] = n + 1
             break
         i += 1
+    return True
+
+
+@compiled_apart
+def add_samples_between_corners(memory: EdgeMemory) -> bool:
+    """Add a sample to each piece of the curve between two neighbouring corners, or crossings of the lines, that
+    has none; False where there is no such piece, or memory is full.
+
+    An arc may lie between two samples. Its ends are then known nevertheless, from the other arcs that end there.
+    """
+    samples, places, new, n = memory.samples, memory.picked[0], memory.picked[1], memory.counts[SAMPLES]
+    m, most = 0, len(places)
+    for i in range(n - 1):
+        if samples.corner[i] == SETTLED and m + 2 < most:
+            places[m], places[m + 1] = samples.corner_t[i], samples.corner_partner[i]
+            m += 2
+    for k in range(min(memory.counts[CROSSINGS], most - m)):
+        places[m] = memory.pieces.crossing_t[k]
+        m += 1
+    for k in range(1, m):
+        place, i = places[k], k
+        while i > 0 and places[i - 1] > place:
+            places[i] = places[i - 1]
+            i -= 1
+        places[i] = place
+    added, i = 0, 0
+    for k in range(m - 1):
+        low, high = places[k], places[k + 1]
+        while i < n and samples.t[i] <= low:
+            i += 1
+        between = i < n and samples.t[i] < high
+        if not between and low > 0.0 and np.isfinite(high) and high > low * (1.0 + CLOSEST):
+            new[added] = 0.5 * (low + high)
+            added += 1
+    if added == 0 or n + added >= len(samples.t):
+        return False
+    i, k = n - 1, added - 1
+    for place in range(n + added - 1, -1, -1):
+        if k >= 0 and (i < 0 or new[k] > samples.t[i]):
+            samples.t[place] = new[k]
+            k -= 1
+        else:
+            samples.t[place] = samples.t[i]
+            i -= 1
+    memory.counts[SAMPLES] = n + added
+    walls_again(memory)
     return True
 
 
