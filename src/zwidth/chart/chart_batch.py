@@ -104,7 +104,7 @@ def _several(
         fill_loop(loops, i, radius, memory)
         if what == STIFFEST:
             status[i] = search_peak(memory)
-        else:
+        if status[i] == DOUBTFUL:
             status[i] = read_edge(memory)
         if status[i] == DOUBTFUL:
             continue

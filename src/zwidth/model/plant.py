@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.model.argument_checks import check_number
-from zwidth.model.design_axes import Array1, Array2, Number
+from zwidth.model.design_axes import Array1, Array2, Number, stack_numbers
 from zwidth.model.nonlinear import Nonlinear
 
 Floats = NDArray[np.float64]
@@ -107,7 +107,7 @@ class Plant:
     def one_mass(cls, mass: float, damping: float = 0.0, stiffness: float = 0.0) -> Plant:
         """A single mass that is driven, read and held where it is, with a damper and a spring to the ground.
 
-        mass, damping, stiffness  [kg], [N s/m], [N/m]
+        mass, damping, stiffness  [kg], [N s/m], [N/m]; or arrays over designs
         Raises  ValueError  for a mass that is not positive, a negative damping, a number that is not finite
 
         >>> Plant.one_mass(mass=0.03, damping=1.0).damping
@@ -115,7 +115,7 @@ class Plant:
         """
         _check_numbers({"mass": mass}, damping, stiffness)
         one = np.ones(1)
-        M, B, K = (np.array([[value]], dtype=np.float64) for value in (mass, damping, stiffness))
+        M, B, K = (stack_numbers([[value]]) for value in (mass, damping, stiffness))
         return cls(M, B, K, one, one.copy(), one.copy(), ("mass",))
 
     @classmethod
@@ -124,7 +124,8 @@ class Plant:
     ) -> Plant:
         """A link side, held by the operator, and a motor side, driven and read, joined by a spring and a damper.
 
-        link_side_mass, motor_side_mass  [kg];   stiffness, damping  between them [N/m], [N s/m]
+        link_side_mass, motor_side_mass  [kg];   stiffness, damping  between them [N/m], [N s/m]; or arrays over
+                                         designs
         Raises  ValueError  for masses that are not positive, a negative damping, a number that is not finite
 
         >>> Plant.two_masses(0.2616, 0.0254, stiffness=15620.0).names
@@ -135,9 +136,9 @@ class Plant:
         between = np.array([[1.0, -1.0], [-1.0, 1.0]])
         link, motor = np.eye(2)
         return cls(
-            mass=np.diag([link_side_mass, motor_side_mass]).astype(np.float64),
-            damping=damping * between,
-            stiffness=stiffness * between,
+            mass=stack_numbers([[link_side_mass, 0.0], [0.0, motor_side_mass]]),
+            damping=np.multiply.outer(damping, between),
+            stiffness=np.multiply.outer(stiffness, between),
             actuator=motor,
             sensor=motor.copy(),
             handle=link,

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from zwidth.device import address
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, KeyPath, dotted, fail, nearest, quote, suggestion
+from zwidth.device.faults import DeviceError, KeyPath, dotted, fail, nearest, plural, quote, suggestion
 from zwidth.device.schema import device_file as schema
 from zwidth.device.toml_access import is_number, tables
 from zwidth.model.reduction import MODELS
@@ -28,11 +28,13 @@ def axes_of(document: dict[str, Any], device: Device | None, faults_of_axes: Fau
     document  the study as read. Values of the wrong type are left out here: `study_schema` reports them
     device    None if it could not be loaded; paths are then not looked up
     """
-    hypercube = document.get("sampling", "grid") == "latin-hypercube"
+    sampling = document.get("sampling", "grid")
     axes, taken = [], SetNumbers()
+    if sampling == "paired":
+        faults_of_axes += _pairing_faults(document)
     for n, table in tables(document, "axis"):
         here = ("axis", n)
-        faults_of_axes += [((*here, *path), message) for path, message in _values_faults(table, hypercube)]
+        faults_of_axes += [((*here, *path), message) for path, message in _values_faults(table, sampling)]
         key = table.get("key")
         if not isinstance(key, str) or not key:
             continue
@@ -68,7 +70,23 @@ def unit_of(document: dict[str, Any], key: str) -> str:
     return ""
 
 
-def _values_faults(table: dict[str, Any], hypercube: bool) -> Iterator[Fault]:
+def _pairing_faults(document: dict[str, Any]) -> Iterator[Fault]:
+    """Faults of paired axes that have unlike numbers of values."""
+    counts: list[tuple[int, str, int]] = []
+    for n, table in tables(document, "axis"):
+        values, count = table.get("values"), table.get("count")
+        many = len(values) if isinstance(values, list) else count if isinstance(count, int) else None
+        if many is not None:
+            counts.append((n, "values" if isinstance(values, list) else "count", many))
+    for n, key, many in counts[1:]:
+        if many != counts[0][2]:
+            message = (
+                f"gives {plural(many, 'value')}, the first axis {counts[0][2]}; paired axes have equally many"
+            )
+            yield (("axis", n, key), message)
+
+
+def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[Fault]:
     """Faults of an axis that has no values, gives them twice (range and values), or has a key too many."""
     span, values = table.get("range"), table.get("values")
     if span is None and values is None:
@@ -76,21 +94,20 @@ def _values_faults(table: dict[str, Any], hypercube: bool) -> Iterator[Fault]:
     if span is not None and values is not None:
         yield (("values",), "and range exclude each other; remove one of them")
     elif values is not None:
-        shown = [repr(value) for value in values] if isinstance(values, list) else []
-        yield from (
-            (("values", n), f"{quote(values[n])} is listed already; remove it")
-            for n, text in enumerate(shown)
-            if text in shown[:n]
-        )
+        seen = set[str]()
+        for n, value in enumerate(values if isinstance(values, list) and sampling != "paired" else []):
+            if repr(value) in seen:
+                yield (("values", n), f"{quote(value)} is listed already; remove it")
+            seen.add(repr(value))
         for key in ("count", "scale"):
             if key in table:
                 yield ((key,), "is read with a range only; remove it")
-    elif span is not None and hypercube and "count" in table:
+    elif span is not None and sampling == "latin-hypercube" and "count" in table:
         yield (
             ("count",),
             "is for a grid; a Latin hypercube has one count for all axes: move it to the top",
         )
-    elif span is not None and not hypercube and "count" not in table:
+    elif span is not None and sampling != "latin-hypercube" and "count" not in table:
         yield ((), "has a range and no count; add the number of its values, such as count = 11")
     if table.get("scale") == "log" and isinstance(span, list) and span and is_number(span[0]) and not span[0] > 0:
         yield (("range",), f'must begin above 0 where scale = "log", got {quote(span)}')

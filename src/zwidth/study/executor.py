@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 PATIENCE: Final = 10.0  # s; a longer job is worth starting processes, which takes some seconds
 BATCH: Final = 0.25  # s that a batch should take: much longer than sending and storing it
 TRIAL: Final = 0.01  # s of computation from which the time per cell is estimated
+LONGER: Final = 1.5  # times as long that twice the cells must take for that
 SHARES: Final = 16  # least number of batches, so that no process waits long for the last one
 GOLDEN: Final = 0.6180339887498949
 MOST_NOTES: Final = 100  # notes per measure; a reason that contains a number may differ in each cell
@@ -144,16 +145,17 @@ def _batch(job: Job, workers: int) -> int:
     most = max(1, count // max(SHARES, 4 * workers))
     if most == 1:
         return 1
-    size, place, seconds, tried = 1, 0.0, 0.0, False
+    size, place, before = 1, 0.0, np.inf
     while size <= most:
         first = int(place * (count - size))
         place = (place + GOLDEN) % 1.0
         began = perf_counter()
         job.compute(first, first + size)
         seconds = perf_counter() - began
-        if seconds >= TRIAL and tried:
+        # while twice the cells take hardly longer, it is not the cells that take the time
+        if seconds >= TRIAL and seconds >= LONGER * before:
             return max(1, min(most, int(BATCH / (seconds / size))))
-        size, tried = size * 2 if seconds < TRIAL else size, seconds >= TRIAL
+        size, before = size * 2, seconds
     return most
 
 

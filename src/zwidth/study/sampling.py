@@ -101,19 +101,29 @@ class Sampling:
 
     A grid has every combination; the last axis changes fastest. A Latin hypercube of n designs divides each axis
     into n equal parts and has one design in each, at a random place in it (McKay, Beckman and Conover 1979,
-    known at second hand): the parts of the axes are paired at random, the same for the same seed.
+    known at second hand): the parts of the axes are paired at random, the same for the same seed. Of paired axes
+    the n-th design has the n-th value of each.
 
-    size  number of designs of the Latin hypercube; None: a grid
-    seed  of its random numbers
+    size    number of designs of the Latin hypercube; None: a grid, or paired axes
+    seed    of its random numbers
+    paired  whether the axes, which then have equally many values, are paired
     """
 
     axes: tuple[Axis, ...]
     size: int | None = None
     seed: int = 1
+    paired: bool = False
+
+    @property
+    def kind(self) -> str:
+        """What it is called in a study file."""
+        return "paired" if self.paired else "grid" if self.size is None else "latin-hypercube"
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of values along each axis of a grid; (size,) for a Latin hypercube."""
+        """Number of values along each axis of a grid; else (n,) of the n designs."""
+        if self.paired:
+            return (len(self.axes[0].values),)
         return tuple(len(axis.values) for axis in self.axes) if self.size is None else (self.size,)
 
     @property
@@ -129,6 +139,8 @@ class Sampling:
         """
         if self.size is not None:
             return tuple(axis.at(share) for axis, share in zip(self.axes, self._shares[design], strict=True))
+        if self.paired:
+            return tuple(axis.values[design] for axis in self.axes)
         places = np.unravel_index(design, self.shape)
         return tuple(axis.values[int(place)] for axis, place in zip(self.axes, places, strict=True))
 
@@ -139,6 +151,8 @@ class Sampling:
         ((1, 2), array([0, 1, 1]))
         """
         designs = np.arange(first, last)
+        if self.paired:
+            return [(axis, axis.values[first:last], designs - first) for axis in self.axes]
         if self.size is None:
             places = np.unravel_index(designs, self.shape) if self.axes else ()
             return [(axis, axis.values, place) for axis, place in zip(self.axes, places, strict=True)]

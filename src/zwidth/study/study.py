@@ -127,7 +127,12 @@ def check_study(
         document=document,
         device=device,
         operators=operators,
-        sampling=Sampling(axes, checked.count if hypercube else None, 1 if checked.seed is None else checked.seed),
+        sampling=Sampling(
+            axes,
+            checked.count if hypercube else None,
+            1 if checked.seed is None else checked.seed,
+            checked.sampling == "paired",
+        ),
         columns=columns,
         at=checked.at,
         direction=checked.direction,
@@ -236,7 +241,7 @@ def _plane(
 def _check_size(checked: StudyFile, hypercube: bool) -> None:
     """Raises TooLarge where the designs would not fit into memory, before any of them is made."""
     each = [len(axis.values) if axis.values is not None else axis.count or 1 for axis in checked.axis]
-    designs = (checked.count or 0) if hypercube else prod(each)
+    designs = (checked.count or 0) if hypercube else each[0] if checked.sampling == "paired" else prod(each)
     ties = sum(len(axis.tie) for axis in checked.axis)
     numbers = designs * (PER_VALUE * len(checked.measures) + PER_AXIS * (len(checked.axis) + ties))
     check_memory(

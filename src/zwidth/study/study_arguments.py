@@ -41,10 +41,11 @@ def study_over(
     stiffness: float | None = None,
     damping: float | None = None,
     frequency: float | None = None,
+    paired: bool = False,
     plane: PlaneGrid | None = None,
     user_measures: Mapping[str, Measure] | None = None,
 ) -> Study:
-    """The study of a grid over axes of a device; see `study.sweep.sweep` for the arguments.
+    """The study of a grid over axes of a device, or of paired axes; see `study.sweep.sweep` for the arguments.
 
     Raises  DeviceError  with all faults found
             TooLarge     where the designs would not fit into memory
@@ -67,6 +68,7 @@ def study_over(
         "device": device.label,
         "measures": names,
         "axis": [{"key": key, "values": values} for key, values in _axes(axes)],
+        **({"sampling": "paired"} if paired else {}),
         **{KEYS.get(name, name): _plain(value) for name, value in given.items() if value is not None},
     }
     faults: Faults = []

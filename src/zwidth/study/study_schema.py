@@ -101,7 +101,7 @@ class StudyFile(Section):
     device: Text = documented_key("a bundled name, or a file beside this one")
     measures: tuple[Text, ...] = documented_key("the measures to compute for each design", min_length=1)
     measures_file: Text | None = documented_key("a file of your own measures, beside this one", default=None)
-    sampling: Literal["grid", "latin-hypercube"] = documented_key(
+    sampling: Literal["grid", "latin-hypercube", "paired"] = documented_key(
         "how designs are spread over the axes", default="grid"
     )
     count: WholeNumber | None = documented_key("designs of a Latin hypercube", ge=1, le=MOST, default=None)

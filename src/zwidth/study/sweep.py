@@ -103,13 +103,14 @@ def sweep(
     stiffness: float | None = None,
     damping: float | None = None,
     frequency: float | None = None,
+    paired: bool = False,
     plane: PlaneGrid | None = None,
     user_measures: Mapping[str, Measure] | None = None,
     store: Store | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
 ) -> xr.Dataset:
-    """Measures of a device with every combination of other numbers.
+    """Measures of a device with every combination of other numbers, or with those of paired axes.
 
         sweep(device, {"loop.sampling_period_s": [0.0005, 0.001]}, ["stiffness_max", "isotropy"])
 
@@ -121,14 +122,17 @@ def sweep(
     position, direction, assembly, model    of all designs, as for `Device.at`
     stiffness, damping, frequency           of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures
                                                 about them
+    paired         True: not every combination, but as many designs as each axis has values: the n-th design has
+                   the n-th value of every axis, such as numbers drawn at random
     plane          the workspace, for measures over it (`study.plane_grid.plane_of`); left out: 15 by 15 points of
                    the device's own
     user_measures  measures of a user's own, by name (`measures.user_measures.load_measures`)
     store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
     progress       is called with the stage, the number of designs done, and of all designs
     workers        processes at most; left out: one for each core
-    Returns        a dataset with a dimension for each axis, named by its path: for each measure its values, nan
-                   where a design has none, and NAME_status. Why they have none stands in the attribute `notes`
+    Returns        a dataset with a dimension for each axis, named by its path, or with the one dimension `design`
+                   of paired axes: for each measure its values, nan where a design has none, and NAME_status. Why
+                   they have none stands in the attribute `notes`
     Raises         DeviceError   with all faults of the arguments and the device
                    MeasureError  for measures that do not exist for this device
                    TooLarge      where the designs would not fit into memory
@@ -149,6 +153,7 @@ def sweep(
         stiffness=stiffness,
         damping=damping,
         frequency=frequency,
+        paired=paired,
         plane=plane,
         user_measures=user_measures,
     )

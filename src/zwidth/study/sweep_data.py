@@ -26,7 +26,7 @@ COMPONENTS: Final = "xyz"
 def as_dataset(sweep: Sweep) -> xr.Dataset:
     """A study's values over its axes.
 
-    A grid has a dimension for each axis, called by its key; a Latin hypercube has one, `design`. For each column
+    A grid has a dimension for each axis, called by its key; other samplings have one, `design`. For each column
     NAME there are its values, nan where there is none, and NAME_status. Tied numbers, and the components of
     positions and directions, are further coordinates. Attributes of a column: unit, title, source, what is better,
     and `notes`, a line for each reason why designs have no value.
@@ -34,7 +34,7 @@ def as_dataset(sweep: Sweep) -> xr.Dataset:
     import xarray as xr
 
     sampling = sweep.job.sampling
-    grid = sampling.size is None
+    grid = sampling.kind == "grid"
     dims = tuple(axis.key for axis in sampling.axes) if grid else (DESIGN,)
     data: dict[str, Any] = {}
     for n, one in enumerate(sweep.job.columns):
@@ -94,8 +94,8 @@ def sweep_document(sweep: Sweep) -> dict[str, Any]:
     sampling, names = sweep.job.sampling, sweep.job.measures
     status = ([STATUS[int(s)] for s in row] for row in sweep.cells.status)
     return {
-        "sampling": "grid" if sampling.size is None else "latin-hypercube",
-        "seed": None if sampling.size is None else sampling.seed,
+        "sampling": sampling.kind,
+        "seed": sampling.seed if sampling.kind == "latin-hypercube" else None,
         "axes": [
             {"key": axis.key, "unit": axis.unit or None}
             | ({"values": axis.values} if sampling.size is None or axis.span is None else {"range": axis.span})

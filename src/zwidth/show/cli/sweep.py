@@ -121,7 +121,7 @@ class SweepCommand(Command):
         from zwidth.study.sweep_data import axis_value_text
 
         count, sampling, columns = result.job.count, result.job.sampling, result.job.columns
-        shape = str(count) if sampling.size is not None else " x ".join(map(str, sampling.shape))
+        shape = str(count) if sampling.kind != "grid" else " x ".join(map(str, sampling.shape))
         over = f"{shape} design{'s' * (count != 1)}"
         axes = ", ".join(axis.key for axis in sampling.axes)
         yield f"{printable(document['name'])}: {over} over {axes}"
