@@ -10,7 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.chart import largest_stiffness
+from zwidth.chart.chart_batch import STIFFEST
 from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.edge_memory import FOUND
+from zwidth.chart.edge_memory import NO_WALL as NONE_FOUND
+from zwidth.chart.point_numbers import numbers_of_points
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
@@ -163,19 +167,43 @@ def largest_stiffness_by_direction(
     units = given / length
     plant = _plants(point)
     motions = _motions(point.jacobian)
-    results: dict[tuple[float, ...], tuple[float, float, float, str]] = {}
-    rows = []
-    for unit in units:
-        key = _direction_key(unit)
-        if key not in results:
-            off = np.linalg.norm(unit - motions.T @ (motions @ unit)) > OUT_OF_MOTION_TOLERANCE
-            none = float("nan")
-            results[key] = (none, none, none, OUT_OF_MOTION) if off else _stiffest(plant, unit, point.controller)
-        rows.append(results[key])
+    keys = [_direction_key(unit) for unit in units]
+    first = {key: n for n, key in reversed(list(enumerate(keys)))}  # one of each pair
+    off = np.linalg.norm(units - units @ motions.T @ motions, axis=1) > OUT_OF_MOTION_TOLERANCE
+    wanted = [n for n in first.values() if not off[n]]
+    together = _together(point, units[wanted])
+    rows: dict[tuple[float, ...], tuple[float, float, float, str]] = {}
+    done = 0
+    for key, n in first.items():
+        none = float("nan")
+        rows[key] = none, none, none, OUT_OF_MOTION
+        if not off[n]:
+            known = together[wanted.index(n)]
+            rows[key] = known if known is not None else _stiffest(plant, units[n], point.controller)
         if progress is not None:
-            progress("directions", len(rows), len(units))
-    stiffness, damper, frequency, status = zip(*rows, strict=True)
+            done += keys.count(key)
+            progress("directions", done, len(units))
+    stiffness, damper, frequency, status = zip(*(rows[key] for key in keys), strict=True)
     return ByDirection(units, np.array(stiffness), np.array(damper), np.array(frequency), status)
+
+
+def _together(point: OperatingPoint, units: Floats) -> list[tuple[float, float, float, str] | None]:
+    """Stiffness, damping, frequency and status along each unit vector (k, 3); None for one to be traced alone."""
+    assert point.posture is not None
+    posture = point.posture.broadcast_to((len(units),))
+    along = replace(point, posture=posture, directions=units[:, None, :])
+    numbers = numbers_of_points(along, STIFFEST) if len(units) else None
+    if numbers is None:
+        return [None] * len(units)
+    hertz, none = 1.0 / (2.0 * np.pi * point.controller.sampling_period), float("nan")
+    found: list[tuple[float, float, float, str] | None] = []
+    for n, status in enumerate(numbers.status):
+        if status == FOUND:
+            K, B, angle = (float(x) for x in (numbers.stiffness[n], numbers.damping[n], numbers.angles[n, 0]))
+            found.append((K, B, angle * hertz, OK))
+        else:
+            found.append((none, none, none, NO_WALL) if status == NONE_FOUND else None)
+    return found
 
 
 def _direction_key(unit: Floats) -> tuple[float, ...]:
