@@ -31,11 +31,12 @@ EVERYWHERE = {
     "memory_limit",
     "result",
     "threads",
+    "tuple_references",
     "_version",
 }
 MAY_IMPORT = {package: {*FLOW[: place + 1], *EVERYWHERE} for place, package in enumerate(FLOW)}
 MAY_IMPORT |= {module: set() for module in EVERYWHERE}
-MAY_IMPORT["compiled"] = {"compile_events", "machine_code"}
+MAY_IMPORT["compiled"] = {"compile_events", "machine_code", "tuple_references"}
 MAY_IMPORT["device"] = {"device", "model", "loop", *EVERYWHERE}
 MAY_IMPORT["study"].add("device")
 MAY_IMPORT["show"].add("device")

@@ -25,6 +25,7 @@ from numba.core.codegen import JITCodeLibrary
 
 from zwidth.compile_events import compiling
 from zwidth.machine_code import MachineCode
+from zwidth.tuple_references import handed_over, refuse_returned_address
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 # Division follows IEEE (1/0 is inf), so that a singular point is data and not an exception.
@@ -35,6 +36,7 @@ APART: Final = "zwidth_apart"  # an option of ours: the kernel is never inlined
 # First and last release of numba whose internal classes are known to work as they are used below. With any other
 # release, kernels are compiled by plain `numba.jit`: the same results, a longer wait at first use.
 TAKEN_APART: Final = ((0, 61), (0, 68))
+HASH_OF_FLAGS: Final = hash(compiler.Flags())
 COMPILING_THRESHOLDS: Final = (100_000, 1000, 1000)  # of Python's garbage collector, see gc.set_threshold
 
 
@@ -147,10 +149,31 @@ class _EntryLibrary(JITCodeLibrary):
         passes.run(self._final_module, *builder)
 
 
+class _Flags(compiler.Flags):
+    """Numba's flags of a compilation, which are quickly compared.
+
+    Numba looks up every operator of a kernel in tables that have the flags in their keys, and at each of a hundred
+    thousand looks compares all forty, one after the other. Here flags are equal where the same options are set to
+    the same values. Numba's hash is that of the options' names, the same for all flags.
+    """
+
+    def __hash__(self) -> int:
+        return HASH_OF_FLAGS
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, _Flags):
+            return bool(self._values == other._values)
+        return bool(super().__eq__(other))
+
+
 class _PartCompiler(compiler.CompilerBase):
     """Numba's pipeline, with the library of a kernel that other kernels call."""
 
     library: type[JITCodeLibrary] = _PartLibrary
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.state.flags = _Flags(self.state.flags)
 
     def define_pipelines(self) -> list[Any]:
         self.state.library = self.library(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
@@ -231,13 +254,14 @@ class _Kernel(registry.CPUDispatcher):
         return [] if self._entry is None else list(self._entry.overloads)
 
     def add_overload(self, result: Any) -> None:
+        refuse_returned_address(self.py_func.__qualname__, result.signature.return_type)
         # not given to numba's own table of what Python may call: there is nothing to call
         self.overloads[tuple(result.signature.args)] = result
 
     def get_call_template(self, arguments: Any, keywords: Any) -> Any:
         """Types of the arguments of a call; numba would give each number written in the call a type of its own."""
-        plain = {name: types.unliteral(kind) for name, kind in keywords.items()}
-        return super().get_call_template(tuple(map(types.unliteral, arguments)), plain)
+        plain = {name: handed_over(types.unliteral(kind)) for name, kind in keywords.items()}
+        return super().get_call_template(tuple(handed_over(types.unliteral(kind)) for kind in arguments), plain)
 
     def _compile_for_args(self, *arguments: Any, **keywords: Any) -> Any:
         """Called by numba for a call from Python with types of arguments that it has not seen."""
