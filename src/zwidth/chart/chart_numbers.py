@@ -14,7 +14,7 @@ from zwidth.chart.arcs import PAIR
 from zwidth.chart.area import curve_integral, end_value, straight_integral
 from zwidth.chart.circle_sampling import NEAR_END
 from zwidth.chart.corner import fill_corners
-from zwidth.chart.curve import NO_LINE, OF_B, OF_K, OF_SLOPE, zero_between
+from zwidth.chart.curve import NO_LINE, OF_B, OF_K, OF_SLOPE, undamped_stiffness, zero_between
 from zwidth.chart.edge_arcs import SAME_CORNER, add_line_arcs, fill_line_pieces, fill_pair_arcs, join_arcs
 from zwidth.chart.edge_memory import (
     ARCS,
@@ -27,10 +27,18 @@ from zwidth.chart.edge_memory import (
     STOPS,
     EdgeMemory,
 )
-from zwidth.chart.edge_samples import LONGEST, SHARE, add_samples_between_corners, fill_curve, flag_all
+from zwidth.chart.edge_samples import (
+    LONGEST,
+    SHARE,
+    add_sample,
+    add_samples_between_corners,
+    edge_flag,
+    fill_curve,
+    flag_all,
+)
 from zwidth.chart.hurwitz import is_stable
 from zwidth.chart.peak import is_stiffer
-from zwidth.chart.wall_samples import HIDDEN
+from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, wall_on_circle, wall_with_slopes
 
@@ -39,7 +47,8 @@ Floats = NDArray[np.float64]
 # A stiffness below this share of the edge's largest |K| is rounding of 0; where K = 0+ is tested; a corner this
 # near to K = 0 lies on it; and how long a stable interval of K = 0+ is at least, as a share of the longest.
 NOTHING, BESIDE_AXIS, ON_AXIS, SHORTEST = 1e-10, 1e-7, 1e-8, 1e-9
-RING_OPEN = 4  # status of an edge of which an arc is missing
+# States of an edge that more samples may settle: an arc is missing; the stiffest wall is no edge. And how often.
+RING_OPEN, PEAK_IS_NO_EDGE, ROUNDS = 4, 5, 4
 
 
 @compiled_lean
@@ -156,7 +165,7 @@ def _read_curve(memory: EdgeMemory, k: int, scale: float) -> bool:
                 return False
         if B_value * next_B < 0.0:
             zero = zero_between(circle, OF_B, NO_LINE, B_t, next_B_t)
-            _keep_peak(memory, NOTHING * scale, wall_on_circle(circle, zero)[0], 0.0, zero, zero)
+            _keep_peak(memory, NOTHING * scale, undamped_stiffness(circle, zero), 0.0, zero, zero)
         at, then = K_t, next_K_t
         K_t, K_value, B_t, B_value = next_K_t, next_K, next_B_t, next_B
         # a smooth maximum of K
@@ -216,15 +225,20 @@ def read_edge(memory: EdgeMemory) -> int:
     """The edge of the loop whose polynomials stand, with its numbers, if nothing on the way is in doubt."""
     if not fill_curve(memory, SHARE, LONGEST, NEAR_END):
         return DOUBTFUL
-    status = _read_flags(memory)
-    if status == RING_OPEN and add_samples_between_corners(memory):
+    for _ in range(ROUNDS):
         status = _read_flags(memory)
-    return DOUBTFUL if status == RING_OPEN else status
+        if status == RING_OPEN and add_samples_between_corners(memory):
+            continue
+        if status == PEAK_IS_NO_EDGE and add_sample(memory, memory.peak[2]):
+            continue
+        break
+    return DOUBTFUL if status in (RING_OPEN, PEAK_IS_NO_EDGE) else status
 
 
 @compiled_apart
 def _read_flags(memory: EdgeMemory) -> int:
-    """`read_edge` from the curve's samples; RING_OPEN where an arc is missing."""
+    """`read_edge` from the curve's samples; RING_OPEN where an arc is missing, PEAK_IS_NO_EDGE where the stiffest
+    wall of the arcs is none of the set."""
     flag_all(memory)
     for i in range(memory.counts[SAMPLES]):
         if memory.samples.flag[i] == HIDDEN:
@@ -237,4 +251,10 @@ def _read_flags(memory: EdgeMemory) -> int:
         return RING_OPEN
     if not read_numbers(memory):
         return DOUBTFUL
-    return FOUND if memory.peak[0] > 0.0 else NO_WALL
+    peak = memory.peak
+    # a maximum of K, or a crossing of B = 0, past which another branch may go
+    if peak[2] == peak[3] and 0.0 < peak[2] < np.inf:
+        flag = edge_flag(memory, peak[2])
+        if flag != EDGE:
+            return PEAK_IS_NO_EDGE if flag == NO_EDGE else DOUBTFUL
+    return FOUND if peak[0] > 0.0 else NO_WALL

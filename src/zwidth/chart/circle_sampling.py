@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.curve import NO_LINE, OF_B, OF_K, zero_between
-from zwidth.chart.loop_polynomials import ZEROS, LoopPolynomials
-from zwidth.chart.roots import divide, find_roots, spread_roots
+from zwidth.chart.loop_polynomials import SPARE, ZEROS, LoopPolynomials
+from zwidth.chart.roots import divide, find_roots, real_root, spread_roots
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import (
     FORCE,
@@ -107,6 +107,30 @@ def _add_roots(out: Features, a0: float, a1: float, a2: float) -> None:
     _add(out, a0 / (a2 * large) if large != 0.0 else 0.0, 0.0)
 
 
+@compiled_lean
+def _add_zeros(out: Features, p: Floats) -> None:
+    """Add the roots of a polynomial in ascending powers of s, to a thousandth of their size."""
+    n = len(p) - 1
+    if n > 3:
+        spread_roots(out.roots[:n])
+        find_roots(p, out.roots[:n], 1e-3)
+        for k in range(n):
+            _add(out, out.roots[k].real, out.roots[k].imag)
+        return
+    a0, a1, a2 = p[0], p[1] if n > 0 else 0.0, p[2] if n > 1 else 0.0
+    if n == 3:
+        root = real_root(p)
+        _add(out, root, 0.0)
+        # the other two: p divided by s - root, from the end at which no digits are lost
+        if abs(root) < 1.0:
+            a2, a1 = p[3], p[2] + p[3] * root
+            a0 = p[1] + a1 * root
+        else:
+            a0 = -p[0] / root
+            a1, a2 = (a0 - p[1]) / root, p[3]
+    _add_roots(out, a0, a1, a2)
+
+
 @compiled_apart
 def fill_computer_features(f: CircleFactors, out: Features) -> None:
     """The points that come from filters and velocity estimate, whatever the plant."""
@@ -143,10 +167,12 @@ def fill_features(f: CircleFactors, polynomials: LoopPolynomials, out: Features)
         bottom += 1
     if bottom > 0:
         _add(out, 0.0, 0.0)
-    spread_roots(out.roots[: top - bottom])
-    find_roots(zeros[bottom : top + 1], out.roots[: top - bottom], 1e-3)
-    for k in range(top - bottom):
-        _add(out, out.roots[k].real, out.roots[k].imag)
+    # one root is s = 1 (z infinite), where a sampled plant has no direct passage
+    rest = polynomials.parts[SPARE]
+    rest[top] = zeros[top]
+    for k in range(top - 1, bottom, -1):
+        rest[k] = rest[k + 1] + zeros[k]
+    _add_zeros(out, rest[bottom + 1 : top + 1])
     _fill_distances(f.radius[0], out)
 
 

@@ -16,13 +16,13 @@ from zwidth.chart.curve import OF_LINE, zero_between
 from zwidth.chart.edge_memory import NONE, OPEN, SAMPLES, SETTLED, EdgeMemory
 from zwidth.chart.edge_samples import edge_flag
 from zwidth.chart.hurwitz import QUOTIENT, combine, deflate
+from zwidth.chart.real_root_lines import line_of, wall_on_line
 from zwidth.chart.roots import divide, find_roots, spread_roots
 from zwidth.chart.wall_samples import EDGE
 from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, CircleFactors, wall_on_circle, wall_with_slopes
 
 Floats = NDArray[np.float64]
-LAST_DIGITS: Final = 1e-14  # of an angle
 NEAR: Final = 0.1  # longest step of Newton's method, as a share of t
 # Where the flags on both sides of a corner are looked at, as a share of t.
 BESIDE_CORNER: Final = 1e-7
@@ -105,31 +105,24 @@ def _same_corner(memory: EdgeMemory, i: int) -> int:
 
 
 @compiled_lean
-def line_of(memory: EdgeMemory, root: float) -> tuple[float, float, float]:
-    """Coefficients a, s, v of  a + s K + v B = 0, the walls with a real root at s = 0 (z = rho) or at infinity
-    (z = -rho); > 0 on the stable side.
-
-    These are the lowest and the highest coefficient of p, which a Hurwitz polynomial has positive.
-    """
-    column = 0 if root == 0.0 else memory.circle.sizes[DEGREE]
-    polynomials = memory.polynomials.coefficients
-    return polynomials[0, column], polynomials[1, column], polynomials[2, column]
-
-
-@compiled_lean
 def _corner_between(memory: EdgeMemory, i: int, j: int) -> tuple[float, float, int]:
     """The t of the corner between an edge sample i and its neighbour j that is none, that of its partner (0 or inf
-    for a real root), and SETTLED or OPEN."""
+    for a real root), and SETTLED or OPEN.
+
+    Several branches may cross there, next to each other: the edge ends at the first one that it meets.
+    """
     circle, samples = memory.circle, memory.samples
     t, K, B = samples.t, samples.K, samples.B
     low, high = min(t[i], t[j]), max(t[i], t[j])
+    corner, partner, found = t[j], 0.0, False
     for root in (0.0, np.inf):
         line = line_of(memory, root)
         at_i, at_j = line[0] + line[1] * K[i] + line[2] * B[i], line[0] + line[1] * K[j] + line[2] * B[j]
         if at_i * at_j < 0.0:
             crossing = zero_between(circle, OF_LINE, line, low, high)
-            if _flag_changes(memory, crossing, t[i], t[j]):
-                return crossing, root, SETTLED
+            nearer = abs(crossing - t[i]) < abs(corner - t[i])
+            if nearer and _flag_changes(memory, crossing, t[i], t[j]):
+                corner, partner, found = crossing, root, True
     dK, dB = K[j] - K[i], B[j] - B[i]
     for k in range(memory.counts[SAMPLES] - 1):
         if k in (i - 1, i, j - 1, j):
@@ -146,8 +139,11 @@ def _corner_between(memory: EdgeMemory, i: int, j: int) -> tuple[float, float, i
         other_share = off / (off - next_off)
         guess = t[i] + share * (t[j] - t[i]), t[k] + other_share * (t[k + 1] - t[k])
         one, other, met = solve_crossing(circle, guess[0], guess[1])
-        if met and low < one < high and _flag_changes(memory, one, t[i], t[j]):
-            return one, other, SETTLED
+        nearer = met and low < one < high and abs(one - t[i]) < abs(corner - t[i])
+        if nearer and _flag_changes(memory, one, t[i], t[j]):
+            corner, partner, found = one, other, True
+    if found:
+        return corner, partner, SETTLED
     return _corner_by_halving(memory, t[i], t[j])
 
 
@@ -221,25 +217,3 @@ def better_conditioned(circle: CircleFactors, one: float, other: float) -> float
     first = (abs(dK) / (abs(dK) + abs(eK)) + abs(dB) / (abs(dB) + abs(eB))) * np.arctan(one)
     second = (abs(eK) / (abs(dK) + abs(eK)) + abs(eB) / (abs(dB) + abs(eB))) * np.arctan(other)
     return one if not first > second else other
-
-
-@compiled_lean
-def wall_on_line(circle: CircleFactors, line: tuple[float, float, float], t: float) -> tuple[float, float]:
-    """The wall where the curve crosses a line of real roots, a + s K + v B = 0, at t.
-
-    On the branch of a mode that the wall hardly moves, walls at two neighbouring double-precision angles are far
-    apart. The rest of the way to the line is taken along the curve's tangent, by less than the angle's last
-    digits. Where the curve changes sides through infinity there is no such wall, and the curve's own is returned.
-    """
-    a, s, v = line
-    K, B, dK, dB = wall_with_slopes(circle, t)
-    theta = 2.0 * np.arctan(t)
-    off, slope = a + s * K + v * B, s * dK + v * dB
-    for beside in (t * (1.0 - LAST_DIGITS), t * (1.0 + LAST_DIGITS)):
-        k, b = wall_on_circle(circle, beside)
-        if not abs(a + s * k + v * b) > abs(off):
-            return K, B
-    step = -off / slope if slope != 0.0 else 0.0
-    if abs(step) <= LAST_DIGITS * theta:
-        return K + step * dK, B + step * dB
-    return K, B

@@ -88,6 +88,18 @@ def zero_between(circle: CircleFactors, of: int, line: Line, low: float, high: f
 
 
 @compiled_lean
+def undamped_stiffness(circle: CircleFactors, t: float) -> float:
+    """K where the curve crosses B = 0, at the t that `zero_between` has found.
+
+    Where B changes slowly along the curve, walls at two neighbouring double-precision t differ by much: the rest
+    of the way is taken along the tangent.
+    """
+    K, B, dK, dB = wall_with_slopes(circle, t)
+    rest = -B * dK / dB
+    return K + rest if abs(rest) < 1e-6 * abs(K) else K
+
+
+@compiled_lean
 def _middle(a: float, b: float) -> float:
     """Middle of two positive numbers, of their logarithms where they are far apart."""
     return float(np.sqrt(a * b)) if max(a, b) > 4.0 * min(a, b) else 0.5 * (a + b)

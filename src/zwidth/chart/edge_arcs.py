@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import CHORD, MINUS, PAIR, PLUS
-from zwidth.chart.corner import line_of, wall_on_line
 from zwidth.chart.curve import OF_LINE, zero_between
 from zwidth.chart.edge_memory import ARCS, CROSSINGS, MOST_ARCS, MOST_PIECES, PIECES, RINGS, SAMPLES, EdgeMemory
 from zwidth.chart.hurwitz import edges_on_line
+from zwidth.chart.real_root_lines import curve_end, line_crossing, line_of, wall_on_line
 from zwidth.chart.wall_samples import EDGE, HIDDEN
 from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, half_angle, velocity_on_circle
@@ -25,44 +25,8 @@ Floats = NDArray[np.float64]
 
 # Corners closer than this share of the set's size are one.
 SAME_CORNER: Final = 1e-7
-# An edge smaller than this share of the whole curve is rounding.
-ROUNDING_SIZE: Final = 1e-9
 # Relative size of a + s K + v B below which its sign is rounding, and below which a wall lies on the line.
 UNSURE_SIDE, ON_LINE = 1e-13, 1e-10
-# Two lines are parallel, or an end of the curve at infinity, where a determinant is this small a share of its
-# terms.
-PARALLEL: Final = 1e-13
-
-
-@compiled_lean
-def curve_end(memory: EdgeMemory, root: float) -> tuple[float, float, bool]:
-    """The wall with a double root at +rho (root 0) or -rho (root inf), and whether there is one; it may be at
-    infinity.
-
-    There the two outermost coefficients of p vanish together: two linear equations.
-    """
-    polynomials, N = memory.polynomials.coefficients, memory.circle.sizes[DEGREE]
-    i, j = (0, 1) if root == 0.0 else (N, N - 1)
-    a, s, v = polynomials[0, i], polynomials[1, i], polynomials[2, i]
-    b, p, q = polynomials[0, j], polynomials[1, j], polynomials[2, j]
-    return _intersection(a, s, v, b, p, q)
-
-
-@compiled_lean
-def line_crossing(memory: EdgeMemory) -> tuple[float, float, bool]:
-    """The wall with roots at +rho and -rho at once, and whether there is one; the lines may be parallel."""
-    a, s, v = line_of(memory, 0.0)
-    b, p, q = line_of(memory, np.inf)
-    return _intersection(a, s, v, b, p, q)
-
-
-@compiled_lean
-def _intersection(a: float, s: float, v: float, b: float, p: float, q: float) -> tuple[float, float, bool]:
-    """K and B with a + s K + v B = 0 and b + p K + q B = 0, and whether there are such."""
-    det = s * q - v * p
-    if abs(det) <= PARALLEL * (abs(s * q) + abs(v * p)) or det == 0.0:
-        return np.nan, np.nan, False
-    return (b * v - a * q) / det, (a * p - b * s) / det, True
 
 
 @compiled_lean
@@ -284,7 +248,7 @@ def join_arcs(memory: EdgeMemory, blur: float) -> bool:
 @compiled_lean
 def _fill_sizes(memory: EdgeMemory) -> None:
     """Extent of each arc, and size of the whole edge."""
-    arcs, samples, T, n = memory.arcs, memory.samples, memory.size[1], memory.counts[SAMPLES]
+    arcs, samples, T = memory.arcs, memory.samples, memory.size[1]
     largest = 0.0
     for k in range(memory.counts[ARCS]):
         K0, B0, extent = arcs.first[k, 0], arcs.first[k, 1], 0.0
@@ -295,36 +259,7 @@ def _fill_sizes(memory: EdgeMemory) -> None:
             extent = max(extent, abs(samples.K[i] - K0) * T, abs(samples.B[i] - B0))
         # a chord that bridges a gap counts however short it is
         arcs.extent[k] = np.inf if arcs.kind[k] == CHORD else extent
-    m, reach = 0, memory.picked[0]
-    for i in range(n):
-        away = max(abs(samples.K[i] * T), abs(samples.B[i]))
-        if np.isfinite(away):
-            reach[m] = away
-            m += 1
-    memory.size[0] = max(largest, ROUNDING_SIZE * _median(reach, m))
-
-
-@compiled_lean
-def _median(values: Floats, n: int) -> float:
-    """The upper median of the first n values, which are put in another order; 0 of none (Hoare's selection)."""
-    low, high, middle = 0, n - 1, n // 2
-    while low < high:
-        pivot = values[(low + high) // 2]
-        i, j = low, high
-        while i <= j:
-            while values[i] < pivot:
-                i += 1
-            while values[j] > pivot:
-                j -= 1
-            if i <= j:
-                values[i], values[j] = values[j], values[i]
-                i += 1
-                j -= 1
-        if j < middle:
-            low = i
-        if i > middle:
-            high = j
-    return float(values[middle]) if n > 0 else 0.0
+    memory.size[0] = largest
 
 
 @compiled_lean

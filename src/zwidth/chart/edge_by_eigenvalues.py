@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.arcs import CHORD, PAIR, PLUS, Arc, Arcs, Wall
 from zwidth.chart.circle_sampling import NEAR_END
-from zwidth.chart.corner import better_conditioned, fill_corners, solve_crossing, wall_on_line
+from zwidth.chart.corner import better_conditioned, fill_corners, solve_crossing
 from zwidth.chart.curve import OF_LINE, zero_between
 from zwidth.chart.edge_arcs import SAME_CORNER, add_line_arcs, fill_line_pieces, fill_pair_arcs, join_arcs
 from zwidth.chart.edge_memory import (
@@ -29,6 +29,7 @@ from zwidth.chart.edge_memory import (
     edge_memory,
 )
 from zwidth.chart.edge_samples import LONGEST, fill_curve, fill_loop, flag_all, walls_again
+from zwidth.chart.real_root_lines import wall_on_line
 from zwidth.chart.tracer import CIRCLE_TOLERANCE, ROOTS, Tracer
 from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.compiled import compiled

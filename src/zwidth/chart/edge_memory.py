@@ -45,6 +45,7 @@ class Samples(NamedTuple):
     """Samples of the curve in ascending order, and the corners between them; memory for n.
 
     t, K, B, flag   (n,)  t = tan(theta/2), the wall, and whether it edges the stable set (`wall_samples`)
+    slope_K, slope_B  (n,)  dK/d ln t and dB/d ln t, to some digits: for `curve_refinement`
     corner          (n,)  state of the corner between this sample and the next: NONE where both flags are alike
     corner_t, corner_partner, corner_K, corner_B  (n,)  its t; that of the other root on the circle, 0 or inf for a
     real
@@ -54,6 +55,8 @@ class Samples(NamedTuple):
     t: Floats
     K: Floats
     B: Floats
+    slope_K: Floats
+    slope_B: Floats
     flag: Small
     corner: Small
     corner_t: Floats
@@ -147,6 +150,8 @@ def edge_memory(loops: LoopTable, most_degree: int, most_samples: int) -> EdgeMe
             t=np.empty(n),
             K=np.empty(n),
             B=np.empty(n),
+            slope_K=np.empty(n),
+            slope_B=np.empty(n),
             flag=np.empty(n, np.int8),
             corner=np.empty(n, np.int8),
             corner_t=np.empty(n),

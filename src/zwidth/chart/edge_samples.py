@@ -13,7 +13,7 @@ from zwidth.chart.circle_sampling import (
     fill_features,
     fill_samples,
 )
-from zwidth.chart.curve import NO_LINE, OF_SLOPE, OF_SLOPE_B, zero_between
+from zwidth.chart.curve_refinement import refine_samples
 from zwidth.chart.edge_memory import CROSSINGS, NONE, SAMPLES, SETTLED, EdgeMemory
 from zwidth.chart.hurwitz import edges_stable_set
 from zwidth.chart.loop_polynomials import fill_computer_polynomials, fill_polynomials
@@ -29,7 +29,6 @@ from zwidth.loop.circle_factors import (
     fill_computer,
     fill_plant,
     wall_on_circle,
-    wall_with_slopes,
 )
 from zwidth.loop.loop_table import LoopTable
 
@@ -38,6 +37,7 @@ Floats = NDArray[np.float64]
 # Steps along the curve for a whole edge, in shares of the distance to its nearest singularity, and the longest.
 SHARE: Final = 0.2
 LONGEST: Final = 0.05
+BESIDE: Final = 1e-6  # share of t over which slopes are taken
 CLOSEST: Final = 1e-9  # share of t within which two places on the curve are one
 
 
@@ -73,47 +73,7 @@ def fill_curve(memory: EdgeMemory, share: float, longest: float, near_end: float
     if not 2 <= n < len(t):
         return False
     walls_again(memory)
-    return _add_excursions(memory)
-
-
-@compiled_lean
-def _add_excursions(memory: EdgeMemory) -> bool:
-    """Add a sample where the curve crosses an axis and comes back between two others; False where memory is full.
-
-    A parabola is farther from its ends by an eighth of its second difference at most: four times that is allowed.
-    """
-    samples, circle, i = memory.samples, memory.circle, 1
-    while i < memory.counts[SAMPLES]:
-        n = memory.counts[SAMPLES]
-        for of, values in ((OF_SLOPE, samples.K), (OF_SLOPE_B, samples.B)):
-            a, b = values[i - 1], values[i]
-            bend = 0.0
-            if i > 1:
-                bend = max(bend, abs(b - 2.0 * a + values[i - 2]))
-            if i < n - 1:
-                bend = max(bend, abs(values[i + 1] - 2.0 * b + a))
-            if not (a * b > 0.0 and min(abs(a), abs(b)) < 0.5 * bend):
-                continue
-            towards = -1.0 if a > 0.0 else 1.0
-            which = 2 + of - OF_SLOPE
-            begins = towards * wall_with_slopes(circle, samples.t[i - 1])[which]
-            ends = towards * wall_with_slopes(circle, samples.t[i])[which]
-            if not (begins > 0.0 and ends < 0.0):
-                continue
-            t = zero_between(circle, of, NO_LINE, samples.t[i - 1], samples.t[i])
-            wall = wall_on_circle(circle, t)
-            if not (wall[which - 2] * a < 0.0 and samples.t[i - 1] < t < samples.t[i]):
-                continue
-            if n + 1 >= len(samples.t):
-                return False
-            for k in range(n, i, -1):
-                samples.t[k], samples.K[k], samples.B[k] = samples.t[k - 1], samples.K[k - 1], samples.B[k - 1]
-            samples.t[i], samples.K[i], samples.B[i] = t, wall[0], wall[1]
-            samples.flag[n], samples.corner[n] = UNKNOWN, NONE
-            memory.counts[SAMPLES] = n + 1
-            break
-        i += 1
-    return True
+    return refine_samples(memory)
 
 
 @compiled_apart
@@ -159,14 +119,37 @@ def add_samples_between_corners(memory: EdgeMemory) -> bool:
             i -= 1
     memory.counts[SAMPLES] = n + added
     walls_again(memory)
-    return True
+    return refine_samples(memory)
+
+
+@compiled_lean
+def add_sample(memory: EdgeMemory, t: float) -> bool:
+    """Add one sample; False where memory is full."""
+    samples, n = memory.samples, memory.counts[SAMPLES]
+    if n + 1 >= len(samples.t):
+        return False
+    i = n
+    while i > 0 and samples.t[i - 1] > t:
+        samples.t[i] = samples.t[i - 1]
+        i -= 1
+    samples.t[i] = t
+    memory.counts[SAMPLES] = n + 1
+    walls_again(memory)
+    return refine_samples(memory)
 
 
 @compiled_lean
 def walls_again(memory: EdgeMemory) -> None:
-    """The walls of samples that stand, not yet flagged."""
-    samples, n = memory.samples, memory.counts[SAMPLES]
+    """The walls of samples that stand, and their slopes, not yet flagged."""
+    samples, beside, n = memory.samples, memory.picked, memory.counts[SAMPLES]
     walls_of_samples(memory.circle, samples.t, n, samples.K, samples.B, memory.lanes)
+    for i in range(n):
+        beside[0, i] = samples.t[i] * (1.0 + BESIDE)
+    walls_of_samples(memory.circle, beside[0], n, beside[1], beside[2], memory.lanes)
+    for i in range(n):
+        samples.slope_K[i] = (beside[1, i] - samples.K[i]) * (1.0 / BESIDE)
+    for i in range(n):
+        samples.slope_B[i] = (beside[2, i] - samples.B[i]) * (1.0 / BESIDE)
     for i in range(n):
         samples.flag[i], samples.corner[i] = UNKNOWN, NONE
 

@@ -167,10 +167,17 @@ def edges_stable_set(polynomials: Floats, N: int, t: float, K: float, B: float, 
 @compiled_lean
 def edges_on_line(polynomials: Floats, N: int, low_end: int, K: float, B: float, room: Floats) -> int:
     """The same for a real root: without the lowest coefficient (low_end 1, root at s = 0) or the highest (0)."""
+    return quotient_flag(polynomials, N, low_end, N - 1, K, B, room)
+
+
+@compiled_lean
+def quotient_flag(polynomials: Floats, N: int, first: int, degree: int, K: float, B: float, room: Floats) -> int:
+    """The same for real roots at s = 0 and infinity: of the polynomial of this degree that is left of p, from its
+    coefficient `first` on."""
     combine(polynomials, N, K, B, room)
-    for i in range(N):
-        room[2, i], room[3, i] = room[0, i + low_end], room[1, i + low_end]
-    return hurwitz(room, QUOTIENT, N - 1)
+    for i in range(degree + 1):
+        room[2, i], room[3, i] = room[0, i + first], room[1, i + first]
+    return hurwitz(room, QUOTIENT, degree)
 
 
 @compiled_lean

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.compiled import compiled, compiled_apart, compiled_inline
+from zwidth.compiled import compiled, compiled_apart, compiled_inline, compiled_lean
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -64,6 +64,30 @@ def find_roots(p: Floats, roots: Complexes, tolerance: float) -> None:
             largest = max(largest, (abs(step.real) + abs(step.imag)) / (abs(s.real) + abs(s.imag) + 1e-300))
         if largest < tolerance:
             break
+
+
+@compiled_lean
+def real_root(p: Floats) -> float:
+    """A real root of p0 + p1 s + p2 s^2 + p3 s^3, by Cardano's formula and one step of Newton's method.
+
+    p  (4,) ascending coefficients, the last one not 0
+    """
+    a, b, c = p[2] / p[3], p[1] / p[3], p[0] / p[3]
+    third = a / 3.0
+    # s = y - a/3:  y^3 + 3 q y + 2 r = 0
+    q, r = b / 3.0 - third * third, 0.5 * c + third * (third * third - 0.5 * b)
+    under = q * q * q + r * r
+    if under > 0.0:
+        u = np.cbrt(abs(r) + np.sqrt(under))
+        y = q / u - u if r > 0.0 else u - q / u
+    else:
+        size = np.sqrt(-q)
+        y = 2.0 * size * np.cos(np.arccos(min(abs(r) / (size * size * size), 1.0)) / 3.0) if size > 0.0 else 0.0
+        y = -y if r > 0.0 else y
+    s = y - third
+    slope = (3.0 * s + 2.0 * a) * s + b
+    nearer = s - (((s + a) * s + b) * s + c) / slope
+    return float(nearer if abs(nearer - s) < 0.1 * abs(s) else s)
 
 
 @compiled
