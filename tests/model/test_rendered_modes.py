@@ -11,7 +11,7 @@ from model_cases import KINDS, some_postures
 from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import rows_response
 from zwidth.loop.loop import Loop
-from zwidth.loop.sections_batch import modal_rows_batch
+from zwidth.loop.sections_batch import section_rows
 from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
 from zwidth.model.posture import solve_posture
 from zwidth.model.reduction import MODELS, reduce_mechanism
@@ -24,7 +24,7 @@ def responses(mechanism, posture, direction, model, damping, encoders="motor", d
     """The sampled plant's response at some points, of all postures by their rows and of each by its loop."""
     controller = Controller(0.0008, delay)
     modes = rendered_modes(mechanism, posture, direction, model, damping, encoders)
-    rows, used = modal_rows_batch(modes, controller)
+    rows, used = section_rows(modes.pairs, controller)
     z = 1.02 * np.exp(1j * np.linspace(0.05, 3.0, 7))
     together = np.array([rows_response(own[:n], delay > 0.0, z) for own, n in zip(rows, used, strict=True)])
     alone = []
@@ -71,7 +71,7 @@ def test_dampers_that_couple_the_modes_are_left_to_the_single_plant():
     direction = np.broadcast_to([1.0, 0.0, 0.0], (2, 3))
     coupled = rendered_modes(mechanism, posture, direction, "full", GivenDamping())
     assert np.isnan(coupled.input).all()
-    assert modal_rows_batch(coupled, Controller(0.001))[1].tolist() == [0, 0]
+    assert section_rows(coupled.pairs, Controller(0.001))[1].tolist() == [0, 0]
     assert np.isfinite(rendered_modes(mechanism, posture, direction, "full", ModalDamping(0.1)).input).all()
 
 
@@ -82,4 +82,4 @@ def test_a_direction_without_motion_has_no_modes():
     still = replace(posture, jacobian=np.zeros_like(posture.jacobian))
     modes = rendered_modes(mechanism, still, np.array([[1.0, 0.0, 0.0]]), "full", ModalDamping(0.05))
     assert np.isnan(modes.input).all()
-    assert modal_rows_batch(modes, Controller(0.001))[1].tolist() == [0]
+    assert section_rows(modes.pairs, Controller(0.001))[1].tolist() == [0]

@@ -11,8 +11,10 @@ import numpy as np
 from zwidth.chart.chart_batch import ChartNumbers, chart_numbers
 from zwidth.loop.loop_table import LoopTable, loop_table
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.sections_batch import modal_rows_batch
+from zwidth.loop.sections_batch import section_rows
+from zwidth.model.coupled_pairs import coupled_pairs
 from zwidth.model.plant_modes import plant_modes
+from zwidth.model.pole_pairs import PolePairs
 from zwidth.model.reduction import Model
 from zwidth.model.rendered_modes import RenderedModes, rendered_modes
 
@@ -39,11 +41,9 @@ def numbers_of_points(point: OperatingPoint, what: int) -> ChartNumbers | None:
 def _tables(point: OperatingPoint) -> Iterator[LoopTable] | None:
     """The loops of all points, flat, some at a time; None as in `numbers_of_points`."""
     model = point.model or "full"
-    if point.response is not None or np.any(point.controller.actuator_time_constant):
+    if point.response is not None:
         return None
-    if point.operator is not None and model != "motor-mass":  # this model holds the operator fixed
-        return None
-    if point.mechanism is None and (point.operator is not None or model != "full" or not point.shape):
+    if point.mechanism is None and (model != "full" or not point.shape):
         return None
     if point.mechanism is not None and point.encoders != "motor" and model != "full":
         return None
@@ -53,10 +53,21 @@ def _tables(point: OperatingPoint) -> Iterator[LoopTable] | None:
         count = int(np.prod(point.shape))
         for first in range(0, count, AT_ONCE):
             piece = flat[first : first + AT_ONCE] if count > AT_ONCE else flat
-            rows, section_count = modal_rows_batch(_modes(piece, model), piece.controller)
+            rows, section_count = section_rows(_pairs(piece, model), piece.controller)
             yield loop_table(rows, section_count, piece.controller)
 
     return tables()
+
+
+def _pairs(point: OperatingPoint, model: Model) -> PolePairs:
+    modes, period = _modes(point, model), np.ravel(point.controller.sampling_period)
+    if point.operator is not None and model != "motor-mass":  # this model holds the operator fixed
+        return coupled_pairs(modes, point.operator, period)
+    if modes.coupled is None or not modes.coupled.any():
+        return modes.pairs
+    rows = np.flatnonzero(modes.coupled)
+    own = period[rows] if len(period) > 1 else period
+    return modes.pairs.with_rows(rows, coupled_pairs(modes.rows(rows), None, own))
 
 
 def _modes(point: OperatingPoint, model: Model) -> RenderedModes:

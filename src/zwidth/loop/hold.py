@@ -17,7 +17,7 @@ from math import cos, exp, expm1, sin, sinh, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.compiled import compiled_lean
+from zwidth.compiled import compiled, compiled_lean
 
 Floats = NDArray[np.float64]
 
@@ -88,58 +88,154 @@ def denominator(decay: float, squared: float, period: float) -> tuple[float, flo
 
 
 Row = tuple[float, float, float, float, float, float, float, float]
+Pair = tuple[float, float]
 
 
 @compiled_lean
-def held_row(decay: float, squared: float, period: float, fraction: float) -> Row:
-    """One second-order mode xi'' + 2 a xi' + w^2 xi = f of unit participation as a row, without actuator lag."""
+def held_row(
+    decay: float, squared: float, position: float, velocity: float, period: float, fraction: float
+) -> Row:
+    """One second-order mode xi'' + 2 a xi' + w^2 xi = f as a row, without actuator lag.
+
+    position, velocity  its share in the reading: position xi + velocity xi'
+    """
     d1, d0 = denominator(decay, squared, period)
-    position, velocity = step_response(decay, squared, period)
-    # Phi_12 = g'(T) and 1 - Phi_22 = 1 - g''(T), read off the mode's own equation
-    back = 2.0 * decay * velocity + squared * position
-    x, v = step_response(decay, squared, (1.0 - fraction) * period)
-    new1, new0 = x, back * x + velocity * v
-    return d1, d0, 0.0, new1, new0, 0.0, position - new1, back * position + velocity * velocity - new0
+    step = step_response(decay, squared, period)
+    new1, new0 = _numerator(
+        decay, squared, step, step_response(decay, squared, (1.0 - fraction) * period), position, velocity
+    )
+    whole1, whole0 = _numerator(decay, squared, step, step, position, velocity)
+    return d1, d0, 0.0, new1, new0, 0.0, whole1 - new1, whole0 - new0
+
+
+@compiled_lean
+def _numerator(decay: float, squared: float, step: Pair, response: Pair, position: float, velocity: float) -> Pair:
+    """Coefficients of d and 1 of  c adj(d - E) V,  c = [position, velocity].
+
+    It is what a force leaves that has brought the mode to V within an interval.
+
+    step      position g and velocity g' after a whole interval of unit force, which E = Phi - 1 consists of:
+              Phi_12 = g', and by the mode's own equation 1 - Phi_22 = 2 a g' + w^2 g, Phi_21 = -w^2 g'
+    response  V
+    """
+    g, dg = step
+    x, v = response
+    back = 2.0 * decay * dg + squared * g
+    return (
+        position * x + velocity * v,
+        position * (back * x + dg * v) + velocity * squared * (g * v - dg * x),
+    )
+
+
+@compiled_lean
+def lagged_row(
+    decay: float, squared: float, position: float, velocity: float, period: float, fraction: float, lag: float
+) -> Row:
+    """The same row of a mode whose force lags, in front of the factor 1/(d + s).
+
+    With P the mode's state after T from a unit lagged force without command, Q from a unit command from rest, and
+    Q_new from one that has acted for the rest of the interval only:
+
+        (d + s) y = c Q + c (d - E)^-1 [ s P + (s + E) Q ]
+    """
+    d1, d0 = denominator(decay, squared, period)
+    if lag == 0.0:  # s = 1, beside modes of other computers whose forces lag
+        row = held_row(decay, squared, position, velocity, period, fraction)
+        n1, n0, o1, o0 = row[3], row[4], row[6], row[7]
+        return d1, d0, n1, n1 + n0, n0, o1, o1 + o0, o0
+    g, dg = step_response(decay, squared, period)
+    p, whole = _lagged_responses(decay, squared, period, lag)
+    _, new = _lagged_responses(decay, squared, (1.0 - fraction) * period, lag)
+    late, late_new = -expm1(-period / lag), -expm1(-(1.0 - fraction) * period / lag)
+    n2, n1, n0 = _lagged_numerator(decay, squared, (g, dg), p, new, late, late_new, position, velocity)
+    a2, a1, a0 = _lagged_numerator(decay, squared, (g, dg), p, whole, late, late, position, velocity)
+    n1, n0, a1, a0 = n1 + n2 * d1, n0 + n2 * d0, a1 + a2 * d1, a0 + a2 * d0
+    return d1, d0, n2, n1, n0, a2 - n2, a1 - n1, a0 - n0
+
+
+@compiled_lean
+def _lagged_numerator(
+    decay: float,
+    squared: float,
+    step: Pair,
+    p: Pair,
+    q: Pair,
+    late: float,
+    late_q: float,
+    position: float,
+    velocity: float,
+) -> tuple[float, float, float]:
+    """c q, and the coefficients of d and 1 of  c adj(d - E) [ late_q P + (late + E) q ]."""
+    g, dg = step
+    x, v = q
+    back = 2.0 * decay * dg + squared * g
+    moved = (
+        late_q * p[0] + late * x - squared * g * x + dg * v,
+        late_q * p[1] + late * v - squared * dg * x - back * v,
+    )
+    n1, n0 = _numerator(decay, squared, step, moved, position, velocity)
+    return position * x + velocity * v, n1, n0
+
+
+@compiled_lean
+def _lagged_responses(decay: float, squared: float, time: float, lag: float) -> tuple[Pair, Pair]:
+    """Position and velocity of a mode after `time`: from a unit lagged force without command, and from rest under
+    a unit command through the lag.
+
+    The exponential of [position, velocity t, force, command] over times in units of t, by Taylor's series for a
+    part of the interval that is then doubled. With the exponential as 1 + X, doubling is X -> 2 X + X^2: nothing
+    is lost in the 1.
+    """
+    if time == 0.0:
+        return (0.0, 0.0), (0.0, 0.0)
+    rate, w, a = time / lag, squared * time * time, 2.0 * decay * time
+    size, halvings = max(abs(w) + abs(a) + 1.0, 2.0 * rate), 0
+    while size > 0.5:
+        size *= 0.5
+        halvings += 1
+    h = 0.5**halvings
+    # columns of the force (f) and the command (c), and of the mode's own two states (x, v): rows x, v, f
+    xf, vf, ff, xc, vc, fc = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    xx, vx, xv, vv = 0.0, 0.0, 0.0, 0.0
+    for k in range(16, 0, -1):  # Horner's rule for 1 + M/1 (1 + M/2 (1 + ...)), less the first 1
+        s = h / k
+        xf, vf, ff = s * vf, s * (-w * xf - a * vf + 1.0 + ff), -s * rate * (1.0 + ff)
+        xc, vc, fc = s * vc, s * (-w * xc - a * vc + fc), s * rate * (1.0 - fc)
+        xx, vx = s * vx, s * (-w * (1.0 + xx) - a * vx)
+        xv, vv = s * (1.0 + vv), s * (-w * xv - a * (1.0 + vv))
+    for _ in range(halvings):
+        xc, vc, fc = (
+            2.0 * xc + xx * xc + xv * vc + xf * fc,
+            2.0 * vc + vx * xc + vv * vc + vf * fc,
+            2.0 * fc + ff * fc,
+        )
+        xf, vf, ff = (
+            2.0 * xf + xx * xf + xv * vf + xf * ff,
+            2.0 * vf + vx * xf + vv * vf + vf * ff,
+            2.0 * ff + ff * ff,
+        )
+        xx, vx, xv, vv = (
+            2.0 * xx + xx * xx + xv * vx,
+            2.0 * vx + vx * xx + vv * vx,
+            2.0 * xv + xx * xv + xv * vv,
+            2.0 * vv + vx * xv + vv * vv,
+        )
+    return (xf * time * time, vf * time), (xc * time * time, vc * time)
 
 
 def modal_row(decay: float, squared: float, period: float, fraction: float = 0.0, lag: float = 0.0) -> Floats:
-    """One mode's row as an array (8,), with or without actuator lag."""
-    if lag == 0.0:
-        return np.array(held_row(decay, squared, period, fraction))
-    T, rest = period, (1.0 - fraction) * period
-    position, velocity = step_response(decay, squared, T)
-    back = 2.0 * decay * velocity + squared * position
-    p, q, q_new = _lagged_responses(decay, squared, T, rest, lag)
-    s = lag_share(T, lag)
-
-    def numerator(response: Floats, share: float) -> Floats:
-        drift = back * response[0] + velocity * response[1]
-        return np.array(
-            [
-                response[0],
-                s * response[0] + drift + share * p[0],
-                s * drift + share * (back * p[0] + velocity * p[1]),
-            ]
-        )
-
-    new, whole = numerator(q_new, lag_share(rest, lag)), numerator(q, s)
-    return np.array([*denominator(decay, squared, T), *new, *(whole - new)])
+    """One mode of unit participation as a row (8,), with or without actuator lag."""
+    row = np.empty(8)
+    _fill_row(decay, squared, period, fraction, lag, row)
+    return row
 
 
-def _lagged_responses(
-    decay: float, squared: float, period: float, rest: float, lag: float
-) -> tuple[Floats, Floats, Floats]:
-    """Position and velocity of a mode after T: from a unit lagged force without command, from rest under a unit
-    command through the lag; and the latter after `rest`.
-
-    By the exponential of [position, velocity T, force, command] over time in units of T.
-    """
-    from scipy.linalg import expm
-
-    T, r = period, period / lag
-    M = np.array(
-        [[0.0, 1.0, 0.0, 0.0], [-squared * T * T, -2.0 * decay * T, 1.0, 0.0], [0.0, 0.0, -r, r], [0.0] * 4]
-    )
-    full, part = expm(np.stack([M, M * (rest / T)]))
-    units = np.array([T * T, T])
-    return full[:2, 2] * units, full[:2, 3] * units, part[:2, 3] * units
+@compiled
+def _fill_row(decay: float, squared: float, period: float, fraction: float, lag: float, row: Floats) -> None:
+    """`modal_row` in memory of the caller."""
+    if lag > 0.0:
+        values = lagged_row(decay, squared, 1.0, 0.0, period, fraction, lag)
+    else:
+        values = held_row(decay, squared, 1.0, 0.0, period, fraction)
+    for k in range(8):
+        row[k] = values[k]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.compiled import compiled
 from zwidth.model.design_axes import design_shape
@@ -18,24 +19,28 @@ STILL = 1e-14  # share of the largest damping below which a mode's own is roundi
 def plant_modes(plant: Plant) -> RenderedModes:
     """The modes of each of N designs of a plant, in the form of those of a mechanism's postures.
 
-    Returns  nan as input where a plant is to be looked at alone: damping that couples the modes, or lags; a loss
-             factor; two modes of one frequency; two free motions with damping; masses that are not positive
+    Returns  with `drag`, and as coupled also two modes of one frequency or two free motions with damping; nan as
+             input where a plant is to be looked at alone: dampers that lag, a loss factor, masses that are not
+             positive
     """
     shape = design_shape(plant)
     N, n = int(np.prod(shape)), plant.size
     M, B, K = (_flat(each, shape, 2) for each in (plant.mass, plant.damping, plant.stiffness))
     actuator, sensor = (_flat(each, shape, 1) for each in (plant.actuator, plant.sensor))
-    decay, squared, enter, leave = (np.empty((N, n)) for _ in range(4))
+    handle = np.full((N, n), np.nan) if plant.handle is None else _flat(plant.handle, shape, 1)
+    drag, coupled = np.full((N, n, n), np.nan), np.zeros(N, dtype=np.bool_)
+    decay, squared, enter, leave, held = (np.full((N, n), np.nan) for _ in range(5))
+    modes = RenderedModes(decay, squared, enter, leave, held, drag, coupled)
     if plant.lagged_dampers or plant.hysteresis is not None:
-        for numbers in (decay, squared, enter, leave):
-            numbers.fill(np.nan)
-        return RenderedModes(decay, squared, enter, leave)
+        return modes
 
     def several(first: int, last: int) -> None:
-        _modes(M, B, K, actuator, sensor, decay, squared, enter, leave, first, last)
+        _modes(
+            M, B, K, actuator, sensor, handle, decay, squared, enter, leave, held, drag, coupled, first, last,
+        )  # fmt: skip
 
     in_chunks(several, N)
-    return RenderedModes(decay, squared, enter, leave)
+    return modes
 
 
 def _flat(array: Floats, shape: tuple[int, ...], own: int) -> Floats:
@@ -51,19 +56,22 @@ def _modes(
     stiffness: Floats,
     actuator: Floats,
     sensor: Floats,
+    handle: Floats,
     decay: Floats,
     squared: Floats,
     enter: Floats,
     leave: Floats,
+    held: Floats,
+    drag: Floats,
+    coupled: NDArray[np.bool_],
     first: int,
     last: int,
 ) -> None:
     """Modes of plants first to last - 1, as in `plant_modes`."""
     n = mass.shape[1]
     root, A, V, shapes = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-    damper = np.empty(n)
     for i in range(first, last):
-        alone = not cholesky(mass[i], root)
+        positive, together = cholesky(mass[i], root), False
         relative(root, stiffness[i], A)
         jacobi(A, V)
         # mass-normalised shapes: the columns of root^-T V
@@ -81,26 +89,27 @@ def _modes(
             value = A[k, k]
             squared[i, k] = 0.0 if abs(value) <= RIGID * max(scale, 2.3e-308) else value
             for j in range(k):
-                alone = alone or abs(A[k, k] - A[j, j]) <= REPEATED * scale
+                together = together or abs(A[k, k] - A[j, j]) <= REPEATED * scale
             for j in range(k + 1):
                 value = 0.0
                 for r in range(n):
                     for s in range(n):
                         value += shapes[r, k] * damping[i, r, s] * shapes[s, j]
-                if j == k:
-                    damper[k] = value
-                else:
-                    off = max(off, abs(value))
+                drag[i, k, j] = drag[i, j, k] = value
+                off = off if j == k else max(off, abs(value))
                 largest = max(largest, abs(value))
-        alone = alone or off > REPEATED * largest
         for k in range(n):
-            decay[i, k] = 0.0 if abs(damper[k]) <= STILL * largest else 0.5 * damper[k]
+            for j in range(n):
+                drag[i, k, j] = 0.0 if abs(drag[i, k, j]) <= STILL * largest else drag[i, k, j]
+            decay[i, k] = 0.5 * drag[i, k, k]
             free += squared[i, k] == 0.0 and decay[i, k] != 0.0
-            enter[i, k], leave[i, k] = 0.0, 0.0
+            enter[i, k], leave[i, k], held[i, k] = 0.0, 0.0, 0.0
             for r in range(n):
                 enter[i, k] += shapes[r, k] * actuator[i, r]
                 leave[i, k] += shapes[r, k] * sensor[i, r]
-        if alone or free > 1:
+                held[i, k] += shapes[r, k] * handle[i, r]
+        coupled[i] = together or free > 1 or off > REPEATED * largest
+        if not positive:
             for k in range(n):
                 enter[i, k] = np.nan
 

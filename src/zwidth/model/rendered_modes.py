@@ -13,7 +13,7 @@ whole plant is ever decomposed; `reduction` and `modes` say the same of one post
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
 from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, inverse_form
 from zwidth.model.mechanism import Ints, Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
+from zwidth.model.pole_pairs import PolePairs
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import Encoders, Model
 from zwidth.threads import in_chunks
@@ -36,13 +37,32 @@ class RenderedModes:
 
     decay              (N, m)  a [1/s]
     frequency_squared  (N, m)  w^2 [1/s^2]; 0 for the free motion
-    input, output  (N, m)  [kg^-1/2]; nan where a posture is not OK or the handle cannot move along the direction
+    input, output, handle  (N, m)  participation of the wall force, of the reading and of the handle along the
+                           direction [kg^-1/2]; input is nan where a posture is not OK or the handle cannot move
+                           along the direction, handle where there is none
+    drag     (N, m, m)  modal dampers V^T B V [1/s]; None: 2 a on the diagonal, nothing else
+    coupled  (N,)       whether a plant's dampers couple its modes, or may; None: nowhere
     """
 
     decay: Floats
     frequency_squared: Floats
     input: Floats
     output: Floats
+    handle: Floats
+    drag: Floats | None = None
+    coupled: NDArray[np.bool_] | None = None
+
+    @property
+    def pairs(self) -> PolePairs:
+        """The modes as pairs of poles; not those of plants whose dampers couple them."""
+        position = self.input * self.output
+        reach = np.abs(self.input).sum(axis=1) * np.abs(self.output).sum(axis=1)
+        return PolePairs(self.decay, self.frequency_squared, position, np.zeros_like(position), reach)
+
+    def rows(self, rows: Ints) -> RenderedModes:
+        """Those of some of the plants."""
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        return replace(self, **{name: value[rows] for name, value in values.items() if value is not None})
 
 
 def rendered_modes(
@@ -120,21 +140,21 @@ def _of_reduced(numbers: EffectiveParameters, model: Model, coefficients: Floats
     m1, m2 = numbers.link_side_mass.ravel(), numbers.motor_side_mass.ravel()
     k, mass = numbers.stiffness.ravel(), numbers.rigid_mass.ravel()
     if model == "rigid":
-        modes = [(0.5 * r_m + 0.0 * mass, 0.0 * mass, 1.0 / np.sqrt(mass))]
+        modes = [(0.5 * r_m + 0.0 * mass, 0.0 * mass, 1.0 / np.sqrt(mass), 1.0 / np.sqrt(mass))]
     else:
         mu = 1.0 / (1.0 / m1 + 1.0 / m2)
         own = 2.0 * ratio * np.sqrt(k * mu) + r_k * k  # the damper between them
         if model == "motor-mass":
-            modes = [(0.5 * (r_m + own / m2), k / m2, 1.0 / np.sqrt(m2))]
+            modes = [(0.5 * (r_m + own / m2), k / m2, 1.0 / np.sqrt(m2), np.nan * m2)]  # holds the handle fixed
         else:
             free = 1.0 / np.sqrt(m1 + m2)
             modes = [
-                (0.5 * r_m + 0.0 * m1, 0.0 * m1, free),
-                (0.5 * (r_m + own / mu), k / mu, np.sqrt(mu) / m2),
+                (0.5 * r_m + 0.0 * m1, 0.0 * m1, free, free),
+                (0.5 * (r_m + own / mu), k / mu, np.sqrt(mu) / m2, -np.sqrt(mu) / m1),
             ]
-    decay, squared, participation = (np.stack(part, axis=-1) for part in zip(*modes, strict=True))
+    decay, squared, participation, handle = (np.stack(part, axis=-1) for part in zip(*modes, strict=True))
     participation = np.where(np.isfinite(participation) & np.isfinite(squared), participation, np.nan)
-    return RenderedModes(decay, squared, participation, participation.copy())
+    return RenderedModes(decay, squared, participation, participation.copy(), handle)
 
 
 def _of_full(
@@ -153,13 +173,13 @@ def _of_full(
     u = np.broadcast_to(direction, (*shape, 3)).reshape(N, 3)
     h = np.einsum("ni,nid->nd", u, J)
     mass = np.array(np.broadcast_to(posture.mass_matrix, (*shape, d, d)).reshape(N, d, d), order="C")
-    squared, enter, leave = np.empty((N, m)), np.empty((N, m)), np.empty((N, m))
+    squared, enter, leave, held = (np.empty((N, m)) for _ in range(4))
 
     def several(first: int, last: int) -> None:
-        _full_modes(mass, h, design, rotor, spring, encoders == "motor", squared, enter, leave, first, last)
+        _full_modes(mass, h, design, rotor, spring, encoders == "motor", squared, enter, leave, held, first, last)
 
     in_chunks(several, N)
-    return RenderedModes(np.zeros((N, m)), squared, enter, leave)
+    return RenderedModes(np.zeros((N, m)), squared, enter, leave, held)
 
 
 @compiled
@@ -173,6 +193,7 @@ def _full_modes(
     squared: Floats,
     enter: Floats,
     leave: Floats,
+    handle: Floats,
     first: int,
     last: int,
 ) -> None:
@@ -229,9 +250,11 @@ def _full_modes(
                 p = flexible[a]
                 moved += along[i, p] * np.sqrt(spring[p]) * V[a, k] / (w * rotor[p])
             squared[i, k], enter[i, k], leave[i, k] = S[k, k], moved, moved if at_motor else read
+            handle[i, k] = read
         for k in range(f, most):
-            squared[i, k], enter[i, k], leave[i, k] = 0.0, 0.0, 0.0
-        squared[i, most], enter[i, most], leave[i, most] = 0.0, np.sqrt(free), np.sqrt(free)
+            squared[i, k], enter[i, k], leave[i, k], handle[i, k] = 0.0, 0.0, 0.0, 0.0
+        squared[i, most], handle[i, most] = 0.0, np.sqrt(free)
+        enter[i, most], leave[i, most] = np.sqrt(free), np.sqrt(free)
         # a posture with one nan has no modes at all
         known = free > 0.0
         for k in range(most + 1):

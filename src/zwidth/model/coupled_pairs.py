@@ -1,0 +1,381 @@
+"""The poles of many plants whose dampers couple their modes: held by an operator, or by themselves.
+
+In modal coordinates q, with the arm x_a as one more where the grasp is elastic, a plant is
+
+    Q(s) x = (M s^2 + B s + K) x = input f,     y = output x
+
+with symmetric M, B and K: unit masses, the modal dampers and w^2, and the operator's mass, damper and spring along
+the handle's motion. A right vector is a left one, too, so that an eigenvalue p with its vector x gives
+
+    p:  x^T Q(p) x = 0,          P(s) = sum over p of  (output x)(input x) / [ x^T (2 p M + B) x ] / (s - p)
+
+(Lancaster 1966; Tisseur and Meerbergen 2001, section 3). Poles come from the companion matrix to some ten digits;
+inverse iteration with the quadratic above then gives pole and vector to rounding. Conjugate poles make one part of
+second order, real ones two by two.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.model.modes import UNOBSERVED_UNDAMPED
+from zwidth.model.operator import Operator
+from zwidth.model.pole_pairs import PolePairs
+from zwidth.model.rendered_modes import RenderedModes
+from zwidth.threads import in_chunks
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+ITERATIONS: Final = 3
+# Two poles nearer than this share of their size, or a pole whose left and right vectors are this near to
+# orthogonal, may be one double pole: such a plant is looked at alone. A pole below a share of the largest is 0.
+SAME_POLE, SHARED, ZERO = 1e-6, 1e-3, 1e-13
+# A residue below this share of the reach is rounding; between it and UNOBSERVED_UNDAMPED it may be.
+HIDDEN: Final = 1e-14
+# How well the parts must add up to the plant's response, in shares of it, at these shares of half the sampling
+# rate.
+AGREEMENT: Final = 1e-10
+PROBES: Final = (1e-3, 0.03, 0.3, 1.0)
+
+
+def coupled_pairs(modes: RenderedModes, operator: Operator | None, period: ArrayLike) -> PolePairs:
+    """The pole pairs of N plants with coupled modes.
+
+    operator  at the handle: one for all, or with numbers of N designs; None: nobody
+    period    () or (N,)  at which they are sampled [s]: up to half that rate the pairs are held against the plants
+    Returns   nan as reach for a plant that is to be looked at alone: without modes; with a motion that nothing
+              holds or brakes though others move it; with poles that are nearly double
+    """
+    M, B, K, ends, known = _matrices(modes, operator)
+    reach = np.where(known, np.abs(ends).sum(axis=2).prod(axis=0), np.nan)
+    free = _set_aside_free_motions(B, K, ends)
+    N, n = ends.shape[1:]
+    companion = np.zeros((N, 2 * n, 2 * n))
+    companion[:, :n, n:] = np.eye(n)
+    companion[:, n:, :n], companion[:, n:, n:] = -np.linalg.solve(M, K), -np.linalg.solve(M, B)
+    poles = np.linalg.eigvals(companion).astype(np.complex128)
+    decay, squared, position, velocity = (np.zeros((N, n)) for _ in range(4))
+    periods = np.array(np.ravel(period), dtype=np.float64)
+    pairs = PolePairs(decay, squared, position, velocity, reach)
+
+    def several(first: int, last: int) -> None:
+        _fill_pairs(M, B, K, ends, poles, decay, squared, position, velocity, reach, periods, first, last)
+
+    in_chunks(several, N)
+    return pairs.with_free_motion(free) if free.any() else pairs
+
+
+def _matrices(
+    modes: RenderedModes, operator: Operator | None
+) -> tuple[Floats, Floats, Floats, Floats, NDArray[np.bool_]]:
+    """M, B, K (N, n, n), input and output (2, N, n) of each plant, and whether it has modes (N,)."""
+    N, m = modes.decay.shape
+    elastic = operator is not None and not operator.rigid_grasp
+    n = m + elastic
+    M, B, K = (np.zeros((N, n, n)) for _ in range(3))
+    ends = np.zeros((2, N, n))
+    known: NDArray[np.bool_] = np.all(np.isfinite(modes.input + modes.output + modes.decay), axis=1)
+    at, here = np.arange(m), known[:, None]
+    M[:, at, at] = 1.0
+    K[:, at, at] = np.where(here, modes.frequency_squared, 1.0)
+    if modes.drag is None:
+        B[:, at, at] = np.where(here, 2.0 * modes.decay, 0.0)
+    else:
+        B[:, :m, :m] = np.where(here[..., None], modes.drag, 0.0)
+    if operator is not None:
+        known &= np.all(np.isfinite(modes.handle), axis=1)
+        handle = np.where(known[:, None], modes.handle, 0.0)
+        mass, spring, damper = (
+            np.broadcast_to(getattr(operator, f"arm_{part}"), (N,)) for part in ("mass", "stiffness", "damping")
+        )
+        if elastic:
+            known &= mass > 0.0
+            for matrix, number in zip((M, B, K), (mass, damper, spring), strict=True):
+                matrix[:, m, m] = np.where(known, number, 1.0)
+            handle = np.concatenate([handle, np.full((N, 1), -1.0)], axis=1)  # how far the hand slips
+            mass, spring, damper = (
+                np.broadcast_to(0.0 if number is None else number, (N,))
+                for number in (None, operator.grasp_stiffness, operator.grasp_damping)
+            )
+        for matrix, number in zip((M, B, K), (mass, damper, spring), strict=True):
+            matrix += np.asarray(number)[:, None, None] * handle[:, :, None] * handle[:, None, :]
+    ends[0, known, :m], ends[1, known, :m] = modes.input[known], modes.output[known]
+    return M, B, K, ends, known
+
+
+def _set_aside_free_motions(B: Floats, K: Floats, ends: Floats) -> Floats:
+    """Take the motions without stiffness and damping, whose double pole at 0 is known, out of the matrices.
+
+    In them they become springs of their own that nothing moves. Returns their shares in the reading (N,) [1/kg],
+    together.
+    """
+    at = np.arange(K.shape[1])
+    free = ~(np.abs(K).max(axis=2) > 0.0) & ~(np.abs(B).max(axis=2) > 0.0)
+    shares = np.where(free, ends[0] * ends[1], 0.0).sum(axis=1)
+    stiffest = np.abs(K).max(axis=(1, 2), initial=0.0)
+    apart = 2.0 + 0.37 * np.cumsum(free, axis=1)
+    K[:, at, at] = np.where(free, apart * np.maximum(stiffest, 1.0)[:, None], K[:, at, at])
+    ends[:, free] = 0.0
+    return np.asarray(shares)
+
+
+@compiled
+def _fill_pairs(
+    M: Floats,
+    B: Floats,
+    K: Floats,
+    ends: Floats,
+    poles: Complexes,
+    decay: Floats,
+    squared: Floats,
+    position: Floats,
+    velocity: Floats,
+    reach: Floats,
+    periods: Floats,
+    first: int,
+    last: int,
+) -> None:
+    """Parts of plants first to last - 1, those with a finite reach; nan as reach of one that is left alone.
+
+    ends  (2, N, n)  input and output
+    """
+    n = M.shape[1]
+    A, x, p, r = (
+        np.empty((n, n), np.complex128),
+        np.empty(n, np.complex128),
+        np.empty(2 * n, np.complex128),
+        np.empty(2 * n, np.complex128),
+    )
+    for i in range(first, last):
+        if not np.isfinite(reach[i]):
+            continue
+        known, count, largest = True, 0, 0.0
+        for k in range(2 * n):
+            largest = max(largest, abs(poles[i, k]))
+        for k in range(2 * n):
+            if poles[i, k].imag >= 0.0:
+                p[count], r[count], sure = _pole_and_residue(
+                    M[i], B[i], K[i], ends[:, i], poles[i, k], largest, A, x
+                )
+                known = known and sure
+                count += 1
+        parts = decay[i], squared[i], position[i], velocity[i]
+        known = known and _are_apart(p, count) and _join_poles(p, r, count, reach[i], *parts)
+        if known:
+            _settle(M[i], ends[:, i], decay[i], position[i], velocity[i], A, x)
+            highest = np.pi / periods[i if len(periods) > 1 else 0]
+            known = _add_up(M[i], B[i], K[i], ends[:, i], *parts, highest, A, x)
+        if not known:
+            reach[i] = np.nan
+
+
+@compiled_lean
+def _pole_and_residue(
+    M: Floats, B: Floats, K: Floats, ends: Floats, start: complex, largest: float, A: Complexes, x: Complexes
+) -> tuple[complex, complex, bool]:
+    """A pole from close by, its residue, and whether it stands alone; A and x are working memory.
+
+    largest  size of the largest pole
+    """
+    n, p = len(x), complex(start)
+    for k in range(n):
+        x[k] = complex(1.0 + 0.37 * k, 0.0)
+    for _ in range(ITERATIONS):
+        for a in range(n):
+            for b in range(n):
+                A[a, b] = (M[a, b] * p + B[a, b]) * p + K[a, b]
+        solve(A, x)
+        length = 0.0
+        for k in range(n):
+            length = max(length, abs(x[k].real) + abs(x[k].imag))
+        for k in range(n):
+            x[k] = complex(x[k].real / length, x[k].imag / length)
+        inertia, drag, spring = _form(M, x), _form(B, x), _form(K, x)
+        # the root of  inertia p^2 + drag p + spring  that is nearer to p; a real pole stays real
+        half = -0.5 * drag / inertia
+        root = np.sqrt(half * half - spring / inertia)
+        nearer = half + root if abs(half + root - p) < abs(half - root - p) else half - root
+        far = half - root if nearer == half + root else half + root
+        if abs(nearer) < abs(far):  # the smaller root from the product, which keeps its digits
+            nearer = spring / (inertia * far)
+        p = complex(nearer.real, nearer.imag if start.imag != 0.0 else 0.0)
+        if abs(p) <= ZERO * largest:
+            p = complex(0.0, 0.0)
+    slope, size = 2.0 * p * inertia + drag, 0.0
+    enter, leave = complex(0.0, 0.0), complex(0.0, 0.0)
+    for a in range(n):
+        enter, leave = enter + ends[0, a] * x[a], leave + ends[1, a] * x[a]
+        for k in range(n):
+            size += (2.0 * abs(p) * abs(M[a, k]) + abs(B[a, k])) * abs(x[a]) * abs(x[k])
+    sure = abs(slope) > SHARED * size and abs(p - start) <= SAME_POLE * abs(start) + 1e-9 * largest
+    return p, enter * leave / slope, sure
+
+
+@compiled_lean
+def _form(matrix: Floats, x: Complexes) -> complex:
+    """x^T A x."""
+    total = complex(0.0, 0.0)
+    for a in range(len(x)):
+        row = complex(0.0, 0.0)
+        for b in range(len(x)):
+            row += matrix[a, b] * x[b]
+        total += x[a] * row
+    return total
+
+
+@compiled_lean
+def solve(A: Complexes, x: Complexes) -> None:
+    """x = A^-1 x by Gauss with the largest pivot of each column; A is overwritten. A pivot of zero, as at an exact
+    eigenvalue, is taken for a tiny one: the solution then points along the eigenvector."""
+    n = len(x)
+    whole = 0.0
+    for a in range(n):
+        for b in range(n):
+            whole = max(whole, abs(A[a, b]))
+    for c in range(n):
+        best, at = -1.0, c
+        for a in range(c, n):
+            size = abs(A[a, c])
+            if size > best:
+                best, at = size, a
+        if at != c:
+            for b in range(c, n):
+                A[c, b], A[at, b] = A[at, b], A[c, b]
+            x[c], x[at] = x[at], x[c]
+        if best <= 1e-16 * whole:
+            A[c, c] = complex(1e-16 * whole + 1e-300, 0.0)
+        for a in range(c + 1, n):
+            factor = A[a, c] / A[c, c]
+            for b in range(c + 1, n):
+                A[a, b] -= factor * A[c, b]
+            x[a] -= factor * x[c]
+    for c in range(n - 1, -1, -1):
+        for b in range(c + 1, n):
+            x[c] -= A[c, b] * x[b]
+        x[c] = x[c] / A[c, c]
+
+
+@compiled_lean
+def _are_apart(p: Complexes, count: int) -> bool:
+    """Whether no two of the poles are nearly one."""
+    for a in range(count):
+        for b in range(a):
+            if abs(p[a] - p[b]) <= SAME_POLE * max(abs(p[a]), abs(p[b])):
+                return False
+    return True
+
+
+@compiled_lean
+def _join_poles(
+    p: Complexes,
+    r: Complexes,
+    count: int,
+    reach: float,
+    decay: Floats,
+    squared: Floats,
+    position: Floats,
+    velocity: Floats,
+) -> bool:
+    """Parts of second order from poles with Im >= 0 and their residues; False where one is to be looked at alone.
+
+    Parts that the force does not move or the sensor does not read are set to zero.
+    """
+    parts = 0
+    for k in range(count):
+        if p[k].imag > 0.0:
+            a, w2 = -p[k].real, p[k].real * p[k].real + p[k].imag * p[k].imag
+            decay[parts], squared[parts] = a, w2
+            # r/(s - p) + conj: [ 2 Re r s - 2 Re(r conj p) ] / (s^2 + 2 a s + w^2)
+            velocity[parts] = 2.0 * r[k].real
+            position[parts] = -2.0 * (r[k].real * p[k].real + r[k].imag * p[k].imag)
+            share = 2.0 * abs(r[k]) * abs(p[k]) / reach
+            if share <= HIDDEN:
+                velocity[parts], position[parts] = 0.0, 0.0
+            elif share <= UNOBSERVED_UNDAMPED:
+                return False
+            parts += 1
+    # real poles, the fastest first, two by two
+    waiting, waiting_residue, have = 0.0, 0.0, False
+    for _ in range(count):
+        best, at = -1.0, -1
+        for k in range(count):
+            if p[k].imag == 0.0 and abs(p[k]) > best and r[k] == r[k]:
+                best, at = abs(p[k]), k
+        if at < 0:
+            break
+        share = abs(r[at]) * max(abs(p[at]), 1.0) / reach
+        if share <= UNOBSERVED_UNDAMPED:  # half a part cannot be left out
+            return False
+        pole, residue = p[at].real, r[at].real
+        r[at] = complex(np.nan, 0.0)
+        if not have:
+            waiting, waiting_residue, have = pole, residue, True
+            continue
+        decay[parts], squared[parts] = -0.5 * (waiting + pole), waiting * pole
+        velocity[parts] = waiting_residue + residue
+        position[parts] = -(waiting_residue * pole + residue * waiting)
+        parts, have = parts + 1, False
+    return not have
+
+
+@compiled_lean
+def _settle(
+    M: Floats, ends: Floats, decay: Floats, position: Floats, velocity: Floats, A: Complexes, x: Complexes
+) -> None:
+    """Correct the parts by what rounding has left of two sums that are known, which high frequencies hang on:
+
+    P(s) -> output M^-1 input / s^2  as s grows
+
+    sum velocity = 0,       sum (position - 2 a velocity) = output M^-1 input
+    """
+    n, sum_v, sum_x, at_v, at_x = len(x), 0.0, 0.0, 0, 0
+    for a in range(n):
+        x[a] = complex(ends[0, a], 0.0)
+        for b in range(n):
+            A[a, b] = complex(M[a, b], 0.0)
+    solve(A, x)
+    for k in range(n):
+        sum_v += velocity[k]
+        at_v = k if abs(velocity[k]) > abs(velocity[at_v]) else at_v
+    velocity[at_v] -= sum_v
+    for k in range(n):
+        sum_x += position[k] - 2.0 * decay[k] * velocity[k] - ends[1, k] * x[k].real
+        at_x = k if abs(position[k]) > abs(position[at_x]) else at_x
+    position[at_x] -= sum_x
+
+
+@compiled_lean
+def _add_up(
+    M: Floats,
+    B: Floats,
+    K: Floats,
+    ends: Floats,
+    decay: Floats,
+    squared: Floats,
+    position: Floats,
+    velocity: Floats,
+    highest: float,
+    A: Complexes,
+    x: Complexes,
+) -> bool:
+    """Whether the parts' responses add up to the plant's at some frequencies up to the highest [rad/s]."""
+    n = len(x)
+    for share in PROBES:
+        s = complex(0.0, share * highest)
+        for a in range(n):
+            x[a] = complex(ends[0, a], 0.0)
+            for b in range(n):
+                A[a, b] = (M[a, b] * s + B[a, b]) * s + K[a, b]
+        solve(A, x)
+        whole, total = complex(0.0, 0.0), complex(0.0, 0.0)
+        for k in range(n):
+            whole += ends[1, k] * x[k]
+            total += (position[k] + velocity[k] * s) / ((s + 2.0 * decay[k]) * s + squared[k])
+        if not abs(total - whole) <= AGREEMENT * abs(whole):
+            return False
+    return True
