@@ -13,7 +13,6 @@ from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import spectral_radius
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import table_of_loops
 
 
 def test_a_grounded_mass_is_fastest_without_a_spring():
@@ -41,9 +40,7 @@ def a_loop(seed):
 )
 def test_where_a_real_root_is_double_another_is_as_large(seed, positive, low, high):
     loop = a_loop(seed)
-    tracer = Tracer(loop)
-    memory = tracer.circle, tracer.all_polynomials
-    K, B, radius = double_root_wall(table_of_loops(loop), *memory, positive, low, high)
+    K, B, radius = double_root_wall(Tracer(loop), positive, low, high)
     assert low < radius < high
     roots = np.linalg.eigvals(loop.transition_matrix(K, B))
     roots = roots[np.argsort(np.abs(roots - (radius if positive else -radius)))]

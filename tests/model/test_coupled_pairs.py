@@ -12,12 +12,13 @@ from systems import random_operator, random_plant
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.chart_batch import ALL_NUMBERS, STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND
-from zwidth.chart.point_numbers import _pairs, numbers_of_points
+from zwidth.chart.point_numbers import numbers_of_points
 from zwidth.device.load import load
 from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import rows_response
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_loops import pole_pairs_of_points
 from zwidth.loop.sections_batch import section_rows
 from zwidth.model.coupled_pairs import coupled_pairs
 from zwidth.model.damping import ModalDamping
@@ -106,7 +107,7 @@ def test_plants_of_every_kind_respond_like_each_alone(kind):
         }
         controller = Controller(0.0005, 0.4)
         point = OperatingPoint(controller, given_plant=Plant(**joined))
-        rows, used = section_rows(_pairs(point, "full"), controller)
+        rows, used = section_rows(pole_pairs_of_points(point, "full"), controller)
         for k, plant in enumerate(plants):
             count += 1
             if used[k]:

@@ -78,8 +78,8 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
         raise ValueError(f"radius must be a number with 0 < radius <= 1, got {radius:g}")
     tracer = Tracer(loop, radius)
     edge = LoopEdge.of(tracer)
-    fastest = fastest_decay(tracer, edge.traced.outlines) if decay else None
-    in_quadrant = fastest_decay_in_first_quadrant(tracer, edge.traced.outlines, fastest) if decay else None
+    fastest = fastest_decay(tracer, lambda: edge.traced.outlines) if decay else None
+    in_quadrant = fastest_decay_in_first_quadrant(tracer, lambda: edge.traced.outlines, fastest) if decay else None
     return StabilityChart(
         loop=loop,
         radius=radius,

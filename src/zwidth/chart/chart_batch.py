@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from threading import local
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.chart_numbers import read_edge
+from zwidth.chart.decay_search import search_fastest
 from zwidth.chart.edge_memory import (
     AREA,
     DOUBTFUL,
@@ -21,29 +23,33 @@ from zwidth.chart.edge_memory import (
 from zwidth.chart.edge_samples import degree_of, fill_loop
 from zwidth.chart.peak_search import search_peak
 from zwidth.chart.wall_samples import MOST_DEGREE
-from zwidth.compiled import compiled
+from zwidth.compiled import compiled, compiled_lean
 from zwidth.loop.circle_factors import COMPUTER
 from zwidth.loop.loop_table import LoopTable
 from zwidth.threads import in_chunks
 
 Floats = NDArray[np.float64]
 
-# What to compute: only the largest stiffness, or all that a chart's edge tells.
-STIFFEST, ALL_NUMBERS = range(2)
+_OWN: Final = local()  # each thread's working memory for single loops
+
+# What to compute, bits of a mask: the largest stiffness; with it what the whole edge tells, largest damping and
+# area; the fastest decay.
+STIFFEST, WHOLE_EDGE, DECAY = 1, 2, 4
+ALL_NUMBERS: Final = STIFFEST | WHOLE_EDGE
 
 
 @dataclass(frozen=True)
 class ChartNumbers:
-    """Numbers of the charts of N loops; nan where the status is DOUBTFUL.
+    """Numbers of the charts of N loops; nan where the status is DOUBTFUL, and where they were not asked for.
 
     status              (N,)    FOUND; NO_WALL where no wall with K > 0, B >= 0 is stable; DOUBTFUL: to be charted
                                 alone
     stiffness, damping  (N,)    the stiffest wall with K > 0, B >= 0; nan where there is none
     angles              (N, 2)  of the roots on the circle there, ascending; equal except at a corner
-    largest_damping     (N,)    supremum of B >= 0 that is stable for all sufficiently small K > 0; nan if it was
-    not
-                                asked for, as the next
+    largest_damping     (N,)    supremum of B >= 0 that is stable for all sufficiently small K > 0
     area                (N,)    of the set within K >= 0, B >= 0
+    decay_status        (N,)    FOUND; NO_WALL where no wall at all is stable; DOUBTFUL: to be searched alone
+    fastest             (N, 3)  the fastest-decaying wall: stiffness, damping, spectral radius
     """
 
     status: NDArray[np.uint8]
@@ -52,65 +58,100 @@ class ChartNumbers:
     angles: Floats
     largest_damping: Floats
     area: Floats
+    decay_status: NDArray[np.uint8]
+    fastest: Floats
+
+    @property
+    def spectral_radius(self) -> Floats:
+        """(N,) of the fastest-decaying walls."""
+        return self.fastest[:, 2].copy()
+
+
+class _Numbers(NamedTuple):
+    """The arrays of `ChartNumbers`, in the form in which kernels take them."""
+
+    status: NDArray[np.uint8]
+    stiffness: Floats
+    damping: Floats
+    angles: Floats
+    largest_damping: Floats
+    area: Floats
+    decay_status: NDArray[np.uint8]
+    fastest: Floats
 
 
 def chart_numbers(loops: LoopTable, what: int = ALL_NUMBERS) -> ChartNumbers:
-    """The numbers of each loop; one whose sections are none, or whose degree is too high, is DOUBTFUL."""
-    N = len(loops.rows)
-    out = ChartNumbers(np.empty(N, np.uint8), *(np.full(shape, np.nan) for shape in (N, N, (N, 2), N, N)))
-    own = local()
+    """The numbers of each loop; one whose sections are none, or whose degree is too high, is DOUBTFUL.
+
+    what  mask of STIFFEST, WHOLE_EDGE and DECAY
+    """
+    out, own = _empty_numbers(len(loops.rows)), local()
 
     def several(first: int, last: int) -> None:
         if not hasattr(own, "memory"):
             own.memory = edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
-        _several(
-            loops, own.memory, what, 1.0, out.status, out.stiffness, out.damping, out.angles, out.largest_damping,
-            out.area, first, last,
-        )  # fmt: skip
+        _several(loops, own.memory, what, 1.0, out, first, last)
 
-    in_chunks(several, N)
-    return out
+    in_chunks(several, len(loops.rows))
+    return ChartNumbers(*out)
 
 
-def read_first(loops: LoopTable, memory: EdgeMemory, radius: float) -> int:
-    """Status of the first loop, whose edge on |z| = radius is left in `memory`."""
-    out = [np.empty(1) for _ in range(4)]
-    status = np.empty(1, np.uint8)
-    _several(loops, memory, ALL_NUMBERS, radius, status, out[0], out[1], np.empty((1, 2)), out[2], out[3], 0, 1)
-    return int(status[0])
+def read_first(loops: LoopTable, memory: EdgeMemory, what: int, radius: float) -> tuple[int, int]:
+    """Status, and status of the fastest decay, of the first loop on |z| = radius.
+
+    What is not DOUBTFUL is left in `memory`: its edge, if the mask has WHOLE_EDGE and not DECAY, and `fastest`.
+    """
+    out = _empty_numbers(1)
+    _several(loops, memory, what, radius, out, 0, 1)
+    return int(out.status[0]), int(out.decay_status[0])
+
+
+def memory_of(loops: LoopTable) -> EdgeMemory:
+    """This thread's working memory for loops of this size."""
+    sizes = tuple(array.shape[1] for array in (loops.rows, loops.force, loops.velocity, loops.window))
+    if getattr(_OWN, "sizes", None) != sizes:
+        _OWN.sizes, _OWN.memory = sizes, edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
+    memory: EdgeMemory = _OWN.memory
+    return memory
+
+
+def _empty_numbers(count: int) -> _Numbers:
+    status = (np.full(count, DOUBTFUL, dtype=np.uint8) for _ in range(2))
+    numbers = (np.full(shape, np.nan) for shape in (count, count, (count, 2), count, count, (count, 3)))
+    one, other = status
+    stiffness, damping, angles, largest_damping, area, fastest = numbers
+    return _Numbers(one, stiffness, damping, angles, largest_damping, area, other, fastest)
 
 
 @compiled
 def _several(
-    loops: LoopTable,
-    memory: EdgeMemory,
-    what: int,
-    radius: float,
-    status: NDArray[np.uint8],
-    stiffness: Floats,
-    damping: Floats,
-    angles: Floats,
-    largest_damping: Floats,
-    area: Floats,
-    first: int,
-    last: int,
+    loops: LoopTable, memory: EdgeMemory, what: int, radius: float, out: _Numbers, first: int, last: int
 ) -> None:
     """Loops first to last - 1, one after the other, on the circle |z| = radius."""
     memory.circle.sizes[COMPUTER] = -1
     for i in range(first, last):
-        status[i] = DOUBTFUL
-        if loops.section_count[i] == 0 or degree_of(loops, i) > MOST_DEGREE:
-            continue
-        fill_loop(loops, i, radius, memory)
-        if what == STIFFEST:
-            status[i] = search_peak(memory)
-        if status[i] == DOUBTFUL:
-            status[i] = read_edge(memory)
-        if status[i] == DOUBTFUL:
-            continue
-        if what != STIFFEST:
-            largest_damping[i], area[i] = memory.numbers[LARGEST_DAMPING], memory.numbers[AREA]
-        if status[i] == FOUND:
-            stiffness[i], damping[i] = memory.peak[0], memory.peak[1]
-            one, other = 2.0 * np.arctan(memory.peak[2]), 2.0 * np.arctan(memory.peak[3])
-            angles[i, 0], angles[i, 1] = min(one, other), max(one, other)
+        if loops.section_count[i] > 0 and degree_of(loops, i) <= MOST_DEGREE:
+            _fill_numbers(loops, i, memory, what, radius, out)
+
+
+@compiled_lean
+def _fill_numbers(loops: LoopTable, i: int, memory: EdgeMemory, what: int, radius: float, out: _Numbers) -> None:
+    """The numbers of loop i that the mask asks for."""
+    fill_loop(loops, i, radius, memory)
+    status = DOUBTFUL
+    if what & (STIFFEST | WHOLE_EDGE) == STIFFEST:
+        status = search_peak(memory)
+    if what & (STIFFEST | WHOLE_EDGE) and status == DOUBTFUL:
+        status = read_edge(memory)
+        if what & WHOLE_EDGE and status != DOUBTFUL:
+            out.largest_damping[i], out.area[i] = memory.numbers[LARGEST_DAMPING], memory.numbers[AREA]
+    out.status[i] = status
+    if status == FOUND:
+        out.stiffness[i], out.damping[i] = memory.peak[0], memory.peak[1]
+        one, other = 2.0 * np.arctan(memory.peak[2]), 2.0 * np.arctan(memory.peak[3])
+        out.angles[i, 0], out.angles[i, 1] = min(one, other), max(one, other)
+    if what & DECAY:
+        out.decay_status[i] = search_fastest(loops, i, memory)
+        if out.decay_status[i] == FOUND:
+            for c in range(3):
+                out.fastest[i, c] = memory.fastest[c]

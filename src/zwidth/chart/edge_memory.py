@@ -31,6 +31,10 @@ Small = NDArray[np.int8]
 MOST_ARCS: Final = 256
 MOST_PIECES: Final = 256  # of the two lines of real roots
 MOST_SAMPLES: Final = 4096
+# From how many walls a simplex goes down to the fastest-decaying one, and its sizes after each restart, in shares
+# of the cell: the spectral radius has edges and cusps in which a single search stalls.
+STARTS: Final = 2
+SIMPLEX_SIZES: Final = np.array([1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8])
 # What becomes of a loop: a stiffest wall; no stable wall with K > 0, B >= 0; to be charted alone, by eigenvalues.
 FOUND, NO_WALL, DOUBTFUL = range(3)
 # States of a corner.
@@ -107,6 +111,23 @@ class LinePieces(NamedTuple):
     crossing_t: Floats
 
 
+class DecaySearch(NamedTuple):
+    """Working memory of the search for the fastest-decaying wall (`decay_search`).
+
+    starts   (s, 3)  walls K, B from which a simplex goes down, and their spectral radii
+    simplex  (3, 3)  K, B and radius of its corners
+    extent   (2,)    of the edge in K and B
+    least    (2,)    least K and B: none
+    sizes    (r,)    of the simplex after each restart, in shares of the extent
+    """
+
+    starts: Floats
+    simplex: Floats
+    extent: Floats
+    least: Floats
+    sizes: Floats
+
+
 class EdgeMemory(NamedTuple):
     """Working memory for one loop after the other.
 
@@ -116,6 +137,8 @@ class EdgeMemory(NamedTuple):
     peak    (4,)  the stiffest wall so far: stiffness, damping and t of both roots on the circle
     stops   (s,)  dampings at which the edge meets K = 0
     numbers (2,)  largest damping and area
+    fastest (3,)  the fastest-decaying wall so far: stiffness, damping, spectral radius
+    double_root  (2,)  wall of the double root that was tried last
     """
 
     circle: CircleFactors
@@ -134,6 +157,9 @@ class EdgeMemory(NamedTuple):
     peak: Floats
     stops: Floats
     numbers: Floats
+    fastest: Floats
+    double_root: Floats
+    search: DecaySearch
     area: AreaMemory
 
 
@@ -182,5 +208,14 @@ def edge_memory(loops: LoopTable, most_degree: int, most_samples: int) -> EdgeMe
         peak=np.empty(4),
         stops=np.empty(2 * MOST_ARCS),
         numbers=np.empty(2),
+        fastest=np.empty(3),
+        double_root=np.empty(2),
+        search=DecaySearch(
+            starts=np.empty((STARTS, 3)),
+            simplex=np.empty((3, 3)),
+            extent=np.empty(2),
+            least=np.full(2, -np.inf),
+            sizes=SIMPLEX_SIZES.copy(),
+        ),
         area=area_memory(),
     )

@@ -56,6 +56,17 @@ def fill_loop(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> No
     memory.size[1] = loops.period[computer]
 
 
+@compiled_lean
+def fill_loop_polynomials(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> None:
+    """The factors and polynomials of loop i on |z| = radius, without its singular points."""
+    circle, computer = memory.circle, loops.computer[i]
+    fill_computer(loops, computer, radius, circle)
+    fill_computer_polynomials(circle, memory.polynomials)
+    fill_plant(loops, i, circle)
+    fill_polynomials(circle, memory.polynomials)
+    circle.sizes[COMPUTER] = -1  # its singular points do not stand
+
+
 @compiled_apart
 def fill_curve(memory: EdgeMemory, share: float, longest: float, near_end: float) -> bool:
     """Samples of the curve with their walls, not yet flagged; False where memory does not hold them.

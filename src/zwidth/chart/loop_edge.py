@@ -4,24 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from threading import local
-from typing import Final
 
 import numpy as np
 import shapely
 
 from zwidth.chart.arcs import Arcs
-from zwidth.chart.chart_batch import read_first
+from zwidth.chart.chart_batch import ALL_NUMBERS, memory_of, read_first
 from zwidth.chart.edge_arcs import SAME_CORNER
 from zwidth.chart.edge_by_eigenvalues import ChartError, arcs_of, closed_rings
-from zwidth.chart.edge_memory import AREA, DOUBTFUL, FOUND, LARGEST_DAMPING, MOST_SAMPLES, EdgeMemory, edge_memory
+from zwidth.chart.edge_memory import AREA, DOUBTFUL, FOUND, LARGEST_DAMPING
 from zwidth.chart.peak import Peak
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
-from zwidth.chart.wall_samples import MOST_DEGREE
-from zwidth.loop.loop_table import LoopTable
-
-_OWN: Final = local()  # each thread's working memory
 
 
 @dataclass(frozen=True)
@@ -46,8 +40,8 @@ class LoopEdge:
     @classmethod
     def of(cls, tracer: Tracer) -> LoopEdge:
         """The edge of a loop on a circle. Raises ChartError if it cannot be closed."""
-        memory = _memory(tracer.table)
-        status = read_first(tracer.table, memory, tracer.radius)
+        memory = memory_of(tracer.table)
+        status, _ = read_first(tracer.table, memory, ALL_NUMBERS, tracer.radius)
         if status == DOUBTFUL:
             arcs, blur = closed_rings(tracer)
             traced = TracedEdge(arcs, {0: tracer})
@@ -88,12 +82,3 @@ def trace_edge(tracer: Tracer, member: int = 0) -> TracedEdge:
     if member == 0:
         return edge
     return TracedEdge(replace(edge.arcs, member=np.full(len(edge.arcs), member)), {member: tracer})
-
-
-def _memory(loops: LoopTable) -> EdgeMemory:
-    """This thread's working memory for loops of this size."""
-    sizes = tuple(array.shape[1] for array in (loops.rows, loops.force, loops.velocity, loops.window))
-    if getattr(_OWN, "sizes", None) != sizes:
-        _OWN.sizes, _OWN.memory = sizes, edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
-    memory: EdgeMemory = _OWN.memory
-    return memory

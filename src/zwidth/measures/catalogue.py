@@ -124,7 +124,6 @@ _MEASURES: Final = (
         "",
         "lower",
         "exact, by D-decomposition",
-        each=True,
     ),
     _measure(
         "closed_forms",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.chart import largest_stiffness, stability_chart
-from zwidth.chart.chart_batch import ALL_NUMBERS, STIFFEST, ChartNumbers
+from zwidth.chart.chart_batch import ALL_NUMBERS, DECAY, STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL, NO_WALL
 from zwidth.chart.point_numbers import numbers_of_points
 from zwidth.loop.operating_point import OperatingPoint
@@ -23,35 +23,42 @@ NONE_STABLE: Final = "no wall with K > 0 and B >= 0 is stable"
 
 def stiffness_max(point: OperatingPoint) -> MeasureValues:
     """Supremum of K over the stable walls with K > 0, B >= 0, of the points' models and loops [N/m]."""
-    return _computed(point, STIFFEST, lambda numbers: numbers.stiffness, _stiffness_max_at, NONE_STABLE)
+    return _computed(point, STIFFEST, "stiffness", _stiffness_max_at, NONE_STABLE)
 
 
 def damping_max(point: OperatingPoint) -> MeasureValues:
     """Supremum of B >= 0 that is stable for all sufficiently small K > 0, of the points [N s/m]; 0 if none is."""
-    return _computed(point, ALL_NUMBERS, lambda numbers: numbers.largest_damping, _damping_max_at)
+    return _computed(point, ALL_NUMBERS, "largest_damping", _damping_max_at)
 
 
 def stable_area(point: OperatingPoint) -> MeasureValues:
     """Area of the stable walls with K >= 0, B >= 0 of the points [N^2 s/m^2]."""
-    return _computed(point, ALL_NUMBERS, lambda numbers: numbers.area, _stable_area_at)
+    return _computed(point, ALL_NUMBERS, "area", _stable_area_at)
+
+
+def fastest_decay(point: OperatingPoint) -> MeasureValues:
+    """Spectral radius of the wall whose slowest motion decays fastest, of the points."""
+    return _computed(point, DECAY, "spectral_radius", _fastest_decay_at, "no wall is stable")
 
 
 def _computed(
     point: OperatingPoint,
     what: int,
-    read: Callable[[ChartNumbers], Floats],
+    number: str,
     alone: Callable[[OperatingPoint], float],
     none_stable: str = "",
 ) -> MeasureValues:
     """A number of all points' charts, computed together (`chart.point_numbers`), and of a point in doubt, or of a
     device whose modes are not in that form, by the chart of each alone.
 
+    number       attribute of `ChartNumbers`
     none_stable  the reason where no wall is stable and there is no number therefore; "": there is one
     """
     numbers = numbers_of_points(point, what)
     if numbers is None:
         return evaluate_pointwise(alone, point)
-    values, found = read(numbers).reshape(point.shape), numbers.status.reshape(point.shape)
+    states = numbers.decay_status if what == DECAY else numbers.status
+    values, found = getattr(numbers, number).reshape(point.shape), states.reshape(point.shape)
     status, why = point.status.copy(), dict[tuple[int, ...], tuple[int, str]]()
     without = (status == OK) & (found == NO_WALL) & bool(none_stable)
     status[without] = NO_VALUE
@@ -81,8 +88,7 @@ def _stable_area_at(point: OperatingPoint) -> float:
     return stability_chart(point.loop, decay=False).stable_area
 
 
-def fastest_decay(point: OperatingPoint) -> float:
-    """Spectral radius of the wall whose slowest motion decays fastest, of one point."""
+def _fastest_decay_at(point: OperatingPoint) -> float:
     wall = stability_chart(point.loop).fastest_decay
     if wall is None:
         raise NoValueError("no wall is stable")

@@ -1,0 +1,233 @@
+"""The fastest-decaying wall of a loop by compiled stages, for one loop and for many.
+
+Mostly the slowest root of that wall is a double real one: it makes the two outermost coefficients of p vanish, K
+and B follow from its radius, and the radius at which another root becomes as large is found on a line. Whether any
+wall decays faster is then read off the curve on a circle that is smaller by a hair: an edge that it has there
+encloses such walls. From the best of them a simplex goes down, until no edge is left.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.circle_sampling import NEAR_END
+from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL, SAMPLES, STARTS, EdgeMemory
+from zwidth.chart.edge_samples import LONGEST, SHARE, fill_curve, fill_loop, fill_loop_polynomials, flag_all
+from zwidth.chart.radius_search import descend, wall_radius
+from zwidth.chart.real_root_lines import curve_end
+from zwidth.chart.roots import polynomial_radius, spread_roots
+from zwidth.chart.wall_samples import EDGE, HIDDEN
+from zwidth.compiled import compiled, compiled_apart, compiled_lean
+from zwidth.loop.circle_factors import DEGREE
+from zwidth.loop.loop_table import LoopTable
+
+Floats = NDArray[np.float64]
+
+# How much faster than the best found, in shares of 1 - radius, the next wall is looked for.
+FASTER: Final = 3e-5
+# Radii at which double roots are tried: 1 - radius from the first of these to the second.
+NEAREST, FARTHEST, RADII = 1e-6, 0.97, 28
+ROUNDS: Final = 12
+# How far the roots of a wall's polynomial, rounded to double precision, may be from its radius: a triple root is
+# split by the cube root of rounding.
+SPLIT: Final = 3e-5
+# How far from the radius found, in shares of 1 - radius, a double root is looked for.
+REACHES: Final = (0.02, 0.1, 0.3)
+PICKS: Final = 14  # walls of an edge between which starts are tried
+
+
+@compiled_apart
+def search_fastest(loops: LoopTable, i: int, memory: EdgeMemory) -> int:
+    """FOUND, with the fastest-decaying wall's K, B and spectral radius in `fastest`; NO_WALL where none is stable;
+    DOUBTFUL where rounding hides it.
+    """
+    fastest = memory.fastest
+    fastest[0], fastest[1], fastest[2] = np.nan, np.nan, np.inf
+    _search_double_roots(loops, i, memory)
+    for _ in range(ROUNDS):
+        radius = 1.0 - (1.0 - fastest[2]) * (1.0 + FASTER) if fastest[2] < 1.0 else 1.0
+        if not radius > 0.0:
+            return FOUND if _keeps_digits(loops, i, memory) else DOUBTFUL
+        edges = _fill_edge_walls(loops, i, radius, memory)
+        if edges < 0:
+            return DOUBTFUL
+        if edges == 0:
+            if not fastest[2] < 1.0:
+                return NO_WALL
+            return FOUND if _keeps_digits(loops, i, memory) else DOUBTFUL
+        if not _search_inside(memory, edges, radius):
+            return DOUBTFUL
+        _refine_at_double_root(loops, i, memory)
+    return DOUBTFUL
+
+
+@compiled_lean
+def _keeps_digits(loops: LoopTable, i: int, memory: EdgeMemory) -> bool:
+    """Whether polynomials on two circles give the fastest wall the radius that was found."""
+    fastest = memory.fastest
+    for radius in (1.0, 0.5 * (1.0 + fastest[2])):
+        fill_loop_polynomials(loops, i, radius, memory)
+        N = memory.circle.sizes[DEGREE]
+        p, roots = memory.room[0, : N + 1], memory.features.roots[:N]
+        spread_roots(roots)
+        value = wall_radius(memory.polynomials.coefficients, radius, fastest[0], fastest[1], p, roots)
+        if not abs(value - fastest[2]) < SPLIT:
+            return False
+    return True
+
+
+@compiled_lean
+def double_root_excess(loops: LoopTable, i: int, root: float, radius: float, memory: EdgeMemory) -> float:
+    """Largest modulus of the other roots less the radius, of the wall with a double root at +radius (root 0) or
+    -radius (inf), which goes into `double_root`; inf where there is none."""
+    fill_loop_polynomials(loops, i, radius, memory)
+    K, B, known = curve_end(memory, root)
+    memory.double_root[0], memory.double_root[1] = K, B
+    if not (known and np.isfinite(K + B)):
+        return np.inf
+    polynomials, N = memory.polynomials.coefficients, memory.circle.sizes[DEGREE]
+    rest, roots, low = memory.room[0, : N - 1], memory.features.roots[: N - 2], 2 if root == 0.0 else 0
+    for k in range(N - 1):
+        rest[k] = polynomials[0, k + low] + K * polynomials[1, k + low] + B * polynomials[2, k + low]
+    spread_roots(roots)
+    return polynomial_radius(rest, radius, roots) - radius
+
+
+@compiled_apart
+def solve_double_root(loops: LoopTable, i: int, root: float, low: float, high: float, memory: EdgeMemory) -> float:
+    """Radius between low and high at which another root is as large as the double one; inf where that does not
+    change sides. Its wall goes into `double_root`. By false position (Illinois; Dowell and Jarratt 1971)."""
+    at_low, at_high = (
+        double_root_excess(loops, i, root, low, memory),
+        double_root_excess(loops, i, root, high, memory),
+    )
+    if not at_low * at_high < 0.0 or not np.isfinite(at_low * at_high):
+        return np.inf
+    last, x = 0, high
+    for _ in range(60):
+        x = (low * at_high - high * at_low) / (at_high - at_low)
+        value = double_root_excess(loops, i, root, x, memory)
+        if abs(value) < 1e-14 or abs(high - low) < 1e-15:
+            break
+        if value * at_high < 0.0:
+            low, at_low = x, value
+            at_high *= 0.5 if last == -1 else 1.0
+            last = -1
+        else:
+            high, at_high = x, value
+            at_low *= 0.5 if last == 1 else 1.0
+            last = 1
+    return x
+
+
+@compiled
+def solve_double_root_alone(loops: LoopTable, root: float, low: float, high: float, memory: EdgeMemory) -> float:
+    """`solve_double_root` of the first loop."""
+    return solve_double_root(loops, 0, root, low, high, memory)
+
+
+@compiled_lean
+def _search_double_roots(loops: LoopTable, i: int, memory: EdgeMemory) -> None:
+    """The wall with a double real root as large as another that decays fastest, into `fastest` if there is one."""
+    fill_loop_polynomials(loops, i, 1.0, memory)
+    if memory.circle.sizes[DEGREE] < 3:
+        return
+    ratio = (FARTHEST / NEAREST) ** (1.0 / (RADII - 1))
+    for root in (0.0, np.inf):
+        before, away, at_before = 1.0 - NEAREST, NEAREST, np.inf
+        for _ in range(RADII):
+            radius = 1.0 - away
+            value = double_root_excess(loops, i, root, radius, memory)
+            # below this radius another root is larger than the double one
+            if at_before <= 0.0 and value > 0.0:
+                _keep_double_root(loops, i, root, radius, before, memory)
+            before, at_before, away = radius, value, away * ratio
+
+
+@compiled_lean
+def _keep_double_root(loops: LoopTable, i: int, root: float, low: float, high: float, memory: EdgeMemory) -> None:
+    """Take the wall that `solve_double_root` finds for the fastest if it decays as fast as the one found."""
+    radius = solve_double_root(loops, i, root, low, high, memory)
+    if radius <= memory.fastest[2] + 1e-12:
+        memory.fastest[0], memory.fastest[1] = memory.double_root[0], memory.double_root[1]
+        memory.fastest[2] = radius
+
+
+@compiled_lean
+def _refine_at_double_root(loops: LoopTable, i: int, memory: EdgeMemory) -> None:
+    """Try the double roots near the radius found: where three roots meet, the search misses them by a cube root of
+    rounding."""
+    if memory.circle.sizes[DEGREE] < 3:
+        return
+    for reach in REACHES:
+        best = memory.fastest[2]
+        away = reach * (1.0 - best)
+        for root in (0.0, np.inf):
+            _keep_double_root(loops, i, root, max(best - away, 1e-6), min(best + away, 1.0), memory)
+
+
+@compiled_lean
+def _fill_edge_walls(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> int:
+    """The walls of the edge on a circle, K and B in `picked[1:]`: their number; -1 where rounding hides one."""
+    fill_loop(loops, i, radius, memory)
+    if not fill_curve(memory, SHARE, LONGEST, NEAR_END):
+        return -1
+    flag_all(memory)
+    samples, walls, n = memory.samples, memory.picked, 0
+    for k in range(memory.counts[SAMPLES]):
+        if samples.flag[k] == HIDDEN:
+            return -1
+        if samples.flag[k] == EDGE:
+            walls[1, n], walls[2, n] = samples.K[k], samples.B[k]
+            n += 1
+    return n
+
+
+@compiled_lean
+def _search_inside(memory: EdgeMemory, edges: int, radius: float) -> bool:
+    """Search among the walls that an edge encloses, from the best middles between its walls: whether one is found
+    that decays faster than the fastest so far, and takes its place."""
+    walls, fastest, search, N = memory.picked, memory.fastest, memory.search, memory.circle.sizes[DEGREE]
+    polynomials = memory.polynomials.coefficients
+    p, roots = memory.room[0, : N + 1], memory.features.roots[:N]
+    for c in range(2):
+        low, high = np.inf, -np.inf
+        for k in range(edges):
+            low, high = min(low, walls[1 + c, k]), max(high, walls[1 + c, k])
+        search.extent[c] = max(high - low, 1e-300)
+    for k in range(STARTS):
+        search.starts[k, 2] = np.inf
+    count = min(edges, PICKS)
+    for a in range(count):
+        for b in range(a, count):
+            i, j = a * (edges - 1) // max(count - 1, 1), b * (edges - 1) // max(count - 1, 1)
+            K, B = 0.5 * (walls[1, i] + walls[1, j]), 0.5 * (walls[2, i] + walls[2, j])
+            spread_roots(roots)
+            _keep_start(search.starts, K, B, wall_radius(polynomials, radius, K, B, p, roots))
+    found = False
+    for k in range(STARTS):
+        start = search.starts[k]
+        if start[2] < np.inf:
+            K, B, value = descend(
+                polynomials, radius, start, search.extent, search.sizes, search.least, p, roots, search.simplex
+            )
+            if value < min(fastest[2], radius):
+                fastest[0], fastest[1], fastest[2] = K, B, value
+                found = True
+    return found
+
+
+@compiled_lean
+def _keep_start(best: Floats, K: float, B: float, value: float) -> None:
+    """Keep a wall with its radius among the best starts (s, 3), the fastest first."""
+    k = len(best)
+    while k > 0 and value < best[k - 1, 2]:
+        k -= 1
+    if k < len(best):
+        for i in range(len(best) - 1, k, -1):
+            for c in range(3):
+                best[i, c] = best[i - 1, c]
+        best[k, 0], best[k, 1], best[k, 2] = K, B, value

@@ -1,0 +1,56 @@
+"""The loops of many operating points as a table, by way of their modes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from zwidth.loop.loop_table import LoopTable, loop_table
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.sections_batch import section_rows
+from zwidth.model.coupled_pairs import coupled_pairs
+from zwidth.model.plant_modes import plant_modes
+from zwidth.model.pole_pairs import PolePairs
+from zwidth.model.reduction import Model
+from zwidth.model.rendered_modes import RenderedModes, rendered_modes
+
+
+def table_of_points(point: OperatingPoint) -> LoopTable | None:
+    """The loops of all points, flat.
+
+    A loop without sections is to be built alone, as `point[i].loop`: its posture is not OK, or its poles are such as
+    compiled code does not treat.
+
+    Returns  None where that holds of every point: a measured response, a given plant of a single design or one that
+             is reduced, encoders on the links in a reduced model
+    """
+    model = point.model or "full"
+    if point.response is not None:
+        return None
+    if point.mechanism is None and (model != "full" or not point.shape):
+        return None
+    if point.mechanism is not None and point.encoders != "motor" and model != "full":
+        return None
+    pairs = pole_pairs_of_points(point.flat if point.shape else point, model)
+    return loop_table(*section_rows(pairs, point.controller), point.controller)
+
+
+def pole_pairs_of_points(point: OperatingPoint, model: Model) -> PolePairs:
+    """The plants of all points along one axis, held by their operator, as pairs of poles."""
+    modes, period = _modes(point, model), np.ravel(point.controller.sampling_period)
+    if point.operator is not None and model != "motor-mass":  # this model holds the operator fixed
+        return coupled_pairs(modes, point.operator, period)
+    if modes.coupled is None or not modes.coupled.any():
+        return modes.pairs
+    rows = np.flatnonzero(modes.coupled)
+    own = period[rows] if len(period) > 1 else period
+    return modes.pairs.with_rows(rows, coupled_pairs(modes.rows(rows), None, own))
+
+
+def _modes(point: OperatingPoint, model: Model) -> RenderedModes:
+    if point.given_plant is not None:
+        return plant_modes(point.given_plant)
+    assert point.mechanism is not None
+    assert point.posture is not None
+    modes = rendered_modes(point.mechanism, point.posture, point.direction, model, point.damping, point.encoders)
+    assert modes is not None  # `table_of_points` has looked at the encoders
+    return modes
