@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.arcs import END_MARGIN
 from zwidth.chart.area import end_value
-from zwidth.chart.curve import NO_LINE, OF_SLOPE, wall_at, zero_between
+from zwidth.chart.curve import NO_LINE, OF_SLOPE, wall_at, walls, zero_between
 from zwidth.compiled import compiled
 from zwidth.loop.circle_factors import CircleFactors, wall_with_slopes
 
@@ -16,10 +16,41 @@ Floats = NDArray[np.float64]
 # Largest distance of a chord from its arc, in shares of the arc's own extent in K and in B.
 CHORD = 1e-6
 MOST_POINTS = 4000
+# How close to an axis the points beside it are, as a share of the angle.
+BESIDE_AXIS = 1e-9
 
 
 @compiled
-def refined_angles(circle: CircleFactors, nodes: Floats, tolerance: float, most: int) -> Floats:
+def dense_points(circle: CircleFactors, t: Floats, ends: Floats) -> tuple[Floats, Floats, Floats]:
+    """Angles strictly between an arc's ends, ascending, with K and B: chords between them stay within CHORD of the
+    arc, and where it crosses K = 0 or B = 0 there is one on either side, close by.
+
+    t     (n,)    ascending tan(theta/2) from end to end
+    ends  (2, 2)  the walls at both ends
+    """
+    n, K_zeros, B_zeros = len(t), sign_changes(circle, t, ends, 0), sign_changes(circle, t, ends, 1)
+    nodes = np.empty(n + 2 * (len(K_zeros) + len(B_zeros)))
+    for i in range(n):
+        nodes[i] = 2.0 * np.arctan(t[i])
+    low, high, count = nodes[0], nodes[n - 1], n
+    for zeros in (K_zeros, B_zeros):
+        for zero in zeros:
+            for share in (1.0 - BESIDE_AXIS, 1.0 + BESIDE_AXIS):
+                theta = share * 2.0 * np.arctan(zero)
+                if low < theta < high:
+                    i = count
+                    while nodes[i - 1] > theta:
+                        nodes[i] = nodes[i - 1]
+                        i -= 1
+                    nodes[i] = theta
+                    count += 1
+    thetas = _refined_angles(circle, nodes[:count], CHORD, MOST_POINTS)
+    K, B = walls(circle, thetas)
+    return thetas, K, B
+
+
+@compiled
+def _refined_angles(circle: CircleFactors, nodes: Floats, tolerance: float, most: int) -> Floats:
     """Angles strictly between the first and last node, each interval cut so that chords stay within tolerance.
 
     The sag of a chord over a step h is h^2/8 times the second derivative; the middle of each interval measures it,

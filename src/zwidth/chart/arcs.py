@@ -75,8 +75,9 @@ class Curve(Protocol):
         Looked for between the angles that found the arc, its ends drawn in by END_MARGIN.
         """
 
-    def dense_angles(self, arc: Arc) -> Floats:
-        """Angles strictly between an arc's ends, from first to last: walls there join to chords on the edge."""
+    def dense_points(self, arc: Arc) -> ArcPoints:
+        """Angles strictly between an arc's ends, from first to last, with K and B: they join to chords on the
+        edge."""
 
     def integral(self, arc: Arc) -> float:
         """Integral of K dB over the part of an arc with K > 0 and B > 0 [N^2 s/m^2]."""
@@ -191,8 +192,7 @@ def sample_arcs(arcs: Arcs, curves: Curves) -> list[ArcPoints]:
             walks.append((np.array([arc.start, arc.end]), np.array([K0, K1]), np.array([B0, B1])))
             continue
         curve = curves[arc.member]
-        thetas = curve.dense_angles(arc)
-        K, B = curve.walls(thetas)
+        thetas, K, B = curve.dense_points(arc)
         walks.append(
             (
                 np.concatenate([[arc.start], thetas, [arc.end]]),

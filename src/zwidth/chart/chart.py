@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,7 @@ from zwidth.chart.edge_by_eigenvalues import decided_trace
 from zwidth.chart.loop_edge import LoopEdge
 from zwidth.chart.peak import Peak
 from zwidth.chart.traced_edge import peak_fields
-from zwidth.chart.tracer import Tracer
+from zwidth.chart.tracer import tracer_of
 from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
@@ -76,7 +76,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     require("loop", loop, Loop)
     if not 0.0 < radius <= 1.0:
         raise ValueError(f"radius must be a number with 0 < radius <= 1, got {radius:g}")
-    tracer = Tracer(loop, radius)
+    tracer = tracer_of(loop, radius)
     edge = LoopEdge.of(tracer)
     fastest = fastest_decay(tracer, lambda: edge.traced.outlines) if decay else None
     in_quadrant = fastest_decay_in_first_quadrant(tracer, lambda: edge.traced.outlines, fastest) if decay else None
@@ -99,13 +99,20 @@ def largest_stiffness(loop: Loop) -> Peak | None:
     Raises  ChartError  as `stability_chart`
     """
     require("loop", loop, Loop)
-    return LoopEdge.of(Tracer(loop)).peak
+    return LoopEdge.of(tracer_of(loop)).peak
 
 
 def boundary_points(
     loop: Loop, count: int = 1000, radius: float = 1.0
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
     """K, B, frequency [Hz] and stable-edge flag at `count` angles spread over (0, pi), denser at low frequency."""
+    thetas, t = _spread_angles(count)
+    K, B, edge = decided_trace(tracer_of(loop, radius), thetas, t)
+    return K, B, thetas * (0.5 / (np.pi * loop.period)), edge
+
+
+@lru_cache(maxsize=8)
+def _spread_angles(count: int) -> tuple[Floats, Floats]:
+    """Angles (count,) in (0, pi), denser at low ones, and tan(theta/2)."""
     thetas = np.pi * np.linspace(0.0, 1.0, count + 2)[1:-1] ** 2
-    K, B, edge = decided_trace(Tracer(loop, radius), thetas)
-    return K, B, thetas / (2.0 * np.pi * loop.period), edge
+    return thetas, np.tan(0.5 * thetas)

@@ -101,7 +101,10 @@ def read_first(loops: LoopTable, memory: EdgeMemory, what: int, radius: float) -
 
     What is not DOUBTFUL is left in `memory`: its edge, if the mask has WHOLE_EDGE and not DECAY, and `fastest`.
     """
-    out = _empty_numbers(1)
+    if not hasattr(_OWN, "numbers"):
+        _OWN.numbers = _empty_numbers(1)
+    out: _Numbers = _OWN.numbers
+    out.status[0] = out.decay_status[0] = DOUBTFUL
     _several(loops, memory, what, radius, out, 0, 1)
     return int(out.status[0]), int(out.decay_status[0])
 

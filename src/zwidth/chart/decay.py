@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.chart_batch import DECAY, memory_of, read_first
-from zwidth.chart.decay_search import REACHES, SPLIT, solve_double_root_alone
+from zwidth.chart.decay_search import REACHES, solve_double_root_alone
 from zwidth.chart.edge_by_eigenvalues import decided_trace
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, SIMPLEX_SIZES, edge_memory
 from zwidth.chart.radius_search import descend_alone, scatter_values
@@ -70,13 +70,9 @@ def fastest_decay(tracer: Tracer, outlines: Callable[[], list[Floats]]) -> Faste
     """
     memory = memory_of(tracer.table)
     _, status = read_first(tracer.table, memory, DECAY, 1.0)
-    if status == FOUND:
-        found = FastestDecay(*memory.fastest.tolist())
-        judged = _decay_by_eigenvalues(tracer.loop, found.stiffness, found.damping)
-        if abs(judged.spectral_radius - found.spectral_radius) < SPLIT:
-            return found if found.spectral_radius < tracer.radius else None
-    elif status != DOUBTFUL:
-        return None
+    if status != DOUBTFUL:
+        found = FastestDecay(*memory.fastest.tolist()) if status == FOUND else None
+        return found if found and found.spectral_radius < tracer.radius else None
     best = _fastest(tracer, outlines(), ALL)
     return _refine_at_double_root(tracer, best, ALL) if best else None
 

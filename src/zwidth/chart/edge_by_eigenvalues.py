@@ -7,7 +7,7 @@ high degree, whose coefficients have lost their digits, the phase along the circ
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from zwidth.chart.edge_memory import (
     PIECES,
     SAMPLES,
     SETTLED,
+    EdgeArcs,
     EdgeMemory,
     edge_memory,
 )
@@ -93,8 +94,31 @@ def closed_rings(tracer: Tracer, extra_angles: Floats | None = None) -> tuple[Ar
 
 def arcs_of(memory: EdgeMemory) -> Arcs:
     """The rings of joined arcs, ring after ring."""
-    arcs, t = memory.arcs, memory.samples.t
-    order = arcs.order[: int(np.count_nonzero(arcs.next_arc[: memory.counts[ARCS]] >= 0))]
+    return arcs_of_rings(rings_of(memory))
+
+
+class EdgeRings(NamedTuple):
+    """A copy of what an `EdgeMemory` holds of the arcs that join to rings.
+
+    arcs  those in use
+    t     of the samples
+    """
+
+    arcs: EdgeArcs
+    t: Floats
+
+
+def rings_of(memory: EdgeMemory) -> EdgeRings:
+    """The rings of joined arcs, as they stand in memory."""
+    arcs, samples = memory.counts[ARCS], memory.counts[SAMPLES]
+    kept = EdgeArcs._make(field[:arcs].copy() for field in memory.arcs)
+    return EdgeRings(kept, memory.samples.t[:samples].copy())
+
+
+def arcs_of_rings(rings: EdgeRings) -> Arcs:
+    """Joined arcs, ring after ring."""
+    arcs, t = rings
+    order = arcs.order[: int(np.count_nonzero(arcs.next_arc >= 0))]
     place = np.empty(MOST_ARCS, dtype=np.int64)
     place[order] = np.arange(len(order))
     start, end = 2.0 * np.arctan(arcs.start[order]), 2.0 * np.arctan(arcs.end[order])
@@ -206,9 +230,14 @@ def decide_flags(tracer: Tracer, thetas: Floats, K: Floats, B: Floats, flags: ND
         flags[:] = flags[sure[np.maximum(np.searchsorted(sure, np.arange(len(flags)), "right") - 1, 0)]]
 
 
-def decided_trace(tracer: Tracer, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """K, B and stable-edge flag at ascending angles in (0, pi), decided by eigenvalues where it must be."""
-    K, B, flags = tracer.trace(thetas)
+def decided_trace(
+    tracer: Tracer, thetas: Floats, t: Floats | None = None
+) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """K, B and stable-edge flag at ascending angles in (0, pi), decided by eigenvalues where it must be.
+
+    t  tan(theta/2) of each, where that is known
+    """
+    K, B, flags = tracer.trace(thetas, t)
     decide_flags(tracer, thetas, K, B, flags)
     return K, B, flags == EDGE
 

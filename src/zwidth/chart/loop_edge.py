@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import shapely
 
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.chart_batch import ALL_NUMBERS, memory_of, read_first
 from zwidth.chart.edge_arcs import SAME_CORNER
-from zwidth.chart.edge_by_eigenvalues import ChartError, arcs_of, closed_rings
+from zwidth.chart.edge_by_eigenvalues import ChartError, EdgeRings, arcs_of_rings, closed_rings, rings_of
 from zwidth.chart.edge_memory import AREA, DOUBTFUL, FOUND, LARGEST_DAMPING
 from zwidth.chart.peak import Peak
 from zwidth.chart.traced_edge import TracedEdge
@@ -23,7 +22,7 @@ class LoopEdge:
     """The edge of one loop's stable set, and what is read off it.
 
     tracer          the loop on the circle
-    arcs            rings of arcs
+    rings           its arcs, as the compiled stages left them or as eigenvalues found them
     blur            share of the set's size to which corners are known
     peak            the stiffest wall with K > 0, B >= 0; None if there is none
     largest_damping [N s/m]
@@ -31,7 +30,7 @@ class LoopEdge:
     """
 
     tracer: Tracer
-    arcs: Arcs
+    rings: EdgeRings | Arcs
     blur: float
     peak: Peak | None
     largest_damping: float
@@ -53,8 +52,13 @@ class LoopEdge:
             peak = Peak(stiffness, damping, angles, (0,) * len(angles))
         numbers = memory.numbers
         return cls(
-            tracer, arcs_of(memory), SAME_CORNER, peak, float(numbers[LARGEST_DAMPING]), float(numbers[AREA])
+            tracer, rings_of(memory), SAME_CORNER, peak, float(numbers[LARGEST_DAMPING]), float(numbers[AREA])
         )
+
+    @cached_property
+    def arcs(self) -> Arcs:
+        """Rings of arcs."""
+        return self.rings if isinstance(self.rings, Arcs) else arcs_of_rings(self.rings)
 
     @cached_property
     def traced(self) -> TracedEdge:
@@ -64,7 +68,7 @@ class LoopEdge:
         traced again, also at the angles of the outline's points.
         """
         edge = TracedEdge(self.arcs, {0: self.tracer})
-        if all(shapely.Polygon(outline).is_valid for outline in edge.outlines):
+        if all(edge.simple):
             return edge
         try:
             arcs, _ = closed_rings(self.tracer, np.concatenate([thetas[1:-1] for thetas, _, _ in edge.arc_points]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import accumulate
 
 import numpy as np
 import shapely
@@ -35,13 +34,18 @@ def outline(arcs: list[ArcPoints]) -> Floats:
 
     An arc's last point is left out where the next one begins, unless they are farther apart than WIDE_CORNER.
     """
-    K, B = np.concatenate([K for _, K, _ in arcs]), np.concatenate([B for _, _, B in arcs])
-    walls = np.column_stack([K, B])
-    after = np.array([*accumulate(len(K) for _, K, _ in arcs)])
-    gaps = np.abs(walls[after - 1] - walls[after % len(walls)])
-    joined = np.all(gaps <= WIDE_CORNER * np.array([np.ptp(K), np.ptp(B)]), axis=1)
-    points = np.delete(walls, after[joined] - 1, axis=0)
-    return np.vstack([points, points[:1]])
+    width, height = (
+        max(np.max(arc[axis]) for arc in arcs) - min(np.min(arc[axis]) for arc in arcs) for axis in (1, 2)
+    )
+    kept = []
+    for (_, K, B), (_, next_K, next_B) in zip(arcs, [*arcs[1:], arcs[0]], strict=True):
+        apart = abs(K[-1] - next_K[0]) > WIDE_CORNER * width or abs(B[-1] - next_B[0]) > WIDE_CORNER * height
+        kept.append(slice(None) if apart else slice(-1))
+    points = np.empty((sum(len(K[keep]) for (_, K, _), keep in zip(arcs, kept, strict=True)) + 1, 2))
+    for axis in (0, 1):
+        np.concatenate([arc[axis + 1][keep] for arc, keep in zip(arcs, kept, strict=True)], out=points[:-1, axis])
+    points[-1] = points[0]
+    return points
 
 
 def signed_area(ring: Floats) -> float:
@@ -50,12 +54,20 @@ def signed_area(ring: Floats) -> float:
     return float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) / 2.0)
 
 
-def simple_rings(outlines: list[Floats]) -> tuple[Floats, ...]:
-    """Outlines as simple counter-clockwise rings; a cell with holes is cut through each of them."""
-    holes = [outline for outline in outlines if signed_area(outline) < 0.0]
-    solid = [outline for outline in outlines if signed_area(outline) > 0.0]
+def simple_rings(outlines: Sequence[Floats], simple: Sequence[bool] | None = None) -> tuple[Floats, ...]:
+    """Outlines as simple counter-clockwise rings; a cell with holes is cut through each of them.
+
+    simple  which outlines are known not to cross themselves; None: not known
+    """
+    areas = [signed_area(outline) for outline in outlines]
+    holes = [outline for outline, area in zip(outlines, areas, strict=True) if area < 0.0]
     rings: list[Floats] = []
-    for outline in solid:
+    for n, outline in enumerate(outlines):
+        if not areas[n] > 0.0:
+            continue
+        if not holes and simple is not None and simple[n]:
+            rings.append(outline)
+            continue
         inside = [hole for hole in holes if shapely.contains_xy(shapely.Polygon(outline), *hole[0])]
         cell = shapely.Polygon(outline, inside)
         if not inside and cell.is_valid:

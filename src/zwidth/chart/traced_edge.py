@@ -9,6 +9,7 @@ from math import nan
 from typing import TypedDict
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from zwidth.chart.arcs import ArcPoints, Arcs, Curves, sample_arcs
@@ -55,6 +56,11 @@ class TracedEdge:
         return [outline([self.arc_points[k] for k in ring]) for ring in self.arcs.rings]
 
     @cached_property
+    def simple(self) -> list[bool]:
+        """Whether each outline does not cross itself."""
+        return [bool(shapely.Polygon(outline).is_valid) for outline in self.outlines]
+
+    @cached_property
     def stiffness_scale(self) -> float:
         """Largest |K| on the edge [N/m]; 0 if there is none."""
         return max((float(np.max(np.abs(outline[:, 0]))) for outline in self.outlines), default=0.0)
@@ -79,7 +85,7 @@ class TracedEdge:
     @cached_property
     def regions(self) -> tuple[Floats, ...]:
         """The cells as simple closed rings (k, 2)."""
-        return simple_rings(self.outlines)
+        return simple_rings(self.outlines, self.simple)
 
     def boundary(self, period: float | Mapping[int, float]) -> tuple[BoundaryArc, ...]:
         """The arcs with their frequencies; period as for `chart_fields`."""

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arc_kernels import CHORD, MOST_POINTS, refined_angles, sign_changes
-from zwidth.chart.arcs import DAMPING, STIFFNESS, Arc, Wall
+from zwidth.chart.arc_kernels import dense_points, sign_changes
+from zwidth.chart.arcs import Arc, ArcPoints, Wall
 from zwidth.chart.area import arc_integral, area_memory
 from zwidth.chart.circle_sampling import (
     MOST_SAMPLES,
@@ -25,15 +25,23 @@ from zwidth.chart.nyquist import phase_flags, terms_along
 from zwidth.chart.wall_samples import EDGE, HIDDEN, MOST_DEGREE, NO_EDGE
 from zwidth.loop.circle_factors import DEGREE, WHOLE_DELAY, WINDOW, CircleFactors, circle_factors
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import LoopTable, table_of_loops
+from zwidth.loop.loop_table import LoopTable
 
 Floats = NDArray[np.float64]
 # A root this near the circle is on neither side of it.
 CIRCLE_TOLERANCE = 1e-9
-# How close to an axis the points beside it are, as a share of the angle.
-BESIDE_AXIS = 1e-9
 RealRoot = Literal["plus", "minus"]
 ROOTS: tuple[RealRoot, RealRoot] = ("plus", "minus")
+
+
+def tracer_of(loop: Loop, radius: float = 1.0) -> Tracer:
+    """The loop on a circle; on the unit circle it is kept with the loop."""
+    if radius != 1.0:
+        return Tracer(loop, radius)
+    if "tracer" not in loop.results:
+        loop.results["tracer"] = Tracer(loop)
+    tracer: Tracer = loop.results["tracer"]
+    return tracer
 
 
 @dataclass(frozen=True)
@@ -47,10 +55,10 @@ class Tracer:
     loop: Loop
     radius: float = 1.0
 
-    @cached_property
+    @property
     def table(self) -> LoopTable:
         """The loop as arrays. Raises what `loop.sections.sampled_sections` raises."""
-        return table_of_loops(self.loop)
+        return self.loop.table
 
     @cached_property
     def circle(self) -> CircleFactors:
@@ -102,25 +110,27 @@ class Tracer:
         zeros = sign_changes(self.circle, t[order].copy(), ends[order].copy(), component)
         return np.asarray(2.0 * np.arctan(zeros))
 
-    def dense_angles(self, arc: Arc) -> Floats:
-        """Angles strictly between an arc's ends, from first to last, with chords within CHORD of the arc; where it
-        crosses K = 0 or B = 0 one on either side, close by."""
-        crossings = np.concatenate([self.zeros(arc, component) for component in (STIFFNESS, DAMPING)])
-        beside = np.concatenate([crossings * (1.0 - BESIDE_AXIS), crossings * (1.0 + BESIDE_AXIS)])
-        low, high = sorted((arc.start, arc.end))
-        nodes = np.unique(np.concatenate([arc.angles, beside[(low < beside) & (beside < high)]]))
-        thetas = refined_angles(self.circle, nodes, CHORD, MOST_POINTS)
-        return thetas if arc.start < arc.end else thetas[::-1].copy()
+    def dense_points(self, arc: Arc) -> ArcPoints:
+        """Angles strictly between an arc's ends, from first to last, with K and B: chords within CHORD of the arc;
+        where it crosses K = 0 or B = 0 one on either side, close by."""
+        t, ends = np.tan(0.5 * arc.angles), np.array([arc.first, arc.last])
+        if arc.start < arc.end:
+            return dense_points(self.circle, t, ends)
+        thetas, K, B = dense_points(self.circle, t[::-1].copy(), ends[::-1].copy())
+        return thetas[::-1], K[::-1], B[::-1]
 
     def integral(self, arc: Arc) -> float:
         """Integral of K dB over the part of an arc with K > 0 and B > 0 [N^2 s/m^2]."""
         first, last = np.array([arc.first, arc.last])
         return arc_integral(self.circle, area_memory(), np.tan(0.5 * arc.angles), first, last)
 
-    def trace(self, thetas: Floats) -> tuple[Floats, Floats, NDArray[np.int8]]:
-        """K, B and flag at ascending angles in (0, pi): EDGE, NO_EDGE, or HIDDEN where eigenvalues must decide."""
+    def trace(self, thetas: Floats, t: Floats | None = None) -> tuple[Floats, Floats, NDArray[np.int8]]:
+        """K, B and flag at ascending angles in (0, pi): EDGE, NO_EDGE, or HIDDEN where eigenvalues must decide.
+
+        t  tan(theta/2) of each, where that is known
+        """
         if not self.is_high_degree:
-            return trace(self.circle, self.polynomials, np.tan(0.5 * thetas))
+            return trace(self.circle, self.polynomials, np.tan(0.5 * thetas) if t is None else t)
         K, B = walls(self.circle, thetas)
         return K, B, self.flags_by_phase(np.column_stack([K, B]), thetas, 0)
 

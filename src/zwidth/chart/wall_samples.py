@@ -40,7 +40,8 @@ MOST_DEGREE: Final = 24
 # Where the rows of the working array begin.
 T, K_, B_, POWER = 0 * LANES, 1 * LANES, 2 * LANES, 3 * LANES
 OUTSIDE, UNSURE, SHARE, RATIO, BEFORE = 4 * LANES, 5 * LANES, 6 * LANES, 7 * LANES, 8 * LANES
-COEFFICIENTS: Final = 9 * LANES
+NUMBER: Final = 9 * LANES
+COEFFICIENTS: Final = 10 * LANES
 ERRORS: Final = COEFFICIENTS + (MOST_DEGREE + 3) * LANES
 LANES_SIZE: Final = ERRORS + (MOST_DEGREE + 3) * LANES
 # and again for the walls themselves
@@ -165,28 +166,36 @@ def flag_walls(
 ) -> None:
     """Flags of walls on the curve at samples t in ascending order: EDGE, NO_EDGE, or HIDDEN where rounding leaves
     it open. A wall at infinity is no edge."""
-    first = 0
-    while first < count:
-        middle = _meeting(polynomials, N, t[first], K[first], B[first])
-        last = min(first + PROBED, count)
-        # the same place serves for its neighbours, as long as probes find it there
-        while last < min(count, first + LANES):
-            if _meeting(polynomials, N, t[last], K[last], B[last]) != middle:
-                break
-            last = min(last + PROBED, count, first + LANES)
-        n = last - first
+    for first in range(0, count, LANES):
+        n = min(LANES, count - first)
         for k in range(n):
             work[T + k] = t[first + k]
         for k in range(n):
             work[K_ + k] = K[first + k]
         for k in range(n):
             work[B_ + k] = B[first + k]
+        _find_negative(polynomials, N, n, work)
+        for k in range(n):
+            flags[first + k] = NO_EDGE if work[OUTSIDE + k] > 0.0 else UNKNOWN
+    at = 0
+    while at < count:
+        n, middle = 0, 0
+        while at < count and n < LANES:
+            if flags[at] == UNKNOWN:
+                # where a division from both ends meets serves for the next samples, too, as long as probes agree
+                if n % PROBED == 0:
+                    meeting = _meeting(polynomials, N, t[at], K[at], B[at])
+                    if n > 0 and meeting != middle:
+                        break
+                    middle = meeting
+                work[T + n], work[K_ + n], work[B_ + n], work[NUMBER + n] = t[at], K[at], B[at], at
+                n += 1
+            at += 1
         _divide_pair(polynomials, N, middle, n, work)
         _hurwitz_lanes(N - 2, n, work)
         for k in range(n):
             unsure = HIDDEN if work[UNSURE + k] > 0.0 else EDGE
-            flags[first + k] = NO_EDGE if work[OUTSIDE + k] > 0.0 else unsure
-        first = last
+            flags[int(work[NUMBER + k])] = NO_EDGE if work[OUTSIDE + k] > 0.0 else unsure
     for k in range(count):
         if flags[k] == HIDDEN:  # with a bound for each entry, or beyond numbers
             flags[k] = edges_stable_set(polynomials, N, t[k], K[k], B[k], room)
@@ -207,6 +216,21 @@ def any_stable(polynomials: Floats, N: int, K: Floats, B: Floats, count: int, wo
     for k in range(count):
         stable += work[OUTSIDE + k] == 0.0 and work[UNSURE + k] == 0.0
     return stable > 0
+
+
+@compiled_lean
+def _find_negative(polynomials: Floats, N: int, n: int, w: Floats) -> None:
+    """OUTSIDE is 1 where a coefficient of p is negative for certain: a wall that edges nothing."""
+    for k in range(n):
+        w[OUTSIDE + k] = 0.0
+    for i in range(N + 1):
+        a, s, v = polynomials[0, i], polynomials[1, i], polynomials[2, i]
+        ra = ROUNDING * abs(a)
+        rs, rv = ROUNDING * (abs(s) + polynomials[3, i]), ROUNDING * (abs(v) + polynomials[4, i])
+        for k in range(n):
+            K, B, outside = w[K_ + k], w[B_ + k], w[OUTSIDE + k]
+            negative = a + K * s + B * v < -(ra + abs(K) * rs + abs(B) * rv)
+            w[OUTSIDE + k] = 1.0 if negative else outside
 
 
 @compiled_lean

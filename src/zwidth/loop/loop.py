@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,8 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.factor_response import factor_response, rows_response, window_response
 from zwidth.loop.filters import Filter, force_path, velocity_estimator
+from zwidth.loop.loop_table import LoopTable, loop_table
+from zwidth.loop.plant_rows import plant_rows
 from zwidth.loop.realisation import StateSpace, realise
 from zwidth.loop.sections import Sections, sampled_sections
 from zwidth.model.argument_checks import require
@@ -44,6 +46,7 @@ class Loop:
 
     plant: Plant
     controller: Controller
+    results: dict[str, Any] = field(init=False, compare=False)  # what several questions share, once it is computed
 
     def __init__(
         self,
@@ -73,6 +76,7 @@ class Loop:
         plant.check_numbers()
         object.__setattr__(self, "plant", plant)
         object.__setattr__(self, "controller", controller)
+        object.__setattr__(self, "results", {})
 
     def __repr__(self) -> str:
         names = ", ".join(self.plant.names) or f"{self.plant.size} coordinates"
@@ -114,6 +118,14 @@ class Loop:
         """The plant between samples, one row per observed pair of poles."""
         lag = self.controller.actuator_time_constant
         return sampled_sections(self.plant, self.period, self.fractional_delay, lag)
+
+    @cached_property
+    def table(self) -> LoopTable:
+        """The loop in the form in which kernels take it. Raises what `sections.sampled_sections` raises."""
+        rows = plant_rows(self.plant, self.controller)
+        if rows is None:
+            rows = self.sections.rows
+        return loop_table(rows[None], np.array([len(rows)]), self.controller)
 
     @cached_property
     def force_path(self) -> Filter:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.controller import Controller, whole_samples
 from zwidth.loop.filters import force_path, velocity_estimator
-from zwidth.loop.loop import Loop
 from zwidth.model.design_axes import design_shape
+
+if TYPE_CHECKING:
+    from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -45,13 +48,14 @@ class LoopTable(NamedTuple):
 
 
 def table_of_loops(*loops: Loop) -> LoopTable:
-    """Loops of any kinds, each with its own computer. Raises what `loop.sections.sampled_sections` raises."""
-    each = [loop.sections.rows for loop in loops]
-    count = np.array([len(rows) for rows in each], dtype=np.int64)
-    table = np.zeros((len(each), count.max(), 9))
-    for line, rows in zip(table, each, strict=True):
-        line[: len(rows)] = rows
-    return _table(table, count, np.arange(len(each)), [loop.controller for loop in loops])
+    """Loops of any kinds, each with its own computer. Raises what `Loop.table` raises."""
+    each = [loop.table for loop in loops]
+    count = np.array([len(table.rows[0]) for table in each], dtype=np.int64)
+    rows = np.zeros((len(each), count.max(), 9))
+    for line, table in zip(rows, each, strict=True):
+        line[: table.rows.shape[1]] = table.rows[0]
+    columns = [computer_columns(loop.controller) for loop in loops]
+    return _table(rows, count, np.arange(len(each)), columns)
 
 
 def loop_table(rows: Floats, section_count: Whole, controller: Controller) -> LoopTable:
@@ -59,63 +63,83 @@ def loop_table(rows: Floats, section_count: Whole, controller: Controller) -> Lo
 
     rows, section_count  as in `LoopTable`
     """
-    several = len(design_shape(controller)) > 0
-    computer = np.arange(len(rows)) if several else np.zeros(len(rows), dtype=np.int64)
-    return _table(rows, section_count, computer, [controller])
+    columns = computer_columns(controller)
+    computer = np.arange(len(rows)) if len(columns.period) > 1 else np.zeros(len(rows), dtype=np.int64)
+    return _table(rows, section_count, computer, [columns])
 
 
-def _table(rows: Floats, section_count: Whole, computer: Whole, controllers: Sequence[Controller]) -> LoopTable:
-    """Controllers in their order, one for each computer or all computers of several designs together."""
-    paths = [force_path(controller) for controller in controllers]
-    estimators = [velocity_estimator(controller) for controller in controllers]
+class ComputerColumns(NamedTuple):
+    """The computers of a controller, one or one for each of its designs: columns of a `LoopTable`."""
+
+    period: Floats
+    whole_delay: Whole
+    split: Whole
+    force: Floats
+    force_count: Whole
+    velocity: Floats
+    velocity_count: Whole
+    window: Floats
+    window_count: Whole
+
+
+def computer_columns(controller: Controller) -> ComputerColumns:
+    """The columns of a controller; those of one without designs are kept for its next loop."""
+    try:
+        return _kept_columns(controller)
+    except TypeError:  # numbers of several designs have no hash
+        return _columns(controller)
+
+
+@lru_cache(maxsize=64)
+def _kept_columns(controller: Controller) -> ComputerColumns:
+    return _columns(controller)
+
+
+def _columns(controller: Controller) -> ComputerColumns:
+    designs = design_shape(controller)
     period, delay = (
-        np.concatenate([np.ravel(value) for value in values])
-        for values in zip(*(_timing(controller) for controller in controllers), strict=True)
+        np.ravel(np.broadcast_to(np.asarray(number, dtype=np.float64), designs))
+        for number in (controller.sampling_period, controller.delay)
     )
-    whole_delay = whole_samples(delay)
-    C = len(period)
-    force, force_count = _factors([(path.numerator, path.denominator) for path in paths], C)
-    velocity, velocity_count = _factors([(each.numerator, each.denominator) for each in estimators], C)
-    window_count = np.array([len(each.window) for each in estimators], dtype=np.int64)
-    window = np.zeros((len(controllers), window_count.max()))
-    for line, each in zip(window, estimators, strict=True):
-        line[: len(each.window)] = each.window
-    if len(controllers) < C:
-        window, window_count = np.repeat(window, C, axis=0), np.repeat(window_count, C)
+    whole_delay, C = whole_samples(delay), len(period)
+    path, estimate = force_path(controller), velocity_estimator(controller)
+    force, velocity = (_factors(each.numerator, each.denominator, C) for each in (path, estimate))
+    return ComputerColumns(
+        period.copy(),
+        whole_delay,
+        (delay - whole_delay > 0.0).astype(np.int64),
+        force,
+        np.full(C, force.shape[1]),
+        velocity,
+        np.full(C, velocity.shape[1]),
+        np.repeat(estimate.window[None], C, axis=0),
+        np.full(C, len(estimate.window)),
+    )
+
+
+def _factors(top: Floats, bottom: Floats, computers: int) -> Floats:
+    """Numerators and denominators (..., k, 3) of several computers side by side, (C, k, 6)."""
+    out = np.zeros((computers, bottom.shape[-2], 6))
+    out[..., :3], out[..., 3:] = top, bottom
+    return out
+
+
+def _table(rows: Floats, section_count: Whole, computer: Whole, columns: Sequence[ComputerColumns]) -> LoopTable:
+    """Plants, and computers one after the other."""
+    joined = columns[0] if len(columns) == 1 else map(_joined, zip(*columns, strict=True))
     return LoopTable(
         np.ascontiguousarray(rows),
         np.asarray(section_count, dtype=np.int64),
         np.asarray(computer, dtype=np.int64),
-        period,
-        whole_delay,
-        (delay - whole_delay > 0.0).astype(np.int64),
-        force,
-        force_count,
-        velocity,
-        velocity_count,
-        window,
-        window_count,
+        *joined,
     )
 
 
-def _timing(controller: Controller) -> tuple[Floats, Floats]:
-    """Sampling periods [s] and delays [samples] of all designs of a controller."""
-    designs = design_shape(controller)
-    return (
-        np.broadcast_to(np.asarray(controller.sampling_period, dtype=np.float64), designs),
-        np.broadcast_to(np.asarray(controller.delay, dtype=np.float64), designs),
-    )
-
-
-def _factors(pairs: list[tuple[Floats, Floats]], computers: int) -> tuple[Floats, Whole]:
-    """Numerators and denominators (..., k, 3) of several computers side by side, and how many factors each has."""
-    counts = np.array([bottom.shape[-2] for _, bottom in pairs], dtype=np.int64)
-    out = np.zeros((computers, counts.max(), 6))
-    if len(pairs) < computers:  # designs of one controller
-        counts = np.repeat(counts, computers)
-        ((top, bottom),) = pairs
-        out[..., :3], out[..., 3:] = top, bottom
-        return out, counts
-    for line, (top, bottom) in zip(out, pairs, strict=True):
-        line[: top.shape[-2], :3], line[: top.shape[-2], 3:] = top, bottom
-    return out, counts
+def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Arrays (C, ...) one after the other; shorter ones are filled up with zeros."""
+    whole = tuple(np.max([part.shape[1:] for part in parts], axis=0)) if parts[0].ndim > 1 else ()
+    out, at = np.zeros((sum(map(len, parts)), *whole), dtype=parts[0].dtype), 0
+    for part in parts:
+        out[(slice(at, at + len(part)), *(slice(n) for n in part.shape[1:]))] = part
+        at += len(part)
+    return out

@@ -17,11 +17,11 @@ from zwidth.model.rendered_modes import RenderedModes, rendered_modes
 def table_of_points(point: OperatingPoint) -> LoopTable | None:
     """The loops of all points, flat.
 
-    A loop without sections is to be built alone, as `point[i].loop`: its posture is not OK, or its poles are such as
-    compiled code does not treat.
+    A loop without sections is to be built alone, as `point[i].loop`: its posture is not OK, or its poles are such
+    as compiled code does not treat.
 
-    Returns  None where that holds of every point: a measured response, a given plant of a single design or one that
-             is reduced, encoders on the links in a reduced model
+    Returns  None where that holds of every point: a measured response, a given plant of a single design or one
+             that is reduced, encoders on the links in a reduced model
     """
     model = point.model or "full"
     if point.response is not None:

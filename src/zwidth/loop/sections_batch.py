@@ -28,7 +28,7 @@ def section_rows(pairs: PolePairs, controller: Controller) -> tuple[Floats, NDAr
     lag = np.array(np.ravel(controller.actuator_time_constant), dtype=np.float64)
 
     def several(first: int, last: int) -> None:
-        _rows(
+        fill_rows(
             pairs.decay, pairs.frequency_squared, pairs.position, pairs.velocity, pairs.reach, period, fraction,
             lag, bool(lag.any()), rows, used, first, last,
         )  # fmt: skip
@@ -38,7 +38,7 @@ def section_rows(pairs: PolePairs, controller: Controller) -> tuple[Floats, NDAr
 
 
 @compiled
-def _rows(
+def fill_rows(
     decay: Floats,
     squared: Floats,
     position: Floats,

@@ -35,7 +35,7 @@ def plant_modes(plant: Plant) -> RenderedModes:
         return modes
 
     def several(first: int, last: int) -> None:
-        _modes(
+        fill_modes(
             M, B, K, actuator, sensor, handle, decay, squared, enter, leave, held, drag, coupled, first, last,
         )  # fmt: skip
 
@@ -50,7 +50,7 @@ def _flat(array: Floats, shape: tuple[int, ...], own: int) -> Floats:
 
 
 @compiled
-def _modes(
+def fill_modes(
     mass: Floats,
     damping: Floats,
     stiffness: Floats,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from zwidth.chart.arcs import DAMPING, END_MARGIN, STIFFNESS, Arc
+from zwidth.chart.arcs import DAMPING, END_MARGIN, STIFFNESS, Arc, ArcPoints
 from zwidth.chart.area import straight_integrals
 from zwidth.chart.several_directions.eigenloci import Loci
 
@@ -52,8 +52,9 @@ class Branch:
         turns = np.flatnonzero(values[1:] * values[:-1] < 0.0)
         return np.array([brentq(value, thetas[k], thetas[k + 1], xtol=1e-300, rtol=1e-14) for k in turns])
 
-    def dense_angles(self, arc: Arc) -> Floats:
-        """Angles strictly between an arc's ends, from first to last, with chords within CHORD of the size."""
+    def dense_points(self, arc: Arc) -> ArcPoints:
+        """Angles strictly between an arc's ends, from first to last, with K and B: chords within CHORD of the
+        size."""
         thetas = arc.angles
         middles = 0.5 * (thetas[1:] + thetas[:-1])
         inner = np.column_stack(self.walls(arc.thetas))
@@ -66,7 +67,8 @@ class Branch:
         steps = [
             np.linspace(a, b, n, endpoint=False) for a, b, n in zip(thetas[:-1], thetas[1:], pieces, strict=True)
         ]
-        return np.concatenate(steps)[1:]
+        between = np.concatenate(steps)[1:]
+        return between, *self.walls(between)
 
     def integral(self, arc: Arc) -> float:
         """Integral of K dB over the part of an arc with K > 0 and B > 0 [N^2 s/m^2], by Gauss's rule."""
