@@ -1,9 +1,13 @@
 """The chart as a competent user would make it without zwidth: by eigenvalues, by python-control, by Jury's test.
 
-All three rasterise walls; each says of every wall whether it is stable.
+The first three rasterise walls; each says of every wall whether it is stable. The last looks for the stiffest wall of
+many plants, by eigenvalues.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -123,3 +127,139 @@ def _raster(A, S, V, K, B):
 def by_jury(plant: Plant, period: float, K, B):
     """Stable or not (len B, len K) on a grid, by Jury's test compiled with numba, a row per thread."""
     return _raster(*characteristic_polynomials(plant, period), np.asarray(K, float), np.asarray(B, float))
+
+
+# The raster of walls from which the stiffest is climbed to: stiffnesses [N/m] and dampings [N s/m].
+STIFFNESSES = np.geomspace(1e-3, 1e10, 53)
+DAMPINGS = np.concatenate([[0.0], np.geomspace(1e-4, 1e6, 81)])
+ROW = 49  # dampings at each stiffness on the way up
+LAST_STEP = 1e-9  # of K
+LARGEST_STACK = 200_000  # matrices in one call of NumPy
+
+
+class SampledPlants(NamedTuple):
+    """D plants of n coordinates under a held force, over one period of each.
+
+    free    (D, 2n, 2n)  transition matrix of [x, v]
+    push    (D, 2n)      what a force of 1 N adds
+    sensor  (D, n)       displacement of the handle by the coordinates
+    period  (D,)         [s]
+    """
+
+    free: np.ndarray
+    push: np.ndarray
+    sensor: np.ndarray
+    period: np.ndarray
+
+
+def observed_part(plant: Plant) -> Plant:
+    """The plant without rigid motions that the sensor does not see and the force does not move.
+
+    Each of these, motions along the wall, is a double root z = 1 whatever the wall, which rounding splits by 1e-8.
+    """
+    from scipy.linalg import null_space
+
+    rigid = null_space(plant.stiffness, rcond=1e-10)
+    unseen = rigid @ null_space((plant.sensor @ rigid)[None, :], rcond=1e-9)
+    if not unseen.size:
+        return plant
+    small = 1e-9 * np.linalg.norm(unseen)
+    assert np.linalg.norm(plant.damping @ unseen) <= small * max(1.0, np.linalg.norm(plant.damping))
+    assert np.linalg.norm(plant.actuator @ unseen) <= small * np.linalg.norm(plant.actuator)
+    others = null_space((plant.mass @ unseen).T)
+    forms = (others.T @ form @ others for form in (plant.mass, plant.damping, plant.stiffness))
+    return Plant(*forms, others.T @ plant.actuator, others.T @ plant.sensor)
+
+
+def sampled_plants(plants: Sequence[tuple[Plant, float]]) -> SampledPlants:
+    """Plants of as many coordinates each, with their sampling periods [s], discretised in one call of SciPy."""
+    from scipy.linalg import expm
+
+    mass, damping, stiffness, actuator, sensor = (
+        np.array([getattr(plant, name) for plant, _ in plants])
+        for name in ("mass", "damping", "stiffness", "actuator", "sensor")
+    )
+    period = np.array([T for _, T in plants])
+    n = mass.shape[-1]
+    A = np.zeros((len(plants), 2 * n + 1, 2 * n + 1))
+    A[:, :n, n : 2 * n] = np.eye(n)
+    A[:, n : 2 * n, :n] = -np.linalg.solve(mass, stiffness)
+    A[:, n : 2 * n, n : 2 * n] = -np.linalg.solve(mass, damping)
+    A[:, n : 2 * n, -1] = np.linalg.solve(mass, actuator[..., None])[..., 0]
+    step = expm(A * period[:, None, None])
+    return SampledPlants(step[:, :-1, :-1], step[:, :-1, -1], sensor, period)
+
+
+def stable_walls(plants: SampledPlants, K: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """Stable or not (D, ...) by the eigenvalues of stacked transition matrices, for walls (D, ...) of each plant."""
+    D, n = plants.sensor.shape
+    K, B, _ = np.broadcast_arrays(K, B, plants.period.reshape(D, *(1,) * (np.ndim(K) - 1)))
+    walls = (K.reshape(D, -1), B.reshape(D, -1))
+    stable = np.empty(walls[0].shape, dtype=bool)
+    several = max(1, LARGEST_STACK // walls[0].shape[1])
+    for first in range(0, D, several):
+        part = slice(first, first + several)
+        free, push, sensor, period = (array[part] for array in plants)
+        rate = walls[1][part] / period[:, None]
+        L = np.zeros((*rate.shape, 2 * n + 1, 2 * n + 1))
+        L[..., :-1, :-1] = free[:, None]
+        L[..., :-1, :n] -= (walls[0][part] + rate)[..., None, None] * (push[:, :, None] * sensor[:, None, :])[
+            :, None
+        ]
+        L[..., :-1, -1] = rate[..., None] * push[:, None]
+        L[..., -1, :n] = sensor[:, None]
+        stable[part] = np.abs(np.linalg.eigvals(L)).max(axis=-1) < 1.0
+    return stable.reshape(K.shape)
+
+
+def stiffest_by_eigenvalues(plants: SampledPlants) -> np.ndarray:
+    """The largest stable K (D,) with a damping B >= 0; 0 where no wall of the raster is stable.
+
+    From the stiffest stable wall of a raster `climb` goes on.
+    """
+    inside = stable_walls(plants, STIFFNESSES[None, :, None], DAMPINGS[None, None, :])
+    top = len(STIFFNESSES) - 1 - np.argmax(inside[:, ::-1].any(axis=2), axis=1)
+    row = inside[np.arange(len(top)), top]
+    first, last = np.argmax(row, axis=1), len(DAMPINGS) - 1 - np.argmax(row[:, ::-1], axis=1)
+    low, high = DAMPINGS[np.maximum(first - 1, 0)], DAMPINGS[np.minimum(last + 1, len(DAMPINGS) - 1)]
+    K = climb(plants, STIFFNESSES[top], low, high)
+    return np.where(inside.any(axis=(1, 2)), K, 0.0)
+
+
+def stiffest_near(plants: SampledPlants, K: np.ndarray, B: np.ndarray, below: float = 1e-3) -> np.ndarray:
+    """The largest stable stiffness (D,) that `climb` reaches from the stable walls at (1 - below) K about B.
+
+    They may be few, where a region ends in a thin tip; nan where none is found.
+    """
+    away = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 600)])
+    shares = np.unique(np.concatenate([1.0 - away, 1.0 + away]))
+    start = (1.0 - below) * K
+    row = B[:, None] * shares
+    inside = stable_walls(plants, start[:, None], row)
+    first, last = np.argmax(inside, axis=1), len(shares) - 1 - np.argmax(inside[:, ::-1], axis=1)
+    one = np.arange(len(K))
+    low, high = row[one, np.maximum(first - 1, 0)], row[one, np.minimum(last + 1, len(shares) - 1)]
+    return np.where(inside.any(axis=1), climb(plants, start, low, high), np.nan)
+
+
+def climb(plants: SampledPlants, K: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """The stiffest wall (D,) reached from stable ones with stiffness K and dampings between low and high.
+
+    K is raised while a row of dampings about those of the last stable walls has a stable one. Bisection of K at one
+    damping would not do: a region may end in a thin tip that leans, so that walls just below it are unstable.
+    """
+    K, low, high = K.copy(), low.copy(), high.copy()
+    step = np.full(len(K), 0.25)
+    one = np.arange(len(K))
+    while step.max() > LAST_STEP:
+        width = high - low
+        start = np.maximum(low - 3.0 * width, 0.0)
+        row = start[:, None] + (high + 3.0 * width - start)[:, None] * np.linspace(0.0, 1.0, ROW)
+        inside = stable_walls(plants, ((1.0 + step) * K)[:, None], row)
+        rises = inside.any(axis=1)
+        first, last = np.argmax(inside, axis=1), ROW - 1 - np.argmax(inside[:, ::-1], axis=1)
+        K = np.where(rises, (1.0 + step) * K, K)
+        low = np.where(rises, row[one, np.maximum(first - 1, 0)], low)
+        high = np.where(rises, row[one, np.minimum(last + 1, ROW - 1)], high)
+        step *= np.where(rises, 1.5, 0.5)
+    return K

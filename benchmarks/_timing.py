@@ -30,6 +30,11 @@ def seconds(value: float) -> str:
     raise AssertionError
 
 
+def verdict(value: float, limit: float) -> str:
+    """Whether a target is reached."""
+    return "reached" if value <= limit else "missed"
+
+
 def machine(*packages: str) -> str:
     """Number of CPUs, their load, and versions of Python and these packages, in one line."""
     busy = f" (load {os.getloadavg()[0]:.1f})" if hasattr(os, "getloadavg") else ""

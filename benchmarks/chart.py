@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._peers import by_eigenvalues, by_jury, by_python_control
-from benchmarks._timing import machine, median_time, print_table, seconds
+from benchmarks._timing import machine, median_time, print_table, seconds, verdict
 from zwidth.chart.chart import StabilityChart, boundary_points, stability_chart
 from zwidth.device.load import load
 from zwidth.loop.loop import Loop
@@ -153,11 +153,6 @@ def main() -> None:
     print(f"\n* wall by wall on {COARSE} x {COARSE}, extrapolated to {GRID} x {GRID}")
     print(f"target 1000 times the eigenvalue grid: {verdict(1000 * chart_time, grid_time)}")
     print(f"target 100 000 times python-control: {as_written} as one writes it, {by_hand} with the wall by hand")
-
-
-def verdict(value: float, limit: float) -> str:
-    """Whether a target is reached."""
-    return "reached" if value <= limit else "missed"
 
 
 if __name__ == "__main__":

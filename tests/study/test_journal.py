@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -78,6 +78,7 @@ class JournalQuestion:
     count: int
     spread: float
     start: np.ndarray
+    known: dict = field(init=False, compare=False, default_factory=dict)
 
 
 def test_a_fingerprint_tells_every_change():
@@ -92,5 +93,7 @@ def test_a_fingerprint_tells_every_change():
     assert len(found) == 5
     assert fingerprint(JournalQuestion(2, 0.2, np.zeros(2))) in found
     assert len({fingerprint(x) for x in (1, 1.0, "1", True, None, [1], {"1": 1})}) == 7
+    plan.known["itself"] = plan  # what has been computed of it so far is no part of it
+    assert fingerprint(plan) in found
     with pytest.raises(TypeError, match="cannot hold"):
         fingerprint(object())

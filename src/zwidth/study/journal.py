@@ -44,7 +44,9 @@ def _plain(part: object) -> Any:
     if isinstance(part, list | tuple):
         return ["list", [_plain(value) for value in part]]
     if is_dataclass(part) and not isinstance(part, type):
-        return [type(part).__name__, [[field.name, _plain(getattr(part, field.name))] for field in fields(part)]]
+        # a field that is neither given nor compared holds what has been computed so far
+        own = [field.name for field in fields(part) if field.init or field.compare]
+        return [type(part).__name__, [[name, _plain(getattr(part, name))] for name in own]]
     hint = "; load measures with zwidth.measures.load_measures, or leave out the store" if callable(part) else ""
     raise TypeError(f"a fingerprint cannot hold {part!r}: its value cannot be read{hint}")
 
