@@ -127,6 +127,15 @@ def test_results_do_not_hang_on_how_designs_are_split(kind):
         assert np.array_equal(np.concatenate([part.values for part in parts]), whole.values, equal_nan=True)
 
 
+def test_a_plant_under_many_computers_is_sampled_by_each():
+    job = job_of("published-two-mass", (Axis("loop.sampling_period_s", (), (5e-4, 4e-3)),), 20, PLANT)
+    together = job.compute(0, job.count)
+    values, status = alone(replace(job, _cache={}))
+    assert (together.status == OK).all()
+    assert np.array_equal(together.status, status)
+    np.testing.assert_allclose(together.values, values, rtol=1e-9)
+
+
 def test_valid_designs_are_not_asked_for_alone(monkeypatch):
     job = job_of(
         "five-bar",

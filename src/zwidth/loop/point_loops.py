@@ -48,7 +48,7 @@ def pole_pairs_of_points(point: OperatingPoint, model: Model) -> PolePairs:
 
 def _modes(point: OperatingPoint, model: Model) -> RenderedModes:
     if point.given_plant is not None:
-        return plant_modes(point.given_plant)
+        return plant_modes(point.given_plant, point.shape)
     assert point.mechanism is not None
     assert point.posture is not None
     modes = rendered_modes(point.mechanism, point.posture, point.direction, model, point.damping, point.encoders)

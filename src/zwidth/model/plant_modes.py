@@ -16,14 +16,15 @@ from zwidth.threads import in_chunks
 STILL = 1e-14  # share of the largest damping below which a mode's own is rounding
 
 
-def plant_modes(plant: Plant) -> RenderedModes:
+def plant_modes(plant: Plant, designs: tuple[int, ...] = ()) -> RenderedModes:
     """The modes of each of N designs of a plant, in the form of those of a mechanism's postures.
 
+    designs  shape of the designs, where their plants are all the same
     Returns  with `drag`, and as coupled also two modes of one frequency or two free motions with damping; nan as
              input where a plant is to be looked at alone: dampers that lag, a loss factor, masses that are not
              positive
     """
-    shape = design_shape(plant)
+    shape = np.broadcast_shapes(design_shape(plant), designs)
     N, n = int(np.prod(shape)), plant.size
     M, B, K = (_flat(each, shape, 2) for each in (plant.mass, plant.damping, plant.stiffness))
     actuator, sensor = (_flat(each, shape, 1) for each in (plant.actuator, plant.sensor))
