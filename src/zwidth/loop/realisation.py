@@ -1,11 +1,15 @@
-"""States for the loop's factors, chosen so that eigenvalues of the transition matrix lose no digits."""
+"""States for the loop's factors, chosen so that eigenvalues of the transition matrix lose no digits.
+
+Loops of one structure are realised together: as many rows, delayed forces and factors of the same orders, with
+numbers that have leading axes (...).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from zwidth.loop.coupled_hold import SampledForm
 from zwidth.loop.estimator import Estimator
@@ -19,9 +23,9 @@ Floats = NDArray[np.float64]
 class StateSpace:
     """Z_{j+1} = (open - input (K position + B velocity)) Z_j, the wall force being u = -(K y + B v).
 
-    open      (N, N)  transition matrix without a wall
-    input     (N,)    how the force enters
-    position  (N,)    y from the states;   velocity  (N,)   v from the states
+    open      (..., N, N)  transition matrix without a wall
+    input     (..., N)     how the force enters
+    position  (..., N)     y from the states;   velocity  (..., N)   v from the states
     """
 
     open: Floats
@@ -29,71 +33,82 @@ class StateSpace:
     position: Floats
     velocity: Floats
 
-    def transition_matrix(self, wall_stiffness: Floats, wall_damping: Floats) -> Floats:
-        """L (..., N, N) for walls (...)."""
-        K, B = np.broadcast_arrays(wall_stiffness, wall_damping)
-        feedback = K[..., None] * self.position + B[..., None] * self.velocity
-        return self.open - self.input[:, None] * feedback[..., None, :]
+    def transition_matrix(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
+        """L (..., N, N) for walls (...), whose axes broadcast with those of the loops."""
+        K, B = np.asarray(wall_stiffness)[..., None], np.asarray(wall_damping)[..., None]
+        feedback = K * self.position + B * self.velocity
+        return self.open - self.input[..., :, None] * feedback[..., None, :]
+
+    def __getitem__(self, index: NDArray[np.int64]) -> StateSpace:
+        """Some of the loops, by the first of their axes."""
+        return StateSpace(self.open[index], self.input[index], self.position[index], self.velocity[index])
 
 
-def pole_pair(d1: float, d0: float) -> tuple[Floats, float]:
-    """A 2 x 2 block with the roots of d^2 + d1 d + d0 in d = z - 1, and its coupling t.
+def pole_pair(d1: Floats | float, d0: Floats | float) -> tuple[Floats, Floats]:
+    """A block (..., 2, 2) with the roots of d^2 + d1 d + d0 in d = z - 1, and its coupling t (...).
 
         [[1 + x, t], [-q/t, 1 + x]],    x = -d1/2,   q = d0 - x^2
 
     A complex pair gives a normal matrix (t = sqrt q), whose eigenvalues are perfectly conditioned.
     """
-    x = -d1 / 2.0
-    q = d0 - x * x
+    x = -0.5 * np.asarray(d1, dtype=np.float64)
+    q = np.asarray(d0) - x * x
+    t = np.maximum(np.sqrt(np.abs(q)), np.where(q > 0.0, 0.0, np.abs(x)))
     # A rigid pair has no scale of its own: any t serves, the eigenvalue solver balances it
-    t = float(np.sqrt(abs(q))) or abs(x) or 1.0
-    if q < 0.0:
-        t = max(t, abs(x))
-    return np.array([[1.0 + x, t], [-q / t, 1.0 + x]]), t
+    t = np.where(t > 0.0, t, 1.0)
+    block = np.empty((*t.shape, 2, 2))
+    block[..., 0, 0] = block[..., 1, 1] = 1.0 + x
+    block[..., 0, 1], block[..., 1, 0] = t, -q / t
+    return block, t
 
 
-def _numerator_input(n1: float, n0: float, d1: float, t: float) -> Floats:
-    """Input vector that gives (n1 d + n0)/(d^2 + d1 d + d0) from the first state of `pole_pair`."""
-    return np.array([n1, (n0 - d1 / 2.0 * n1) / t])
+def _numerator_input(n1: Floats, n0: Floats, d1: Floats, t: Floats) -> Floats:
+    """Input vector (..., 2) that gives (n1 d + n0)/(d^2 + d1 d + d0) from the first state of `pole_pair`."""
+    out = np.empty((*np.shape(t), 2))
+    out[..., 0], out[..., 1] = n1, (n0 - d1 / 2.0 * n1) / t
+    return out
 
 
 @dataclass
 class _Signal:
-    """An affine function of the states and of the wall force u:  states . Z + force u."""
+    """An affine function of the states and of the wall force u:  states (..., N) . Z + force u."""
 
     states: Floats
-    force: float
+    force: Floats | float
 
     def drive(self, at: slice, gain: Floats, space: StateSpace) -> None:
-        """Let the signal drive some states with a gain each."""
-        space.open[at] += np.outer(gain, self.states)
-        space.input[at] += gain * self.force
+        """Let the signal drive some states with a gain (..., k) each."""
+        space.open[..., at, :] += gain[..., :, None] * self.states[..., None, :]
+        space.input[..., at] += gain * np.asarray(self.force)[..., None]
 
-    def scaled(self, factor: float) -> _Signal:
-        return _Signal(factor * self.states, factor * self.force)
+    def scaled(self, factor: Floats) -> _Signal:
+        return _Signal(factor[..., None] * self.states, factor * self.force)
 
 
-def _orders(denominator: Floats) -> list[int]:
-    """Degree, 1 or 2, of each factor."""
-    return [2 if row[0] != 0.0 else 1 for row in denominator]
+def orders(denominator: Floats) -> tuple[int, ...]:
+    """Degree, 1 or 2, of each factor (..., k, 3); the same for all loops that are realised together."""
+    return tuple(2 if np.any(denominator[..., k, 0]) else 1 for k in range(denominator.shape[-2]))
 
 
 def realise(sections: Sections, whole_delay: int, split: bool, force: Filter, estimator: Estimator) -> StateSpace:
     """Assemble plant sections, force path, delayed forces and the estimate's factors into one state vector.
 
-    split  whether the fractional part of the delay splits the hold
+    sections  of loops of one structure, rows (..., m, 9); their axes are those of the result
+    split     whether the fractional part of the delay splits the hold
     """
-    queue = whole_delay + split
-    sizes = (_plant_states(sections), sum(_orders(force.denominator)), queue, len(estimator.window) - 1)
-    N = sum(sizes) + sum(_orders(estimator.denominator))
-    space = StateSpace(np.zeros((N, N)), np.zeros(N), np.zeros(N), np.zeros(N))
+    queue, past_samples = whole_delay + split, estimator.window.shape[-1] - 1
+    sizes = (_plant_states(sections), sum(orders(force.denominator)), queue, past_samples)
+    N, loops = sum(sizes) + sum(orders(estimator.denominator)), sections.rows.shape[:-2]
+    space = StateSpace(np.zeros((*loops, N, N)), *(np.zeros((*loops, N)) for _ in range(3)))
     first = np.cumsum((0, *sizes))
     command = _cascade(space, _Signal(np.zeros(N), 1.0), force.numerator, force.denominator, int(first[1]))
     late = _delay_line(space, command, queue, int(first[2]))
     reading = _plant_reading(space, sections, late[whole_delay], late[whole_delay + 1] if split else None)
     space.position[:] = reading
-    past = _delay_line(space, _Signal(reading, 0.0), len(estimator.window) - 1, int(first[3]))
-    window = _Signal(sum(w * signal.states for w, signal in zip(estimator.window, past, strict=True)), 0.0)
+    past = _delay_line(space, _Signal(reading, 0.0), past_samples, int(first[3]))
+    window = _Signal(np.zeros(N), 0.0)
+    for k, signal in enumerate(past):
+        window.states = window.states + estimator.window[..., k, None] * signal.states
     velocity = _cascade(space, window, estimator.numerator, estimator.denominator, int(first[4]))
     space.velocity[:] = velocity.states
     return space
@@ -102,13 +117,15 @@ def realise(sections: Sections, whole_delay: int, split: bool, force: Filter, es
 def _plant_states(sections: Sections) -> int:
     """Number of states of the plant."""
     if sections.sampled_form is None:
-        return 2 * len(sections.rows)
+        return 2 * int(sections.rows.shape[-2])
     return 2 * _rows_before_chain(sections) + len(sections.sampled_form.output)
 
 
 def _rows_before_chain(sections: Sections) -> int:
     """Number of rows before the chain, which begins at the last row that is not chained."""
-    return int(np.flatnonzero(sections.rows[:, 8] == 0.0)[-1]) if sections.sampled_form else len(sections.rows)
+    if sections.sampled_form is None:
+        return int(sections.rows.shape[-2])
+    return int(np.flatnonzero(sections.rows[:, 8] == 0.0)[-1])
 
 
 def _delay_line(space: StateSpace, signal: _Signal, count: int, start: int) -> list[_Signal]:
@@ -116,15 +133,16 @@ def _delay_line(space: StateSpace, signal: _Signal, count: int, start: int) -> l
     signals = [signal]
     for at in range(start, start + count):
         signals[-1].drive(slice(at, at + 1), np.ones(1), space)
-        signals.append(_Signal(np.eye(1, len(space.open), at)[0], 0.0))
+        signals.append(_Signal(np.eye(1, space.open.shape[-1], at)[0], 0.0))
     return signals
 
 
 def _plant_reading(space: StateSpace, sections: Sections, new: _Signal, old: _Signal | None) -> Floats:
-    """Let the forces `new` and `old` drive the plant's states; returns the states' weights (N,) in the reading."""
-    reading = np.zeros(len(space.open))
+    """Let the forces `new` and `old` drive the plant's states; returns the states' weights (..., N) in the
+    reading."""
+    reading = np.zeros_like(space.position)
     leading = _rows_before_chain(sections)
-    _row_states(space, sections.rows[:leading], new, old, reading)
+    _row_states(space, sections.rows[..., :leading, :], new, old, reading)
     if sections.sampled_form is not None:
         _chain_states(space, sections.sampled_form, slice(2 * leading, _plant_states(sections)), new, old, reading)
     return reading
@@ -136,18 +154,19 @@ def _row_states(space: StateSpace, rows: Floats, new: _Signal, old: _Signal | No
     In a chain each row drives the one before it, through that one's 1/(d^2 + d1 d + d0).
     """
     before = np.zeros(2)
-    for k, (d1, d0, n2, n1, n0, o2, o1, o0, chained) in enumerate(rows):
+    for k in range(rows.shape[-2]):
+        d1, d0, n2, n1, n0, o2, o1, o0, chained = (rows[..., k, column] for column in range(9))
         at = slice(2 * k, 2 * k + 2)
-        space.open[at, at], t = pole_pair(d1, d0)
+        space.open[..., at, at], t = pole_pair(d1, d0)
         for signal, (c2, c1, c0) in ((new, (n2, n1, n0)), (old, (o2, o1, o0))):
             if signal is not None:
                 signal.drive(at, _numerator_input(c1 - c2 * d1, c0 - c2 * d0, d1, t), space)
-                reading += c2 * signal.states
-        if chained:
-            space.open[2 * k - 2 : 2 * k, 2 * k] += before
+                reading += c2[..., None] * signal.states
+        if np.any(chained):
+            space.open[..., 2 * k - 2 : 2 * k, 2 * k] += before
         else:
-            reading[2 * k] += 1.0
-        before = _numerator_input(0.0, 1.0, d1, t)
+            reading[..., 2 * k] += 1.0
+        before = _numerator_input(np.zeros(()), np.ones(()), d1, t)
 
 
 def _chain_states(
@@ -165,19 +184,20 @@ def _chain_states(
 def _cascade(space: StateSpace, signal: _Signal, numerator: Floats, denominator: Floats, start: int) -> _Signal:
     """The signal after a cascade of factors, whose states begin at `start`."""
     at = start
-    for (c2, c1, c0), (lead, d1, d0) in zip(numerator, denominator, strict=True):
-        if lead == 0.0:
+    for k, order in enumerate(orders(denominator)):
+        c2, c1, c0 = (numerator[..., k, column] for column in range(3))
+        d1, d0 = denominator[..., k, 1], denominator[..., k, 2]
+        if order == 1:
             signal.drive(slice(at, at + 1), np.ones(1), space)
-            space.open[at, at] += 1.0 - d0
+            space.open[..., at, at] += 1.0 - d0
             signal = signal.scaled(c1)
-            signal.states[at] += c0 - c1 * d0
-            at += 1
+            signal.states[..., at] += c0 - c1 * d0
         else:
             block, t = pole_pair(d1, d0)
             pair = slice(at, at + 2)
-            space.open[pair, pair] += block
+            space.open[..., pair, pair] += block
             signal.drive(pair, _numerator_input(c1 - c2 * d1, c0 - c2 * d0, d1, t), space)
             signal = signal.scaled(c2)
-            signal.states[at] += 1.0
-            at += 2
+            signal.states[..., at] += 1.0
+        at += order
     return signal

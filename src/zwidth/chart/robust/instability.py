@@ -1,4 +1,4 @@
-"""Whether walls are unstable for a loop, and how much softer a wall must be to be stable."""
+"""Whether walls are unstable for loops, and how much softer a wall must be to be stable."""
 
 from __future__ import annotations
 
@@ -6,20 +6,126 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.hurwitz import is_stable, work_array
-from zwidth.compiled import compiled
+from zwidth.chart.loop_polynomials import (
+    LoopPolynomials,
+    fill_computer_polynomials,
+    fill_polynomials,
+    polynomial_memory,
+)
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.loop.circle_factors import (
+    COMPUTER,
+    DEGREE,
+    CircleFactors,
+    factor_memory,
+    fill_computer,
+    fill_plant,
+)
+from zwidth.loop.loop_table import LoopTable, Whole
+from zwidth.threads import in_chunks
 
 Floats = NDArray[np.float64]
+Marks = NDArray[np.bool_]
 
 
 @compiled
-def unstable(polynomials: Floats, K: Floats, B: Floats) -> NDArray[np.bool_]:
+def unstable(polynomials: Floats, K: Floats, B: Floats) -> Marks:
     """Which walls (k,) are certainly unstable for a loop, given by `Tracer.polynomials`."""
     out = np.empty(len(K), dtype=np.bool_)
     N = polynomials.shape[1] - 1
-    room = work_array(N)
+    mark_unstable(polynomials, N, K, B, work_array(N), out)
+    return out
+
+
+@compiled_lean
+def mark_unstable(polynomials: Floats, N: int, K: Floats, B: Floats, room: Floats, out: Marks) -> None:
+    """Mark the walls (k,) that are certainly unstable for a loop of degree N."""
     for i in range(len(K)):
         out[i] = is_stable(polynomials, N, K[i], B[i], room) < 0
+
+
+def unstable_walls(loops: LoopTable, K: Floats, B: Floats) -> Marks:
+    """Which walls (k,) are certainly unstable for each loop of a table, (N, k); none for one without sections."""
+    out = np.zeros((len(loops.rows), len(K)), dtype=bool)
+    most, K, B = most_degree(loops), K.copy(), B.copy()
+
+    def several(first: int, last: int) -> None:
+        memory = factor_memory(loops), polynomial_memory(most), work_array(most)
+        _unstable_walls(loops, *memory, K, B, out, first, last)
+
+    in_chunks(several, len(out))
     return out
+
+
+def softenings(loops: LoopTable, which: Whole, K: Floats, B: Floats) -> Floats:
+    """`softening` [N/m] (p,) of each of p unstable walls K, B (p,) for one loop each, number `which` (p,)."""
+    out = np.empty(len(which))
+    most, which, K, B = most_degree(loops), which.copy(), K.copy(), B.copy()
+
+    def several(first: int, last: int) -> None:
+        memory = factor_memory(loops), polynomial_memory(most), work_array(most)
+        _softenings(loops, *memory, which, K, B, out, first, last)
+
+    in_chunks(several, len(out))
+    return out
+
+
+def most_degree(loops: LoopTable) -> int:
+    """A degree that no characteristic polynomial of these loops exceeds."""
+    delayed = loops.whole_delay.max() + 1 + loops.window.shape[1] - 1
+    factors = loops.rows.shape[1] + loops.force.shape[1] + loops.velocity.shape[1]
+    return int(2 * factors + delayed)
+
+
+@compiled_lean
+def _fill(loops: LoopTable, i: int, circle: CircleFactors, polynomials: LoopPolynomials) -> None:
+    """The polynomials of loop i on the unit circle; what its computer alone decides is kept from the loop before,
+    if that has the same one."""
+    computer = loops.computer[i]
+    if circle.sizes[COMPUTER] != computer:
+        fill_computer(loops, computer, 1.0, circle)
+        fill_computer_polynomials(circle, polynomials)
+    fill_plant(loops, i, circle)
+    fill_polynomials(circle, polynomials)
+
+
+@compiled
+def _unstable_walls(
+    loops: LoopTable,
+    circle: CircleFactors,
+    polynomials: LoopPolynomials,
+    room: Floats,
+    K: Floats,
+    B: Floats,
+    out: Marks,
+    first: int,
+    last: int,
+) -> None:
+    """Mark the walls that are certainly unstable for loops first to last - 1."""
+    for i in range(first, last):
+        if loops.section_count[i] > 0:
+            _fill(loops, i, circle, polynomials)
+            mark_unstable(polynomials.coefficients, circle.sizes[DEGREE], K, B, room, out[i])
+
+
+@compiled
+def _softenings(
+    loops: LoopTable,
+    circle: CircleFactors,
+    polynomials: LoopPolynomials,
+    room: Floats,
+    which: Whole,
+    K: Floats,
+    B: Floats,
+    out: Floats,
+    first: int,
+    last: int,
+) -> None:
+    """Fill in `out` for walls first to last - 1."""
+    for k in range(first, last):
+        if k == first or which[k] != which[k - 1]:
+            _fill(loops, which[k], circle, polynomials)
+        out[k] = _softening(polynomials.coefficients, circle.sizes[DEGREE], K[k], B[k], room)
 
 
 @compiled
@@ -30,7 +136,12 @@ def softening(polynomials: Floats, K: float, B: float) -> float:
     The next stable stiffness below is looked for in steps that grow by a quarter from 1e-8 of K, then bisected.
     """
     N = polynomials.shape[1] - 1
-    room = work_array(N)
+    return _softening(polynomials, N, K, B, work_array(N))
+
+
+@compiled_lean
+def _softening(polynomials: Floats, N: int, K: float, B: float, room: Floats) -> float:
+    """`softening` for polynomials of degree N."""
     bad, step = 0.0, 1e-8
     while True:
         good = min(bad + step, 1.0)
