@@ -127,6 +127,22 @@ def test_results_do_not_hang_on_how_designs_are_split(kind):
         assert np.array_equal(np.concatenate([part.values for part in parts]), whole.values, equal_nan=True)
 
 
+def test_a_0_among_coordinates_is_a_number_as_any_other():
+    """A computer without delay is another than one with; an origin at 0 is none but an origin."""
+    job = job_of(
+        "five-bar",
+        (Axis("links.upper-left.origin_m.0", (-0.01, 0.0, 0.01)), Axis("loop.delay_samples", (0.0, 1.0))),
+        None,
+        ("stiffness_max", "stable_area"),
+    )
+    groups = list(job._grouping.groups(list(job._design_columns(0, job.count))))
+    assert [group.rows.tolist() for group in groups] == [[1, 3, 5], [0, 2, 4]]
+    together = job.compute(0, job.count)
+    values, status = alone(replace(job, _cache={}))
+    assert np.array_equal(together.status, status)
+    np.testing.assert_allclose(together.values, values, rtol=1e-9)
+
+
 def test_a_plant_under_many_computers_is_sampled_by_each():
     job = job_of("published-two-mass", (Axis("loop.sampling_period_s", (), (5e-4, 4e-3)),), 20, PLANT)
     together = job.compute(0, job.count)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,22 @@ from zwidth.device.design_batch import DesignBatch, design_batch, takes_arrays
 from zwidth.device.faults import DeviceError, KeyPath
 from zwidth.device.load import check
 from zwidth.device.operator_choice import with_operator
-from zwidth.study.sampling import CIRCUMSTANCES, WANTED, Axis, Sampling
+from zwidth.study.sampling import CIRCUMSTANCES, WANTED
 
 Rows = NDArray[np.int64]
+
+
+class DesignColumn(NamedTuple):
+    """What one key is in each of P designs.
+
+    key     a path of the device file, "operator" or another circumstance
+    values  the values that it takes
+    places  (P,) which of them each design has
+    """
+
+    key: str
+    values: Sequence[Any]
+    places: Rows
 
 
 @dataclass(frozen=True)
@@ -47,37 +60,27 @@ class DesignGrouping:
     operators  as in `Study`
     """
 
-    def __init__(
-        self, document: dict[str, Any], label: str, operators: Mapping[str, Any], sampling: Sampling
-    ) -> None:
-        self.document, self.label, self.operators, self.sampling = document, label, operators, sampling
+    def __init__(self, document: dict[str, Any], label: str, operators: Mapping[str, Any]) -> None:
+        self.document, self.label, self.operators = document, label, operators
         self._steps: dict[str, KeyPath | None] = {}
         self._documents: dict[tuple[Any, ...], dict[str, Any] | None] = {}
 
-    def groups(self, first: int, last: int) -> Iterator[DesignGroup]:
-        """The groups of designs first to last - 1; designs that cannot be built together with any are in none."""
-        taken = [
-            (key, values, places)
-            for axis, axis_values, places in self.sampling.columns(first, last)
-            for key, values in self._numbers(axis, axis_values)
-        ]
-        if not taken:
+    def groups(self, columns: Sequence[DesignColumn]) -> Iterator[DesignGroup]:
+        """The groups of designs; those that cannot be built together with any are in none.
+
+        columns  all keys that may differ from the document's, or from each other
+        """
+        if not columns:
             return
-        kinds = [self._kinds(key, values) for key, values, _ in taken]
-        codes = [code[places] for (code, _), (_, _, places) in zip(kinds, taken, strict=True)]
+        kinds = [self._kinds(one.key, one.values) for one in columns]
+        codes = [code[one.places] for (code, _), one in zip(kinds, columns, strict=True)]
         found, group_of = np.unique(np.stack(codes, axis=1), axis=0, return_inverse=True)
         for n, own in enumerate(found):
             rows = np.flatnonzero(group_of.ravel() == n)
-            kind = tuple(names[code] for (_, names), code in zip(kinds, own, strict=True))
-            group = self._group(rows, kind, [(key, values, places[rows]) for key, values, places in taken])
+            kind = tuple((one.key, names[code]) for one, (_, names), code in zip(columns, kinds, own, strict=True))
+            group = self._group(rows, kind, [one._replace(places=one.places[rows]) for one in columns])
             if group is not None:
                 yield group
-
-    def _numbers(self, axis: Axis, values: Sequence[Any]) -> Iterator[tuple[str, Sequence[Any]]]:
-        """Each key that an axis sets, and its values where the axis has these."""
-        yield axis.key, values
-        for tie in axis.ties:
-            yield tie.key, [tie.value(value) for value in values]
 
     def _kinds(self, key: str, values: Sequence[Any]) -> tuple[NDArray[np.int64], Sequence[Any]]:
         """A number for each value that stands for its kind, and the kinds by these numbers: what must be alike in
@@ -87,7 +90,8 @@ class DesignGrouping:
             return np.zeros(len(values), dtype=np.int64), [None]
         if steps is not None and takes_arrays(steps) and all(type(value) in (int, float) for value in values):
             numbers = np.array(values, dtype=np.float64)
-            return np.where(numbers == 0.0, 1, np.where(np.isfinite(numbers), 0, 2)), ["number", "0", "not finite"]
+            none = (numbers == 0.0) & (not _in_list(steps))
+            return np.where(none, 1, np.where(np.isfinite(numbers), 0, 2)), ["number", "0", "not finite"]
         number_of: dict[str, int] = {}
         code = [number_of.setdefault(self._kind(key, steps, value), len(number_of)) for value in values]
         return np.array(code), list(number_of)
@@ -108,9 +112,7 @@ class DesignGrouping:
                 self._steps[key] = None
         return self._steps[key]
 
-    def _group(
-        self, rows: Rows, kind: tuple[Any, ...], taken: list[tuple[str, Sequence[Any], Rows]]
-    ) -> DesignGroup | None:
+    def _group(self, rows: Rows, kind: tuple[Any, ...], taken: list[DesignColumn]) -> DesignGroup | None:
         document = self._document(kind, taken, len(rows))
         if document is None:
             return None
@@ -129,9 +131,7 @@ class DesignGrouping:
         chosen = {key: value for key, value in example.items() if key in CIRCUMSTANCES and key not in WANTED}
         return DesignGroup(rows, batch, valid, positions, chosen)
 
-    def _document(
-        self, kind: tuple[Any, ...], taken: list[tuple[str, Sequence[Any], Rows]], count: int
-    ) -> dict[str, Any] | None:
+    def _document(self, kind: tuple[Any, ...], taken: list[DesignColumn], count: int) -> dict[str, Any] | None:
         """The document of a valid design of a kind; None where none is found among these."""
         if self._documents.get(kind) is None:
             for row in range(count):
@@ -151,6 +151,12 @@ class DesignGrouping:
             document = with_operator(document, self.operators[chosen["operator"]])
         own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
         return address.assign_all(document, own)
+
+
+def _in_list(steps: KeyPath) -> bool:
+    """Whether a path leads to an element of a list. A 0 there takes no part of the device away, as that of a lag
+    does."""
+    return isinstance(steps[-1], int)
 
 
 def _holds(document: Any, steps: KeyPath) -> bool:

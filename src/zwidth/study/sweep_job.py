@@ -37,7 +37,7 @@ from zwidth.measures.definition import (
 from zwidth.measures.evaluate import evaluate, evaluate_safely, measured_together
 from zwidth.model.posture import OutOfReach, PostureError, Singular
 from zwidth.study.column import Column
-from zwidth.study.design_groups import DesignGroup, DesignGrouping
+from zwidth.study.design_groups import DesignColumn, DesignGroup, DesignGrouping
 from zwidth.study.job import CellValues
 from zwidth.study.journal import fingerprint
 from zwidth.study.sampling import CIRCUMSTANCES, Sampling, settings
@@ -125,7 +125,7 @@ class SweepJob:
             if reason:
                 reasons[column].setdefault((found[1], reason), []).append(first + row)
 
-        for group in self._grouping.groups(first, last):
+        for group in self._grouping.groups(list(self._design_columns(first, last))):
             for row, column, found in self._together(group, first):
                 fill(row, column, found)
         for row, column in np.argwhere(status == MISSING):
@@ -140,7 +140,14 @@ class SweepJob:
 
     @cached_property
     def _grouping(self) -> DesignGrouping:
-        return DesignGrouping(self.document, self.label, self.operators, self.sampling)
+        return DesignGrouping(self.document, self.label, self.operators)
+
+    def _design_columns(self, first: int, last: int) -> Iterator[DesignColumn]:
+        """Each key that an axis, or a number tied to it, sets in designs first to last - 1."""
+        for axis, values, places in self.sampling.columns(first, last):
+            yield DesignColumn(axis.key, values, places)
+            for tie in axis.ties:
+                yield DesignColumn(tie.key, [tie.value(value) for value in values], places)
 
     def _together(self, group: DesignGroup, first: int) -> Iterator[tuple[int, int, Found]]:
         """Row, column and value of each design of a group that need not be asked for alone."""
