@@ -143,6 +143,16 @@ class DesignBatch:
         alone = (posture.status != OK) | ~masses_moved(posture)
         return self._with_posture(posture, direction, model), alone
 
+    def at_point(self, point: OperatingPoint) -> tuple[OperatingPoint, Marks]:
+        """The designs at the operating point of a single device, as `Device.at_point` puts each of them; see `at`.
+
+        point   one posture that is given by the handle's position, and one direction; or a plant
+        """
+        if point.posture is None:
+            return self.at(model=point.model)
+        where = cast("Floats | None", point.requested_position)
+        return self.at(where, point.direction, point.posture.assembly, point.model)
+
     def _over_workspace(
         self, position: Floats, direction: Any, assembly: str | None, model: str | None
     ) -> tuple[OperatingPoint, Marks]:

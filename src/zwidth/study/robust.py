@@ -21,59 +21,24 @@ from numpy.typing import NDArray
 
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.chart import RobustChart, robust_chart_of_members
-from zwidth.chart.robust.instability import softening, unstable
 from zwidth.chart.robust.members import Member, chart_member
-from zwidth.chart.tracer import Tracer
-from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.loop.estimator import NonlinearError
-from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
 from zwidth.result import Result
 from zwidth.study.robust_family import Family, FamilyMember, RangeError
+from zwidth.study.robust_search import MemberRadii, violating_members
+from zwidth.study.unseen_members import Violation, sample_walls, try_unseen_members
+
+__all__ = ["RobustError", "RobustStudy", "Violation", "robust_study", "sample_walls"]
 
 Floats = NDArray[np.float64]
 
 REFINING: Final = 0.25  # share of the members that is reserved for those found by the search
-SEARCHED: Final = 12  # number of walls of the edge at which each round searches for a worse member
-FIRST_STEP, LAST_STEP = 0.25, 1e-3  # step of the pattern search, in shares of the ranges
-EXCEEDS: Final = 1e-7  # excess of the spectral radius over 1 that makes a member join
-EDGE_WALLS: Final = 200  # walls along the edge that random members are tried on
-RASTER: Final = 12  # walls inside, per axis
-DEPTH: Final = 1e-6  # distance of these walls inside the edge, in shares of the set's size
 
 
 class RobustError(ValueError):
     """No member of the family can be built and charted."""
-
-
-@dataclass(frozen=True)
-class Violation:
-    """Random members, not used for the chart, tried on the robust walls.
-
-    unseen                 number of members tried, without those that could not be built
-    violating              number of them for which one of the walls is unstable
-    worst_spectral_radius  largest over all of them and all walls; at most 1 if none violates
-    worst_stiffness_share  the largest share of the largest stiffness by which a robust wall (K > 0, B >= 0) must
-                           be softened, at its damping, to be stable for a member; 0 if none violates
-    worst_member           that member's values: path -> value; {} if none violates
-    """
-
-    unseen: int
-    violating: int
-    worst_spectral_radius: float
-    worst_stiffness_share: float
-    worst_member: dict[str, Any]
-
-    def document(self) -> dict[str, Any]:
-        """The numbers by key."""
-        return {
-            "unseen": self.unseen,
-            "violating": self.violating,
-            "worst_spectral_radius": self.worst_spectral_radius,
-            "worst_stiffness_share": self.worst_stiffness_share,
-            "worst_member": self.worst_member or None,
-        }
 
 
 @dataclass(frozen=True)
@@ -179,11 +144,11 @@ def robust_study(
     charted = _Members(family, progress or (lambda stage, done, of: None))
     points = list(_sample(family, members, seed))
     charted.add(points, "members")
-    chart = charted.chart()
+    chart, radii = charted.chart(), MemberRadii(family)
     rounds, area_change, settled = 0, 0.0, not family.free
     while not settled and len(charted.points) < members and chart.regions:
         charted.progress("search", rounds, rounds + 1)
-        new_members = _violating_members(charted, chart)[: members - len(charted.points)]
+        new_members = violating_members(radii, charted.points, chart)[: members - len(charted.points)]
         if not new_members:
             area_change, settled = 0.0, True
             break
@@ -199,7 +164,7 @@ def robust_study(
         rounds=rounds,
         area_change=area_change,
         settled=settled,
-        violation=_violation(charted, chart, unseen, seed) if family.free and chart.regions else None,
+        violation=_violation(charted, chart, unseen, seed),
     ).about(family.operating_point)
 
 
@@ -211,10 +176,10 @@ class _Members:
         self.points: list[FamilyMember] = []
         self.charted: dict[int, Member] = {}
         self.failed: dict[int, str] = {}
-        self.loops: dict[FamilyMember, Loop | None] = {}
 
     def add(self, points: list[FamilyMember], stage: str) -> None:
         """Build and chart more members; those that fail are kept with the reason."""
+        self.family.build(points)
         for done, point in enumerate(points):
             self.progress(stage, done, len(points))
             index = len(self.points)
@@ -233,16 +198,6 @@ class _Members:
             reason = next(iter(self.failed.values()))
             raise RobustError(f"none of {len(self.points)} members could be charted; the first: {reason}")
         return robust_chart_of_members(dict(self.charted), dict(self.failed))
-
-    def radius(self, point: FamilyMember, K: float, B: float) -> float:
-        """Spectral radius of a wall for a member; -1 for one that cannot be built."""
-        if point not in self.loops:
-            try:
-                self.loops[point] = self.family.loop(point)
-            except (ValueError, np.linalg.LinAlgError):
-                self.loops[point] = None
-        loop = self.loops[point]
-        return -1.0 if loop is None else float(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max())
 
 
 def _sample(family: Family, members: int, seed: int) -> Iterator[FamilyMember]:
@@ -263,136 +218,17 @@ def _sample(family: Family, members: int, seed: int) -> Iterator[FamilyMember]:
         shares += list(inside[: count - len(shares)])
     for operator in range(operators):
         for place in shares[:count]:
-            yield _point(family, operator, place)
+            yield family.member(operator, place)
 
 
-def _point(family: Family, operator: int, free: Floats) -> FamilyMember:
-    """The member with these shares of the free ranges; of fixed ranges the share is 0."""
-    shares = np.zeros(len(family.ranges))
-    shares[list(family.free)] = free
-    return FamilyMember(operator, tuple(shares.tolist()))
-
-
-def _violating_members(charted: _Members, chart: RobustChart) -> list[FamilyMember]:
-    """Members found by the search for which a wall of the edge is unstable, the largest spectral radius first."""
-    family, radii = charted.family, dict[FamilyMember, float]()
-    for K, B, starts in _searched_walls(chart):
-        for start in starts:
-            point, radius = _worst_member(charted, charted.points[start], K, B)
-            if radius > 1.0 + EXCEEDS and point not in charted.points:
-                rounded = _point(family, point.operator, np.round([point.shares[k] for k in family.free], 6))
-                radii[rounded] = max(radius, radii.get(rounded, 0.0))
-    return sorted(radii, key=lambda point: -radii[point])
-
-
-def _searched_walls(chart: RobustChart) -> list[tuple[float, float, tuple[int, ...]]]:
-    """Walls of the edge to search from, with the members that bind there: the stiffest, where the binding member
-    changes, and the middles of the longest arcs."""
-    walls = []
-    if chart.members_at_stiffness_max:
-        walls.append((chart.stiffness_max, chart.damping_at_stiffness_max, chart.members_at_stiffness_max))
-    arcs = chart.boundary
-    for arc, following in zip(arcs, (*arcs[1:], *arcs[:1]), strict=True):
-        if arc.member != following.member:
-            walls.append((float(arc.stiffness[-1]), float(arc.damping[-1]), (arc.member, following.member)))
-    longest = sorted(arcs, key=lambda arc: -len(arc.stiffness))
-    for share in (0.5, 0.25, 0.75):
-        for arc in longest[:4]:
-            k = int(share * (len(arc.stiffness) - 1))
-            K, B = (float((x[k] + x[k + 1]) / 2.0) for x in (arc.stiffness, arc.damping))
-            walls.append((K, B, (arc.member,)))
-    return walls[:SEARCHED]
-
-
-def _worst_member(charted: _Members, start: FamilyMember, K: float, B: float) -> tuple[FamilyMember, float]:
-    """The member of the largest spectral radius at a wall, by pattern search from a member: one range at a time,
-    the step halved when no range gives a larger one."""
-    best, radius, step = start, charted.radius(start, K, B), FIRST_STEP
-    while step >= LAST_STEP:
-        gained = False
-        for k in charted.family.free:
-            for sign in (-1.0, 1.0):
-                share = min(max(best.shares[k] + sign * step, 0.0), 1.0)
-                neighbour = FamilyMember(best.operator, (*best.shares[:k], share, *best.shares[k + 1 :]))
-                new_radius = charted.radius(neighbour, K, B) if neighbour != best else -1.0
-                if new_radius > radius:
-                    best, radius, gained = neighbour, new_radius, True
-        if not gained:
-            step *= 0.5
-    return best, radius
+def _violation(charted: _Members, chart: RobustChart, unseen: int, seed: int) -> Violation | None:
+    """What random members say of the robust walls; None where there are no ranges, or no walls."""
+    if not charted.family.free or not chart.regions:
+        return None
+    return try_unseen_members(charted.family, chart, unseen, seed, charted.progress)
 
 
 def _area_change(before: RobustChart, after: RobustChart) -> float:
     """Share by which the area of the whole set became smaller."""
     areas = [sum(shapely.Polygon(ring).area for ring in chart.regions) for chart in (before, after)]
     return max(1.0 - areas[1] / areas[0], 0.0) if areas[0] > 0.0 else 0.0
-
-
-def _violation(charted: _Members, chart: RobustChart, unseen: int, seed: int) -> Violation:
-    """Try `unseen` random members on the robust walls."""
-    family = charted.family
-    walls = sample_walls(chart)
-    random = np.random.default_rng([seed, 1])
-    tested_members, violating, radius, share, worst = 0, 0, -1.0, 0.0, dict[str, Any]()
-    for done in range(unseen):
-        if done % 50 == 0:
-            charted.progress("unseen members", done, unseen)
-        operator = int(random.integers(max(len(family.operators), 1)))
-        point = _point(family, operator, random.random(len(family.free)))
-        try:
-            tracer = Tracer(family.loop(point))
-        except (ValueError, np.linalg.LinAlgError):
-            continue
-        tested_members += 1
-        bad = np.flatnonzero(unstable(tracer.polynomials, walls[:, 0].copy(), walls[:, 1].copy()))
-        bad_radius = spectral_radius(tracer.loop, *walls[bad].T) if len(bad) else np.empty(0)
-        bad = bad[bad_radius > 1.0 + BAND]
-        if not len(bad):
-            continue
-        violating += 1
-        softer = [_share(tracer, float(walls[k, 0]), float(walls[k, 1]), chart.stiffness_max) for k in bad]
-        if max(softer) > share or not worst:
-            share, worst = max(max(softer), share), family.values(point)
-        radius = max(radius, float(bad_radius.max()))
-    charted.progress("unseen members", unseen, unseen)
-    if radius < 0.0:
-        radius = float(max(np.max(spectral_radius(chart.members[k], *walls.T)) for k in chart.binding))
-    return Violation(tested_members, violating, radius, share, worst)
-
-
-def _share(tracer: Tracer, K: float, B: float, stiffness_max: float) -> float:
-    """`Violation.worst_stiffness_share` of one wall; 0 for a wall with K <= 0 or B < 0."""
-    return softening(tracer.polynomials, K, B) / stiffness_max if K > 0.0 and B >= 0.0 else 0.0
-
-
-def sample_walls(chart: RobustChart) -> Floats:
-    """Walls (k, 2), K [N/m] and B [N s/m], to test a robust set: just inside its edge, and a raster over it."""
-    if not chart.regions:
-        return np.empty((0, 2))
-    size = np.ptp(np.vstack(chart.regions), axis=0)
-    total = sum(_lengths(arc.stiffness, arc.damping, size).sum() for arc in chart.boundary)
-    inside = []
-    for arc in chart.boundary:
-        lengths = _lengths(arc.stiffness, arc.damping, size)
-        along = np.concatenate([[0.0], np.cumsum(lengths)])
-        count = max(int(np.ceil(EDGE_WALLS * along[-1] / total)), 2)
-        at = np.linspace(0.0, along[-1], count + 1)[1:]
-        points = np.column_stack([np.interp(at, along, x) for x in (arc.stiffness, arc.damping)]) / size
-        ahead = (
-            points
-            - np.column_stack([np.interp(at - 1e-3 * at[-1], along, x) for x in (arc.stiffness, arc.damping)])
-            / size
-        )
-        left = np.column_stack([-ahead[:, 1], ahead[:, 0]]) / np.maximum(np.hypot(*ahead.T), 1e-300)[:, None]
-        inside.append((points + DEPTH * left) * size)
-    low = np.vstack(chart.regions).min(axis=0)
-    shares = (np.arange(RASTER) + 0.5) / RASTER
-    inside.append(low + size * np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2))
-    walls = np.vstack(inside)
-    cells = [shapely.Polygon(ring) for ring in chart.regions]
-    in_set = np.any([shapely.contains_xy(cell, walls) for cell in cells], axis=0)
-    return np.asarray(walls[in_set])
-
-
-def _lengths(K: Floats, B: Floats, size: Floats) -> Floats:
-    return np.asarray(np.hypot(np.diff(K) / size[0], np.diff(B) / size[1]))

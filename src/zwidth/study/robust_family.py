@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from zwidth.device import address, build
 from zwidth.device.consistency import operator_inconsistencies
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, dotted, one_line, quote
+from zwidth.device.faults import DeviceError, KeyPath, dotted, one_line, quote
 from zwidth.device.load import from_document
 from zwidth.device.operator_choice import document_held_by
 from zwidth.device.schema import device_file as schema
@@ -23,10 +25,15 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import Spelling, as_argument
 from zwidth.model.plant import Plant
 from zwidth.study.advice import Advice
+from zwidth.study.built_designs import BuiltDesigns, build_at_point
+from zwidth.study.design_groups import DesignColumn, DesignGrouping
 
 # Advice of two of the faults; arguments are spelled as in Python.
 BY_VALUE: Final = Advice("compute it for each value with {}", "Device.with_")
 LINEARLY: Final = Advice("give a positive number, or leave out {}", "logarithmic")
+# Keys of a link that may set its joint's axis askew. Its single moment of inertia then no longer serves, which is
+# looked at for each device alone.
+ASKEW: Final = {"axis", "orientation_rad"}
 
 
 @dataclass(frozen=True)
@@ -120,15 +127,34 @@ class Family:
     ranges: tuple[Range, ...]
     operators: tuple[str, ...]
     operating_point: OperatingPoint
+    _built: dict[FamilyMember, tuple[OperatingPoint, int]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @property
     def free(self) -> tuple[int, ...]:
         """Indices of the ranges whose low and high differ."""
         return tuple(k for k, one in enumerate(self.ranges) if one.low < one.high)
 
+    def member(self, operator: int, free: NDArray[np.float64]) -> FamilyMember:
+        """The member with these shares of the free ranges; of fixed ranges the share is 0."""
+        shares = np.zeros(len(self.ranges))
+        shares[list(self.free)] = free
+        return FamilyMember(operator, tuple(shares.tolist()))
+
     @cached_property
     def _documents(self) -> tuple[dict[str, Any], ...]:
         return tuple(document_held_by(self.device.document, name) for name in self.operators or (None,))
+
+    @cached_property
+    def _groupings(self) -> tuple[DesignGrouping, ...]:
+        """How members fall into groups, for each operator; () where each member is to be built alone."""
+        askew = any(ASKEW & set(steps) for steps, _ in self._paths(self._documents[0]))
+        if askew or self._ungripped_plant is not None:
+            return ()
+        # what the numbers' sources are changes no loop
+        documents = [{key: part for key, part in one.items() if key != "sources"} for one in self._documents]
+        return tuple(DesignGrouping(document, self.device.label, {}) for document in documents)
 
     @cached_property
     def _ungripped_plant(self) -> Plant | None:
@@ -145,16 +171,46 @@ class Family:
     def document(self, point: FamilyMember) -> dict[str, Any]:
         """A member's device file; a number off a matrix's diagonal is set together with its mirror image."""
         document = self._documents[point.operator]
-        for one, share in zip(self.ranges, point.shares, strict=True):
+        values = [one.at(share) for one, share in zip(self.ranges, point.shares, strict=True)]
+        settings = [(dotted(steps, document), values[k]) for steps, k in self._paths(document)]
+        return address.assign_all(document, settings)
+
+    def _paths(self, document: dict[str, Any]) -> Iterator[tuple[KeyPath, int]]:
+        """Resolved path of each number that differs in a document, and whose of the ranges it is."""
+        for k, one in enumerate(self.ranges):
             steps = address.resolve(document, one.path)
-            document = address.assign(document, one.path, one.at(share))
+            yield steps, k
             if len(steps) > 2 and isinstance(steps[-1], int) and isinstance(steps[-2], int):
-                mirror = dotted((*steps[:-2], steps[-1], steps[-2]), document)
-                document = address.assign(document, mirror, one.at(share))
-        return document
+                yield (*steps[:-2], steps[-1], steps[-2]), k
+
+    def build(self, members: Sequence[FamilyMember]) -> list[BuiltDesigns]:
+        """The members that can be built together, by their places among these; `loop` finds them built until the
+        next call. The others are to be built alone."""
+        self._built.clear()
+        built = []
+        operators = np.array([one.operator for one in members])
+        for operator, grouping in enumerate(self._groupings):
+            places = np.flatnonzero(operators == operator)
+            if not len(places):
+                continue
+            columns = self._columns([members[n] for n in places.tolist()], grouping.document)
+            for group in build_at_point(grouping.groups(columns), self.operating_point):
+                built.append(replace(group, rows=places[group.rows]))
+        for group in built:
+            self._built.update((members[row], (group.point, n)) for n, row in enumerate(group.rows))
+        return built
+
+    def _columns(self, members: Sequence[FamilyMember], document: dict[str, Any]) -> list[DesignColumn]:
+        """The numbers that differ in the document of several members."""
+        values = [[one.at(member.shares[k]) for member in members] for k, one in enumerate(self.ranges)]
+        every = np.arange(len(members))
+        return [DesignColumn(dotted(steps, document), values[k], every) for steps, k in self._paths(document)]
 
     def loop(self, point: FamilyMember) -> Loop:
         """A member's loop. Raises what building it raises: DeviceError, and ValueErrors of the model."""
+        if point in self._built:
+            together, place = self._built[point]
+            return together[place].loop
         document = self.document(point)
         if self._ungripped_plant is not None:
             held = self._point_with_operator(document)
