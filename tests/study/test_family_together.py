@@ -15,7 +15,7 @@ from zwidth.device.new_device import new_device
 from zwidth.loop.table_states import CHAINED
 from zwidth.study import robust_family, unseen_members
 from zwidth.study.robust import robust_study
-from zwidth.study.robust_family import Family, FamilyMember, Range
+from zwidth.study.robust_family import Family, FamilyMember, Range, build_together
 
 LENGTHS = ("links.upper-left.length_m", "links.distal-right.length_m")
 FIVE_BAR = (
@@ -101,7 +101,7 @@ def test_members_built_together_are_the_members_alone(name, paths, spread, seed)
     family = random_family(name, paths, rng, spread)
     members = random_members(family, rng, 24)
     seen = set()
-    for built in family.build(members):
+    for built in build_together(family, members):
         assert built.table is not None
         for n, row in enumerate(built.rows.tolist()):
             seen.add(row)
@@ -125,7 +125,7 @@ def test_members_that_cannot_be_built_are_left_out_and_say_why():
     short = Family(linkage, (Range("links.distal-left.length_m", 0.02, 0.25),), (), linkage.at())
     for family in (coupled, short):
         members = [FamilyMember(0, (share,)) for share in np.linspace(0.0, 1.0, 21).tolist()]
-        rows = {row for built in family.build(members) for row in built.rows.tolist()}
+        rows = {row for built in build_together(family, members) for row in built.rows.tolist()}
         assert rows == {n for n, member in enumerate(members) if alone(family, member) is not None}
         assert 0 < len(rows) < 21
         for n in set(range(21)) - rows:
@@ -138,7 +138,7 @@ def test_operators_are_groups_of_their_own():
     family = Family(device, ranges, ("none", "thesis-arm"), device.at())
     rng = np.random.default_rng(3)
     members = random_members(family, rng, 20)
-    groups = family.build(members)
+    groups = build_together(family, members)
     assert sorted(row for built in groups for row in built.rows.tolist()) == list(range(20))
     for built in groups:
         assert len({members[row].operator for row in built.rows.tolist()}) == 1
@@ -154,10 +154,10 @@ def test_a_posture_keeps_its_position_while_lengths_change_and_joint_angles_are_
     ranges = tuple(Range(path, 0.14, 0.2) for path in LENGTHS)
     members = [FamilyMember(0, (0.1, 0.9)), FamilyMember(0, (0.9, 0.8))]
     by_position = Family(device, ranges, (), device.at((0.03, 0.24)))
-    (built,) = by_position.build(members)
+    (built,) = build_together(by_position, members)
     np.testing.assert_allclose(built.point.posture.position, [[0.03, 0.24, 0.0]] * 2, atol=1e-12)
     angles = {"upper-right": 0.65, "upper-left": 2.491}
-    assert Family(device, ranges, (), device.at(angles)).build(members) == []
+    assert build_together(Family(device, ranges, (), device.at(angles)), members) == []
 
 
 def test_what_may_turn_an_axis_is_checked_one_by_one():
@@ -165,7 +165,7 @@ def test_what_may_turn_an_axis_is_checked_one_by_one():
     device = from_document(tomllib.loads(new_device("arm", "serial-2r")))
     device = device.with_({"links.lower.orientation_rad": [0.0, 0.0, 0.0]})
     family = Family(device, (Range("links.lower.orientation_rad.0", 0.0, np.pi),), (), device.at())
-    assert family.build([FamilyMember(0, (0.0,)), FamilyMember(0, (0.5,))]) == []
+    assert build_together(family, [FamilyMember(0, (0.0,)), FamilyMember(0, (0.5,))]) == []
     with pytest.raises(ValueError, match="is one number"):
         family.loop(FamilyMember(0, (0.5,)))
 
@@ -173,7 +173,7 @@ def test_what_may_turn_an_axis_is_checked_one_by_one():
 def studied(family, monkeypatch=None, **arguments):
     """A study, and its numbers; with `monkeypatch` each member is built alone."""
     if monkeypatch is not None:
-        monkeypatch.setattr(Family, "build", lambda self, members: [])
+        monkeypatch.setattr(robust_family, "build_at_point", lambda groups, point: iter(()))
     study = robust_study(family, **arguments)
     document = study.document()
     return study, {key: document[key] for key in ("members", "failed", "binding", "search", "violation")}

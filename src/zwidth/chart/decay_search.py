@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.circle_sampling import NEAR_END
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL, SAMPLES, STARTS, EdgeMemory
-from zwidth.chart.edge_samples import LONGEST, SHARE, fill_curve, fill_loop, fill_loop_polynomials, flag_all
+from zwidth.chart.edge_samples import LONGEST, SHARE, fill_curve, fill_loop, fill_without_singularities, flag_all
 from zwidth.chart.radius_search import descend, wall_radius
 from zwidth.chart.real_root_lines import curve_end
 from zwidth.chart.roots import polynomial_radius, spread_roots
@@ -69,7 +69,7 @@ def _keeps_digits(loops: LoopTable, i: int, memory: EdgeMemory) -> bool:
     """Whether polynomials on two circles give the fastest wall the radius that was found."""
     fastest = memory.fastest
     for radius in (1.0, 0.5 * (1.0 + fastest[2])):
-        fill_loop_polynomials(loops, i, radius, memory)
+        fill_without_singularities(loops, i, radius, memory)
         N = memory.circle.sizes[DEGREE]
         p, roots = memory.room[0, : N + 1], memory.features.roots[:N]
         spread_roots(roots)
@@ -83,7 +83,7 @@ def _keeps_digits(loops: LoopTable, i: int, memory: EdgeMemory) -> bool:
 def double_root_excess(loops: LoopTable, i: int, root: float, radius: float, memory: EdgeMemory) -> float:
     """Largest modulus of the other roots less the radius, of the wall with a double root at +radius (root 0) or
     -radius (inf), which goes into `double_root`; inf where there is none."""
-    fill_loop_polynomials(loops, i, radius, memory)
+    fill_without_singularities(loops, i, radius, memory)
     K, B, known = curve_end(memory, root)
     memory.double_root[0], memory.double_root[1] = K, B
     if not (known and np.isfinite(K + B)):
@@ -132,7 +132,7 @@ def solve_double_root_alone(loops: LoopTable, root: float, low: float, high: flo
 @compiled_lean
 def _search_double_roots(loops: LoopTable, i: int, memory: EdgeMemory) -> None:
     """The wall with a double real root as large as another that decays fastest, into `fastest` if there is one."""
-    fill_loop_polynomials(loops, i, 1.0, memory)
+    fill_without_singularities(loops, i, 1.0, memory)
     if memory.circle.sizes[DEGREE] < 3:
         return
     ratio = (FARTHEST / NEAREST) ** (1.0 / (RADII - 1))

@@ -16,7 +16,7 @@ from zwidth.chart.circle_sampling import (
 from zwidth.chart.curve_refinement import refine_samples
 from zwidth.chart.edge_memory import CROSSINGS, NONE, SAMPLES, SETTLED, EdgeMemory
 from zwidth.chart.hurwitz import edges_stable_set
-from zwidth.chart.loop_polynomials import fill_computer_polynomials, fill_polynomials
+from zwidth.chart.loop_polynomials import fill_computer_polynomials, fill_loop_polynomials, fill_polynomials
 from zwidth.chart.wall_samples import UNKNOWN, flag_walls, walls_of_samples
 from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import (
@@ -57,14 +57,10 @@ def fill_loop(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> No
 
 
 @compiled_lean
-def fill_loop_polynomials(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> None:
+def fill_without_singularities(loops: LoopTable, i: int, radius: float, memory: EdgeMemory) -> None:
     """The factors and polynomials of loop i on |z| = radius, without its singular points."""
-    circle, computer = memory.circle, loops.computer[i]
-    fill_computer(loops, computer, radius, circle)
-    fill_computer_polynomials(circle, memory.polynomials)
-    fill_plant(loops, i, circle)
-    fill_polynomials(circle, memory.polynomials)
-    circle.sizes[COMPUTER] = -1  # its singular points do not stand
+    fill_loop_polynomials(loops, i, radius, memory.circle, memory.polynomials)
+    memory.circle.sizes[COMPUTER] = -1  # its singular points do not stand
 
 
 @compiled_apart

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import (
+    COMPUTER,
     DEGREE,
     FORCE,
     SECTIONS,
@@ -22,7 +23,10 @@ from zwidth.loop.circle_factors import (
     WHOLE_DELAY,
     WINDOW,
     CircleFactors,
+    fill_computer,
+    fill_plant,
 )
+from zwidth.loop.loop_table import LoopTable
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -50,6 +54,12 @@ class LoopPolynomials(NamedTuple):
 def polynomial_memory(most: int) -> LoopPolynomials:
     """Memory for loops of at most this degree."""
     return LoopPolynomials(np.zeros((5, most + 1)), np.zeros((10, most + 4)), np.zeros(10, dtype=np.int64))
+
+
+def most_degree(loops: LoopTable) -> int:
+    """A degree that no loop of a table exceeds."""
+    factors = loops.rows.shape[1] + loops.force.shape[1] + loops.velocity.shape[1]
+    return int(2 * factors + loops.whole_delay.max() + loops.split.max() + loops.window.shape[1] - 1)
 
 
 @compiled_lean
@@ -179,4 +189,18 @@ def fill_polynomials(f: CircleFactors, out: LoopPolynomials) -> None:
 def polynomials_of_loop(circle: CircleFactors, out: LoopPolynomials) -> None:
     """All polynomials of a single loop."""
     fill_computer_polynomials(circle, out)
+    fill_polynomials(circle, out)
+
+
+@compiled_apart
+def fill_loop_polynomials(
+    loops: LoopTable, i: int, radius: float, circle: CircleFactors, out: LoopPolynomials
+) -> None:
+    """Factors and polynomials of loop i of a table on |z| = radius. What its computer alone decides is kept from
+    the loop before, if that has the same one."""
+    computer = loops.computer[i]
+    if circle.sizes[COMPUTER] != computer or circle.radius[0] != radius:
+        fill_computer(loops, computer, radius, circle)
+        fill_computer_polynomials(circle, out)
+    fill_plant(loops, i, circle)
     fill_polynomials(circle, out)

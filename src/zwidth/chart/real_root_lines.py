@@ -8,10 +8,13 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.chart.edge_memory import EdgeMemory
 from zwidth.compiled import compiled_lean
 from zwidth.loop.circle_factors import DEGREE, CircleFactors, wall_on_circle, wall_with_slopes
+
+Floats = NDArray[np.float64]
 
 LAST_DIGITS: Final = 1e-14  # of an angle
 # Two lines are parallel, or an end of the curve at infinity, where a determinant is this small a share of its
@@ -44,11 +47,16 @@ def sum_of_coefficients(memory: EdgeMemory) -> float:
 @compiled_lean
 def curve_end(memory: EdgeMemory, root: float) -> tuple[float, float, bool]:
     """The wall with a double root at +rho (root 0) or -rho (root inf), and whether there is one; it may be at
-    infinity.
+    infinity."""
+    return end_of_curve(memory.polynomials.coefficients, memory.circle.sizes[DEGREE], root)
+
+
+@compiled_lean
+def end_of_curve(polynomials: Floats, N: int, root: float) -> tuple[float, float, bool]:
+    """`curve_end` of a loop of degree N.
 
     There the two outermost coefficients of p vanish together: two linear equations.
     """
-    polynomials, N = memory.polynomials.coefficients, memory.circle.sizes[DEGREE]
     i, j = (0, 1) if root == 0.0 else (N, N - 1)
     a, s, v = polynomials[0, i], polynomials[1, i], polynomials[2, i]
     b, p, q = polynomials[0, j], polynomials[1, j], polynomials[2, j]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.arc_kernels import dense_points, sign_changes
-from zwidth.chart.arcs import Arc, ArcPoints, Wall
+from zwidth.chart.arcs import Arc, ArcPoints
 from zwidth.chart.area import arc_integral, area_memory
 from zwidth.chart.circle_sampling import (
     MOST_SAMPLES,
@@ -215,15 +215,3 @@ class Tracer:
             own = np.argmin(np.abs(z - (self.radius if root == "plus" else -self.radius)))
             return bool(np.abs(np.delete(z, own)).max() < self.radius - CIRCLE_TOLERANCE)
         return bool(flag > 0)
-
-    def curve_end(self, root: RealRoot) -> Wall | None:
-        """The wall with a double root at +rho (theta = 0) or -rho (theta = pi); None if it is at infinity.
-
-        There the two outermost coefficients of p vanish together: two linear equations.
-        """
-        A, S, V = self.polynomials[:3]
-        i, j = (0, 1) if root == "plus" else (self.degree, self.degree - 1)
-        det = S[i] * V[j] - S[j] * V[i]
-        if abs(det) <= 1e-13 * (abs(S[i] * V[j]) + abs(S[j] * V[i])) or det == 0.0:
-            return None
-        return float((A[j] * V[i] - A[i] * V[j]) / det), float((A[i] * S[j] - A[j] * S[i]) / det)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from zwidth.loop.loop_table import LoopTable, loop_table
@@ -14,12 +16,14 @@ from zwidth.model.reduction import Model
 from zwidth.model.rendered_modes import RenderedModes, rendered_modes
 
 
-def table_of_points(point: OperatingPoint) -> LoopTable | None:
+def table_of_points(point: OperatingPoint, coupled: bool = True) -> LoopTable | None:
     """The loops of all points, flat.
 
     A loop without sections is to be built alone, as `point[i].loop`: its posture is not OK, or its poles are such
     as compiled code does not treat.
 
+    coupled  False: to rounding. Loops whose dampers couple their modes, which are known to some ten digits here,
+             have no sections then either
     Returns  None where that holds of every point: a measured response, a given plant of a single design or one
              that is reduced, encoders on the links in a reduced model
     """
@@ -30,20 +34,32 @@ def table_of_points(point: OperatingPoint) -> LoopTable | None:
         return None
     if point.mechanism is not None and point.encoders != "motor" and model != "full":
         return None
-    pairs = pole_pairs_of_points(point.flat if point.shape else point, model)
+    if _is_held(point, model) and not coupled:
+        return None
+    pairs = pole_pairs_of_points(point.flat if point.shape else point, model, coupled)
     return loop_table(*section_rows(pairs, point.controller), point.controller)
 
 
-def pole_pairs_of_points(point: OperatingPoint, model: Model) -> PolePairs:
-    """The plants of all points along one axis, held by their operator, as pairs of poles."""
+def pole_pairs_of_points(point: OperatingPoint, model: Model, coupled: bool = True) -> PolePairs:
+    """The plants of all points along one axis, held by their operator, as pairs of poles.
+
+    coupled  False: nan as reach for plants whose dampers couple their modes; nobody holds them
+    """
     modes, period = _modes(point, model), np.ravel(point.controller.sampling_period)
-    if point.operator is not None and model != "motor-mass":  # this model holds the operator fixed
+    if _is_held(point, model):
         return coupled_pairs(modes, point.operator, period)
     if modes.coupled is None or not modes.coupled.any():
         return modes.pairs
+    if not coupled:
+        return replace(modes.pairs, reach=np.where(modes.coupled, np.nan, modes.pairs.reach))
     rows = np.flatnonzero(modes.coupled)
     own = period[rows] if len(period) > 1 else period
     return modes.pairs.with_rows(rows, coupled_pairs(modes.rows(rows), None, own))
+
+
+def _is_held(point: OperatingPoint, model: Model) -> bool:
+    """Whether an operator moves with the plants; the motor's mass alone has him fixed."""
+    return point.operator is not None and model != "motor-mass"
 
 
 def _modes(point: OperatingPoint, model: Model) -> RenderedModes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
@@ -57,6 +57,21 @@ def one_sided_derivative(of: Callable[[float], float], at: float, scale: float, 
     return _extrapolate(lambda h: side * (of(at + side * h) - start) / h, scale, 2.0)
 
 
+def arguments(at: float, scale: float, trial: int) -> Iterator[float]:
+    """Every argument at which the derivatives above may want the function for one of their first steps, number
+    `trial` of FIRST: `at` itself, and those above and below it."""
+    yield at
+    for h in _steps(FIRST[trial] * scale):
+        yield at + h
+        yield at - h
+
+
+def _steps(first: float) -> Iterator[float]:
+    """A first step, and the most halvings of it."""
+    for level in range(MOST):
+        yield first / 2.0**level
+
+
 def _extrapolate(quotient: Callable[[float], float], scale: float, factor: float) -> Derivative:
     """The best result over the first steps; tried in turn until one is accurate enough."""
     best = _table(quotient, FIRST[0] * scale, scale, factor)
@@ -76,8 +91,8 @@ def _table(quotient: Callable[[float], float], first: float, scale: float, facto
     """
     row: list[float] = []
     best, best_level = Derivative(float("nan"), float("inf")), 0
-    for level in range(MOST):
-        above, row = row, [quotient(first / 2.0**level)]
+    for level, step in enumerate(_steps(first)):
+        above, row = row, [quotient(step)]
         for k, coarse in enumerate(above):
             row.append(row[k] + (row[k] - coarse) / (factor ** (k + 1) - 1.0))
             error = max(abs(row[k + 1] - row[k]), abs(row[k + 1] - coarse))

@@ -14,18 +14,29 @@ equations: implicit differentiation of K1(angle 1) = K2(angle 2), B1 = B2 with b
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import nan, pi
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.chart import StabilityChart
+from zwidth.chart.curve import wall_at
+from zwidth.chart.loop_polynomials import (
+    LoopPolynomials,
+    fill_loop_polynomials,
+    most_degree,
+    polynomial_memory,
+)
 from zwidth.chart.peak import Peak
-from zwidth.chart.tracer import RealRoot, Tracer
+from zwidth.chart.real_root_lines import end_of_curve
+from zwidth.chart.tracer import Tracer, tracer_of
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.loop.circle_factors import DEGREE, CircleFactors, factor_memory
 from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import LoopTable
+from zwidth.threads import in_chunks
 
 Floats = NDArray[np.float64]
 Kind = Literal["smooth maximum", "corner", "edge at B = 0", "end of the curve"]
@@ -36,7 +47,27 @@ AT_MAXIMUM: Final = 1e-5
 # Extreme points closer than this share of the stable set's size are one.
 APART: Final = 1e-3
 
-Piece = tuple[Floats, Callable[[Tracer], float]]
+# Kinds of pieces of the edge.
+CURVE, LINE, AXIS, END = range(4)
+
+
+class EdgePieces(NamedTuple):
+    """Pieces of a loop's edge that meet in a wall, as equations for the motion of that wall with the loop.
+
+    kind    (n,)    CURVE at a fixed angle, LINE of a real root, AXIS B = 0, or END of the curve
+    angle   (n,)    of the roots on the circle; 0 for z = 1, pi for z = -1
+    normal  (n, 2)  n = (n_K, n_B) of n . dwall = dr
+    start   (n,)    r for the loop itself, of a LINE; else 0
+    weight  (n,)    dK of the wall per dr of each piece
+    wall    (2,)    K [N/m], B [N s/m] of the wall
+    """
+
+    kind: NDArray[np.int64]
+    angle: Floats
+    normal: Floats
+    start: Floats
+    weight: Floats
+    wall: Floats
 
 
 class OptimumError(ValueError):
@@ -47,16 +78,74 @@ class OptimumError(ValueError):
 class Optimum:
     """The stiffest wall and the part of the edge on which it lies.
 
-    peak                      the wall, and the angles of its roots
-    kind                      a smooth maximum of the edge; a corner of two pieces of edge; an edge that crosses B
-                              = 0; or a double real root at an end of the curve
-    stiffness_to_first_order  loop -> a number whose derivative by anything in the loop is that of the largest
-                              stiffness [N/m]; at the loop itself it is the largest stiffness
+    peak    the wall, and the angles of its roots
+    kind    a smooth maximum of the edge; a corner of two pieces of edge; an edge that crosses B = 0; or a double
+            real root at an end of the curve
+    pieces  of the edge
     """
 
     peak: Peak
     kind: Kind
-    stiffness_to_first_order: Callable[[Loop], float]
+    pieces: EdgePieces
+
+    def stiffness_to_first_order(self, loop: Loop) -> float:
+        """A number whose derivative by anything in the loop is that of the largest stiffness [N/m]; for the loop
+        itself it is the largest stiffness. Raises OptimumError where the curve's end goes to infinity."""
+        (stiffness,) = self.stiffnesses_to_first_order(loop.table).tolist()
+        if self.kind == "end of the curve" and not np.isfinite(stiffness):
+            raise OptimumError("the curve's end goes to infinity")
+        return float(stiffness)
+
+    def stiffnesses_to_first_order(self, loops: LoopTable) -> Floats:
+        """`stiffness_to_first_order` of each loop of a table, (N,); nan for one without sections, and where the
+        curve's end goes to infinity."""
+        out = np.full(len(loops.rows), nan)
+        most = most_degree(loops)
+
+        def several(first: int, last: int) -> None:
+            _stiffnesses(loops, factor_memory(loops), polynomial_memory(most), self.pieces, out, first, last)
+
+        in_chunks(several, len(out))
+        return out
+
+
+@compiled
+def _stiffnesses(
+    loops: LoopTable,
+    circle: CircleFactors,
+    polynomials: LoopPolynomials,
+    pieces: EdgePieces,
+    out: Floats,
+    first: int,
+    last: int,
+) -> None:
+    """Fill in `out` for loops first to last - 1."""
+    for i in range(first, last):
+        if loops.section_count[i] == 0:
+            continue
+        fill_loop_polynomials(loops, i, 1.0, circle, polynomials)
+        stiffness = 0.0
+        for k in range(len(pieces.kind)):
+            stiffness += pieces.weight[k] * _read_piece(circle, polynomials.coefficients, pieces, k)
+        out[i] = stiffness
+
+
+@compiled_lean
+def _read_piece(circle: CircleFactors, polynomials: Floats, pieces: EdgePieces, k: int) -> float:
+    """r of piece k for a loop; for the end of the curve its K."""
+    kind, angle, N = pieces.kind[k], pieces.angle[k], circle.sizes[DEGREE]
+    if kind == CURVE:
+        K, B, _, _ = wall_at(circle, angle)
+        return float(pieces.normal[k, 0] * K + pieces.normal[k, 1] * B)
+    if kind == AXIS:
+        return 0.0
+    if kind == LINE:
+        outer = 0 if angle == 0.0 else N
+        a, s, v = polynomials[0, outer], polynomials[1, outer], polynomials[2, outer]
+        sK, vB = s * pieces.wall[0], v * pieces.wall[1]
+        # scaled by itself: a line is the same line at any multiple, and its scale jumps with the number of roots
+        return float(pieces.start[k] - (a + sK + vB) / (abs(a) + abs(sK) + abs(vB)))
+    return float(end_of_curve(polynomials, N, 0.0 if angle == 0.0 else np.inf)[0])
 
 
 def optimum(loop: Loop, peak: Peak) -> Optimum:
@@ -76,61 +165,60 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
     >>> stiffest.kind, round((heavier - lighter) / (0.002 * 68629.15), 6)
     ('smooth maximum', 1.0)
     """
-    tracer = Tracer(loop)
+    tracer = tracer_of(loop)
     inside = [angle for angle in peak.angles if 0.0 < angle < pi]
-    real: list[RealRoot] = ["plus" if angle == 0.0 else "minus" for angle in peak.angles if angle not in inside]
-    pieces = [_curve(tracer, angle) for angle in inside] + [_line(tracer, root, peak) for root in real]
+    real = [angle for angle in peak.angles if angle not in inside]
+    pieces = [_curve(tracer, angle) for angle in inside] + [_line(tracer, angle, peak) for angle in real]
     if len(pieces) == 1 and peak.damping == 0.0:
-        return _crossing(peak, "edge at B = 0", [*pieces, (np.array([0.0, 1.0]), lambda _: 0.0)], loop.period)
+        return _crossing(peak, "edge at B = 0", [*pieces, _Piece(AXIS, 0.0, np.array([0.0, 1.0]))], loop.period)
     if len(pieces) == 2:
         return _crossing(peak, "corner", pieces, loop.period)
-    if inside:
-        angle = inside[0]
-        if not _is_maximum(tracer, angle):
-            raise OptimumError(
-                "rounding hides the edge where the largest stiffness lies, so that it has no derivative"
-            )
-        return Optimum(peak, "smooth maximum", lambda other: Tracer(other).wall(angle)[0])
-    return Optimum(peak, "end of the curve", lambda other: _end(other, real[0]))
+    if inside and not _is_maximum(tracer, inside[0]):
+        raise OptimumError(
+            "rounding hides the edge where the largest stiffness lies, so that it has no derivative"
+        )
+    alone = _Piece(CURVE if inside else END, (inside or real)[0], np.array([1.0, 0.0]))
+    return Optimum(peak, "smooth maximum" if inside else "end of the curve", _pieces(peak, [alone], np.ones(1)))
 
 
-def _curve(tracer: Tracer, angle: float) -> Piece:
+class _Piece(NamedTuple):
+    """One piece of edge, see `EdgePieces`."""
+
+    kind: int
+    angle: float
+    normal: Floats
+    start: float = 0.0
+
+
+def _pieces(peak: Peak, pieces: list[_Piece], weights: Floats) -> EdgePieces:
+    return EdgePieces(
+        kind=np.array([one.kind for one in pieces]),
+        angle=np.array([one.angle for one in pieces]),
+        normal=np.array([one.normal for one in pieces]),
+        start=np.array([one.start for one in pieces]),
+        weight=weights,
+        wall=np.array([peak.stiffness, peak.damping]),
+    )
+
+
+def _curve(tracer: Tracer, angle: float) -> _Piece:
     _, _, dK, dB = tracer.wall(angle)
-    normal = np.array([dB, -dK]) / np.hypot(dB, dK)
-    return normal, lambda other: float(normal @ other.wall(angle)[:2])
+    return _Piece(CURVE, angle, np.array([dB, -dK]) / np.hypot(dB, dK))
 
 
-def _line(tracer: Tracer, root: RealRoot, peak: Peak) -> Piece:
+def _line(tracer: Tracer, angle: float, peak: Peak) -> _Piece:
     wall = np.array([1.0, peak.stiffness, peak.damping])
-
-    def size(line: Floats) -> float:
-        return float(np.abs(line) @ np.abs(wall))
-
-    here = tracer.line(root)
-    normal = here[1:] / size(here)
-    start = float(normal @ wall[1:])
-
-    def read(other: Tracer) -> float:
-        # scaled by itself: a line is the same line at any multiple, and its scale jumps with the number of roots
-        line = other.line(root)
-        return start - float(line @ wall) / size(line)
-
-    return normal, read
+    line = tracer.line("plus" if angle == 0.0 else "minus")
+    normal = line[1:] / float(np.abs(line) @ np.abs(wall))
+    return _Piece(LINE, angle, normal, float(normal @ wall[1:]))
 
 
-def _crossing(peak: Peak, kind: Kind, pieces: list[Piece], period: float) -> Optimum:
-    normals = np.array([normal for normal, _ in pieces])
+def _crossing(peak: Peak, kind: Kind, pieces: list[_Piece], period: float) -> Optimum:
+    normals = np.array([one.normal for one in pieces])
     scaled = normals * np.array([1.0 / period, 1.0])  # K T and B have one unit
     if np.linalg.cond(scaled / np.linalg.norm(scaled, axis=1)[:, None]) > 1e9:
         raise OptimumError("two pieces of the edge touch at the largest stiffness, which then has no derivative")
-    weights = np.linalg.solve(normals.T, np.array([1.0, 0.0]))
-    readers = [read for _, read in pieces]
-
-    def stiffness(other: Loop) -> float:
-        tracer = Tracer(other)
-        return float(weights @ [read(tracer) for read in readers])
-
-    return Optimum(peak, kind, stiffness)
+    return Optimum(peak, kind, _pieces(peak, pieces, np.linalg.solve(normals.T, np.array([1.0, 0.0]))))
 
 
 def _is_maximum(tracer: Tracer, angle: float) -> bool:
@@ -139,13 +227,6 @@ def _is_maximum(tracer: Tracer, angle: float) -> bool:
     low, here, high = (tracer.wall(angle + shift)[2] for shift in (-step, 0.0, step))
     curvature = (high - low) / (2.0 * step)
     return bool(abs(here) <= AT_MAXIMUM * angle * abs(curvature))
-
-
-def _end(loop: Loop, root: RealRoot) -> float:
-    end = Tracer(loop).curve_end(root)
-    if end is None:
-        raise OptimumError("the curve's end goes to infinity")
-    return end[0]
 
 
 def second_peak_stiffness(chart: StabilityChart) -> float:

@@ -26,7 +26,7 @@ from zwidth.loop.estimator import NonlinearError
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
 from zwidth.result import Result
-from zwidth.study.robust_family import Family, FamilyMember, RangeError
+from zwidth.study.robust_family import Family, FamilyMember, RangeError, build_together
 from zwidth.study.robust_search import MemberRadii, violating_members
 from zwidth.study.unseen_members import Violation, sample_walls, try_unseen_members
 
@@ -131,7 +131,7 @@ def robust_study(
                NonlinearError  for a velocity estimate that is not linear
 
     >>> from zwidth.device.load import from_document
-    >>> from zwidth.study.robust_family import Family, Range
+    >>> from zwidth.study.robust_family import Family, Range, build_together
     >>> plain = from_document({"name": "m", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}})
     >>> mass = Range("plant.mass_kg", 0.1, 0.3)
     >>> study = robust_study(Family(plain, (mass,), (), plain.at()), 8, 100)
@@ -179,7 +179,7 @@ class _Members:
 
     def add(self, points: list[FamilyMember], stage: str) -> None:
         """Build and chart more members; those that fail are kept with the reason."""
-        self.family.build(points)
+        build_together(self.family, points)
         for done, point in enumerate(points):
             self.progress(stage, done, len(points))
             index = len(self.points)

@@ -183,23 +183,6 @@ class Family:
             if len(steps) > 2 and isinstance(steps[-1], int) and isinstance(steps[-2], int):
                 yield (*steps[:-2], steps[-1], steps[-2]), k
 
-    def build(self, members: Sequence[FamilyMember]) -> list[BuiltDesigns]:
-        """The members that can be built together, by their places among these; `loop` finds them built until the
-        next call. The others are to be built alone."""
-        self._built.clear()
-        built = []
-        operators = np.array([one.operator for one in members])
-        for operator, grouping in enumerate(self._groupings):
-            places = np.flatnonzero(operators == operator)
-            if not len(places):
-                continue
-            columns = self._columns([members[n] for n in places.tolist()], grouping.document)
-            for group in build_at_point(grouping.groups(columns), self.operating_point):
-                built.append(replace(group, rows=places[group.rows]))
-        for group in built:
-            self._built.update((members[row], (group.point, n)) for n, row in enumerate(group.rows))
-        return built
-
     def _columns(self, members: Sequence[FamilyMember], document: dict[str, Any]) -> list[DesignColumn]:
         """The numbers that differ in the document of several members."""
         values = [[one.at(member.shares[k]) for member in members] for k, one in enumerate(self.ranges)]
@@ -258,6 +241,25 @@ class Family:
                             for fault in error.faults
                         ]
         return list(dict.fromkeys(faults))
+
+
+def build_together(family: Family, members: Sequence[FamilyMember]) -> list[BuiltDesigns]:
+    """The members that can be built together, by their places among these. The others are to be built alone.
+
+    `Family.loop` finds them built until the next call.
+    """
+    operators, built = np.array([one.operator for one in members]), []
+    for operator, grouping in enumerate(family._groupings):
+        places = np.flatnonzero(operators == operator)
+        if not len(places):
+            continue
+        columns = family._columns([members[n] for n in places.tolist()], grouping.document)
+        for group in build_at_point(grouping.groups(columns), family.operating_point):
+            built.append(replace(group, rows=places[group.rows]))
+    family._built.clear()
+    for group in built:
+        family._built.update((members[row], (group.point, n)) for n, row in enumerate(group.rows))
+    return built
 
 
 def _path_faults(document: dict[str, Any], one: Range) -> list[RangeFault]:

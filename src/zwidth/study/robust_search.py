@@ -14,7 +14,7 @@ import numpy as np
 from zwidth.chart.robust.chart import RobustChart
 from zwidth.chart.table_radii import spectral_radii
 from zwidth.loop.loop import Loop
-from zwidth.study.robust_family import Family, FamilyMember
+from zwidth.study.robust_family import Family, FamilyMember, build_together
 
 Wall: TypeAlias = tuple[float, float]  # K [N/m], B [N s/m]
 
@@ -37,7 +37,7 @@ class MemberRadii:
         number = {member: n for n, member in enumerate(dict.fromkeys(member for member, _ in pairs))}
         member_of = np.array([number[member] for member, _ in pairs], dtype=np.int64)
         walls = np.array([wall for _, wall in pairs]).reshape(-1, 2)
-        for built in self.family.build(list(number)):
+        for built in build_together(self.family, list(number)):
             if built.table is None:
                 continue
             row = np.full(len(number), -1)

@@ -3,15 +3,16 @@
     e = d ln K_max / d ln p = (p / K_max) dK_max/dp,       + 1 % of p gives + e % of K_max
 
 The stiffest wall is not searched again for each number: to first order it moves as the edge on which it lies
-(`study.optimum`). The device is built again with the number slightly larger and smaller, and the motion of the
-edge is differenced (`study.derivative`).
+(`study.optimum`). The device is built again with the number slightly larger and smaller, together for all numbers
+(`study.changed_devices`), and the motion of the edge is differenced (`study.derivative`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from math import isfinite, isnan, nan
 from typing import Any, Final
 
@@ -22,14 +23,13 @@ from zwidth.device import address
 from zwidth.device.build_nonlinear import nonlinear_kind
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted
-from zwidth.device.load import from_document
 from zwidth.device.schema import device_file as schema
-from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
+from zwidth.study.changed_devices import Change, ChangedDevices
 from zwidth.study.derivative import Derivative, central_derivative, one_sided_derivative
-from zwidth.study.optimum import Optimum, OptimumError, optimum, second_peak_stiffness
+from zwidth.study.optimum import OptimumError, optimum, second_peak_stiffness
 from zwidth.study.sensitivity_result import Group, Sensitivities, Sensitivity
 
 # Numbers of a device file that choose a posture, or help to find it, and are no property of the device.
@@ -66,9 +66,6 @@ def sensitivities(
     require("device", device, Device)
     operating_point = point or device.at()
 
-    def loop_of(changed: Device) -> Loop:
-        return changed.at_point(operating_point).loop
-
     loop = operating_point.loop
     peak = largest_stiffness(loop)
     left_out = dict(_left_out(device.document))
@@ -78,8 +75,12 @@ def sensitivities(
         stiffest, obstacle = optimum(loop, peak), ""
     except OptimumError as error:
         stiffest, obstacle = None, str(error)
-    derivatives = _StiffnessDerivatives(device, loop_of, stiffest, obstacle)
     numbers, varied = [], list(_numbers(device.document))
+    changed = None
+    if stiffest is not None:
+        changes = dict(_changes(device.document, varied))
+        changed = ChangedDevices(device, operating_point, stiffest, changes)
+    derivatives = _StiffnessDerivatives(device, changed, obstacle)
     for number in varied:
         numbers.append(derivatives.sensitivity(*number))
         if progress is not None:
@@ -108,81 +109,61 @@ def _rank(number: Sensitivity) -> tuple[bool, float, bool, float]:
 
 @dataclass(frozen=True)
 class _StiffnessDerivatives:
-    """Derivatives of the largest stiffness by changes of the device's document.
+    """Derivatives of the largest stiffness by changes of the device's numbers.
 
-    loop_of   device -> its loop at the operating point
-    optimum   the stiffest wall and the edge it lies on; None where it has no derivative, for the reason `obstacle`
+    changed  the device with each change; None where the stiffest wall has no derivative, for the reason `obstacle`
     """
 
     device: Device
-    loop_of: Callable[[Device], Loop]
-    optimum: Optimum | None
+    changed: ChangedDevices | None
     obstacle: str
 
     def sensitivity(self, path: str, steps: KeyPath, value: float) -> Sensitivity:
         """The sensitivity to one number; of a number that cannot be varied, with the reason."""
-        document = self.device.document
-        unit = _unit(steps)
-        scale = abs(value) or _scale(document, steps)
-        reason = _obstacle(steps, value)
+        unit, reason = _unit(steps), _obstacle(steps, value)
         slope, side = Derivative(nan, nan), ""
         if not reason:
-            slope, side, reason = self._slope(lambda changed: _with(document, steps, changed), value, scale)
-        if self.optimum is None or reason:
+            slope, side, reason = self._slope(path)
+        if self.changed is None or reason:
             return Sensitivity(path, value, unit, nan, nan, nan, "", reason)
-        K = self.optimum.peak.stiffness
+        K, scale = self.changed.optimum.peak.stiffness, self.changed.changes[path].scale
         if value == 0.0:
             return Sensitivity(path, value, unit, nan, slope.value * K, slope.error * K, side, ZERO)
         return Sensitivity(path, value, unit, slope.value * value, slope.value * K, slope.error * scale, side)
 
     def groups(self, by_path: dict[str, Sensitivity]) -> Iterator[Group]:
         """The groups of numbers. A plant's matrix is scaled as a whole: a free plant stays free."""
-        steps_of = {path: steps for path, steps, _ in _numbers(self.device.document)}
         for name, paths in _groups(self.device.document).items():
             parts = [by_path[path] for path in paths if by_path[path].value != 0.0]
             if len(parts) < 2:
                 continue
             total = float(sum(part.logarithmic for part in parts))
             if name.startswith("plant."):
-                scaled = self._scaling([(steps_of[part.path], part.value) for part in parts])
-                total = self._slope(scaled, 1.0, 1.0)[0].value
+                total = self._slope(name)[0].value
             yield Group(name, tuple(paths), total)
 
-    def _scaling(self, places: list[tuple[KeyPath, float]]) -> Callable[[float], dict[str, Any]]:
-        """Common factor -> the document with these numbers multiplied by it."""
-
-        def scaled(factor: float) -> dict[str, Any]:
-            document = self.device.document
-            for steps, value in places:
-                document = _with(document, steps, factor * value)
-            return document
-
-        return scaled
-
-    def _slope(
-        self, change: Callable[[float], dict[str, Any]], at: float, scale: float
-    ) -> tuple[Derivative, str, str]:
-        """Derivative of ln K_max, its side, and "" or the reason why there is none. It is taken from both sides
-        where these are alike, else from above, else from below.
+    def _slope(self, name: str) -> tuple[Derivative, str, str]:
+        """Derivative of ln K_max by a change, its side, and "" or the reason why there is none. It is taken from
+        both sides where these are alike, else from above, else from below.
 
         A delay that crosses whole samples changes the form of the loop, and the largest stiffness bends there.
         """
-        if self.optimum is None:
+        if self.changed is None:
             return Derivative(nan, nan), "", self.obstacle
-        stiffest, delays = self.optimum, dict[int, tuple[int, bool]]()
+        changed, change, delays = self.changed, self.changed.changes[name], dict[int, tuple[int, bool]]()
 
-        def stiffness(changed: float) -> float:
-            loop = self.loop_of(from_document(change(changed), skip_assembly_check=True))
-            delays[int(np.sign(changed - at))] = (loop.whole_delay, loop.fractional_delay > 0.0)
-            return stiffest.stiffness_to_first_order(loop) / stiffest.peak.stiffness
+        def stiffness(argument: float) -> float:
+            loop = changed.loop(name, argument)
+            delays[int(np.sign(argument - change.at))] = loop.delay
+            return loop.stiffness / changed.optimum.peak.stiffness
 
         reason = ""
         for side, sign in (("both", 0), ("above", 1), ("below", -1)):
             try:
                 slope = (
-                    one_sided_derivative(stiffness, at, scale, sign)
+                    one_sided_derivative(stiffness, change.at, change.scale, sign)
                     if sign
-                    else central_derivative(stiffness, at, scale)
+                    else central_derivative(stiffness, change.at, change.scale)
                 )
             except DeviceError as error:
                 reason = reason or error.faults[0].message
@@ -192,10 +173,29 @@ class _StiffnessDerivatives:
                 continue
             if side == "both" and delays[-1] != delays[1]:
                 continue
-            if slope.error * scale <= WORTHLESS * max(1.0, abs(slope.value) * scale):
+            if slope.error * change.scale <= WORTHLESS * max(1.0, abs(slope.value) * change.scale):
                 return slope, side, ""
             reason = reason or "it changes too abruptly here to have a derivative"
         return Derivative(nan, nan), "", reason
+
+
+def _changes(document: dict[str, Any], varied: list[tuple[str, KeyPath, float]]) -> Iterator[tuple[str, Change]]:
+    """Each number that can be varied, by its path; and the matrices and vectors of a plant, scaled as wholes."""
+    for path, steps, value in varied:
+        if not _obstacle(steps, value):
+            yield path, Change(tuple(_places(document, steps, 1.0)), value, abs(value) or _scale(document, steps))
+    known = {path: (steps, value) for path, steps, value in varied if value != 0.0}
+    for name, paths in _groups(document).items():
+        if name.startswith("plant."):
+            parts = [known[path] for path in paths if path in known]
+            yield name, Change(tuple(place for part in parts for place in _places(document, *part)), 1.0, 1.0)
+
+
+def _places(document: dict[str, Any], steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
+    """A number as a multiple of an argument, and its mirror image where it stands in a symmetric matrix."""
+    yield steps, multiple
+    if _is_matrix(document, steps) and steps[-1] != steps[-2]:
+        yield (*steps[:-2], steps[-1], steps[-2]), multiple
 
 
 def _obstacle(steps: KeyPath, value: float) -> str:
@@ -239,15 +239,7 @@ def _is_matrix(document: dict[str, Any], steps: KeyPath) -> bool:
     return len(steps) > 2 and isinstance(steps[-1], int) and isinstance(steps[-2], int)
 
 
-def _with(document: dict[str, Any], steps: KeyPath, value: float) -> dict[str, Any]:
-    """The document with a number changed, and its mirror image where it stands in a symmetric matrix."""
-    changed = address.assign(document, dotted(steps, document), value)
-    if _is_matrix(document, steps) and steps[-1] != steps[-2]:
-        mirror = (*steps[:-2], steps[-1], steps[-2])
-        changed = address.assign(changed, dotted(mirror, document), value)
-    return changed
-
-
+@cache
 def _unit(steps: KeyPath) -> str:
     """The unit that the schema states for the number, or for the list that it stands in."""
     while steps:

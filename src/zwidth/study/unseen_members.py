@@ -17,9 +17,9 @@ from zwidth.chart.robust.instability import softenings, unstable_walls
 from zwidth.chart.table_radii import spectral_radii
 from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import LoopTable, Whole, table_of_loops
+from zwidth.loop.loop_table import LoopTable, Whole
 from zwidth.progress import Progress
-from zwidth.study.robust_family import Family, FamilyMember
+from zwidth.study.robust_family import Family, FamilyMember, build_together
 
 Floats = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def _tried(
     """
     report(before)
     alone = np.ones(len(members), dtype=bool)
-    for built in family.build(members):
+    for built in build_together(family, members):
         if built.table is not None:
             known = built.table.section_count > 0
             radius, softer = _worst_walls(built.table, walls, partial(spectral_radii, built.table))
@@ -114,7 +114,7 @@ def _tried(
 
 def _worst_walls_alone(loop: Loop, walls: Floats) -> tuple[Floats, Floats]:
     """`_worst_walls` of a single loop. Raises what making a table of it raises."""
-    return _worst_walls(table_of_loops(loop), walls, lambda _, K, B: spectral_radius(loop, K, B))
+    return _worst_walls(loop.table, walls, lambda _, K, B: spectral_radius(loop, K, B))
 
 
 def _worst_walls(

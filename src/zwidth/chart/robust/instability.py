@@ -8,19 +8,12 @@ from numpy.typing import NDArray
 from zwidth.chart.hurwitz import is_stable, work_array
 from zwidth.chart.loop_polynomials import (
     LoopPolynomials,
-    fill_computer_polynomials,
-    fill_polynomials,
+    fill_loop_polynomials,
+    most_degree,
     polynomial_memory,
 )
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.loop.circle_factors import (
-    COMPUTER,
-    DEGREE,
-    CircleFactors,
-    factor_memory,
-    fill_computer,
-    fill_plant,
-)
+from zwidth.loop.circle_factors import DEGREE, CircleFactors, factor_memory
 from zwidth.loop.loop_table import LoopTable, Whole
 from zwidth.threads import in_chunks
 
@@ -70,25 +63,6 @@ def softenings(loops: LoopTable, which: Whole, K: Floats, B: Floats) -> Floats:
     return out
 
 
-def most_degree(loops: LoopTable) -> int:
-    """A degree that no characteristic polynomial of these loops exceeds."""
-    delayed = loops.whole_delay.max() + 1 + loops.window.shape[1] - 1
-    factors = loops.rows.shape[1] + loops.force.shape[1] + loops.velocity.shape[1]
-    return int(2 * factors + delayed)
-
-
-@compiled_lean
-def _fill(loops: LoopTable, i: int, circle: CircleFactors, polynomials: LoopPolynomials) -> None:
-    """The polynomials of loop i on the unit circle; what its computer alone decides is kept from the loop before,
-    if that has the same one."""
-    computer = loops.computer[i]
-    if circle.sizes[COMPUTER] != computer:
-        fill_computer(loops, computer, 1.0, circle)
-        fill_computer_polynomials(circle, polynomials)
-    fill_plant(loops, i, circle)
-    fill_polynomials(circle, polynomials)
-
-
 @compiled
 def _unstable_walls(
     loops: LoopTable,
@@ -104,7 +78,7 @@ def _unstable_walls(
     """Mark the walls that are certainly unstable for loops first to last - 1."""
     for i in range(first, last):
         if loops.section_count[i] > 0:
-            _fill(loops, i, circle, polynomials)
+            fill_loop_polynomials(loops, i, 1.0, circle, polynomials)
             mark_unstable(polynomials.coefficients, circle.sizes[DEGREE], K, B, room, out[i])
 
 
@@ -124,7 +98,7 @@ def _softenings(
     """Fill in `out` for walls first to last - 1."""
     for k in range(first, last):
         if k == first or which[k] != which[k - 1]:
-            _fill(loops, which[k], circle, polynomials)
+            fill_loop_polynomials(loops, which[k], 1.0, circle, polynomials)
         out[k] = _softening(polynomials.coefficients, circle.sizes[DEGREE], K[k], B[k], room)
 
 
