@@ -7,7 +7,7 @@ import pytest
 
 from tests.systems import random_loop
 from zwidth.chart.robust.instability import softening, softenings, unstable, unstable_walls
-from zwidth.chart.table_radii import spectral_radii
+from zwidth.chart.table_radii import radii_and_leverages, spectral_radii
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import spectral_radius
 from zwidth.loop.loop_table import table_of_loops
@@ -50,6 +50,21 @@ def test_radii_are_those_of_each_loop_alone(seed):
     radii = spectral_radii(table_of_loops(*loops), which, K, B)
     for n in range(400):
         assert radii[n] == pytest.approx(float(spectral_radius(loops[which[n]], K[n], B[n])), rel=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_leverage_bounds_how_the_radius_moves_with_the_plant(seed):
+    loops = loops_without_chains(seed, 40)
+    table, (K, B), change = table_of_loops(*loops), random_walls(seed, 200), 1e-7
+    which = np.random.default_rng(seed).integers(len(loops), size=200)
+    radii, leverages = radii_and_leverages(table, which, K, B)
+    np.testing.assert_array_equal(radii, spectral_radii(table, which, K, B))
+    table.rows[:, :, 2:8] *= 1.0 + change
+    moved = np.abs(spectral_radii(table, which, K, B) - radii) / change
+    plain = leverages < 100.0  # where roots meet a change moves them by its square root
+    assert plain.mean() > 0.8
+    assert np.all(moved[plain] <= leverages[plain] * 1.01 + 1e-6)
+    assert np.any(moved[plain] > 0.9 * leverages[plain])
 
 
 def test_what_stands_beside_a_loop_changes_no_bit_of_it():

@@ -8,9 +8,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from zwidth.chart.verdict import judge
 from zwidth.device import address
 from zwidth.device.load import load
-from zwidth.measures.bindings import impedance
+from zwidth.measures.bindings import impedance, wall_decay
 from zwidth.measures.definition import FAILED, OK
 from zwidth.study.column import column_named
 from zwidth.study.sampling import Axis, Sampling, Tie
@@ -113,6 +114,37 @@ def test_designs_together_are_the_designs_alone(kind, seed):
     values, status = alone(replace(job, _cache={}))
     assert np.array_equal(together.status, status)
     np.testing.assert_allclose(together.values, values, rtol=1e-9)
+
+
+def wall_job(kind, seed, size):
+    """A sweep for the decay at walls that differ from design to design, too."""
+    job = random_job(kind, seed, size)
+    walls = Axis("stiffness_N_per_m", (), (10.0, 20000.0)), Axis("damping_Ns_per_m", (), (0.0, 20.0))
+    columns = tuple(column_named(one) for one in ("spectral_radius", "decay_time"))
+    return replace(job, columns=columns, sampling=Sampling((*job.sampling.axes, *walls), size, seed))
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("kind", DEVICES)
+def test_walls_of_designs_decay_as_each_alone(kind, seed):
+    job = wall_job(kind, seed, 40)
+    together = job.compute(0, job.count)
+    cells = [[job._alone(n, one) for one in job.columns] for n in range(job.count)]
+    assert together.status.tolist() == [[status for _, status, _ in row] for row in cells]
+    np.testing.assert_allclose(together.values, [[value for value, _, _ in row] for row in cells], rtol=1e-9)
+    for column, notes in enumerate(together.notes):
+        assert {note.reason for note in notes} == {row[column][2] for row in cells} - {""}
+
+
+@pytest.mark.parametrize("kind", ["loops", "filters and lag", "a rigid drive", "held"])
+def test_only_walls_near_the_circle_are_judged_alone(kind, monkeypatch):
+    judged = []
+    monkeypatch.setattr(wall_decay, "judge", lambda *arguments: judged.append(arguments) or judge(*arguments))
+    job = wall_job(kind, 3, 60)
+    taken = sum(len(group.rows) for group in job._grouping.groups(list(job._design_columns(0, 60))))
+    job.compute(0, 60)
+    assert taken == 60
+    assert len(judged) < 6
 
 
 @pytest.mark.parametrize("kind", ["loops", "filters and lag", "masses"])

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import fields
-from typing import Final
 
 import numpy as np
 
 from zwidth.chart.chart_batch import ChartNumbers, chart_numbers
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_loops import table_of_points
-
-AT_ONCE: Final = 32768  # loops that are in memory at once
+from zwidth.loop.point_loops import pieces_of_points, table_of_points
 
 
 def numbers_of_points(point: OperatingPoint, what: int) -> ChartNumbers | None:
@@ -30,7 +26,7 @@ def numbers_of_points(point: OperatingPoint, what: int) -> ChartNumbers | None:
 
 def _numbers(point: OperatingPoint, what: int) -> ChartNumbers | None:
     parts = []
-    for piece in _pieces(point):
+    for _, piece in pieces_of_points(point):
         table = table_of_points(piece)
         if table is None:
             return None
@@ -38,14 +34,3 @@ def _numbers(point: OperatingPoint, what: int) -> ChartNumbers | None:
     return ChartNumbers(
         *(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(ChartNumbers))
     )
-
-
-def _pieces(point: OperatingPoint) -> Iterator[OperatingPoint]:
-    """All points, flat, some at a time."""
-    count = int(np.prod(point.shape))
-    if count <= AT_ONCE:
-        yield point
-        return
-    flat = point.flat
-    for first in range(0, count, AT_ONCE):
-        yield flat[first : first + AT_ONCE]

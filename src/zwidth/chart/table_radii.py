@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.verdict import BATCH_SIZE
 from zwidth.loop.loop_table import LoopTable, Whole
+from zwidth.loop.realisation import StateSpace
 from zwidth.loop.table_states import state_spaces
 
 Floats = NDArray[np.float64]
+
+BESIDE: Final = 1e-3  # how much smaller a root may be that could be the largest instead
 
 
 def spectral_radii(loops: LoopTable, which: Whole, wall_stiffness: Floats, wall_damping: Floats) -> Floats:
@@ -21,22 +26,52 @@ def spectral_radii(loops: LoopTable, which: Whole, wall_stiffness: Floats, wall_
     Returns  nan for a loop without sections, and where the matrix is not finite
     Raises   ValueError  for chained sections, see `state_spaces`
     """
-    out = np.full(len(which), np.nan)
+    radii, _ = _radii(loops, which, wall_stiffness, wall_damping, False)
+    return radii
+
+
+def radii_and_leverages(
+    loops: LoopTable, which: Whole, wall_stiffness: Floats, wall_damping: Floats
+) -> tuple[Floats, Floats]:
+    """`spectral_radii`, and by how much the largest root moves at most, per relative change of the plant's
+    response (p,).
+
+    With the loop's poles o_j without a wall, p(z) = prod (z - o_j) (1 + L(z)) = prod (z - z_k), so that a change
+    of L by dL moves the root z_i, at which L = -1, by
+
+        dz_i = (dL / L) prod_j (z_i - o_j) / prod_{k != i} (z_i - z_k)
+    """
+    return _radii(loops, which, wall_stiffness, wall_damping, True)
+
+
+def _radii(loops: LoopTable, which: Whole, K: Floats, B: Floats, leverage: bool) -> tuple[Floats, Floats]:
+    """Radii (p,), and leverages (p,) if these are wanted, else nan."""
+    radii, leverages = np.full((2, len(which)), np.nan)
     for first in range(0, len(which), BATCH_SIZE):
-        walls = slice(first, first + BATCH_SIZE)
-        out[walls] = _radii(loops, which[walls], wall_stiffness[walls], wall_damping[walls])
-    return out
+        batch = np.arange(first, min(first + BATCH_SIZE, len(which)))
+        alike, place = np.unique(which[batch], return_inverse=True)
+        for of_one_structure, space in state_spaces(loops, alike):
+            row = np.full(len(alike), -1)
+            row[of_one_structure] = np.arange(len(of_one_structure))
+            walls = np.flatnonzero(row[place] >= 0)
+            states = space[row[place[walls]]]
+            with np.errstate(over="ignore", invalid="ignore"):
+                L = states.transition_matrix(K[batch[walls]], B[batch[walls]])
+            finite = np.isfinite(L).all(axis=(-2, -1))
+            z = np.linalg.eigvals(L[finite]).astype(np.complex128)
+            radii[batch[walls[finite]]] = np.abs(z).max(axis=-1)
+            if leverage:
+                leverages[batch[walls[finite]]] = _leverages(z, states[np.flatnonzero(finite)])
+    return radii, leverages
 
 
-def _radii(loops: LoopTable, which: Whole, K: Floats, B: Floats) -> Floats:
-    out = np.full(len(which), np.nan)
-    alike, place = np.unique(which, return_inverse=True)
-    for of_one_structure, space in state_spaces(loops, alike):
-        row = np.full(len(alike), -1)
-        row[of_one_structure] = np.arange(len(of_one_structure))
-        walls = np.flatnonzero(row[place] >= 0)
-        with np.errstate(over="ignore", invalid="ignore"):
-            L = space[row[place[walls]]].transition_matrix(K[walls], B[walls])
-        finite = np.isfinite(L).all(axis=(-2, -1))
-        out[walls[finite]] = np.abs(np.linalg.eigvals(L[finite])).max(axis=-1)
-    return out
+def _leverages(z: NDArray[np.complex128], states: StateSpace) -> Floats:
+    """The largest (p,) over the roots that are, or are nearly, the largest of z (p, N)."""
+    poles = np.linalg.eigvals(states.open)
+    size = np.abs(z)
+    largest = size > size.max(axis=-1, keepdims=True) - BESIDE
+    apart = np.abs(z[:, :, None] - z[:, None, :])
+    apart[:, np.arange(z.shape[1]), np.arange(z.shape[1])] = 1.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moved = np.prod(np.abs(z[:, :, None] - poles[:, None, :]) / apart, axis=-1)
+    return np.asarray(np.where(largest, moved, 0.0).max(axis=-1))

@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 BAND = 1e-9
 # Rounding of an eigenvalue in units of its own condition number.
 ROUNDING = 1e-15
+NEAR = 1e-4  # distance from the unit circle within which an eigenvalue's own error may decide
 UNSTABLE, UNDECIDED, STABLE = -1, 0, 1
 BATCH_SIZE = 20_000  # walls judged in one batch of transition matrices
 NAMES = {STABLE: "stable", UNDECIDED: "undecided", UNSTABLE: "unstable"}
@@ -144,8 +145,7 @@ def _judged(loop: Loop | MultiLoop, K: Floats, B: Floats) -> tuple[NDArray[np.in
     radius = np.where(finite, np.abs(top), np.nan)
     frequency = np.where(finite, np.abs(np.angle(top)) / (2.0 * np.pi * loop.period), np.nan)
     width = np.full(radius.shape, BAND)
-    # Only near the circle can an eigenvalue's own error decide
-    for index in np.argwhere(np.abs(radius - 1.0) < 1e-4):
+    for index in np.argwhere(np.abs(radius - 1.0) < NEAR):
         at = tuple(index)
         width[at] = max(BAND, _rounding(L[at]))
     verdict = np.where(radius < 1.0 - width, STABLE, np.where(radius > 1.0 + width, UNSTABLE, UNDECIDED))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -14,6 +16,20 @@ from zwidth.model.plant_modes import plant_modes
 from zwidth.model.pole_pairs import PolePairs
 from zwidth.model.reduction import Model
 from zwidth.model.rendered_modes import RenderedModes, rendered_modes
+
+AT_ONCE: Final = 32768  # loops that are in memory at once
+
+
+def pieces_of_points(point: OperatingPoint) -> Iterator[tuple[slice, OperatingPoint]]:
+    """All points, flat, as many at a time as are in memory at once; and which they are."""
+    count = int(np.prod(point.shape))
+    if count <= AT_ONCE:
+        yield slice(None), point
+        return
+    flat = point.flat
+    for first in range(0, count, AT_ONCE):
+        piece = slice(first, first + AT_ONCE)
+        yield piece, flat[piece]
 
 
 def table_of_points(point: OperatingPoint, coupled: bool = True) -> LoopTable | None:

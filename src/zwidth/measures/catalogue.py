@@ -11,7 +11,8 @@ from zwidth.model.argument_checks import wrong_type
 
 _BINDINGS: Final = "zwidth.measures.bindings"
 _OF_THE_MECHANISM: Final = ("dexterity", "forces")  # files whose measures need no loop
-_WALL_FILE: Final = "wanted_wall"  # file whose measures are all about a wanted wall
+_OF_A_WALL: Final = ("wanted_wall", "wall_decay")  # files whose measures are all about a wanted wall
+_OF_DESIGNS: Final = (*_OF_THE_MECHANISM, "impedance", "wall_decay")  # files whose measures take many designs
 
 
 def _measure(
@@ -27,8 +28,8 @@ def _measure(
 ) -> Measure:
     linear = file not in _OF_THE_MECHANISM
     function = f"{_BINDINGS}.{file}:{name}"
-    of_designs = file in (*_OF_THE_MECHANISM, "impedance") and not each
-    wall = file == _WALL_FILE
+    of_designs = file in _OF_DESIGNS and not each
+    wall = file in _OF_A_WALL
     return Measure(
         name, title, unit, better, source, function, each, along, linear, of_wall=wall, of_designs=of_designs
     )
@@ -167,22 +168,20 @@ _MEASURES: Final = (
         "thesis eq. 5.14; motor side on its spring, structural damping left out",
     ),
     _measure(
-        "wanted_wall",
+        "wall_decay",
         "spectral_radius",
         "Spectral radius at the wanted wall",
         "",
         "lower",
         "thesis eq. 2.40",
-        each=True,
     ),
     _measure(
-        "wanted_wall",
+        "wall_decay",
         "decay_time",
         "Time in which vibration at the wanted wall decays to 1/e",
         "s",
         "lower",
         "T / -ln of the spectral radius",
-        each=True,
     ),
     _measure(
         "wanted_wall",

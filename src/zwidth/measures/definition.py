@@ -158,6 +158,17 @@ class WantedWall:
 
 
 @dataclass(frozen=True)
+class WantedWalls:
+    """The wall to be rendered by each of many designs, for measures that take designs all at once.
+
+    stiffness, damping  (...) [N/m], [N s/m]; they broadcast with the points
+    """
+
+    stiffness: NDArray[np.float64]
+    damping: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
 class Measure:
     """One number for a device at an operating point.
 
@@ -171,7 +182,7 @@ class Measure:
     along     whether it depends on the rendered direction
     linear    whether it is computed from the linear loop, without friction, encoder steps and limits
     of_wall   whether it is about a wanted wall, which its function takes as a second argument
-    wall      the wanted wall
+    wall      the wanted wall; of many designs with walls of their own, these walls
     of_designs  whether it also takes points whose mechanism, plant or computer differ, all at once
     """
 
@@ -185,7 +196,7 @@ class Measure:
     along: bool = True
     linear: bool = True
     of_wall: bool = False
-    wall: WantedWall = WantedWall()
+    wall: WantedWall | WantedWalls = WantedWall()
     of_designs: bool = False
 
     @property
@@ -200,7 +211,7 @@ class Measure:
         plain = re.fullmatch(r"[A-Za-z0-9_]+", written) and "^r" not in self.unit
         return f"{self.name}_{written}" if plain else self.name
 
-    def at_wall(self, wall: WantedWall) -> Measure:
+    def at_wall(self, wall: WantedWall | WantedWalls) -> Measure:
         """The same measure for a wanted wall; itself if it needs none."""
         return replace(self, wall=wall) if self.of_wall else self
 

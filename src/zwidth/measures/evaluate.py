@@ -124,13 +124,20 @@ def _note(points: NDArray[np.bool_], status: int, reason: str) -> Note:
 
 def evaluate_pointwise(compute: Callable[[OperatingPoint], Any], point: OperatingPoint) -> MeasureValues:
     """Call a function with one point at a time, for all points."""
-    values, status = np.full(point.shape, np.nan), point.status.copy()
+    return complete_pointwise(np.full(point.shape, np.nan), lambda index: compute(point[index]), point)
+
+
+def complete_pointwise(
+    known: NDArray[np.float64], compute: Callable[[tuple[int, ...]], Any], point: OperatingPoint
+) -> MeasureValues:
+    """Values at all points: those known, and where these are nan those that a function of an index returns."""
+    status = point.status.copy()
+    values = np.where(status == OK, known, np.nan)
     why: dict[tuple[int, ...], tuple[int, str]] = {}
-    for index in np.ndindex(point.shape):
-        if status[index] == OK:
-            values[index], status[index], reason = evaluate_safely(lambda: compute(point[index]))  # noqa: B023
-            if reason:
-                why[index] = (int(status[index]), reason)
+    for index in map(tuple, np.argwhere((status == OK) & np.isnan(values)).tolist()):
+        values[index], status[index], reason = evaluate_safely(lambda: compute(index))  # noqa: B023
+        if reason:
+            why[index] = (int(status[index]), reason)
     return MeasureValues(values, status, notes_of_points(why))
 
 

@@ -33,6 +33,7 @@ from zwidth.measures.definition import (
     Note,
     Spelling,
     WantedWall,
+    WantedWalls,
 )
 from zwidth.measures.evaluate import evaluate, evaluate_safely, measured_together
 from zwidth.model.posture import OutOfReach, PostureError, Singular
@@ -189,13 +190,14 @@ class SweepJob:
         if same and not measure.of_wall:
             yield from [_column_value(one, measure, point, self.weights)] * len(designs)
             return
-        if measure.of_wall or not measured_together(measure, point):
+        together = not same and measured_together(measure, point) and (measure.of_designs or not measure.of_wall)
+        if not together:
             for place, number in enumerate(designs):
                 wanted = measure.at_wall(self.design(int(number)).wall)
                 yield _column_value(one, wanted, point if same else point[place], self.weights)
             return
         try:
-            result = evaluate(measure, point)
+            result = evaluate(measure.at_wall(self._walls(designs, point)) if measure.of_wall else measure, point)
         except MeasureError as error:
             yield from [(np.nan, NO_VALUE, error.spelled(as_key))] * len(designs)
             return
@@ -210,6 +212,14 @@ class SweepJob:
                 found = one.reduce(MeasureValues(values, status), point[place], self.weights)
             known = reasons.get(found[1], [])
             yield None if len(known) > 1 else (*found[:2], found[2] or "".join(known))
+
+    def _walls(self, designs: NDArray[np.int64], point: OperatingPoint) -> WantedWall | WantedWalls:
+        """The walls wanted of some designs, along the first of the points' axes."""
+        each = [self.design(int(number)).wall for number in designs]
+        if None in (each[0].stiffness, each[0].damping):  # and so of all of them
+            return each[0]
+        walls = np.array([(one.stiffness, one.damping) for one in each])
+        return WantedWalls(*walls.T.reshape(2, -1, *[1] * (len(point.shape) - 1)))
 
     def design(self, number: int) -> Design:
         """One of the designs, by its number from 0."""

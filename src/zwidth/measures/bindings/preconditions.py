@@ -5,15 +5,18 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.conditions.assumptions import COLLOCATED, PLAIN, ConditionCase, case_of
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import MeasureError, WantedWall
+from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
 from zwidth.measures.handle_impedance import HandleError, handle_of
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
+
+Floats = NDArray[np.float64]
 
 # One mass in place of a mechanism, where only the computer matters.
 UNIT: Final = Plant(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1), np.ones(1))
@@ -25,6 +28,12 @@ def wall_of(wanted: WantedWall) -> tuple[float, float]:
     if K is None or B is None:
         raise MeasureError("needs a wanted wall", [("stiffness", None), ("damping", None)])
     return K, B
+
+
+def walls_of(wanted: WantedWall | WantedWalls, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
+    """Stiffness and damping of the wall at each of many points. Raises MeasureError where they are not given."""
+    K, B = (wanted.stiffness, wanted.damping) if isinstance(wanted, WantedWalls) else wall_of(wanted)
+    return np.broadcast_to(K, shape), np.broadcast_to(B, shape)
 
 
 def frequency_of(wanted: WantedWall) -> float:

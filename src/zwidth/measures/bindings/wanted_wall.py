@@ -43,19 +43,6 @@ def optimal_motor_side_mass(point: OperatingPoint, wanted: WantedWall) -> Measur
     return with_status(point, _optimal(point, wanted).mass, _NOT_REACHED)
 
 
-def spectral_radius(point: OperatingPoint, wanted: WantedWall) -> float:
-    """Spectral radius of the wanted wall by eigenvalues, for any model and loop."""
-    return float(_wall_verdicts(point, wanted).spectral_radius[0])
-
-
-def decay_time(point: OperatingPoint, wanted: WantedWall) -> float:
-    """Time in which the slowest vibration at the wanted wall shrinks to 1/e [s]."""
-    verdicts = _wall_verdicts(point, wanted)
-    if verdicts.verdict[0] != STABLE:
-        raise NoValueError(f"the wanted wall is {verdicts.names[0]} here, so that vibration does not decay")
-    return float(vibration_decay.decay_time(verdicts.spectral_radius[0], point.controller.sampling_period))
-
-
 def structural_distortion(point: OperatingPoint, wanted: WantedWall) -> float:
     """Largest share of the motors' motion that deforms the structure, up to the wanted frequency."""
     return deformation.structural_distortion(plant_with_handle(point), frequency_of(wanted))
