@@ -6,14 +6,17 @@ import json
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+from time import sleep
 
 import numpy as np
 import pytest
 
 from zwidth import compile_events
+from zwidth import compiled as compiled_module
 from zwidth.compile_events import compiling, listening
 from zwidth.compiled import can_be_taken_apart
 from zwidth.show.cli.first_use import KernelTimes, Progress, announce_compiling
@@ -77,6 +80,24 @@ def call(tmp_path):
         return done.stdout.strip()
 
     return run
+
+
+@needs_parts
+def test_threads_that_call_a_new_kernel_at_once_share_its_entry(monkeypatch):
+    """A second entry would load the machine code again, over that which the first thread runs."""
+    entries: list[object] = []
+    make = compiled_module._Entry.__init__
+
+    def make_slowly(self, *arguments):
+        entries.append(self)
+        sleep(0.1)  # so that the other thread arrives
+        make(self, *arguments)
+
+    monkeypatch.setattr(compiled_module._Entry, "__init__", make_slowly)
+    half = compiled_module.compiled(lambda x: 0.5 * x)
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(half, [1.0, 3.0])) == [0.5, 1.5]
+    assert len(entries) == 1
 
 
 @needs_parts

@@ -16,6 +16,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from threading import Lock
 from typing import Any, Final, TypeVar, cast
 
 import numba
@@ -38,6 +39,9 @@ APART: Final = "zwidth_apart"  # an option of ours: the kernel is never inlined
 TAKEN_APART: Final = ((0, 61), (0, 68))
 HASH_OF_FLAGS: Final = hash(compiler.Flags())
 COMPILING_THRESHOLDS: Final = (100_000, 1000, 1000)  # of Python's garbage collector, see gc.set_threshold
+# Threads may call a kernel for the first time at once. With an entry for each the second would load the same
+# machine code over that which the first already runs, and now and then the process would crash.
+MAKING_ENTRY: Final = Lock()
 
 
 def compiled(function: Function) -> Function:
@@ -265,6 +269,7 @@ class _Kernel(registry.CPUDispatcher):
 
     def _compile_for_args(self, *arguments: Any, **keywords: Any) -> Any:
         """Called by numba for a call from Python with types of arguments that it has not seen."""
-        if self._entry is None:
-            self._entry = _Entry(self.py_func, self.kernel_options, self)
+        with MAKING_ENTRY:
+            if self._entry is None:
+                self._entry = _Entry(self.py_func, self.kernel_options, self)
         return self._entry._compile_for_args(*arguments, **keywords)
