@@ -20,13 +20,12 @@ from threading import Lock
 from typing import Any, Final, TypeVar, cast
 
 import numba
-from numba import types
 from numba.core import compiler, registry
 from numba.core.codegen import JITCodeLibrary
 
 from zwidth.compile_events import compiling
 from zwidth.machine_code import MachineCode
-from zwidth.tuple_references import handed_over, refuse_returned_address
+from zwidth.tuple_references import TakesAddresses, refuse_returned_address
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 # Division follows IEEE (1/0 is inf), so that a singular point is data and not an exception.
@@ -242,14 +241,17 @@ def rare_garbage_collection() -> Iterator[None]:
         gc.set_threshold(*thresholds)
 
 
-class _Kernel(registry.CPUDispatcher):
-    """A kernel as other kernels call it; a call from Python goes to its `_Entry`."""
+class _Kernel(TakesAddresses, registry.CPUDispatcher):
+    """A kernel as other kernels call it; a call from Python goes to its `_Entry`.
+
+    apart  whether it is never inlined
+    """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any], apart: bool) -> None:
         part_options = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         compiler_class = _ApartCompiler if apart else _PartCompiler
         super().__init__(function, targetoptions=part_options, pipeline_class=compiler_class)
-        self.kernel_options = options
+        self.kernel_options, self.apart = options, apart
         self._entry: _Entry | None = None
 
     @property
@@ -261,11 +263,6 @@ class _Kernel(registry.CPUDispatcher):
         refuse_returned_address(self.py_func.__qualname__, result.signature.return_type)
         # not given to numba's own table of what Python may call: there is nothing to call
         self.overloads[tuple(result.signature.args)] = result
-
-    def get_call_template(self, arguments: Any, keywords: Any) -> Any:
-        """Types of the arguments of a call; numba would give each number written in the call a type of its own."""
-        plain = {name: handed_over(types.unliteral(kind)) for name, kind in keywords.items()}
-        return super().get_call_template(tuple(handed_over(types.unliteral(kind)) for kind in arguments), plain)
 
     def _compile_for_args(self, *arguments: Any, **keywords: Any) -> Any:
         """Called by numba for a call from Python with types of arguments that it has not seen."""

@@ -53,6 +53,16 @@ def handed_over(kind: types.Type) -> types.Type:
     return kind
 
 
+class TakesAddresses:
+    """Part of numba's dispatcher of a kernel that others call, on any processor: tuples come as addresses."""
+
+    def get_call_template(self, arguments: Any, keywords: Any) -> Any:
+        """Types of the arguments of a call; numba would give each number written in the call a type of its own."""
+        plain = {name: handed_over(types.unliteral(kind)) for name, kind in keywords.items()}
+        given = tuple(handed_over(types.unliteral(kind)) for kind in arguments)
+        return super().get_call_template(given, plain)  # type: ignore[misc]
+
+
 def refuse_returned_address(kernel: str, kind: types.Type) -> None:
     """Raise TypeError if a kernel returns a tuple that was handed to it.
 
