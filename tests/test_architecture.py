@@ -26,6 +26,8 @@ FLOW = ("model", "loop", "chart", "conditions", "guarantees", "contact", "measur
 EVERYWHERE = {
     "compiled",
     "compile_events",
+    "cuda_kernels",
+    "processors",
     "progress",
     "machine_code",
     "memory_limit",
@@ -37,6 +39,7 @@ EVERYWHERE = {
 MAY_IMPORT = {package: {*FLOW[: place + 1], *EVERYWHERE} for place, package in enumerate(FLOW)}
 MAY_IMPORT |= {module: set() for module in EVERYWHERE}
 MAY_IMPORT["compiled"] = {"compile_events", "machine_code", "tuple_references"}
+MAY_IMPORT["cuda_kernels"] = {"tuple_references"}
 MAY_IMPORT["device"] = {"device", "model", "loop", *EVERYWHERE}
 MAY_IMPORT["study"].add("device")
 MAY_IMPORT["show"].add("device")

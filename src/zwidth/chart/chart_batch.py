@@ -67,7 +67,7 @@ class ChartNumbers:
         return self.fastest[:, 2].copy()
 
 
-class _Numbers(NamedTuple):
+class NumberArrays(NamedTuple):
     """The arrays of `ChartNumbers`, in the form in which kernels take them."""
 
     status: NDArray[np.uint8]
@@ -85,7 +85,7 @@ def chart_numbers(loops: LoopTable, what: int = ALL_NUMBERS) -> ChartNumbers:
 
     what  mask of STIFFEST, WHOLE_EDGE and DECAY
     """
-    out, own = _empty_numbers(len(loops.rows)), local()
+    out, own = empty_numbers(len(loops.rows)), local()
 
     def several(first: int, last: int) -> None:
         if not hasattr(own, "memory"):
@@ -102,8 +102,8 @@ def read_first(loops: LoopTable, memory: EdgeMemory, what: int, radius: float) -
     What is not DOUBTFUL is left in `memory`: its edge, if the mask has WHOLE_EDGE and not DECAY, and `fastest`.
     """
     if not hasattr(_OWN, "numbers"):
-        _OWN.numbers = _empty_numbers(1)
-    out: _Numbers = _OWN.numbers
+        _OWN.numbers = empty_numbers(1)
+    out: NumberArrays = _OWN.numbers
     out.status[0] = out.decay_status[0] = DOUBTFUL
     _several(loops, memory, what, radius, out, 0, 1)
     return int(out.status[0]), int(out.decay_status[0])
@@ -118,28 +118,35 @@ def memory_of(loops: LoopTable) -> EdgeMemory:
     return memory
 
 
-def _empty_numbers(count: int) -> _Numbers:
+def empty_numbers(count: int) -> NumberArrays:
+    """The numbers of so many loops before any is computed: all DOUBTFUL and nan."""
     status = (np.full(count, DOUBTFUL, dtype=np.uint8) for _ in range(2))
     numbers = (np.full(shape, np.nan) for shape in (count, count, (count, 2), count, count, (count, 3)))
     one, other = status
     stiffness, damping, angles, largest_damping, area, fastest = numbers
-    return _Numbers(one, stiffness, damping, angles, largest_damping, area, other, fastest)
+    return NumberArrays(one, stiffness, damping, angles, largest_damping, area, other, fastest)
 
 
 @compiled
 def _several(
-    loops: LoopTable, memory: EdgeMemory, what: int, radius: float, out: _Numbers, first: int, last: int
+    loops: LoopTable, memory: EdgeMemory, what: int, radius: float, out: NumberArrays, first: int, last: int
 ) -> None:
     """Loops first to last - 1, one after the other, on the circle |z| = radius."""
     memory.circle.sizes[COMPUTER] = -1
     for i in range(first, last):
-        if loops.section_count[i] > 0 and degree_of(loops, i) <= MOST_DEGREE:
-            _fill_numbers(loops, i, memory, what, radius, out)
+        fill_numbers(loops, i, memory, what, radius, out)
 
 
 @compiled_lean
-def _fill_numbers(loops: LoopTable, i: int, memory: EdgeMemory, what: int, radius: float, out: _Numbers) -> None:
-    """The numbers of loop i that the mask asks for."""
+def fill_numbers(
+    loops: LoopTable, i: int, memory: EdgeMemory, what: int, radius: float, out: NumberArrays
+) -> None:
+    """The numbers of loop i that the mask asks for; none if it has no sections or its degree is too high.
+
+    memory  as a loop before this one has left it, or with -1 as its computer
+    """
+    if loops.section_count[i] == 0 or degree_of(loops, i) > MOST_DEGREE:
+        return
     fill_loop(loops, i, radius, memory)
     status = DOUBTFUL
     if what & (STIFFEST | WHOLE_EDGE) == STIFFEST:

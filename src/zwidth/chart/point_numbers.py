@@ -7,8 +7,10 @@ from dataclasses import fields
 import numpy as np
 
 from zwidth.chart.chart_batch import ChartNumbers, chart_numbers
+from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import pieces_of_points, table_of_points
+from zwidth.processors import processor_in_use
 
 
 def numbers_of_points(point: OperatingPoint, what: int) -> ChartNumbers | None:
@@ -30,7 +32,15 @@ def _numbers(point: OperatingPoint, what: int) -> ChartNumbers | None:
         table = table_of_points(piece)
         if table is None:
             return None
-        parts.append(chart_numbers(table, what))
+        parts.append(_compute(table, what))
     return ChartNumbers(
         *(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(ChartNumbers))
     )
+
+
+def _compute(loops: LoopTable, what: int) -> ChartNumbers:
+    if processor_in_use() == "cpu":
+        return chart_numbers(loops, what)
+    from zwidth.chart.chart_cuda import numbers_on_gpu
+
+    return numbers_on_gpu(loops, what)

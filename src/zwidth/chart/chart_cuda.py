@@ -1,0 +1,126 @@
+"""The numbers of many loops' charts on a GPU, by the kernels of `chart_batch`: a thread takes one loop after the
+other.
+
+Each thread has its own `EdgeMemory`, a row of arrays that are allocated for all threads together. It takes 0.6 MB,
+so that the GPU's memory limits the number of threads, and not the number of loops.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Final, get_type_hints
+
+import numpy as np
+from numba import cuda
+from numba.core.errors import NumbaPerformanceWarning
+
+from zwidth.chart.chart_batch import ChartNumbers, NumberArrays, empty_numbers, fill_numbers
+from zwidth.chart.edge_memory import MOST_SAMPLES, EdgeMemory, edge_memory
+from zwidth.chart.wall_samples import MOST_DEGREE
+from zwidth.cuda_kernels import SIMULATED, function_of_gpu, rounding_each_step
+from zwidth.loop.circle_factors import COMPUTER
+from zwidth.loop.loop_table import LoopTable
+
+BLOCK: Final = 64  # threads of a block
+# The kernel takes 255 registers, of which a multiprocessor has enough for so many threads.
+THREADS_OF_MULTIPROCESSOR: Final = 256
+SHARE_OF_MEMORY: Final = 0.5  # of the GPU's free memory
+# What all threads read, and none writes.
+SHARED: Final = ("memory.area.rule", "memory.search.least", "memory.search.sizes")
+
+
+def numbers_on_gpu(loops: LoopTable, what: int) -> ChartNumbers:
+    """`chart_batch.chart_numbers` on a GPU, which `processors.check_processor` has found."""
+    N = len(loops.rows)
+    out = empty_numbers(N)
+    if N == 0:
+        return ChartNumbers(*out)
+    like = edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
+    threads = min(N, most_threads(_bytes(like)))
+    block = min(threads, BLOCK)
+    blocks = -(-threads // block)
+    given = LoopTable(*(cuda.to_device(np.ascontiguousarray(array)) for array in loops))
+    there: Any = NumberArrays(*map(cuda.to_device, out))
+    memory = memory_of_threads(like, blocks * block)
+    with rounding_each_step(), warnings.catch_warnings():
+        warnings.simplefilter("ignore", NumbaPerformanceWarning)  # of few blocks, where there are few loops
+        kernel_of_gpu()[blocks, block](given, memory, what, 1.0, there)
+    return ChartNumbers(*(array.copy_to_host() for array in there))
+
+
+def most_threads(bytes_each: int) -> int:
+    """Number of threads for which this GPU has registers, and working memory of so many bytes; at least one."""
+    if SIMULATED:
+        return BLOCK
+    context = cuda.current_context()
+    context.deallocations.clear()  # numba gives memory back late
+    for_memory = int(SHARE_OF_MEMORY * context.get_memory_info().free) // bytes_each
+    for_registers = int(context.device.MULTIPROCESSOR_COUNT) * THREADS_OF_MULTIPROCESSOR
+    return max(1, min(for_memory, for_registers))
+
+
+def memory_of_threads(like: EdgeMemory, threads: int, place_for: Any = cuda) -> EdgeMemory:
+    """Arrays with an axis of threads before those of one memory; those of SHARED have none.
+
+    place_for  has the functions `to_device` and `device_array`, as numba.cuda does for the GPU
+    """
+
+    def there(part: Any, place: str) -> Any:
+        if isinstance(part, tuple):
+            kind: Any = type(part)
+            return kind(*(there(one, f"{place}.{name}") for name, one in zip(kind._fields, part, strict=True)))
+        if place in SHARED:
+            return place_for.to_device(part)
+        return place_for.device_array((threads, *part.shape), part.dtype)
+
+    memory: EdgeMemory = there(like, "memory")
+    return memory
+
+
+@cache
+def kernel_of_gpu() -> Any:
+    """The kernel; it is compiled when it is first launched, which takes about a minute in each process."""
+    numbers, own = function_of_gpu(fill_numbers), cuda.jit(_memory_of_thread(), device=True)
+
+    def fill_all(loops: Any, memory: Any, what: int, radius: float, out: Any) -> None:
+        """Numbers of all loops, each thread those that are as many apart as there are threads."""
+        thread = cuda.grid(1)
+        mine = own(memory, thread)
+        mine.circle.sizes[COMPUTER] = -1
+        for i in range(thread, len(out.status), cuda.gridsize(1)):
+            numbers(loops, i, mine, what, radius, out)
+
+    # what is run is then what can be compiled without a GPU, and it is compiled once, not for two kinds of output
+    return cuda.jit(fill_all) if SIMULATED else cuda.jit(fill_all, lto=False)
+
+
+def _memory_of_thread() -> Callable[[Any, int], Any]:
+    """A function that takes one thread's rows of the arrays of all: `EdgeMemory(..., memory.lanes[thread], ...)`.
+
+    It is written out from the fields of the memory, since numba has no loop over the parts of a tuple that are of
+    several types.
+    """
+    known: dict[str, Any] = {}
+    exec(f"def own(memory, thread):\n    return {_rows(EdgeMemory, 'memory', known)}", known)
+    own: Callable[[Any, int], Any] = known["own"]
+    return own
+
+
+def _rows(kind: type, place: str, known: dict[str, Any]) -> str:
+    """The text that makes a tuple of this kind of the rows of that at a place; `known` gets the kinds it names."""
+    known[kind.__name__] = kind
+    parts = []
+    for name, inner in get_type_hints(kind).items():
+        field = f"{place}.{name}"
+        if hasattr(inner, "_fields"):
+            parts.append(_rows(inner, field, known))
+        else:
+            parts.append(field if field in SHARED else f"{field}[thread]")
+    return f"{kind.__name__}({', '.join(parts)})"
+
+
+def _bytes(part: Any) -> int:
+    """Bytes of all arrays in a tuple."""
+    return sum(map(_bytes, part)) if isinstance(part, tuple) else int(part.nbytes)
