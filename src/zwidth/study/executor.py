@@ -17,6 +17,7 @@ import numpy as np
 
 from zwidth.measures.definition import MISSING, Note
 from zwidth.memory_limit import check_memory
+from zwidth.processors import Processor, check_processor, computing_on
 from zwidth.progress import Progress
 from zwidth.study.job import CellValues, Job
 from zwidth.study.workers import CellRange, Workers, cores, pack_job
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 
 PATIENCE: Final = 10.0  # s; a longer job is worth starting processes, which takes some seconds
+GPU_BATCH: Final = 32768  # cells on a GPU: a loop for each thread of a large one
 BATCH: Final = 0.25  # s that a batch should take: much longer than sending and storing it
 TRIAL: Final = 0.01  # s of computation from which the time per cell is estimated
 LONGER: Final = 1.5  # times as long that twice the cells must take for that
@@ -41,20 +43,23 @@ def run(
     progress: Progress | None = None,
     workers: int | None = None,
     *,
+    processor: Processor = "cpu",
     batch: int | None = None,
     stage: str = "computing",
     patience: float = PATIENCE,
 ) -> CellValues:
     """Compute all cells of a job.
 
-    store     keeps the batches done; those it already holds are not computed again
-    progress  is called with `stage`, the number of cells done, and of all cells
-    workers   largest number of processes; left out: one per core. 1: this process alone
-    batch     cells per batch; left out: as many as take 0.25 s (a store begun earlier keeps its own number)
-    patience  processes are started if the rest is estimated to take longer than this [s]
+    store      keeps the batches done; those it already holds are not computed again
+    progress   is called with `stage`, the number of cells done, and of all cells
+    workers    largest number of processes; left out: one per core. 1: this process alone
+    processor  "cuda": charts are computed on a GPU, by this process alone and in batches of its own
+    batch      cells per batch; left out: as many as take 0.25 s (a store begun earlier keeps its own number)
+    patience   processes are started if the rest is estimated to take longer than this [s]
     Raises    TooLarge    where the cells would not fit into memory
               StoreError  where they would not fit on the disk
               WorkerLost  where a process ended too early; batches done are kept
+              what `processors.check_processor` raises
               whatever the job raises
 
     >>> class Squares:
@@ -65,10 +70,13 @@ def run(
     >>> run(Squares()).values.ravel().tolist()
     [0.0, 1.0, 4.0]
     """
+    check_processor(processor)
     total = job.count
     numbers = 2.0 * total * len(job.measures) * 9 / 8  # values and status, and a copy while they are put together
     check_memory(numbers, f"{total} cells of {len(job.measures)} measures", "ask for fewer")
     number = workers or cores()
+    if processor == "cuda":
+        number, batch = 1, GPU_BATCH
     collection = _CellCollection(job)
     if store is not None and store.batch is not None:
         size = store.batch
@@ -83,7 +91,7 @@ def run(
     done = total - sum(last - first for first, last in ranges)
     if progress is not None:
         progress(stage, done, total)
-    with closing(_compute_ranges(job, ranges, number, patience)) as computed:
+    with computing_on(processor), closing(_compute_ranges(job, ranges, number, patience)) as computed:
         for (first, last), cells in computed:
             if store is not None:
                 store.write_batch(first, cells)

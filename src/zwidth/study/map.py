@@ -17,6 +17,7 @@ from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note, WantedWall
 from zwidth.measures.evaluate import evaluate
 from zwidth.model.argument_checks import require
+from zwidth.processors import Processor
 from zwidth.progress import Progress
 from zwidth.study.column import measure_list, unit_attributes
 from zwidth.study.executor import run
@@ -148,6 +149,7 @@ def workspace_map(
     store: Store | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
+    processor: Processor = "cpu",
 ) -> xr.Dataset:
     """Measures over a plane of a device's workspace.
 
@@ -160,6 +162,7 @@ def workspace_map(
     store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
     progress       is called with "mapping", cells done, and cells of all
     workers        processes at most; left out: one for each core
+    processor      "cuda": charts are computed on an NVIDIA GPU, by one process (`processors`); else "cpu"
     Returns        a dataset over (y_m, x_m): for each measure NAME its values, nan where there is none,
                    NAME_status, and with an extreme direction NAME_direction (y_m, x_m, component). Why cells have
                    no value stands in the attribute `notes`, a line for each reason
@@ -170,7 +173,9 @@ def workspace_map(
                    what `executor.run` and `Store` raise
     """
     job = map_job(device, measures, plane, direction, assembly, model, wall, user_measures=user_measures)
-    return as_dataset(job, run(job, store_for(job, store), progress, workers, batch=job.batch, stage="mapping"))
+    kept = store_for(job, store)
+    cells = run(job, kept, progress, workers, processor=processor, batch=job.batch, stage="mapping")
+    return as_dataset(job, cells)
 
 
 def map_job(

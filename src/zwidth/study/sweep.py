@@ -18,6 +18,7 @@ from zwidth.device.device import Device
 from zwidth.device.faults import plural
 from zwidth.measures.definition import OK, STATUS, Measure
 from zwidth.model.argument_checks import wrong_type
+from zwidth.processors import Processor
 from zwidth.progress import Progress
 from zwidth.result import Result
 from zwidth.study.executor import run
@@ -109,6 +110,7 @@ def sweep(
     store: Store | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
+    processor: Processor = "cpu",
 ) -> xr.Dataset:
     """Measures of a device with every combination of other numbers, or with those of paired axes.
 
@@ -130,6 +132,7 @@ def sweep(
     store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
     progress       is called with the stage, the number of designs done, and of all designs
     workers        processes at most; left out: one for each core
+    processor      "cuda": charts are computed on an NVIDIA GPU, by one process (`processors`); else "cpu"
     Returns        a dataset with a dimension for each axis, named by its path, or with the one dimension `design`
                    of paired axes: for each measure its values, nan where a design has none, and NAME_status. Why
                    they have none stands in the attribute `notes`
@@ -158,7 +161,7 @@ def sweep(
         user_measures=user_measures,
     )
     job = sweep_job(study)
-    return compute_designs(study, job, store_for(job, store), progress, workers).dataset()
+    return compute_designs(study, job, store_for(job, store), progress, workers, processor).dataset()
 
 
 def run_study(
@@ -166,10 +169,11 @@ def run_study(
     store: Store | str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
+    processor: Processor = "cpu",
 ) -> Sweep:
     """Compute a study, read by `read_study` or named by its file.
 
-    store, progress, workers  as for `sweep`
+    store, progress, workers, processor  as for `sweep`
     Raises  DeviceError   with all faults of the study's file and the device's
             MeasureError  for measures that do not exist for this device
             TooLarge      where the designs would not fit into memory
@@ -180,7 +184,7 @@ def run_study(
         raise wrong_type("study", "a Study or the path of a study file", study, hint)
     study = study if isinstance(study, Study) else read_study(study)
     job = sweep_job(study)
-    return compute_designs(study, job, store_for(job, store), progress, workers)
+    return compute_designs(study, job, store_for(job, store), progress, workers, processor)
 
 
 def compute_designs(
@@ -189,6 +193,7 @@ def compute_designs(
     store: Store | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
+    processor: Processor = "cpu",
 ) -> Sweep:
     """Compute the designs of a study as its job; see `executor.run` for the rest."""
-    return Sweep(study, job, run(job, store, progress, workers, stage="computing designs"))
+    return Sweep(study, job, run(job, store, progress, workers, processor=processor, stage="computing designs"))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from zwidth.device.faults import SETTINGS, DeviceError, Fault
+from zwidth.processors import ProcessorError
 from zwidth.show.cli.process import BAD_INPUT, INTERNAL, INTERRUPTED
 from zwidth.show.output import OutputError, printable
 from zwidth.study.points_file import PointsError
@@ -88,6 +89,8 @@ def explain(error: Exception) -> tuple[list[str], int]:
             return [str(_as_typed(fault)) for fault in error.faults], BAD_INPUT
         case BadInput() | PointsError():
             return [printable(line) for line in error.lines], BAD_INPUT
+        case ProcessorError():
+            return [error.spelled(as_option)], BAD_INPUT
         case UnfinishedRun():
             return [f"zwidth: {error}"], INTERNAL
         case OutputError():

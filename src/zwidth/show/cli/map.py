@@ -14,7 +14,7 @@ from zwidth.measures.catalogue import MEASURES
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Finite, Numbers, ParamType, about_a_workspace, refuse_empty
+from zwidth.show.cli.options import Finite, Numbers, ParamType, about_a_workspace, processor_option, refuse_empty
 from zwidth.show.output import ARRAYS, DATA, FIGURES
 
 if TYPE_CHECKING:
@@ -141,6 +141,7 @@ class MapCommand(Command):
             metavar="F",
             help="Frequency of the hand's motion, for measures that depend on it [Hz].",
         ),
+        processor_option,
     )
     outputs = (*FIGURES, *DATA, *ARRAYS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .json .nc .mat)."
@@ -201,6 +202,7 @@ class MapCommand(Command):
                 question.model,
                 case["wall"],
                 progress=case.progress,
+                processor=case["processor"],
             )
         except MeasureError as error:
             raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.processors import PROCESSORS
 from zwidth.show.circumstances import AS_GIVEN
 from zwidth.study.points_file import wall_number
 
@@ -212,6 +213,15 @@ def about_a_device(command: Callback) -> Callback:
             help="Rendered direction, a vector of any length.",
         ),
     )
+
+
+processor_option: Final = click.option(
+    "--processor",
+    type=click.Choice(PROCESSORS),
+    default="cpu",
+    show_default=True,
+    help="Where charts are computed; cuda: on an NVIDIA GPU.",
+)
 
 
 def about_a_workspace(command: Callback) -> Callback:

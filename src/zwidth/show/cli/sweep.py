@@ -13,7 +13,7 @@ from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Question, refuse_empty
+from zwidth.show.cli.options import Question, processor_option, refuse_empty
 from zwidth.show.cli.resumable import open_store, report_kept_work, resume_options
 from zwidth.show.output import ARRAYS, DATA, FIGURES, FOLDERS, printable
 from zwidth.show.units import number, typed
@@ -74,7 +74,7 @@ class SweepCommand(Command):
         "zwidth sweep my-study.toml --output designs.svg",
         "zwidth sweep my-study.toml --resume my-study.cells --workers 4 --output designs.nc",
     )
-    options = (resume_options,)
+    options = (resume_options, processor_option)
     outputs = (*FIGURES, *DATA, *ARRAYS, *FOLDERS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .json .nc .mat .zarr)."
 
@@ -105,7 +105,9 @@ class SweepCommand(Command):
             job = sweep_job(question.study)
             store = open_store(job, case.path, case["resume"])
             with report_kept_work(store):
-                return compute_designs(question.study, job, store, case.progress, case["workers"])
+                return compute_designs(
+                    question.study, job, store, case.progress, case["workers"], case["processor"]
+                )
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
         except MeasureError as error:

@@ -1,0 +1,47 @@
+"""Numbers of charts in numba's simulator of a GPU, where kernels run as Python, and by the processor.
+
+    NUMBA_ENABLE_CUDASIM=1 python tests/chart/cuda_simulation.py
+
+prints one JSON object: the name of each number -> its values there, and here; those of a map's cells, too.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+import numpy as np
+
+from tests.systems import mass, published, random_loop
+from zwidth.chart.chart_batch import DECAY, STIFFEST, WHOLE_EDGE, chart_numbers
+from zwidth.chart.chart_cuda import numbers_on_gpu
+from zwidth.device.load import load
+from zwidth.loop.controller import Controller
+from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import table_of_loops
+from zwidth.study.map import workspace_map
+from zwidth.study.plane_grid import plane_of
+
+RANDOM = 3  # loops besides the two known ones
+
+
+def main() -> None:
+    """Compute and print."""
+    rng = np.random.default_rng(5)
+    known = published(), Loop(mass(0.3, 0.5), Controller(0.001, delay=0.5))
+    loops = table_of_loops(*known, *(random_loop(rng) for _ in range(RANDOM)))
+    found: dict[str, list[object]] = {}
+    for what in (STIFFEST, STIFFEST | WHOLE_EDGE | DECAY):
+        there, here = (asdict(numbers(loops, what)) for numbers in (numbers_on_gpu, chart_numbers))
+        found |= {f"{name} {what}": [there[name].tolist(), here[name].tolist()] for name in there}
+    device = load("five-bar")
+    plane = plane_of(device, cells=(3, 2))
+    there, here = (
+        workspace_map(device, "stiffness_max", plane, processor=one)["stiffness_max"] for one in ("cuda", "cpu")
+    )
+    found["map"] = [there.values.tolist(), here.values.tolist()]
+    print(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main()
