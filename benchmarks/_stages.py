@@ -28,12 +28,12 @@ STAGES = (
     ("which are on the edge", False),
     ("check: does the edge go on from a corner", True),
     ("check: edges of real roots", True),
-    ("check: stiffer walls between crossings", True),
+    ("check: stiffer crossings and maxima", True),
     ("all, from the plant to the stiffest wall", False),
 )
 REPEATS = 10
 _goes_on, _has_stiffer_line = peak_search._goes_on, peak_search._has_stiffer_line
-_has_stiffer_trial = peak_search._has_stiffer_trial
+_has_stiffer_turn = peak_search._has_stiffer_turn
 
 
 def _repeater(stage: int) -> Any:
@@ -71,7 +71,7 @@ def _repeater(stage: int) -> Any:
                 elif stage == 8:
                     _has_stiffer_line(memory)
                 elif stage == 9:
-                    _has_stiffer_trial(memory)
+                    _has_stiffer_turn(memory)
                 else:
                     memory.circle.sizes[COMPUTER] = -1
                     fill_loop(loops, i, 1.0, memory)

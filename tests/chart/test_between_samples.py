@@ -168,6 +168,33 @@ def test_the_stiffest_wall_is_that_of_the_whole_edge():
     compare(chart_numbers(table, STIFFEST), chart_numbers(table, ALL_NUMBERS))
 
 
+# Two masses whose stiffest wall is the tip of another region, thinner than samples are apart: both masses [kg],
+# spring [N/m], damper [N s/m], sampling period [s].
+THIN_TIPS = (
+    (0.01623192823647311, 0.04762463958315099, 35470.497881770236, 9.76329948789438, 0.0015294219887945707),
+    (0.0491474138593875, 0.015961523430560738, 977218.0026366629, 17.20298008273422, 0.000996095990629463),
+    (0.20997772810539228, 0.03998806885521413, 518764.1443221464, 50.34392388532686, 0.0024655835990060205),
+    (0.017851799521672766, 0.02700265484085537, 71011.04929947219, 14.286896065771305, 0.0015115847337645978),
+)
+
+
+def test_a_thin_tip_of_another_region_is_found():
+    """One in a million of such designs; eigenvalues just below the tip, and beside it."""
+    for link, motor, stiffness, damping, period in THIN_TIPS:
+        loop = Loop(Plant.two_masses(link, motor, stiffness, damping), Controller(period))
+        found = chart_numbers(table_of_loops(loop), STIFFEST)
+        (K,), (B,) = found.stiffness, found.damping
+        row = B * (1.0 + np.linspace(-1e-3, 1e-3, 4001))
+        walls = reference_transition_matrix(loop, (1.0 - 1e-6) * K, row)
+        assert np.any(np.abs(np.linalg.eigvals(walls)).max(axis=-1) < 1.0)
+        walls = reference_transition_matrix(loop, (1.0 + 1e-6) * K, row)
+        assert np.all(np.abs(np.linalg.eigvals(walls)).max(axis=-1) > 1.0)
+        softer = (K * np.linspace(0.97, 0.999, 30))[:, None], B * np.linspace(0.5, 2.0, 401)
+        # the region below the tip is thin: hardly one wall of a raster lies in it
+        stable = np.abs(np.linalg.eigvals(reference_transition_matrix(loop, *softer))).max(axis=-1) < 1.0
+        assert stable.mean() < 0.02
+
+
 def compare(one: ChartNumbers, other: ChartNumbers) -> None:
     """Both have the same largest stiffness, wherever neither is in doubt; of the softest to 10 uN/m."""
     certain = (one.status != DOUBTFUL) & (other.status != DOUBTFUL)

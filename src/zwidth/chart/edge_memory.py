@@ -133,7 +133,8 @@ class EdgeMemory(NamedTuple):
 
     counts  (6,)  samples, arcs, pieces, rings, stops and crossings of lines in use
     size    (2,)  largest |K T|, |B| of the whole edge, and T
-    picked  (3, n), (n,), (n,)  working memory for samples that are flagged: t, K and B, number, flag
+    picked  (4, n), (n,), (n,)  working memory: of samples that are flagged t, K and B, number, flag; of pieces of
+                                the curve the least and largest K and B
     peak    (4,)  the stiffest wall so far: stiffness, damping and t of both roots on the circle
     stops   (s,)  dampings at which the edge meets K = 0
     numbers (2,)  largest damping and area
@@ -202,7 +203,7 @@ def edge_memory(loops: LoopTable, most_degree: int, most_samples: int) -> EdgeMe
         ),
         counts=np.zeros(6, np.int64),
         size=np.zeros(2),
-        picked=np.empty((3, n)),
+        picked=np.empty((4, n)),
         picked_number=np.empty(n, np.int64),
         picked_flag=np.empty(n, np.int8),
         peak=np.empty(4),

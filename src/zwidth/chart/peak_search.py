@@ -6,8 +6,9 @@ rings. Instead the result is tested, and a loop in doubt is left to its whole ch
 
 - no wall was found, a sample's flag is lost in rounding, or a corner does not settle;
 - a maximum or a crossing that is no edge: another branch passes between its samples;
-- the edge goes on from a corner to stiffer walls, or a straight edge (a real root at z = 1 or -1) has some;
-- a stable wall stiffer than the stiffest found, among walls in the middle between crossings of the curve.
+- the edge goes on from a corner to stiffer walls, or a straight edge (a real root at z = 1 or -1) ends at one;
+- the curve has a stiffer maximum, or crosses B = 0, itself or a straight line at a stiffer wall, and that is an
+  edge: another region may end there, however thin.
 """
 
 from __future__ import annotations
@@ -17,15 +18,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.corner import fill_corner
-from zwidth.chart.curve import NO_LINE, OF_B, OF_SLOPE, Line, undamped_stiffness, zero_between
+from zwidth.chart.corner import fill_corner, solve_crossing
+from zwidth.chart.curve import NO_LINE, OF_B, OF_LINE, OF_SLOPE, Line, undamped_stiffness, zero_between
 from zwidth.chart.curve_refinement import STRAY
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, SAMPLES, SETTLED, EdgeMemory
 from zwidth.chart.edge_samples import LONGEST, SHARE, edge_flag, fill_curve, flag_quadrant
 from zwidth.chart.hurwitz import edges_on_line, quotient_flag
 from zwidth.chart.peak import is_stiffer
 from zwidth.chart.real_root_lines import curve_end, line_crossing, line_of
-from zwidth.chart.wall_samples import EDGE, HIDDEN, any_stable
+from zwidth.chart.wall_samples import EDGE, HIDDEN
 from zwidth.compiled import compiled_inline, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, wall_on_circle, wall_with_slopes
 
@@ -36,12 +37,12 @@ Floats = NDArray[np.float64]
 WIDE_SHARE, WIDE_STEP, SMALL_DEGREE = 0.4, 0.2, 7
 # How near to its ends the curve is sampled.
 NEAR_END: Final = 0.05
-# Trial walls are stiffer than the stiffest found by these factors; of each stiffness so many are tried at most.
-BEYOND: Final = (1.0001, 1.02, 1.3)
-TRIALS: Final = 16
-BESIDE: Final = 1e-6  # how far beyond a corner the edge is looked at, in shares of t, or of K
+BESIDE: Final = 1e-6  # how far beside a corner the edge is looked at, in shares of t, or of K
 # A stiffness below this share of the plant's own, some m/T^2, may be rounding of 0.
 NOTHING: Final = 1e-10
+PARTS: Final = 4  # chords that a piece of the curve between two samples is taken for, where it may cross another
+BEYOND_CHORD: Final = 0.25  # how far beyond their ends chords are taken to cross, in shares of their lengths
+FAR_BELOW: Final = 0.1  # what a coefficient may be below 0, in shares of its terms, near a stable wall
 # A wall that misses the stiffest found by more than this cannot be the stiffest.
 SLACK: Final = 1.01
 
@@ -77,7 +78,7 @@ def search_peak(memory: EdgeMemory) -> int:
         return DOUBTFUL
     if peak[0] == 0.0 or hidden * SLACK > peak[0]:
         return DOUBTFUL
-    if _goes_on(memory) or _has_stiffer_line(memory) or _has_stiffer_trial(memory):
+    if _goes_on(memory) or _has_stiffer_line(memory) or _has_stiffer_turn(memory):
         return DOUBTFUL
     own, moved = 0.0, 0.0
     for i in range(N + 1):
@@ -170,11 +171,15 @@ def _goes_on(memory: EdgeMemory) -> bool:
 def _has_stiffer_line(memory: EdgeMemory) -> bool:
     """Whether a straight line may edge the stable set beyond the stiffest wall found, or the curve ends there.
 
-    A line is looked at in the middle between neighbouring places where it crosses B = 0, the curve or the other
-    line.
+    The stiffer end of a piece of edge on a line is where that crosses B = 0, the curve or the other line, or where
+    the curve ends.
     """
     polynomials, N = memory.polynomials.coefficients, memory.circle.sizes[DEGREE]
-    samples, peak, place, other_line = memory.samples, memory.peak[0], memory.stops, line_crossing(memory)
+    samples, peak = memory.samples, memory.peak[0]
+    K, B, known = line_crossing(memory)
+    beyond = known and peak * (1.0 + BESIDE) < K and B >= 0.0
+    if beyond and quotient_flag(polynomials, N, 1, N - 2, K, B, memory.room) >= 0:
+        return True
     for root in (0.0, np.inf):
         low_end = 1 if root == 0.0 else 0
         K, B, known = curve_end(memory, root)
@@ -188,47 +193,147 @@ def _has_stiffer_line(memory: EdgeMemory) -> bool:
             continue
         if edges_on_line(polynomials, N, low_end, farthest, 0.0, memory.room) >= 0:
             return True
-        if v == 0.0 or -(a + s * peak) / v < 0.0:
-            continue
-        place[0], place[1], n = peak, farthest, 2
-        if other_line[2]:
-            n = _add_in_order(place, n, other_line[0], peak)
         before = a + s * samples.K[0] + v * samples.B[0]
         for i in range(1, memory.counts[SAMPLES]):
             side = a + s * samples.K[i] + v * samples.B[i]
-            if before * side < 0.0 and n < TRIALS:
-                n = _add_in_order(place, n, _crossing_between(memory, i - 1, (a, s, v))[0], peak)
+            if before * side < 0.0 and _is_edge_at_line(memory, i - 1, (a, s, v)):
+                return True
             before = side
-        for k in range(n - 1):
-            K = 0.5 * (place[k] + place[k + 1])
-            B = -(a + s * K) / v
-            if B >= 0.0 and edges_on_line(polynomials, N, low_end, K, B, memory.room) >= 0:
+    return False
+
+
+@compiled_lean
+def _is_edge_at_line(memory: EdgeMemory, i: int, line: Line) -> bool:
+    """Whether the curve between samples i and i + 1 crosses a line in a corner of an edge that is stiffer than the
+    stiffest wall found."""
+    K, B = _crossing_between(memory, i, line)
+    if memory.peak[0] * (1.0 - BEYOND_CHORD) > K or _is_unstable_around(memory, K, B):
+        return False
+    t = zero_between(memory.circle, OF_LINE, line, memory.samples.t[i], memory.samples.t[i + 1])
+    return _is_edge_beside(memory, t)
+
+
+@compiled_lean
+def _has_stiffer_turn(memory: EdgeMemory) -> bool:
+    """Whether the curve is, or may be, an edge at a maximum of K, a crossing of B = 0 or one of itself that is
+    stiffer than the stiffest wall found. Elsewhere no region ends towards stiffer walls, except on a straight
+    line."""
+    samples, box, number, count = memory.samples, memory.picked, memory.picked_number, 0
+    K, B = samples.K, samples.B
+    for i in range(memory.counts[SAMPLES] - 1):
+        j, third = i + 1, STRAY * 2.0 / 3.0 * (samples.t[i + 1] - samples.t[i]) / (samples.t[i + 1] + samples.t[i])
+        first, last = K[i] + third * samples.slope_K[i], K[j] - third * samples.slope_K[j]
+        high = max(max(K[i], K[j]), max(first, last))
+        if not high > memory.peak[0]:
+            continue
+        above, below = B[i] + third * samples.slope_B[i], B[j] - third * samples.slope_B[j]
+        top = max(max(B[i], B[j]), max(above, below))
+        if not (top >= 0.0 and np.isfinite(high + top)):
+            continue
+        if _is_edge_inside(memory, i):
+            return True
+        number[count] = i
+        box[0, count], box[1, count] = min(min(K[i], K[j]), min(first, last)), high
+        box[2, count], box[3, count] = min(min(B[i], B[j]), min(above, below)), top
+        for k in range(count):
+            apart = box[1, k] < box[0, count] or box[0, k] > high or box[3, k] < box[2, count] or box[2, k] > top
+            if not apart and number[k] < i - 1 and _is_edge_where_they_cross(memory, number[k], i):
+                return True
+        count += 1
+    return False
+
+
+@compiled_lean
+def _is_edge_inside(memory: EdgeMemory, i: int) -> bool:
+    """Whether the curve may be an edge where the cubic between samples i and i + 1 has a maximum of K, or crosses
+    B = 0, if it is stiffer there than the stiffest wall found."""
+    samples, j = memory.samples, i + 1
+    K, B, step = samples.K, samples.B, 2.0 * (samples.t[j] - samples.t[i]) / (samples.t[j] + samples.t[i])
+    for of_damping in (False, True):
+        if of_damping:
+            if not B[i] * B[j] < 0.0:
+                continue
+            x = B[i] / (B[i] - B[j])
+            stiffness = _crossing_between(memory, i, (0.0, 0.0, 1.0))[0]
+        else:
+            rise, next_rise = step * samples.slope_K[i], step * samples.slope_K[j]
+            if not (rise > 0.0 and next_rise < 0.0) or samples.t[i] <= memory.peak[2] <= samples.t[j]:
+                continue
+            k1, k2, k3 = _cubic(K[i], K[j], rise, next_rise)
+            # slope k1 + 2 k2 x + 3 k3 x^2, positive at 0 and negative at 1
+            root = np.sqrt(max(k2 * k2 - 3.0 * k1 * k3, 0.0))
+            x = k1 / (root - k2)
+            stiffness = ((k3 * x + k2) * x + k1) * x + K[i]
+        if stiffness > memory.peak[0] * (1.0 + BESIDE):
+            t = samples.t[i] + x * (samples.t[j] - samples.t[i])
+            if edge_flag(memory, t) >= 0:
                 return True
     return False
 
 
 @compiled_lean
-def _has_stiffer_trial(memory: EdgeMemory) -> bool:
-    """Whether one of some walls stiffer than the stiffest found is stable: of each stiffness those in the middle
-    between neighbouring crossings of B = 0, the curve and the straight lines."""
-    samples, trial, count = memory.samples, memory.picked, 1
-    trial[1, 0], trial[2, 0] = (1.0 + BESIDE) * memory.peak[0], memory.peak[1]
-    K, crossing = samples.K, memory.stops
-    for factor in BEYOND:
-        stiffness, n = factor * memory.peak[0], 1
-        crossing[0] = 0.0
-        for i in range(memory.counts[SAMPLES] - 1):
-            if (K[i] - stiffness) * (K[i + 1] - stiffness) < 0.0 and n < TRIALS - 2:
-                n = _add_in_order(crossing, n, _crossing_between(memory, i, (-stiffness, 1.0, 0.0))[1], 0.0)
-        for root in (0.0, np.inf):
-            a, s, v = line_of(memory, root)
-            if v != 0.0:
-                n = _add_in_order(crossing, n, -(a + s * stiffness) / v, 0.0)
-        for k in range(n - 1):
-            trial[1, count], trial[2, count] = stiffness, 0.5 * (crossing[k] + crossing[k + 1])
-            count += 1
-    polynomials, N = memory.polynomials.coefficients, memory.circle.sizes[DEGREE]
-    return any_stable(polynomials, N, trial[1], trial[2], count, memory.lanes)
+def _is_edge_where_they_cross(memory: EdgeMemory, i: int, j: int) -> bool:
+    """Whether the curve between samples i and i + 1 may cross that between j and j + 1 in a corner of an edge that
+    is stiffer than the stiffest wall found.
+
+    Each is taken for PARTS chords of its cubic.
+    """
+    samples, part = memory.samples, 1.0 / PARTS
+    for a in range(PARTS):
+        K0, B0 = _place_between(memory, i, a * part)
+        K1, B1 = _place_between(memory, i, (a + 1) * part)
+        dK, dB = K1 - K0, B1 - B0
+        for b in range(PARTS):
+            L0, C0 = _place_between(memory, j, b * part)
+            L1, C1 = _place_between(memory, j, (b + 1) * part)
+            eK, eB = L1 - L0, C1 - C0
+            det = dK * eB - dB * eK
+            if det == 0.0:
+                continue
+            share = ((L0 - K0) * eB - (C0 - B0) * eK) / det
+            other = ((L0 - K0) * dB - (C0 - B0) * dK) / det
+            if not (-BEYOND_CHORD <= share <= 1.0 + BEYOND_CHORD and -BEYOND_CHORD <= other <= 1.0 + BEYOND_CHORD):
+                continue
+            if K0 + share * dK < memory.peak[0] * (1.0 - BEYOND_CHORD) or _is_unstable_around(
+                memory, K0 + share * dK, B0 + share * dB
+            ):
+                continue
+            one = samples.t[i] + (a + share) * part * (samples.t[i + 1] - samples.t[i])
+            another = samples.t[j] + (b + other) * part * (samples.t[j + 1] - samples.t[j])
+            one, another, met = solve_crossing(memory.circle, one, another)
+            if met and (_is_edge_beside(memory, one) or _is_edge_beside(memory, another)):
+                return True
+    return False
+
+
+@compiled_lean
+def _is_edge_beside(memory: EdgeMemory, t: float) -> bool:
+    """Whether the curve is stiffer at t than the stiffest wall found, and beside t an edge."""
+    K, B = wall_on_circle(memory.circle, t)
+    if not (memory.peak[0] * (1.0 + BESIDE) < K and B >= 0.0):
+        return False
+    return edge_flag(memory, t * (1.0 - BESIDE)) >= 0 or edge_flag(memory, t * (1.0 + BESIDE)) >= 0
+
+
+@compiled_lean
+def _is_unstable_around(memory: EdgeMemory, K: float, B: float) -> bool:
+    """Whether a coefficient of p is far below 0 at a wall, and so at those about it."""
+    polynomials = memory.polynomials.coefficients
+    for i in range(memory.circle.sizes[DEGREE] + 1):
+        a, s, v = polynomials[0, i], K * polynomials[1, i], B * polynomials[2, i]
+        if a + s + v < -FAR_BELOW * (abs(a) + abs(s) + abs(v)):
+            return True
+    return False
+
+
+@compiled_lean
+def _place_between(memory: EdgeMemory, i: int, x: float) -> tuple[float, float]:
+    """The wall at a share x of the way from sample i to i + 1, by the cubic."""
+    samples, j = memory.samples, i + 1
+    K, B, step = samples.K, samples.B, 2.0 * (samples.t[j] - samples.t[i]) / (samples.t[j] + samples.t[i])
+    k1, k2, k3 = _cubic(K[i], K[j], step * samples.slope_K[i], step * samples.slope_K[j])
+    b1, b2, b3 = _cubic(B[i], B[j], step * samples.slope_B[i], step * samples.slope_B[j])
+    return ((k3 * x + k2) * x + k1) * x + K[i], ((b3 * x + b2) * x + b1) * x + B[i]
 
 
 @compiled_lean
@@ -257,16 +362,3 @@ def _cubic(first: float, last: float, rise: float, next_rise: float) -> tuple[fl
     """Coefficients of x, x^2 and x^3 of the cubic from first to last with these slopes at x = 0 and x = 1."""
     whole = last - first
     return rise, 3.0 * whole - 2.0 * rise - next_rise, rise + next_rise - 2.0 * whole
-
-
-@compiled_lean
-def _add_in_order(values: Floats, n: int, value: float, least: float) -> int:
-    """Add a value above the least to the first n, which ascend; their new number."""
-    if not value > least:
-        return n
-    i = n
-    while i > 0 and values[i - 1] > value:
-        values[i] = values[i - 1]
-        i -= 1
-    values[i] = value
-    return n + 1

@@ -202,59 +202,6 @@ def flag_walls(
 
 
 @compiled_lean
-def any_stable(polynomials: Floats, N: int, K: Floats, B: Floats, count: int, work: Floats) -> bool:
-    """Whether one of up to LANES walls is stable beyond doubt."""
-    for k in range(count):
-        work[T + k] = 1.0
-    for k in range(count):
-        work[K_ + k] = K[k]
-    for k in range(count):
-        work[B_ + k] = B[k]
-    if not _any_perhaps_stable(polynomials, N, count, work):
-        return False
-    _sum_polynomials(polynomials, N, count, work)
-    _hurwitz_lanes(N, count, work)
-    stable = 0
-    for k in range(count):
-        stable += work[OUTSIDE + k] == 0.0 and work[UNSURE + k] == 0.0
-    return stable > 0
-
-
-@compiled_lean
-def _any_perhaps_stable(polynomials: Floats, N: int, n: int, w: Floats) -> bool:
-    """Whether a wall has no negative entry in Routh's array, which is as `_hurwitz_lanes` computes it, but without
-    the bounds of its errors."""
-    for i in range(N + 1):
-        a, s, v = polynomials[0, i], polynomials[1, i], polynomials[2, i]
-        p = COEFFICIENTS + i * LANES
-        for k in range(n):
-            w[p + k] = a + w[K_ + k] * s + w[B_ + k] * v
-    top = COEFFICIENTS + N * LANES
-    for k in range(n):
-        w[OUTSIDE + k], w[NUMBER + k] = 0.0, np.copysign(1.0, w[top + k])
-    for i in range(N + 1):
-        p = COEFFICIENTS + i * LANES
-        for k in range(n):
-            value = w[p + k] * w[NUMBER + k]
-            w[p + k] = value
-            w[OUTSIDE + k] = 1.0 if value < 0.0 else w[OUTSIDE + k]
-    for step in range(N - 1):
-        top = COEFFICIENTS + (N - step) * LANES
-        for k in range(n):
-            w[RATIO + k] = w[top + k] / w[top - LANES + k]
-        for i in range(N - step - 2, -1, -2):
-            p = COEFFICIENTS + i * LANES
-            for k in range(n):
-                w[p + k] -= w[RATIO + k] * w[p - LANES + k]
-        for k in range(n):
-            w[OUTSIDE + k] = 1.0 if w[top - 2 * LANES + k] < 0.0 else w[OUTSIDE + k]
-    outside = 0.0
-    for k in range(n):
-        outside += w[OUTSIDE + k]
-    return outside < n
-
-
-@compiled_lean
 def _find_negative(polynomials: Floats, N: int, n: int, w: Floats) -> None:
     """OUTSIDE is 1 where a coefficient of p is negative for certain: a wall that edges nothing."""
     for k in range(n):

@@ -111,14 +111,14 @@ def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag:
         alone.append([*row, 0.0])
     unobserved = [motion_name(0.0, 0.0)] * (form.free_count - len(alone))
     unobserved += [pole_name(pole) for pole in form.hidden_poles if pole.imag >= 0.0]
+    # a chain shrinks slow motions, beside which what rounding leaves of a fast hidden one would not stay small
+    form = without_hidden_poles(form)
     sampled = sample_form(form, period, fraction, lag)
     rows = form_rows(form, sampled, period)
     m = len(rows)
     while m and _repeats(rows[m - 1], rows[: m - 1]):
         m -= 1
     unobserved += ["motion that decays as another one does"] * (len(rows) - m)
-    if len(form.hidden_poles):
-        sampled = sample_form(without_hidden_poles(form), period, fraction, lag)
     states = sampled if m == len(rows) else None
     chained = np.column_stack([rows[:m], np.arange(m) > 0])
     return Sections(np.vstack([np.array(alone).reshape(-1, 9), chained]), tuple(unobserved), states)
