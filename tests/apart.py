@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import mpmath
 import numpy as np
 import scipy.linalg
 from scipy.optimize import brentq
 
-from tests.systems import FEATURES, generator, random_loop, reference_transition_matrix, velocity_weights
+from tests.systems import FEATURES, random_loop, reference_transition_matrix, velocity_weights
 from zwidth.loop.controller import FirstOrder
 from zwidth.loop.estimators import Kalman
 
@@ -22,7 +23,8 @@ KINDS = ("chain", "dense", "coupled", "apart")
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(10)
 # Values at the nodes -> derivative there, of the polynomial through them
 _POWERS = np.polynomial.legendre.legvander(GAUSS, 9)
-_SLOPES = np.column_stack([np.polynomial.legendre.legval(GAUSS, np.polynomial.legendre.legder(e)) for e in np.eye(10)])
+_DERIVATIVES = [np.polynomial.legendre.legder(one) for one in np.eye(10)]
+_SLOPES = np.column_stack([np.polynomial.legendre.legval(GAUSS, one) for one in _DERIVATIVES])
 SLOPES = _SLOPES @ np.linalg.inv(_POWERS)
 
 
@@ -57,6 +59,11 @@ class ApartLoop:
 
     loop: object
 
+    @property
+    def guide(self):
+        """The loop by which crossings of the axes are found."""
+        return self
+
     @cached_property
     def sampled(self):
         """F - 1 of the plant in complex Schur form, the force's effect now and one sample later, the sensor."""
@@ -87,7 +94,7 @@ class ApartLoop:
             state[i] = right / np.where(away == 0.0, 1e-30, away)
             out = out + sensor[i] * state[i]
         controller = self.loop.controller
-        return out * z ** -self.whole * low_pass_response(controller.force_filter, d, controller.sampling_period)
+        return out * z**-self.whole * low_pass_response(controller.force_filter, d, controller.sampling_period)
 
     def velocity_response(self, d):
         """w (k,) at z = 1 + d (k,)."""
@@ -149,10 +156,14 @@ class ApartLoop:
         LK, LB = (reference_transition_matrix(self.loop, *wall) - L0 for wall in ((K, 0.0), (0.0, B)))
         return L0, LK / K, LB / B
 
+    def roots(self, K, B):
+        """Eigenvalues (k, N) of walls (k,)."""
+        L0, LK, LB = self.matrices
+        return np.linalg.eigvals(L0 + np.multiply.outer(K, LK) + np.multiply.outer(B, LB))
+
     def radii(self, K, B):
         """Spectral radii (k,) of walls (k,) by eigenvalues."""
-        L0, LK, LB = self.matrices
-        return np.abs(np.linalg.eigvals(L0 + np.multiply.outer(K, LK) + np.multiply.outer(B, LB))).max(axis=-1)
+        return np.abs(self.roots(K, B)).max(axis=-1)
 
 
 def modal_generator(plant, lag, T):
@@ -214,7 +225,7 @@ def straight_area(K0, B0, K1, B1):
         if a * b < 0.0:
             cuts.append(a / (a - b))
     cuts, total = sorted(cuts), 0.0
-    for low, high in zip(cuts, cuts[1:]):
+    for low, high in pairwise(cuts):
         middle = 0.5 * (low + high)
         K, B = K0 + middle * (K1 - K0), B0 + middle * (B1 - B0)
         if K > 0.0 and B > 0.0:
@@ -223,32 +234,24 @@ def straight_area(K0, B0, K1, B1):
 
 
 def curve_area(apart, angles):
-    """The same along a piece of the curve, with nodes of Gauss's rule between angles one after the other."""
+    """The same along a piece of the curve, by Gauss's rule between angles one after the other and crossings of the
+    axes."""
     low, high = np.array(angles[:-1]), np.array(angles[1:])
-    for _ in range(2):
-        half = 0.5 * (high - low)
-        nodes = (0.5 * (low + high))[:, None] + half[:, None] * np.append(GAUSS, [-0.9999, 0.9999])
-        K, B = (values.reshape(nodes.shape) for values in apart.walls(nodes.ravel()))
-        mixed = [(x.min(axis=1) < 0.0) & (x.max(axis=1) > 0.0) for x in (K, B)]
-        cuts = []
-        for component, some in enumerate(mixed):
-            values = (K, B)[component]
-            for i in np.flatnonzero(some):
-                order = np.argsort(nodes[i])
-                at, x = nodes[i][order], values[i][order]
-                for j in np.flatnonzero(x[:-1] * x[1:] < 0.0):
-                    cuts.append((i, brentq(lambda t: apart.walls(t)[component][0], at[j], at[j + 1], xtol=1e-17, rtol=1e-15)))
-        if not cuts:
-            break
-        new_low, new_high = [], []
-        for i in range(len(low)):
-            own = sorted((t for k, t in cuts if k == i), reverse=bool(low[i] > high[i]))
-            points = [low[i], *own, high[i]]
-            new_low += points[:-1]
-            new_high += points[1:]
-        low, high = np.array(new_low), np.array(new_high)
-    half = 0.5 * (high - low)
-    nodes = (0.5 * (low + high))[:, None] + half[:, None] * GAUSS
+    nodes = (0.5 * (low + high))[:, None] + 0.5 * (high - low)[:, None] * np.append(GAUSS, [-0.9999, 0.9999])
+    nodes.sort(axis=1)
+    components = [values.reshape(nodes.shape) for values in apart.guide.walls(nodes.ravel())]
+    cuts = []
+    for component, values in enumerate(components):
+
+        def value(theta, component=component):
+            return apart.guide.walls(theta)[component][0]
+
+        for i, j in np.argwhere(values[:, :-1] * values[:, 1:] < 0.0):
+            cuts.append(brentq(value, nodes[i, j], nodes[i, j + 1], xtol=1e-17, rtol=1e-15))
+    every = np.unique(np.concatenate([angles, cuts]))
+    every = every if angles[0] < angles[-1] else every[::-1]
+    low, high = every[:-1], every[1:]
+    nodes = (0.5 * (low + high))[:, None] + 0.5 * (high - low)[:, None] * GAUSS
     K, B = (values.reshape(nodes.shape) for values in apart.walls(nodes.ravel()))
     inside = (np.median(K, axis=1) > 0.0) & (np.median(B, axis=1) > 0.0)
     return float(np.sum(np.where(inside, ((B @ SLOPES.T) * K) @ WEIGHTS, 0.0)))
@@ -260,6 +263,10 @@ class ExactLoop(ApartLoop):
     DIGITS = 90
 
     @cached_property
+    def guide(self):
+        return ApartLoop(self.loop)
+
+    @cached_property
     def poles(self):
         """Poles of the plant, z - 1 of the sampled ones, their residues of the force now and one sample later."""
         plant, controller = self.loop.plant, self.loop.controller
@@ -268,22 +275,22 @@ class ExactLoop(ApartLoop):
             s, right = mpmath.eig(A)
             weight = mpmath.lu_solve(right, source)
             rest = mpmath.mpf(controller.delay) - self.whole
-            pulse = [sum(plant.sensor[i] * right[i, k] for i in range(plant.size)) * weight[k] for k in range(len(s))]
-            now = [r * hold(p, (1 - rest) * T) for r, p in zip(pulse, s)]
+            read = [sum(plant.sensor[i] * right[i, k] for i in range(plant.size)) for k in range(len(s))]
+            pulse = [r * weight[k] for k, r in enumerate(read)]
+            now = [r * hold(p, (1 - rest) * T) for r, p in zip(pulse, s, strict=True)]
             later = [
                 r * mpmath.exp(p * (1 - rest) * T) * hold(p, rest * T) if rest else mpmath.mpf(0)
-                for r, p in zip(pulse, s)
+                for r, p in zip(pulse, s, strict=True)
             ]
             return [mpmath.expm1(p * T) for p in s], now, later
 
-    def exact_wall(self, theta):
-        """K and B with a pair of roots at exp(+-i theta), as numbers of mpmath."""
+    def exact_terms(self, d):
+        """P and w at z = 1 + d, as numbers of mpmath."""
         controller = self.loop.controller
         T = mpmath.mpf(controller.sampling_period)
         sampled, now, later = self.poles
-        d = mpmath.expm1(mpmath.mpc(0, theta))
         z = 1 + d
-        P = sum((a + b / z) / (d - e) for e, a, b in zip(sampled, now, later))
+        P = sum((a + b / z) / (d - e) for e, a, b in zip(sampled, now, later, strict=True))
         P *= z**-self.whole * exact_low_pass(controller.force_filter, d, T)
         method = controller.velocity
         weights = velocity_weights(method, 1.0)
@@ -295,10 +302,44 @@ class ExactLoop(ApartLoop):
             weights = [mpmath.mpf(x) for x in weights]
             weights[0] -= sum(weights)
             w = sum(x * z**-k for k, x in enumerate(weights)) / T
-        w *= exact_low_pass(controller.velocity_filter, d, T)
+        return P, w * exact_low_pass(controller.velocity_filter, d, T)
+
+    def exact_wall(self, theta):
+        """K and B with a pair of roots at exp(+-i theta), as numbers of mpmath."""
+        P, w = self.exact_terms(mpmath.expm1(mpmath.mpc(0, theta)))
         h = -1 / P
         B = h.imag / w.imag
         return h.real - B * w.real, B
+
+    def radius(self, K, B, roots):
+        """Largest |z| - 1 of the roots of 1 + P (K + B w) nearest to numbers given; -1 if there are none."""
+        with mpmath.workdps(50):
+            K, B, largest = mpmath.mpf(float(K)), mpmath.mpf(float(B)), -1.0
+
+            def characteristic(d):
+                P, w = self.exact_terms(d)
+                return 1 / P + K + B * w
+
+            for root in roots:
+                start = mpmath.mpc(complex(root)) - 1
+                try:
+                    beside = start * (1 + mpmath.mpf(10) ** -10)
+                    d = mpmath.findroot(characteristic, (start, beside), tol=1e-60, maxsteps=40, verify=False)
+                except (ZeroDivisionError, ValueError):
+                    continue
+                if abs(d - start) < 1e-4:
+                    largest = max(largest, float(abs(1 + d) - 1))
+        return largest
+
+    @cached_property
+    def exact_plus(self):
+        """`plus` as a number of mpmath."""
+        plant = self.loop.plant
+        if ApartLoop(self.loop).plus == 0.0:
+            return mpmath.mpf(0)
+        with mpmath.workdps(self.DIGITS):
+            bent = mpmath.lu_solve(mpmath.matrix(plant.stiffness.tolist()), mpmath.matrix(plant.actuator.tolist()))
+            return -1 / sum(mpmath.mpf(float(c)) * x for c, x in zip(plant.sensor, bent, strict=True))
 
     def walls(self, thetas):
         with mpmath.workdps(self.DIGITS):

@@ -1,0 +1,149 @@
+"""Walls in and about the charts of loops of every kind, judged by eigenvalues of matrices built apart.
+
+The full size, ten million walls, is run by hand, some ten minutes on one core:
+
+    ZWIDTH_FULL_STUDY=1 python -m pytest -m slow -s tests/chart/test_millions_of_walls.py
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+
+import numpy as np
+import pytest
+import shapely
+
+from tests.apart import ApartLoop, ExactLoop, loop_of_every_kind
+from zwidth.chart.chart import stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.verdict import STABLE, UNDECIDED
+from zwidth.loop.sections import UnmovedError
+
+SEED = 20260
+WALLS = 500  # of a loop, half as many where its matrix has more than 16 rows
+# Half-width of the band round the unit circle in which a wall is left out: that in which `Chart.check` says
+# "undecided", since undamped modes that the wall hardly moves stay in it.
+BAND = 1e-9
+# Distance from the outline, as a share of the cell's extent, within which its chords may be off: twice `CHORD`.
+CHORDS = 2e-6
+CHECKED = 4  # walls of each loop for `Chart.check`
+NEAR = 1e-3  # distance from the circle within which a root is refined
+
+
+def walls_about(rng, chart, apart, count):
+    """Walls (count, 2): a third in and about a cell's box, a third beside its edge, the others all over."""
+    plant, T = apart.loop.plant, apart.loop.period
+    inertia = 1.0 / (plant.actuator @ np.linalg.solve(plant.mass, plant.actuator))
+    size = 10.0 ** rng.uniform(-5.0, 0.3, count)
+    walls = (
+        inertia
+        / T
+        * size[:, None]
+        * np.column_stack([rng.choice([-0.2, 0.2, 1.0], count) / T, rng.uniform(-1.0, 3.0, count)])
+    )
+    rings = chart.regions
+    for i, ring in enumerate(rings):
+        low, high = ring.min(axis=0), ring.max(axis=0)
+        share = count // (6 * len(rings))
+        about = slice(4 * share * i, 4 * share * i + 2 * share)
+        beside = slice(about.stop, about.stop + 2 * share)
+        walls[about] = low - 0.2 * (high - low) + 1.4 * (high - low) * rng.random((2 * share, 2))
+        distance = 10.0 ** rng.uniform(-6.0, -2.0, (2 * share, 1)) * rng.uniform(-1.0, 1.0, (2 * share, 2))
+        walls[beside] = ring[rng.integers(len(ring), size=2 * share)] + distance * (high - low)
+    if rings:  # softest walls, down to K = 0+
+        soft = slice(count - count // 12, count)
+        high = max(float(np.abs(ring[:, 0]).max()) for ring in rings)
+        most = max(float(np.abs(ring[:, 1]).max()) for ring in rings)
+        walls[soft, 0] = high * 10.0 ** rng.uniform(-6.0, -2.0, count // 12)
+        walls[soft, 1] = most * rng.uniform(-0.1, 1.2, count // 12)
+    return walls
+
+
+def is_inside(rings, walls):
+    """Which walls (k, 2) the chart's regions hold."""
+    inside = np.zeros(len(walls), dtype=bool)
+    for ring in rings:
+        cell = shapely.Polygon(ring)
+        shapely.prepare(cell)
+        inside |= shapely.contains_xy(cell, *walls.T)
+    return inside
+
+
+def is_on_chord(rings, wall):
+    """Whether a wall is so near an outline that its chords decide."""
+    for ring in rings:
+        extent = np.ptp(ring, axis=0)
+        if shapely.distance(shapely.LinearRing(ring / extent), shapely.Point(wall / extent)) < CHORDS:
+            return True
+    return False
+
+
+def judge_loop(seed, number, counts, wrong):
+    """Judge the walls of one loop; what is found is counted, and what is wrong listed."""
+    loop, rng = loop_of_every_kind(seed, number), np.random.default_rng([seed, number, 1])
+    try:
+        chart = stability_chart(loop, decay=False)
+        rings = chart.regions
+    except UnmovedError:
+        counts["loops that no wall moves"] += 1
+        return
+    except ChartError:
+        counts["loops given up"] += 1
+        return
+    apart = ApartLoop(loop)
+    size = len(apart.matrices[0])
+    walls = walls_about(rng, chart, apart, WALLS if size <= 16 else WALLS // 2)
+    inside, roots = is_inside(rings, walls), apart.roots(*walls.T)
+    radius = np.abs(roots).max(axis=1)
+    hidden = np.abs(radius - 1.0) <= BAND
+    counts["loops"] += 1
+    counts["walls"] += len(walls)
+    counts["inside"] += int(inside.sum())
+    counts["left out: in the band"] += int(hidden.sum())
+    exact = ExactLoop(loop)
+    for i in np.flatnonzero(((radius < 1.0) != inside) & ~hidden):
+        if is_on_chord(rings, walls[i]):
+            counts["left out: on a chord"] += 1
+            continue
+        excess = exact.radius(*walls[i], roots[i][np.abs(roots[i]) > 1.0 - NEAR])
+        if abs(excess) <= BAND:
+            counts["left out: in the band"] += 1
+        elif (excess < 0.0) == inside[i]:
+            counts["right, eigenvalues were rounded"] += 1
+        else:
+            wrong.append(("regions", seed, number, *walls[i].tolist(), bool(inside[i]), radius[i] - 1.0, excess))
+    checked = rng.integers(len(walls), size=CHECKED)
+    verdict = chart.check(*walls[checked].T).verdict
+    for i, said in zip(checked.tolist(), verdict.tolist(), strict=True):
+        counts["checked, " + ("undecided" if said == UNDECIDED else "decided")] += 1
+        if said != UNDECIDED and (said == STABLE) != (radius[i] < 1.0) and not hidden[i]:
+            excess = exact.radius(*walls[i], roots[i][np.abs(roots[i]) > 1.0 - NEAR])
+            if abs(excess) > BAND and (excess < 0.0) != (said == STABLE):
+                wrong.append(("check", seed, number, *walls[i].tolist(), said, radius[i] - 1.0, excess))
+
+
+def judge_walls(seed, count):
+    """Loops one after the other until so many walls are judged."""
+    counts, wrong, number = Counter(), [], 0
+    while counts["walls"] < count:
+        judge_loop(seed, number, counts, wrong)
+        number += 1
+    return counts, wrong
+
+
+def test_no_wall_of_thousands_is_wrong():
+    counts, wrong = judge_walls(SEED + 1, 20_000)
+    assert wrong == []
+    assert counts["inside"] > 0.2 * counts["walls"]
+    assert counts["left out: in the band"] + counts["left out: on a chord"] < 0.03 * counts["walls"]
+
+
+@pytest.mark.slow
+def test_no_wall_of_millions_is_wrong():
+    full = os.environ.get("ZWIDTH_FULL_STUDY") == "1"
+    counts, wrong = judge_walls(SEED, 10_000_000 if full else 2_000_000)
+    print(dict(counts), *wrong, sep="\n")
+    assert wrong == []
+    assert counts["loops given up"] <= 0.005 * counts["loops"]
+    assert counts["left out: in the band"] + counts["left out: on a chord"] < 0.03 * counts["walls"]
