@@ -311,8 +311,12 @@ class ExactLoop(ApartLoop):
         B = h.imag / w.imag
         return h.real - B * w.real, B
 
-    def radius(self, K, B, roots):
-        """Largest |z| - 1 of the roots of 1 + P (K + B w) nearest to numbers given; -1 if there are none."""
+    def radius(self, K, B, roots, moved=0.0):
+        """Largest |z| - 1 of the roots of 1 + P (K + B w) nearest to numbers given; -1 if there are none.
+
+        moved  how far a root has to be from the plant's poles to count
+        """
+        sampled = self.poles[0]
         with mpmath.workdps(50):
             K, B, largest = mpmath.mpf(float(K)), mpmath.mpf(float(B)), -1.0
 
@@ -327,7 +331,7 @@ class ExactLoop(ApartLoop):
                     d = mpmath.findroot(characteristic, (start, beside), tol=1e-60, maxsteps=40, verify=False)
                 except (ZeroDivisionError, ValueError):
                     continue
-                if abs(d - start) < 1e-4:
+                if abs(d - start) < 1e-4 and min(abs(d - pole) for pole in sampled) >= moved:
                     largest = max(largest, float(abs(1 + d) - 1))
         return largest
 
