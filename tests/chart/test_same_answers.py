@@ -100,10 +100,10 @@ COUPLED = {
 # A motion named as unobserved moves the numbers by more than UNMOVED.
 UNOBSERVED = {630, 1131, 1896, 2197, 2287, 6133, 6934, 7198, 7299, 8883, 10835, 12113, 14492, 15656, 18715, 19847}
 # In doubt in the table: answered alone beyond the corners' blur, or a second route that found another wall.
-DOUBTFUL = {39, 2744, 3652, 4020, 7819, 7966, 12185, 15818}
+IN_DOUBT = {39, 2744, 3652, 4020, 7819, 7966, 12185, 15818}
 # Others, mostly near 1e-9.
 OTHERS = {2196, 4454, 6013, 6675, 7244, 9430, 11664, 12987, 13665, 16036, 19443}
-KNOWN = frozenset(COUPLED | UNOBSERVED | DOUBTFUL | OTHERS)
+KNOWN = frozenset(COUPLED | UNOBSERVED | IN_DOUBT | OTHERS)
 PANELS = 4
 EVERY = 10  # of how many loops one has its regions and its decay compared
 DIGITS = (
