@@ -29,7 +29,7 @@ BAND = 1e-9
 CHORDS = 2e-6
 # How far a wall may move a root of a motion that the chart names as unobserved, and leaves out.
 UNMOVED = 1e-6
-# Loops of SEED with wrong walls, all with damping that couples modes: P of their sections is off by up to 0.8, while
+# Loops of SEED with wrong walls, all with coupled damping: P of their sections is off by up to 0.8, while
 # their transition matrix is right. Whoever mends that empties this set.
 KNOWN = frozenset({7025, 7567, 9157, 9795, 10181, 10499, 11479, 15192})
 CHECKED = 4  # walls of each loop for `Chart.check`
