@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ Complexes = NDArray[np.complex128]
 
 # Motions slower than this share of the fast ones' rate can lose digits to what rounding leaves of the fast ones.
 MUCH_SLOWER = 0.3
+PROBES, SLOWEST_PROBE = 25, 1e-3  # angles of the unit circle, and the smallest [rad], where rows are tried
 SLOW = 0.03  # rates below this share of the sampling rate count as equally slow
 
 
@@ -88,6 +89,53 @@ def form_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floa
         rows.append(row)
         parts = [(0.0, E @ (E @ G + d1 * G) + d0 * G) for _, G in parts]
     return np.array(rows).reshape(-1, 8)
+
+
+def separate_rows(form: FirstOrderForm, period: float, fraction: float = 0.0, lag: float = 0.0) -> Floats:
+    """Rows (m, 8) as of `form_rows`, one for each pair of poles on a subspace of its own, none divided by another.
+
+    Where poles lie far apart these keep digits that a long chain loses; where two coincide there are none such.
+    """
+    rows = []
+    for pair in _pairs(form.poles, period):
+        right, left = invariant_subspace(form, pair)
+        own = replace(
+            form,
+            dynamics=left.T @ form.dynamics @ right,
+            input=left.T @ form.input,
+            output=form.output @ right,
+            poles=pair,
+        )
+        rows.append(form_rows(own, sample_form(own, period, fraction, lag), period))
+    return np.vstack(rows)
+
+
+def rows_error(rows: Floats, sampled: SampledForm) -> float:
+    """How far the response of rows (m, 9) is from that of the states on the unit circle, in shares of it; 0
+    without states.
+
+    Both are compared at PROBES angles, each in shares of the largest response at three neighbouring ones: about a
+    zero of the response rounding is any share of it.
+    """
+    k = len(sampled.output)
+    if not k:
+        return 0.0
+    z = np.exp(1j * np.geomspace(SLOWEST_PROBE, 0.999 * np.pi, PROBES))
+    d = z - 1.0
+    pushed = np.stack([sampled.new, sampled.old], axis=1)
+    states = np.linalg.solve(
+        d[:, None, None] * np.eye(k) - sampled.growth, np.broadcast_to(pushed, (PROBES, k, 2))
+    )
+    new, old = (sampled.output @ states).T
+    wanted = new + sampled.direct_new + (old + sampled.direct_old) / z
+    found, over = np.zeros(PROBES, dtype=np.complex128), np.ones(PROBES, dtype=np.complex128)
+    for d1, d0, n2, n1, n0, o2, o1, o0, chained in rows:
+        below = (d + d1) * d + d0
+        over = over / below if chained else 1.0 / below
+        found += ((n2 * d + n1) * d + n0 + ((o2 * d + o1) * d + o0) / z) * over
+    size = np.pad(np.abs(wanted), 1)
+    largest = np.maximum(np.maximum(size[:-2], size[1:-1]), size[2:])
+    return float(np.max(np.abs(found - wanted) / largest))
 
 
 def _without_subspace(G: Floats, right: Floats, left: Floats) -> Floats:

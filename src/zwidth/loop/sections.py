@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.loop.coupled_hold import SampledForm, form_rows, sample_form
+from zwidth.loop.coupled_hold import SampledForm, form_rows, rows_error, sample_form, separate_rows
 from zwidth.loop.hold import modal_row
 from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.model.first_order_form import FirstOrderForm, first_order_form, without_hidden_poles
@@ -19,10 +19,17 @@ Floats = NDArray[np.float64]
 
 # Two pairs of poles of a chain within this relative distance are equal poles that rounding has set apart.
 SAME_POLES = 1e-6
+# A chain that misses the response by more than this has lost digits; by more than that, two ways to write it tell
+# nothing of the plant.
+FEW_DIGITS, LOST_DIGITS = 1e-8, 1e-4
 
 
 class UnmovedError(ValueError):
     """A plant of which the wall moves nothing that the sensor reads."""
+
+
+class UnresolvedError(UnmovedError):
+    """A plant of which the wall moves so little that the sensor reads that rounding hides it."""
 
 
 class HysteresisError(ValueError):
@@ -49,8 +56,8 @@ def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: fl
     """The plant's rows for a sampling period T [s], the fractional part f of the delay [samples] and the time
     constant of the actuator [s].
 
-    Raises UnmovedError where no mode is both moved by the wall force and read by the sensor; HysteresisError for a
-    plant with a loss factor.
+    Raises UnmovedError where no mode is both moved by the wall force and read by the sensor; UnresolvedError where
+    dampers couple modes and rounding hides what is read; HysteresisError for a plant with a loss factor.
     """
     if plant.hysteresis is not None:
         raise HysteresisError(
@@ -121,6 +128,17 @@ def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag:
     unobserved += ["motion that decays as another one does"] * (len(rows) - m)
     states = sampled if m == len(rows) else None
     chained = np.column_stack([rows[:m], np.arange(m) > 0])
+    off = rows_error(chained, sampled)
+    if off > FEW_DIGITS:
+        parts = separate_rows(form, period, fraction, lag)
+        own = np.column_stack([parts, np.zeros(len(parts))])
+        if rows_error(own, sampled) < off:
+            off, chained, states = rows_error(own, sampled), own, None
+    if off > LOST_DIGITS:
+        raise UnresolvedError(
+            "the wall force moves so little that the sensor reads that rounding hides it: two ways to compute the "
+            f"response differ by {100.0 * off:.2g} %; check actuator, sensor and the springs and dampers between"
+        )
     return Sections(np.vstack([np.array(alone).reshape(-1, 9), chained]), tuple(unobserved), states)
 
 
