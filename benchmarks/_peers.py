@@ -1,7 +1,7 @@
 """The chart as a competent user would make it without zwidth: by eigenvalues, by python-control, by Jury's test.
 
-The first three rasterise walls; each says of every wall whether it is stable. The last looks for the stiffest wall of
-many plants, by eigenvalues.
+The first three rasterise walls; each says of every wall whether it is stable. The last looks for the stiffest wall
+of many plants, by eigenvalues.
 """
 
 from __future__ import annotations
@@ -191,7 +191,7 @@ def sampled_plants(plants: Sequence[tuple[Plant, float]]) -> SampledPlants:
 
 
 def stable_walls(plants: SampledPlants, K: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """Stable or not (D, ...) by the eigenvalues of stacked transition matrices, for walls (D, ...) of each plant."""
+    """Stable or not (D, ...) by eigenvalues of stacked transition matrices, for walls (D, ...) of each plant."""
     D, n = plants.sensor.shape
     K, B, _ = np.broadcast_arrays(K, B, plants.period.reshape(D, *(1,) * (np.ndim(K) - 1)))
     walls = (K.reshape(D, -1), B.reshape(D, -1))
@@ -245,8 +245,8 @@ def stiffest_near(plants: SampledPlants, K: np.ndarray, B: np.ndarray, below: fl
 def climb(plants: SampledPlants, K: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """The stiffest wall (D,) reached from stable ones with stiffness K and dampings between low and high.
 
-    K is raised while a row of dampings about those of the last stable walls has a stable one. Bisection of K at one
-    damping would not do: a region may end in a thin tip that leans, so that walls just below it are unstable.
+    K is raised while a row of dampings about those of the last stable walls has a stable one. Bisection of K at
+    one damping would not do: a region may end in a thin tip that leans, so that walls just below it are unstable.
     """
     K, low, high = K.copy(), low.copy(), high.copy()
     step = np.full(len(K), 0.25)

@@ -7,10 +7,10 @@ Two studies with random designs, each design with a computer of its own:
   together, its posture solved, its modes found.
 
 The peers take some of the designs and are multiplied up. NumPy looks for the stiffest wall by eigenvalues, many
-designs in one call: over a raster of walls, then upwards from the best; python-control bisects the stiffness at the
-damping that is best, which spares it the search, and closes the loop of one wall at a time. What NumPy finds also
-judges our answers: of each design the search from the raster, and one from 0.1 % below our answer. What the stages of
-our answer cost, checks among them, is printed, too.
+designs in one call: over a raster of walls, then upwards from the best. python-control closes the loop of one wall
+at a time and bisects the stiffness at the damping that is best, which spares it the search. What NumPy finds also
+judges our answers: of each design the search from the raster, and one from 0.1 % below our answer. What the stages
+of our answer cost, checks among them, is printed, too.
 
 Run `python benchmarks/design.py`.
 """
@@ -37,10 +37,11 @@ from benchmarks._peers import (
 from benchmarks._peers import by_python_control as walls_by_python_control
 from benchmarks._stages import stage_times
 from benchmarks._timing import machine, print_table, seconds, verdict
-from zwidth.chart.chart_batch import STIFFEST, ChartNumbers, chart_numbers
+from zwidth.chart.chart import largest_stiffness
+from zwidth.chart.peak import Peak
 from zwidth.device.load import load
 from zwidth.loop.controller import Controller
-from zwidth.loop.loop_table import table_of_loops
+from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import table_of_points
 from zwidth.model.plant import Plant
@@ -123,9 +124,11 @@ def by_python_control(plant: Plant, period: float, K: float, B: float, halvings:
     return low
 
 
-def compare(plants: list[tuple[Plant, float]], ours: ChartNumbers, name: str) -> tuple[float, float]:
+def compare(plants: list[tuple[Plant, float]], ours: list[Peak | None], name: str) -> tuple[float, float]:
     """Print how far ours is from what eigenvalues find; seconds that each peer takes for a design."""
-    K, B, sampled = ours.stiffness, ours.damping, sampled_plants(plants)
+    K = np.array([np.nan if peak is None else peak.stiffness for peak in ours])
+    B = np.array([np.nan if peak is None else peak.damping for peak in ours])
+    sampled = sampled_plants(plants)
     began = perf_counter()
     searched = stiffest_by_eigenvalues(sampled)
     numpy = (perf_counter() - began) / len(plants)
@@ -136,15 +139,22 @@ def compare(plants: list[tuple[Plant, float]], ours: ChartNumbers, name: str) ->
     beyond = searched[walls] / K[walls] - 1.0
     apart = np.abs(near).max()
     print(
-        f"{name}: {len(K)} designs, {np.sum(~walls)} without a stable wall. Climbing by eigenvalues from 0.1 % below "
-        f"ours ends within {apart:.1e} of it (target {CLOSE:.0e}: {verdict(apart, CLOSE)}); from the best wall of a "
-        f"raster at most {max(0.0, beyond.max()):.1e} beyond it, and in {np.sum(beyond < -CLOSE)} designs, where "
-        "the raster misses a thin tip, below it"
+        f"{name}: {len(K)} designs, {np.sum(~walls)} without a stable wall. Climbing by eigenvalues from 0.1 %\n"
+        f"below ours ends within {apart:.1e} of it (target {CLOSE:.0e}: {verdict(apart, CLOSE)}); from the\n"
+        f"best wall of a raster at most {max(0.0, beyond.max()):.1e} beyond it, and below it in\n"
+        f"{np.sum(beyond < -CLOSE)} designs, where the raster misses a thin tip"
     )
     began = perf_counter()
     for (plant, period), stiffness, damping in zip(plants[:PEERS], K, B, strict=False):
         by_python_control(plant, period, stiffness, damping)
     return numpy, (perf_counter() - began) / PEERS
+
+
+def print_apart(together: np.ndarray, alone: list[Peak | None]) -> None:
+    """Print how far largest stiffnesses of designs together are from those of each alone."""
+    K = np.array([np.nan if peak is None else peak.stiffness for peak in alone])
+    assert np.array_equal(np.isnan(K), np.isnan(together))
+    print(f"designs together and built one by one differ by {np.nanmax(np.abs(together / K - 1.0)):.1e} at most")
 
 
 def main() -> None:
@@ -178,7 +188,9 @@ def main() -> None:
         [(name, seconds(taken)) for name, _, taken in stage_times(table)],
     )
     plants = single(*two_masses(COMPARED))
-    numpy, control = compare(plants, chart_numbers(table, STIFFEST), "two masses")
+    alone = [largest_stiffness(Loop(plant, Controller(period))) for plant, period in plants]
+    print_apart(stiffest(*two_masses(COMPARED)), alone)
+    numpy, control = compare(plants, alone, "two masses")
     print(
         f"NumPy {seconds(numpy)} and python-control {seconds(control)} a design: "
         f"{numpy * WANTED / whole[WANTED]:.0f} and {control * WANTED / whole[WANTED]:.0f} times as long"
@@ -197,15 +209,12 @@ def main() -> None:
         f"{verdict(times[len(ALL_NUMBERS)], 15.0)}"
     )
     numbers = five_bars(FIVE_BARS)
-    device, some, loops = load("five-bar"), [], []
+    device, some, alone = load("five-bar"), [], []
     for i in range(COMPARED):
         point = device.with_({key: float(values[i]) for key, values in numbers.items()}).at()
         some.append((observed_part(point.plant), point.controller.sampling_period))
-        loops.append(point.loop)
-    alone = chart_numbers(table_of_loops(*loops), STIFFEST)
-    together = found["stiffness_max"][:COMPARED]
-    apart = np.nanmax(np.abs(together / alone.stiffness - 1.0))
-    print(f"the sweep and designs built one by one differ by {apart:.1e} at most")
+        alone.append(largest_stiffness(point.loop))
+    print_apart(found["stiffness_max"][:COMPARED], alone)
     numpy, control = compare(some, alone, "five-bars")
     print(
         f"NumPy {seconds(numpy)} and python-control {seconds(control)} a design, given its plant: "
