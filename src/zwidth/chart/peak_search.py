@@ -245,30 +245,23 @@ def _has_stiffer_turn(memory: EdgeMemory) -> bool:
 
 @compiled_lean
 def _is_edge_inside(memory: EdgeMemory, i: int) -> bool:
-    """Whether the curve may be an edge where the cubic between samples i and i + 1 has a maximum of K, or crosses
-    B = 0, if it is stiffer there than the stiffest wall found."""
-    samples, j = memory.samples, i + 1
-    K, B, step = samples.K, samples.B, 2.0 * (samples.t[j] - samples.t[i]) / (samples.t[j] + samples.t[i])
-    for of_damping in (False, True):
-        if of_damping:
-            if not B[i] * B[j] < 0.0:
-                continue
-            x = B[i] / (B[i] - B[j])
-            stiffness = _crossing_between(memory, i, (0.0, 0.0, 1.0))[0]
-        else:
-            rise, next_rise = step * samples.slope_K[i], step * samples.slope_K[j]
-            if not (rise > 0.0 and next_rise < 0.0) or samples.t[i] <= memory.peak[2] <= samples.t[j]:
-                continue
-            k1, k2, k3 = _cubic(K[i], K[j], rise, next_rise)
-            # slope k1 + 2 k2 x + 3 k3 x^2, positive at 0 and negative at 1
-            root = np.sqrt(max(k2 * k2 - 3.0 * k1 * k3, 0.0))
-            x = k1 / (root - k2)
-            stiffness = ((k3 * x + k2) * x + k1) * x + K[i]
-        if stiffness > memory.peak[0] * (1.0 + BESIDE):
-            t = samples.t[i] + x * (samples.t[j] - samples.t[i])
-            if edge_flag(memory, t) >= 0:
-                return True
-    return False
+    """Whether the curve may be an edge where the cubic between samples i and i + 1 crosses B = 0, or has a maximum
+    of K, if it is stiffer there than the stiffest wall found."""
+    samples, j, stiffer = memory.samples, i + 1, memory.peak[0] * (1.0 + BESIDE)
+    t, K, B, whole = samples.t, samples.K, samples.B, samples.t[i + 1] - samples.t[i]
+    if B[i] * B[j] < 0.0 and stiffer < _crossing_between(memory, i, (0.0, 0.0, 1.0))[0]:
+        share = B[i] / (B[i] - B[j])
+        if edge_flag(memory, t[i] + share * whole) >= 0:
+            return True
+    step = 2.0 * whole / (t[j] + t[i])
+    rise, next_rise = step * samples.slope_K[i], step * samples.slope_K[j]
+    if not (rise > 0.0 and next_rise < 0.0) or t[i] <= memory.peak[2] <= t[j]:
+        return False
+    k1, k2, k3 = _cubic(K[i], K[j], rise, next_rise)
+    # the slope k1 + 2 k2 x + 3 k3 x^2 is positive at 0 and negative at 1
+    x = k1 / (np.sqrt(max(k2 * k2 - 3.0 * k1 * k3, 0.0)) - k2)
+    top = ((k3 * x + k2) * x + k1) * x + K[i]
+    return stiffer < top and edge_flag(memory, t[i] + x * whole) >= 0
 
 
 @compiled_lean

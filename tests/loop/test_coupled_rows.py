@@ -1,0 +1,50 @@
+"""Rows of plants whose dampers couple motions of very unlike frequencies, held against matrices built apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.apart import ApartLoop, loop_of_every_kind
+from zwidth.chart.chart import boundary_points
+from zwidth.loop import sections
+from zwidth.loop.coupled_hold import rows_error, sample_form, separate_rows
+from zwidth.loop.sections import UnresolvedError
+from zwidth.model.first_order_form import first_order_form, without_hidden_poles
+
+# Seeds and numbers of loops: with a fast pole that the wall does not move, of which rounding leaves something beside
+# slow motions; and with a chain that loses digits, by 1e-5 to 0.15 of the response.
+HIDDEN = ((20262, 4917), (20262, 5081), (20262, 6912), (20262, 15146))
+LONG = ((20260, 11479), (20260, 15192), (20262, 6577), (20262, 7231))
+
+
+@pytest.mark.parametrize(("seed", "number"), HIDDEN + LONG)
+def test_walls_of_the_edge_have_a_root_on_the_circle(seed, number):
+    loop = loop_of_every_kind(seed, number)
+    K, B, _, edge = boundary_points(loop, 200)
+    assert edge.any()
+    roots = ApartLoop(loop).roots(K[edge], B[edge])
+    assert np.abs(np.abs(roots) - 1.0).min(axis=1).max() < 1e-7
+
+
+@pytest.mark.parametrize(("seed", "number"), LONG)
+def test_rows_apart_keep_digits_that_a_chain_loses(seed, number, monkeypatch):
+    loop = loop_of_every_kind(seed, number)
+    plant, T = loop.plant, loop.period
+    form = without_hidden_poles(first_order_form(plant, T))
+    states = sample_form(form, T, loop.fractional_delay, loop.controller.actuator_time_constant)
+    rows = separate_rows(form, T, loop.fractional_delay, loop.controller.actuator_time_constant)
+    taken = loop.sections.rows[-len(rows) :]
+    np.testing.assert_array_equal(taken[:, :8], rows)
+    assert not taken[:, 8].any()
+    monkeypatch.setattr(sections, "FEW_DIGITS", np.inf)
+    monkeypatch.setattr(sections, "LOST_DIGITS", np.inf)
+    chain = loop_of_every_kind(seed, number).sections.rows[-len(rows) :]
+    assert chain[1:, 8].all()
+    assert rows_error(taken, states) < 0.1 * rows_error(chain, states)
+
+
+def test_what_rounding_hides_is_refused():
+    """Force and sensor at two masses that share a hundred-millionth of their motion."""
+    with pytest.raises(UnresolvedError, match=r"two ways to compute the response differ by \d"):
+        _ = loop_of_every_kind(20260, 9795).sections
