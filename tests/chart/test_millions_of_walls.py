@@ -161,7 +161,7 @@ def test_no_wall_of_thousands_is_wrong():
 @pytest.mark.slow
 def test_no_wall_of_millions_is_wrong():
     full = os.environ.get("ZWIDTH_FULL_STUDY") == "1"
-    counts, wrong = judge_walls(SEED, 10_000_000 if full else 3_000_000)
+    counts, wrong = judge_walls(SEED, 10_000_000 if full else 1_000_000)
     print(dict(counts), *wrong, sep="\n")
     assert wrong == []
     assert counts["loops given up"] <= 0.002 * counts["loops"]

@@ -12,8 +12,8 @@ from zwidth.loop.coupled_hold import rows_error, sample_form, separate_rows
 from zwidth.loop.sections import UnresolvedError
 from zwidth.model.first_order_form import first_order_form, without_hidden_poles
 
-# Seeds and numbers of loops: with a fast pole that the wall does not move, of which rounding leaves something beside
-# slow motions; and with a chain that loses digits, by 1e-5 to 0.15 of the response.
+# Seeds and numbers of loops: with a fast pole that the wall does not move, of which rounding leaves something
+# beside slow motions; and with a chain that loses digits, by 1e-5 to 0.15 of the response.
 HIDDEN = ((20262, 4917), (20262, 5081), (20262, 6912), (20262, 15146))
 LONG = ((20260, 11479), (20260, 15192), (20262, 6577), (20262, 7231))
 
