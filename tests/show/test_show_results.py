@@ -92,7 +92,7 @@ def all_results():
 STAGES = """
     Device OperatingPoint Posture Plant MultiPlant Response Loop Controller Estimator AlphaBeta Nonlinear
     Measure Requirement Environment PlaneGrid Study RangeFault CellValues MeasureError ForceLaw Function UserPoint
-    Walls
+    Walls Family FamilyMember
 """
 # Plain values, arrays, and a few numbers by name, such as the rows of a result; datasets show themselves.
 NUMBERS = """

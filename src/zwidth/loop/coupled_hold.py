@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ Complexes = NDArray[np.complex128]
 
 # Motions slower than this share of the fast ones' rate can lose digits to what rounding leaves of the fast ones.
 MUCH_SLOWER = 0.3
+NEARLY_EQUAL = 1e-6  # shares of the poles' size within which pairs of poles are not told apart
 PROBES, SLOWEST_PROBE = 25, 1e-3  # angles of the unit circle, and the smallest [rad], where rows are tried
 SLOW = 0.03  # rates below this share of the sampling rate count as equally slow
 
@@ -94,10 +96,14 @@ def form_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floa
 def separate_rows(form: FirstOrderForm, period: float, fraction: float = 0.0, lag: float = 0.0) -> Floats:
     """Rows (m, 8) as of `form_rows`, one for each pair of poles on a subspace of its own, none divided by another.
 
-    Where poles lie far apart these keep digits that a long chain loses; where two coincide there are none such.
+    Where poles lie far apart these keep digits that a long chain loses. Where two pairs are nearly equal there are
+    none such: no rows, (0, 8).
     """
-    rows = []
-    for pair in _pairs(form.poles, period):
+    rows, pairs = [], _pairs(form.poles, period)
+    for pair, other in combinations(pairs, 2):
+        if np.min(np.abs(pair[:, None] - other)) <= NEARLY_EQUAL * np.max(np.abs(pair)):
+            return np.zeros((0, 8))
+    for pair in pairs:
         right, left = invariant_subspace(form, pair)
         own = replace(
             form,

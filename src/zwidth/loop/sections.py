@@ -130,9 +130,9 @@ def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag:
     chained = np.column_stack([rows[:m], np.arange(m) > 0])
     off = rows_error(chained, sampled)
     if off > FEW_DIGITS:
-        parts = separate_rows(form, period, fraction, lag)
-        own = np.column_stack([parts, np.zeros(len(parts))])
-        if rows_error(own, sampled) < off:
+        apart = separate_rows(form, period, fraction, lag)
+        own = np.column_stack([apart, np.zeros(len(apart))])
+        if len(own) and rows_error(own, sampled) < off:
             off, chained, states = rows_error(own, sampled), own, None
     if off > LOST_DIGITS:
         raise UnresolvedError(

@@ -33,6 +33,8 @@ COMMANDS: Final = (
         "move linkage.toml --plane 0,0.26,0,-1 --stiffness 2000 --damping 5 --push 0,2 --duration 0.05",
         "map linkage.toml --measure stiffness_max --cells 9,9 --output map.svg",
         "show linkage.toml",
+        "chart linkage.toml --with-direction 1,0",
+        "chart linkage.toml --model two-mass --operator thesis-arm",
         "show arm.toml --at upper=0.7,lower=1.4",
         "simulate masses.toml --stiffness 4000 --damping 10 --duration 0.05",
     ),
