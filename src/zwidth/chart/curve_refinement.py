@@ -24,7 +24,7 @@ from zwidth.chart.edge_memory import NONE, SAMPLES, EdgeMemory
 from zwidth.chart.real_root_lines import line_of, sum_of_coefficients
 from zwidth.chart.wall_samples import UNKNOWN
 from zwidth.compiled import compiled_apart, compiled_inline, compiled_lean
-from zwidth.loop.circle_factors import wall_with_slopes
+from zwidth.loop.circle_factors import DEGREE, wall_with_slopes
 
 Floats = NDArray[np.float64]
 
@@ -118,9 +118,10 @@ def _may_hide(memory: EdgeMemory, i: int, most: float) -> bool:
     far = max(abs(uK), abs(wK), abs(cK)) > ROUNDING_STEP * abs(K[i])
     if not far and max(abs(uB), abs(wB), abs(cB)) <= ROUNDING_STEP * abs(B[i]):
         return False
-    returns = False
-    for root in (0.0, np.inf):
-        a, s, v = line_of(memory, root)
+    returns, N = False, memory.circle.sizes[DEGREE]
+    polynomials = memory.polynomials.coefficients
+    for c in range(N + 1):
+        a, s, v = polynomials[0, c], polynomials[1, c], polynomials[2, c]
         before, after = a + s * K[i] + v * B[i], a + s * K[j] + v * B[j]
         rise, next_rise = STRAY / 3.0 * (s * uK + v * uB), STRAY / 3.0 * (s * wK + v * wB)
         low = min(min(before, after), min(before + rise, after - next_rise))
@@ -128,7 +129,9 @@ def _may_hide(memory: EdgeMemory, i: int, most: float) -> bool:
         if abs(before) > ROUNDING_SIDE * (abs(a) + abs(s * K[i]) + abs(v * B[i])):
             if high < 0.0 or low > most:
                 return False
-            returns = returns or (before * after > 0.0 and low < 0.0 < high)
+            # the first and the last coefficient are the lines of real roots
+            line = c == 0 or c == N
+            returns = returns or (line and before * after > 0.0 and low < 0.0 < high)
     if returns or _may_return(K[i], uK, wK, K[j]) or _may_return(B[i], uB, wB, B[j]):
         return True
     mK, mB = 1.5 * cK - 0.5 * (uK + wK), 1.5 * cB - 0.5 * (uB + wB)
