@@ -171,8 +171,8 @@ def _of_full(
     N, m = len(design), int(np.isfinite(spring).sum(axis=1).max(initial=0)) + 1
     J = np.broadcast_to(posture.jacobian, (*shape, 3, d)).reshape(N, 3, d)
     u = np.broadcast_to(direction, (*shape, 3)).reshape(N, 3)
-    # in the order of rows whatever their own is: kernels are compiled once for these
-    h = np.ascontiguousarray(np.einsum("ni,nid->nd", u, J))
+    # own arrays, in the order of rows: kernels are compiled once for these
+    h, design = np.ascontiguousarray(np.einsum("ni,nid->nd", u, J)), design.copy()
     mass = np.array(np.broadcast_to(posture.mass_matrix, (*shape, d, d)).reshape(N, d, d), order="C")
     squared, enter, leave, held = (np.empty((N, m)) for _ in range(4))
 
