@@ -8,7 +8,6 @@ prints one JSON object: the name of each number -> its values there, and here; t
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 
 import numpy as np
 
@@ -32,7 +31,7 @@ def main() -> None:
     loops = table_of_loops(*known, *(random_loop(rng) for _ in range(RANDOM)))
     found: dict[str, list[object]] = {}
     for what in (STIFFEST, STIFFEST | WHOLE_EDGE | DECAY):
-        there, here = (asdict(numbers(loops, what)) for numbers in (numbers_on_gpu, chart_numbers))
+        there, here = (numbers(loops, what)._asdict() for numbers in (numbers_on_gpu, chart_numbers))
         found |= {f"{name} {what}": [there[name].tolist(), here[name].tolist()] for name in there}
     device = load("five-bar")
     plane = plane_of(device, cells=(3, 2))

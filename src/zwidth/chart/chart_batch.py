@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from threading import local
 from typing import Final, NamedTuple
 
@@ -38,8 +37,7 @@ STIFFEST, WHOLE_EDGE, DECAY = 1, 2, 4
 ALL_NUMBERS: Final = STIFFEST | WHOLE_EDGE
 
 
-@dataclass(frozen=True)
-class ChartNumbers:
+class ChartNumbers(NamedTuple):
     """Numbers of the charts of N loops; nan where the status is DOUBTFUL, and where they were not asked for.
 
     status              (N,)    FOUND; NO_WALL where no wall with K > 0, B >= 0 is stable; DOUBTFUL: to be charted
@@ -67,19 +65,6 @@ class ChartNumbers:
         return self.fastest[:, 2].copy()
 
 
-class NumberArrays(NamedTuple):
-    """The arrays of `ChartNumbers`, in the form in which kernels take them."""
-
-    status: NDArray[np.uint8]
-    stiffness: Floats
-    damping: Floats
-    angles: Floats
-    largest_damping: Floats
-    area: Floats
-    decay_status: NDArray[np.uint8]
-    fastest: Floats
-
-
 def chart_numbers(loops: LoopTable, what: int = ALL_NUMBERS) -> ChartNumbers:
     """The numbers of each loop; one whose sections are none, or whose degree is too high, is DOUBTFUL.
 
@@ -93,7 +78,7 @@ def chart_numbers(loops: LoopTable, what: int = ALL_NUMBERS) -> ChartNumbers:
         _several(loops, own.memory, what, 1.0, out, first, last)
 
     in_chunks(several, len(loops.rows))
-    return ChartNumbers(*out)
+    return out
 
 
 def read_first(loops: LoopTable, memory: EdgeMemory, what: int, radius: float) -> tuple[int, int]:
@@ -103,7 +88,7 @@ def read_first(loops: LoopTable, memory: EdgeMemory, what: int, radius: float) -
     """
     if not hasattr(_OWN, "numbers"):
         _OWN.numbers = empty_numbers(1)
-    out: NumberArrays = _OWN.numbers
+    out: ChartNumbers = _OWN.numbers
     out.status[0] = out.decay_status[0] = DOUBTFUL
     _several(loops, memory, what, radius, out, 0, 1)
     return int(out.status[0]), int(out.decay_status[0])
@@ -118,18 +103,18 @@ def memory_of(loops: LoopTable) -> EdgeMemory:
     return memory
 
 
-def empty_numbers(count: int) -> NumberArrays:
+def empty_numbers(count: int) -> ChartNumbers:
     """The numbers of so many loops before any is computed: all DOUBTFUL and nan."""
     status = (np.full(count, DOUBTFUL, dtype=np.uint8) for _ in range(2))
     numbers = (np.full(shape, np.nan) for shape in (count, count, (count, 2), count, count, (count, 3)))
     one, other = status
     stiffness, damping, angles, largest_damping, area, fastest = numbers
-    return NumberArrays(one, stiffness, damping, angles, largest_damping, area, other, fastest)
+    return ChartNumbers(one, stiffness, damping, angles, largest_damping, area, other, fastest)
 
 
 @compiled
 def _several(
-    loops: LoopTable, memory: EdgeMemory, what: int, radius: float, out: NumberArrays, first: int, last: int
+    loops: LoopTable, memory: EdgeMemory, what: int, radius: float, out: ChartNumbers, first: int, last: int
 ) -> None:
     """Loops first to last - 1, one after the other, on the circle |z| = radius."""
     memory.circle.sizes[COMPUTER] = -1
@@ -139,7 +124,7 @@ def _several(
 
 @compiled_lean
 def fill_numbers(
-    loops: LoopTable, i: int, memory: EdgeMemory, what: int, radius: float, out: NumberArrays
+    loops: LoopTable, i: int, memory: EdgeMemory, what: int, radius: float, out: ChartNumbers
 ) -> None:
     """The numbers of loop i that the mask asks for; none if it has no sections or its degree is too high.
 

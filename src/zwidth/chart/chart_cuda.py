@@ -16,7 +16,7 @@ import numpy as np
 from numba import cuda
 from numba.core.errors import NumbaPerformanceWarning
 
-from zwidth.chart.chart_batch import ChartNumbers, NumberArrays, empty_numbers, fill_numbers
+from zwidth.chart.chart_batch import ChartNumbers, empty_numbers, fill_numbers
 from zwidth.chart.edge_memory import MOST_SAMPLES, EdgeMemory, edge_memory
 from zwidth.chart.wall_samples import MOST_DEGREE
 from zwidth.cuda_kernels import SIMULATED, function_of_gpu, rounding_each_step
@@ -36,13 +36,13 @@ def numbers_on_gpu(loops: LoopTable, what: int) -> ChartNumbers:
     N = len(loops.rows)
     out = empty_numbers(N)
     if N == 0:
-        return ChartNumbers(*out)
+        return out
     like = edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
     threads = min(N, most_threads(_bytes(like)))
     block = min(threads, BLOCK)
     blocks = -(-threads // block)
     given = LoopTable(*(cuda.to_device(np.ascontiguousarray(array)) for array in loops))
-    there: Any = NumberArrays(*map(cuda.to_device, out))
+    there: Any = ChartNumbers(*map(cuda.to_device, out))
     memory = memory_of_threads(like, blocks * block)
     with rounding_each_step(), warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaPerformanceWarning)  # of few blocks, where there are few loops

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 
 from zwidth.chart.chart_batch import ChartNumbers, chart_numbers
@@ -33,9 +31,7 @@ def _numbers(point: OperatingPoint, what: int) -> ChartNumbers | None:
         if table is None:
             return None
         parts.append(_compute(table, what))
-    return ChartNumbers(
-        *(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(ChartNumbers))
-    )
+    return ChartNumbers(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _compute(loops: LoopTable, what: int) -> ChartNumbers:
