@@ -60,7 +60,7 @@ class Arc(NamedTuple):
     @property
     def angles(self) -> Floats:
         """The angles that found it with its ends, from first to last."""
-        return np.concatenate([[self.start], self.thetas, [self.end]])
+        return _with_ends(self.start, self.thetas, self.end)
 
 
 class Curve(Protocol):
@@ -188,16 +188,13 @@ def sample_arcs(arcs: Arcs, curves: Curves) -> list[ArcPoints]:
     walks = []
     for arc in arcs:
         (K0, B0), (K1, B1) = arc.first, arc.last
-        if not arc.curved:
-            walks.append((np.array([arc.start, arc.end]), np.array([K0, K1]), np.array([B0, B1])))
-            continue
-        curve = curves[arc.member]
-        thetas, K, B = curve.dense_points(arc)
-        walks.append(
-            (
-                np.concatenate([[arc.start], thetas, [arc.end]]),
-                np.concatenate([[K0], K, [K1]]),
-                np.concatenate([[B0], B, [B1]]),
-            )
-        )
+        thetas, K, B = curves[arc.member].dense_points(arc) if arc.curved else 3 * (np.empty(0),)
+        walks.append((_with_ends(arc.start, thetas, arc.end), _with_ends(K0, K, K1), _with_ends(B0, B, B1)))
     return walks
+
+
+def _with_ends(first: float, inner: Floats, last: float) -> Floats:
+    """Numbers along an arc, from its first wall to its last."""
+    out = np.empty(len(inner) + 2)
+    out[0], out[1:-1], out[-1] = first, inner, last
+    return out

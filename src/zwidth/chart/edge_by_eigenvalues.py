@@ -124,7 +124,7 @@ def arcs_of_rings(rings: EdgeRings) -> Arcs:
     start, end = 2.0 * np.arctan(arcs.start[order]), 2.0 * np.arctan(arcs.end[order])
     inner = [
         t[low:high] if forwards else t[low:high][::-1]
-        for (low, high), forwards in zip(arcs.samples[order], start < end, strict=True)
+        for (low, high), forwards in zip(arcs.samples[order].tolist(), (start < end).tolist(), strict=True)
     ]
     return Arcs(
         kind=arcs.kind[order].astype(np.int64),

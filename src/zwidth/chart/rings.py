@@ -34,18 +34,13 @@ def outline(arcs: list[ArcPoints]) -> Floats:
 
     An arc's last point is left out where the next one begins, unless they are farther apart than WIDE_CORNER.
     """
-    width, height = (
-        max(np.max(arc[axis]) for arc in arcs) - min(np.min(arc[axis]) for arc in arcs) for axis in (1, 2)
-    )
-    kept = []
-    for (_, K, B), (_, next_K, next_B) in zip(arcs, [*arcs[1:], arcs[0]], strict=True):
-        apart = abs(K[-1] - next_K[0]) > WIDE_CORNER * width or abs(B[-1] - next_B[0]) > WIDE_CORNER * height
-        kept.append(slice(None) if apart else slice(-1))
-    points = np.empty((sum(len(K[keep]) for (_, K, _), keep in zip(arcs, kept, strict=True)) + 1, 2))
-    for axis in (0, 1):
-        np.concatenate([arc[axis + 1][keep] for arc, keep in zip(arcs, kept, strict=True)], out=points[:-1, axis])
-    points[-1] = points[0]
-    return points
+    closed = [[*(arc[axis] for arc in arcs), arcs[0][axis][:1]] for axis in (1, 2)]
+    walls = np.array([np.concatenate(parts) for parts in closed])
+    last = np.cumsum([len(K) for _, K, _ in arcs]) - 1
+    gaps = np.abs(walls[:, last + 1] - walls[:, last])
+    kept = np.ones(walls.shape[1], dtype=np.bool_)
+    kept[last] = (gaps > WIDE_CORNER * np.ptp(walls, axis=1)[:, None]).any(axis=0)
+    return np.ascontiguousarray(walls.compress(kept, axis=1).T)
 
 
 def signed_area(ring: Floats) -> float:
