@@ -23,6 +23,8 @@ from model_cases import (
 from scipy import ndimage
 
 from zwidth.model.mechanism import Mechanism
+from zwidth.model.mechanism_arrays import pack
+from zwidth.model.mobility import check_mobility, drives_fit
 from zwidth.model.posture import (
     OK,
     OUT_OF_REACH,
@@ -30,6 +32,7 @@ from zwidth.model.posture import (
     LoopOpen,
     OutOfReach,
     Singular,
+    _references,
     inertia_terms,
     solve_posture,
 )
@@ -379,3 +382,28 @@ def test_a_reference_position_out_of_reach_is_called_that():
     assert "nearer" not in str(caught.value)
     with pytest.raises(OutOfReach, match="the nearest position it reaches is"):
         solve_posture(mechanism, [0.0, 9.0])
+
+
+def test_the_drives_of_many_designs_fit_where_each_alone_fits():
+    arm = spatial_arm(np.random.default_rng(0))
+    singular, misfit = (
+        ("outward", "right", "left"),
+        (
+            replace(five_bar(), drives=drives_on([0])),
+            arm_on_a_four_bar(),
+            replace(arm, handle_link=1, handle_point=np.zeros(3)),
+        ),
+    )
+    cases = [(five_bar(), name) for name in singular] + [
+        (one, next(iter(one.assemblies))) for one in (*misfit, arm)
+    ]
+    fit = []
+    for mechanism, name in cases:
+        mech = pack(mechanism)
+        reference, _ = _references(mechanism, mech, name)
+        fit.append(bool(drives_fit(mechanism, mech, np.zeros(1, dtype=np.int64), reference)[0]))
+        try:
+            assert (check_mobility(mechanism, mech, 0, reference[0]) is None) == fit[-1]
+        except ValueError:  # the drives fit nowhere
+            assert not fit[-1]
+    assert fit == [True, False, False, False, False, False, True]

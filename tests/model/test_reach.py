@@ -8,7 +8,7 @@ from model_cases import KINDS, five_bar
 
 from zwidth.model import posture_batch
 from zwidth.model.mechanism_arrays import pack
-from zwidth.model.posture import OK, OUT_OF_REACH, solve_posture
+from zwidth.model.posture import OK, OUT_OF_REACH, UNDECIDED, OutOfReach, solve_posture
 from zwidth.model.reach_shells import outside_shells, shells
 from zwidth.model.roadmap import roadmap
 
@@ -42,3 +42,31 @@ def test_the_short_cut_changes_no_answer(monkeypatch):
     assert (quick.status == full.status).all()
     assert {OK, OUT_OF_REACH} <= set(np.unique(quick.status).tolist())
     assert np.nanmax(np.abs(quick.jacobian - full.jacobian)) < 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_certain_to_be_out_of_reach_is_so_alone(kind):
+    """Positions all over, and a little beyond each shell: within the tolerance they may be projected."""
+    rng = np.random.default_rng(12)
+    mechanism, tolerance = KINDS[kind](rng), 0.01
+    found = shells(pack(mechanism), 0)
+    reach = max(float(shell.most) for shell in found)
+    goals = [mechanism.reference_position + reach * rng.uniform(-1.0, 1.0, (12, 3)) * [1, 1, 0.1]]
+    for shell in found:
+        ways = rng.normal(size=(6, 3)) * [1, 1, 0.1]
+        ways *= float(shell.most) / np.linalg.norm(ways, axis=1)[:, None]
+        goals.append(shell.centre + ways * rng.uniform(1.0, 1.0 + 3.0 * tolerance, (6, 1)))
+    goals = np.concatenate(goals)
+    together = solve_posture(mechanism, goals, tolerance=tolerance, straight=True).status
+    assert (together == OUT_OF_REACH).any()
+    for goal, status in zip(goals, together, strict=True):
+        if status == OUT_OF_REACH:
+            with pytest.raises(OutOfReach):
+                solve_posture(mechanism, goal, tolerance=tolerance)
+
+
+def test_a_position_that_would_be_projected_is_left_to_be_decided_alone():
+    mechanism = five_bar(lengths=(0.146, 0.199, 0.146, 0.199))
+    goals = [[0.0, 0.345 * (1.0 + share), 0.0] for share in (0.005, 0.0099, 0.0101, 0.5)]
+    status = solve_posture(mechanism, goals, tolerance=0.01, straight=True).status
+    assert status.tolist() == [UNDECIDED, UNDECIDED, OUT_OF_REACH, OUT_OF_REACH]

@@ -12,7 +12,7 @@ from zwidth.chart.verdict import judge
 from zwidth.device import address
 from zwidth.device.load import load
 from zwidth.measures.bindings import impedance, wall_decay
-from zwidth.measures.definition import FAILED, OK
+from zwidth.measures.definition import FAILED, OK, OUT_OF_REACH
 from zwidth.study.column import column_named
 from zwidth.study.sampling import Axis, Sampling, Tie
 from zwidth.study.sweep_job import SweepJob
@@ -213,6 +213,36 @@ def test_arcs_that_lie_between_two_samples_are_found(monkeypatch):
     monkeypatch.setattr(impedance, "stability_chart", lambda *a, **k: doubtful.append(1) or chart(*a, **k))
     assert (job.compute(0, job.count).status == OK).all()
     assert len(doubtful) <= 3
+
+
+@pytest.mark.parametrize("fastest", ["lengths", "computer"])
+def test_designs_out_of_reach_are_told_together(fastest, monkeypatch):
+    """But for those that only a way round, or a projection, may reach."""
+    lengths = Axis(
+        "links.upper-right.length_m",
+        tuple(np.linspace(0.01, 0.147, 24).tolist()),
+        ties=(Tie("links.upper-left.length_m"),),
+    )
+    computers = Axis("loop.sampling_period_s", (5e-4, 1e-3))
+    axes = (computers, lengths) if fastest == "lengths" else (lengths, computers)
+    job = job_of("five-bar", axes, None, ("stiffness_max", "isotropy"))
+    values, status = alone(replace(job, _cache={}))
+    asked = []
+    one = SweepJob._alone
+    monkeypatch.setattr(SweepJob, "_alone", lambda self, number, _: asked.append(number) or one(self, number, _))
+    together = job.compute(0, job.count)
+    assert np.array_equal(together.status, status)
+    np.testing.assert_allclose(together.values, values, rtol=1e-9)
+    missed = int((status[:, 0] == OUT_OF_REACH).sum())
+    assert missed > job.count / 4
+    assert len(set(asked)) < missed / 4
+
+
+def test_a_position_out_of_reach_of_the_only_mechanism_is_told_of_all_designs(monkeypatch):
+    job = job_of("five-bar", (Axis("loop.sampling_period_s", (5e-4, 1e-3)),), None, ("stiffness_max", "isotropy"))
+    job = replace(job, fixed_circumstances={"at": (0.5, 0.5)})
+    monkeypatch.setattr(SweepJob, "_alone", lambda *_: pytest.fail("asked for alone"))
+    assert (job.compute(0, job.count).status == OUT_OF_REACH).all()
 
 
 def test_some_designs_fail_and_some_do_not():

@@ -23,6 +23,7 @@ from tests.study.executor_cases import (
 )
 from zwidth.measures.definition import FAILED, MISSING, NO_VALUE, MeasureError, Note
 from zwidth.memory_limit import TooLarge
+from zwidth.study import executor
 from zwidth.study.executor import MORE, merge_notes, run
 from zwidth.study.store import Store
 from zwidth.study.workers import WorkerLost, cores, pack_job
@@ -41,6 +42,23 @@ def test_the_cells_are_those_of_the_job():
 @pytest.mark.parametrize("batch", [1, 3, 99, 100, 1000, None])
 def test_batches_of_any_size_give_the_same(batch):
     assert same_cells(run(RootsJob(100), workers=1, batch=batch), RootsJob(100).compute(0, 100))
+
+
+@pytest.mark.parametrize(("seconds", "expected"), [(1e-5, 62_500 // 4), (1e-3, 244), (0.2, 1), (30.0, 1)])
+def test_a_batch_takes_a_quarter_of_a_second_whatever_the_first_cells_load(seconds, expected, monkeypatch):
+    """A kernel takes time once to be loaded, here when so many cells are first computed; each call takes some."""
+    now, loads = [0.0], {2: 0.9, 16: 0.4}
+
+    class Job(RootsJob):
+        def compute(self, first, last):
+            now[0] += 0.005 + seconds * (last - first) + loads.pop(last - first, 0.0)
+            return super().compute(first, last)
+
+    monkeypatch.setattr(executor, "perf_counter", lambda: now[0])
+    job = Job(250_000)
+    found = executor._batch(job, 1)
+    assert found == pytest.approx(expected, rel=0.2)
+    assert sum(last - first for first, last in job.computed_ranges) <= max(4, 4 * found)
 
 
 def test_processes_give_the_same_and_say_how_far_they_are(capfd):

@@ -178,6 +178,15 @@ def test_what_is_no_device_and_what_is_out_of_reach_is_told_and_the_rest_is_kept
     assert "2 designs failed: mechanism.links.distal-left.mass_kg" in found.dataset()["isotropy"].attrs["notes"]
 
 
+def test_why_a_design_failed_is_stored_with_its_values(tmp_path):
+    masses = axis("links.distal-left.mass_kg", range=[-0.05, 0.05], count=3)
+    job = sweep_job(study(masses, measures=["isotropy"]))
+    whole = job.compute(0, 3)
+    assert whole.notes[0]
+    for _ in range(2):
+        assert same_cells(run(job, Store(tmp_path / "cells", job), workers=1), whole)
+
+
 def test_a_mechanism_that_moves_no_mass_is_no_device():
     """What a device file may not say, a design may not either, though its loops are not closed anew."""
     names = ["upper-right", "distal-right", "upper-left", "distal-left"]

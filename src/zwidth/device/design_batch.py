@@ -21,10 +21,10 @@ from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath
 from zwidth.device.load import build_device, check
 from zwidth.device.schema.value_types import Section
-from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.operating_point import PROJECTION_TOLERANCE, OperatingPoint
 from zwidth.model.design_axes import change_designs, design_shape
 from zwidth.model.mechanism import Floats, Mechanism
-from zwidth.model.posture import OK, Posture, PostureError, join_postures, solve_posture
+from zwidth.model.posture import UNDECIDED, Posture, PostureError, join_postures, solve_posture
 from zwidth.model.reduction import Model
 
 _DRIVE: Final = [
@@ -124,7 +124,8 @@ class DesignBatch:
         position   (P, 2) or (P, 3), or (..., 2) or (..., 3) of a workspace that has two axes or more; None: the
                    reference of each design
         Returns    OperatingPoint of shape (P,) or (P, ...), without P where nothing differs; and marks (P,) of the
-                   designs to be asked for alone: there may be a way round to the position, or a reason why not
+                   designs to be asked for alone: there may be a way round to the position, or a reason why not.
+                   A position that is certain to be out of reach is marked in `status` alone
         Raises     what `Device.at` raises, of what is the same for all designs
         """
         parts, none = self.parts, np.zeros(self.count, dtype=bool)
@@ -139,8 +140,14 @@ class DesignBatch:
         mechanism = cast(Mechanism, parts.mechanism)
         with self.device.solving(assembly) as name:
             goals = mechanism.reference_position if position is None else self.device.position(position)
-            posture = solve_posture(mechanism, np.broadcast_to(goals, (self.count, 3)), name, straight=True)
-        alone = (posture.status != OK) | ~masses_moved(posture)
+            posture = solve_posture(
+                mechanism,
+                np.broadcast_to(goals, (self.count, 3)),
+                name,
+                tolerance=PROJECTION_TOLERANCE,
+                straight=True,
+            )
+        alone = (posture.status == UNDECIDED) | ~masses_moved(posture)
         return self._with_posture(posture, direction, model), alone
 
     def at_point(self, point: OperatingPoint) -> tuple[OperatingPoint, Marks]:

@@ -23,7 +23,6 @@ from zwidth.model.mechanism import Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.mobility import constraints
 from zwidth.model.posture_batch import solve_batch
-from zwidth.model.reach_shells import shells
 from zwidth.model.roadmap import roadmap, turn_drive
 
 STARTS: Final = 4  # nodes of the roadmap nearest to the goal, from which it is approached
@@ -34,11 +33,6 @@ SETTLED: Final = 1e-13  # turn of all drives, below which they have arrived [rad
 # Shares of the way back from the nearest position to where the descent began: at the edge the drives lose control.
 RETREAT: Final = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.3, 1.0])
 TURN: Final = 0.02  # of a drive in one step to a posture given by its joints [rad]
-
-
-def arm_length(mech: MechanismArrays, design: int) -> float:
-    """From the base to the handle through the shortest chain of links, stretched out [m]."""
-    return min((shell.most for shell in shells(mech, design)), default=0.0)
 
 
 def nearest_position(mech: MechanismArrays, design: int, references: Floats, goal: Floats) -> Floats | None:

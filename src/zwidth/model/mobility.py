@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.compiled import compiled
 from zwidth.model.closure import equations
 from zwidth.model.continuation import ASSEMBLY_TOLERANCE, assemble_batch
 from zwidth.model.forward_kinematics import place_links, working_memory
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Floats, Ints, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 NEGLIGIBLE: Final = 1e-6  # singular values below this part of the mechanism's size count as zero
 NEARBY: Final = 0.05  # how far the joints turn to configurations that are not special [rad]
 ELSEWHERE: Final = 16  # configurations tried all over the joints' turns
+
+Marks = NDArray[np.bool_]
 
 
 class Misfit(NamedTuple):
@@ -36,50 +38,76 @@ def check_mobility(mechanism: Mechanism, mech: MechanismArrays, design: int, ref
 
     Raises  ValueError  where the drives fit the mechanism in no configuration
     """
-    rng = np.random.default_rng(0)
-    near = reference + NEARBY * rng.uniform(-1.0, 1.0, (2, reference.size))
-    misfit = _misfit(mechanism, mech, design, [reference, *closed_configurations(mech, design, near)])
+    misfit = _misfit(mechanism, mech, _ranks_near(mech, np.array([design]), reference[None])[0])
     if misfit is None:
         return None
+    rng = np.random.default_rng(1)
     far = rng.uniform(-np.pi, np.pi, (ELSEWHERE, reference.size))
-    if all(_misfit(mechanism, mech, design, [angles]) for angles in closed_configurations(mech, design, far)):
+    designs = np.full(ELSEWHERE, design)
+    angles, closed = _closed_configurations(mech, designs, far)
+    elsewhere = _ranks(mech, designs[closed], angles[closed])
+    if all(_misfit(mechanism, mech, ranks) for ranks in elsewhere):
         raise ValueError(f"{misfit.reason}; {misfit.advice}")
     return misfit.reason
 
 
-def closed_configurations(mech: MechanismArrays, design: int, rough: Floats) -> Floats:
-    """Configurations (k, n) with closed loops from rough angles (N, n), k <= N; the handle goes where it must."""
+def drives_fit(mechanism: Mechanism, mech: MechanismArrays, designs: Ints, references: Floats) -> Marks:
+    """Of which of N designs, each at a reference (N, n), the drives control the handle, (N,): `check_mobility`."""
+    kinds, kind_of = np.unique(_ranks_near(mech, designs, references), axis=0, return_inverse=True)
+    fit = np.array([_misfit(mechanism, mech, ranks) is None for ranks in kinds], dtype=np.bool_)
+    return fit[kind_of.ravel()]
+
+
+def _ranks_near(mech: MechanismArrays, designs: Ints, references: Floats) -> Ints:
+    """The largest `_ranks` of N designs at references (N, n) and at closed configurations near them."""
+    ranks = _ranks(mech, designs, references)
+    rng = np.random.default_rng(0)
+    for turn in NEARBY * rng.uniform(-1.0, 1.0, (2, mech.parent.size)):
+        angles, closed = _closed_configurations(mech, designs, references + turn)
+        ranks[closed] = np.maximum(ranks[closed], _ranks(mech, designs[closed], angles[closed]))
+    return ranks
+
+
+def _closed_configurations(mech: MechanismArrays, designs: Ints, rough: Floats) -> tuple[Floats, Marks]:
+    """Configurations of N designs from rough angles (N, n), the handle going where it must; and whether their
+    loops are closed."""
     angles = np.zeros_like(rough)
     angles[:, mech.joint] = rough[:, mech.joint]
     gaps = np.zeros((len(angles), mech.a.size))
-    goals = np.zeros((len(angles), 3))
-    assemble_batch(mech, np.full(len(angles), design), goals, False, angles, gaps)
-    closed: Floats = angles[gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size[design]]
-    return closed
+    assemble_batch(mech, designs, np.zeros((len(angles), 3)), False, angles, gaps)
+    return angles, gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size[designs]
 
 
-def _misfit(
-    mechanism: Mechanism, mech: MechanismArrays, design: int, configurations: Sequence[Floats]
-) -> Misfit | None:
-    rows = [constraints(mech, design, angles)[0] for angles in configurations]
-    m, d, loops = mech.joint.size, mech.driven, 3 * mech.a.size
-    size = float(mech.size[design])
-    freedom = m - max(_rank(A[:, :loops], size) for A in rows)
+def _misfit(mechanism: Mechanism, mech: MechanismArrays, ranks: Ints) -> Misfit | None:
+    m, d = mech.joint.size, mech.driven
+    of_loops, of_passive, of_all = ranks
+    freedom = m - of_loops
     if freedom != d:
         return Misfit(
             f"the mechanism has {freedom} degrees of freedom but {d} drives",
             "give it as many drives, or check its joints and loops",
         )
-    if max(_rank(A[: m - d, :loops], size) for A in rows) < m - d:
+    if of_passive < m - d:
         driven = ", ".join(mechanism.drives.names)
         return Misfit(f"the driven joints {driven} do not determine the other joints", "drive other joints")
-    if max(_rank(A, size) for A in rows) < m:
+    if of_all < m:
         return Misfit(
             f"the handle on link {mechanism.links.names[mech.handle_link]!r} can rest while the drives move: "
             "its position does not determine the posture",
             "place it on another link or take a drive away",
         )
     return None
+
+
+def _ranks(mech: MechanismArrays, designs: Ints, angles: Floats) -> Ints:
+    """Ranks (N, 3) of the `constraints` of N designs at joint angles (N, n): of all joints on the loops, of the
+    passive joints on the loops, of all joints on loops and handle."""
+    m, loops, passive = mech.joint.size, 3 * mech.a.size, mech.joint.size - mech.driven
+    rows = np.empty((len(designs), m, loops + 3))
+    for i, design in enumerate(designs):
+        rows[i] = constraints(mech, design, angles[i])[0]
+    parts = rows[:, :, :loops], rows[:, :passive, :loops], rows
+    return np.stack([_rank(part, mech.size[designs]) for part in parts], axis=1)
 
 
 @compiled
@@ -92,7 +120,9 @@ def constraints(mech: MechanismArrays, design: int, angles: Floats) -> tuple[Flo
     return work.rows, work.gaps
 
 
-def _rank(rows: Floats, size: float) -> int:
+def _rank(rows: Floats, sizes: Floats) -> Ints:
+    """Of matrices (N, i, j), of mechanisms of these sizes (N,)."""
     if 0 in rows.shape:
-        return 0
-    return int(np.sum(np.linalg.svd(rows, compute_uv=False) > NEGLIGIBLE * size))
+        return np.zeros(len(rows), dtype=np.int64)
+    values = np.linalg.svd(rows, compute_uv=False)
+    return np.asarray((values > NEGLIGIBLE * sizes[:, None]).sum(axis=1))

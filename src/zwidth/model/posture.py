@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,17 +14,19 @@ from zwidth.model.argument_checks import require
 from zwidth.model.bias import bias_batch
 from zwidth.model.continuation import ASSEMBLY_TOLERANCE, OK, OUT_OF_REACH, SINGULAR, assemble_batch
 from zwidth.model.forward_kinematics import place_links, working_memory
-from zwidth.model.handle_position import arm_length, nearest_position, position_of_angles
+from zwidth.model.handle_position import nearest_position, position_of_angles
 from zwidth.model.mechanism import Floats, Ints, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, design_of_each, pack, per_design
-from zwidth.model.mobility import check_mobility
+from zwidth.model.mobility import check_mobility, drives_fit
 from zwidth.model.posture_batch import PostureBatch, failed_batch, solve_batch, solve_from_starts
+from zwidth.model.reach_shells import arm_length, far_outside_shells, shells
 from zwidth.model.roadmap import roadmap
 
 __all__ = [
     "OK",
     "OUT_OF_REACH",
     "SINGULAR",
+    "UNDECIDED",
     "LinkPoints",
     "LoopOpen",
     "OutOfReach",
@@ -40,6 +42,8 @@ __all__ = [
     "reachable_positions",
     "solve_posture",
 ]
+
+UNDECIDED: Final = 255  # status of a design that is to be solved alone
 
 
 class PostureError(ValueError):
@@ -133,8 +137,10 @@ def solve_posture(
     position  (..., 3), or (..., 2) in the plane of the reference position [m]; it broadcasts with the leading
               axes of the mechanism's numbers
     tolerance how far a position may be projected, as a share of the arm's length from base to handle
-    straight  True: take only the straight way from the reference, and leave a posture that lies on no such way
-              OUT_OF_REACH; each posture then hangs on its own design alone, and takes a microsecond
+    straight  True, for one position of each of several designs: take only the straight way from the reference,
+              which makes each posture hang on its own design alone, and takes a microsecond. Where there is none,
+              the status is OUT_OF_REACH if the handle cannot be there nor where the position would be projected
+              to, and UNDECIDED otherwise
     Returns   Posture; in a batch a position that cannot be had is marked by its status
     Raises    OutOfReach, Singular  where a single posture is requested and does not exist; an assembly may be
                           singular throughout
@@ -155,8 +161,12 @@ def solve_posture(
         _check_loops(mechanism, mech, name, gaps[0])
     if straight:
         solved = solve_from_starts(mech, design, reference, design, goals)
-        unclosed = gaps.max(axis=1, initial=0.0) > ASSEMBLY_TOLERANCE * mech.size
-        solved.overwrite(unclosed[design], failed_batch(mech, 1, OUT_OF_REACH))
+        closed = (gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size)[design]
+        missed = np.flatnonzero(~closed | (solved.status != OK))
+        solved.overwrite(missed, failed_batch(mech, len(missed), UNDECIDED))
+        far = missed[closed[missed] & far_outside_shells(mech, design[missed], goals[missed], tolerance)]
+        own, place = np.unique(design[far], return_inverse=True)
+        solved.status[far[drives_fit(mechanism, mech, own, reference[own])[place]]] = OUT_OF_REACH
         return _posture(name, mech, goals, solved, np.where(solved.status == OK, 0.0, np.nan), shape)
     closed = np.flatnonzero(gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size)
     uncontrolled = check_mobility(mechanism, mech, int(closed[0]), reference[closed[0]]) if len(closed) else None
@@ -168,7 +178,7 @@ def solve_posture(
     wanted = np.flatnonzero(solved.status == OUT_OF_REACH) if tolerance > 0.0 or not shape else ()
     for i in wanted:
         near = nearest_position(mech, int(design[i]), reference, goals[i])
-        if near is None or np.linalg.norm(near - goals[i]) > tolerance * arm_length(mech, int(design[i])):
+        if near is None or np.linalg.norm(near - goals[i]) > tolerance * arm_length(shells(mech, int(design[i]))):
             continue
         solved.overwrite(np.array([i]), solve_batch(mech, design[i : i + 1], reference, near[None]))
         goals[i], projected[i] = near, np.linalg.norm(near - goals[i])

@@ -7,13 +7,13 @@ outside any chain's shell is out of reach, which is found at once; inside all of
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.model.mechanism import Floats
+from zwidth.model.mechanism import Floats, Ints
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 BASE: Final = -1
@@ -24,34 +24,59 @@ SharedPoint = tuple[int, Floats, int, Floats]
 
 
 class Shell(NamedTuple):
-    """Range of one chain: the handle's distance from `centre` lies between `least` and `most` [m]."""
+    """Range of one chain, of one design or of several (...): the handle's distance from `centre` (..., 3) lies
+    between `least` and `most` [m]."""
 
     centre: Floats
-    least: float
-    most: float
+    least: Floats
+    most: Floats
+
+    def misses(self, goals: Floats) -> Floats:
+        """How far handle positions (N, 3), of one design or each of its own, are beyond the range [m]; not
+        positive within it."""
+        distance = np.linalg.norm(goals - self.centre, axis=-1)
+        return np.asarray(np.maximum(distance - self.most, self.least - distance))
 
 
 def outside_shells(mech: MechanismArrays, design: int, goals: Floats) -> NDArray[np.bool_]:
     """Which handle positions (N, 3) lie outside of a chain's shell, (N,), by more than rounding; nan does not."""
     out = np.zeros(len(goals), dtype=np.bool_)
-    slack = ROUNDING * float(mech.size[design])
     for shell in shells(mech, design):
-        distance = np.linalg.norm(goals - shell.centre, axis=1)
-        out |= (distance > shell.most + slack) | (distance < shell.least - slack)
+        out |= shell.misses(goals) > ROUNDING * mech.size[design]
     return out
 
 
-def shells(mech: MechanismArrays, design: int) -> list[Shell]:
-    """The shells of one design's chains, one for each way from base to handle that visits no link twice."""
+def far_outside_shells(mech: MechanismArrays, designs: Ints, goals: Floats, tolerance: float) -> NDArray[np.bool_]:
+    """Which of N designs have their goal (N, 3) outside of a chain's shell by more than they project it, (N,).
+
+    tolerance  how far a position is projected, as a share of the arm's length
+    """
+    found = shells(mech, designs)
+    slack = tolerance * arm_length(found) + ROUNDING * mech.size[designs]
+    return np.asarray(np.any([shell.misses(goals) > slack for shell in found], axis=0))
+
+
+def arm_length(found: Sequence[Shell]) -> Floats:
+    """From the base to the handle through the shortest of all chains, stretched out [m]."""
+    return np.asarray(np.min([shell.most for shell in found], axis=0))
+
+
+def shells(mech: MechanismArrays, design: int | Ints) -> list[Shell]:
+    """The shells of the chains, one for each way from base to handle that visits no link twice.
+
+    design  one, or several (N,), whose shells then have N centres and ranges
+    """
     all_shells = []
-    for centre, lengths in _chains(_shared_points(mech, design), mech.handle_link, mech.handle[design, 0]):
-        total = sum(lengths)
-        all_shells.append(Shell(centre, max(0.0, 2.0 * max(lengths) - total), total))
+    for centre, segments in _chains(_shared_points(mech, design), mech.handle_link, mech.handle[design, 0]):
+        lengths = np.array(segments)
+        total = lengths.sum(axis=0)
+        all_shells.append(Shell(centre, np.maximum(0.0, 2.0 * lengths.max(axis=0) - total), total))
     return all_shells
 
 
-def _shared_points(mech: MechanismArrays, design: int) -> list[SharedPoint]:
-    joints = [(int(mech.parent[i]), mech.origin[design, i], i, np.zeros(3)) for i in range(len(mech.parent))]
+def _shared_points(mech: MechanismArrays, design: int | Ints) -> list[SharedPoint]:
+    tip = np.zeros_like(mech.handle[design, 0])
+    joints = [(int(mech.parent[i]), mech.origin[design, i], i, tip) for i in range(len(mech.parent))]
     loops = [
         (int(mech.a[k]), mech.point_a[design, k], int(mech.b[k]), mech.point_b[design, k])
         for k in range(len(mech.a))
@@ -66,10 +91,10 @@ def _chains(
     link: int = BASE,
     at: Floats | None = None,
     visited: frozenset[int] = frozenset({BASE}),
-) -> Iterator[tuple[Floats, list[float]]]:
+) -> Iterator[tuple[Floats, list[Floats]]]:
     """Where each chain leaves the base, and the lengths of its segments; `at` is where it entered `link`."""
     if at is not None and link == last:
-        yield at, [float(np.linalg.norm(handle - at))]
+        yield at, [_length(handle - at)]
         return
     both_ways = [*meetings, *((b, q, a, p) for a, p, b, q in meetings)]
     for here, leaves, there, enters in both_ways:
@@ -79,4 +104,8 @@ def _chains(
             if at is None:
                 yield leaves, rest
             else:
-                yield start, [float(np.linalg.norm(leaves - at)), *rest]
+                yield start, [_length(leaves - at), *rest]
+
+
+def _length(segment: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(segment, axis=-1))

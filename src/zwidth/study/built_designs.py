@@ -12,7 +12,7 @@ from zwidth.device.faults import DeviceError
 from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import table_of_points
-from zwidth.model.posture import PostureError
+from zwidth.model.posture import OK, PostureError
 from zwidth.study.design_groups import DesignGroup, Rows
 
 
@@ -37,8 +37,8 @@ def build_at_point(groups: Iterable[DesignGroup], point: OperatingPoint) -> Iter
     """The designs of each group at the operating point of a single device, as `Device.at_point` puts each of them.
 
     A design that is in none is to be built alone: it is not certain to be valid, it differs from no other of its
-    group, its posture does not lie straight ahead or is given by joint angles, or the point has a response or
-    several directions.
+    group, its posture is out of reach, does not lie straight ahead or is given by joint angles, or the point has a
+    response or several directions.
     """
     by_angles = isinstance(point.requested_position, Mapping)
     if by_angles or point.response is not None or point.direction_count > 1:
@@ -50,6 +50,6 @@ def build_at_point(groups: Iterable[DesignGroup], point: OperatingPoint) -> Iter
             built, alone = group.batch.at_point(point)
         except (PostureError, DeviceError):
             continue  # each design alone says why
-        kept = np.flatnonzero(group.valid & ~alone)
+        kept = np.flatnonzero(group.valid & ~alone & (built.status == OK))
         if len(kept):
             yield BuiltDesigns(group.rows[kept], built[kept])

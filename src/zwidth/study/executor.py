@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 PATIENCE: Final = 10.0  # s; a longer job is worth starting processes, which takes some seconds
 GPU_BATCH: Final = 32768  # cells on a GPU: a loop for each thread of a large one
 BATCH: Final = 0.25  # s that a batch should take: much longer than sending and storing it
-TRIAL: Final = 0.01  # s of computation from which the time per cell is estimated
-LONGER: Final = 1.5  # times as long that twice the cells must take for that
+TRIAL: Final = 0.05  # s of computation from which the time per cell is estimated
 SHARES: Final = 16  # least number of batches, so that no process waits long for the last one
 GOLDEN: Final = 0.6180339887498949
 MOST_NOTES: Final = 100  # notes per measure; a reason that contains a number may differ in each cell
@@ -147,23 +146,27 @@ def _batch(job: Job, workers: int) -> int:
     """How many cells take about a quarter of a second.
 
     Some cells are computed to measure the time, and their values are dropped: cells spread over the job, since the
-    first of a study are often its slowest, and growing numbers, since many at once may cost little more than one.
+    first of a study are often its slowest, and growing numbers until they take long enough to tell: many at once
+    may cost little more than one. What takes long is computed again, since the first time may load what all cells
+    need; two cells at least, since a job may keep what it knows of its last one.
     """
     count = job.count
     most = max(1, count // max(SHARES, 4 * workers))
     if most == 1:
         return 1
-    size, place, before = 1, 0.0, np.inf
+    size, place = 2, 0.0
     while size <= most:
         first = int(place * (count - size))
         place = (place + GOLDEN) % 1.0
-        began = perf_counter()
-        job.compute(first, first + size)
-        seconds = perf_counter() - began
-        # while twice the cells take hardly longer, it is not the cells that take the time
-        if seconds >= TRIAL and seconds >= LONGER * before:
+        for _ in range(2):
+            began = perf_counter()
+            job.compute(first, first + size)
+            seconds = perf_counter() - began
+            if seconds < TRIAL:
+                break
+        else:
             return max(1, min(most, int(BATCH / (seconds / size))))
-        size, before = size * 2, seconds
+        size *= 2
     return most
 
 

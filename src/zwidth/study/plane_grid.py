@@ -144,7 +144,7 @@ class ReachableSet:
         along = self.positions @ axis
         low, high = float(along.min()), float(along.max())
         margin = BETWEEN * (high - low)
-        allowed = [(float(shell.centre @ axis), shell.most) for shell in self.shells]
+        allowed = [(float(shell.centre @ axis), float(shell.most)) for shell in self.shells]
         return (
             max([low - margin, *(min(low, centre - most) for centre, most in allowed)]),
             min([high + margin, *(max(high, centre + most) for centre, most in allowed)]),

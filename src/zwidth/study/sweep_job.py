@@ -129,8 +129,8 @@ class SweepJob:
         for group in self._grouping.groups(list(self._design_columns(first, last))):
             for row, column, found in self._together(group, first):
                 fill(row, column, found)
-        for row, column in np.argwhere(status == MISSING):
-            fill(row, column, self._alone(first + int(row), self.columns[column]))
+        for row, column in np.argwhere(status == MISSING).tolist():
+            fill(row, column, self._alone(first + row, self.columns[column]))
         notes = [
             tuple(
                 Note(*key, len(at), (min(at),)) for key, at in sorted(kinds.items(), key=lambda item: min(item[1]))
@@ -165,13 +165,24 @@ class SweepJob:
                 at = chosen.get("at") if group.positions is None else group.positions[piece]
                 try:
                     point, alone = group.batch[piece].at(self.positions if over_workspace else at, *circumstances)
+                except (OutOfReach, Singular) as error:  # of the one mechanism that all of them have
+                    status = _status_of(error)
+                    missed = group.rows[piece][group.valid[piece]]
+                    yield from ((int(row), column, (np.nan, status, "")) for row in missed for column in columns)
+                    continue
                 except (PostureError, DeviceError):
                     continue  # each design alone says why
-                kept = np.flatnonzero(group.valid[piece] & ~alone)
+                same = not group.batch.differs and (over_workspace or group.positions is None)
+                decided = group.valid[piece] & ~alone
+                if not (over_workspace or same):
+                    missed = decided & (point.status != OK)
+                    for row, status in zip(group.rows[piece][missed], point.status[missed], strict=True):
+                        yield from ((int(row), column, (np.nan, int(status), "")) for column in columns)
+                    decided &= ~missed
+                kept = np.flatnonzero(decided)
                 if not len(kept):
                     continue
-                rows, same = group.rows[piece][kept], not group.batch.differs
-                same = same and (over_workspace or group.positions is None)
+                rows = group.rows[piece][kept]
                 point = point if same else point[kept]
                 for column in columns:
                     found = self._measured(self.columns[column], point, first + rows, same)
@@ -296,21 +307,23 @@ class Design:
             assembly = self._circumstance("assembly")
             # what changes the computer or the operator alone leaves the posture as it is
             same = name, self._circumstance("at"), assembly, self.job.of_mechanism(self.settings)
-            known = self.job._cache.get(name, (None, None))
+            kept, solved = self.job._cache.get(name, (None, None))
+            if kept == same and isinstance(solved, _NoPoint):
+                raise solved
             point = device.at(
-                known[1] if known[0] == same else positions,
+                solved if kept == same else positions,
                 self._circumstance("direction"),
                 assembly=assembly,
                 model=self._circumstance("model"),
             )
-            if known[0] != same:
+            if kept != same:
                 if point.posture is not None and not masses_moved(point.posture).all():
                     from_document(device.document, device.label)  # says what is wrong
                 self.job._cache[name] = same, point.posture
-        except OutOfReach as error:
-            raise _NoPoint(OUT_OF_REACH) from error
-        except Singular as error:
-            raise _NoPoint(SINGULAR) from error
+        except (OutOfReach, Singular) as error:
+            none = _NoPoint(_status_of(error))
+            self.job._cache[name] = same, none
+            raise none from error
         except (PostureError, DeviceError) as error:
             raise _NoPoint(FAILED, _error_text(error)) from error
         except ValueError as error:
@@ -319,6 +332,10 @@ class Design:
 
     def _circumstance(self, key: str) -> Any:
         return self.settings.get(key, self.job.fixed_circumstances.get(key))
+
+
+def _status_of(error: OutOfReach | Singular) -> int:
+    return OUT_OF_REACH if isinstance(error, OutOfReach) else SINGULAR
 
 
 def _error_text(error: Exception) -> str:
