@@ -407,3 +407,42 @@ def test_the_drives_of_many_designs_fit_where_each_alone_fits():
         except ValueError:  # the drives fit nowhere
             assert not fit[-1]
     assert fit == [True, False, False, False, False, False, True]
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_an_arm_of_other_lengths_keeps_its_elbow_on_its_side(side):
+    """From the same rough angles: the reference may be nearer for an elbow on the other side."""
+    lower, reference = 0.18, np.array([0.08, 0.24, 0.0])
+    rough = np.array([np.arctan2(0.24, 0.08) - 0.79 * side, 1.67 * side])
+    lengths = np.linspace(0.06, 0.45, 100)
+    tip = np.zeros((100, 2, 3))
+    tip[:, 0, 0], tip[:, 1, 0] = lengths, lower
+    origin = np.zeros((100, 2, 3))
+    origin[:, 1, 0] = lengths
+    one = links_of(
+        ["upper", "lower"],
+        [-1, 0],
+        origin[0],
+        [[0.0, 0.0, 1.0]] * 2,
+        [0.2, 0.1],
+        np.zeros((2, 3)),
+        [1e-4 * np.eye(3)] * 2,
+        [lengths[0], lower],
+    )
+    handle = np.array([lower, 0.0, 0.0])
+    arms = Mechanism(
+        replace(one, tip=tip, origin=origin),
+        NO_CLOSURES,
+        drives_on([0, 1]),
+        1,
+        handle,
+        {"elbow": rough},
+        reference,
+        np.full((3, 2), np.nan),
+    )
+    found = solve_posture(arms, reference)
+    away = np.linalg.norm(reference)
+    reached = (lengths > away - lower + 1e-6) & (lengths < away + lower - 1e-6)
+    assert np.array_equal(found.status == OK, reached)
+    cosine = (away**2 - lengths**2 - lower**2) / (2.0 * lengths * lower)
+    assert found.angles[reached, 1] == pytest.approx(side * np.arccos(cosine[reached]), abs=1e-9)

@@ -60,17 +60,15 @@ def correct(
 
     tolerance  the error of the angles left [rad]: the next correction is judged from the last two
     """
-    start, rows, gaps, solution = work.start, work.rows, work.gaps, work.solution
-    m, count = rows.shape[0], gaps.size
+    gaps, solution = work.gaps, work.solution
+    m, count = work.rows.shape[0], gaps.size
     rounding = ROUNDING * mech.size[design]
     last, moved, condition = 0.0, 0.0, 0.0
     for iteration in range(60):
         place_links(mech, design, angles, work)
         equations(mech, design, goal, work)
         if iteration == 0:
-            for u in range(m):
-                for r in range(count):
-                    start[u, r] = rows[u, r]
+            keep_rows(work)
         condition = newton_step(mech, work)
         size = largest_magnitude(solution[0], m)
         moved += size
@@ -87,11 +85,26 @@ def correct(
     equations(mech, design, goal, work)
     # Newton may pass a singularity without slowing down: it knows nothing of the drives, and an arm that goes
     # straight over its back does not feel the direction it has lost
+    return -1.0 if has_turned(mech, work) else condition
+
+
+@compiled_lean
+def has_turned(mech: MechanismArrays, work: WorkingMemory) -> bool:
+    """Whether the drives or the handle act the other way round in `rows` than in `start`: a singularity lies
+    between."""
+    start, rows, count, m = work.start, work.rows, work.gaps.size, work.rows.shape[0]
     if orientation(start, rows, work.triangle, m - mech.driven, count - 3) < 0.0:
-        return -1.0
-    if orientation(start, rows, work.triangle, m, count) < 0.0:
-        return -1.0
-    return condition
+        return True
+    return bool(orientation(start, rows, work.triangle, m, count) < 0.0)
+
+
+@compiled_lean
+def keep_rows(work: WorkingMemory) -> None:
+    """Copy `rows` to `start`."""
+    start, rows, count = work.start, work.rows, work.gaps.size
+    for u in range(rows.shape[0]):
+        for r in range(count):
+            start[u, r] = rows[u, r]
 
 
 @compiled_lean
@@ -136,25 +149,66 @@ def follow(mech: MechanismArrays, design: int, target: Floats, angles: Floats, w
 
 
 @compiled
-def assemble_batch(
-    mech: MechanismArrays, design: Ints, goals: Floats, hold: bool, angles: Floats, gaps: Floats
-) -> None:
-    """Close the loops of design[i] from rough angles[i] (in place), with the handle at goals[i] if `hold`.
+def reference_batch(mech: MechanismArrays, goals: Floats, angles: Floats, gaps: Floats) -> None:
+    """The posture of each design that an assembly's rough angles (P, n) stand for (in place): with the handle at
+    goals (P, 3), or wherever the loops close first.
 
-    gaps  (N, k)  filled: what remains open of each loop [m]; all inf where the handle cannot be held there
+    That is not at the goal where it cannot be, nor where a singularity lies between: there an arm whose elbow is
+    on its right would get one on its left.
+    gaps  (P, k)  filled: what remains open of each loop [m]
     """
     work = working_memory(mech)
-    present, left = work.angles, work.gaps
+    present, rough = work.angles, np.empty(angles.shape[1])
+    for i in range(len(angles)):
+        for j in range(present.size):
+            present[j] = rough[j] = angles[i, j]
+        place_links(mech, i, present, work)
+        equations(mech, i, goals[i], work)
+        keep_rows(work)
+        assemble(mech, i, goals[i], True, present, work)
+        held = _is_closed(mech, i, work, work.gaps.size)
+        if held:
+            _keep_posture(work, angles[i], gaps[i])
+            if not has_turned(mech, work):
+                continue
+            keep_rows(work)
+        for j in range(present.size):
+            present[j] = rough[j]
+        assemble(mech, i, goals[i], False, present, work)
+        if not held or (_is_closed(mech, i, work, work.gaps.size - 3) and has_turned(mech, work)):
+            _keep_posture(work, angles[i], gaps[i])
+
+
+@compiled
+def assemble_batch(mech: MechanismArrays, design: Ints, angles: Floats, gaps: Floats) -> None:
+    """Close the loops of design[i] from rough angles[i] (in place); the handle goes where it must.
+
+    gaps  (N, k)  filled: what remains open of each loop [m]
+    """
+    work = working_memory(mech)
+    present = work.angles
     for i in range(design.size):
         for j in range(present.size):
             present[j] = angles[i, j]
-        assemble(mech, design[i], goals[i], hold, present, work)
-        for j in range(present.size):
-            angles[i, j] = present[j]
-        missed = hold and largest_magnitude(left, left.size) > ASSEMBLY_TOLERANCE * mech.size[design[i]]
-        for c in range(gaps.shape[1]):
-            x, y, z = left[3 * c], left[3 * c + 1], left[3 * c + 2]
-            gaps[i, c] = np.inf if missed else np.sqrt(x * x + y * y + z * z)
+        assemble(mech, design[i], work.goal, False, present, work)
+        _keep_posture(work, angles[i], gaps[i])
+
+
+@compiled_lean
+def _is_closed(mech: MechanismArrays, design: int, work: WorkingMemory, count: int) -> bool:
+    """Whether the first `count` equations hold; nan does not."""
+    return bool(largest_magnitude(work.gaps, count) <= ASSEMBLY_TOLERANCE * mech.size[design])
+
+
+@compiled_lean
+def _keep_posture(work: WorkingMemory, angles: Floats, gaps: Floats) -> None:
+    """Copy the angles (n,), and what remains open of each loop (k,) [m]."""
+    present, left = work.angles, work.gaps
+    for j in range(present.size):
+        angles[j] = present[j]
+    for c in range(gaps.size):
+        x, y, z = left[3 * c], left[3 * c + 1], left[3 * c + 2]
+        gaps[c] = np.sqrt(x * x + y * y + z * z)
 
 
 @compiled_lean

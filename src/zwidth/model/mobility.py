@@ -74,7 +74,7 @@ def _closed_configurations(mech: MechanismArrays, designs: Ints, rough: Floats) 
     angles = np.zeros_like(rough)
     angles[:, mech.joint] = rough[:, mech.joint]
     gaps = np.zeros((len(angles), mech.a.size))
-    assemble_batch(mech, designs, np.zeros((len(angles), 3)), False, angles, gaps)
+    assemble_batch(mech, designs, angles, gaps)
     return angles, gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size[designs]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.compiled import compiled
 from zwidth.model.argument_checks import require
 from zwidth.model.bias import bias_batch
-from zwidth.model.continuation import ASSEMBLY_TOLERANCE, OK, OUT_OF_REACH, SINGULAR, assemble_batch
+from zwidth.model.continuation import ASSEMBLY_TOLERANCE, OK, OUT_OF_REACH, SINGULAR, reference_batch
 from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.handle_position import nearest_position, position_of_angles
 from zwidth.model.mechanism import Floats, Ints, Mechanism
@@ -331,18 +331,11 @@ def _place_batch(mech: MechanismArrays, design: Ints, angles: Floats, rotation: 
 
 def _references(mechanism: Mechanism, mech: MechanismArrays, name: str) -> tuple[Floats, Floats]:
     """Reference posture (P, n) of each design, and the gaps (P, k) left in its loops [m]."""
-    angles = per_design(mechanism, np.asarray(mechanism.assemblies[name], dtype=np.float64), 1).copy()
+    angles = per_design(mechanism, np.asarray(mechanism.assemblies[name], dtype=np.float64), 1)
     goals = per_design(mechanism, mechanism.reference_position, 1)
     gaps = np.zeros((len(angles), mech.a.size))
-    reference = angles.copy()
-    assemble_batch(mech, np.arange(len(angles)), goals, True, reference, gaps)
-    # where the handle cannot be held at the reference position, the loops may still close with it elsewhere
-    missed = np.flatnonzero(np.isinf(gaps).any(axis=1))
-    if len(missed):
-        freed, left = angles[missed], np.zeros((len(missed), mech.a.size))
-        assemble_batch(mech, missed, goals[missed], False, freed, left)
-        reference[missed], gaps[missed] = freed, left
-    return reference, gaps
+    reference_batch(mech, goals, angles, gaps)
+    return angles, gaps
 
 
 def _throughout(name: str, uncontrolled: str) -> Singular:
