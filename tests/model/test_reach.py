@@ -8,7 +8,7 @@ from model_cases import KINDS, five_bar
 
 from zwidth.model import posture_batch
 from zwidth.model.mechanism_arrays import pack
-from zwidth.model.posture import OK, OUT_OF_REACH, UNDECIDED, OutOfReach, solve_posture
+from zwidth.model.posture import OK, OUT_OF_REACH, UNSOLVED, OutOfReach, solve_posture
 from zwidth.model.reach_shells import outside_shells, shells
 from zwidth.model.roadmap import roadmap
 
@@ -69,4 +69,4 @@ def test_a_position_that_would_be_projected_is_left_to_be_decided_alone():
     mechanism = five_bar(lengths=(0.146, 0.199, 0.146, 0.199))
     goals = [[0.0, 0.345 * (1.0 + share), 0.0] for share in (0.005, 0.0099, 0.0101, 0.5)]
     status = solve_posture(mechanism, goals, tolerance=0.01, straight=True).status
-    assert status.tolist() == [UNDECIDED, UNDECIDED, OUT_OF_REACH, OUT_OF_REACH]
+    assert status.tolist() == [UNSOLVED, UNSOLVED, OUT_OF_REACH, OUT_OF_REACH]

@@ -24,7 +24,7 @@ from zwidth.device.schema.value_types import Section
 from zwidth.loop.operating_point import PROJECTION_TOLERANCE, OperatingPoint
 from zwidth.model.design_axes import change_designs, design_shape
 from zwidth.model.mechanism import Floats, Mechanism
-from zwidth.model.posture import UNDECIDED, Posture, PostureError, join_postures, solve_posture
+from zwidth.model.posture import UNSOLVED, Posture, PostureError, join_postures, solve_posture
 from zwidth.model.reduction import Model
 
 _DRIVE: Final = [
@@ -147,7 +147,7 @@ class DesignBatch:
                 tolerance=PROJECTION_TOLERANCE,
                 straight=True,
             )
-        alone = (posture.status == UNDECIDED) | ~masses_moved(posture)
+        alone = (posture.status == UNSOLVED) | ~masses_moved(posture)
         return self._with_posture(posture, direction, model), alone
 
     def at_point(self, point: OperatingPoint) -> tuple[OperatingPoint, Marks]:

@@ -26,7 +26,7 @@ __all__ = [
     "OK",
     "OUT_OF_REACH",
     "SINGULAR",
-    "UNDECIDED",
+    "UNSOLVED",
     "LinkPoints",
     "LoopOpen",
     "OutOfReach",
@@ -43,7 +43,7 @@ __all__ = [
     "solve_posture",
 ]
 
-UNDECIDED: Final = 255  # status of a design that is to be solved alone
+UNSOLVED: Final = 255  # status where no straight way leads: the design is to be asked for alone
 
 
 class PostureError(ValueError):
@@ -140,7 +140,7 @@ def solve_posture(
     straight  True, for one position of each of several designs: take only the straight way from the reference,
               which makes each posture hang on its own design alone, and takes a microsecond. Where there is none,
               the status is OUT_OF_REACH if the handle cannot be there nor where the position would be projected
-              to, and UNDECIDED otherwise
+              to, and UNSOLVED otherwise
     Returns   Posture; in a batch a position that cannot be had is marked by its status
     Raises    OutOfReach, Singular  where a single posture is requested and does not exist; an assembly may be
                           singular throughout
@@ -159,17 +159,17 @@ def solve_posture(
     reference, gaps = _references(mechanism, mech, name)
     if not designs:
         _check_loops(mechanism, mech, name, gaps[0])
+    closed = gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size
     if straight:
         solved = solve_from_starts(mech, design, reference, design, goals)
-        closed = (gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size)[design]
-        missed = np.flatnonzero(~closed | (solved.status != OK))
-        solved.overwrite(missed, failed_batch(mech, len(missed), UNDECIDED))
-        far = missed[closed[missed] & far_outside_shells(mech, design[missed], goals[missed], tolerance)]
+        missed = np.flatnonzero(~closed[design] | (solved.status != OK))
+        solved.overwrite(missed, failed_batch(mech, len(missed), UNSOLVED))
+        far = missed[closed[design[missed]] & far_outside_shells(mech, design[missed], goals[missed], tolerance)]
         own, place = np.unique(design[far], return_inverse=True)
         solved.status[far[drives_fit(mechanism, mech, own, reference[own])[place]]] = OUT_OF_REACH
         return _posture(name, mech, goals, solved, np.where(solved.status == OK, 0.0, np.nan), shape)
-    closed = np.flatnonzero(gaps.max(axis=1, initial=0.0) <= ASSEMBLY_TOLERANCE * mech.size)
-    uncontrolled = check_mobility(mechanism, mech, int(closed[0]), reference[closed[0]]) if len(closed) else None
+    first = int(np.argmax(closed))
+    uncontrolled = check_mobility(mechanism, mech, first, reference[first]) if closed.any() else None
     if uncontrolled and not shape:
         raise _throughout(name, uncontrolled)
     singular = uncontrolled and not designs  # of several designs another may be in control
