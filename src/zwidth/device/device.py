@@ -262,11 +262,11 @@ class Device:
         if position is None:
             return self.reference_position
         if isinstance(position, Mapping):
-            from zwidth.model.posture import joint_position
+            from zwidth.model.posture import place_of_joints
 
             angles = joint_angles(self.label, mechanism, position)
             with self.solving(assembly) as name:
-                return joint_position(mechanism, angles, name)
+                return place_of_joints(mechanism, angles, name)[0]
         return positions(self.label, position, float(self.reference_position[2]))
 
     def direction(self, direction: ArrayLike | None = None) -> Floats:

@@ -1,7 +1,13 @@
-"""A mechanism as arrays: rigid links in a tree, loops closed by points, drives on some joints.
+"""A mechanism as arrays: rigid links in a tree, loops closed by points, axes or frames, drives on some joints.
 
 Every number may carry leading batch axes (a set of designs that share one topology); the topology itself
 (parents, joint types, which joints are driven, what closes on what) is the same for the whole batch.
+
+Every entry of `Links` has at most one joint coordinate. A universal joint is two entries, of which the first is a
+link without mass; a ball joint is three, BALL_X, BALL_Y and BALL_Z, one behind the other, of which the last is the
+body. The three coordinates of a ball joint are its rotation vector v [rad], the link standing at Exp(v) against
+its parent, and their rates are its angular velocity about its own axes: there is no posture in which they fail, as
+three successive angles do when two of their axes meet.
 """
 
 from __future__ import annotations
@@ -21,6 +27,20 @@ Ints = NDArray[np.int64]
 
 FIXED: Final = 0
 REVOLUTE: Final = 1
+PRISMATIC: Final = 2
+BALL_X: Final = 3
+BALL_Y: Final = 4
+BALL_Z: Final = 5
+
+# What of two links a closure holds together.
+POINT: Final = 0
+AXIS: Final = 1
+FRAME: Final = 2
+
+# What of its handle a mechanism controls, and a posture is asked by.
+POSITION: Final = 0
+POSE: Final = 1
+ORIENTATION: Final = 2
 
 
 @dataclass(frozen=True)
@@ -29,14 +49,16 @@ class Links:
 
     names      (n,)         unique
     parent     (n,)         index of the parent link, -1 for the base
-    joint      (n,)         FIXED or REVOLUTE: how the link moves against its parent
+    joint      (n,)         FIXED, REVOLUTE, PRISMATIC, or BALL_X, BALL_Y and BALL_Z in this order
     origin     (..., n, 3)  joint origin in the parent's frame [m]
-    rotation   (..., n, 3, 3)  link axes in the parent's frame at joint angle 0
-    axis       (..., n, 3)  unit joint axis in the link's frame
+    rotation   (..., n, 3, 3)  link axes in the parent's frame at joint coordinate 0
+    axis       (..., n, 3)  unit joint axis in the link's frame; of a ball joint x, y and z
     mass       (..., n)     [kg]
     center_of_mass (..., n, 3)  in the link's frame [m]
     inertia    (..., n, 3, 3)  about the centre of mass, link axes [kg m^2]
     tip        (..., n, 3)  the link's tip in its own frame, (length, 0, 0) [m]; drawn, and default for points
+    lower, upper  (..., n)  limits of each revolute joint [rad] and prismatic one [m], infinite where there is
+                            none; None: no limits
     """
 
     names: tuple[str, ...]
@@ -49,14 +71,20 @@ class Links:
     center_of_mass: Array2
     inertia: Array3
     tip: Array2
+    lower: Array1 | None = None
+    upper: Array1 | None = None
 
 
 @dataclass(frozen=True)
 class Closures:
-    """The k loop closures: a point of link a stays on a point of link b (both in link frames) [m].
+    """The k loop closures: a point of link a stays on a point of link b; of some, an axis or a frame too.
 
     a, b       (k,)         link indices, -1 for the base
-    point_a, point_b  (..., k, 3)
+    point_a, point_b  (..., k, 3)  in the frames of the links [m]
+    kind       (k,)         POINT; AXIS: the axes also stay parallel, as in a hinge; FRAME: the links also keep
+                            their orientation, as if welded. None: all are points
+    axis_a, axis_b    (..., k, 3)  unit vectors in the frames of the links, of AXIS; None: of none
+    rotation   (..., k, 3, 3)  axes of link b in the frame of link a, of FRAME; None: of none
     """
 
     names: tuple[str, ...]
@@ -64,6 +92,10 @@ class Closures:
     b: Ints
     point_a: Array2
     point_b: Array2
+    kind: Ints | None = None
+    axis_a: Array2 | None = None
+    axis_b: Array2 | None = None
+    rotation: Array3 | None = None
 
 
 @dataclass(frozen=True)
@@ -134,9 +166,15 @@ class Mechanism:
     """Links, closures and drives, with the handle and the named ways of assembling it.
 
     handle_link, handle_point  the handle: a point (..., 3) of that link [m]
-    assemblies    name -> approximate joint angles (n,) near the reference posture (0 for fixed joints) [rad]
+    assemblies    name -> approximate joint coordinates (n,) near the reference posture (0 for fixed joints) [rad],
+                  of a prismatic joint [m]
     reference_position (3,)    handle position the assemblies are given at [m]
     workspace     (3, 2)       bounds of the handle's position, nan where not given [m]
+    handle_rotation  (..., 3, 3)  axes of the handle in the frame of its link; None: those of the link
+    controls      POSITION, POSE or ORIENTATION: what of its handle the drives control
+    reference_rotation  (..., 3, 3)  axes of the handle in the base frame at the reference; None: where the
+                  assembly has them, which only a mechanism that controls the position alone may leave open
+    free          (f,)         links whose joint coordinate nobody drives and no loop determines
     """
 
     links: Links
@@ -147,6 +185,10 @@ class Mechanism:
     assemblies: dict[str, Array1]
     reference_position: Array1
     workspace: Floats
+    handle_rotation: Array2 | None = None
+    controls: int = POSITION
+    reference_rotation: Array2 | None = None
+    free: tuple[int, ...] = ()
 
     @cached_property
     def design_shape(self) -> tuple[int, ...]:

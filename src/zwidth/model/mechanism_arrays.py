@@ -1,53 +1,93 @@
 """A mechanism packed for the compiled kernels: flat arrays, one leading axis of designs, nothing else.
 
-The unknowns are the revolute joints, the passive ones first and the driven ones last, so that the columns of
-every constraint matrix split into [passive | driven] without any indexing.
+The unknowns are the joint coordinates: first the passive ones, which the loops determine, then the driven ones,
+last the free ones, so that the columns of every constraint matrix split into [passive | driven | free] without any
+indexing. Driven and free ones together are the independent coordinates.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from zwidth.model.mechanism import FIXED, Floats, Ints, Mechanism
+from zwidth.model.mechanism import (
+    BALL_Z,
+    FIXED,
+    POINT,
+    PRISMATIC,
+    Floats,
+    Ints,
+    Links,
+    Mechanism,
+)
 
 
 class MechanismArrays(NamedTuple):
     """Topology shared by all designs, then the numbers of each of the P designs.
 
     parent          (n,)    parent link, -1 for the base
-    column          (n,)    the unknown that turns this link, -1 for a fixed joint
-    joint           (m,)    the link each unknown turns: passive ones first, then the d driven ones
-    driven          d       number of driven joints
+    kind            (n,)    FIXED, REVOLUTE, PRISMATIC, BALL_X, BALL_Y or BALL_Z: the link's joint
+    carrier         (n,)    the link against which the joint turns: the parent; of a ball joint what carries all
+                    three
+    column          (n,)    the unknown that moves this link, -1 for a fixed joint
+    joint           (m,)    the link each unknown moves: passive ones, then driven, then free
+    balls           (b,)    the links behind ball joints
+    bodies          (w,)    the links with a mass or an inertia, in any design
+    driven, free    number of driven and of free coordinates
     a, b            (k,)    links that closure k holds together
-    handle_link         link the handle is a point of
+    closing         (k,)    POINT, AXIS or FRAME
+    first_row       (k+1,)  row of each closure's first equation; last their number
+    handle_link     link the handle is a point of
+    controls        POSITION, POSE or ORIENTATION
     origin          (P, n, 3)        as in `Links`
     rotation_terms  (P, n, 3, 3, 3)  C0, C1, C2: the link against its parent is C0 + sin q C1 + cos q C2
     axis            (P, n, 3)        joint axis in the parent's frame
-    point_a, point_b  (P, k, 3)  as in `Closures`
+    point_a, point_b  (P, k, 3)  as in `Closures`;   axis_a, axis_b (P, k, 3), closing_rotation (P, k, 3, 3)  too
     handle          (P, 1, 3)        the handle's point in its link's frame
+    handle_rotation (P, 3, 3)        the handle's axes in its link's frame
     mass            (P, n), center_of_mass (P, n, 3), inertia (P, n, 3, 3)   as in `Links`
+    lower, upper    (P, n)           limits of the joints, infinite where there is none
     size            (P,)             a length of the mechanism [m], to judge gaps by
+    unit            (P, m)           of each unknown, in which steps are judged: 1 rad, or the size [m]
     """
 
     parent: Ints
+    kind: Ints
+    carrier: Ints
     column: Ints
     joint: Ints
+    balls: Ints
+    bodies: Ints
     driven: int
+    free: int
     a: Ints
     b: Ints
+    closing: Ints
+    first_row: Ints
     handle_link: int
+    controls: int
     origin: Floats
     rotation_terms: Floats
     axis: Floats
     point_a: Floats
     point_b: Floats
+    axis_a: Floats
+    axis_b: Floats
+    closing_rotation: Floats
     handle: Floats
+    handle_rotation: Floats
     mass: Floats
     center_of_mass: Floats
     inertia: Floats
+    lower: Floats
+    upper: Floats
     size: Floats
+    unit: Floats
+
+
+NUMBERS: Final = MechanismArrays._fields[MechanismArrays._fields.index("origin") :]
+"""The fields that have an axis of designs; those before them are the topology."""
 
 
 def per_design(mechanism: Mechanism, array: Floats, trailing: int) -> Floats:
@@ -57,6 +97,12 @@ def per_design(mechanism: Mechanism, array: Floats, trailing: int) -> Floats:
     full = np.broadcast_to(np.asarray(array, dtype=np.float64), shape + tail)
     # always a copy: kernels are compiled once for writable arrays and once more for read-only ones
     return np.array(full.reshape((int(np.prod(shape)), *tail)), order="C")
+
+
+def one_design(mech: MechanismArrays, design: int) -> MechanismArrays:
+    """The arrays of a single design, which then is design 0."""
+    own = {name: getattr(mech, name)[design : design + 1].copy() for name in NUMBERS}
+    return mech._replace(**own)
 
 
 def design_of_each(mechanism: Mechanism, shape: tuple[int, ...]) -> Ints:
@@ -70,38 +116,77 @@ def design_of_each(mechanism: Mechanism, shape: tuple[int, ...]) -> Ints:
 def pack(mechanism: Mechanism) -> MechanismArrays:
     """The mechanism as `MechanismArrays`; every call packs anew, nothing is kept."""
     links, closures = mechanism.links, mechanism.closures
-    revolute = [i for i in range(len(links.names)) if links.joint[i] != FIXED]
-    driven = [int(i) for i in mechanism.drives.joint]
-    joint = np.array([i for i in revolute if i not in driven] + driven, dtype=np.int64)
-    column = np.full(len(links.names), -1, dtype=np.int64)
+    kind = np.array(links.joint, dtype=np.int64)
+    independent = [*(int(i) for i in mechanism.drives.joint), *mechanism.free]
+    passive = [i for i in range(len(kind)) if kind[i] != FIXED and i not in independent]
+    joint = np.array(passive + independent, dtype=np.int64)
+    column = np.full(len(kind), -1, dtype=np.int64)
     column[joint] = np.arange(len(joint))
+    count = len(closures.names)
+    closing = np.full(count, POINT) if closures.kind is None else np.array(closures.kind)
 
     origin = per_design(mechanism, links.origin, 2)
     rotation = per_design(mechanism, links.rotation, 3)
     axis = per_design(mechanism, links.axis, 2)
     point_a, point_b = (per_design(mechanism, p, 2) for p in (closures.point_a, closures.point_b))
     handle = per_design(mechanism, mechanism.handle_point, 1)
+    mass, inertia = per_design(mechanism, links.mass, 1), per_design(mechanism, links.inertia, 3)
+    heavy = (mass != 0.0).any(axis=0) | (inertia != 0.0).any(axis=(0, 2, 3))
     tip = per_design(mechanism, links.tip, 2)
-    size = sum(np.linalg.norm(p, axis=-1).sum(axis=-1) for p in (origin, tip, point_a, point_b, handle[:, None]))
+    lengths = sum(
+        np.linalg.norm(p, axis=-1).sum(axis=-1) for p in (origin, tip, point_a, point_b, handle[:, None])
+    )
+    size = np.ascontiguousarray(np.where(lengths > 0.0, lengths, 1.0), dtype=np.float64)
+    along = np.broadcast_to(np.array([1.0, 0.0, 0.0]), (count, 3))
+    plain = np.eye(3)
     return MechanismArrays(
         parent=np.array(links.parent, dtype=np.int64),
+        kind=kind,
+        carrier=_carriers(links),
         column=column,
         joint=joint,
-        driven=len(driven),
+        balls=np.flatnonzero(kind == BALL_Z).astype(np.int64),
+        bodies=np.flatnonzero(heavy).astype(np.int64),
+        driven=len(mechanism.drives.joint),
+        free=len(mechanism.free),
         a=np.array(closures.a, dtype=np.int64),
         b=np.array(closures.b, dtype=np.int64),
+        closing=closing.astype(np.int64),
+        first_row=np.concatenate([[0], np.cumsum(np.where(closing == POINT, 3, 6))]).astype(np.int64),
         handle_link=int(mechanism.handle_link),
+        controls=int(mechanism.controls),
         origin=origin,
         rotation_terms=_turning(rotation, axis),
         axis=np.ascontiguousarray(np.einsum("pnij,pnj->pni", rotation, axis)),
         point_a=point_a,
         point_b=point_b,
+        axis_a=per_design(mechanism, along if closures.axis_a is None else closures.axis_a, 2),
+        axis_b=per_design(mechanism, along if closures.axis_b is None else closures.axis_b, 2),
+        closing_rotation=per_design(
+            mechanism,
+            np.broadcast_to(plain, (count, 3, 3)) if closures.rotation is None else closures.rotation,
+            3,
+        ),
         handle=np.ascontiguousarray(handle[:, None]),
-        mass=per_design(mechanism, links.mass, 1),
+        handle_rotation=per_design(
+            mechanism, plain if mechanism.handle_rotation is None else mechanism.handle_rotation, 2
+        ),
+        mass=mass,
         center_of_mass=per_design(mechanism, links.center_of_mass, 2),
-        inertia=per_design(mechanism, links.inertia, 3),
-        size=np.ascontiguousarray(size, dtype=np.float64),
+        inertia=inertia,
+        lower=per_design(mechanism, np.full(len(kind), -np.inf) if links.lower is None else links.lower, 1),
+        upper=per_design(mechanism, np.full(len(kind), np.inf) if links.upper is None else links.upper, 1),
+        size=size,
+        unit=np.ascontiguousarray(np.where(kind[joint] == PRISMATIC, size[:, None], 1.0)),
     )
+
+
+def _carriers(links: Links) -> Ints:
+    """Of each link the one against which its joint turns."""
+    carrier = np.array(links.parent, dtype=np.int64)
+    for i in np.flatnonzero(np.asarray(links.joint) == BALL_Z):
+        carrier[i - 1 : i + 1] = carrier[i - 2]
+    return carrier
 
 
 def _turning(rotation: Floats, axis: Floats) -> Floats:
