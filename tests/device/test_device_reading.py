@@ -124,7 +124,7 @@ def test_whatever_the_bytes_only_device_errors_come_out(data):
 def test_listing_the_bundled_devices_needs_no_numerics():
     program = (
         "import sys; from zwidth.device.read import bundled; bundled(); print(*sys.modules);"
-        "from zwidth.device.load import load; load('five-bar'); print(*sys.modules)"
+        "from zwidth.device.load import load; load('published-two-mass'); print(*sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     listing, loading = done.stdout.splitlines()

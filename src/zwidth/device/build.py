@@ -6,7 +6,6 @@ A number of the file may be an array over designs (`device.design_batch`); what 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -18,10 +17,6 @@ from zwidth.device.schema.friction import FrictionSection
 from zwidth.device.schema.loop import EncoderSection, LoopSection
 from zwidth.device.schema.mechanism import (
     DampingSection,
-    DriveSection,
-    LinkSection,
-    LoopClosure,
-    MechanismSection,
 )
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.plant import PlantSection
@@ -29,9 +24,9 @@ from zwidth.device.schema.response import ResponseSection
 from zwidth.device.schema.velocity import ButterworthFilter, FirstOrderFilter, FoawSection, KalmanSection
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, Foaw, Kalman, VelocityMethod
-from zwidth.model.design_axes import join_designs, stack_numbers
+from zwidth.model.design_axes import stack_numbers
 from zwidth.model.electrical_damping import add_dampers
-from zwidth.model.mechanism import FIXED, REVOLUTE, Closures, Drives, Floats, Links, Mechanism
+from zwidth.model.mechanism import Floats
 from zwidth.model.operator import Operator
 from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.response import Response
@@ -134,130 +129,6 @@ def damping(section: DampingSection | None) -> Damping:
         return ModalDamping(section.mode_ratio)
     coefficients = section.mass_coefficient_1_per_s, section.stiffness_coefficient_s
     return ProportionalDamping(*(value_or(one, 0.0) for one in coefficients))
-
-
-def mechanism(section: MechanismSection) -> Mechanism:
-    """The mechanism, its links sorted so that parents stand before children."""
-    links = _parents_first(section.links)
-    index = {"base": -1} | {link.name: i for i, link in enumerate(links)}
-    tips = {"base": [0.0, 0.0, 0.0]} | {link.name: [link.length_m, 0.0, 0.0] for link in links}
-    handle = section.handle
-    workspace = section.workspace
-    bounds = [(workspace and getattr(workspace, f"{axis}_m")) or (math.nan, math.nan) for axis in "xyz"]
-    return Mechanism(
-        links=_links(links, index, tips),
-        closures=_closures(section.loops, index, tips),
-        drives=_drives(section, index),
-        handle_link=index[handle.link],
-        handle_point=stack_numbers(tips[handle.link] if handle.point_m is None else handle.point_m),
-        assemblies={
-            name: stack_numbers([assembly.joints_rad.get(link.name, 0.0) for link in links])
-            for name, assembly in section.assemblies.items()
-        },
-        reference_position=in_space(section.reference.position_m),
-        workspace=np.array(bounds),
-    )
-
-
-def in_space(vector: Sequence[float]) -> Floats:
-    """A vector of up to three components, (..., 3): those left out are 0."""
-    return stack_numbers([*vector, 0.0, 0.0, 0.0][:3])
-
-
-def roll_pitch_yaw(angles: Sequence[float]) -> Floats:
-    """Rotation Rz(yaw) Ry(pitch) Rx(roll): about the parent's fixed x, y, z axes in turn, (..., 3, 3)."""
-    turns = np.moveaxis(stack_numbers(angles), -1, 0)
-    (cr, cp, cy), (sr, sp, sy) = np.cos(turns), np.sin(turns)
-    return stack_numbers(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-
-
-def _links(links: Sequence[LinkSection], index: dict[str, int], tips: dict[str, list[float]]) -> Links:
-    axes = stack_numbers([link.axis for link in links])
-    axes = axes / np.abs(axes).max(axis=-1, keepdims=True)  # lengths of 1e-300 have a direction, too
-    axes = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
-    return Links(
-        names=tuple(link.name for link in links),
-        parent=np.array([index[link.parent] for link in links], dtype=np.int64),
-        joint=np.array([FIXED if link.joint == "fixed" else REVOLUTE for link in links], dtype=np.int64),
-        origin=stack_numbers([tips[link.parent] if link.origin_m is None else link.origin_m for link in links]),
-        rotation=join_designs([roll_pitch_yaw(link.orientation_rad) for link in links], 2),
-        axis=axes,
-        mass=stack_numbers([link.mass_kg for link in links]),
-        center_of_mass=join_designs([in_space(link.center_of_mass_m) for link in links], 1),
-        inertia=join_designs([_inertia(link, axes[..., i, :]) for i, link in enumerate(links)], 2),
-        tip=stack_numbers([tips[link.name] for link in links]),
-    )
-
-
-def _inertia(link: LinkSection, axis: Floats) -> Floats:
-    """(..., 3, 3); one number is the moment about the joint axis and leaves the others open: I a a^T."""
-    rows = stack_numbers(link.inertia_kg_m2)
-    return rows * axis[..., :, None] * axis[..., None, :] if rows.shape[-1] == 1 else _even(rows)
-
-
-def _closures(loops: Sequence[LoopClosure], index: dict[str, int], tips: dict[str, list[float]]) -> Closures:
-    ends = [loop.points_m or [tips[name] for name in loop.links] for loop in loops]
-    points = stack_numbers(ends) if ends else np.zeros((0, 2, 3))
-    return Closures(
-        names=tuple(loop.name for loop in loops),
-        a=np.array([index[loop.links[0]] for loop in loops], dtype=np.int64),
-        b=np.array([index[loop.links[1]] for loop in loops], dtype=np.int64),
-        point_a=points[..., 0, :],
-        point_b=points[..., 1, :],
-    )
-
-
-def _drives(section: MechanismSection, index: dict[str, int]) -> Drives:
-    drives = section.drives
-
-    def column(key: str, omitted: float) -> Floats:
-        return build_nonlinear.per_drive(drives, key, omitted)
-
-    windings = [_winding(drive) for drive in drives]
-    return Drives(
-        names=tuple(drive.name for drive in drives),
-        joint=np.array([index[drive.joint] for drive in drives], dtype=np.int64),
-        motor_inertia=column("motor_inertia_kg_m2", math.nan),
-        transmission=column("transmission_ratio", math.nan),
-        stiffness=column("stiffness_Nm_per_rad", math.inf),
-        damping=column("damping_Nms_per_rad", 0.0),
-        torque_constant=column("torque_constant_Nm_per_A", math.nan),
-        torque_limit=column("torque_limit_Nm", math.inf),
-        encoder_counts=column("encoder_counts_per_rev", math.nan),
-        continuous_torque=column("continuous_torque_Nm", math.nan),
-        winding_damping=stack_numbers([damping for damping, _ in windings]),
-        winding_time_constant=stack_numbers([lag for _, lag in windings]),
-        nonlinearity=build_nonlinear.drive_nonlinearity(drives, section.friction),
-    )
-
-
-def _winding(drive: DriveSection) -> tuple[float, float]:
-    """Damping k^2/R [N m s/rad] and lag L/R [s] at the motor of a winding closed through a resistor; else 0."""
-    if drive.damping_resistance_ohm is None:
-        return 0.0, 0.0
-    keys = drive.winding_resistance_ohm, drive.torque_constant_Nm_per_A, drive.winding_inductance_H
-    inside, constant, inductance = (value_or(one, 0.0) for one in keys)
-    R = inside + drive.damping_resistance_ohm
-    return constant**2 / R, inductance / R
-
-
-def _parents_first(links: Sequence[LinkSection]) -> list[LinkSection]:
-    """Sorted so that every parent stands before its children; otherwise in the file's order."""
-    ordered: list[LinkSection] = []
-    placed, waiting = {"base"}, list(links)
-    while waiting:
-        for link in waiting:
-            if link.parent in placed:
-                ordered.append(link)
-                placed.add(link.name)
-        waiting = [link for link in waiting if link.name not in placed]
-    return ordered
 
 
 def _even(matrix: Floats) -> Floats:

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from zwidth.device.address import exists, in_schema
 from zwidth.device.faults import KeyPath, comma_list, plural, quote, suggestion
+from zwidth.device.legs import spread_tables, written_path
 from zwidth.device.loop_consistency import electrical_inconsistencies, loop_inconsistencies
 from zwidth.device.nonlinear_consistency import nonlinear_inconsistencies
 from zwidth.device.schema.device_file import flat_sources
@@ -23,12 +24,33 @@ KINDS: Final = ("mechanism", "plant", "response")
 # Tables that only device files have, and keys that only studies have: they tell which of the two a file is.
 DEVICE_KEYS: Final = frozenset({*KINDS, "loop"})
 STUDY_KEYS: Final = frozenset({"measures", "axis"})
+# Joints with several coordinates; how many angles and ways each joint has; the joints that have a key.
+SEVERAL: Final = frozenset({"universal", "spherical", "free"})
+ANGLES: Final = {"revolute": 1, "universal": 2, "spherical": 3, "free": 3}
+WAYS: Final = {"prismatic": 1, "free": 3}
+JOINT_KEYS: Final = {
+    "second_axis": ("universal",),
+    "limits_rad": ("revolute",),
+    "limits_m": ("prismatic",),
+    "free": ("revolute", "prismatic", "universal", "spherical", "free"),
+}
 
 
 def inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMessages:
-    """Path and sentence of every disagreement; `original` still has the sections not supported yet."""
-    yield from _one_kind(original)
+    """Path and sentence of every disagreement; `original` still has the sections not supported yet.
+
+    Legs are checked as the copies that a mechanism has of them; a fault is reported where the leg is written.
+    """
+    spread, paths = spread_tables(table(document, "mechanism"))
+    flat = {**document, "mechanism": spread} if spread else document
+    for path, message in _inconsistencies(flat, original):
+        yield written_path(path, paths), message
     yield from _sources(document)
+    yield from _legs(table(document, "mechanism"))
+
+
+def _inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMessages:
+    yield from _one_kind(original)
     yield from _plant(table(document, "plant"))
     yield from loop_inconsistencies(document)
     yield from nonlinear_inconsistencies(document)
@@ -41,6 +63,9 @@ def inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMe
         if _joints(mechanism):
             yield from _references(mechanism)
             yield from _assemblies(mechanism)
+        yield from _joint_keys(mechanism)
+        yield from _loop_keys(mechanism)
+        yield from _place_of_handle(mechanism)
         yield from _workspace(mechanism)
         yield from _damping(mechanism)
 
@@ -224,31 +249,114 @@ def _references(mechanism: dict[str, Any]) -> KeyMessages:
         if joint not in links:
             yield path, f"'{joint}' is not a link; {suggestion(joint, links, 'links')}"
         elif links[joint] == "fixed":
-            yield path, f"'{joint}' is fixed to its parent; a drive needs a revolute joint"
+            yield path, f"'{joint}' is fixed to its parent; a drive needs a revolute or prismatic joint"
+        elif links[joint] in SEVERAL:
+            yield (
+                path,
+                (
+                    f"'{joint}' has a {links[joint]} joint; a drive needs a revolute or prismatic one: make it "
+                    "of several, with links of no mass between them"
+                ),
+            )
         elif joint in driven:
             yield path, f"'{joint}' has a drive already; one joint takes one drive"
         driven.add(joint)
 
 
 def _assemblies(mechanism: dict[str, Any]) -> KeyMessages:
-    turning = {name for name, joint in _joints(mechanism).items() if joint != "fixed"}
+    """Coordinates of the joints that have some, in the right table, as many as the joint has."""
+    joints = _joints(mechanism)
+    turning = {name: count for name, joint in joints.items() if (count := ANGLES.get(joint, 0))}
+    sliding = {name: count for name, joint in joints.items() if (count := WAYS.get(joint, 0))}
     assemblies = table(mechanism, "assemblies")
     for name, assembly in assemblies.items():
-        angles = assembly.get("joints_rad") if isinstance(assembly, dict) else None
-        if not isinstance(angles, dict):
-            continue
-        path = ("mechanism", "assemblies", name, "joints_rad")
-        for joint in angles:
-            if joint not in turning:
-                yield (*path, joint), f"names no revolute joint; {suggestion(joint, turning, 'joints')}"
-        for joint in sorted(turning - set(angles)):
-            yield (*path, joint), "is missing; give an approximate angle for every revolute joint"
+        for key, counts, moves in (("joints_rad", turning, "turns"), ("joints_m", sliding, "slides")):
+            given = assembly.get(key, {}) if isinstance(assembly, dict) else None
+            if isinstance(given, dict):
+                path = ("mechanism", "assemblies", name, key)
+                yield from _coordinates(path, given, counts, moves)
+                needed = {joint for joint in counts if joints[joint] not in ("spherical", "free")}
+                for joint in sorted(needed - set(given)):
+                    kind = (
+                        "angle for every revolute joint"
+                        if key == "joints_rad"
+                        else "way for every prismatic joint"
+                    )
+                    yield (*path, joint), f"is missing; give an approximate {kind}"
     reference = table(mechanism, "reference")
     wanted, place = reference.get("assembly"), ("mechanism", "reference", "assembly")
     if isinstance(wanted, str) and assemblies and wanted not in assemblies:
         yield place, f"'{wanted}' is not an assembly; {suggestion(wanted, set(assemblies), 'assemblies')}"
     elif wanted is None and reference and len(assemblies) > 1:
         yield place, f"is missing; choose one of {comma_list(sorted(assemblies))}"
+
+
+def _coordinates(path: KeyPath, given: dict[str, Any], counts: dict[str, int], moves: str) -> KeyMessages:
+    for joint, value in given.items():
+        if joint not in counts:
+            yield (*path, joint), f"names no joint that {moves}; {suggestion(joint, set(counts), 'joints')}"
+            continue
+        length = len(value) if isinstance(value, list) else 1
+        if length != counts[joint]:
+            yield (
+                (*path, joint),
+                f"has {plural(length, 'number')}, but the joint has {counts[joint]}; give {counts[joint]}",
+            )
+
+
+def _joint_keys(mechanism: dict[str, Any]) -> KeyMessages:
+    """Keys of a link that only some joints have."""
+    for index, link in tables(mechanism, "links"):
+        joint = link.get("joint")
+        if not isinstance(joint, str):
+            continue
+        for key, kinds in JOINT_KEYS.items():
+            if key in link and joint not in kinds and link[key] is not False:
+                yield (
+                    ("mechanism", "links", index, key),
+                    f"is of a {' or '.join(kinds)} joint, and this one is {joint}; remove it",
+                )
+
+
+def _loop_keys(mechanism: dict[str, Any]) -> KeyMessages:
+    for index, loop in tables(mechanism, "loops"):
+        for key, kind in (("axes", "axis"), ("orientation_rad", "frame")):
+            if key in loop and loop.get("closes", "point") != kind:
+                yield (
+                    ("mechanism", "loops", index, key),
+                    f'is used only with closes = "{kind}"; set that or remove this',
+                )
+
+
+def _place_of_handle(mechanism: dict[str, Any]) -> KeyMessages:
+    """The reference gives what the drives control of the handle."""
+    controls, reference = table(mechanism, "handle").get("controls", "position"), table(mechanism, "reference")
+    path = ("mechanism", "reference")
+    if reference and "position_m" not in reference and controls != "orientation":
+        yield (*path, "position_m"), "is missing; give the position of the handle"
+    if "orientation_rad" in reference and controls == "position":
+        yield (
+            (*path, "orientation_rad"),
+            "does not apply, as the drives control the handle's position alone; remove it, or say otherwise by "
+            "mechanism.handle.controls",
+        )
+    for key, what in (("position_m", "orientation"),):
+        if key in reference and controls == what:
+            yield (*path, key), "does not apply, as the drives control the handle's orientation alone; remove it"
+
+
+def _legs(mechanism: dict[str, Any]) -> KeyMessages:
+    """Each leg says how many copies there are, one way."""
+    for index, leg in tables(mechanism, "legs"):
+        if ("angles_rad" in leg) == ("count" in leg):
+            fault = "has angles_rad and count" if "count" in leg else "has neither angles_rad nor count"
+            yield (
+                ("mechanism", "legs", index),
+                f"{fault}; give one of them: by what its copies are turned, or how many",
+            )
+    owners = [mechanism, *(leg for _, leg in tables(mechanism, "legs"))]
+    if mechanism and mechanism.get("drives", []) == [] and not any(tables(owner, "drives") for owner in owners):
+        yield ("mechanism", "drives"), "are missing; give one for each degree of freedom"
 
 
 def _workspace(mechanism: dict[str, Any]) -> KeyMessages:
@@ -298,7 +406,7 @@ def _damping(mechanism: dict[str, Any]) -> KeyMessages:
 
 def _joints(mechanism: dict[str, Any]) -> dict[str, Any]:
     return {
-        link["name"]: link.get("joint")
+        link["name"]: link["joint"] if isinstance(link.get("joint"), str) else None
         for _, link in tables(mechanism, "links")
         if isinstance(link.get("name"), str)
     }

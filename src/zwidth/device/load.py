@@ -8,7 +8,7 @@ from typing import Any, Final, TypeAlias
 
 from pydantic import ValidationError
 
-from zwidth.device import address, build, mechanism_check, unsupported
+from zwidth.device import address, build, build_mechanism, mechanism_check, unsupported
 from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS, inconsistencies
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
@@ -143,13 +143,15 @@ def build_device(checked: DeviceFile, document: dict[str, Any], label: str) -> D
         source=checked.source,
         sources=dict(checked.sources),
         label=label,
-        mechanism=build.mechanism(section) if section else None,
+        mechanism=build_mechanism.mechanism(section) if section else None,
         given_plant=build.plant(checked.plant, checked.friction, checked.loop.encoder) if checked.plant else None,
         response=build.response(checked.response, label, controller.sampling_period) if checked.response else None,
         controller=controller,
         damping=build.damping(section.damping if section else None),
-        reference_position=build.in_space(reference.position_m) if reference else None,
-        reference_direction=build.in_space(reference.direction) if reference else None,
+        reference_position=build_mechanism.in_space(reference.position_m or (0.0, 0.0, 0.0))
+        if reference
+        else None,
+        reference_direction=build_mechanism.in_space(reference.direction) if reference else None,
         reference_assembly=(reference.assembly or next(iter(section.assemblies)))
         if reference and section
         else None,

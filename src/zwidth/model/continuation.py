@@ -36,7 +36,7 @@ from zwidth.model.rotations import fill_rotation, vector_between
 OK: Final = 0
 OUT_OF_REACH: Final = 1
 SINGULAR: Final = 2
-BEYOND_LIMIT: Final = 3  # there is a posture, but in it a joint is beyond its limit
+BEYOND_LIMIT: Final = 6  # there is a posture, but in it a joint is beyond its limit
 
 CONTRACTION: Final = 0.55  # of one correction by the next; on the edge of the workspace Newton gains a half each
 LARGEST_TURN: Final = 0.5  # of one joint in one step, in its unit [rad]

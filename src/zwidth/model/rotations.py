@@ -30,10 +30,14 @@ def rotation_vector(rotation: Floats) -> Floats:
 
 def rotation_matrix(vector: Floats) -> Floats:
     """Exp(v) of vectors (..., 3) [rad], (..., 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    flat = np.asarray(vector, dtype=np.float64).reshape(-1, 3)
-    return np.asarray(Rotation.from_rotvec(flat).as_matrix().reshape(*vector.shape[:-1], 3, 3))
+    v = np.asarray(vector, dtype=np.float64)
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    cross = np.zeros((*v.shape, 3))
+    cross[..., 0, 1], cross[..., 0, 2], cross[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    cross = cross - np.swapaxes(cross, -1, -2)
+    # sinc(x) is sin(pi x)/(pi x), 1 at 0
+    A, B = np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    return np.asarray(np.eye(3) + A * cross + B * (cross @ cross))
 
 
 @compiled_lean

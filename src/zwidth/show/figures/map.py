@@ -14,7 +14,7 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from zwidth.measures.definition import FAILED, NO_VALUE, SINGULAR, UNDECIDED
+from zwidth.measures.definition import BEYOND_LIMIT, FAILED, NO_VALUE, SINGULAR, UNDECIDED
 from zwidth.show.figures.colour_bands import LARGEST, bands_of, colour_bar
 from zwidth.show.figures.mechanism import joint_points, link_stroke
 from zwidth.show.figures.style import BLACK, GREY, LINES, VERMILION, figure, label
@@ -32,6 +32,7 @@ ProjectedMechanism = tuple[list[Floats], Floats, Floats]  # strokes of the links
 
 MARKS: Final = {
     SINGULAR: ("singular", "xxxx"),
+    BEYOND_LIMIT: ("beyond a joint limit", "----"),
     NO_VALUE: ("no value", "////"),
     UNDECIDED: ("undecided", "...."),
     FAILED: ("failed", "\\\\\\\\"),
