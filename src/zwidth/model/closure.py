@@ -16,7 +16,7 @@ import numpy as np
 
 from zwidth.compiled import compiled_lean
 from zwidth.model.forward_kinematics import WorkingMemory, fill_handle_axes, link_point, link_vector, move_joints
-from zwidth.model.mechanism import AXIS, ORIENTATION, POINT, POSITION, PRISMATIC, Floats
+from zwidth.model.mechanism import AXIS, ORIENTATION, POINT, POSITION, PRISMATIC, Floats, Ints
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.rotations import vector_between, vector_between_axes
 
@@ -123,9 +123,13 @@ def _handle_equations(mech: MechanismArrays, design: int, r: int, work: WorkingM
 
 
 @compiled_lean
-def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, rows: int, sides: int) -> float:
+def least_squares(
+    Q: Floats, R: Floats, b: Floats, x: Floats, spans: Ints, unknowns: int, rows: int, sides: int
+) -> float:
     """Minimise |Q^T x_s - b_s| for each of the first right-hand sides s, by modified Gram-Schmidt.
 
+    spans (m, 2)  first row and end of the rows of each line of Q that are not 0, also after lines before it are
+                  taken away; beyond `rows` they do not count
     Q  (m, ...)  the first `unknowns` lines hold the columns of the matrix; left orthogonal, not normalised
     R  (m, m)    filled: R_jj the squared length of line j, R_ji the part of column i along it
     b  (s, ...)  right-hand sides, overwritten;   x  (s, m)  solutions, filled
@@ -135,7 +139,8 @@ def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, row
     shortest, longest = np.inf, 0.0
     for j in range(unknowns):
         left, taken = 0.0, 0.0
-        for r in range(rows):
+        first, end = spans[j, 0], min(spans[j, 1], rows)
+        for r in range(first, end):
             left += Q[j, r] * Q[j, r]
         for i in range(j):
             # with what columns before have taken away, this is the column's original length
@@ -146,19 +151,19 @@ def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, row
         R[j, j] = left
         for i in range(j + 1, unknowns):
             part = 0.0
-            for r in range(rows):
+            for r in range(first, end):
                 part += Q[j, r] * Q[i, r]
             part *= scale
             R[j, i] = part
-            for r in range(rows):
+            for r in range(first, end):
                 Q[i, r] -= part * Q[j, r]
         for s in range(sides):
             part = 0.0
-            for r in range(rows):
+            for r in range(first, end):
                 part += Q[j, r] * b[s, r]
             part *= scale
             x[s, j] = part
-            for r in range(rows):
+            for r in range(first, end):
                 b[s, r] -= part * Q[j, r]
     for s in range(sides):
         for j in range(unknowns - 1, -1, -1):
@@ -181,7 +186,7 @@ def newton_step(mech: MechanismArrays, design: int, work: WorkingMemory) -> floa
             basis[u, r] = unit[design, u] * rows[u, r]
     for r in range(count):
         sides[0, r] = gaps[r]
-    condition = least_squares(basis, work.triangle, sides, work.solution, moved, count, 1)
+    condition = least_squares(basis, work.triangle, sides, work.solution, mech.filled, moved, count, 1)
     for u in range(moved, m):
         work.solution[0, u] = 0.0
     return condition
@@ -218,7 +223,7 @@ def passive_rates(mech: MechanismArrays, design: int, work: WorkingMemory) -> fl
     for s in range(c):
         for r in range(count):
             sides[s, r] = -rows[passive + s, r]
-    condition = least_squares(basis, work.triangle, sides, solution, passive, count, c)
+    condition = least_squares(basis, work.triangle, sides, solution, mech.filled, passive, count, c)
     for s in range(c):
         for u in range(passive):
             rates[s, u] = unit[design, u] * solution[s, u]
@@ -236,10 +241,10 @@ def closure_step(mech: MechanismArrays, work: WorkingMemory) -> float:
     """
     m, rows = mech.joint.size, mech.first_row[mech.a.size]
     passive = m - work.rates.shape[0]
-    Q, R, x = work.basis, work.triangle, work.solution
+    Q, R, x, spans = work.basis, work.triangle, work.solution, mech.filled
     for j in range(passive):
         x[0, j] = 0.0
-        for r in range(rows):
+        for r in range(spans[j, 0], min(spans[j, 1], rows)):
             x[0, j] += Q[j, r] * work.gaps[r] / R[j, j]
     most = 0.0
     for j in range(passive - 1, -1, -1):
@@ -252,9 +257,11 @@ def closure_step(mech: MechanismArrays, work: WorkingMemory) -> float:
 
 
 @compiled_lean
-def orientation(start: Floats, rows: Floats, G: Floats, unknowns: int, count: int) -> float:
+def orientation(start: Floats, rows: Floats, G: Floats, spans: Ints, unknowns: int, count: int) -> float:
     """det(start^T rows) over the first unknowns and `count` equations, G (m, m) being scratch: it changes
     sign across a singularity.
+
+    spans (m, 2)  first row and end of the rows of each line that are not 0
 
     For square systems it is the product of the two determinants; products of rectangular ones stay positive
     while the column space turns by less than a right angle.
@@ -262,7 +269,7 @@ def orientation(start: Floats, rows: Floats, G: Floats, unknowns: int, count: in
     for i in range(unknowns):
         for j in range(unknowns):
             part = 0.0
-            for r in range(count):
+            for r in range(max(spans[i, 0], spans[j, 0]), min(spans[i, 1], spans[j, 1], count)):
                 part += start[i, r] * rows[j, r]
             G[i, j] = part
     # Gauss with row exchanges, each of which turns the sign
@@ -280,6 +287,8 @@ def orientation(start: Floats, rows: Floats, G: Floats, unknowns: int, count: in
                 G[j, c], G[pivot, c] = G[pivot, c], G[j, c]
         determinant *= G[j, j]
         for i in range(j + 1, unknowns):
+            if G[i, j] == 0.0:  # unknowns of different loops have nothing to do with each other
+                continue
             factor = G[i, j] / G[j, j]
             for c in range(j + 1, unknowns):
                 G[i, c] -= factor * G[j, c]

@@ -112,9 +112,9 @@ def has_turned(mech: MechanismArrays, work: WorkingMemory) -> bool:
     between."""
     start, rows, count, moved = work.start, work.rows, work.gaps.size, work.rows.shape[0] - mech.free
     loops = mech.first_row[mech.a.size]
-    if orientation(start, rows, work.triangle, moved - mech.driven, loops) < 0.0:
+    if orientation(start, rows, work.triangle, mech.spans, moved - mech.driven, loops) < 0.0:
         return True
-    return bool(orientation(start, rows, work.triangle, moved, count) < 0.0)
+    return bool(orientation(start, rows, work.triangle, mech.spans, moved, count) < 0.0)
 
 
 @compiled_lean
@@ -320,7 +320,7 @@ def assemble(mech: MechanismArrays, design: int, hold: bool, angles: Floats, wor
                 basis[u, count + r] = np.sqrt(damping) * mech.size[design] if r == u else 0.0
         for r in range(count + m):
             sides[0, r] = gaps[r] if r < count else 0.0
-        least_squares(basis, work.triangle, sides, work.solution, m, count + m, 1)
+        least_squares(basis, work.triangle, sides, work.solution, mech.whole, m, count + m, 1)
         if largest_magnitude(work.solution[0], m) < 1e-15:
             break
         for u in range(m, rows.shape[0]):

@@ -15,6 +15,7 @@ from zwidth.model.mechanism import (
     BALL_Z,
     FIXED,
     POINT,
+    POSE,
     PRISMATIC,
     Floats,
     Ints,
@@ -38,6 +39,9 @@ class MechanismArrays(NamedTuple):
     a, b            (k,)    links that closure k holds together
     closing         (k,)    POINT, AXIS or FRAME
     first_row       (k+1,)  row of each closure's first equation; last their number
+    spans           (m, 2)  first and end of the rows of each unknown that are not 0, in the equations of closures
+                    and handle; filled: also once unknowns before it are eliminated; whole: all rows that there can
+                    be
     handle_link     link the handle is a point of
     controls        POSITION, POSE or ORIENTATION
     origin          (P, n, 3)        as in `Links`
@@ -65,6 +69,9 @@ class MechanismArrays(NamedTuple):
     b: Ints
     closing: Ints
     first_row: Ints
+    spans: Ints
+    filled: Ints
+    whole: Ints
     handle_link: int
     controls: int
     origin: Floats
@@ -118,12 +125,17 @@ def pack(mechanism: Mechanism) -> MechanismArrays:
     links, closures = mechanism.links, mechanism.closures
     kind = np.array(links.joint, dtype=np.int64)
     independent = [*(int(i) for i in mechanism.drives.joint), *mechanism.free]
+    closing = np.full(len(closures.names), POINT) if closures.kind is None else np.array(closures.kind)
+    first_row = np.concatenate([[0], np.cumsum(np.where(closing == POINT, 3, 6))]).astype(np.int64)
+    rows_of_links = _rows_of_links(mechanism, first_row)
     passive = [i for i in range(len(kind)) if kind[i] != FIXED and i not in independent]
+    # those with few equations first, so that they have still few when others are eliminated
+    passive.sort(key=lambda i: rows_of_links[i, 1] - rows_of_links[i, 0])
     joint = np.array(passive + independent, dtype=np.int64)
+    spans = rows_of_links[joint].reshape(-1, 2)
     column = np.full(len(kind), -1, dtype=np.int64)
     column[joint] = np.arange(len(joint))
     count = len(closures.names)
-    closing = np.full(count, POINT) if closures.kind is None else np.array(closures.kind)
 
     origin = per_design(mechanism, links.origin, 2)
     rotation = per_design(mechanism, links.rotation, 3)
@@ -152,7 +164,10 @@ def pack(mechanism: Mechanism) -> MechanismArrays:
         a=np.array(closures.a, dtype=np.int64),
         b=np.array(closures.b, dtype=np.int64),
         closing=closing.astype(np.int64),
-        first_row=np.concatenate([[0], np.cumsum(np.where(closing == POINT, 3, 6))]).astype(np.int64),
+        first_row=first_row,
+        spans=spans,
+        filled=_filled(spans),
+        whole=np.tile(np.array([0, np.iinfo(np.int64).max]), (len(joint), 1)),
         handle_link=int(mechanism.handle_link),
         controls=int(mechanism.controls),
         origin=origin,
@@ -179,6 +194,37 @@ def pack(mechanism: Mechanism) -> MechanismArrays:
         size=size,
         unit=np.ascontiguousarray(np.where(kind[joint] == PRISMATIC, size[:, None], 1.0)),
     )
+
+
+def _rows_of_links(mechanism: Mechanism, first_row: Ints) -> Ints:
+    """First and end (n, 2) of the rows that each link's joint moves, in the equations of closures and handle."""
+    parent, closures, loops = mechanism.links.parent, mechanism.closures, int(first_row[-1])
+    rows = np.tile(np.array([np.iinfo(np.int64).max, 0]), (len(parent), 1))
+    ends = [
+        (int(end), first_row[k], first_row[k + 1])
+        for k in range(len(closures.names))
+        for end in (closures.a[k], closures.b[k])
+    ]
+    for link, first, end in [
+        *ends,
+        (mechanism.handle_link, loops, loops + (6 if mechanism.controls == POSE else 3)),
+    ]:
+        while link >= 0:
+            rows[link] = min(rows[link, 0], first), max(rows[link, 1], end)
+            link = int(parent[link])
+    rows[rows[:, 1] == 0] = 0
+    return rows
+
+
+def _filled(spans: Ints) -> Ints:
+    """Rows (m, 2) that are not 0 once each unknown before is eliminated from those that share rows with it."""
+    filled = spans.copy()
+    for j in range(len(spans)):
+        shares = (filled[:, 0] < filled[j, 1]) & (filled[j, 0] < filled[:, 1])
+        shares[: j + 1] = False
+        filled[shares, 0] = np.minimum(filled[shares, 0], filled[j, 0])
+        filled[shares, 1] = np.maximum(filled[shares, 1], filled[j, 1])
+    return filled
 
 
 def _carriers(links: Links) -> Ints:

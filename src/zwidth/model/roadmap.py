@@ -186,9 +186,9 @@ def turn_drive(
         return False
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)
-    if orientation(start, rows, work.triangle, moved, work.gaps.size) <= 0.0:
+    if orientation(start, rows, work.triangle, mech.spans, moved, work.gaps.size) <= 0.0:
         return False
-    if orientation(start, rows, work.triangle, moved - mech.driven, loops) <= 0.0:
+    if orientation(start, rows, work.triangle, mech.spans, moved - mech.driven, loops) <= 0.0:
         return False
     return bool(min(passive_rates(mech, 0, work), newton_step(mech, 0, work)) >= margin)
 

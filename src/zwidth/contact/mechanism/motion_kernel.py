@@ -144,7 +144,7 @@ def check_state(system: System, memory: Memory, x: Floats, condition: float) -> 
         return SINGULAR
     passive, loops = mech.joint.size - work.rates.shape[0], mech.first_row[mech.a.size]
     # in its own memory: the factors of the closures stand in `work` until the accelerations are known
-    if passive > 0 and not orientation(work.start, work.rows, memory.square, passive, loops) > 0.0:
+    if passive > 0 and not orientation(work.start, work.rows, memory.square, mech.spans, passive, loops) > 0.0:
         return SINGULAR
     keep_rows(work)
     return DONE
