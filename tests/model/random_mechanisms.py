@@ -144,13 +144,13 @@ def closure_values(links, closures, q):
     """What is 0 where the loops are closed: gaps, and of axes and frames how far they have turned."""
     R, o = place(links, q)
     R, o = np.concatenate([R, np.eye(3)[None]]), np.concatenate([o, np.zeros((1, 3))])
-    out = []
+    out, kinds = [], np.zeros(len(closures.names), int) if closures.kind is None else closures.kind
     for k in range(len(closures.names)):
         i, j = closures.a[k], closures.b[k]
         out.append(o[i] + R[i] @ closures.point_a[k] - o[j] - R[j] @ closures.point_b[k])
-        if closures.kind[k] == AXIS:
+        if kinds[k] == AXIS:
             out.append(np.cross(R[i] @ closures.axis_a[k], R[j] @ closures.axis_b[k]))
-        elif closures.kind[k] == FRAME:
+        elif kinds[k] == FRAME:
             turned = R[j].T @ R[i] @ closures.rotation[k]
             out.append(
                 np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])

@@ -6,6 +6,7 @@ A number of the file may be an array over designs (`device.design_batch`); what 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -129,6 +130,11 @@ def damping(section: DampingSection | None) -> Damping:
         return ModalDamping(section.mode_ratio)
     coefficients = section.mass_coefficient_1_per_s, section.stiffness_coefficient_s
     return ProportionalDamping(*(value_or(one, 0.0) for one in coefficients))
+
+
+def in_space(vector: Sequence[float]) -> Floats:
+    """A vector of up to three components, (..., 3): those left out are 0."""
+    return stack_numbers([*vector, 0.0, 0.0, 0.0][:3])
 
 
 def _even(matrix: Floats) -> Floats:

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.device import build_nonlinear
+from zwidth.device.build import in_space
 from zwidth.device.build_nonlinear import value_or
 from zwidth.device.legs import Member, members, of_copies
 from zwidth.device.schema.mechanism import (
@@ -36,6 +37,7 @@ from zwidth.model.mechanism import (
     Closures,
     Drives,
     Floats,
+    Ints,
     Links,
     Mechanism,
 )
@@ -77,7 +79,7 @@ def mechanism(section: MechanismSection) -> Mechanism:
     return Mechanism(
         links=_links(tree),
         closures=_closures(loops, tree),
-        drives=_drives(drives, section, tree.last),
+        drives=_drives(drives, section, tree),
         handle_link=tree.last[handle.link],
         handle_point=stack_numbers(tree.tips[handle.link] if handle.point_m is None else handle.point_m),
         assemblies={name: _coordinates(section, assembly, tree) for name, assembly in section.assemblies.items()},
@@ -88,11 +90,6 @@ def mechanism(section: MechanismSection) -> Mechanism:
         reference_rotation=roll_pitch_yaw(reference.orientation_rad or (0.0, 0.0, 0.0)),
         free=_free(tree, loops),
     )
-
-
-def in_space(vector: Sequence[float]) -> Floats:
-    """A vector of up to three components, (..., 3): those left out are 0."""
-    return stack_numbers([*vector, 0.0, 0.0, 0.0][:3])
 
 
 def roll_pitch_yaw(angles: Sequence[float]) -> Floats:
@@ -150,7 +147,22 @@ def _links(tree: Tree) -> Links:
         tip=join_designs(tip, 1),
         lower=np.array(lower) if limited else None,
         upper=np.array(upper) if limited else None,
+        joint_stiffness=_of_joints(tree, "stiffness", "Nm_per_rad", "N_per_m"),
+        joint_damping=_of_joints(tree, "damping", "Nms_per_rad", "Ns_per_m"),
+        joint_coulomb=_of_joints(tree, "coulomb", "Nm", "N"),
     )
+
+
+def _of_joints(tree: Tree, what: str, turning: str, sliding: str) -> Floats | None:
+    """One number of each joint coordinate (..., n), of those that turn and those that slide; None if none has
+    it."""
+    rows: list[Any] = []
+    for member in tree.members:
+        keys = {PRISMATIC: f"joint_{what}_{sliding}"}
+        for kind in SINGLE[member.entry.joint]:
+            value = getattr(member.entry, keys.get(kind, f"joint_{what}_{turning}"))
+            rows.append(0.0 if value is None or kind == FIXED else value)
+    return stack_numbers(rows) if any(np.any(row) for row in rows) else None
 
 
 def _entries(member: Member, tree: Tree) -> list[tuple[Any, ...]]:
@@ -301,7 +313,9 @@ def _way_to_base(name: str, parent: dict[str, str]) -> list[str]:
     return way
 
 
-def _drives(drives: Sequence[DriveSection], section: MechanismSection, index: dict[str, int]) -> Drives:
+def _drives(drives: Sequence[DriveSection], section: MechanismSection, tree: Tree) -> Drives:
+    index = tree.last
+
     def column(key: str, omitted: float) -> Floats:
         return build_nonlinear.per_drive(drives, key, omitted)
 
@@ -320,6 +334,37 @@ def _drives(drives: Sequence[DriveSection], section: MechanismSection, index: di
         winding_damping=stack_numbers([damping for damping, _ in windings]),
         winding_time_constant=stack_numbers([lag for _, lag in windings]),
         nonlinearity=build_nonlinear.drive_nonlinearity(drives, section.friction),
+        coupling=_coupling(drives, index),
+        motor_link=_motor_links(drives, index),
+        motor_axis=_motor_axes(drives),
+    )
+
+
+def _coupling(drives: Sequence[DriveSection], index: dict[str, int]) -> Floats | None:
+    """Turns of each motor per turn of other joints over its own ratio, (..., d, n); None without any."""
+    if not any(drive.coupling for drive in drives):
+        return None
+    rows = []
+    for drive in drives:
+        row: list[Any] = [0.0] * max(index.values()) + [0.0]
+        for name, ratio in drive.coupling.items():
+            row[index[name]] = ratio / drive.transmission_ratio
+        rows.append(stack_numbers(row))
+    return join_designs(rows, 1)
+
+
+def _motor_links(drives: Sequence[DriveSection], index: dict[str, int]) -> Ints | None:
+    if all(drive.motor_link is None for drive in drives):
+        return None
+    return np.array([index[drive.motor_link or "base"] for drive in drives], dtype=np.int64)
+
+
+def _motor_axes(drives: Sequence[DriveSection]) -> Floats | None:
+    """Unit axes of the rotors, (..., d, 3); 0 of one that is neglected."""
+    if all(drive.motor_axis is None for drive in drives):
+        return None
+    return join_designs(
+        [np.zeros(3) if drive.motor_axis is None else _unit(drive.motor_axis) for drive in drives], 1
     )
 
 

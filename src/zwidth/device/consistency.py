@@ -28,11 +28,15 @@ STUDY_KEYS: Final = frozenset({"measures", "axis"})
 SEVERAL: Final = frozenset({"universal", "spherical", "free"})
 ANGLES: Final = {"revolute": 1, "universal": 2, "spherical": 3, "free": 3}
 WAYS: Final = {"prismatic": 1, "free": 3}
-JOINT_KEYS: Final = {
+TURNING: Final = ("revolute", "universal", "spherical", "free")
+MOVING: Final = ("revolute", "prismatic", "universal", "spherical", "free")
+JOINT_KEYS: Final[dict[str, tuple[str, ...]]] = {
     "second_axis": ("universal",),
     "limits_rad": ("revolute",),
     "limits_m": ("prismatic",),
-    "free": ("revolute", "prismatic", "universal", "spherical", "free"),
+    "free": MOVING,
+    **{f"joint_{key}": TURNING for key in ("stiffness_Nm_per_rad", "damping_Nms_per_rad", "coulomb_Nm")},
+    **{f"joint_{key}": ("prismatic",) for key in ("stiffness_N_per_m", "damping_Ns_per_m", "coulomb_N")},
 }
 
 
@@ -261,6 +265,30 @@ def _references(mechanism: dict[str, Any]) -> KeyMessages:
         elif joint in driven:
             yield path, f"'{joint}' has a drive already; one joint takes one drive"
         driven.add(joint)
+    yield from _couplings(mechanism, links, driven)
+
+
+def _couplings(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str]) -> KeyMessages:
+    """Drives that turn with other joints, which are driven or free; motors on links that exist."""
+    free = {link["name"] for _, link in tables(mechanism, "links") if link.get("free") is True and "name" in link}
+    for index, drive in tables(mechanism, "drives"):
+        for name in table(drive, "coupling"):
+            path: KeyPath = ("mechanism", "drives", index, "coupling", name)
+            if name not in links:
+                yield path, f"'{name}' is not a link; {suggestion(name, set(links), 'links')}"
+            elif name == drive.get("joint"):
+                yield path, "is the drive's own joint, whose ratio is transmission_ratio; remove it"
+            elif name not in driven | free or links[name] in SEVERAL:
+                yield path, f"'{name}' has no joint that is driven or free; a motor can turn with such joints only"
+        link = drive.get("motor_link")
+        if isinstance(link, str) and link not in links and link != "base":
+            yield (
+                ("mechanism", "drives", index, "motor_link"),
+                f"'{link}' is not a link; {suggestion(link, {*links, 'base'}, 'links')}",
+            )
+        for key, other in (("motor_link", "motor_axis"), ("motor_axis", "motor_link")):
+            if key in drive and other not in drive:
+                yield ("mechanism", "drives", index, other), f"is missing; {key} needs it"
 
 
 def _assemblies(mechanism: dict[str, Any]) -> KeyMessages:

@@ -238,7 +238,8 @@ def design_batch(
         used = np.where(valid.reshape(-1, *(1,) * (numbers.ndim - 1)), numbers, numbers[first])
         with_arrays = _substitute(with_arrays, document, steps, used)
     device = build_device(checked, cleaned, label)
-    parts = build_device(with_arrays, cleaned, label) if valid.any() else device
+    surplus = device.mechanism.drives.surplus if device.mechanism is not None else ()
+    parts = build_device(with_arrays, cleaned, label, surplus) if valid.any() else device
     return DesignBatch(device, parts, count), valid
 
 

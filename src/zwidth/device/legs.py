@@ -138,6 +138,10 @@ def _renamed(entry: Any, group: str, names: frozenset[Any], copy: int) -> Any:
         changes["links"] = type(_get(entry, "links"))(own(name) for name in _get(entry, "links"))
     elif group == "drives" and _get(entry, "joint") is not None:
         changes["joint"] = own(_get(entry, "joint"))
+        if _get(entry, "motor_link") is not None:
+            changes["motor_link"] = own(_get(entry, "motor_link"))
+        if isinstance(_get(entry, "coupling"), dict):
+            changes["coupling"] = {own(name): ratio for name, ratio in _get(entry, "coupling").items()}
     if isinstance(entry, Section):
         return entry.model_copy(update=changes)
     return {**entry, **changes}

@@ -20,6 +20,7 @@ CLOSED: Final = 1e-9  # gap of a closed loop, relative to the mechanism's size
 RANK_TOLERANCE: Final = 1e-7  # of singular values, relative to the largest
 RESTARTS: Final = 30  # random postures tried before a loop is said not to close
 NEARBY: Final = 0.05  # how far joints turn to a posture that is not special [rad]
+INDEPENDENT: Final = 1e-6  # share of the largest motion, below which a joint follows from others
 PARALLEL: Final = 1e-9  # sine of the angle below which two axes are parallel
 MOVING: Final = 1e-6  # share of the largest part of a motion, below which a joint rests in it
 
@@ -46,6 +47,31 @@ def mechanism_faults(mechanism: Mechanism, section: MechanismSection, *, assembl
         )
     if not open_loops:
         yield from _freedom(mechanism, mech, angles)
+
+
+def surplus_drives(mechanism: Mechanism) -> tuple[int, ...]:
+    """The drives beyond the freedom that loops leave a mechanism: of its drives in their order, those whose joints
+    the ones before them and the free joints determine. () where the loops do not close."""
+    mech = pack(mechanism)
+    if not mech.a.size or mech.driven < 2:
+        return ()
+    angles, gaps = _close_loops(mechanism, mech)
+    if gaps.max() > CLOSED * mech.size[0]:
+        return ()
+    _, _, motions = _least_free(mech, angles)
+    if motions.shape[1] >= mech.driven + mech.free:
+        return ()
+    scaled = motions / mech.unit[0][:, None]
+    first = mech.joint.size - mech.driven - mech.free
+    kept = [first + mech.driven + i for i in range(mech.free)]
+    surplus = []
+    for i in range(mech.driven):
+        values = np.linalg.svd(scaled[[*kept, first + i]], compute_uv=False)
+        if len(values) > len(kept) and values[-1] > INDEPENDENT * values[0]:
+            kept.append(first + i)
+        else:
+            surplus.append(i)
+    return tuple(surplus)
 
 
 def _freedom(mechanism: Mechanism, mech: MechanismArrays, angles: Floats) -> KeyMessages:

@@ -20,7 +20,8 @@ from zwidth.loop.point_errors import NoMechanismError, OperatingPointError, chec
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.damping import Damping, GivenDamping
 from zwidth.model.design_axes import change_designs, design_shape
-from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters
+from zwidth.model.drive_side import DriveSide, drive_side
+from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, lever_arms, screw
 from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import Operator, attach
@@ -228,7 +229,8 @@ class OperatingPoint:
 
     @property
     def jacobian(self) -> Floats:
-        """J (..., 3, d) in the driven coordinates [m/rad]; nan where the posture is not OK.
+        """J (..., 3, c) in the independent coordinates, those of the drives and then of free joints [m/rad]; nan
+        where the posture is not OK.
 
         Raises  NoMechanismError  for a device without a mechanism
         """
@@ -236,24 +238,33 @@ class OperatingPoint:
 
     @property
     def mass_matrix(self) -> Floats:
-        """M (..., d, d) of the links in the driven coordinates [kg m^2]. Raises NoMechanismError as `jacobian`."""
+        """M (..., c, c) of the links in the independent coordinates [kg m^2]. Raises NoMechanismError as
+        `jacobian`."""
         return self._posture.mass_matrix
+
+    @cached_property
+    def drive_side(self) -> DriveSide:
+        """How the drives and the joints' own springs, dampers and friction act on the coordinates. Raises
+        NoMechanismError as `jacobian`."""
+        posture = self._posture
+        assert self.mechanism is not None
+        return drive_side(self.mechanism, posture)
 
     @property
     def whole_mass_matrix(self) -> Floats:
-        """M (..., d, d) of links and rotors in the driven coordinates [kg m^2]. Raises NoMechanismError as
-        `jacobian`."""
-        drives = self.drives
-        rotors = drives.transmission**2 * drives.motor_inertia
-        return self.mass_matrix + rotors[..., None] * np.eye(rotors.shape[-1])
+        """M (..., c, c) of links and rotors, all drives rigid, in the independent coordinates [kg m^2]. Raises
+        NoMechanismError as `jacobian`."""
+        return self.drive_side.with_rotors(self.mass_matrix, self.drives)
 
     @property
     def lever_arms(self) -> Floats:
-        """h = J^T u (..., d): handle motion along the direction by each driven joint [m/rad].
+        """h = J^T u (..., c): handle motion along the direction by each independent coordinate [m/rad].
 
         Raises  NoMechanismError  for a device without a mechanism
         """
-        return np.asarray(np.einsum("...i,...id->...d", self.direction, self.jacobian))
+        self._posture  # noqa: B018  raises for a device without a mechanism
+        assert self.posture is not None
+        return lever_arms(self.posture, screw(self.direction))
 
     @cached_property
     def effective(self) -> EffectiveParameters:

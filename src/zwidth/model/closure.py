@@ -203,7 +203,8 @@ def apply_step(mech: MechanismArrays, design: int, angles: Floats, work: Working
 
 @compiled_lean
 def passive_rates(mech: MechanismArrays, design: int, work: WorkingMemory) -> float:
-    """Fill `rates`: dq/dp of all unknowns with respect to the independent ones; returns the reciprocal condition.
+    """Fill `rates`: dq/dp of all unknowns per coordinate of the drives and free joints; returns the reciprocal
+    condition.
 
     A_p q_p' = -A_i p'   with the closure rows A = [A_p | A_i]   (thesis eq. B.6 and B.18, for any loops)
     """
@@ -229,7 +230,23 @@ def passive_rates(mech: MechanismArrays, design: int, work: WorkingMemory) -> fl
             rates[s, u] = unit[design, u] * solution[s, u]
         for u in range(c):
             rates[s, passive + u] = 1.0 if u == s else 0.0
+    if mech.coupled:
+        _rates_per_drive(mech, design, work)
     return condition
+
+
+@compiled_lean
+def _rates_per_drive(mech: MechanismArrays, design: int, work: WorkingMemory) -> None:
+    """Turn rates per independent joint into those per drive and free joint."""
+    rates, before, G = work.rates, work.solution, mech.to_joint
+    for s in range(rates.shape[0]):
+        for u in range(rates.shape[1]):
+            before[s, u] = rates[s, u]
+    for s in range(rates.shape[0]):
+        for u in range(rates.shape[1]):
+            rates[s, u] = 0.0
+            for t in range(rates.shape[0]):
+                rates[s, u] += G[design, t, s] * before[t, u]
 
 
 @compiled_lean

@@ -156,7 +156,7 @@ def goal_of_angles(mech: MechanismArrays, reference: Floats, driven: Floats) -> 
     angles = reference.copy()
     turn = np.asarray(driven, dtype=np.float64) - angles[joints]
     turn -= np.where(mech.kind[joints] == REVOLUTE, 2.0 * np.pi * np.round(turn / (2.0 * np.pi)), 0.0)
-    turn /= mech.unit[0, moved - mech.driven : moved]
+    turn = mech.to_drive[0, : mech.driven, : mech.driven] @ turn / mech.unit[0, moved - mech.driven : moved]
     count = int(np.ceil(np.max(np.abs(turn)) / TURN))
     if not _turn_drives(mech, angles, turn / max(count, 1), count):
         return None

@@ -59,6 +59,9 @@ class Links:
     tip        (..., n, 3)  the link's tip in its own frame, (length, 0, 0) [m]; drawn, and default for points
     lower, upper  (..., n)  limits of each revolute joint [rad] and prismatic one [m], infinite where there is
                             none; None: no limits
+    joint_stiffness, joint_damping, joint_coulomb  (..., n)  spring at rest where the joint stands, damper and dry
+                            friction of each joint by itself [N m/rad], [N m s/rad], [N m], of a prismatic one
+                            [N/m], [N s/m], [N]; None: of none
     """
 
     names: tuple[str, ...]
@@ -73,6 +76,9 @@ class Links:
     tip: Array2
     lower: Array1 | None = None
     upper: Array1 | None = None
+    joint_stiffness: Array1 | None = None
+    joint_damping: Array1 | None = None
+    joint_coulomb: Array1 | None = None
 
 
 @dataclass(frozen=True)
@@ -130,7 +136,10 @@ class DriveNonlinearity:
 
 @dataclass(frozen=True)
 class Drives:
-    """The d drives, each on one revolute joint; their order is the order of the driven coordinates.
+    """The d drives, each on one revolute or prismatic joint; their order is the order of the driven coordinates.
+
+    The coordinate of a drive is its motor's angle over `transmission`, at its joint: the joint's own coordinate,
+    or that and what other joints add to it (`coupling`).
 
     joint            (d,)      index of the driven link (its joint)
     motor_inertia    (..., d)  rotor [kg m^2], at the motor
@@ -144,6 +153,13 @@ class Drives:
     winding_damping  (..., d)  k_t^2/R of a winding closed through a resistor, at the motor [N m s/rad]; None: none
     winding_time_constant  (..., d)  its L/R [s]
     nonlinearity     friction, springs that are not straight, brakes; None: none
+    coupling         (..., d, n)  motor turns per joint turn of other joints that turn the motor too, over
+                     `transmission`; 0 for the drive's own joint. None: of none
+    surplus          (s,)  drives beyond the mechanism's freedom, whose coordinates the others determine
+    motor_link       (d,)  link that carries the motor, -1 for the base, for the full kinetic energy of its rotor;
+                     None: the rotors' turning with their links is neglected, as in thesis eq. 2.21
+    motor_axis       (..., d, 3)  the rotor's spin axis in that link's frame, in the sense in which the motor's
+                     angle counts; of length 0 for a drive of which it is neglected
     """
 
     names: tuple[str, ...]
@@ -159,6 +175,10 @@ class Drives:
     winding_damping: Array1 | None = None
     winding_time_constant: Array1 | None = None
     nonlinearity: DriveNonlinearity | None = None
+    coupling: Array2 | None = None
+    surplus: tuple[int, ...] = ()
+    motor_link: Ints | None = None
+    motor_axis: Array2 | None = None
 
 
 @dataclass(frozen=True)
@@ -189,6 +209,12 @@ class Mechanism:
     controls: int = POSITION
     reference_rotation: Array2 | None = None
     free: tuple[int, ...] = ()
+
+    @cached_property
+    def driven(self) -> Ints:
+        """The links whose joints are the driven coordinates: those of all drives but the surplus ones."""
+        kept = [i for i in range(len(self.drives.joint)) if i not in self.drives.surplus]
+        return np.asarray(self.drives.joint)[kept]
 
     @cached_property
     def design_shape(self) -> tuple[int, ...]:

@@ -42,6 +42,7 @@ class MechanismArrays(NamedTuple):
     spans           (m, 2)  first and end of the rows of each unknown that are not 0, in the equations of closures
                     and handle; filled: also once unknowns before it are eliminated; whole: all rows that there can
                     be
+    coupled         whether drives turn with several joints: their coordinates then are not those of the joints
     handle_link     link the handle is a point of
     controls        POSITION, POSE or ORIENTATION
     origin          (P, n, 3)        as in `Links`
@@ -53,6 +54,8 @@ class MechanismArrays(NamedTuple):
     mass            (P, n), center_of_mass (P, n, 3), inertia (P, n, 3, 3)   as in `Links`
     lower, upper    (P, n)           limits of the joints, infinite where there is none
     size            (P,)             a length of the mechanism [m], to judge gaps by
+    to_joint, to_drive  (P, c, c)    the independent joints' coordinates from those of the drives and the free
+                    joints, and back
     unit            (P, m)           of each unknown, in which steps are judged: 1 rad, or the size [m]
     """
 
@@ -72,6 +75,7 @@ class MechanismArrays(NamedTuple):
     spans: Ints
     filled: Ints
     whole: Ints
+    coupled: bool
     handle_link: int
     controls: int
     origin: Floats
@@ -90,6 +94,8 @@ class MechanismArrays(NamedTuple):
     lower: Floats
     upper: Floats
     size: Floats
+    to_joint: Floats
+    to_drive: Floats
     unit: Floats
 
 
@@ -124,7 +130,7 @@ def pack(mechanism: Mechanism) -> MechanismArrays:
     """The mechanism as `MechanismArrays`; every call packs anew, nothing is kept."""
     links, closures = mechanism.links, mechanism.closures
     kind = np.array(links.joint, dtype=np.int64)
-    independent = [*(int(i) for i in mechanism.drives.joint), *mechanism.free]
+    independent = [*(int(i) for i in mechanism.driven), *mechanism.free]
     closing = np.full(len(closures.names), POINT) if closures.kind is None else np.array(closures.kind)
     first_row = np.concatenate([[0], np.cumsum(np.where(closing == POINT, 3, 6))]).astype(np.int64)
     rows_of_links = _rows_of_links(mechanism, first_row)
@@ -150,6 +156,7 @@ def pack(mechanism: Mechanism) -> MechanismArrays:
     )
     size = np.ascontiguousarray(np.where(lengths > 0.0, lengths, 1.0), dtype=np.float64)
     along = np.broadcast_to(np.array([1.0, 0.0, 0.0]), (count, 3))
+    to_drive = _to_drive(mechanism, independent)
     plain = np.eye(3)
     return MechanismArrays(
         parent=np.array(links.parent, dtype=np.int64),
@@ -159,7 +166,7 @@ def pack(mechanism: Mechanism) -> MechanismArrays:
         joint=joint,
         balls=np.flatnonzero(kind == BALL_Z).astype(np.int64),
         bodies=np.flatnonzero(heavy).astype(np.int64),
-        driven=len(mechanism.drives.joint),
+        driven=len(mechanism.driven),
         free=len(mechanism.free),
         a=np.array(closures.a, dtype=np.int64),
         b=np.array(closures.b, dtype=np.int64),
@@ -168,6 +175,7 @@ def pack(mechanism: Mechanism) -> MechanismArrays:
         spans=spans,
         filled=_filled(spans),
         whole=np.tile(np.array([0, np.iinfo(np.int64).max]), (len(joint), 1)),
+        coupled=mechanism.drives.coupling is not None,
         handle_link=int(mechanism.handle_link),
         controls=int(mechanism.controls),
         origin=origin,
@@ -192,8 +200,21 @@ def pack(mechanism: Mechanism) -> MechanismArrays:
         lower=per_design(mechanism, np.full(len(kind), -np.inf) if links.lower is None else links.lower, 1),
         upper=per_design(mechanism, np.full(len(kind), np.inf) if links.upper is None else links.upper, 1),
         size=size,
+        to_joint=np.ascontiguousarray(np.linalg.inv(to_drive), dtype=np.float64),
+        to_drive=to_drive,
         unit=np.ascontiguousarray(np.where(kind[joint] == PRISMATIC, size[:, None], 1.0)),
     )
+
+
+def _to_drive(mechanism: Mechanism, independent: list[int]) -> Floats:
+    """The coordinates of drives and free joints per coordinate of the independent joints, (P, c, c)."""
+    c, drives = len(independent), mechanism.drives
+    P = int(np.prod(mechanism.design_shape))
+    T = np.tile(np.eye(c), (P, 1, 1))
+    if drives.coupling is not None:
+        rows = [i for i in range(len(drives.names)) if i not in drives.surplus]
+        T[:, : len(rows)] += per_design(mechanism, drives.coupling, 2)[:, rows][:, :, independent]
+    return T
 
 
 def _rows_of_links(mechanism: Mechanism, first_row: Ints) -> Ints:

@@ -29,18 +29,22 @@ def close_at(mech: MechanismArrays, independent: Floats, angles: Floats, work: W
     Newton starts from where the passive joints' rates would take them. NOT_CLOSED where it leaves the branch.
     Links, `rows` and `rates` belong to the closed posture afterwards.
     """
-    joint, rates, step = mech.joint, work.rates, work.solution[0]
-    m, loops = mech.joint.size, mech.first_row[mech.a.size]
-    passive = m - rates.shape[0]
-    for u in range(passive):
+    joint, rates, step, ahead = mech.joint, work.rates, work.solution[0], work.solution[1]
+    m, loops, c = mech.joint.size, mech.first_row[mech.a.size], work.rates.shape[0]
+    passive = m - c
+    for s in range(c):
+        ahead[s] = independent[s]
+        for t in range(c):
+            ahead[s] -= mech.to_drive[0, s, t] * angles[joint[passive + t]]
+    for u in range(m):
         step[u] = 0.0
-        for s in range(rates.shape[0]):
-            step[u] += rates[s, u] * (independent[s] - angles[joint[passive + s]])
-    for u in range(passive, m):
-        step[u] = 0.0
+        for s in range(c if u < passive else 0):
+            step[u] += rates[s, u] * ahead[s]
     move_joints(mech, angles, step)
-    for s in range(rates.shape[0]):
-        angles[joint[passive + s]] = independent[s]
+    for s in range(c):
+        angles[joint[passive + s]] = 0.0
+        for t in range(c):
+            angles[joint[passive + s]] += mech.to_joint[0, s, t] * independent[t]
     last, moved, sure = 0.0, 0.0, loops == 0
     for iteration in range(12):
         place_links(mech, 0, angles, work)

@@ -74,6 +74,30 @@ class LinkSection(Section):
         "rad",
         default=(0.0, 0.0, 0.0),
     )
+    joint_stiffness_Nm_per_rad: Stiffness | None = documented_key(
+        "spring of the joint itself, about each of its axes, at rest in the posture asked about; omitted: none",
+        "N m/rad",
+        gt=0,
+        default=None,
+    )
+    joint_damping_Nms_per_rad: Damper | None = documented_key(
+        "viscous friction of the joint itself, about each of its axes; omitted: none",
+        "N m s/rad",
+        ge=0,
+        default=None,
+    )
+    joint_coulomb_Nm: DryFriction | None = documented_key(
+        "dry friction of the joint itself, about each of its axes; omitted: none", "N m", default=None
+    )
+    joint_stiffness_N_per_m: Stiffness | None = documented_key(
+        "spring along a prismatic joint; omitted: none", "N/m", gt=0, default=None
+    )
+    joint_damping_Ns_per_m: Damper | None = documented_key(
+        "viscous friction along a prismatic joint; omitted: none", "N s/m", ge=0, default=None
+    )
+    joint_coulomb_N: DryFriction | None = documented_key(
+        "dry friction along a prismatic joint; omitted: none", "N", default=None
+    )
     length_m: Number = documented_key(
         "length along the link's x axis; its tip is at (length, 0, 0)", "m", ge=0, default=0.0
     )
@@ -191,6 +215,26 @@ class DriveSection(Section):
     motor_inertia_kg_m2: RotorInertia = documented_key("inertia of the rotor, at the motor", "kg m^2", ge=0)
     transmission_ratio: Ratio = documented_key(
         "motor turns per joint turn; on a prismatic joint radians of the motor per metre", "1", gt=0
+    )
+    coupling: dict[Name, Number] = documented_key(
+        "motor turns per turn of other driven or free joints, by link name, that turn this motor too: of a drive "
+        "that holds the forearm's angle against the base, as a parallelogram does, the upper arm's joint with "
+        "the same ratio",
+        "1",
+        default={},
+    )
+    motor_link: Name | None = documented_key(
+        'the link that carries the motor, or "base", with motor_axis: the whole kinetic energy of a rotor that '
+        "turns "
+        "with it; that link's inertia holds the rotor as if it were locked. Omitted: the turning of rotors with "
+        "their links is neglected",
+        default=None,
+    )
+    motor_axis: Axis | None = documented_key(
+        "the rotor's axis in the frame of motor_link, any length, in the sense in which its angle grows with the "
+        "joint's",
+        "1",
+        default=None,
     )
     stiffness_Nm_per_rad: Spring | None = documented_key(
         "stiffness of the transmission at the motor shaft; omitted or inf: rigid",
