@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 def controller(loop: LoopSection) -> Controller:
     """The sampled wall law; a delay in seconds becomes samples, a filter of no time constant none."""
-    period = loop.sampling_period_s
+    period = math.nan if loop.sampling_period_s is None else loop.sampling_period_s
     delay = loop.delay_s / period if loop.delay_s is not None else value_or(loop.delay_samples, 0.0)
     return Controller(
         sampling_period=period,

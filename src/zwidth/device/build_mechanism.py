@@ -181,7 +181,8 @@ def _entries(member: Member, tree: Tree) -> list[tuple[Any, ...]]:
         name = link.name if body else f"{link.name}/{k + 1}"
         parent = tree.last[link.parent] if k == 0 else tree.first[link.name] + k - 1
         place = (origin, rotation) if k == 0 else (none, np.eye(3))
-        own = link.mass_kg, in_space(link.center_of_mass_m), _inertia(link, axis), tip
+        mass = math.nan if link.mass_kg is None else link.mass_kg
+        own = mass, in_space(link.center_of_mass_m), _inertia(link, axis), tip
         limits = link.limits_rad or link.limits_m or (-math.inf, math.inf)
         rows.append(
             (name, parent, kind, *place, axis, *(own if body else (0.0, none, np.zeros((3, 3)), none)), limits)
@@ -204,6 +205,8 @@ def _unit(vector: Any) -> Floats:
 
 def _inertia(link: LinkSection, axis: Floats) -> Floats:
     """(..., 3, 3); one number is the moment about the joint axis and leaves the others open: I a a^T."""
+    if link.inertia_kg_m2 is None:
+        return np.full((3, 3), math.nan)
     rows = stack_numbers(link.inertia_kg_m2)
     if rows.shape[-1] == 1:
         return rows * axis[..., :, None] * axis[..., None, :]
@@ -348,7 +351,7 @@ def _coupling(drives: Sequence[DriveSection], index: dict[str, int]) -> Floats |
     for drive in drives:
         row: list[Any] = [0.0] * max(index.values()) + [0.0]
         for name, ratio in drive.coupling.items():
-            row[index[name]] = ratio / drive.transmission_ratio
+            row[index[name]] = ratio / value_or(drive.transmission_ratio, math.nan)
         rows.append(stack_numbers(row))
     return join_designs(rows, 1)
 

@@ -14,6 +14,7 @@ from zwidth.device.address import exists, in_schema
 from zwidth.device.faults import KeyPath, comma_list, plural, quote, suggestion
 from zwidth.device.legs import spread_tables, written_path
 from zwidth.device.loop_consistency import electrical_inconsistencies, loop_inconsistencies
+from zwidth.device.missing import partly_missing
 from zwidth.device.nonlinear_consistency import nonlinear_inconsistencies
 from zwidth.device.schema.device_file import flat_sources
 from zwidth.device.toml_access import is_number, row_count, table, tables
@@ -51,6 +52,8 @@ def inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMe
         yield written_path(path, paths), message
     yield from _sources(document)
     yield from _legs(table(document, "mechanism"))
+    for path in partly_missing(table(document, "mechanism")):
+        yield path, "is missing; give it here, or nowhere if it is not known"
 
 
 def _inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMessages:
@@ -61,6 +64,7 @@ def _inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyM
     yield from _response(original)
     yield from electrical_inconsistencies(document)
     yield from operator_inconsistencies(document)
+    yield from _sampling(document)
     mechanism = table(document, "mechanism")
     if mechanism:
         yield from _tree(mechanism)
@@ -80,6 +84,15 @@ def _one_kind(document: dict[str, Any]) -> KeyMessages:
         yield (), "has neither [mechanism] nor [plant] nor [response]; give one of them"
     elif len(given) > 1:
         yield (), f"has {' and '.join(given)}; only one of them is allowed: remove the other"
+
+
+def _sampling(document: dict[str, Any]) -> KeyMessages:
+    """Only a mechanism has answers without a computer."""
+    loop = document.get("loop")
+    if isinstance(loop, dict) and "sampling_period_s" not in loop and "mechanism" not in document:
+        yield ("loop", "sampling_period_s"), "is missing; give a number"
+    if isinstance(loop, dict) and "delay_s" in loop and "sampling_period_s" not in loop:
+        yield ("loop", "delay_s"), "needs sampling_period_s; give that, or delay_samples"
 
 
 def _sources(document: dict[str, Any]) -> KeyMessages:

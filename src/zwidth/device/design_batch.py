@@ -42,6 +42,7 @@ _DRIVE: Final = [
     "encoder_noise_rad",
 ]
 _LINK: Final = ["origin_m", "orientation_rad", "axis", "length_m", "mass_kg", "center_of_mass_m", "inertia_kg_m2"]
+_OWNERS: Final[tuple[KeyPath, ...]] = (("mechanism",), ("mechanism", "legs", "*"))
 _FILTER: Final = ("time_constant_s", "cutoff_Hz")
 _PLANT: Final = ["mass_kg", "damping_Ns_per_m", "stiffness_N_per_m", "actuator", "sensor", "handle"]
 _OPERATOR: Final = [
@@ -52,9 +53,9 @@ _OPERATOR: Final = [
     "grasp_damping_Ns_per_m",
 ]
 ARRAYS: Final[tuple[KeyPath, ...]] = (
-    *(("mechanism", "links", "*", key) for key in _LINK),
-    *(("mechanism", "drives", "*", key) for key in _DRIVE),
-    ("mechanism", "loops", "*", "points_m"),
+    *((*owner, "links", "*", key) for owner in _OWNERS for key in _LINK),
+    *((*owner, "drives", "*", key) for owner in _OWNERS for key in _DRIVE),
+    *((*owner, "loops", "*", "points_m") for owner in _OWNERS),
     ("mechanism", "handle", "point_m"),
     ("mechanism", "assemblies", "*", "joints_rad"),
     ("mechanism", "reference", "position_m"),

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from zwidth import _verbs
 from zwidth.device.faults import DeviceError, fail, quote, suggestion
+from zwidth.device.missing import missing_numbers
 from zwidth.device.posture_arguments import joint_angles, positions, unit_vectors
 from zwidth.loop.controller import Controller
 from zwidth.loop.linear_omissions import linear_omissions
@@ -94,6 +96,11 @@ class Device:
             return bool(np.isfinite(self.mechanism.drives.encoder_counts).all())
         return self.document.get("loop", {}).get("encoder", {}).get("resolution_m") is not None
 
+    @cached_property
+    def missing(self) -> dict[str, tuple[str, ...]]:
+        """Keys that the file leaves out as not known, by what needs them: "dynamics", "sampling"."""
+        return missing_numbers(self.document)
+
     @property
     def linear_omissions(self) -> tuple[str, ...]:
         """Parts of the device that a linear answer leaves out, in words; () if there are none."""
@@ -168,6 +175,7 @@ class Device:
             resolution_known=self.resolution_known,
             name=self.name,
             requested_position=requested_position,
+            missing=self.missing,
         )
 
     def plant(self, *arguments: Any, **options: Any) -> Any:

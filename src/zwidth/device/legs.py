@@ -67,6 +67,15 @@ def members(mechanism: Any, group: str) -> list[Member]:
     return found
 
 
+def written(mechanism: dict[str, Any], group: str) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
+    """Path under [mechanism] and table of each link, loop or drive of a file, those of a leg once."""
+    for i, entry in tables(mechanism, group):
+        yield (group, i), entry
+    for n, leg in tables(mechanism, "legs"):
+        for i, entry in tables(leg, group):
+            yield ("legs", n, group, i), entry
+
+
 def copied(name: str, copy: int) -> str:
     """The name of a leg's link, loop or drive in one of its copies, counted from 1."""
     return f"{name}-{copy}"

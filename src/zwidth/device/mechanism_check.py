@@ -92,6 +92,8 @@ def _freedom(mechanism: Mechanism, mech: MechanismArrays, angles: Floats) -> Key
             f"({plural(m, 'joint coordinate')} less {m - freedom} held by loops); {advice}",
         )
         return
+    if np.isnan(mech.mass).any() or np.isnan(mech.inertia).any():
+        return
     M = motions.T @ joint_mass_matrix(mechanism, angles) @ motions
     eigenvalues = np.linalg.eigvalsh(M)
     if not eigenvalues[0] > freedom * np.finfo(float).eps * eigenvalues[-1]:
@@ -138,7 +140,12 @@ def _moments_left_open(mechanism: Mechanism, mech: MechanismArrays, section: Mec
     reported = set()
     for member in members(section, "links"):
         given, i = member.entry, order[member.entry.name]
-        if len(given.inertia_kg_m2) != 1 or given.inertia_kg_m2[0][0] == 0 or member.path in reported:
+        if (
+            given.inertia_kg_m2 is None
+            or len(given.inertia_kg_m2) != 1
+            or given.inertia_kg_m2[0][0] == 0
+            or member.path in reported
+        ):
             continue
         for j in _ancestors(mechanism, i):
             if links.joint[j] not in (FIXED, PRISMATIC) and np.linalg.norm(np.cross(axis[j], axis[i])) > PARALLEL:
@@ -160,8 +167,10 @@ def _close_loops(mechanism: Mechanism, mech: MechanismArrays) -> tuple[Floats, F
     starts = np.array(list(mechanism.assemblies.values()))
     for batch in (starts, scale * random.uniform(-np.pi, np.pi, (RESTARTS, n))):
         angles, gaps = _closed(mech, batch)
-        best = int(np.argmin(gaps.max(axis=1, initial=0.0)))
-        if gaps[best].max(initial=0.0) <= CLOSED * mech.size[0]:
+        worst = gaps.max(axis=1, initial=0.0)
+        closed = np.flatnonzero(worst <= CLOSED * mech.size[0])
+        best = int(closed[0]) if len(closed) else int(np.argmin(worst))
+        if len(closed):  # the first assembly that closes: a later one may be singular throughout
             break
     return angles[best], gaps[best]
 

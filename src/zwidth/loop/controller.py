@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import floor, inf
+from math import floor, inf, isnan
 from typing import Final, Literal, get_args
 
 import numpy as np
@@ -53,7 +53,7 @@ class Butterworth:
 class Controller:
     """The sampled wall law: f = -F (K y + B v), v estimated from samples of y.
 
-    sampling_period         T [s]
+    sampling_period         T [s]; nan: not known, of which no loop is made
     delay                   from reading to force, in samples, any real >= 0
     velocity_filter         acts on the velocity only; None: none
     velocity                how the velocity is estimated
@@ -77,7 +77,8 @@ class Controller:
 
     def __post_init__(self) -> None:
         T = self.sampling_period
-        check_number("sampling_period", T, "s", above=0.0, hint="is it a frequency?")
+        if not (isinstance(T, float) and isnan(T)):
+            check_number("sampling_period", T, "s", above=0.0, hint="is it a frequency?")
         check_number("delay", self.delay, "samples", least=0.0)
         check_number("actuator_time_constant", self.actuator_time_constant, "s", least=0.0)
         check_number("force_limit", self.force_limit, "N", above=0.0, infinite=True)

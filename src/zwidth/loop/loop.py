@@ -74,6 +74,8 @@ class Loop:
             )
         require("controller", controller, Controller)
         plant.check_numbers()
+        if np.any(np.isnan(controller.sampling_period)):
+            raise ValueError("controller.sampling_period is not known; a loop needs it")
         object.__setattr__(self, "plant", plant)
         object.__setattr__(self, "controller", controller)
         object.__setattr__(self, "results", {})

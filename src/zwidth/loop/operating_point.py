@@ -16,7 +16,12 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.linear_omissions import linear_omissions
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
-from zwidth.loop.point_errors import NoMechanismError, OperatingPointError, check_several_directions
+from zwidth.loop.point_errors import (
+    MissingNumbersError,
+    NoMechanismError,
+    OperatingPointError,
+    check_several_directions,
+)
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.damping import Damping, GivenDamping
 from zwidth.model.design_axes import change_designs, design_shape
@@ -84,6 +89,8 @@ class OperatingPoint:
     friction_known, resolution_known   whether the dry friction, and the encoders' step, are given, 0 included
     name                the device's name in results and figures
     requested_position  position as requested, before it was projected; None: the device's reference
+    missing             keys that the device file leaves out as not known, by what needs them: "dynamics",
+                        "sampling"
     results             what several measures of these points share, once it is computed
     """
 
@@ -102,6 +109,7 @@ class OperatingPoint:
     resolution_known: bool = True
     name: str = ""
     requested_position: Position | Floats | None = None
+    missing: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     results: dict[Any, Any] = field(init=False, default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
@@ -236,10 +244,17 @@ class OperatingPoint:
         """
         return self._posture.jacobian
 
+    def require(self, *kinds: Literal["dynamics", "sampling"]) -> None:
+        """Raise MissingNumbersError where the device file leaves out numbers that these kinds of answers need."""
+        keys = [key for kind in kinds for key in self.missing.get(kind, ())]
+        if keys:
+            raise MissingNumbersError(keys)
+
     @property
     def mass_matrix(self) -> Floats:
         """M (..., c, c) of the links in the independent coordinates [kg m^2]. Raises NoMechanismError as
-        `jacobian`."""
+        `jacobian`, MissingNumbersError where masses are not known."""
+        self.require("dynamics")
         return self._posture.mass_matrix
 
     @cached_property
@@ -272,6 +287,7 @@ class OperatingPoint:
 
         Raises  OperatingPointError  for several directions, and for a measured response
         """
+        self.require("dynamics")
         if self.mechanism is not None:
             return effective_parameters(self.mechanism, self._posture, self.direction)
         if self.given_plant is None:
@@ -329,6 +345,7 @@ class OperatingPoint:
         if self.given_plant is not None:
             return self.given_plant if self.model is None else reduce_plant(self.given_plant, self.model)
         self._check_single("plant")
+        self.require("dynamics")
         assert self.mechanism is not None
         return reduce_mechanism(
             self.mechanism, self._posture, self.direction, self.model or "full", self.damping, self.encoders
@@ -355,6 +372,7 @@ class OperatingPoint:
         posture = self._posture
         self._check_single("plant")
         check_several_directions(self.mechanism, self.operator, self.encoders)
+        self.require("dynamics")
         assert self.mechanism is not None
         assert self.directions is not None
         return reduce_directions(self.mechanism, posture, self.directions, self.model or "full", self.damping)
@@ -362,11 +380,13 @@ class OperatingPoint:
     @cached_property
     def loop(self) -> Loop:
         """The plant under the sampled wall law. Raises what `plant` raises."""
+        self.require("dynamics", "sampling")
         return Loop(self.plant, self.controller)
 
     @cached_property
     def loop_of_directions(self) -> MultiLoop:
         """All directions under one sampled wall law. Raises what `plant_of_directions` raises."""
+        self.require("dynamics", "sampling")
         return MultiLoop(self.plant_of_directions, self.controller)
 
     def _check_single(self, what: str) -> None:

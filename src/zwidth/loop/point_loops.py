@@ -47,6 +47,7 @@ def table_of_points(point: OperatingPoint, coupled: bool = True) -> LoopTable | 
              that is reduced, encoders on the links in a reduced model, a mechanism that is not plain
              (`drive_side.is_plain`) in a reduced model
     """
+    point.require("dynamics", "sampling")
     model = point.model or "full"
     if point.response is not None:
         return None

@@ -97,6 +97,7 @@ def simulate_mechanism(
     mechanism, posture = point.mechanism, point.posture
     if mechanism is None or posture is None:
         raise NoMechanismError
+    point.require("dynamics", "sampling")
     if point.shape:
         raise MotionError(f"one posture is moved at a time, got {point.shape}; take one of them by its index")
     if posture.status != OK:

@@ -71,8 +71,13 @@ class SaturationSection(Section):
 class LoopSection(Section):
     """The sampled wall law, f = -F (K y + B v)."""
 
-    sampling_period_s: Annotated[Number, BeforeValidator(_a_period)] = documented_key(
-        "sampling period T, 1e-7 <= T <= 1", "s", ge=SHORTEST_PERIOD, le=LONGEST_PERIOD
+    sampling_period_s: Annotated[Number, BeforeValidator(_a_period)] | None = documented_key(
+        "sampling period T, 1e-7 <= T <= 1; omitted, of a [mechanism]: not known, which leaves answers without a "
+        "computer",
+        "s",
+        ge=SHORTEST_PERIOD,
+        le=LONGEST_PERIOD,
+        default=None,
     )
     delay_samples: Number | None = documented_key(
         "time from reading the encoder to setting the force, in samples, whole or not; or delay_s",

@@ -101,14 +101,20 @@ class LinkSection(Section):
     length_m: Number = documented_key(
         "length along the link's x axis; its tip is at (length, 0, 0)", "m", ge=0, default=0.0
     )
-    mass_kg: Mass = documented_key("mass; 0 for a massless link", "kg", ge=0)
+    mass_kg: Mass | None = documented_key(
+        "mass; 0 for a massless link; omitted, of all links: not known",
+        "kg",
+        ge=0,
+        default=None,
+    )
     center_of_mass_m: Offset = documented_key(
         "centre of mass in the link's frame, x or x, y or x, y, z", "m", default=(0.0, 0.0, 0.0)
     )
-    inertia_kg_m2: Inertia = documented_key(
+    inertia_kg_m2: Inertia | None = documented_key(
         "moments of inertia about the centre of mass, link axes: one number (about the joint axis; enough "
-        "for planar motion), three moments [Ixx, Iyy, Izz], or a 3 x 3 matrix",
+        "for planar motion), three moments [Ixx, Iyy, Izz], or a 3 x 3 matrix; omitted, of all links: not known",
         "kg m^2",
+        default=None,
     )
 
 
@@ -212,9 +218,15 @@ class DriveSection(Section):
 
     name: Name = documented_key("the drive's name: letters, digits, - and _")
     joint: Name = documented_key("the link whose joint it drives")
-    motor_inertia_kg_m2: RotorInertia = documented_key("inertia of the rotor, at the motor", "kg m^2", ge=0)
-    transmission_ratio: Ratio = documented_key(
-        "motor turns per joint turn; on a prismatic joint radians of the motor per metre", "1", gt=0
+    motor_inertia_kg_m2: RotorInertia | None = documented_key(
+        "inertia of the rotor, at the motor; omitted, of all drives: not known", "kg m^2", ge=0, default=None
+    )
+    transmission_ratio: Ratio | None = documented_key(
+        "motor turns per joint turn; on a prismatic joint radians of the motor per metre; omitted, of all "
+        "drives: not known",
+        "1",
+        gt=0,
+        default=None,
     )
     coupling: dict[Name, Number] = documented_key(
         "motor turns per turn of other driven or free joints, by link name, that turn this motor too: of a drive "
@@ -366,7 +378,9 @@ class MechanismSection(Section):
     drives: tuple[DriveSection, ...] = documented_key(
         "the drives, in the order of the driven coordinates; those of legs follow", default=()
     )
-    damping: DampingSection = documented_key("structural damping, one of the three ways")
+    damping: DampingSection | None = documented_key(
+        "structural damping, one of the three ways; omitted only where no drive is flexible", default=None
+    )
     friction: DriveFrictionSection = documented_key(
         "how the dry friction of the drives, coulomb_Nm, grips",
         default=DriveFrictionSection(
