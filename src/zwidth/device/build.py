@@ -137,5 +137,18 @@ def in_space(vector: Sequence[float]) -> Floats:
     return stack_numbers([*vector, 0.0, 0.0, 0.0][:3])
 
 
+def roll_pitch_yaw(angles: Sequence[float] | Floats) -> Floats:
+    """Rotation Rz(yaw) Ry(pitch) Rx(roll): about the parent's fixed x, y, z axes in turn, (..., 3, 3)."""
+    turns = np.moveaxis(stack_numbers(angles), -1, 0)
+    (cr, cp, cy), (sr, sp, sy) = np.cos(turns), np.sin(turns)
+    return stack_numbers(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
 def _even(matrix: Floats) -> Floats:
     return 0.5 * matrix + 0.5 * np.swapaxes(matrix, -1, -2)

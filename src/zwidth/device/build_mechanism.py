@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.device import build_nonlinear
-from zwidth.device.build import in_space
+from zwidth.device.build import in_space, roll_pitch_yaw
 from zwidth.device.build_nonlinear import value_or
 from zwidth.device.legs import Member, members, of_copies
 from zwidth.device.schema.mechanism import (
@@ -89,19 +89,6 @@ def mechanism(section: MechanismSection) -> Mechanism:
         controls=CONTROLS[handle.controls],
         reference_rotation=roll_pitch_yaw(reference.orientation_rad or (0.0, 0.0, 0.0)),
         free=_free(tree, loops),
-    )
-
-
-def roll_pitch_yaw(angles: Sequence[float]) -> Floats:
-    """Rotation Rz(yaw) Ry(pitch) Rx(roll): about the parent's fixed x, y, z axes in turn, (..., 3, 3)."""
-    turns = np.moveaxis(stack_numbers(angles), -1, 0)
-    (cr, cp, cy), (sr, sp, sy) = np.cos(turns), np.sin(turns)
-    return stack_numbers(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
     )
 
 

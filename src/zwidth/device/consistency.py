@@ -372,8 +372,8 @@ def _loop_keys(mechanism: dict[str, Any]) -> KeyMessages:
 def _place_of_handle(mechanism: dict[str, Any]) -> KeyMessages:
     """The reference gives what the drives control of the handle."""
     controls, reference = table(mechanism, "handle").get("controls", "position"), table(mechanism, "reference")
-    path = ("mechanism", "reference")
-    if reference and "position_m" not in reference and controls != "orientation":
+    path, given = ("mechanism", "reference"), isinstance(mechanism.get("reference"), dict)
+    if given and "position_m" not in reference and controls != "orientation":
         yield (*path, "position_m"), "is missing; give the position of the handle"
     if "orientation_rad" in reference and controls == "position":
         yield (
@@ -381,9 +381,19 @@ def _place_of_handle(mechanism: dict[str, Any]) -> KeyMessages:
             "does not apply, as the drives control the handle's position alone; remove it, or say otherwise by "
             "mechanism.handle.controls",
         )
-    for key, what in (("position_m", "orientation"),):
-        if key in reference and controls == what:
-            yield (*path, key), "does not apply, as the drives control the handle's orientation alone; remove it"
+    if "position_m" in reference and controls == "orientation":
+        yield (
+            (*path, "position_m"),
+            "does not apply, as the drives control the handle's orientation alone; remove it",
+        )
+    if given and "direction" not in reference and "axis" not in reference:
+        yield (*path, "direction"), "is missing; give a rendered direction, or an axis for moments"
+    screw = "direction" in reference and "axis" in reference
+    if screw != ("characteristic_length_m" in reference):
+        fault = (
+            "is missing; direction and axis together need it" if screw else "is used only with direction and axis"
+        )
+        yield (*path, "characteristic_length_m"), fault
 
 
 def _legs(mechanism: dict[str, Any]) -> KeyMessages:

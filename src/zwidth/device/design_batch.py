@@ -184,7 +184,8 @@ class DesignBatch:
 
     def _with_posture(self, posture: Posture, direction: Any, model: str | None) -> OperatingPoint:
         shape = posture.status.shape
-        rendered = np.broadcast_to(self.device.direction(direction), (*shape, 3))
+        vector = self.device.direction(direction)
+        rendered = np.broadcast_to(vector, (*shape, vector.shape[-1]))
         point = OperatingPoint(
             controller=self.device.controller,
             mechanism=self.device.mechanism,

@@ -16,12 +16,13 @@ from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
 from zwidth.device.format_version import refuse_newer, without_version
 from zwidth.device.operator_choice import document_held_by
 from zwidth.device.plausibility import warn_of_implausible
+from zwidth.device.posture_arguments import screws
 from zwidth.device.read import bundled, read
 from zwidth.device.schema.device_file import DeviceFile, schema
-from zwidth.device.schema.mechanism import MechanismSection
+from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
 from zwidth.device.validation_messages import validation_messages
 from zwidth.model.argument_checks import wrong_type
-from zwidth.model.mechanism import Mechanism
+from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.operator import Operator
 
 UNNAMED_OPERATOR: Final = "as given"  # an operator without a name
@@ -160,7 +161,7 @@ def build_device(
         controller=controller,
         damping=build.damping(section.damping if section else None),
         reference_position=None if mechanism is None else mechanism.reference_position,
-        reference_direction=build.in_space(reference.direction) if reference else None,
+        reference_direction=_reference_direction(reference) if reference else None,
         reference_assembly=(reference.assembly or next(iter(section.assemblies)))
         if reference and section
         else None,
@@ -169,6 +170,14 @@ def build_device(
         encoders="motor" if checked.loop.encoder.at in (None, "motor") else "link",
         document=document,
     )
+
+
+def _reference_direction(reference: ReferenceSection) -> Floats:
+    """(3,) of any length, or a screw (6,)."""
+    if reference.axis is None:
+        return build.in_space(reference.direction or ())
+    direction = None if reference.direction is None else build.in_space(reference.direction)
+    return screws("", direction, reference.axis, reference.characteristic_length_m)
 
 
 def _mechanism(section: MechanismSection, surplus: tuple[int, ...] | None) -> Mechanism:

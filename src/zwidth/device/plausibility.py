@@ -154,6 +154,7 @@ def _angles(mechanism: dict[str, Any]) -> KeyMessages:
 
 def _links(mechanism: dict[str, Any], size: float) -> KeyMessages:
     """A mass too large for the device or for its own inertia, an inertia too large for the device."""
+    wrist = table(mechanism, "handle").get("controls") == "orientation"  # which may give no lengths at all
     for path, link in written(mechanism, "links"):
         mass, inertia = float(link.get("mass_kg", 0.0)), _largest_moment(link.get("inertia_kg_m2", 0.0))
         gyration = math.sqrt(inertia / mass) if mass > 0.0 else 0.0
@@ -170,7 +171,7 @@ def _links(mechanism: dict[str, Any], size: float) -> KeyMessages:
                 ("mechanism", *path, "mass_kg"),
                 f"{mass:g} kg looks wrong for a link of a device of {_length(size)}; {_thousandth(mass, 'g')}",
             )
-        if size > 0.0 and gyration > GYRATION * size:
+        if size > 0.0 and gyration > GYRATION * size and not wrist:
             yield (
                 ("mechanism", *path, "inertia_kg_m2"),
                 f"{inertia:g} kg m^2 looks wrong for {mass:g} kg, a radius of gyration of {_length(gyration)} on "

@@ -77,8 +77,8 @@ class OperatingPoint:
     controller          the computer that closes the loop
     mechanism           links, joints, loops and drives
     posture             (...) solved postures
-    directions          (..., m, 3) unit vectors; the m directions of one posture are rendered together, under one
-                        law
+    directions          (..., m, 3) unit vectors, or (..., m, 6) screws (`model.effective_parameters.screw`) of
+                        moments about an axis; the m directions of one posture are rendered together, under one law
     given_plant         dynamics of the rendered direction, as given
     response            measured response from force command to reading
     model               "full", "two-mass", "motor-mass" or "rigid"; None: full, or the plant as given
@@ -174,8 +174,8 @@ class OperatingPoint:
 
     @property
     def direction(self) -> Floats:
-        """(..., 3) unit vector. Raises OperatingPointError where several directions are rendered together, and
-        NoMechanismError for a device without a mechanism."""
+        """(..., 3) unit vector, or (..., 6) screw. Raises OperatingPointError where several directions are
+        rendered together, and NoMechanismError for a device without a mechanism."""
         if self.directions is None:
             raise NoMechanismError
         if self.direction_count > 1:
@@ -206,9 +206,18 @@ class OperatingPoint:
             parts |= {"posture": self.posture.with_axes(change), "directions": change(self.directions)}
         return replace(self, **parts)
 
+    @property
+    def turns(self) -> bool:
+        """Whether moments about an axis are rendered, and walls are in N m/rad; a screw with a way along it is in
+        N/m."""
+        return (
+            self.directions is not None and self.directions.shape[-1] == 6 and not self.directions[..., :3].any()
+        )
+
     def towards(self, direction: Floats) -> OperatingPoint:
-        """The same postures rendering another direction, unit vectors (..., 3)."""
-        directions = np.broadcast_to(np.asarray(direction, dtype=np.float64), (*self.shape, 3))
+        """The same postures rendering another direction, unit vectors (..., 3) or screws (..., 6)."""
+        given = np.asarray(direction, dtype=np.float64)
+        directions = np.broadcast_to(given, (*self.shape, given.shape[-1]))
         return replace(self, directions=directions[..., None, :])
 
     def in_model(self, model: Model | None) -> OperatingPoint:
@@ -298,9 +307,10 @@ class OperatingPoint:
     def handle_range(self) -> tuple[float, float] | None:
         """Range of the handle from its posture along the direction [m]: backwards (not positive), forwards.
 
-        None for a device without a mechanism. Raises OperatingPointError for several points.
+        None for a device without a mechanism, and for moments about an axis. Raises OperatingPointError for
+        several points.
         """
-        if self.mechanism is None:
+        if self.mechanism is None or self.direction.shape[-1] == 6:
             return None
         self._check_single("handle_range")
         return handle_range(self.mechanism, self._posture, self.direction)
@@ -311,10 +321,10 @@ class OperatingPoint:
         The linear plant moves along the tangent, the handle along a curve if it has few drives.
 
         displacement  from the posture, along the direction [m]
-        Returns  None for a device without a mechanism
+        Returns  None for a device without a mechanism, and for moments about an axis
         Raises   PostureError  (model.posture) where the handle cannot be moved so far
         """
-        if self.mechanism is None:
+        if self.mechanism is None or self.direction.shape[-1] == 6:
             return None
         self._check_single("distance_from_path")
         if displacement == 0.0:

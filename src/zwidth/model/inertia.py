@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from zwidth.compiled import compiled_lean
 from zwidth.model.forward_kinematics import WorkingMemory, link_point
 from zwidth.model.mechanism import PRISMATIC, Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
+
+NO_TURN: Final = 1e-12  # share of the fastest link's angular velocity that is rounding
 
 
 @compiled_lean
@@ -41,17 +45,23 @@ def unit_motions(mech: MechanismArrays, work: WorkingMemory) -> None:
 def handle_jacobian(
     mech: MechanismArrays, design: int, work: WorkingMemory, out: Floats, angular: Floats, index: int
 ) -> None:
-    """dh/dp and the handle's angular velocity per unit rate, from the unit motions, into [index] (3, c) of
-    each."""
+    """dh/dp and the handle's angular velocity per unit rate, from the unit motions, into [index] (3, c) of each.
+
+    A platform that its legs keep from turning turns by rounding, which is set to 0.
+    """
     w, v, o, link = work.spin, work.speed, work.origin, mech.handle_link
     h = link_point(work.rotation, o, link, mech.handle, design, 0)
     rx, ry, rz = h[0] - o[link, 0], h[1] - o[link, 1], h[2] - o[link, 2]
     for s in range(w.shape[0]):
+        fastest = 0.0
+        for i in range(w.shape[1]):
+            fastest = max(fastest, abs(w[s, i, 0]), abs(w[s, i, 1]), abs(w[s, i, 2]))
         wx, wy, wz = w[s, link, 0], w[s, link, 1], w[s, link, 2]
         out[index, 0, s] = v[s, link, 0] + wy * rz - wz * ry
         out[index, 1, s] = v[s, link, 1] + wz * rx - wx * rz
         out[index, 2, s] = v[s, link, 2] + wx * ry - wy * rx
-        angular[index, 0, s], angular[index, 1, s], angular[index, 2, s] = wx, wy, wz
+        for x in range(3):
+            angular[index, x, s] = w[s, link, x] if abs(w[s, link, x]) > NO_TURN * fastest else 0.0
 
 
 @compiled_lean

@@ -104,7 +104,7 @@ def check_moves_along(posture: Posture, side: DriveSide, h: Floats, u: Floats) -
     reach = float(np.linalg.norm(posture.jacobian)) if np.any(u[:3]) else 0.0
     if np.any(u[3:]):
         reach = max(reach, float(np.linalg.norm(posture.angular_jacobian) * np.linalg.norm(u[3:])))
-    if np.linalg.norm(h[: side.driven]) > 1e-12 * reach:
+    if np.linalg.norm(h[: side.driven]) > 1e-12 * reach:  # and not where nothing moves
         return
     along = ", ".join(f"{component:.6g}" for component in (u[:3] if np.any(u[:3]) else u[3:]))
     if np.any(u[:3]):

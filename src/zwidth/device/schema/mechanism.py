@@ -199,7 +199,18 @@ class ReferenceSection(Section):
         "rad",
         default=None,
     )
-    direction: Direction = documented_key("rendered direction, any length", "1")
+    direction: Direction | None = documented_key(
+        "rendered direction, any length; or axis, or both", "1", default=None
+    )
+    axis: Axis | None = documented_key(
+        "axis about which moments are rendered, any length; with direction: a screw, as much of either as the "
+        "vectors are long",
+        "1",
+        default=None,
+    )
+    characteristic_length_m: Number | None = documented_key(
+        "length by which angles count as ways on a screw, of direction and axis together", "m", gt=0, default=None
+    )
     assembly: Name | None = documented_key(
         "the assembly used by default; omitted only where one is named", default=None
     )

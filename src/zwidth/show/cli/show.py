@@ -70,10 +70,15 @@ class ShowCommand(Command):
                     ("isotropy (1 is best)", amount(values["isotropy"])),
                 ]
             )
-            angles = [(name, amount(angle)) for name, angle in values["joints_rad"].items()]
+            angles = [(name, _coordinates(value)) for name, value in values["joints_rad"].items()]
             yield table(["joint", "angle [rad]"], angles)
         if values["sources"]:
             yield table(["numbers", "source"], list(values["sources"].items()))
+
+
+def _coordinates(value: Any) -> str:
+    """A joint's coordinate, or those of a joint with several."""
+    return ", ".join(amount(one) for one in value) if isinstance(value, list) else amount(value)
 
 
 def _dexterity_units(jacobian: Floats) -> tuple[str, str]:

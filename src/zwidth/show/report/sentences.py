@@ -21,7 +21,7 @@ from zwidth.loop.motion_names import group_names
 from zwidth.model.mechanism import Floats
 from zwidth.show.figures.decay import tenfold_time
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity
+from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity, way
 from zwidth.study.validity import Fit, Interval, Validity
 from zwidth.study.what_if import LEAST_GAIN, REMEDIES, Variant, find_variant, limiting_change
 
@@ -74,6 +74,8 @@ def where(facts: Facts) -> str:
     """Direction and position: "Along y at (0, 0.25) m "; "" for a plant."""
     if facts.posture is None or facts.direction is None:
         return ""
+    if facts.direction.shape[-1] == 6:
+        return f"{way(facts.direction).capitalize()} at {point(facts.posture.position)} "
     return f"Along {direction_name(facts.direction)} at {point(facts.posture.position)} "
 
 
