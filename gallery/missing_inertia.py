@@ -6,8 +6,9 @@ thickness t, density rho known in ranges. Of a uniform bar of length l
 
     m = rho w t l,        I = m (l^2 + w^2) / 12   about its middle.
 
-Bearings and the handle are a point mass at the end point, motors are small ones without gears, and the drives are rigid
-and without friction, so that a wall feels one mass m_felt. Then the largest stiffness of the sampled wall is known,
+Bearings and the handle are a point mass at the end point, motors are small ones without gears, and the drives are
+rigid and without friction, so that a wall feels one mass m_felt. Then the largest stiffness of the sampled wall is
+known,
 
     K_max = (12 - 8 sqrt 2) m_felt / T^2,
 

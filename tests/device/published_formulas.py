@@ -1,7 +1,7 @@
 """Published kinematics and mass matrices of bundled devices, typed from their formulas: judges that share no code.
 
-Only formulas are here that stand a check of their own, Jacobian against differences, energy against its derivative;
-what is printed wrongly somewhere (`docs/zoo.md` names it) is not.
+Only formulas are here that stand a check of their own, Jacobian against differences, energy against its
+derivative; what is printed wrongly somewhere (`docs/zoo.md` names it) is not.
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ def premium_jacobian(q, lengths):
     return np.array([cos(q1) * radial - sin(q1) * around, sin(q1) * radial + cos(q1) * around, up])
 
 
-# --- offset deltas: Stamper's thesis, (3.1)-(3.9), (4.9)-(4.13), (6.29)-(6.32); libnifalcon's r, s, c, f ------------
+# --- offset deltas: Stamper's thesis, (3.1)-(3.9), (4.9)-(4.13), (6.29)-(6.32); libnifalcon's r, s, c, f
+# ------------
 
 DELTAS = {
     "novint-falcon": {"a": 0.06, "b": 0.1025, "c": 0.01443, "d": 0.01125, "f": -0.025, "r": 0.04, "s": -0.02309},
@@ -104,7 +105,11 @@ def delta_jacobian(angles, name):
     legs = LEGS.get(name, FALCON_LEGS)
     along = cos(second) * sin(third)
     rows = np.array(
-        [along * cos(legs) - cos(third) * sin(legs), along * sin(legs) + cos(third) * cos(legs), sin(second) * sin(third)]
+        [
+            along * cos(legs) - cos(third) * sin(legs),
+            along * sin(legs) + cos(third) * cos(legs),
+            sin(second) * sin(third),
+        ]
     )
     return (rows / (DELTAS[name]["a"] * sin(second - first) * sin(third))).T
 
@@ -163,12 +168,20 @@ def five_bar_jacobian(left, right, name):
 
 
 def master_arm_place(q):
-    """Centre of the wrist (3,): MTMR.json's standard Denavit-Hartenberg table, joints 1 to 4, its 1.5708 a quarter turn."""
-    rows = ((pi / 2, 0.0, 0.0, -pi / 2), (0.0, 0.2794, 0.0, -pi / 2), (-pi / 2, 0.3645, 0.0, pi / 2), (pi / 2, 0.0, 0.1506, 0.0))
+    """Centre of the wrist (3,): MTMR.json's standard Denavit-Hartenberg table, joints 1 to 4, its 1.5708 a quarter
+    turn."""
+    rows = (
+        (pi / 2, 0.0, 0.0, -pi / 2),
+        (0.0, 0.2794, 0.0, -pi / 2),
+        (-pi / 2, 0.3645, 0.0, pi / 2),
+        (pi / 2, 0.0, 0.1506, 0.0),
+    )
     T = np.eye(4)
     for (alpha, a, d, offset), angle in zip(rows, (*q, 0.0), strict=True):
         ct, st, ca, sa = cos(angle + offset), sin(angle + offset), cos(alpha), sin(alpha)
-        T = T @ np.array([[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1]])
+        T = T @ np.array(
+            [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1]]
+        )
     return T[:3, 3]
 
 
@@ -183,11 +196,14 @@ def wooden_jacobian(t):
     out = 0.205 * sin(t[1]) + 0.245 * sin(t[2])
     b, c = 0.205 * cos(t[1]), 0.245 * cos(t[2])
     ca, sa = cos(t[0]), sin(t[0])
-    return np.array([[-sa * out, ca * b, ca * c], [ca * out, sa * b, sa * c], [0, -0.205 * sin(t[1]), 0.245 * sin(t[2])]])
+    return np.array(
+        [[-sa * out, ca * b, ca * c], [ca * out, sa * b, sa * c], [0, -0.205 * sin(t[1]), 0.245 * sin(t[2])]]
+    )
 
 
 def touch_place(waist, shoulder, elbow):
-    """omni.urdf: the centre of the gimbal; in the plane of waist 0 both arms lie in y, z, elbow at -1.5 from the arm."""
+    """omni.urdf: the centre of the gimbal; in the plane of waist 0 both arms lie in y, z, elbow at -1.5 from the
+    arm."""
     forearm = shoulder + elbow - 1.5
     out = 0.134 * cos(shoulder) + 0.1325 * cos(forearm)
     return np.array([-sin(waist) * out, cos(waist) * out, 0.125 + 0.134 * sin(shoulder) + 0.1325 * sin(forearm)])

@@ -1,7 +1,7 @@
 """Every bundled mechanism against MuJoCo and Pinocchio: mass matrix, Jacobians, closures, natural frequencies.
 
-What a file does not know of links and drives is drawn at random, the same for all copies of a leg, so that the algebra of
-devices with geometry alone is asked as well; what it knows stays. All drives are made flexible.
+What a file does not know of links and drives is drawn at random, the same for all copies of a leg, so that the
+algebra of devices with geometry alone is asked as well; what it knows stays. All drives are made flexible.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Bundled devices of which only geometry is known answer kinematic questions and refuse the others in a sentence."""
+"""Bundled devices of which only geometry is known answer kinematic questions and refuse the others in a
+sentence."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ def test_an_open_arm_has_the_published_kinematics():
 
 
 def test_an_arm_with_a_gimbal_has_the_published_tree():
-    device, rng = zwidth.load("touch"), np.random.default_rng(11)
+    device, rng = zwidth.load("touch-omni"), np.random.default_rng(11)
     for _ in range(10):
         waist, shoulder, elbow = rng.uniform([-0.9, 0.2, -0.5], [0.9, 1.2, 0.8])
         posture = device.at({"waist": waist, "upper-arm": shoulder, "crank": shoulder + elbow}).posture

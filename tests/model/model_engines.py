@@ -106,7 +106,9 @@ def mjcf(mechanism):
         joints, i = joints_of(first)
         # principal axes outright: the engine finds its own to ten digits
         moments, axes = np.linalg.eigh(links.inertia[i])
-        if moments[0] == moments[1] == 0.0:  # one number, about the only axis it turns about: any round body has it
+        if (
+            moments[0] == moments[1] == 0.0
+        ):  # one number, about the only axis it turns about: any round body has it
             moments[:2] = moments[2]
         moments, mass = np.maximum(moments, NEARLY_NOTHING), max(links.mass[i], NEARLY_NOTHING)
         axes[:, 2] *= np.linalg.det(axes)

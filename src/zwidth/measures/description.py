@@ -67,7 +67,9 @@ class Description(Result):
     def __repr__(self) -> str:
         felt = self.effective
         if not self.natural_frequencies.size:
-            return f"Description: no masses; manipulability {self.manipulability:.4g}, isotropy {self.isotropy:.4g}"
+            return (
+                f"Description: no masses; manipulability {self.manipulability:.4g}, isotropy {self.isotropy:.4g}"
+            )
         masses = f"{felt.link_side_mass:.4g} kg link side, {felt.motor_side_mass:.4g} kg motor side"
         frequencies = ", ".join(f"{f:.4g}" for f in self.natural_frequencies[:8])
         more = ", ..." if len(self.natural_frequencies) > 8 else ""
