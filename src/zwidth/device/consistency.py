@@ -16,7 +16,7 @@ from zwidth.device.legs import spread_tables, written_path
 from zwidth.device.loop_consistency import electrical_inconsistencies, loop_inconsistencies
 from zwidth.device.missing import partly_missing
 from zwidth.device.nonlinear_consistency import nonlinear_inconsistencies
-from zwidth.device.schema.device_file import flat_sources
+from zwidth.device.schema.device_file import flat_sources, keys
 from zwidth.device.toml_access import is_number, row_count, table, tables
 
 KeyMessages = Iterator[tuple[KeyPath, str]]
@@ -89,7 +89,8 @@ def _one_kind(document: dict[str, Any]) -> KeyMessages:
 def _sampling(document: dict[str, Any]) -> KeyMessages:
     """Only a mechanism has answers without a computer."""
     loop = document.get("loop")
-    if isinstance(loop, dict) and "sampling_period_s" not in loop and "mechanism" not in document:
+    misspelt = isinstance(loop, dict) and not set(loop) <= keys(("loop",))
+    if isinstance(loop, dict) and "sampling_period_s" not in loop and "mechanism" not in document and not misspelt:
         yield ("loop", "sampling_period_s"), "is missing; give a number"
     if isinstance(loop, dict) and "delay_s" in loop and "sampling_period_s" not in loop:
         yield ("loop", "delay_s"), "needs sampling_period_s; give that, or delay_samples"

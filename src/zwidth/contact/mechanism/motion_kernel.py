@@ -15,7 +15,7 @@ from zwidth.contact.mechanism.stepping import linearise, prepare, step, turned
 from zwidth.contact.mechanism.surfaces import penetration
 from zwidth.contact.mechanism.system import Memory, System, memory_of
 from zwidth.model.closure import equations, orientation, passive_rates
-from zwidth.model.continuation import keep_rows
+from zwidth.model.continuation import joint_beyond_limit, keep_rows
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, place_links
 from zwidth.model.mechanism import Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
@@ -25,6 +25,7 @@ SINGULAR: Final = 1
 LOOP_LOST: Final = 2
 DIVERGED: Final = 3
 NO_FORCE: Final = 4
+AT_LIMIT: Final = 100  # and the number of the link whose joint is at its limit
 NEAR_SINGULAR: Final = (
     1e-3  # reciprocal condition of the loops below which the drives hardly hold the other joints
 )
@@ -147,6 +148,9 @@ def check_state(system: System, memory: Memory, x: Floats, condition: float) -> 
     if passive > 0 and not orientation(work.start, work.rows, memory.square, mech.spans, passive, loops) > 0.0:
         return SINGULAR
     keep_rows(work)
+    link = joint_beyond_limit(mech, 0, memory.angles)
+    if link >= 0:
+        return AT_LIMIT + link
     return DONE
 
 
