@@ -284,7 +284,8 @@ def _references(mechanism: dict[str, Any]) -> KeyMessages:
 
 def _couplings(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str]) -> KeyMessages:
     """Drives that turn with other joints, which are driven or free; motors on links that exist."""
-    free = {link["name"] for _, link in tables(mechanism, "links") if link.get("free") is True and "name" in link}
+    of_links = [link for _, link in tables(mechanism, "links") if link.get("free") is True]
+    free = {name for link in of_links if isinstance(name := link.get("name"), str)}
     for index, drive in tables(mechanism, "drives"):
         if table(drive, "coupling") and "transmission_ratio" not in drive:
             yield ("mechanism", "drives", index, "transmission_ratio"), "is missing; coupling needs it"

@@ -57,9 +57,9 @@ def members(mechanism: Any, group: str) -> list[Member]:
     """
     found = [Member(entry, (group, i)) for i, entry in _entries(mechanism, group)]
     for n, leg in _entries(mechanism, "legs"):
-        names = frozenset(_get(link, "name") for _, link in _entries(leg, "links"))
+        names = frozenset(_names(leg))
         for copy, angle in enumerate(_angles(leg), start=1):
-            own = frozenset(copied(name, copy) for name in names if isinstance(name, str))
+            own = frozenset(copied(name, copy) for name in names)
             for i, entry in _entries(leg, group):
                 renamed = _renamed(entry, group, names, copy)
                 axis = _get(leg, "axis") or (0.0, 0.0, 1.0)
@@ -86,8 +86,7 @@ def of_copies(mechanism: Any, values: Mapping[str, Any]) -> dict[str, Any]:
     for one copy comes before what is given for all."""
     spread = dict(values)
     for _, leg in _entries(mechanism, "legs"):
-        for _, link in _entries(leg, "links"):
-            name = _get(link, "name")
+        for name in _names(leg):
             if name not in values:
                 continue
             spread.pop(name, None)
@@ -132,7 +131,13 @@ def _angles(leg: Any) -> list[float]:
     return [0.0]
 
 
-def _renamed(entry: Any, group: str, names: frozenset[Any], copy: int) -> Any:
+def _names(leg: Any) -> list[str]:
+    """What the leg calls its links; what is no name is left out."""
+    found = [_get(link, "name") for _, link in _entries(leg, "links")]
+    return [name for name in found if isinstance(name, str)]
+
+
+def _renamed(entry: Any, group: str, names: frozenset[str], copy: int) -> Any:
     """A link, loop or drive of a leg as one of its copies has it."""
 
     def own(name: Any) -> Any:

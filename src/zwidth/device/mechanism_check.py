@@ -78,6 +78,13 @@ def _freedom(mechanism: Mechanism, mech: MechanismArrays, angles: Floats) -> Key
     """A drive for each degree of freedom that is not declared free, and a mass behind every motion."""
     angles, rows, motions = _least_free(mech, angles)
     m, freedom, drives = mech.joint.size, motions.shape[1], mech.driven
+    if not freedom:
+        yield (
+            ("mechanism", "loops"),
+            f"leave the mechanism no freedom: they hold all of its {plural(m, 'joint coordinate')}; check axes "
+            "and points",
+        )
+        return
     if freedom != drives + mech.free:
         free = f", and {mech.free} declared free" if mech.free else ""
         held = _move_although_held(mechanism, mech, rows)
@@ -92,7 +99,8 @@ def _freedom(mechanism: Mechanism, mech: MechanismArrays, angles: Floats) -> Key
             f"({plural(m, 'joint coordinate')} less {m - freedom} held by loops); {advice}",
         )
         return
-    if np.isnan(mech.mass).any() or np.isnan(mech.inertia).any():
+    rotors = mechanism.drives.transmission * mechanism.drives.motor_inertia
+    if np.isnan(mech.mass).any() or np.isnan(mech.inertia).any() or np.isnan(rotors).any():
         return
     M = motions.T @ joint_mass_matrix(mechanism, angles) @ motions
     eigenvalues = np.linalg.eigvalsh(M)

@@ -28,6 +28,7 @@ def joint_mass_matrix(mechanism: Mechanism, coordinates: Floats) -> Floats:
     _mass(cut._replace(driven=mech.joint.size, free=0), np.ascontiguousarray(coordinates), M)
     rigid = np.where(np.isinf(drives.stiffness), drives.transmission**2 * drives.motor_inertia, 0.0)
     rotors = np.zeros(mech.joint.size)
+    rigid = rigid[[i for i in range(len(rigid)) if i not in drives.surplus]]  # the others have no coordinate
     rotors[mech.joint.size - mech.free - mech.driven : mech.joint.size - mech.free] = rigid
     return np.asarray(M[0] + np.diag(rotors))
 
