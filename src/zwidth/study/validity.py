@@ -147,7 +147,7 @@ def validity(point: OperatingPoint, tolerance: float = TOLERANCE) -> Validity:
     natural = natural_frequencies(full.ungripped_plant)
     flexible = natural[natural > 0.0]
     edge = _Edge(chart)
-    fits = [_fit(edge, point.controller, *model, tolerance) for model in _models(full)]
+    fits = [_fit(edge, point.computer, *model, tolerance) for model in _models(full)]
     return Validity(
         tolerance=tolerance,
         first_natural=float(flexible[0]) if len(flexible) else nan,
