@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from zwidth.device.address import exists, in_schema
 from zwidth.device.faults import KeyPath, comma_list, plural, quote, suggestion
+from zwidth.device.feedback_consistency import feedback_inconsistencies
 from zwidth.device.loop_consistency import electrical_inconsistencies, loop_inconsistencies
 from zwidth.device.nonlinear_consistency import nonlinear_inconsistencies
 from zwidth.device.schema.device_file import flat_sources
@@ -31,6 +32,7 @@ def inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMe
     yield from _sources(document)
     yield from _plant(table(document, "plant"))
     yield from loop_inconsistencies(document)
+    yield from feedback_inconsistencies(document)
     yield from nonlinear_inconsistencies(document)
     yield from _response(original)
     yield from electrical_inconsistencies(document)
