@@ -193,9 +193,8 @@ def interval_parts(loop: Loop, substeps: int) -> list[IntervalPart]:
 
 
 def measured_rows(held_devices: Sequence[HeldDevice], plants: PlantArrays) -> Floats:
-    """Weights (D, N + 2 + E) of states, command, push and elements in the force that each device's sensor measures.
-
-    It is the force of the hand, less what the mass between sensor and hand takes.
+    """Weights (D, N + 2 + E) of states, command, push and elements in what each device's force sensor measures:
+    the force of the hand, less what the mass between sensor and hand takes.
     """
     N, E = plants.transition.shape[-1], plants.kind.shape[1]
     rows = np.zeros((len(held_devices), N + 2 + E))

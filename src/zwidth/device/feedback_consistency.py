@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -32,8 +33,8 @@ def feedback_inconsistencies(document: dict[str, Any]) -> KeyMessages:
     yield from cutoff_fault(("loop", "feedforward", "acceleration_filter"), table(ahead, "acceleration_filter"), T)
     yield from _estimate(("loop", "feedforward", "velocity"), ahead, loop, T)
     times = local.get("rate_multiple")
-    whole = isinstance(times, int) and not isinstance(times, bool) and 1 <= times <= MOST_FAST_SAMPLES
-    yield from _estimate(("loop", "local", "velocity"), local, loop, T / times if whole else float("nan"))
+    whole = times if type(times) is int and 1 <= times <= MOST_FAST_SAMPLES else math.nan
+    yield from _estimate(("loop", "local", "velocity"), local, loop, T / whole)
 
 
 def _wrong_device(document: dict[str, Any], place: KeyPath) -> KeyMessages:

@@ -469,8 +469,7 @@ def delay_name(controller: Controller) -> str:
 
 
 def velocity_and_force_text(controller: Controller) -> str:
-    """Velocity estimator, filters and what is commanded beside the wall's force: "velocity by kalman, force lagging
-    by 2 ms"."""
+    """Velocity estimator, filters and other feedback: "velocity by kalman, force lagging by 2 ms"."""
     plain = isinstance(controller.velocity, BackwardDifference)
     method = next(name for name, kind in METHODS.items() if isinstance(controller.velocity, kind))
     estimate = "velocity" if plain else f"velocity by {method}"
