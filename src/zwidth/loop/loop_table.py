@@ -54,8 +54,8 @@ def table_of_loops(*loops: Loop) -> LoopTable:
     rows = np.zeros((len(each), count.max(), 9))
     for line, table in zip(rows, each, strict=True):
         line[: table.rows.shape[1]] = table.rows[0]
-    columns = [computer_columns(loop.controller) for loop in loops]
-    return _table(rows, count, np.arange(len(each)), columns)
+    first = LoopTable._fields.index("period")
+    return _table(rows, count, np.arange(len(each)), [ComputerColumns(*table[first:]) for table in each])
 
 
 def loop_table(rows: Floats, section_count: Whole, controller: Controller) -> LoopTable:

@@ -257,7 +257,7 @@ def _fit(
     try:
         model = Loop(plant, controller)
         chart, tracer = stability_chart(model, decay=False), Tracer(model)
-    except ChartError as problem:
+    except (ChartError, ModelError) as problem:
         return Fit(key, label, none, none, (), str(problem))
 
     def fits(frequency: float) -> bool:
