@@ -29,6 +29,7 @@ class ControlledLoop:
     operator: Operator | None
     controller: Controller
     loop: Loop = field(init=False)
+    steps: dict[float, tuple[np.ndarray, np.ndarray]] = field(init=False, default_factory=dict)
 
     def __post_init__(self):
         held = self.device if self.operator is None else attach(self.device, self.operator)
@@ -249,7 +250,10 @@ class Period:
 
     def move(self, time, command):
         if time > 0.0:
-            F, g = systems.held_step(self.plant, time, self.c.actuator_time_constant)
+            known, key = self.case.steps, float(f"{time:.13g}")
+            if key not in known:
+                known[key] = systems.held_step(self.plant, time, self.c.actuator_time_constant)
+            F, g = known[key]
             self.x = F @ self.x + np.multiply.outer(g, command)
 
 

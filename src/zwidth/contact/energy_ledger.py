@@ -9,7 +9,7 @@ each step of the way is charged with the difference it makes:
     velocity estimate    the estimate from true readings instead of the velocity
     quantiser            counted readings (and their noise) instead of true ones
     passivity controller what it adds
-    actuator             delay, filter, limit and lag, fixed feedback beside the wall (force sensor, feedforward, local
+    actuator             delay, filter, limit and lag, feedback beside the wall (force sensor, feedforward, local
                          loop), and that the actuator is not where the sensor is
 
 Hand, friction, brakes and bent springs hold their force over a substep, so that their work is force times motion;

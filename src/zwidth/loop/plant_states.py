@@ -20,7 +20,12 @@ from zwidth.loop.coupled_hold import step_growth
 from zwidth.loop.hold import modal_row, mode_growth
 from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.loop.sections import equal_modes
-from zwidth.model.first_order_form import FirstOrderForm, first_order_form, without_hidden_poles
+from zwidth.model.first_order_form import (
+    SECOND_UNREAD,
+    FirstOrderForm,
+    first_order_form,
+    without_hidden_poles,
+)
 from zwidth.model.modes import UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes
 from zwidth.model.plant import Plant
 
@@ -103,9 +108,9 @@ def _modal_states(modes: RealModes, period: float, rows: Floats) -> PlantStates:
     """
     a, squared, T = modes.decay, modes.frequency_squared, period
     force = np.array([rows[2] - squared * rows[0], rows[1] - 2.0 * a * rows[0]])  # per place and velocity
-    reach = np.abs(modes.input).sum() * np.array(
-        [np.abs(modes.output).sum() * T**2, np.abs(force).sum(axis=1) @ [T**2, T]]
-    )
+    # the force per force counts itself: a feedback moves poles by what it reads of them
+    together = np.abs(modes.input).sum() * np.abs(modes.output).sum()
+    reach = np.array([together * T**2, SECOND_UNREAD / UNOBSERVED_UNDAMPED])
     kept, hidden, names = [], list[float](), list[str]()
     for group in equal_modes(modes):
         one = group[0]

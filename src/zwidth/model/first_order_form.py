@@ -17,6 +17,7 @@ Complexes = NDArray[np.complex128]
 SHARED = 1e-3
 ZERO = 1e-13  # a pole below this share of the largest is a rounded zero
 UNREAD = 1e-12  # share of a sensor's reading that is rounding
+SECOND_UNREAD = 1e-10  # what a second reading, of a force per force, may show of an undamped motion that is hidden
 ROUNDING = 1e-13  # of a residue, in shares of the terms that it is summed from
 
 
@@ -54,7 +55,7 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
     reads, one state for all of them. Hidden is a pole that moves the reading within a period T [s] by no more than
     rounding.
 
-    second_reading  (3, n)  weights of x'', x' and x; a pole is hidden only if it moves this reading neither. Of
+    second_reading  (3, n)  weights of x'', x' and x in a force; a pole is hidden only if it moves this neither. Of
                             motions without springs it must read no place, of those without dampers no velocity
     """
     free, braked, elastic = _motions(plant)
@@ -71,8 +72,8 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
         second = _second_output(A, elastic, damped_or_elastic, len(plant.lagged_dampers), period, second_reading)
         direct = float(second_reading[0] @ np.linalg.solve(plant.mass, plant.actuator))
         if np.any(second):
-            reach = float(np.abs(second) @ np.abs(source)) * period
-            hidden &= _poles(A, source, second, period, reach)[1]
+            # a feedback of it moves poles by what it reads of them: here that counts itself, not a share of all
+            hidden &= _poles(A, source, second, period, SECOND_UNREAD / UNOBSERVED_UNDAMPED)[1]
     unread = np.zeros(2 * damped_or_elastic.shape[1] + len(plant.lagged_dampers) - len(A), dtype=complex)
     hidden_poles = np.concatenate([poles[hidden], unread])
     free_count = int(free.shape[1])
