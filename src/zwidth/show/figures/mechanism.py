@@ -75,7 +75,7 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
 def _axis_stroke(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> Floats:
     """The joint's axis through its origin, (2, 3), where there is nothing else to draw."""
     axis = points_of_links.rotation[link] @ mechanism.links.axis[link]
-    return points_of_links.origin[link] + AXIS_LENGTH * np.array([-axis, axis])
+    return np.asarray(points_of_links.origin[link] + AXIS_LENGTH * np.array([-axis, axis]))
 
 
 def drawn_links(mechanism: Mechanism) -> list[int]:
