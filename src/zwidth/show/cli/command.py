@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import click
 
-from zwidth.moment_units import keys_of_moments, speaking_of_moments
 from zwidth.show.cli.answer import Answer, deliver
 from zwidth.show.cli.errors import NoAnswer, translate_errors
 from zwidth.show.cli.first_use import announce_compiling
 from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.progress import show_progress
+from zwidth.show.moment_units import keys_of_moments, speaking_of_moments
 from zwidth.show.output import DATA, FIGURES, destination, printable, write_data
 
 if TYPE_CHECKING:
