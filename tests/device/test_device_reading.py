@@ -77,7 +77,7 @@ def test_a_directory_is_no_device(tmp_path):
     [
         ("fivebar", "did you mean 'five-bar'?"),
         ("./five-bar.toml", "did you mean 'five-bar'?"),
-        ("nothing/like/it.toml", "is neither a file nor a bundled device; bundled: five-bar, "),
+        ("nothing/like/it.toml", "is neither a file nor a bundled device; bundled: da-vinci-mtm, five-bar, "),
         ("a" * 5000, "cannot be read: file name too long"),
         ("five-bar/x\\y", "is neither"),
     ],
@@ -88,7 +88,7 @@ def test_a_missing_file_leads_to_the_bundled_ones(path, words):
 
 def test_an_empty_name_is_called_one():
     with pytest.raises(
-        DeviceError, match=r"^device: the name is empty; give a device file, or a bundled name: five-bar"
+        DeviceError, match=r"^device: the name is empty; give a device file, or a bundled name: da-vinci-mtm, five-bar"
     ):
         load("")
 

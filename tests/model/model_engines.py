@@ -24,6 +24,8 @@ from zwidth.model.mechanism import (
     REVOLUTE,
 )
 
+NEARLY_NOTHING = 1e-14  # kg and kg m^2 of a massless link: this engine wants some
+
 
 def moving_links(mechanism):
     return [i for i in range(len(mechanism.links.names)) if mechanism.links.joint[i] != FIXED]
@@ -95,7 +97,7 @@ def mjcf(mechanism):
         tag = (
             f'<joint name="{i}" type="{"slide" if kind == PRISMATIC else "hinge"}" axis="{text(links.axis[i])}"/>'
         )
-        if links.mass[i] == 0.0 and not links.inertia[i].any():  # the cross of a universal joint
+        if links.names[i].partition("/")[0] != links.names[i]:  # the cross of a universal joint
             more, last = joints_of(i + 1)
             return tag + more, last
         return tag, i
@@ -104,11 +106,16 @@ def mjcf(mechanism):
         joints, i = joints_of(first)
         # principal axes outright: the engine finds its own to ten digits
         moments, axes = np.linalg.eigh(links.inertia[i])
+        if (
+            moments[0] == moments[1] == 0.0
+        ):  # one number, about the only axis it turns about: any round body has it
+            moments[:2] = moments[2]
+        moments, mass = np.maximum(moments, NEARLY_NOTHING), max(links.mass[i], NEARLY_NOTHING)
         axes[:, 2] *= np.linalg.det(axes)
         children = "".join(body(j) for j in range(len(links.names)) if links.parent[j] == i)
         return (
             f'<body pos="{text(links.origin[first])}" quat="{text(quaternion(links.rotation[first]))}">{joints}'
-            f'<inertial pos="{text(links.center_of_mass[i])}" mass="{text(links.mass[i])}" '
+            f'<inertial pos="{text(links.center_of_mass[i])}" mass="{text(mass)}" '
             f'diaginertia="{text(moments)}" quat="{text(quaternion(axes))}"/>{"".join(inside[i])}{children}</body>'
         )
 

@@ -288,6 +288,8 @@ def _couplings(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str
     """Drives that turn with other joints, which are driven or free; motors on links that exist."""
     free = {link["name"] for _, link in tables(mechanism, "links") if link.get("free") is True and "name" in link}
     for index, drive in tables(mechanism, "drives"):
+        if table(drive, "coupling") and "transmission_ratio" not in drive:
+            yield ("mechanism", "drives", index, "transmission_ratio"), "is missing; coupling needs it"
         for name in table(drive, "coupling"):
             path: KeyPath = ("mechanism", "drives", index, "coupling", name)
             if name not in links:

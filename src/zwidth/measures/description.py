@@ -23,7 +23,8 @@ class Description(Result):
     """Masses and stiffness felt along the direction, frequencies, and the mechanism's dexterity.
 
     effective            masses [kg] and stiffness [N/m]; nan where inapplicable
-    natural_frequencies  (n,)  of the device without its operator [Hz]; rigid modes exactly 0
+    natural_frequencies  (n,)  of the device without its operator [Hz]; rigid modes exactly 0; none where the
+                         file gives no masses, as of which all that needs them is nan or None
     damping_ratios       of each frequency, None for rigid ones; None where damping couples the modes
     joints               angle of each joint by its link [rad], of a prismatic one the way [m], a list of those of
                          a joint with several; None for a device without a mechanism, as all below
@@ -65,6 +66,10 @@ class Description(Result):
 
     def __repr__(self) -> str:
         felt = self.effective
+        if not self.natural_frequencies.size:
+            return (
+                f"Description: no masses; manipulability {self.manipulability:.4g}, isotropy {self.isotropy:.4g}"
+            )
         masses = f"{felt.link_side_mass:.4g} kg link side, {felt.motor_side_mass:.4g} kg motor side"
         frequencies = ", ".join(f"{f:.4g}" for f in self.natural_frequencies[:8])
         more = ", ..." if len(self.natural_frequencies) > 8 else ""
@@ -80,20 +85,28 @@ class Description(Result):
 def describe(point: OperatingPoint) -> Description:
     """Describe the device at one operating point, without its operator.
 
+    A file that gives no masses leaves the kinematic part.
+
     Raises  what `OperatingPoint.plant` raises
     """
     require("point", point, OperatingPoint)
-    plant = point.ungripped_plant
-    common = point.effective, natural_frequencies(plant), damping_ratios(plant)
+    massless = "dynamics" in point.missing
+    if massless:
+        unknown = np.asarray(np.nan)
+        common: tuple[EffectiveParameters, Floats, list[float | None] | None]
+        common = EffectiveParameters(unknown, unknown, unknown, unknown), np.zeros(0), None
+    else:
+        plant = point.ungripped_plant
+        common = point.effective, natural_frequencies(plant), damping_ratios(plant)
     if point.mechanism is None or point.posture is None:
         return Description(*common)
     return Description(
         *common,
         joints=joint_coordinates(point.mechanism, point.posture.angles),
         jacobian=point.jacobian,
-        mass_matrix=point.mass_matrix,
+        mass_matrix=None if massless else point.mass_matrix,
         manipulability=float(dexterity.manipulability(point)),
-        dynamic_manipulability=float(dexterity.dynamic_manipulability(point)),
+        dynamic_manipulability=None if massless else float(dexterity.dynamic_manipulability(point)),
         isotropy=float(dexterity.isotropy(point)),
     )
 
