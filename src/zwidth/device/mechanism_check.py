@@ -92,9 +92,9 @@ def _freedom(mechanism: Mechanism, mech: MechanismArrays, angles: Floats) -> Key
             f"({plural(m, 'joint coordinate')} less {m - freedom} held by loops); {advice}",
         )
         return
-    if np.isnan(mech.mass).any() or np.isnan(mech.inertia).any():
-        return
     M = motions.T @ joint_mass_matrix(mechanism, angles) @ motions
+    if np.isnan(M).any():  # masses, rotors or ratios are not known
+        return
     eigenvalues = np.linalg.eigvalsh(M)
     if not eigenvalues[0] > freedom * np.finfo(float).eps * eigenvalues[-1]:
         yield (

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-from zwidth.device.faults import KeyPath, dotted
+from zwidth.device.faults import KeyPath, comma_list, dotted
 from zwidth.device.legs import members, written
 from zwidth.device.toml_access import table
 
@@ -57,11 +57,19 @@ class Unknown:
 
     group       dotted path, with * for all of them;   paths  of each that lacks it
     needed_for  what cannot be answered, or how it is answered without, as a clause
+    count       how many of the group there are
     """
 
     group: str
     paths: tuple[str, ...]
     needed_for: str
+    count: int = 1
+
+    @property
+    def names(self) -> str:
+        """Which of several lack it: "all", or their names."""
+        names = [path.split(".")[-2] for path in self.paths]
+        return "all" if len(names) == self.count else comma_list(names, 6)
 
 
 # Key of the links, drives or computer -> what it is needed for, or what is taken instead.
@@ -91,7 +99,7 @@ def unknown_numbers(document: dict[str, Any]) -> list[Unknown]:
             paths = [("mechanism", *path, key) for path, entry in entries if key not in entry]
             if paths:
                 named = tuple(dotted(path, document) for path in paths)
-                found.append(Unknown(f"mechanism.{group}.*.{key}", named, NEEDED_FOR[key]))
+                found.append(Unknown(f"mechanism.{group}.*.{key}", named, NEEDED_FOR[key], len(entries)))
     if "sampling_period_s" not in table(document, "loop"):
         found.append(Unknown(dotted(PERIOD), (dotted(PERIOD),), NEEDED_FOR["sampling_period_s"]))
     return found

@@ -22,7 +22,8 @@ from zwidth.result import Result
 class Description(Result):
     """Masses and stiffness felt along the direction, frequencies, and the mechanism's dexterity.
 
-    effective            masses [kg] and stiffness [N/m]; nan where inapplicable
+    effective            masses [kg] and stiffness [N/m]; nan where inapplicable; None, as all that needs masses, for
+                         a device of which only the geometry is known
     natural_frequencies  (n,)  of the device without its operator [Hz]; rigid modes exactly 0
     damping_ratios       of each frequency, None for rigid ones; None where damping couples the modes
     joints               angle of each joint by its link [rad]; None for a device without a mechanism, as all below
@@ -30,8 +31,8 @@ class Description(Result):
     manipulability, dynamic_manipulability, isotropy   see `measures.dexterity`
     """
 
-    effective: EffectiveParameters
-    natural_frequencies: Floats
+    effective: EffectiveParameters | None
+    natural_frequencies: Floats | None
     damping_ratios: list[float | None] | None
     joints: dict[str, float] | None = None
     jacobian: Floats | None = None
@@ -44,10 +45,10 @@ class Description(Result):
         """The numbers by key and unit; None where inapplicable."""
         felt = self.effective
         return {
-            "link_side_mass_kg": felt.link_side_mass,
-            "motor_side_mass_kg": felt.motor_side_mass,
-            "rigid_mass_kg": felt.rigid_mass,
-            "stiffness_N_per_m": felt.stiffness,
+            "link_side_mass_kg": felt and felt.link_side_mass,
+            "motor_side_mass_kg": felt and felt.motor_side_mass,
+            "rigid_mass_kg": felt and felt.rigid_mass,
+            "stiffness_N_per_m": felt and felt.stiffness,
             "natural_frequencies_Hz": self.natural_frequencies,
             "damping_ratios": self.damping_ratios,
             "joints_rad": self.joints,
@@ -63,37 +64,47 @@ class Description(Result):
         return entries(self.document())
 
     def __repr__(self) -> str:
-        felt = self.effective
-        masses = f"{felt.link_side_mass:.4g} kg link side, {felt.motor_side_mass:.4g} kg motor side"
-        frequencies = ", ".join(f"{f:.4g}" for f in self.natural_frequencies[:8])
-        more = ", ..." if len(self.natural_frequencies) > 8 else ""
-        lines = [
-            f"Description: {felt.rigid_mass:.4g} kg rigid ({masses}), {felt.stiffness:.5g} N/m between",
-            f"natural frequencies {frequencies}{more} Hz",
-        ]
+        lines = [*self._masses()]
         if self.manipulability is not None:
             lines.append(f"manipulability {self.manipulability:.4g}, isotropy {self.isotropy:.4g}")
         return "\n  ".join(lines)
 
+    def _masses(self) -> Iterator[str]:
+        felt = self.effective
+        if felt is None or self.natural_frequencies is None:
+            yield "Description: masses not known"
+            return
+        masses = f"{felt.link_side_mass:.4g} kg link side, {felt.motor_side_mass:.4g} kg motor side"
+        frequencies = ", ".join(f"{f:.4g}" for f in self.natural_frequencies[:8])
+        more = ", ..." if len(self.natural_frequencies) > 8 else ""
+        yield f"Description: {felt.rigid_mass:.4g} kg rigid ({masses}), {felt.stiffness:.5g} N/m between"
+        yield f"natural frequencies {frequencies}{more} Hz"
+
 
 def describe(point: OperatingPoint) -> Description:
-    """Describe the device at one operating point, without its operator.
+    """Describe the device at one operating point, without its operator; of a device whose masses are not known its
+    geometry alone.
 
     Raises  what `OperatingPoint.plant` raises
     """
     require("point", point, OperatingPoint)
-    plant = point.ungripped_plant
-    common = point.effective, natural_frequencies(plant), damping_ratios(plant)
+    known = "dynamics" not in point.missing
+    plant = point.ungripped_plant if known else None
+    felt = point.effective if known else None
+    frequencies = None if plant is None else natural_frequencies(plant)
+    ratios = None if plant is None else damping_ratios(plant)
     if point.mechanism is None or point.posture is None:
-        return Description(*common)
+        return Description(felt, frequencies, ratios)
     J, names = point.jacobian, point.mechanism.links.names
     return Description(
-        *common,
+        felt,
+        frequencies,
+        ratios,
         joints=dict(zip(names, point.posture.angles.tolist(), strict=True)),
         jacobian=J,
-        mass_matrix=point.mass_matrix,
+        mass_matrix=point.mass_matrix if known else None,
         manipulability=float(manipulability(J)),
-        dynamic_manipulability=float(dynamic_manipulability(J, point.whole_mass_matrix)),
+        dynamic_manipulability=float(dynamic_manipulability(J, point.whole_mass_matrix)) if known else None,
         isotropy=float(isotropy(J)),
     )
 

@@ -17,7 +17,7 @@ from zwidth.device.robot_files.robot import WARNING, Finding
 LEAST: Final = 1e-14  # of masses and moments that count as given; MuJoCo refuses less
 MESH_KINDS: Final = ("mjGEOM_MESH", "mjGEOM_HFIELD", "mjGEOM_SDF")
 ASSETS: Final = ("skins", "flexes", "meshes", "hfields", "materials", "textures")
-ROUNDED: Final = 0.01  # excess of a largest moment, relative, that rounding of the numbers explains
+ROUNDED: Final = 1e-9  # share of the largest moment, below which an excess is rounding
 
 
 @dataclass
@@ -161,38 +161,30 @@ def _leave_meshes_out(mujoco: Any, spec: Any) -> None:
 
 
 def _possible_moments(spec: Any, label: str) -> list[Finding]:
-    """Lower a largest moment that rounding put above the sum of the other two; refuse what no body has."""
+    """Lower a largest moment that is above the sum of the other two to that sum, and tell it; MuJoCo would refuse
+    it. Raises DeviceError for negative ones."""
     found, faults = [], []
     for body in spec.bodies:
         if not body.explicitinertial or spec.compiler.balanceinertia:
             continue
-        full = not np.isnan(body.fullinertia[0])
-        moments, axes = np.linalg.eigh(matrix_of_six(body.fullinertia)) if full else (np.array(body.inertia), None)
-        largest, rest = moments.max(), moments.sum() - moments.max()
+        full, axes = not np.isnan(body.fullinertia[0]), np.eye(3)
+        moments = np.array(body.inertia)
+        if full:
+            moments, axes = np.linalg.eigh(matrix_of_six(body.fullinertia))
+        place, rest = int(np.argmax(moments)), float(moments.sum() - moments.max())
         listed = ", ".join(f"{moment:.6g}" for moment in sorted(moments))
-        if moments.min() < 0.0 or largest > rest * (1.0 + ROUNDED) / (1.0 - ROUNDED):
-            wrong = "has a negative moment" if moments.min() < 0.0 else "has one above the sum of the other two"
-            faults.append(
-                Fault(
-                    label,
-                    f"body '{body.name}'",
-                    f"has the principal moments of inertia {listed} kg m^2; no body {wrong}: correct its inertia",
-                )
-            )
-        elif largest > rest and not full:
-            body.inertia = np.where(moments == largest, rest, moments)
-        elif largest > rest:
-            moments[-1] = rest
-            body.fullinertia = six_of_matrix(axes @ np.diag(moments) @ axes.T)
-        if not faults and largest > rest * (1.0 + 1e-9):
-            found.append(
-                Finding(
-                    f"body '{body.name}'",
-                    f"has the principal moments of inertia {listed} kg m^2, of which the largest is above the sum of "
-                    f"the other two, as of no body; {rest:.6g} is taken for it",
-                    WARNING,
-                )
-            )
+        where, what = f"body '{body.name}'", f"has the principal moments of inertia {listed} kg m^2"
+        if moments.min() < -ROUNDED * moments.max():
+            faults.append(Fault(label, where, f"{what}; no body has a negative one: correct its inertia"))
+        elif moments[place] > rest:
+            if moments[place] > rest * (1.0 + ROUNDED):
+                told = "no body has one above the sum of the other two"
+                found.append(Finding(where, f"{what}; {told}, {rest:.6g}, which is taken", WARNING))
+            moments[place] = rest * (1.0 - 1e-14)
+            if not full:
+                body.inertia = moments
+            else:
+                body.fullinertia = six_of_matrix(axes @ np.diag(moments) @ axes.T)
     if faults:
         raise DeviceError(faults)
     return found

@@ -11,6 +11,7 @@ import numpy as np
 
 from zwidth.device.faults import DeviceError, Fault, comma_list, fail, suggestion
 from zwidth.device.robot_files import freedom
+from zwidth.device.robot_files.followers import settle_followers, write_linkages
 from zwidth.device.robot_files.freedom import Motions
 from zwidth.device.robot_files.links import LinkTree, Shape, link_tree, listed, merge_universal, moving_bodies
 from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot, roll_pitch_yaw_of
@@ -59,12 +60,14 @@ def decide(robot: Robot, choices: Choices) -> Decided:
 
     Raises DeviceError  with what cannot be decided, or cannot be written
     """
+    settle_followers(robot)
     fixed = _fixed(robot, choices.fixed)
     handle = find_handle(robot, choices.handle)
     if handle[0] not in moving_bodies(robot, fixed):
         raise fail(robot.label, f"'{choices.handle or 'handle'}'", f"does not move; {_handles(robot)}")
     if sum(len(body.joints) for body in robot.bodies) > MOST_COORDINATES:
         raise fail(robot.label, "", f"has more than {MOST_COORDINATES} joints, more than a device file is for")
+    write_linkages(robot)
     motors = _motors(robot, fixed)
     shape = Shape(fixed=fixed)
     _leave_out_fixed_loops(robot, shape)
@@ -108,18 +111,6 @@ def _fixed(robot: Robot, names: Sequence[str]) -> frozenset[str]:
         if not one.leader:
             robot.note(one.where, f"holds '{one.joint}' where it stands; it is written as fixed")
     robot.followers = [one for one in left if one.joint not in held]
-    faults = [
-        Fault(
-            robot.label,
-            one.where,
-            f"lets '{one.joint}' follow '{one.leader}' by the ratio {one.ratio:.6g}"
-            f"{'' if one.linear else ' and a curve'}, which a device file cannot hold here; hold both still with "
-            f"fix={one.joint}, or write the linkage between them as a loop",
-        )
-        for one in robot.followers
-    ]
-    if faults:
-        raise DeviceError(faults)
     return frozenset(held)
 
 
@@ -246,7 +237,12 @@ def _check_loops(robot: Robot, motions: Motions) -> None:
 
 def _assumed(robot: Robot, tree: LinkTree, motions: Motions) -> list[Motor]:
     """As many driven joints as the loops leave freedom, those next to the base first."""
-    singles = [name for name, (_, joint) in robot.joints.items() if joint.single and name in tree.link_of]
+    followers = {one.joint for one in robot.followers}
+    singles = [
+        name
+        for name, (_, joint) in robot.joints.items()
+        if joint.single and name in tree.link_of and name not in followers
+    ]
     groups = [motions.rows(tree.link_of[name]) for name in singles]
     return [Motor(singles[k], singles[k]) for k in freedom.independent(motions.basis, groups)]
 

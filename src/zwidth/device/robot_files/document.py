@@ -36,13 +36,14 @@ def _drives(robot: Robot, decided: Decided, names: LinkTree) -> list[dict[str, A
     """The drives; rotor and ratio are given for all of them or for none."""
     motors, tree = decided.motors, decided.tree
     ratios = all(motor.turns for motor in motors)
-    rotors = ratios and any((motor.inertia or 0.0) > 0.0 for motor in motors)
+    inertias = [_rotor(robot, motor) for motor in motors]
+    rotors = ratios and any(inertias)
     tables = []
-    for motor in motors:
+    for motor, inertia in zip(motors, inertias, strict=True):
         table: dict[str, Any] = {"name": names.name(motor.name), "joint": tree.link_of[motor.joint]}
         if rotors:
-            table["motor_inertia_kg_m2"] = float(motor.inertia or 0.0)
-            if not motor.inertia:
+            table["motor_inertia_kg_m2"] = inertia
+            if not inertia:
                 robot.warn(f"actuator '{motor.name}'", "has no armature, which others have; its rotor is taken as 0")
         if ratios:
             table["transmission_ratio"] = motor.turns[motor.joint]
@@ -57,6 +58,17 @@ def _drives(robot: Robot, decided: Decided, names: LinkTree) -> list[dict[str, A
     return tables
 
 
+def _rotor(robot: Robot, motor: Motor) -> float:
+    """Inertia of the rotor at the motor: its own, and the armature of the joint that it drives alone, and of those
+    that follow this, over the square of the ratio."""
+    own = float(motor.inertia or 0.0)
+    if len(motor.turns) != 1:
+        return own
+    joints = robot.joints
+    led = sum(one.ratio**2 * joints[one.joint][1].armature for one in robot.followers if one.leader == motor.joint)
+    return float(own + (joints[motor.joint][1].armature + led) / motor.turns[motor.joint] ** 2)
+
+
 def _torque(robot: Robot, motor: Motor) -> float | None:
     """Largest torque at the motor: its own, or what its joint bears."""
     if motor.torque is not None or not motor.turns:
@@ -68,6 +80,7 @@ def _torque(robot: Robot, motor: Motor) -> float | None:
 def _tell_of_armature(robot: Robot, decided: Decided) -> None:
     """Armature of joints that no motor has for itself: a device file has rotors, not joints with inertia."""
     own = {motor.joint for motor in decided.motors if len(motor.turns) == 1}
+    own |= {one.joint for one in robot.followers if one.leader in own}
     left = [
         f"{name} {joint.armature:.4g}"
         for name, (_, joint) in robot.joints.items()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from zwidth.device.faults import DeviceError, Fault, fail
+from zwidth.device.faults import DeviceError, Fault, comma_list, fail, suggestion
 from zwidth.device.load import from_document
 from zwidth.device.missing import unknown_numbers
 from zwidth.device.plausibility import implausible
@@ -47,6 +47,7 @@ def import_file(
     handle: str | None = None,
     controls: str | None = None,
     keyframe: str | None = None,
+    posture: Mapping[str, float] | None = None,
     fix: Sequence[str] = (),
 ) -> ImportedDevice:
     """The device file of an MJCF or URDF file; nothing is written.
@@ -58,6 +59,8 @@ def import_file(
     controls  what of the handle the drives control, "position", "orientation" or "pose"; left out: the least that
               tells all of them
     keyframe  name of the keyframe that is the reference posture; left out: all joints as the file has them
+    posture   joint name -> coordinate of the reference posture, as the file counts it [rad], of a joint that slides
+              [m]; other joints stay, and loops are closed from there
     fix       names of joints, or of bodies with their joints, that are held where they stand
     Raises    DeviceError  with all faults of the file, or of the device that it describes
               ValueError   for other controls
@@ -75,6 +78,7 @@ def import_file(
     else:
         included_files(root, Path(path).parent, label)
         robot = _read_mjcf(Path(path), root.get("model") or Path(path).stem, label, keyframe)
+    _put_joints(robot, posture or {})
     decided = decide(robot, Choices(handle, controls, tuple(fix)))
     _tell_of_decisions(robot, decided)
     document = document_of(robot, decided, f"imported from {Path(label).name}")
@@ -83,8 +87,37 @@ def import_file(
     unknown = unknown_numbers(document)
     for entry in unknown:
         robot.note(entry.group, f"is not in the file; {entry.needed_for}")
-    findings = list(dict.fromkeys(robot.findings))
+    findings = merged(robot.findings)
     return ImportedDevice(document, device_text(document, findings), findings, [k for e in unknown for k in e.paths])
+
+
+def merged(findings: Sequence[Finding]) -> list[Finding]:
+    """The findings with those that say the same of several places made one; warnings first."""
+    places: dict[tuple[str, str], list[str]] = {}
+    for one in findings:
+        of_same = places.setdefault((one.severity, one.what), [])
+        if one.where not in of_same:
+            of_same.append(one.where)
+    made = [Finding(comma_list(where, 6), what, severity) for (severity, what), where in places.items()]
+    return sorted(made, key=lambda one: one.severity != WARNING)
+
+
+def _put_joints(robot: Robot, posture: Mapping[str, float]) -> None:
+    """Put joints of one coordinate where the user wants them. Raises DeviceError for others."""
+    singles = {name for name, (_, joint) in robot.joints.items() if joint.single}
+    faults = [
+        Fault(robot.label, "posture", f"'{name}' is no joint that turns or slides; {suggestion(name, singles, 'joints')}")
+        for name in posture
+        if name not in singles
+    ]
+    if faults:
+        raise DeviceError(faults)
+    for i, body in enumerate(robot.bodies):
+        joints = tuple(
+            replace(joint, value=float(posture[joint.name]) - joint.rest) if joint.name in posture else joint
+            for joint in body.joints
+        )
+        robot.bodies[i] = replace(body, joints=joints)
 
 
 def _read_mjcf(path: Path, name: str, label: str, keyframe: str | None) -> Robot:

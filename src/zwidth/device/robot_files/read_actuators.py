@@ -51,7 +51,7 @@ def _motor(mujoco: Any, model: Any, a: int, robot: Robot) -> Motor | None:
     if int(model.actuator_dyntype[a]) != int(mujoco.mjtDyn.mjDYN_NONE):
         robot.note(where, "has a lag; it is left out: loop.actuator.time_constant_s holds one")
     return Motor(
-        name or joint, joint, turns, _rotor(model, a, turns, joint, robot), _torque(mujoco, model, a, turns[joint])
+        name or joint, joint, turns, _rotor(mujoco, model, a), _torque(mujoco, model, a, turns[joint])
     )
 
 
@@ -77,11 +77,11 @@ def _fixed_tendon(mujoco: Any, model: Any, tendon: int) -> dict[int, float]:
     return {int(model.wrap_objid[k]): float(model.wrap_prm[k]) for k in steps}
 
 
-def _rotor(model: Any, a: int, turns: dict[str, float], joint: str, robot: Robot) -> float:
-    """Inertia of the rotor at the motor: the armature of its joint over gear^2, and its own."""
+def _rotor(mujoco: Any, model: Any, a: int) -> float:
+    """Inertia of the rotor at the motor that the file gives the motor, or its tendon; that of joints comes to it."""
     own = float(model.actuator_armature[a]) if hasattr(model, "actuator_armature") else 0.0
-    if len(turns) == 1:
-        return own + robot.joints[joint][1].armature / turns[joint] ** 2
+    if int(model.actuator_trntype[a]) != int(mujoco.mjtTrn.mjTRN_TENDON):
+        return own
     tendon = int(model.actuator_trnid[a, 0])
     along = float(model.tendon_armature[tendon]) if hasattr(model, "tendon_armature") else 0.0
     return own + along / float(model.actuator_gear[a, 0]) ** 2
@@ -187,6 +187,7 @@ def _follow(model: Any, e: int, name: str, robot: Robot) -> None:
             model.joint(joint).name,
             "" if leader < 0 else model.joint(leader).name,
             float(coefficients[1]),
+            float(coefficients[0]),
             linear=not coefficients[2:].any(),
         )
     )

@@ -86,7 +86,7 @@ def _joint(model: Any, j: int, place: Place, qpos: Floats) -> RobotJoint:
     kind = KINDS[int(model.jnt_type[j])]
     at, dof = int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])
     value: Any
-    limits = None
+    limits, rest = None, 0.0
     if kind == "free":
         way = place.turn.T @ (qpos[at : at + 3] - place.at)
         turn = place.turn.T @ rotation_of_quaternion(qpos[at + 3 : at + 7])
@@ -113,6 +113,7 @@ def _joint(model: Any, j: int, place: Place, qpos: Floats) -> RobotJoint:
         coulomb=float(model.dof_frictionloss[dof]),
         armature=float(model.dof_armature[dof]),
         effort=effort,
+        rest=rest,
     )
 
 

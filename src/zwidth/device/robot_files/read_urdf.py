@@ -120,7 +120,7 @@ def _followers(root: ElementTree.Element) -> list[Follower]:
         if mimic is not None:
             name = joint.get("name", "")
             ratio = _number(mimic, "multiplier", 1.0)
-            found.append(Follower(f"joint '{name}', mimic", name, mimic.get("joint", ""), ratio))
+            found.append(Follower(f"joint '{name}', mimic", name, mimic.get("joint", ""), ratio, _number(mimic, "offset", 0.0)))
     return found
 
 

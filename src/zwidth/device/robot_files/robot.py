@@ -72,6 +72,7 @@ class RobotJoint:
     stiffness, damping, coulomb   of the joint itself
     armature  inertia that is added at the joint [kg m^2], of a prismatic one [kg]
     effort  largest force or torque at the joint; None: not given
+    rest    coordinate in the file where the device's is 0
     second  second axis of a joint of the kind "universal", two joints in one place that nobody drives
     """
 
@@ -86,6 +87,7 @@ class RobotJoint:
     coulomb: float = 0.0
     armature: float = 0.0
     effort: float | None = None
+    rest: float = 0.0
     second: Floats | None = None
 
     @property
@@ -153,6 +155,7 @@ class Follower:
     joint: str
     leader: str
     ratio: float
+    offset: float = 0.0
     linear: bool = True
 
 

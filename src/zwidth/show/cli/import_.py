@@ -17,7 +17,7 @@ from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Question, refuse_empty
+from zwidth.show.cli.options import PostureType, Question, refuse_empty
 from zwidth.show.output import printable, write_text
 
 if TYPE_CHECKING:
@@ -59,6 +59,11 @@ class ImportCommand(Command):
         ),
         click.option(
             "--keyframe", metavar="NAME", callback=refuse_empty, help="Keyframe that is the reference posture."
+        ),
+        click.option(
+            "--posture",
+            type=PostureType(),
+            help="Joints of the reference posture, as the file counts them [rad] or [m]. Others stay.",
         ),
         click.option(
             "--fix",
@@ -104,6 +109,7 @@ class ImportCommand(Command):
                 handle=case["handle"],
                 controls=case["controls"],
                 keyframe=case["keyframe"],
+                posture=case["posture"],
                 fix=case["fix"],
             )
         except DeviceError as error:

@@ -11,6 +11,7 @@ from zwidth.show.output import DATA, json_value
 from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
+    from zwidth.device.device import Device
     from zwidth.measures.description import Description
     from zwidth.model.mechanism import Floats
 
@@ -36,6 +37,7 @@ class ShowCommand(Command):
         "manipulability",
         "dynamic_manipulability",
         "isotropy",
+        "missing",
         "sources",
     )
 
@@ -43,7 +45,11 @@ class ShowCommand(Command):
         return case.point.describe()
 
     def document(self, case: CommandLine, result: Description) -> dict[str, Any]:
-        return result.document() | {"sources": case.device.sources}
+        from zwidth.device.missing import unknown_numbers
+
+        unknown = unknown_numbers(case.device.document)
+        missing = [{"path": path, "needed_for": one.needed_for} for one in unknown for path in one.paths]
+        return result.document() | {"missing": missing, "sources": case.device.sources}
 
     def table(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> dict[str, list[Any]]:
         from zwidth.measures.description import entries
@@ -52,15 +58,16 @@ class ShowCommand(Command):
 
     def pages(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> Iterator[Any]:
         values = json_value(document)
-        yield two_columns(
-            [
-                ("link side", amount(values["link_side_mass_kg"], "kg")),
-                ("motor side", amount(values["motor_side_mass_kg"], "kg")),
-                ("both, rigid", amount(values["rigid_mass_kg"], "kg")),
-                ("stiffness between", amount(values["stiffness_N_per_m"], "N/m")),
-                ("natural frequencies", ", ".join(_modes(values))),
-            ]
-        )
+        if result.effective is not None:
+            yield two_columns(
+                [
+                    ("link side", amount(values["link_side_mass_kg"], "kg")),
+                    ("motor side", amount(values["motor_side_mass_kg"], "kg")),
+                    ("both, rigid", amount(values["rigid_mass_kg"], "kg")),
+                    ("stiffness between", amount(values["stiffness_N_per_m"], "N/m")),
+                    ("natural frequencies", ", ".join(_modes(values))),
+                ]
+            )
         if result.jacobian is not None:
             units = _dexterity_units(result.jacobian)
             yield two_columns(
@@ -72,8 +79,18 @@ class ShowCommand(Command):
             )
             angles = [(name, amount(angle)) for name, angle in values["joints_rad"].items()]
             yield table(["joint", "angle [rad]"], angles)
+        yield from _missing(case.device)
         if values["sources"]:
             yield table(["numbers", "source"], list(values["sources"].items()))
+
+
+def _missing(device: Device) -> Iterator[Any]:
+    """What the file leaves out, and what for it is needed."""
+    from zwidth.device.missing import unknown_numbers
+
+    unknown = unknown_numbers(device.document)
+    if unknown:
+        yield table(["missing", "of", ""], [(one.group, one.names, one.needed_for) for one in unknown])
 
 
 def _dexterity_units(jacobian: Floats) -> tuple[str, str]:
