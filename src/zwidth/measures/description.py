@@ -22,8 +22,8 @@ from zwidth.result import Result
 class Description(Result):
     """Masses and stiffness felt along the direction, frequencies, and the mechanism's dexterity.
 
-    effective            masses [kg] and stiffness [N/m]; nan where inapplicable; None, as all that needs masses, for
-                         a device of which only the geometry is known
+    effective            masses [kg] and stiffness [N/m]; nan where inapplicable; None, as all that needs masses,
+                         for a device of which only the geometry is known
     natural_frequencies  (n,)  of the device without its operator [Hz]; rigid modes exactly 0
     damping_ratios       of each frequency, None for rigid ones; None where damping couples the modes
     joints               angle of each joint by its link [rad]; None for a device without a mechanism, as all below

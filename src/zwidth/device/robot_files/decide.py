@@ -17,8 +17,11 @@ from zwidth.device.robot_files.links import LinkTree, Shape, link_tree, listed, 
 from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot, roll_pitch_yaw_of
 from zwidth.model.mechanism import Floats
 
-HANDLE_WORDS: Final = re.compile(r"handle|grip|tool|tcp|eef|end.?effector|attachment|stylus|pen|tip", re.IGNORECASE)
+HANDLE_WORDS: Final = re.compile(
+    r"handle|grip|tool|tcp|eef|end.?effector|attachment|stylus|pen|tip", re.IGNORECASE
+)
 MOST_COORDINATES: Final = 200
+MOVES: Final = 1e-6  # part of a motion from which a joint takes part in it
 
 
 @dataclass(frozen=True)
@@ -160,7 +163,8 @@ def _draft(robot: Robot, shape: Shape, handle: tuple[int, Place]) -> tuple[LinkT
     single = next((link["name"] for link in tree.links if link["joint"] in ("revolute", "prismatic")), None)
     if single is None:
         raise fail(robot.label, "", "has no joint that turns about one axis or slides, which a drive needs")
-    section = section_of(robot, tree, handle, "pose", [{"name": "drive", "joint": single}])
+    links = [{key: value for key, value in link.items() if key != "free"} for link in tree.links]
+    section = section_of(robot, tree, handle, "pose", [{"name": "drive", "joint": single}]) | {"links": links}
     return tree, freedom.motions(section, robot.label)
 
 
@@ -180,7 +184,11 @@ def section_of(
     return section | {
         "handle": held | {"controls": controls},
         "assemblies": {"as-imported": {key: value for key, value in assembly.items() if value}},
-        "reference": {"position_m": [0.0, 0.0, 0.0], "orientation_rad": [0.0, 0.0, 0.0], "direction": [1.0, 0.0, 0.0]},
+        "reference": {
+            "position_m": [0.0, 0.0, 0.0],
+            "orientation_rad": [0.0, 0.0, 0.0],
+            "direction": [1.0, 0.0, 0.0],
+        },
         "drives": drives,
     }
 
@@ -260,7 +268,9 @@ def _set_free(
     turned = dict(shape.turned)
     looped = _looped(robot)
     joints = {
-        name: (body, joint) for name, (body, joint) in robot.joints.items() if name in tree.link_of and name not in drives
+        name: (body, joint)
+        for name, (body, joint) in robot.joints.items()
+        if name in tree.link_of and name not in drives
     }
     names = {**{name: name for name in joints}, **{name: name for name in tree.link_of if name not in drives}}
     while left.shape[1]:
@@ -268,11 +278,15 @@ def _set_free(
         whole = [
             name
             for name, (body, joint) in joints.items()
-            if name not in free and not joint.single and body not in looped
+            if name not in free
+            and not joint.single
+            and body not in looped
             and freedom.independent(left, [motions.rows(tree.link_of[name])])
         ]
-        spin = next((name for name in joints if name not in free and _spins(motions, tree, joints, name, left)), None)
-        singles = [name for name in sizes if len(motions.rows(tree.link_of[name])) == 1 and sizes[name] > 1e-6]
+        spin = next(
+            (name for name in joints if name not in free and _spins(motions, tree, joints, name, left)), None
+        )
+        singles = [name for name in sizes if len(motions.rows(tree.link_of[name])) == 1 and sizes[name] > MOVES]
         if whole:
             free.add(whole[0])
             left = freedom.left_over(left, motions.rows(tree.link_of[whole[0]]))
@@ -284,7 +298,8 @@ def _set_free(
             free.add(spin)
             left = _without(left, np.asarray(axis @ left[rows]))
         elif singles:
-            largest = max(singles, key=lambda name: sizes[name])
+            sprung = [name for name in singles if name in joints and joints[name][1].stiffness > 0.0]
+            largest = max(sprung or singles, key=lambda name: sizes[name])
             free.add(largest)
             left = freedom.left_over(left, motions.rows(tree.link_of[largest]))
         else:
@@ -315,7 +330,7 @@ def _spins(motions: Motions, tree: LinkTree, joints: dict[str, Any], name: str, 
     if not turning.shape[1]:
         return False
     values = np.linalg.svd(turning[motions.rows(tree.link_of[name])], compute_uv=False)
-    return bool(values[0] > 1e-6 and (len(values) == 1 or values[1] <= 1e-6 * values[0]))
+    return bool(values[0] > MOVES and (len(values) == 1 or values[1] <= MOVES * values[0]))
 
 
 def _only_direction(rows: Floats) -> Floats:
@@ -395,7 +410,7 @@ def _not_controlled(
     rank = max(int(np.linalg.matrix_rank(H, tol=1e-6 * max(np.abs(H).max(), 1e-300))) for H in each)
     joints = [names[row].joint for row in kept]
     return (
-        f"has {len(kept)} drives, {comma_list(joints, 12)}, that move the handle in {rank} ways: a posture is asked "
-        f"by the handle, which must tell all of them. Hold {len(kept) - rank} of them still with fix={joints[-1]} or "
-        "another"
+        f"has {len(kept)} drives, {comma_list(joints, 12)}, that move the handle in {rank} ways: a posture is "
+        f"asked by the handle, which must tell all of them. Hold {len(kept) - rank} of them still with "
+        f"fix={joints[-1]} or another"
     )

@@ -44,7 +44,9 @@ def _drives(robot: Robot, decided: Decided, names: LinkTree) -> list[dict[str, A
         if rotors:
             table["motor_inertia_kg_m2"] = inertia
             if not inertia:
-                robot.warn(f"actuator '{motor.name}'", "has no armature, which others have; its rotor is taken as 0")
+                robot.warn(
+                    f"actuator '{motor.name}'", "has no armature, which others have; its rotor is taken as 0"
+                )
         if ratios:
             table["transmission_ratio"] = motor.turns[motor.joint]
         if ratios and len(motor.turns) > 1:
@@ -115,6 +117,7 @@ def _direction(robot: Robot, decided: Decided) -> list[float]:
     sizes = np.linalg.norm(decided.columns[:3], axis=1)
     axis = int(np.argmax(np.round(sizes / max(sizes.max(), np.finfo(float).tiny), 6)))
     robot.note(
-        "mechanism.reference.direction", f"is not of the file; {'xyz'[axis]} is taken, along which the handle moves most"
+        "mechanism.reference.direction",
+        f"is not of the file; {'xyz'[axis]} is taken, along which the handle moves most",
     )
-    return np.eye(3)[axis].tolist()
+    return listed(np.eye(3)[axis])

@@ -57,21 +57,18 @@ def write_linkages(robot: Robot) -> None:
 
     Raises DeviceError  for followers that no linkage stands for
     """
-    faults = []
-    for one in robot.followers:
-        if not _linked(robot, one):
-            faults.append(
-                Fault(
-                    robot.label,
-                    one.where,
-                    f"lets '{one.joint}' follow '{one.leader}' by the ratio {one.ratio:.6g}"
-                    f"{'' if one.linear else ' and a curve'}, which a device file cannot hold; hold both still with "
-                    f"fix={one.joint}, or write the linkage between them as a loop",
-                )
-            )
+    faults = [Fault(robot.label, one.where, _refusal(one)) for one in robot.followers if not _linked(robot, one)]
     if faults:
         raise DeviceError(faults)
     robot.motors = None if robot.motors is None else [_on_leader(robot, motor) for motor in robot.motors]
+
+
+def _refusal(one: Follower) -> str:
+    curve = "" if one.linear else " and a curve"
+    return (
+        f"lets '{one.joint}' follow '{one.leader}' by the ratio {one.ratio:.6g}{curve}, which a device file "
+        f"cannot hold; hold both still with fix={one.joint}, or write the linkage between them as a loop"
+    )
 
 
 def _on_leader(robot: Robot, motor: Motor) -> Motor:
@@ -109,7 +106,8 @@ def _linked(robot: Robot, one: Follower) -> bool:
 
 
 def _anchored(robot: Robot, body: int) -> tuple[int, Place]:
-    """The body that carries this one without a joint between, the farthest such, and the place of this one in it."""
+    """The body that carries this one without a joint between, the farthest such, and the place of this one in
+    it."""
     place = UNMOVED
     while body != BASE and not robot.bodies[body].joints:
         place = robot.bodies[body].place @ place
@@ -168,14 +166,19 @@ def _turn_together(robot: Robot, one: Follower, l: int, f: int) -> bool:
     u, v = of_leader.turn @ leader.axis, of_follower.turn @ follower.axis
     if under_leader == under_follower:
         at_leader, at_follower = (
-            place @ joint_motion(joint, joint.value) for place, joint in ((of_leader, leader), (of_follower, follower))
+            place @ joint_motion(joint, joint.value)
+            for place, joint in ((of_leader, leader), (of_follower, follower))
         )
         keeps, kept, wanted, u = (l, at_leader), (f, at_follower), 1.0, u
     elif under_follower == l:
-        behind = of_leader @ joint_motion(leader, leader.value) @ of_follower @ joint_motion(follower, follower.value)
+        behind = (
+            of_leader @ joint_motion(leader, leader.value) @ of_follower @ joint_motion(follower, follower.value)
+        )
         keeps, kept, wanted, v = (under_leader, UNMOVED), (f, behind), -1.0, of_leader.turn @ v
     elif under_leader == f:
-        behind = of_follower @ joint_motion(follower, follower.value) @ of_leader @ joint_motion(leader, leader.value)
+        behind = (
+            of_follower @ joint_motion(follower, follower.value) @ of_leader @ joint_motion(leader, leader.value)
+        )
         keeps, kept, wanted, u = (under_follower, UNMOVED), (l, behind), -1.0, of_follower.turn @ u
     else:
         return False
@@ -196,6 +199,4 @@ def _keep_orientation(
     e /= np.linalg.norm(e)
     first = _slide(robot, f"{name}-1", keeps[0], Place(np.eye(3), relative.at), e)
     second = _slide(robot, f"{name}-2", first, UNMOVED, np.cross(u, e))
-    robot.closures.append(
-        RobotClosure(name, (second, kept[0]), np.zeros((2, 3)), "frame", turn=relative.turn)
-    )
+    robot.closures.append(RobotClosure(name, (second, kept[0]), np.zeros((2, 3)), "frame", turn=relative.turn))

@@ -1,4 +1,5 @@
-"""What can move in a mechanism: which joints are driven, which are free, and what of the handle the drives control."""
+"""What can move in a mechanism: which joints are driven, which are free, and what of the handle the drives
+control."""
 
 from __future__ import annotations
 
@@ -155,5 +156,6 @@ def controlled(part: Floats) -> bool:
 def idle(H: Floats) -> list[int]:
     """The drives that do not move the handle at all."""
     sizes = np.abs(H).max(axis=0)
-    return [int(k) for k in np.flatnonzero(sizes <= NEGLIGIBLE * max(sizes.max(initial=0.0), np.finfo(float).tiny))]
-
+    return [
+        int(k) for k in np.flatnonzero(sizes <= NEGLIGIBLE * max(sizes.max(initial=0.0), np.finfo(float).tiny))
+    ]

@@ -54,13 +54,13 @@ def import_file(
 
         text = import_file("arm.xml", handle="tool").text
 
-    handle    name of the site or body (in URDF: the link) that is the handle; left out: the only one that is called
-              so, or the last body of a single chain
+    handle    name of the site or body (in URDF: the link) that is the handle; left out: the only one that is
+              called so, or the last body of a single chain
     controls  what of the handle the drives control, "position", "orientation" or "pose"; left out: the least that
               tells all of them
     keyframe  name of the keyframe that is the reference posture; left out: all joints as the file has them
-    posture   joint name -> coordinate of the reference posture, as the file counts it [rad], of a joint that slides
-              [m]; other joints stay, and loops are closed from there
+    posture   joint name -> coordinate of the reference posture, as the file counts it [rad], of a joint that
+              slides [m]; other joints stay, and loops are closed from there
     fix       names of joints, or of bodies with their joints, that are held where they stand
     Raises    DeviceError  with all faults of the file, or of the device that it describes
               ValueError   for other controls
@@ -88,7 +88,9 @@ def import_file(
     for entry in unknown:
         robot.note(entry.group, f"is not in the file; {entry.needed_for}")
     findings = merged(robot.findings)
-    return ImportedDevice(document, device_text(document, findings), findings, [k for e in unknown for k in e.paths])
+    return ImportedDevice(
+        document, device_text(document, findings), findings, [k for e in unknown for k in e.paths]
+    )
 
 
 def merged(findings: Sequence[Finding]) -> list[Finding]:
@@ -106,7 +108,11 @@ def _put_joints(robot: Robot, posture: Mapping[str, float]) -> None:
     """Put joints of one coordinate where the user wants them. Raises DeviceError for others."""
     singles = {name for name, (_, joint) in robot.joints.items() if joint.single}
     faults = [
-        Fault(robot.label, "posture", f"'{name}' is no joint that turns or slides; {suggestion(name, singles, 'joints')}")
+        Fault(
+            robot.label,
+            "posture",
+            f"'{name}' is no joint that turns or slides; {suggestion(name, singles, 'joints')}",
+        )
         for name in posture
         if name not in singles
     ]
@@ -139,12 +145,15 @@ def _tell_of_decisions(robot: Robot, decided: Any) -> None:
         robot.warn("mechanism.drives", f"the file names no motors; these joints are taken to be driven: {joints}")
     if decided.shape.free:
         robot.note(
-            "mechanism.links", f"nobody drives, and no loop determines: {', '.join(sorted(decided.shape.free))}; free"
+            "mechanism.links",
+            f"nobody drives, and no loop determines: {', '.join(sorted(decided.shape.free))}; free",
         )
     if decided.tree.masses_known:
         for body in robot.bodies[1:]:
             if body.mass is None and any(joint.name not in decided.shape.fixed for joint in body.joints):
-                robot.warn(f"body '{body.name}'", "has no mass in the file, as others have; it is taken as massless")
+                robot.warn(
+                    f"body '{body.name}'", "has no mass in the file, as others have; it is taken as massless"
+                )
 
 
 def _checked(document: dict[str, Any], label: str) -> Any:

@@ -161,7 +161,9 @@ def split_joint(joint: RobotJoint) -> Iterator[RobotJoint | Place]:
     if joint.kind == "universal":
         for k, axis in enumerate((joint.axis, joint.second)):
             assert axis is not None
-            yield replace(joint, name=f"{joint.name}-{k + 1}", kind="revolute", axis=axis, value=joint.value[k], second=None)
+            yield replace(
+                joint, name=f"{joint.name}-{k + 1}", kind="revolute", axis=axis, value=joint.value[k], second=None
+            )
         return
     yield joint_motion(joint, joint.value)
     if joint.kind == "free":
@@ -169,7 +171,13 @@ def split_joint(joint: RobotJoint) -> Iterator[RobotJoint | Place]:
             yield replace(plain, name=f"{joint.name}-{letter}", kind="prismatic", axis=axis, value=0.0)
     for letter, axis in zip("xyz", np.eye(3), strict=True):
         yield replace(
-            joint, name=f"{joint.name}-about-{letter}", kind="revolute", axis=axis, value=0.0, armature=0.0, limits=None
+            joint,
+            name=f"{joint.name}-about-{letter}",
+            kind="revolute",
+            axis=axis,
+            value=0.0,
+            armature=0.0,
+            limits=None,
         )
 
 
@@ -243,6 +251,11 @@ def merge_universal(robot: Robot, alone: set[str]) -> None:
         plain = all(
             joint.kind == "revolute" and joint.limits is None and joint.name not in alone for joint in body.joints
         )
-        if plain and same and np.array_equal(one.anchor, two.anchor) and np.linalg.norm(np.cross(one.axis, two.axis)) > 0.1:
+        if (
+            plain
+            and same
+            and np.array_equal(one.anchor, two.anchor)
+            and np.linalg.norm(np.cross(one.axis, two.axis)) > 0.1
+        ):
             both = replace(one, kind="universal", second=two.axis, value=np.array([one.value, two.value]))
             robot.bodies[i] = replace(body, joints=(both,))

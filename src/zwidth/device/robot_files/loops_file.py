@@ -45,11 +45,13 @@ def add_loops(robot: Robot, path: Path) -> None:
     try:
         section = LoopsFile.model_validate(document)
     except ValidationError as error:
-        faults = validation_messages(error, document)
-        raise DeviceError([Fault(label, dotted(place, document), message) for place, message in faults]) from None
+        told = validation_messages(error, document)
+        raise DeviceError(Fault(label, dotted(place, document), message) for place, message in told) from None
     order = {body.name: i for i, body in enumerate(robot.bodies)} | {"base": BASE}
     faults = [
-        Fault(label, f"loops.{loop.name}.links", f"'{name}' is not a link; {suggestion(name, set(order), 'links')}")
+        Fault(
+            label, f"loops.{loop.name}.links", f"'{name}' is not a link; {suggestion(name, set(order), 'links')}"
+        )
         for loop in section.loops
         for name in loop.links
         if name not in order

@@ -23,7 +23,8 @@ def read_actuators(mujoco: Any, model: Any, robot: Robot) -> None:
             continue
         if motor.joint in motors:
             robot.note(
-                f"actuator '{motor.name}'", f"drives the joint of '{motors[motor.joint].name}' too; one drive is made"
+                f"actuator '{motor.name}'",
+                f"drives the joint of '{motors[motor.joint].name}' too; one drive is made",
             )
             continue
         motors[motor.joint] = motor
@@ -50,9 +51,7 @@ def _motor(mujoco: Any, model: Any, a: int, robot: Robot) -> Motor | None:
         robot.note(where, "has a control law of its own (position, velocity or bias); it is left out")
     if int(model.actuator_dyntype[a]) != int(mujoco.mjtDyn.mjDYN_NONE):
         robot.note(where, "has a lag; it is left out: loop.actuator.time_constant_s holds one")
-    return Motor(
-        name or joint, joint, turns, _rotor(mujoco, model, a), _torque(mujoco, model, a, turns[joint])
-    )
+    return Motor(name or joint, joint, turns, _rotor(mujoco, model, a), _torque(mujoco, model, a, turns[joint]))
 
 
 def _turns(mujoco: Any, model: Any, a: int) -> dict[str, float]:
@@ -78,7 +77,8 @@ def _fixed_tendon(mujoco: Any, model: Any, tendon: int) -> dict[int, float]:
 
 
 def _rotor(mujoco: Any, model: Any, a: int) -> float:
-    """Inertia of the rotor at the motor that the file gives the motor, or its tendon; that of joints comes to it."""
+    """Inertia of the rotor at the motor that the file gives the motor, or its tendon; that of joints comes to
+    it."""
     own = float(model.actuator_armature[a]) if hasattr(model, "actuator_armature") else 0.0
     if int(model.actuator_trntype[a]) != int(mujoco.mjtTrn.mjTRN_TENDON):
         return own
@@ -90,10 +90,9 @@ def _rotor(mujoco: Any, model: Any, a: int) -> float:
 def _torque(mujoco: Any, model: Any, a: int, gear: float) -> float | None:
     """Largest torque that the motor gives both ways; None where nothing limits it."""
     limits = []
-    plain = (
-        int(model.actuator_gaintype[a]) == int(mujoco.mjtGain.mjGAIN_FIXED)
-        and int(model.actuator_biastype[a]) == int(mujoco.mjtBias.mjBIAS_NONE)
-    )
+    plain = int(model.actuator_gaintype[a]) == int(mujoco.mjtGain.mjGAIN_FIXED) and int(
+        model.actuator_biastype[a]
+    ) == int(mujoco.mjtBias.mjBIAS_NONE)
     if plain and model.actuator_ctrllimited[a]:
         limits.append(float(model.actuator_gainprm[a, 0]) * model.actuator_ctrlrange[a])
     if model.actuator_forcelimited[a]:
@@ -131,7 +130,9 @@ def read_equalities(mujoco: Any, model: Any, robot: Robot) -> None:
             _tell_of_softness(model, e, robot)
         else:
             kind_name = kinds(kind).name.removeprefix("mjEQ_").lower()
-            robot.warn(where, f"is a constraint of the kind {kind_name}, which a device file cannot hold; it is left out")
+            robot.warn(
+                where, f"is a constraint of the kind {kind_name}, which a device file cannot hold; it is left out"
+            )
     for together in connects.values():
         robot.closures += _joined(together, robot)
 
@@ -217,4 +218,3 @@ def read_the_rest(mujoco: Any, model: Any, robot: Robot) -> None:
         robot.warn("flex", "bodies that bend are left out")
     if getattr(model, "nplugin", 0):
         robot.warn("plugin", "what plug-ins do is left out")
-

@@ -64,7 +64,9 @@ def _body(model: Any, i: int, qpos: Floats, compiled: Compiled, full: dict[str, 
     if name in compiled.massless | compiled.unknown:
         mass, inertia = 0.0, np.zeros((3, 3))
     known = None if name in compiled.unknown else mass
-    return RobotBody(name, int(model.body_parentid[i]), place, joints, known, np.array(model.body_ipos[i]), inertia)
+    return RobotBody(
+        name, int(model.body_parentid[i]), place, joints, known, np.array(model.body_ipos[i]), inertia
+    )
 
 
 def _inertia(model: Any, i: int, six: Floats | None) -> Floats:
@@ -118,7 +120,7 @@ def _joint(model: Any, j: int, place: Place, qpos: Floats) -> RobotJoint:
 
 
 def _unit(axis: Any) -> Floats:
-    return np.array(axis) / np.linalg.norm(axis)
+    return np.asarray(axis / np.linalg.norm(axis))
 
 
 def _site_place(model: Any, i: int) -> Place:
@@ -136,8 +138,8 @@ def _tell_of_joints(model: Any, robot: Robot, qpos: Floats) -> None:
         if model.jnt_stiffness[j] and single and float(model.qpos_spring[at]) != qpos[at]:
             robot.warn(
                 where,
-                f"has a spring at rest at {float(model.qpos_spring[at]):.6g}; in a device file it is at rest where "
-                "the joint stands, so that its pull there is left out",
+                f"has a spring at rest at {float(model.qpos_spring[at]):.6g}; in a device file it is at rest "
+                "where the joint stands, so that its pull there is left out",
             )
         if not single and model.jnt_limited[j]:
             robot.warn(where, "is of several coordinates; its limit is left out")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Final
 from xml.etree import ElementTree
@@ -57,13 +57,16 @@ def _faults(root: ElementTree.Element, label: str) -> Iterator[Fault]:
             element = joint.find(end)
             link = "" if element is None else element.get("link", "")
             if link not in links:
-                yield Fault(label, where, f"names the {end} link '{link}'; {suggestion(link, set(links), 'links')}")
+                yield Fault(
+                    label, where, f"names the {end} link '{link}'; {suggestion(link, set(links), 'links')}"
+                )
             elif end == "child" and link in carried:
                 yield Fault(
                     label,
                     where,
-                    f"carries the link '{link}', which '{carried[link]}' carries already: a URDF is a tree. Leave one "
-                    "of the two joints out and close the loop in a file beside it, NAME.loops.toml, with [[loops]]",
+                    f"carries the link '{link}', which '{carried[link]}' carries already: a URDF is a tree. "
+                    "Leave one of the two joints out and close the loop in a file beside it, NAME.loops.toml, "
+                    "with [[loops]]",
                 )
             elif end == "child":
                 carried[link] = joint.get("name", "")
@@ -74,7 +77,9 @@ def _faults(root: ElementTree.Element, label: str) -> Iterator[Fault]:
         yield Fault(label, "", "has no link that nothing carries: its joints go round in a circle")
     elif len(roots) > 1:
         yield Fault(
-            label, "", f"has {len(roots)} links that nothing carries: {comma_list(roots, 6)}; join them by fixed joints"
+            label,
+            "",
+            f"has {len(roots)} links that nothing carries: {comma_list(roots, 6)}; join them by fixed joints",
         )
 
 
@@ -91,7 +96,7 @@ def _for_mujoco(root: ElementTree.Element) -> str:
     return ElementTree.tostring(kept, encoding="unicode")
 
 
-def _with_effort(root: ElementTree.Element):  # type: ignore[no-untyped-def]
+def _with_effort(root: ElementTree.Element) -> Callable[[RobotJoint], RobotJoint]:
     """A function that gives a joint the effort that its limit states."""
     efforts = {}
     for joint in root.findall("joint"):
@@ -106,7 +111,8 @@ def _with_effort(root: ElementTree.Element):  # type: ignore[no-untyped-def]
 
 
 def _number(element: ElementTree.Element | None, key: str, default: float) -> float:
-    """A number of an element, or of its text where key is empty; MuJoCo refuses what is none, where it reads it."""
+    """A number of an element, or of its text where key is empty; MuJoCo refuses what is none, where it reads
+    it."""
     try:
         return float((element.get(key) if key else element.text) or "") if element is not None else default
     except ValueError:
@@ -120,14 +126,20 @@ def _followers(root: ElementTree.Element) -> list[Follower]:
         if mimic is not None:
             name = joint.get("name", "")
             ratio = _number(mimic, "multiplier", 1.0)
-            found.append(Follower(f"joint '{name}', mimic", name, mimic.get("joint", ""), ratio, _number(mimic, "offset", 0.0)))
+            found.append(
+                Follower(
+                    f"joint '{name}', mimic", name, mimic.get("joint", ""), ratio, _number(mimic, "offset", 0.0)
+                )
+            )
     return found
 
 
 def _motors(root: ElementTree.Element, robot: Robot) -> list[Motor] | None:
     """The motors that transmissions name; None where there is none."""
     kinds = {joint.get("name", ""): joint.get("type", "") for joint in root.findall("joint")}
-    efforts = {joint.get("name", ""): _number(joint.find("limit"), "effort", 0.0) for joint in root.findall("joint")}
+    efforts = {
+        joint.get("name", ""): _number(joint.find("limit"), "effort", 0.0) for joint in root.findall("joint")
+    }
     motors: dict[str, Motor] = {}
     for transmission in root.findall("transmission"):
         name = transmission.get("name", "")

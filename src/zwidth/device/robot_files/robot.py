@@ -1,4 +1,5 @@
-"""A robot as its file describes it: bodies in a tree, their joints, closures, motors and joints that follow others."""
+"""A robot as its file describes it: bodies in a tree, their joints, closures, motors and joints that follow
+others."""
 
 from __future__ import annotations
 
@@ -216,7 +217,9 @@ def joint_motion(joint: RobotJoint, value: Any) -> Place:
     if joint.kind == "prismatic":
         return Place(np.eye(3), float(value) * joint.axis)
     if joint.kind == "free":
-        return Place(rotation_matrix(np.asarray(value[3:], dtype=np.float64)), np.asarray(value[:3], dtype=np.float64))
+        return Place(
+            rotation_matrix(np.asarray(value[3:], dtype=np.float64)), np.asarray(value[:3], dtype=np.float64)
+        )
     vector = np.asarray(value) if joint.kind == "spherical" else float(value) * joint.axis
     turn = rotation_matrix(vector)
     return Place(turn, joint.anchor - turn @ joint.anchor)
@@ -249,4 +252,3 @@ def roll_pitch_yaw_of(turn: Floats) -> Floats:
     angles = np.array([roll, pitch, yaw])
     angles[np.abs(angles) < ROUNDING] = 0.0
     return angles
-

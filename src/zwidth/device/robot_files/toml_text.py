@@ -1,4 +1,5 @@
-"""A device file as text: sections in the order of their documentation, numbers to their last digit, and comments."""
+"""A device file as text: sections in the order of their documentation, numbers to their last digit, and
+comments."""
 
 from __future__ import annotations
 
@@ -23,7 +24,10 @@ def device_text(document: dict[str, Any], findings: Sequence[Finding]) -> str:
     document  its tables: name, source, mechanism with lists of tables, loop
     findings  written into its head
     """
-    return "\n".join([*_head(document, findings), *_mechanism(document["mechanism"]), *_loop(document["loop"])]) + "\n"
+    return (
+        "\n".join([*_head(document, findings), *_mechanism(document["mechanism"]), *_loop(document["loop"])])
+        + "\n"
+    )
 
 
 def _head(document: dict[str, Any], findings: Sequence[Finding]) -> Iterator[str]:
