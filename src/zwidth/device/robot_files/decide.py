@@ -126,7 +126,8 @@ def find_handle(robot: Robot, name: str | None) -> tuple[int, Place]:
             return sites[name] if name in sites else bodies[name]
         near = suggestion(name, {*sites, *bodies}, "sites and bodies")
         raise fail(robot.label, "handle", f"'{name}' is neither a site nor a body of the file; {near}")
-    named = [one for one in (*sites, *bodies) if HANDLE_WORDS.search(one)]
+    named = [one for one in sites if HANDLE_WORDS.search(one)]
+    named = named if len(named) == 1 else [one for one in (*sites, *bodies) if HANDLE_WORDS.search(one)]
     leaves = [body.name for i, body in enumerate(robot.bodies) if i and all(b.parent != i for b in robot.bodies)]
     found = named if len(named) == 1 else leaves if len(leaves) == 1 else []
     if not found:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.device.faults import DeviceError
+from zwidth.device.faults import DeviceError, plural
 from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
@@ -126,7 +126,7 @@ class ImportCommand(Command):
 
     def pages(self, case: CommandLine, result: ImportedDevice, document: Mapping[str, Any]) -> Iterator[Any]:
         mechanism = result.document["mechanism"]
-        parts = [f"{len(mechanism.get(group, []))} {group}" for group in ("links", "loops", "drives")]
+        parts = [plural(len(mechanism.get(f"{one}s", [])), one) for one in ("link", "loop", "drive")]
         yield f"{printable(result.document['name'])}: {', '.join(parts)}"
         rows = [(one["severity"], one["where"], one["what"]) for one in document["findings"]]
         if rows:
