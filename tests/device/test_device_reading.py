@@ -88,7 +88,8 @@ def test_a_missing_file_leads_to_the_bundled_ones(path, words):
 
 def test_an_empty_name_is_called_one():
     with pytest.raises(
-        DeviceError, match=r"^device: the name is empty; give a device file, or a bundled name: da-vinci-mtm, five-bar"
+        DeviceError,
+        match=r"^device: the name is empty; give a device file, or a bundled name: da-vinci-mtm, five-bar",
     ):
         load("")
 

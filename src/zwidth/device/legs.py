@@ -57,9 +57,10 @@ def members(mechanism: Any, group: str) -> list[Member]:
     """
     found = [Member(entry, (group, i)) for i, entry in _entries(mechanism, group)]
     for n, leg in _entries(mechanism, "legs"):
-        names = frozenset(_get(link, "name") for _, link in _entries(leg, "links"))
+        given = (_get(link, "name") for _, link in _entries(leg, "links"))
+        names = frozenset(name for name in given if isinstance(name, str))
         for copy, angle in enumerate(_angles(leg), start=1):
-            own = frozenset(copied(name, copy) for name in names if isinstance(name, str))
+            own = frozenset(copied(name, copy) for name in names)
             for i, entry in _entries(leg, group):
                 renamed = _renamed(entry, group, names, copy)
                 axis = _get(leg, "axis") or (0.0, 0.0, 1.0)
@@ -88,7 +89,7 @@ def of_copies(mechanism: Any, values: Mapping[str, Any]) -> dict[str, Any]:
     for _, leg in _entries(mechanism, "legs"):
         for _, link in _entries(leg, "links"):
             name = _get(link, "name")
-            if name not in values:
+            if not isinstance(name, str) or name not in values:
                 continue
             spread.pop(name, None)
             for copy in range(1, len(_angles(leg)) + 1):

@@ -120,6 +120,13 @@ class Controller:
         return self.feedforward is not None and bool(np.any(self.feedforward.coulomb))
 
     @property
+    def timing_text(self) -> str:
+        """Sampling and delay in words: "sampled every 0.001 s, 0.5 samples of delay"."""
+        known = not np.isnan(self.sampling_period)
+        sampling = f"sampled every {self.sampling_period:g} s" if known else "sampling period not known"
+        return f"{sampling}, {self.delay:g} samples of delay"
+
+    @property
     def feedback_names(self) -> tuple[str, ...]:
         """What is added to the wall law, in words: "force feedback (gain 0.5)"; () for nothing."""
         every = (self.force_sensor, self.feedforward, self.local_loop)

@@ -90,7 +90,7 @@ class Loop:
 
     def __repr__(self) -> str:
         names = ", ".join(self.plant.names) or f"{self.plant.size} coordinates"
-        computer = f"sampled every {self.period:g} s, {self.controller.delay:g} samples of delay"
+        computer = self.controller.timing_text
         computer += "".join(f", with {part}" for part in self.controller.feedback_names)
         return f"Loop of a plant ({names}), {computer}"
 

@@ -133,9 +133,7 @@ class OperatingPoint:
         held = f", held by {self.operator_name or 'an operator'}" if self.operator is not None else ""
         if self.differing:
             return f"OperatingPoint of {self.name or 'a device'}: designs and postures of shape {self.shape}{held}"
-        computer = (
-            f"sampled every {self.controller.sampling_period:g} s, {self.controller.delay:g} samples of delay"
-        )
+        computer = self.controller.timing_text
         if self.posture is None or self.directions is None:
             kind = "measured response" if self.response is not None else f"plant, model {self.model or 'as given'}"
             return f"OperatingPoint of {self.name or 'a device'}: {kind}{held}\n  {computer}"
