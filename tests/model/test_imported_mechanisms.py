@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from model_cases import KINDS
 from model_engines import mjcf, moving_links, quaternion, text
-from random_mechanisms import random_mechanisms
+from random_mechanisms import random_mechanism, random_mechanisms
 from scipy.spatial.transform import Rotation
 
 import zwidth
 from zwidth.device.load import from_document
 from zwidth.device.robot_files.import_file import import_file
-from zwidth.model.mechanism import BALL_X, PRISMATIC, REVOLUTE
+from zwidth.model.mechanism import BALL_X, FIXED, PRISMATIC, REVOLUTE
 from zwidth.model.posture import solve_posture
 
 RELATIVE = 1e-9
@@ -148,3 +148,52 @@ def test_joints_that_follow_others(name, tmp_path):
     posture = from_document(made.document).at().posture
     assert close(posture.mass_matrix, B.T @ (M - np.diag(model.dof_armature)) @ B)
     assert close(posture.jacobian, J @ B)
+
+
+def urdf(mechanism):
+    """A tree of revolute, prismatic and fixed joints as URDF, its handle a link of its own."""
+    links, parts = mechanism.links, ['<robot name="tree"><link name="ground"/>']
+    kinds = {FIXED: "fixed", REVOLUTE: "revolute", PRISMATIC: "prismatic"}
+
+    def joint(name, kind, parent, place, turn, more=""):
+        rpy = Rotation.from_matrix(turn).as_euler("xyz")
+        return (
+            f'<joint name="{name}-joint" type="{kind}"><parent link="{parent}"/><child link="{name}"/>'
+            f'<origin xyz="{text(place)}" rpy="{text(rpy)}"/>{more}</joint>'
+        )
+
+    for i, name in enumerate(links.names):
+        I = links.inertia[i]
+        six = zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), I[np.triu_indices(3)], strict=True)
+        moments = " ".join(f'{key}="{text(value)}"' for key, value in six)
+        parts.append(
+            f'<link name="{name}"><inertial><origin xyz="{text(links.center_of_mass[i])}"/>'
+            f'<mass value="{text(links.mass[i])}"/><inertia {moments}/></inertial></link>'
+        )
+        parent = "ground" if links.parent[i] < 0 else links.names[links.parent[i]]
+        more = f'<axis xyz="{text(links.axis[i])}"/><limit lower="-9" upper="9" effort="1" velocity="1"/>'
+        parts.append(joint(name, kinds[links.joint[i]], parent, links.origin[i], links.rotation[i], more))
+    parts.append('<link name="grip"/>')
+    parts.append(joint("grip", "fixed", links.names[mechanism.handle_link], mechanism.handle_point, np.eye(3)))
+    return "".join([*parts, "</robot>"])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_trees_through_urdf(seed, tmp_path):
+    rng = np.random.default_rng(seed)
+    names = ["revolute", "prismatic", "revolute", "fixed", "revolute"]
+    mechanism = None
+    while mechanism is None:
+        mechanism = random_mechanism(rng, list(rng.permutation(names)))
+    native = solve_posture(mechanism)
+    path = tmp_path / "tree.urdf"
+    path.write_text(urdf(mechanism))
+    moving = moving_links(mechanism)
+    posture = {f"{mechanism.links.names[i]}-joint": native.angles[i] for i in moving}
+    controls = ("position", "pose", "orientation")[mechanism.controls]
+    made = import_file(path, handle="grip", posture=posture, controls=controls)
+    found = from_document(made.document).at().posture
+    assert close(
+        handle_mobility(found.mass_matrix, found.jacobian, found.angular_jacobian),
+        handle_mobility(native.mass_matrix, native.jacobian, native.angular_jacobian),
+    )
