@@ -384,8 +384,8 @@ def _controls(
     if not freedom.controlled(each[0][parts[controls]]):
         robot.warn(
             "mechanism.reference",
-            "the posture of the file is singular: its drives cannot move the handle every way. Name another with "
-            "keyframe=NAME, or ask elsewhere, by the joints",
+            "the posture of the file is singular: its drives cannot move the handle every way. Give another with "
+            "posture=JOINT=VALUE or keyframe=NAME",
         )
     return controls, each[0]
 
