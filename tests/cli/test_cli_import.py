@@ -184,6 +184,54 @@ def test_what_looks_wrong_is_told_and_imported(folder, text, said):
     assert any(said in one for one in findings(document_of("import", "robot.urdf"), "warning"))
 
 
+TOLD = """<mujoco>
+  <option gravity="0 0 -9.81"/>
+  <worldbody>
+    <site name="far" pos="1 0 0"/>
+    <body name="one">
+      <joint name="j" axis="0 0 1" stiffness="2" springref="20" damping="0.1"/>
+      <joint name="k" axis="0 1 0" armature="0.01"/>
+      <inertial mass="0.1" pos="0.1 0 0" diaginertia="1e-3 1e-3 1e-3"/>
+      <site name="tool" pos="0.1 0 0"/>
+    </body>
+    <body name="held" mocap="true" pos="0 0 1"/>
+  </worldbody>
+  <tendon>
+    <spatial name="string" stiffness="3"><site site="far"/><site site="tool"/></spatial>
+    <fixed name="idle"><joint joint="j" coef="1"/></fixed>
+  </tendon>
+  <equality>
+    <weld name="grip" body1="one" body2="held"/>
+    <connect name="off" body1="one" anchor="0.1 0 0" active="false"/>
+    <tendon name="equal" tendon1="idle"/>
+  </equality>
+  <actuator>
+    <motor name="m" joint="j" gear="2"/>
+    <motor name="pull" tendon="string"/>
+    <muscle name="biceps" tendon="idle" lengthrange="0.1 0.2"/>
+  </actuator>
+</mujoco>"""
+
+
+def test_what_a_device_file_has_no_place_for_is_named(folder):
+    (folder / "told.xml").write_text(TOLD)
+    document = document_of("import", "told.xml", "--controls", "position")
+    warned = "\n".join(findings(document, "warning"))
+    for words in (
+        "joint 'j': has a spring at rest at 0.349066",
+        "tendon 'string': has stiffness, damping or friction",
+        "equality 'grip': holds a body to one that the simulation moves (mocap)",
+        "equality 'equal': is a constraint of the kind tendon",
+        "actuator 'pull': acts on a tendon, not on the coordinate of a joint",
+        "actuator 'biceps': is a muscle",
+        "armature: of joints without a motor of their own is left out: k 0.01",
+    ):
+        assert words in warned
+    noted = "\n".join(findings(document, "note"))
+    for words in ("equality 'off': is not active", "free", "tool", "mocap"):
+        assert words in noted
+
+
 BODY = (
     '<body name="{0}"><joint name="{0}-j" axis="0 0 1"/>'
     '<inertial mass="1" pos="0.1 0 0" diaginertia="1e-3 1e-3 1e-3"/>{1}</body>'
@@ -230,7 +278,7 @@ MACRO = '<robot name="x" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:incl
         ("x.xml", mjcf(TWO), ["--posture", "three=1"], "posture: 'three' is no joint that turns or slides"),
         ("x.xml", mjcf(TWO), ["--fix", "one-j,two-j"], "'handle': does not move"),
         ("x.xml", MESHED, [], "body 'm': has its mass from the mesh 'g', and meshes are not read; give it an"),
-        ("x.xml", WELDED, ["--handle", "two"], "drives no joint that moves"),
+        ("x.xml", WELDED, ["--handle", "two"], "has loops that hold everything: 2 joint coordinates"),
         (
             "x.xml",
             APART,

@@ -124,12 +124,9 @@ def _check_meshes(mujoco: Any, spec: Any, label: str) -> None:
     """Refuse a mass that only a mesh knows: meshes are not read."""
     always = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     faults = []
-    for body in spec.bodies:
-        carried = body
-        while carried is not None and not len(carried.joints):
-            carried = carried.parent
-        if carried is None or (body.explicitinertial and not always):
-            continue  # of what does not move no mass is asked
+    for body in _moving(spec):
+        if body.explicitinertial and not always:
+            continue
         meshes = [g.meshname for g in body.geoms if _meshed(mujoco, g) and (g.density > 0.0 or g.mass > 0.0)]
         if meshes and all(np.isnan(g.mass) or g.mass > 0.0 for g in body.geoms):
             faults.append(
@@ -142,6 +139,17 @@ def _check_meshes(mujoco: Any, spec: Any, label: str) -> None:
             )
     if faults:
         raise DeviceError(faults)
+
+
+def _moving(spec: Any) -> Iterator[Any]:
+    """The bodies that some joint moves; of others no mass is asked."""
+    waiting = [(spec.worldbody, False)]
+    while waiting:
+        body, moves = waiting.pop()
+        moves = moves or bool(len(body.joints))
+        if moves:
+            yield body
+        waiting += [(child, moves) for child in body.bodies]
 
 
 def _leave_meshes_out(mujoco: Any, spec: Any) -> None:
@@ -157,7 +165,8 @@ def _leave_meshes_out(mujoco: Any, spec: Any) -> None:
         tendon.material = ""
     for group in ASSETS:
         for element in list(getattr(spec, group, [])):
-            spec.delete(element)
+            delete = getattr(spec, "delete", None)  # elements delete themselves in MuJoCo 3.3.0
+            delete(element) if delete else element.delete()
 
 
 def _possible_moments(spec: Any, label: str) -> list[Finding]:

@@ -366,8 +366,8 @@ def _controls(
     wanted: str | None,
 ) -> tuple[str, Floats]:
     """What of the handle the drives control, and their motions of it (6, d) at the reference posture."""
-    if not driven:
-        raise fail(robot.label, "", "drives no joint that moves; name a motor for each degree of freedom")
+    if not kept:
+        raise fail(robot.label, "", _nothing_moves(robot, motions))
     free = [row for name in shape.free for row in _free_rows(robot, tree, motions, name)]
     each = [freedom.handle_motions(place, kept, free) for place in motions.places]
     found = [controls for H in each if (controls := freedom.controls_of(H))]
@@ -384,10 +384,21 @@ def _controls(
     if not freedom.controlled(each[0][parts[controls]]):
         robot.warn(
             "mechanism.reference",
-            "the posture of the file is singular: its drives cannot move the handle every way. Name another with "
-            "keyframe=NAME, or ask elsewhere, by the joints",
+            "the posture of the file is singular: its drives cannot move the handle every way. Give another with "
+            "posture=JOINT=VALUE or keyframe=NAME",
         )
     return controls, each[0]
+
+
+def _nothing_moves(robot: Robot, motions: Motions) -> str:
+    """Why no drive moves anything."""
+    if motions.basis.shape[1]:
+        return "drives no joint that moves; name a motor for each degree of freedom"
+    names = comma_list([f"'{closure.name}'" for closure in robot.closures], 6)
+    return (
+        f"has loops that hold everything: {len(motions.entries)} joint coordinates, all of them held by {names}; "
+        "leave one out, or let one hold less (a point by connect, not a whole body by weld)"
+    )
 
 
 def _free_rows(robot: Robot, tree: LinkTree, motions: Motions, name: str) -> list[int]:

@@ -198,7 +198,7 @@ def _tell_of_softness(model: Any, e: int, robot: Robot) -> None:
     where = f"equality '{model.equality(e).name or f'loop-{e + 1}'}'"
     time, ratio = (float(x) for x in model.eq_solref[e])
     soft = f"solref {time:g} {ratio:g}"
-    robot.note(where, f"is soft in MuJoCo ({soft}); the device file holds it exactly")
+    robot.note(where, f"soft in MuJoCo ({soft}), held exactly by the device file")
 
 
 def read_the_rest(mujoco: Any, model: Any, robot: Robot) -> None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 ENDING: Final = ".toml"
 CONTROLS: Final = ("position", "orientation", "pose")
-ARGUMENT: Final = re.compile(r"\b(handle|controls|keyframe|fix)=([^\s;,][^\s;]*)")
+ARGUMENT: Final = re.compile(r"\b(handle|controls|keyframe|posture|fix)=([^\s;,][^\s;]*)")
 
 
 class ImportCommand(Command):
