@@ -88,7 +88,7 @@ def simulate_mechanism(
     >>> from zwidth.contact.mechanism.surfaces import Sphere
     >>> from zwidth.contact.mechanism.walls import SurfaceWall
     >>> devices = (zwidth.load(name) for name, *_ in zwidth.bundled())
-    >>> device = next(device for device in devices if device.mechanism)
+    >>> device = next(device for device in devices if device.mechanism and not device.missing)
     >>> hollow = Sphere(device.reference_position, radius=0.01, hollow=True)
     >>> wall = SurfaceWall(500.0, 2.0)
     >>> simulate_mechanism(device.at(), wall, hollow, duration=0.1, start_velocity=device.direction()).status
