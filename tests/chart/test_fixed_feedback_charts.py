@@ -96,9 +96,10 @@ def about_the_chart(chart, judge, rng, seen):
     for polygon in polygons:
         inside |= shapely.contains_xy(polygon, K, B)
     radii, still = judge.radii(K, B)
-    seen["still"] += bool(still and not chart.loop.unobserved_modes)
+    hidden = still > 2 * len(chart.loop.unobserved_modes)
+    seen["still"] += hidden
     seen["empty"] += not polygons
-    if still and not chart.loop.unobserved_modes:
+    if hidden:
         return  # an undamped motion that the wall hardly moves: then all walls are within the band
     clear = np.abs(radii - 1.0) > (HIDDEN if chart.loop.unobserved_modes else BAND)
     wrong = clear & (inside != (radii < 1.0))
