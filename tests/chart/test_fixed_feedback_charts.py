@@ -26,6 +26,7 @@ KINDS = {
 }
 BAND = 1e-9  # round the unit circle, where double precision does not tell
 EDGES, WALLS = 6, 40  # walls tried: on each arc, and about the chart
+DOUBLE = 1e-5  # a pair of roots nearer to the real axis counts as a double root
 HIDDEN = 1e-6  # how far a motion may move that is named as unobserved
 CHORD = 1e-6  # shares of the chart's size by which the chords of a drawn outline miss the edge
 
@@ -54,15 +55,15 @@ class Judge:
         return np.array([np.abs(own).max() for own in roots]), len(still)
 
     def distance(self, K, B, z):
-        """How far the nearest root is from z, less what rounding leaves open: its condition times rounding."""
-        own, right = np.linalg.eig(matrix_balance(self.matrices(K, B), permute=False)[0])
-        nearest = int(np.argmin(np.abs(own - z)))
-        off = float(abs(own[nearest] - z))
+        """How far the nearest root is from z, less what rounding of this matrix leaves open of it."""
+        off = float(np.min(np.abs(np.linalg.eigvals(self.matrices(K, B)) - z)))
         if off <= BAND:
             return off
-        left = np.linalg.pinv(right)
+        matrix = matrix_balance(self.case.transition_matrix(K, B), permute=False)[0]
+        own, right = np.linalg.eig(matrix)
+        left, nearest = np.linalg.pinv(right), int(np.argmin(np.abs(own - z)))
         condition = np.linalg.norm(left[nearest]) * np.linalg.norm(right[:, nearest])
-        return off - 1e-14 * condition
+        return float(abs(own[nearest] - z)) - 1e-14 * condition * np.linalg.norm(matrix)
 
 
 def on_edges(chart, judge, seen):
@@ -72,6 +73,8 @@ def on_edges(chart, judge, seen):
         some = inner[np.linspace(0, len(inner) - 1, EDGES).astype(int)] if len(inner) > EDGES else inner
         for k in some:
             z = np.exp(2j * np.pi * arc.frequency[k] * chart.loop.period)
+            if abs(z.imag) < DOUBLE:
+                continue  # all but a double root, which eigenvalues know to the root of rounding
             seen["edges"] += 1
             seen["edges off"] += judge.distance(arc.stiffness[k], arc.damping[k], z) > BAND
 
@@ -93,10 +96,11 @@ def about_the_chart(chart, judge, rng, seen):
     for polygon in polygons:
         inside |= shapely.contains_xy(polygon, K, B)
     radii, still = judge.radii(K, B)
-    seen["still"] += bool(still and not chart.loop.unobserved_modes)
+    hidden = still > 2 * len(chart.loop.unobserved_modes)
+    seen["still"] += hidden
     seen["empty"] += not polygons
-    if still and not polygons:
-        return  # an undamped motion that the wall hardly moves: then nothing is stable
+    if hidden:
+        return  # an undamped motion that the wall hardly moves: then all walls are within the band
     clear = np.abs(radii - 1.0) > (HIDDEN if chart.loop.unobserved_modes else BAND)
     wrong = clear & (inside != (radii < 1.0))
     for k in np.flatnonzero(wrong):
