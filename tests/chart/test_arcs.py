@@ -11,6 +11,7 @@ from zwidth.chart.arcs import CHORD, DAMPING, MINUS, PAIR, PLUS, SLOPE, STIFFNES
 from zwidth.chart.area import quadrant_area
 from zwidth.chart.loop_edge import trace_edge
 from zwidth.chart.peak import find_peak, largest_damping, stiffest_index
+from zwidth.chart.rings import cut_at_holes
 from zwidth.chart.several_directions.branch import Branch
 from zwidth.chart.several_directions.eigenloci import trace_loci
 from zwidth.chart.traced_edge import TracedEdge
@@ -226,3 +227,15 @@ def test_a_branch_is_straight_beside_its_end():
     (arc,) = (edge.arcs[k] for k in edge.arcs.curved if edge.arcs[k].start == 0.0)
     branch = branch_of_one_direction(published(), size)
     assert branch.integral(arc) == pytest.approx(tracer.integral(arc), rel=0.0, abs=1e-14 * size.prod())
+
+
+def test_holes_that_rounding_left_are_no_holes():
+    """Of a corner of many branches `make_valid` may leave holes as small as digits, which no cut takes apart."""
+    x, y, e = -119633.04780942366, -40.12418191206121, 2e-11
+    specks = [[(x + k * e, y), (x + k * e, y + e), (x + (k + 0.5) * e, y + 0.5 * e)] for k in range(3)]
+    cell = shapely.Polygon([(-2e5, -50.0), (6e5, -50.0), (6e5, 1300.0), (-2e5, 1300.0)], specks)
+    (whole,) = cut_at_holes(cell)
+    assert whole.equals(shapely.Polygon(cell.exterior))
+    ring = cut_at_holes(shapely.box(0.0, 0.0, 3.0, 3.0) - shapely.box(1.0, 1.0, 2.0, 2.0))
+    assert len(ring) == 2
+    assert sum(piece.area for piece in ring) == pytest.approx(8.0)

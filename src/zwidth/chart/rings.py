@@ -14,6 +14,7 @@ from zwidth.chart.arcs import ArcPoints
 Floats = NDArray[np.float64]
 # Of a ring's extent: corners blurred by more are drawn from one arc's end to the next one's beginning.
 WIDE_CORNER = 1e-6
+ROUNDING_AREA = 1e-12  # share of a cell that a part of it, or a hole, is only rounding of
 
 Window = tuple[float, float, float, float]  # KMIN, KMAX, BMIN, BMAX
 
@@ -70,17 +71,20 @@ def simple_rings(outlines: Sequence[Floats], simple: Sequence[bool] | None = Non
             continue
         # Rounding can cross two chords in a corner of many branches: loops of no area, which are dropped
         parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(cell)))  # a collection may hold collections
-        real = [part for part in parts if isinstance(part, shapely.Polygon) and part.area > 1e-12 * cell.area]
+        real = [
+            part for part in parts if isinstance(part, shapely.Polygon) and part.area > ROUNDING_AREA * cell.area
+        ]
         rings += [np.array(orient(piece).exterior.coords) for part in real for piece in cut_at_holes(part)]
     return tuple(rings)
 
 
 def cut_at_holes(cell: shapely.Polygon) -> list[shapely.Polygon]:
     """A polygon with holes as polygons without, cut upright through each hole's middle."""
-    if not cell.interiors:
-        return [cell]
+    holes = [hole for hole in map(shapely.Polygon, cell.interiors) if hole.area > ROUNDING_AREA * cell.area]
+    if not holes:
+        return [shapely.Polygon(cell.exterior)]
     left, low, right, high = cell.bounds
-    middle = shapely.Polygon(cell.interiors[0]).centroid.x
+    middle = holes[0].centroid.x
     halves = (shapely.box(left, low, middle, high), shapely.box(middle, low, right, high))
     parts = [part for half in halves for part in shapely.get_parts(shapely.intersection(cell, half))]
     return [piece for part in parts if isinstance(part, shapely.Polygon) for piece in cut_at_holes(part)]

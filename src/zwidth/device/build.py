@@ -14,6 +14,7 @@ import numpy as np
 
 from zwidth.device import build_nonlinear
 from zwidth.device.build_nonlinear import value_or
+from zwidth.device.schema.feedback import FeedforwardSection, ForceSensorSection, LocalSection
 from zwidth.device.schema.friction import FrictionSection
 from zwidth.device.schema.loop import EncoderSection, LoopSection
 from zwidth.device.schema.mechanism import (
@@ -22,9 +23,16 @@ from zwidth.device.schema.mechanism import (
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.plant import PlantSection
 from zwidth.device.schema.response import ResponseSection
-from zwidth.device.schema.velocity import ButterworthFilter, FirstOrderFilter, FoawSection, KalmanSection
+from zwidth.device.schema.velocity import (
+    ButterworthFilter,
+    FirstOrderFilter,
+    FoawSection,
+    KalmanSection,
+    VelocitySection,
+)
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import METHODS, Foaw, Kalman, VelocityMethod
+from zwidth.loop.estimators import METHODS, BackwardDifference, Foaw, Kalman, LinearMethod, VelocityMethod
+from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
 from zwidth.model.design_axes import stack_numbers
 from zwidth.model.electrical_damping import add_dampers
 from zwidth.model.mechanism import Floats
@@ -44,11 +52,50 @@ def controller(loop: LoopSection) -> Controller:
         sampling_period=period,
         delay=delay,
         velocity_filter=_low_pass(loop.velocity.filter),
-        velocity=_velocity(loop),
+        velocity=_velocity(loop, loop.velocity),
         force_filter=_low_pass(loop.force.filter),
         actuator_time_constant=loop.actuator.time_constant_s,
         force_limit=math.inf if loop.saturation is None else loop.saturation.force_N,
+        force_sensor=None if loop.force_sensor is None else _force_sensor(loop.force_sensor),
+        feedforward=None if loop.feedforward is None else _feedforward(loop, loop.feedforward),
+        local_loop=None if loop.local is None else _local_loop(loop, loop.local),
     )
+
+
+def _force_sensor(section: ForceSensorSection) -> ForceSensor:
+    low_pass = _low_pass(section.filter)
+    return ForceSensor(section.gain, low_pass, section.delay_samples, section.mass_beyond_kg, section.law)
+
+
+def _feedforward(loop: LoopSection, section: FeedforwardSection) -> Feedforward:
+    return Feedforward(
+        inertia=value_or(section.inertia_kg, 0.0),
+        inertia_share=value_or(section.inertia_share, 0.0),
+        damping=section.damping_Ns_per_m,
+        coulomb=section.coulomb_N,
+        dead_band=value_or(section.deadband_m_per_s, 0.0),
+        velocity=_linear_velocity(loop, section.velocity),
+        velocity_filter=None if section.velocity is None else _low_pass(section.velocity.filter),
+        acceleration_filter=_low_pass(section.acceleration_filter),
+    )
+
+
+def _local_loop(loop: LoopSection, section: LocalSection) -> LocalLoop:
+    return LocalLoop(
+        rate_multiple=section.rate_multiple,
+        stiffness=section.stiffness_N_per_m,
+        damping=section.damping_Ns_per_m,
+        velocity=_linear_velocity(loop, section.velocity),
+        velocity_filter=None if section.velocity is None else _low_pass(section.velocity.filter),
+        delay=section.delay_samples,
+    )
+
+
+def _linear_velocity(loop: LoopSection, section: VelocitySection | None) -> LinearMethod:
+    """The estimate of a feedback beside the wall law, which the file's checks have found linear."""
+    method = BackwardDifference() if section is None else _velocity(loop, section)
+    assert isinstance(method, LinearMethod)
+    return method
 
 
 def _low_pass(given: FirstOrderFilter | ButterworthFilter | None) -> FirstOrder | Butterworth | None:
@@ -57,8 +104,8 @@ def _low_pass(given: FirstOrderFilter | ButterworthFilter | None) -> FirstOrder 
     return None if given is None else Butterworth(given.order, given.cutoff_Hz, given.discretisation)
 
 
-def _velocity(loop: LoopSection) -> VelocityMethod:
-    section, own = loop.velocity, loop.velocity.parameters()
+def _velocity(loop: LoopSection, section: VelocitySection) -> VelocityMethod:
+    own = section.parameters()
     step = loop.encoder.resolution_m
     if isinstance(section, KalmanSection) and section.position_noise_m is None and step:
         return Kalman.of_encoder(section.acceleration_noise_m_per_s2, step)

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from zwidth.device.address import exists, in_schema
 from zwidth.device.faults import KeyPath, comma_list, plural, quote, suggestion
+from zwidth.device.feedback_consistency import feedback_inconsistencies
 from zwidth.device.legs import spread_tables, written_path
 from zwidth.device.loop_consistency import electrical_inconsistencies, loop_inconsistencies
 from zwidth.device.missing import partly_missing
@@ -60,6 +61,7 @@ def _inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyM
     yield from _one_kind(original)
     yield from _plant(table(document, "plant"))
     yield from loop_inconsistencies(document)
+    yield from feedback_inconsistencies(document)
     yield from nonlinear_inconsistencies(document)
     yield from _response(original)
     yield from electrical_inconsistencies(document)

@@ -44,6 +44,7 @@ _DRIVE: Final = [
 _LINK: Final = ["origin_m", "orientation_rad", "axis", "length_m", "mass_kg", "center_of_mass_m", "inertia_kg_m2"]
 _OWNERS: Final[tuple[KeyPath, ...]] = (("mechanism",), ("mechanism", "legs", "*"))
 _FILTER: Final = ("time_constant_s", "cutoff_Hz")
+_FEEDFORWARD: Final = ("inertia_kg", "inertia_share", "damping_Ns_per_m", "coulomb_N", "deadband_m_per_s")
 _PLANT: Final = ["mass_kg", "damping_Ns_per_m", "stiffness_N_per_m", "actuator", "sensor", "handle"]
 _OPERATOR: Final = [
     "arm_mass_kg",
@@ -64,7 +65,12 @@ ARRAYS: Final[tuple[KeyPath, ...]] = (
         for key in ("mode_ratio", "mass_coefficient_1_per_s", "stiffness_coefficient_s")
     ),
     *(("loop", key) for key in ("sampling_period_s", "delay_samples", "delay_s")),
-    *(("loop", path, "filter", key) for path in ("velocity", "force") for key in _FILTER),
+    *(("loop", path, "filter", key) for path in ("velocity", "force", "force_sensor") for key in _FILTER),
+    *(("loop", "force_sensor", key) for key in ("gain", "mass_beyond_kg")),
+    *(("loop", "feedforward", key) for key in _FEEDFORWARD),
+    *(("loop", "feedforward", "acceleration_filter", key) for key in _FILTER),
+    *(("loop", path, "velocity", "filter", key) for path in ("feedforward", "local") for key in _FILTER),
+    *(("loop", "local", key) for key in ("stiffness_N_per_m", "damping_Ns_per_m")),
     ("loop", "actuator", "time_constant_s"),
     *(("plant", key) for key in _PLANT),
     *(("operator", key) for key in _OPERATOR),

@@ -30,6 +30,11 @@ from zwidth.model.design_axes import join_designs
 Marks = NDArray[np.bool_]
 Values = dict[KeyPath, NDArray[np.float64]]
 
+_LOW_PASSES: Final = (
+    *((path, "filter") for path in ("velocity", "force", "force_sensor")),
+    ("feedforward", "acceleration_filter"),
+    *((path, "velocity", "filter") for path in ("feedforward", "local")),
+)
 PLANT_MATRICES: Final = ("mass_kg", "damping_Ns_per_m", "stiffness_N_per_m")
 PLANT_VECTORS: Final = ("actuator", "sensor", "handle")
 
@@ -143,10 +148,11 @@ Broken = Iterator[Any]
 def _loop(document: dict[str, Any], read: Read) -> Broken:
     """Delays, lags and cutoffs against the sampling period."""
     T = read("loop", "sampling_period_s")
-    for path in ("velocity", "force"):
-        cutoff = read("loop", path, "filter", "cutoff_Hz")
+    for path in _LOW_PASSES:
+        cutoff = read("loop", *path, "cutoff_Hz")
         if cutoff is not None:
-            yield reaches_nyquist(cutoff, T)
+            times = read("loop", "local", "rate_multiple") if path[0] == "local" else 1
+            yield reaches_nyquist(cutoff, T / times)
     lag, delay, late = (
         read("loop", *steps) for steps in (("actuator", "time_constant_s"), ("delay_samples",), ("delay_s",))
     )
@@ -159,17 +165,17 @@ def _loop(document: dict[str, Any], read: Read) -> Broken:
 
 
 def _kalman(document: dict[str, Any], read: Read) -> Broken:
-    """The tracking index of a Kalman filter."""
-    velocity = table(table(document, "loop"), "velocity")
-    if velocity.get("method") != "kalman":
-        return
-    noise, step = read("loop", "velocity", "position_noise_m"), read("loop", "encoder", "resolution_m")
-    if noise is None:
-        noise = quantisation_noise(step)
-    index = (
-        read("loop", "velocity", "acceleration_noise_m_per_s2") * read("loop", "sampling_period_s") ** 2 / noise
-    )
-    yield (index < INDEX[0]) | (index > INDEX[1])
+    """The tracking index of a Kalman filter, at its own rate."""
+    T, step = read("loop", "sampling_period_s"), read("loop", "encoder", "resolution_m")
+    for path in (("loop",), ("loop", "feedforward"), ("loop", "local")):
+        if read(*path, "velocity", "method") != "kalman":
+            continue
+        noise = read(*path, "velocity", "position_noise_m")
+        if noise is None:
+            noise = quantisation_noise(step)
+        own = T / read(*path, "rate_multiple") if path[-1] == "local" else T
+        index = read(*path, "velocity", "acceleration_noise_m_per_s2") * own**2 / noise
+        yield (index < INDEX[0]) | (index > INDEX[1])
 
 
 def _drives(document: dict[str, Any], read: Read) -> Broken:

@@ -78,9 +78,7 @@ class Device:
 
     def __repr__(self) -> str:
         kind = self._kind if self.mechanism is None else "[mechanism]"
-        computer = (
-            f"sampled every {self.controller.sampling_period:g} s, {self.controller.delay:g} samples of delay"
-        )
+        computer = self.controller.timing_text
         held = f", held by {self.operator_name}" if self.operator_name else ""
         return f"Device {self.name!r}, {kind} from {self.label}{held}\n  {computer}"
 

@@ -57,7 +57,8 @@ def members(mechanism: Any, group: str) -> list[Member]:
     """
     found = [Member(entry, (group, i)) for i, entry in _entries(mechanism, group)]
     for n, leg in _entries(mechanism, "legs"):
-        names = frozenset(_names(leg))
+        given = (_get(link, "name") for _, link in _entries(leg, "links"))
+        names = frozenset(name for name in given if isinstance(name, str))
         for copy, angle in enumerate(_angles(leg), start=1):
             own = frozenset(copied(name, copy) for name in names)
             for i, entry in _entries(leg, group):
@@ -86,8 +87,9 @@ def of_copies(mechanism: Any, values: Mapping[str, Any]) -> dict[str, Any]:
     for one copy comes before what is given for all."""
     spread = dict(values)
     for _, leg in _entries(mechanism, "legs"):
-        for name in _names(leg):
-            if name not in values:
+        for _, link in _entries(leg, "links"):
+            name = _get(link, "name")
+            if not isinstance(name, str) or name not in values:
                 continue
             spread.pop(name, None)
             for copy in range(1, len(_angles(leg)) + 1):
@@ -129,12 +131,6 @@ def _angles(leg: Any) -> list[float]:
     if isinstance(count, int) and 0 < count < 100:
         return [2.0 * math.pi * k / count for k in range(count)]
     return [0.0]
-
-
-def _names(leg: Any) -> list[str]:
-    """What the leg calls its links; what is no name is left out."""
-    found = [_get(link, "name") for _, link in _entries(leg, "links")]
-    return [name for name in found if isinstance(name, str)]
 
 
 def _renamed(entry: Any, group: str, names: frozenset[str], copy: int) -> Any:

@@ -36,7 +36,7 @@ def mechanism_faults(mechanism: Mechanism, section: MechanismSection, *, assembl
     yield from _moments_left_open(mechanism, mech, section)
     if assembled:
         return
-    angles, gaps = _close_loops(mechanism, mech)
+    angles, gaps = close_loops(mechanism, mech)
     loops = members(section, "loops")
     open_loops = [k for k, gap in enumerate(gaps) if gap > CLOSED * mech.size[0]]
     for k in open_loops:
@@ -55,7 +55,7 @@ def surplus_drives(mechanism: Mechanism) -> tuple[int, ...]:
     mech = pack(mechanism)
     if not mech.a.size or mech.driven < 2:
         return ()
-    angles, gaps = _close_loops(mechanism, mech)
+    angles, gaps = close_loops(mechanism, mech)
     if gaps.max() > CLOSED * mech.size[0]:
         return ()
     _, _, motions = _least_free(mech, angles)
@@ -99,10 +99,9 @@ def _freedom(mechanism: Mechanism, mech: MechanismArrays, angles: Floats) -> Key
             f"({plural(m, 'joint coordinate')} less {m - freedom} held by loops); {advice}",
         )
         return
-    rotors = mechanism.drives.transmission * mechanism.drives.motor_inertia
-    if np.isnan(mech.mass).any() or np.isnan(mech.inertia).any() or np.isnan(rotors).any():
-        return
     M = motions.T @ joint_mass_matrix(mechanism, angles) @ motions
+    if np.isnan(M).any():  # masses, rotors or ratios are not known
+        return
     eigenvalues = np.linalg.eigvalsh(M)
     if not eigenvalues[0] > freedom * np.finfo(float).eps * eigenvalues[-1]:
         yield (
@@ -115,7 +114,7 @@ def _freedom(mechanism: Mechanism, mech: MechanismArrays, angles: Floats) -> Key
 def _move_although_held(mechanism: Mechanism, mech: MechanismArrays, rows: Floats) -> list[str]:
     """The links whose joints can move while the drives and the free joints rest."""
     passive = mech.joint.size - mech.driven - mech.free
-    motions = _null_space(rows[:passive].T)
+    motions = null_space(rows[:passive].T)
     if not motions.size:
         return []
     parts = np.abs(motions).max(axis=1)
@@ -129,15 +128,20 @@ def _least_free(mech: MechanismArrays, angles: Floats) -> tuple[Floats, Floats, 
 
     Where links happen to be in line the loops leave more than elsewhere: the fewest count.
     """
+    places = closed_nearby(mech, angles)
+    goal, loops = np.zeros(6 if mech.controls == POSE else 3), int(mech.first_row[-1])
+    each = [constraints(mech, 0, place, goal)[0][:, :loops] * mech.unit[0][:, None] for place in places]
+    freedoms = [null_space(rows.T) for rows in each]
+    fewest = min(range(len(each)), key=lambda i: freedoms[i].shape[1])
+    return places[fewest], each[fewest], mech.unit[0][:, None] * freedoms[fewest]
+
+
+def closed_nearby(mech: MechanismArrays, angles: Floats) -> list[Floats]:
+    """Closed joint coordinates (n,), and two near them."""
     random = np.random.default_rng(1)
     unit = np.where(mech.kind == PRISMATIC, mech.size[0], 1.0)
     starts = angles + unit * random.uniform(-NEARBY, NEARBY, (2, len(angles)))
-    places = [angles, *_closed(mech, starts)[0]]
-    goal, loops = np.zeros(6 if mech.controls == POSE else 3), int(mech.first_row[-1])
-    each = [constraints(mech, 0, place, goal)[0][:, :loops] * mech.unit[0][:, None] for place in places]
-    freedoms = [_null_space(rows.T) for rows in each]
-    fewest = min(range(len(each)), key=lambda i: freedoms[i].shape[1])
-    return places[fewest], each[fewest], mech.unit[0][:, None] * freedoms[fewest]
+    return [angles, *_closed(mech, starts)[0]]
 
 
 def _moments_left_open(mechanism: Mechanism, mech: MechanismArrays, section: MechanismSection) -> KeyMessages:
@@ -167,7 +171,7 @@ def _moments_left_open(mechanism: Mechanism, mech: MechanismArrays, section: Mec
                 break
 
 
-def _close_loops(mechanism: Mechanism, mech: MechanismArrays) -> tuple[Floats, Floats]:
+def close_loops(mechanism: Mechanism, mech: MechanismArrays) -> tuple[Floats, Floats]:
     """Joint coordinates that close the loops as well as may be, (n,), and the gap left in each loop, (k,) [m]."""
     n = len(mechanism.links.names)
     random = np.random.default_rng(0)
@@ -198,7 +202,7 @@ def _ancestors(mechanism: Mechanism, link: int) -> Iterator[int]:
         link = int(mechanism.links.parent[link])
 
 
-def _null_space(A: Floats) -> Floats:
+def null_space(A: Floats) -> Floats:
     """Orthonormal basis of the motions that A does not resist, (n, f)."""
     if not A.size:
         return np.eye(A.shape[1])

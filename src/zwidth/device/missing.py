@@ -8,10 +8,11 @@ mistake.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, Final
 
-from zwidth.device.faults import KeyPath, dotted
-from zwidth.device.legs import members
+from zwidth.device.faults import KeyPath, comma_list, dotted
+from zwidth.device.legs import members, written
 from zwidth.device.toml_access import table
 
 LINKS: Final = ("mass_kg", "inertia_kg_m2")
@@ -48,3 +49,57 @@ def _left_out(mechanism: dict[str, Any]) -> Iterator[KeyPath]:
     for group, keys in (("links", LINKS), ("drives", DRIVES)):
         for member in members(mechanism, group):
             yield from (("mechanism", *member.path, key) for key in keys if key not in member.entry)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number that some drives or links of a device lack, or the computer.
+
+    group       dotted path, with * for all of them;   paths  of each that lacks it
+    needed_for  what cannot be answered, or how it is answered without, as a clause
+    count       how many of the group there are
+    """
+
+    group: str
+    paths: tuple[str, ...]
+    needed_for: str
+    count: int = 1
+
+    @property
+    def names(self) -> str:
+        """Which of several lack it: "all", or their names."""
+        names = [path.split(".")[-2] for path in self.paths]
+        return "all" if len(names) == self.count else comma_list(names, 6)
+
+
+# Key of the links, drives or computer -> what it is needed for, or what is taken instead.
+NEEDED_FOR: Final = {
+    "mass_kg": "needed for masses felt, frequencies, charts and simulations",
+    "inertia_kg_m2": "needed for masses felt, frequencies, charts and simulations",
+    "motor_inertia_kg_m2": "needed for masses felt, frequencies, charts and simulations",
+    "transmission_ratio": "needed for masses felt, frequencies, charts and simulations",
+    "sampling_period_s": "needed for charts, checks of walls and simulations",
+    "stiffness_Nm_per_rad": "taken as rigid: flexible modes and the walls that they limit need it",
+    "encoder_counts_per_rev": "needed for encoder steps: limit cycles, noise and their simulation",
+    "torque_limit_Nm": "taken as unlimited: the largest force needs it",
+}
+USEFUL: Final = ("stiffness_Nm_per_rad", "encoder_counts_per_rev", "torque_limit_Nm")
+
+
+def unknown_numbers(document: dict[str, Any]) -> list[Unknown]:
+    """What a valid document leaves out as not known, and what for it is needed; [] for a device without
+    [mechanism]."""
+    mechanism = table(document, "mechanism")
+    if not mechanism:
+        return []
+    found = []
+    for group, keys in (("links", LINKS), ("drives", (*DRIVES, *USEFUL))):
+        entries = [*written(mechanism, group)]
+        for key in keys:
+            paths = [("mechanism", *path, key) for path, entry in entries if key not in entry]
+            if paths:
+                named = tuple(dotted(path, document) for path in paths)
+                found.append(Unknown(f"mechanism.{group}.*.{key}", named, NEEDED_FOR[key], len(entries)))
+    if "sampling_period_s" not in table(document, "loop"):
+        found.append(Unknown(dotted(PERIOD), (dotted(PERIOD),), NEEDED_FOR["sampling_period_s"]))
+    return found

@@ -13,6 +13,7 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.filter_states import FilterStates, filter_states
 from zwidth.loop.filters import force_filter, velocity_estimator
 from zwidth.loop.multi_hold import ContinuousPlant, SampledPlant, continuous_plant, sample_plant
+from zwidth.loop.point_errors import SeveralDirectionsError
 from zwidth.loop.sections import UnmovedError
 from zwidth.model.argument_checks import require
 from zwidth.model.multi_plant import MultiPlant
@@ -35,10 +36,13 @@ class MultiLoop:
     controller: Controller
 
     def __post_init__(self) -> None:
-        """Raise TypeError for anything but a plant of several directions and a controller."""
+        """Raise TypeError for anything but a plant of several directions and a controller, SeveralDirectionsError
+        (loop.point_errors) for a controller with fixed feedback."""
         hint = "write Loop(plant, controller) for one direction" if isinstance(self.plant, Plant) else ""
         require("plant", self.plant, MultiPlant, hint)
         require("controller", self.controller, Controller)
+        if self.controller.fixed_feedback:
+            raise SeveralDirectionsError(self.controller.feedback_names)
 
     @property
     def period(self) -> float:

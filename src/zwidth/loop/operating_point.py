@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth import _verbs
 from zwidth.loop.controller import Controller
+from zwidth.loop.inertia_share import has_inertia_share, with_inertia_of
 from zwidth.loop.linear_omissions import linear_omissions
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
@@ -132,9 +133,7 @@ class OperatingPoint:
         held = f", held by {self.operator_name or 'an operator'}" if self.operator is not None else ""
         if self.differing:
             return f"OperatingPoint of {self.name or 'a device'}: designs and postures of shape {self.shape}{held}"
-        computer = (
-            f"sampled every {self.controller.sampling_period:g} s, {self.controller.delay:g} samples of delay"
-        )
+        computer = self.controller.timing_text
         if self.posture is None or self.directions is None:
             kind = "measured response" if self.response is not None else f"plant, model {self.model or 'as given'}"
             return f"OperatingPoint of {self.name or 'a device'}: {kind}{held}\n  {computer}"
@@ -388,14 +387,23 @@ class OperatingPoint:
         return reduce_directions(self.mechanism, posture, self.directions, self.model or "full", self.damping)
 
     @cached_property
+    def computer(self) -> Controller:
+        """The controller at this point: of a feedforward that is given as a share of the device's rigid mass, with
+        that mass [kg]. Raises OperatingPointError where the device has none, or for several points."""
+        if not has_inertia_share(self.controller):
+            return self.controller
+        self._check_single("computer")
+        return with_inertia_of(self.controller, float(self.effective.rigid_mass))
+
+    @cached_property
     def loop(self) -> Loop:
-        """The plant under the sampled wall law. Raises what `plant` raises."""
+        """The plant under the sampled wall law. Raises what `plant` and `computer` raise."""
         self.require("dynamics", "sampling")
-        return Loop(self.plant, self.controller)
+        return Loop(self.plant, self.computer)
 
     @cached_property
     def loop_of_directions(self) -> MultiLoop:
-        """All directions under one sampled wall law. Raises what `plant_of_directions` raises."""
+        """All directions under one sampled wall law. Raises what `plant_of_directions` and `MultiLoop` raise."""
         self.require("dynamics", "sampling")
         return MultiLoop(self.plant_of_directions, self.controller)
 

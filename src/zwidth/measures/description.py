@@ -22,9 +22,9 @@ from zwidth.result import Result
 class Description(Result):
     """Masses and stiffness felt along the direction, frequencies, and the mechanism's dexterity.
 
-    effective            masses [kg] and stiffness [N/m]; nan where inapplicable
-    natural_frequencies  (n,)  of the device without its operator [Hz]; rigid modes exactly 0; none where the
-                         file gives no masses, as of which all that needs them is nan or None
+    effective            masses [kg] and stiffness [N/m]; nan where inapplicable; None, as all that needs masses,
+                         for a device of which only the geometry is known
+    natural_frequencies  (n,)  of the device without its operator [Hz]; rigid modes exactly 0
     damping_ratios       of each frequency, None for rigid ones; None where damping couples the modes
     joints               angle of each joint by its link [rad], of a prismatic one the way [m], a list of those of
                          a joint with several; None for a device without a mechanism, as all below
@@ -32,8 +32,8 @@ class Description(Result):
     manipulability, dynamic_manipulability, isotropy   see `measures.dexterity`
     """
 
-    effective: EffectiveParameters
-    natural_frequencies: Floats
+    effective: EffectiveParameters | None
+    natural_frequencies: Floats | None
     damping_ratios: list[float | None] | None
     joints: dict[str, Any] | None = None
     jacobian: Floats | None = None
@@ -46,10 +46,10 @@ class Description(Result):
         """The numbers by key and unit; None where inapplicable."""
         felt = self.effective
         return {
-            "link_side_mass_kg": felt.link_side_mass,
-            "motor_side_mass_kg": felt.motor_side_mass,
-            "rigid_mass_kg": felt.rigid_mass,
-            "stiffness_N_per_m": felt.stiffness,
+            "link_side_mass_kg": felt and felt.link_side_mass,
+            "motor_side_mass_kg": felt and felt.motor_side_mass,
+            "rigid_mass_kg": felt and felt.rigid_mass,
+            "stiffness_N_per_m": felt and felt.stiffness,
             "natural_frequencies_Hz": self.natural_frequencies,
             "damping_ratios": self.damping_ratios,
             "joints_rad": self.joints,
@@ -65,48 +65,46 @@ class Description(Result):
         return entries(self.document())
 
     def __repr__(self) -> str:
-        felt = self.effective
-        if not self.natural_frequencies.size:
-            return (
-                f"Description: no masses; manipulability {self.manipulability:.4g}, isotropy {self.isotropy:.4g}"
-            )
-        masses = f"{felt.link_side_mass:.4g} kg link side, {felt.motor_side_mass:.4g} kg motor side"
-        frequencies = ", ".join(f"{f:.4g}" for f in self.natural_frequencies[:8])
-        more = ", ..." if len(self.natural_frequencies) > 8 else ""
-        lines = [
-            f"Description: {felt.rigid_mass:.4g} kg rigid ({masses}), {felt.stiffness:.5g} N/m between",
-            f"natural frequencies {frequencies}{more} Hz",
-        ]
+        lines = [*self._masses()]
         if self.manipulability is not None:
             lines.append(f"manipulability {self.manipulability:.4g}, isotropy {self.isotropy:.4g}")
         return "\n  ".join(lines)
 
+    def _masses(self) -> Iterator[str]:
+        felt = self.effective
+        if felt is None or self.natural_frequencies is None:
+            yield "Description: masses not known"
+            return
+        masses = f"{felt.link_side_mass:.4g} kg link side, {felt.motor_side_mass:.4g} kg motor side"
+        frequencies = ", ".join(f"{f:.4g}" for f in self.natural_frequencies[:8])
+        more = ", ..." if len(self.natural_frequencies) > 8 else ""
+        yield f"Description: {felt.rigid_mass:.4g} kg rigid ({masses}), {felt.stiffness:.5g} N/m between"
+        yield f"natural frequencies {frequencies}{more} Hz"
+
 
 def describe(point: OperatingPoint) -> Description:
-    """Describe the device at one operating point, without its operator.
-
-    A file that gives no masses leaves the kinematic part.
+    """Describe the device at one operating point, without its operator; of a device whose masses are not known its
+    geometry alone.
 
     Raises  what `OperatingPoint.plant` raises
     """
     require("point", point, OperatingPoint)
-    massless = "dynamics" in point.missing
-    if massless:
-        unknown = np.asarray(np.nan)
-        common: tuple[EffectiveParameters, Floats, list[float | None] | None]
-        common = EffectiveParameters(unknown, unknown, unknown, unknown), np.zeros(0), None
-    else:
-        plant = point.ungripped_plant
-        common = point.effective, natural_frequencies(plant), damping_ratios(plant)
+    known = "dynamics" not in point.missing
+    plant = point.ungripped_plant if known else None
+    felt = point.effective if known else None
+    frequencies = None if plant is None else natural_frequencies(plant)
+    ratios = None if plant is None else damping_ratios(plant)
     if point.mechanism is None or point.posture is None:
-        return Description(*common)
+        return Description(felt, frequencies, ratios)
     return Description(
-        *common,
+        felt,
+        frequencies,
+        ratios,
         joints=joint_coordinates(point.mechanism, point.posture.angles),
         jacobian=point.jacobian,
-        mass_matrix=None if massless else point.mass_matrix,
+        mass_matrix=point.mass_matrix if known else None,
         manipulability=float(dexterity.manipulability(point)),
-        dynamic_manipulability=None if massless else float(dexterity.dynamic_manipulability(point)),
+        dynamic_manipulability=float(dexterity.dynamic_manipulability(point)) if known else None,
         isotropy=float(dexterity.isotropy(point)),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -31,7 +32,8 @@ def computer_text(controller: Controller) -> str:
     period = _given(controller.sampling_period, "s")
     samples = "sample" if controller.delay == 1.0 else "samples"
     delay = f"{_given(controller.delay)} {samples} of delay" if controller.delay else "no delay"
-    parts = [f"sampled every {period}", delay]
+    known = math.isfinite(controller.sampling_period)
+    parts = [f"sampled every {period}" if known else "sampling period not known", delay]
     estimate = "velocity"
     if not isinstance(controller.velocity, BackwardDifference):
         name = next(name for name, method in METHODS.items() if isinstance(controller.velocity, method))
@@ -53,6 +55,7 @@ def computer_text(controller: Controller) -> str:
         parts.append(f"force through {_filter(controller.force_filter)}")
     if controller.actuator_time_constant:
         parts.append(f"force lagging by {_given(controller.actuator_time_constant, 's')}")
+    parts += [f"with {name}" for name in controller.feedback_names]
     return ", ".join(parts)
 
 

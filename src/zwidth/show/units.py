@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from math import floor, isfinite, isnan, log10
 from typing import Final
 
-from zwidth.moment_units import spoken_unit
+from zwidth.show.moment_units import spoken_unit
 
 PREFIXES: Final = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Prefixes, as powers of ten, that a unit may take; one that is not named takes none: kg has a prefix already, one

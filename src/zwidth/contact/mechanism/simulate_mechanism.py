@@ -21,6 +21,7 @@ from zwidth.contact.mechanism.system import System, system_of
 from zwidth.contact.mechanism.walls import SurfaceRendering, rendered_environment
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import NoMechanismError
+from zwidth.loop.unsupported_feedback import refuse_feedback
 from zwidth.model.argument_checks import check_choice, require
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.mechanism_arrays import pack
@@ -113,6 +114,11 @@ def simulate_mechanism(
     if wall is not None and surface is not None:
         environment, values = rendered_environment(wall, surface)
     controller = point.controller
+    refuse_feedback(
+        controller,
+        "the large motion of a mechanism is not simulated",
+        "simulate one rendered direction, or leave it out",
+    )
     inputs = motion_inputs(mechanism, controller, duration, push, gravity, substeps, len(posture.jacobian[0]))
     velocity, rates = start_rates(posture, start_velocity)
     shape, mech = packed(surface), pack(mechanism)

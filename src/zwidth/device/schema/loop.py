@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BeforeValidator
 
 from zwidth.device.faults import quote
+from zwidth.device.schema.feedback import FeedforwardSection, ForceSensorSection, LocalSection
 from zwidth.device.schema.value_types import Number, NumberOrInfinity, Section, Step, documented_key
 from zwidth.device.schema.velocity import BackwardDifferenceSection, LowPass, VelocitySection
 
@@ -100,3 +101,10 @@ class LoopSection(Section):
         "where the encoder sits, and its step", default=EncoderSection(at=None, resolution_m=None, noise_m=None)
     )
     saturation: SaturationSection | None = documented_key("the largest force; omitted: no limit", default=None)
+    force_sensor: ForceSensorSection | None = documented_key(
+        "a force sensor at the handle, fed back; omitted: none", default=None
+    )
+    feedforward: FeedforwardSection | None = documented_key(
+        "feedforward of the device's own inertia and friction; omitted: none", default=None
+    )
+    local: LocalSection | None = documented_key("a fast loop under the wall's; omitted: none", default=None)

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import click
 
-from zwidth.moment_units import keys_of_moments, speaking_of_moments
 from zwidth.show.cli.answer import Answer, deliver
 from zwidth.show.cli.errors import NoAnswer, translate_errors
 from zwidth.show.cli.first_use import announce_compiling
 from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.progress import show_progress
+from zwidth.show.moment_units import keys_of_moments, speaking_of_moments
 from zwidth.show.output import DATA, FIGURES, destination, printable, write_data
 
 if TYPE_CHECKING:
@@ -92,6 +92,7 @@ class Command:
     linear            does the answer leave out the nonlinear parts?
     may_be_undecided  may double precision leave it undecided? Then the answer has the key `decided`
     takes_responses   does it answer for a measured response, too?
+    has_device        is it about a device that is read? Not where it writes a new one
     """
 
     name: ClassVar[str]
@@ -105,6 +106,7 @@ class Command:
     linear: ClassVar[bool] = True
     may_be_undecided: ClassVar[bool] = False
     takes_responses: ClassVar[bool] = False
+    has_device: ClassVar[bool] = True
 
     # --- what a command says of itself ----------------------------------------------------------------
 
@@ -235,10 +237,10 @@ class Command:
 
     def is_about_moments(self, case: CommandLine) -> bool:
         """Whether the answer is about moments about an axis, in N m/rad."""
-        return case.question.is_about_moments(case.device)
+        return self.has_device and case.question.is_about_moments(case.device)
 
     def _answer(self, case: CommandLine) -> Answer:
-        if not self.takes_responses and case.device.response is not None:
+        if self.has_device and not self.takes_responses and case.device.response is not None:
             case.question.point(case.device)  # refuses options that need a model for a [response]
             none = self.unanswered(case, NoAnswer(NO_MODEL))
             return replace(none, document=case.question.linear_circumstances(case.device) | none.document)

@@ -17,6 +17,7 @@ COMMANDS: Final = {
     "schema": ("schema", "schema"),
     "compile": ("compile", "compile_command"),
     "new": ("new", "NewCommand"),
+    "import": ("import_", "ImportCommand"),
     "show": ("show", "ShowCommand"),
     "chart": ("chart", "ChartCommand"),
     "check": ("check", "CheckCommand"),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from zwidth.moment_units import speaking_of_moments
 from zwidth.show.circumstances import computer_text, omission_text, operator_text
+from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.output import printable
 from zwidth.show.units import amount, typed, vector, way
 

@@ -42,7 +42,7 @@ class NewCommand(Command):
     )
     outputs = (ENDING,)
     output_help = "Where to write it (.toml). Default: NAME.toml in this folder."
-    takes_responses = True  # there is no device yet
+    has_device = False
 
     def about(self, command: Callback) -> Callback:
         @wraps(command)
@@ -50,9 +50,6 @@ class NewCommand(Command):
             return command(Question(device), **more)
 
         return click.argument("device", metavar="NAME", callback=refuse_empty)(with_name)
-
-    def is_about_moments(self, case: CommandLine) -> bool:
-        return False  # there is no device yet
 
     def default_output(self, question: Question) -> str:
         return question.name if question.name.lower().endswith(ENDING) else question.name + ENDING

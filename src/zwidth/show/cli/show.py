@@ -11,6 +11,7 @@ from zwidth.show.output import DATA, json_value
 from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
+    from zwidth.device.device import Device
     from zwidth.measures.description import Description
     from zwidth.model.mechanism import Floats
 
@@ -36,6 +37,7 @@ class ShowCommand(Command):
         "manipulability",
         "dynamic_manipulability",
         "isotropy",
+        "missing",
         "sources",
     )
 
@@ -43,7 +45,11 @@ class ShowCommand(Command):
         return case.point.describe()
 
     def document(self, case: CommandLine, result: Description) -> dict[str, Any]:
-        return result.document() | {"sources": case.device.sources}
+        from zwidth.device.missing import unknown_numbers
+
+        unknown = unknown_numbers(case.device.document)
+        missing = [{"path": path, "needed_for": one.needed_for} for one in unknown for path in one.paths]
+        return result.document() | {"missing": missing, "sources": case.device.sources}
 
     def table(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> dict[str, list[Any]]:
         from zwidth.measures.description import entries
@@ -52,11 +58,7 @@ class ShowCommand(Command):
 
     def pages(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> Iterator[Any]:
         values = json_value(document)
-        massless = case.point.missing.get("dynamics", ())
-        if massless:
-            more = f" and {len(massless) - 2} more" if len(massless) > 2 else ""
-            yield f"  kinematics only: the file does not give {', '.join(massless[:2])}{more}\n"
-        else:
+        if result.effective is not None:
             yield two_columns(_felt(values))
         if result.jacobian is not None:
             units = _dexterity_units(result.jacobian)
@@ -64,12 +66,13 @@ class ShowCommand(Command):
             yield two_columns(
                 [
                     ("manipulability", amount(values["manipulability"], units[0])),
-                    *([] if massless else [dynamic]),
+                    *([dynamic] if result.effective is not None else []),
                     ("isotropy (1 is best)", amount(values["isotropy"])),
                 ]
             )
             angles = [(name, _coordinates(value)) for name, value in values["joints_rad"].items()]
             yield table(["joint", "angle [rad]"], angles)
+        yield from _missing(case.device)
         if values["sources"]:
             yield table(["numbers", "source"], list(values["sources"].items()))
 
@@ -88,6 +91,15 @@ def _felt(values: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _coordinates(value: Any) -> str:
     """A joint's coordinate, or those of a joint with several."""
     return ", ".join(amount(one) for one in value) if isinstance(value, list) else amount(value)
+
+
+def _missing(device: Device) -> Iterator[Any]:
+    """What the file leaves out, and what for it is needed."""
+    from zwidth.device.missing import unknown_numbers
+
+    unknown = unknown_numbers(device.document)
+    if unknown:
+        yield table(["missing", "of", ""], [(one.group, one.names, one.needed_for) for one in unknown])
 
 
 def _dexterity_units(jacobian: Floats) -> tuple[str, str]:

@@ -471,7 +471,7 @@ def delay_name(controller: Controller) -> str:
 
 
 def velocity_and_force_text(controller: Controller) -> str:
-    """Velocity estimator and filters: "velocity by kalman, force lagging by 2 ms"."""
+    """Velocity estimator, filters and other feedback: "velocity by kalman, force lagging by 2 ms"."""
     plain = isinstance(controller.velocity, BackwardDifference)
     method = next(name for name, kind in METHODS.items() if isinstance(controller.velocity, kind))
     estimate = "velocity" if plain else f"velocity by {method}"
@@ -482,6 +482,7 @@ def velocity_and_force_text(controller: Controller) -> str:
         parts.append(f"force through {filter_name(controller.force_filter)}")
     if controller.actuator_time_constant:
         parts.append(f"force lagging by {as_written(controller.actuator_time_constant, 's')}")
+    parts += [f"with {name}" for name in controller.feedback_names]
     return ", ".join(parts)
 
 

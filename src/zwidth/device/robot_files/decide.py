@@ -1,0 +1,428 @@
+"""What a robot file leaves open: which joints are driven and free, how joints are written, where the handle is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+
+from zwidth.device.faults import DeviceError, Fault, comma_list, fail, suggestion
+from zwidth.device.robot_files import freedom
+from zwidth.device.robot_files.followers import settle_followers, write_linkages
+from zwidth.device.robot_files.freedom import Motions
+from zwidth.device.robot_files.links import LinkTree, Shape, link_tree, listed, merge_universal, moving_bodies
+from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot, roll_pitch_yaw_of
+from zwidth.model.mechanism import Floats
+
+HANDLE_WORDS: Final = re.compile(
+    r"handle|grip|tool|tcp|eef|end.?effector|attachment|stylus|pen|tip", re.IGNORECASE
+)
+MOST_COORDINATES: Final = 200
+MOVES: Final = 1e-6  # part of a motion from which a joint takes part in it
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the user says of a file.
+
+    handle    name of the site or body that is the handle; None: to be found
+    controls  "position", "orientation" or "pose"; None: the least that determines the drives
+    fixed     names of joints, or of bodies with their joints, that are held where they stand
+    """
+
+    handle: str | None = None
+    controls: str | None = None
+    fixed: tuple[str, ...] = ()
+
+
+@dataclass
+class Decided:
+    """A robot with all decisions made.
+
+    tree, motions  of the final links;   motors  of the joints that are driven;   shape  what was decided of bodies
+    handle         body and place;   controls  of it;   assumed  whether the driven joints are not of the file
+    columns        (6, d) motions of the handle by the drives at the reference posture
+    """
+
+    tree: LinkTree
+    motions: Motions
+    motors: list[Motor]
+    shape: Shape
+    handle: tuple[int, Place]
+    controls: str
+    columns: Floats
+    assumed: bool = False
+    closures: list[dict[str, Any]] = field(default_factory=list)
+
+
+def decide(robot: Robot, choices: Choices) -> Decided:
+    """Make all decisions that a device file needs.
+
+    Raises DeviceError  with what cannot be decided, or cannot be written
+    """
+    settle_followers(robot)
+    fixed = _fixed(robot, choices.fixed)
+    handle = find_handle(robot, choices.handle)
+    if handle[0] not in moving_bodies(robot, fixed):
+        raise fail(robot.label, f"'{choices.handle or 'handle'}'", f"does not move; {_handles(robot)}")
+    if sum(len(body.joints) for body in robot.bodies) > MOST_COORDINATES:
+        raise fail(robot.label, "", f"has more than {MOST_COORDINATES} joints, more than a device file is for")
+    write_linkages(robot)
+    motors = _motors(robot, fixed)
+    shape = Shape(fixed=fixed)
+    _leave_out_fixed_loops(robot, shape)
+    merge_universal(robot, {joint for motor in motors or () for joint in motor.turns} | fixed)
+    for _ in range(len(robot.bodies) + 2):
+        tree, motions = _draft(robot, shape, handle)
+        _check_loops(robot, motions)
+        driven = motors if motors is not None else _assumed(robot, tree, motions)
+        rows = [motions.rows(tree.link_of[motor.joint])[0] for motor in driven]
+        kept = [rows[k] for k in freedom.independent(motions.basis, [[row] for row in rows])]
+        changed = _set_free(robot, tree, motions, shape, kept, {motor.joint for motor in driven})
+        if changed == shape:
+            break
+        shape = changed
+    controls, columns = _controls(robot, tree, motions, driven, kept, shape, choices.controls)
+    return Decided(
+        tree, motions, driven, shape, handle, controls, columns, motors is None, closure_tables(robot, tree)
+    )
+
+
+def _fixed(robot: Robot, names: Sequence[str]) -> frozenset[str]:
+    """Joints that are held: those named, those of bodies named, and those that follow a held joint."""
+    joints, bodies = robot.joints, {body.name: body for body in robot.bodies if body.joints}
+    faults, held = [], set()
+    for name in names:
+        if name in joints:
+            held.add(name)
+        elif name in bodies:
+            held |= {joint.name for joint in bodies[name].joints}
+        else:
+            known = {*joints, *bodies}
+            faults.append(Fault(robot.label, "fix", f"'{name}' is no joint; {suggestion(name, known, 'joints')}"))
+    if faults:
+        raise DeviceError(faults)
+    left = list(robot.followers)
+    for _ in range(len(left) + 1):
+        for one in left:
+            if not one.leader or one.leader in held or (one.ratio and one.joint in held):
+                held |= {one.joint, one.leader} - {""}
+    for one in left:
+        if not one.leader:
+            robot.note(one.where, f"holds '{one.joint}' where it stands; it is written as fixed")
+    robot.followers = [one for one in left if one.joint not in held]
+    return frozenset(held)
+
+
+def find_handle(robot: Robot, name: str | None) -> tuple[int, Place]:
+    """Body and place of the handle. Raises DeviceError where it cannot be told."""
+    sites = {site.name: (site.body, site.place) for site in robot.sites}
+    bodies = {body.name: (i, UNMOVED) for i, body in enumerate(robot.bodies) if i != BASE}
+    if name is not None:
+        if name in sites or name in bodies:
+            return sites[name] if name in sites else bodies[name]
+        near = suggestion(name, {*sites, *bodies}, "sites and bodies")
+        raise fail(robot.label, "handle", f"'{name}' is neither a site nor a body of the file; {near}")
+    named = [one for one in sites if HANDLE_WORDS.search(one)]
+    named = named if len(named) == 1 else [one for one in (*sites, *bodies) if HANDLE_WORDS.search(one)]
+    leaves = [body.name for i, body in enumerate(robot.bodies) if i and all(b.parent != i for b in robot.bodies)]
+    found = named if len(named) == 1 else leaves if len(leaves) == 1 else []
+    if not found:
+        raise fail(robot.label, "", f"does not say which site or body is the handle; {_handles(robot)}")
+    robot.note("mechanism.handle", f"is taken to be '{found[0]}'; name another with handle=NAME")
+    return sites.get(found[0]) or bodies[found[0]]
+
+
+def _handles(robot: Robot) -> str:
+    sites = [site.name for site in robot.sites]
+    bodies = [body.name for body in robot.bodies[1:]][::-1]
+    listed_sites = f"sites: {comma_list(sites, 8)}; " if sites else ""
+    return f"name it with handle=NAME; {listed_sites}bodies: {comma_list(bodies, 8)}"
+
+
+def _motors(robot: Robot, fixed: frozenset[str]) -> list[Motor] | None:
+    """The motors of joints that move; None where the file names none."""
+    if robot.motors is None:
+        return None
+    kept = []
+    for motor in robot.motors:
+        turns = {joint: turn for joint, turn in motor.turns.items() if joint not in fixed}
+        if motor.joint in fixed and not turns:
+            robot.note(f"actuator '{motor.name}'", "drives a joint that is held; it is left out")
+            continue
+        joint = motor.joint if motor.joint not in fixed else max(turns, key=lambda one: abs(turns[one]))
+        kept.append(replace(motor, joint=joint, turns=turns))
+    return kept
+
+
+def _draft(robot: Robot, shape: Shape, handle: tuple[int, Place]) -> tuple[LinkTree, Motions]:
+    """The links with this shape, and how they move."""
+    tree = link_tree(robot, shape)
+    single = next((link["name"] for link in tree.links if link["joint"] in ("revolute", "prismatic")), None)
+    if single is None:
+        raise fail(robot.label, "", "has no joint that turns about one axis or slides, which a drive needs")
+    links = [{key: value for key, value in link.items() if key != "free"} for link in tree.links]
+    section = section_of(robot, tree, handle, "pose", [{"name": "drive", "joint": single}]) | {"links": links}
+    return tree, freedom.motions(section, robot.label)
+
+
+def section_of(
+    robot: Robot, tree: LinkTree, handle: tuple[int, Place], controls: str, drives: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """[mechanism], its reference not yet computed."""
+    link, place = tree.in_link(*handle)
+    angles = roll_pitch_yaw_of(place.turn)
+    held: dict[str, Any] = {"link": link, "point_m": listed(place.at)}
+    if angles.any():
+        held["orientation_rad"] = listed(angles)
+    assembly = {"joints_rad": tree.joints_rad, "joints_m": tree.joints_m}
+    section: dict[str, Any] = {"links": tree.links, "loops": closure_tables(robot, tree)}
+    if not section["loops"]:
+        del section["loops"]
+    return section | {
+        "handle": held | {"controls": controls},
+        "assemblies": {"as-imported": {key: value for key, value in assembly.items() if value}},
+        "reference": {
+            "position_m": [0.0, 0.0, 0.0],
+            "orientation_rad": [0.0, 0.0, 0.0],
+            "direction": [1.0, 0.0, 0.0],
+        },
+        "drives": drives,
+    }
+
+
+def _leave_out_fixed_loops(robot: Robot, shape: Shape) -> None:
+    """Leave out what joins two bodies that are one link."""
+    frames = link_tree(robot, shape).frames
+    for closure in list(robot.closures):
+        a, b = closure.bodies
+        if frames[a][0] == frames[b][0]:
+            robot.note(f"loop '{closure.name}'", "joins two bodies that are fixed to each other; it is left out")
+            robot.closures.remove(closure)
+
+
+def closure_tables(robot: Robot, tree: LinkTree) -> list[dict[str, Any]]:
+    """The loops, in the frames of the links."""
+    tables, taken = [], LinkTree()
+    for closure in robot.closures:
+        (link_a, frame_a), (link_b, frame_b) = (tree.frames[body] for body in closure.bodies)
+        points = [frame.of_point(point) for frame, point in zip((frame_a, frame_b), closure.points, strict=True)]
+        table: dict[str, Any] = {
+            "name": taken.name(closure.name),
+            "links": [link_a, link_b],
+            "points_m": [listed(point) for point in points],
+        }
+        if closure.closes != "point":
+            table["closes"] = closure.closes
+        if closure.closes == "axis" and closure.axes is not None:
+            axes = (frame.turn @ axis for frame, axis in zip((frame_a, frame_b), closure.axes, strict=True))
+            table["axes"] = [listed(axis) for axis in axes]
+        if closure.closes == "frame" and closure.turn is not None:
+            table["orientation_rad"] = listed(roll_pitch_yaw_of(frame_a.turn @ closure.turn @ frame_b.turn.T))
+        tables.append(table)
+    return tables
+
+
+def _check_loops(robot: Robot, motions: Motions) -> None:
+    if not motions.open_loops:
+        return
+    faults = []
+    for k in motions.open_loops:
+        closure = robot.closures[k]
+        a, b = (robot.bodies[i].name for i in closure.bodies)
+        faults.append(
+            Fault(
+                robot.label,
+                f"loop '{closure.name}'",
+                f"closes nowhere: its two {closure.closes}s, on '{a}' and '{b}', stay at least "
+                f"{motions.gaps[k]:.3g} m apart; check anchors, lengths and axes",
+            )
+        )
+    raise DeviceError(faults)
+
+
+def _assumed(robot: Robot, tree: LinkTree, motions: Motions) -> list[Motor]:
+    """As many driven joints as the loops leave freedom, those next to the base first."""
+    followers = {one.joint for one in robot.followers}
+    singles = [
+        name
+        for name, (_, joint) in robot.joints.items()
+        if joint.single and name in tree.link_of and name not in followers
+    ]
+    groups = [motions.rows(tree.link_of[name]) for name in singles]
+    return [Motor(singles[k], singles[k]) for k in freedom.independent(motions.basis, groups)]
+
+
+def _set_free(
+    robot: Robot, tree: LinkTree, motions: Motions, shape: Shape, driven: list[int], drives: set[str]
+) -> Shape:
+    """The shape with every motion that drives and loops leave given to a free joint.
+
+    Where a joint of several coordinates is neither free nor determined as a whole, it is split, and all is asked
+    anew.
+    """
+    left = freedom.left_over(motions.basis, driven)
+    free: set[str] = set()
+    turned = dict(shape.turned)
+    looped = _looped(robot)
+    joints = {
+        name: (body, joint)
+        for name, (body, joint) in robot.joints.items()
+        if name in tree.link_of and name not in drives
+    }
+    names = {**{name: name for name in joints}, **{name: name for name in tree.link_of if name not in drives}}
+    while left.shape[1]:
+        sizes = {name: _size(left, motions.rows(tree.link_of[name])) for name in names if name not in free}
+        whole = [
+            name
+            for name, (body, joint) in joints.items()
+            if name not in free
+            and not joint.single
+            and body not in looped
+            and freedom.independent(left, [motions.rows(tree.link_of[name])])
+        ]
+        spin = next(
+            (name for name in joints if name not in free and _spins(motions, tree, joints, name, left)), None
+        )
+        singles = [name for name in sizes if len(motions.rows(tree.link_of[name])) == 1 and sizes[name] > MOVES]
+        if whole:
+            free.add(whole[0])
+            left = freedom.left_over(left, motions.rows(tree.link_of[whole[0]]))
+        elif spin:
+            body, rows = joints[spin][0], motions.rows(tree.link_of[spin])
+            axis = _only_direction(left[rows])
+            if body not in turned:
+                turned[body] = tuple(map(tuple, _axes_along(axis).tolist()))
+            free.add(spin)
+            left = _without(left, np.asarray(axis @ left[rows]))
+        elif singles:
+            sprung = [name for name in singles if name in joints and joints[name][1].stiffness > 0.0]
+            largest = max(sprung or singles, key=lambda name: sizes[name])
+            free.add(largest)
+            left = freedom.left_over(left, motions.rows(tree.link_of[largest]))
+        else:
+            name = max(sizes, key=lambda name: sizes[name])
+            return replace(shape, split=shape.split | {name})
+    return replace(shape, free=frozenset(free), turned=turned)
+
+
+def _size(left: Floats, rows: Sequence[int]) -> float:
+    return float(np.abs(left[list(rows)]).max(initial=0.0))
+
+
+def _looped(robot: Robot) -> set[int]:
+    """Bodies between the ends of a loop and their fork."""
+    found: set[int] = set()
+    for closure in robot.closures:
+        one, two = (robot.way_to_base(body) for body in closure.bodies)
+        found |= set(one) ^ set(two)
+    return found
+
+
+def _spins(motions: Motions, tree: LinkTree, joints: dict[str, Any], name: str, left: Floats) -> bool:
+    """Whether a ball joint in a loop turns about one axis of its body while all joints of one coordinate rest."""
+    if joints[name][1].kind != "spherical" or name not in tree.link_of:
+        return False
+    resting = [row for row, entry in enumerate(motions.entries) if len(motions.rows(entry.partition("/")[0])) == 1]
+    turning = freedom.left_over(left, resting)
+    if not turning.shape[1]:
+        return False
+    values = np.linalg.svd(turning[motions.rows(tree.link_of[name])], compute_uv=False)
+    return bool(values[0] > MOVES and (len(values) == 1 or values[1] <= MOVES * values[0]))
+
+
+def _only_direction(rows: Floats) -> Floats:
+    """Unit vector (3,) along the largest motion of a ball joint, (3, f)."""
+    return np.asarray(np.linalg.svd(rows)[0][:, 0])
+
+
+def _without(left: Floats, row: Floats) -> Floats:
+    """The motions in which this combination of coordinates rests."""
+    _, _, right = np.linalg.svd(row[None])
+    return np.asarray(left @ right[1:].T)
+
+
+def _axes_along(axis: Floats) -> Floats:
+    """Axes (3, 3) of which the first is the given one, the nearer way round."""
+    x = axis if axis[np.argmax(np.abs(axis))] > 0.0 else -axis
+    x = np.where(np.abs(x) < 1e-12, 0.0, x)
+    x = x / np.linalg.norm(x)
+    y = np.eye(3)[int(np.argmin(np.abs(x)))]
+    y = y - x * (x @ y)
+    y = y / np.linalg.norm(y)
+    return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def _controls(
+    robot: Robot,
+    tree: LinkTree,
+    motions: Motions,
+    driven: list[Motor],
+    kept: list[int],
+    shape: Shape,
+    wanted: str | None,
+) -> tuple[str, Floats]:
+    """What of the handle the drives control, and their motions of it (6, d) at the reference posture."""
+    if not kept:
+        raise fail(robot.label, "", _nothing_moves(robot, motions))
+    free = [row for name in shape.free for row in _free_rows(robot, tree, motions, name)]
+    each = [freedom.handle_motions(place, kept, free) for place in motions.places]
+    found = [controls for H in each if (controls := freedom.controls_of(H))]
+    if not found:
+        raise fail(robot.label, "", _not_controlled(motions, tree, driven, kept, each))
+    controls = min(found, key=("position", "orientation", "pose").index)
+    parts = {"position": slice(0, 3), "orientation": slice(3, 6), "pose": slice(0, 6)}
+    if wanted is not None:
+        if not any(freedom.controlled(H[parts[wanted]]) for H in each):
+            raise fail(
+                robot.label, "controls", f"cannot be {wanted}: it leaves drives open; it can be {controls} or pose"
+            )
+        controls = wanted
+    if not freedom.controlled(each[0][parts[controls]]):
+        robot.warn(
+            "mechanism.reference",
+            "the posture of the file is singular: its drives cannot move the handle every way. Give another with "
+            "posture=JOINT=VALUE or keyframe=NAME",
+        )
+    return controls, each[0]
+
+
+def _nothing_moves(robot: Robot, motions: Motions) -> str:
+    """Why no drive moves anything."""
+    if motions.basis.shape[1]:
+        return "drives no joint that moves; name a motor for each degree of freedom"
+    names = comma_list([f"'{closure.name}'" for closure in robot.closures], 6)
+    return (
+        f"has loops that hold everything: {len(motions.entries)} joint coordinates, all of them held by {names}; "
+        "leave one out, or let one hold less (a point by connect, not a whole body by weld)"
+    )
+
+
+def _free_rows(robot: Robot, tree: LinkTree, motions: Motions, name: str) -> list[int]:
+    rows = motions.rows(tree.link_of[name])
+    found = robot.joints.get(name)
+    spins = found is not None and found[1].kind == "spherical" and found[0] in _looped(robot)
+    return rows[:1] if spins else rows
+
+
+def _not_controlled(
+    motions: Motions, tree: LinkTree, driven: list[Motor], kept: list[int], each: list[Floats]
+) -> str:
+    names = {motions.rows(tree.link_of[motor.joint])[0]: motor for motor in driven}
+    resting = set.intersection(*(set(freedom.idle(H)) for H in each))
+    idle = [names[kept[k]].joint for k in sorted(resting)]
+    if idle:
+        return (
+            f"drives {comma_list(idle, 12)}, which do not move the handle; hold them still with "
+            f"fix={','.join(idle[:12])}, or name another handle with handle=NAME"
+        )
+    rank = max(int(np.linalg.matrix_rank(H, tol=1e-6 * max(np.abs(H).max(), 1e-300))) for H in each)
+    joints = [names[row].joint for row in kept]
+    return (
+        f"has {len(kept)} drives, {comma_list(joints, 12)}, that move the handle in {rank} ways: a posture is "
+        f"asked by the handle, which must tell all of them. Hold {len(kept) - rank} of them still with "
+        f"fix={joints[-1]} or another"
+    )
