@@ -26,6 +26,7 @@ KINDS = {
 }
 BAND = 1e-9  # round the unit circle, where double precision does not tell
 EDGES, WALLS = 6, 40  # walls tried: on each arc, and about the chart
+LOST = 1e-5  # by how much roots of two matrices may differ by rounding
 DOUBLE = 1e-5  # a pair of roots nearer to the real axis counts as a double root
 HIDDEN = 1e-6  # how far a motion may move that is named as unobserved
 CHORD = 1e-6  # shares of the chart's size by which the chords of a drawn outline miss the edge
@@ -55,15 +56,18 @@ class Judge:
         return np.array([np.abs(own).max() for own in roots]), len(still)
 
     def distance(self, K, B, z):
-        """How far the nearest root is from z, less what rounding of this matrix leaves open of it."""
-        off = float(np.min(np.abs(np.linalg.eigvals(self.matrices(K, B)) - z)))
-        if off <= BAND:
-            return off
-        matrix = matrix_balance(self.case.transition_matrix(K, B), permute=False)[0]
-        own, right = np.linalg.eig(matrix)
-        left, nearest = np.linalg.pinv(right), int(np.argmin(np.abs(own - z)))
-        condition = np.linalg.norm(left[nearest]) * np.linalg.norm(right[:, nearest])
-        return float(abs(own[nearest] - z)) - 1e-14 * condition * np.linalg.norm(matrix)
+        """How far the nearest root is from z. Where this matrix has lost digits, as beside very unlike masses, the
+        loop's own states tell, which are not what charts are made of; less what rounding leaves open of a root."""
+        roots = np.linalg.eigvals(self.matrices(K, B))
+        apart = roots[np.argmin(np.abs(roots - z))]
+        if abs(apart - z) <= BAND:
+            return float(abs(apart - z))
+        own = matrix_balance(self.case.loop.transition_matrix(K, B), permute=False)[0]
+        roots, right = np.linalg.eig(own)
+        left, nearest = np.linalg.pinv(right), int(np.argmin(np.abs(roots - z)))
+        assert abs(roots[nearest] - apart) < LOST, (K, B, z)
+        condition = np.linalg.norm(left[nearest]) * np.linalg.norm(right[:, nearest]) * np.linalg.norm(own)
+        return float(abs(roots[nearest] - z)) - 2e-15 * condition
 
 
 def on_edges(chart, judge, seen):

@@ -32,6 +32,7 @@ STEPS, SETTLED = 3, 1e-15  # of Newton's method; the step in shares of a root at
 # The longest steps that are tried, in shares of the distance to the next root, and how many of any length.
 SMALL_STEP, LONG_STEP, ANY_STEP, MANY_STEPS = 1e-3, 0.1, 1e300, 40
 GOOD = 1e-11  # error below which nothing better is looked for
+FEW_DIGITS = 1e-3  # weight of the largest error beside the median
 PROBES, LOWEST_PROBE = 40, 1e-3  # angles of the circle at which responses are compared, and their least [rad]
 # Where P d^2 is below this share of its largest, walls on the circle are far too stiff to be edges.
 IRRELEVANT = 1e-6
@@ -60,7 +61,7 @@ class PoleZeroForm:
 def pole_zero_form(
     form: SampledForm, zero_poles: int, path: SampledForm, known_zeros: Complexes
 ) -> tuple[PoleZeroForm, float]:
-    """The poles, zeros and gain of a form, and their error in shares of the response on the circle.
+    """The poles, zeros and gain of a form, and their typical error in shares of the response on the circle.
 
     form         without `old` and direct parts
     zero_poles   how many of the poles are 0 exactly: places and speeds that a free motion keeps
@@ -93,7 +94,7 @@ class _Match:
         size = np.abs(self.wanted * d**2)
         slow = np.minimum(np.abs(d) / SLOW, 1.0) ** zero_poles
         self.allowed = (size + IRRELEVANT * np.max(size)) / np.abs(d) ** 2 / slow
-        self.at = int(np.argmax(size))
+        self.relevant = size > IRRELEVANT * np.max(size)
 
     def best(self, poles: list[Complexes], zeros: list[Complexes]) -> tuple[PoleZeroForm, float]:
         """The form of one of the sets of poles and one of the sets of zeros with the least error, and that."""
@@ -103,9 +104,11 @@ class _Match:
             if some is None or others is None:
                 continue
             with np.errstate(all="ignore"):  # a pole on the circle may be a probe
-                gain = self.wanted[self.at] / PoleZeroForm(some, others, 1.0).response(self.d)[self.at]
-                one = PoleZeroForm(some, others, float(gain.real))
-                error = float(np.max(np.abs(one.response(self.d) - self.wanted) / self.allowed))
+                ratio = self.wanted / PoleZeroForm(some, others, 1.0).response(self.d)
+                one = PoleZeroForm(some, others, float(np.median(ratio[self.relevant].real)))
+                off = np.abs(one.response(self.d) - self.wanted) / self.allowed
+            # at high frequency the system's own response has few digits left, which the form is not to follow
+            error = float(np.median(off) + FEW_DIGITS * np.max(off))
             if error < least:
                 found, least = one, error
         return found, least
