@@ -47,10 +47,7 @@ NOT_COVERED = (
         "Fig. B.1",
         "Photographs and sketches of devices and models, not in the scan.",
     ),
-    (
-        "(A.1), (B.13), (B.14)",
-        "The characteristic equation, Lagrange's equations and the sum of the kinetic energies: definitions.",
-    ),
+    ("(A.1)", "The characteristic equation: a definition."),
 )
 
 # The same for what has no number of its own.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from lazy_module import LazyModule
@@ -29,6 +31,7 @@ matrices = LazyModule("gallery.transition_matrices")
 damped = LazyModule("gallery.damped_mass_algebra")
 sprung = LazyModule("gallery.mass_spring_algebra")
 appendix_b = LazyModule("gallery.appendix_b")
+drawn = LazyModule("gallery.appendix_b_random")
 
 # Transition matrix by matrix exponential, eigenvalues: largest stiffness, its damping and frequency, largest
 # damping for K -> 0. All digits given are right.
@@ -225,9 +228,14 @@ def test_the_thesis_transition_matrices():
     assert matrices.zero < 1e-12 < 0.01 < matrices.non_zero
     assert max(matrices.error_of_damped, matrices.error_of_filtered) < 1e-12
     assert matrices.error_of_filter < 1e-15
-    # another wall is another polynomial
-    wall = (4000.0, 10.0)
-    assert matrices.coefficient_distance(matrices.modal_matrix(*wall), matrices.modal_matrix(4000.0, 10.01)) > 1e-5
+    assert max(matrices.error_of_steps, matrices.random_error_of_steps) < 1e-9
+    assert max(matrices.error_of_zwidth, matrices.random_error_of_zwidth, matrices.random_error_of_modal) < 1e-9
+    assert matrices.random_error_of_modes < 1e-14
+    # another wall is another polynomial, and so is another damping
+    pair = matrices.thesis
+    one = matrices.modal_matrix(pair, 4000.0, 10.0)
+    for other in ((pair, 4000.0, 10.01), (pair._replace(r_m=0.51), 4000.0, 10.0)):
+        assert matrices.coefficient_distance(one, matrices.modal_matrix(*other)) > 1e-5
 
 
 def test_a_mass_with_friction_and_one_on_a_spring_by_algebra():
@@ -244,6 +252,36 @@ def test_appendix_b():
     for name in ("position", "jacobian", "B_6", "B_7", "B_8", "inverse", "mass", "terms"):
         assert getattr(appendix_b, f"error_of_{name}") < 1e-13
     assert appendix_b.error_of_B_17 > 1.0
+
+
+def test_appendix_b_on_random_five_bars():
+    assert set(drawn.errors) == {"position", "jacobian", "B_6", "B_7", "B_8", "inverse", "mass", "terms"} | {
+        "B_17",
+        "slope_alone",
+        "B_13",
+    }
+    assert all(drawn.errors[name] < 1e-12 for name in set(drawn.errors) - {"B_17", "slope_alone"})
+    assert drawn.error_of_B_13 < 1e-14
+    assert min(drawn.least_error_of_B_17, drawn.errors["slope_alone"]) > 0.5
+    assert drawn.least_error_of_B_8_with_unequal_arms > 1e-3
+
+
+def test_a_changed_energy_is_another_lagrange_function():
+    """A rod's inertia of one part in a million more, in (B.15) alone, is seen."""
+    device, *case = next(drawn.random_cases())
+    assert drawn.error_of_lagrange(device, *case) < 1e-12
+    at = device.at(case[0]).posture
+    links = device.mechanism.links
+    mass = links.mass * [1.0, 1.000001, 1.0, 1.0]
+    heavier = replace(device, mechanism=replace(device.mechanism, links=replace(links, mass=mass)))
+    p = at.angles[[0, 2]]
+    torques = [
+        drawn.lagrange_function(one.mechanism.links, at.angles).torques(p, *case[1:]) for one in (device, heavier)
+    ]
+    assert drawn.relative_difference(*torques) > 1e-8
+
+
+def test_appendix_b_with_other_readings_of_the_masses():
     assert table_3_4.link_side_mass_of_appendix_b == pytest.approx(0.2626, abs=5e-5)
     assert table_3_4.link_side_mass_of_rods_with_offsets == pytest.approx(0.2586, abs=5e-5)
 
