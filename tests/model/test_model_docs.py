@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import zwidth
+from zwidth.model.damping import modal_matrix
+from zwidth.model.plant import Plant
 from zwidth.model.posture import OK, OUT_OF_REACH
 
 PAGE = (Path(__file__).parents[2] / "docs" / "mechanism.md").read_text(encoding="utf-8")
@@ -18,7 +20,7 @@ BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 
 @pytest.fixture(scope="module")
 def names() -> dict[str, Any]:
-    """What stands in the names after both examples, one after the other."""
+    """What stands in the names after the examples, one after the other."""
     found: dict[str, Any] = {}
     for block in BLOCKS:
         exec(compile(block, "docs/mechanism.md", "exec"), found)
@@ -31,8 +33,8 @@ def row(beginning: str) -> list[list[float]]:
     return [[float(x) for x in re.findall(r"[\d.]+", cell)] for cell in line.strip("|").split("|")[1:]]
 
 
-def test_the_page_has_both_examples():
-    assert len(BLOCKS) == 2
+def test_the_page_has_its_examples():
+    assert len(BLOCKS) == 3
 
 
 @pytest.mark.parametrize("name", ["link_side_mass", "motor_side_mass", "rigid_mass", "stiffness"])
@@ -89,3 +91,83 @@ def test_the_pages_damping_of_the_pair(names, model):
     m1, m2, k = (float(x) for x in (felt.link_side_mass, felt.motor_side_mass, felt.stiffness))
     b = 2 * names["device"].damping.ratio * np.sqrt(k * m1 * m2 / (m1 + m2))
     assert names["device"].at(model=model).plant.damping[-1, -1] == pytest.approx(b, rel=1e-12)
+
+
+# --- the serial arm whose elbow motor rides on its first link ----------------------------------------
+
+
+def with_change(value: float, plain: float, digits: int) -> str:
+    """As the table writes a number and what it differs by."""
+    change = f"{100 * (value / plain - 1):+.1f}".replace("-", "−")
+    return f"{value:.{digits}f} ({change} %)"
+
+
+def serial_arm_by_hand(document: dict[str, Any], n: float, way: float) -> Plant:
+    """The full model of the arm from its energies: two links, and J (s + w)^2/2 - J s^2/2 for the elbow's rotor,
+    with s the rate of the first link, whose inertia holds the rotor as if it were locked."""
+    (m1, L1, c1, I1), (m2, L2, c2, I2) = (
+        (link["mass_kg"], link["length_m"], link["center_of_mass_m"][0], link["inertia_kg_m2"])
+        for link in document["mechanism"]["links"]
+    )
+    x, y = document["mechanism"]["reference"]["position_m"]
+    q2 = np.arccos((x * x + y * y - L1 * L1 - L2 * L2) / (2 * L1 * L2))  # positive: the elbow on the right
+    q1 = np.arctan2(y, x) - np.arctan2(L2 * np.sin(q2), L1 + L2 * np.cos(q2))
+    lower = I2 + m2 * c2**2
+    mixed = lower + m2 * L1 * c2 * np.cos(q2)
+    links = [[I1 + m1 * c1**2 + m2 * L1**2 - lower + 2 * mixed, mixed], [mixed, lower]]
+    rotor, spring = (
+        np.diag([drive["transmission_ratio"] ** 2 * drive[key] for drive in document["mechanism"]["drives"]])
+        for key in ("motor_inertia_kg_m2", "stiffness_Nm_per_rad")
+    )
+    coupling = np.zeros((2, 2))
+    coupling[1, 0] = way * rotor[1, 1] / n  # J s w = J s n theta'
+    M = np.block([[np.array(links), coupling.T], [coupling, rotor]])
+    K = np.block([[spring, -spring], [-spring, spring]])
+    along_y = np.array([L1 * np.cos(q1) + L2 * np.cos(q1 + q2), L2 * np.cos(q1 + q2)])
+    links_side, motors_side = np.append(along_y, [0, 0]), np.append([0, 0], along_y)
+    damping = modal_matrix(M, K, document["mechanism"]["damping"]["mode_ratio"])
+    return Plant(M, damping, K, actuator=motors_side, sensor=motors_side, handle=links_side)
+
+
+@pytest.mark.parametrize("n", [10.0, 3.0, 1.0])
+def test_what_a_riding_motor_costs_a_serial_arm_is_what_the_page_says(names, n):
+    (line,) = [line for line in PAGE.splitlines() if line.startswith(f"| {n:.0f} | ")]
+    said = [cell.strip() for cell in line.strip("|").split("|")][1:]
+    found = [
+        [names["serial"][n, way][what] * scale for way in (0.0, 1.0, -1.0)] for what, scale in ((0, 1000), (1, 1))
+    ]
+    masses, stiffest = found
+    expected = [f"{masses[0]:.2f}", *(with_change(mass, masses[0], 2) for mass in masses[1:])]
+    expected += [f"{stiffest[0]:.1f}", *(with_change(reached, stiffest[0], 1) for reached in stiffest[1:])]
+    assert said == expected
+
+
+@pytest.mark.parametrize("way", [0.0, 1.0, -1.0])
+@pytest.mark.parametrize("n", [10.0, 3.0, 1.0])
+def test_the_serial_arms_numbers_are_those_of_its_energies(names, n, way):
+    arm = names["arm"]
+    plant = serial_arm_by_hand(arm.document, n, way)
+    mass, reached = names["serial"][n, way]
+    moves = plant.handle[:2]
+    # all four coordinates as one: each rotor with its joint
+    together = np.vstack([np.eye(2), np.eye(2)])
+    whole = together.T @ plant.mass @ together
+    assert mass == pytest.approx(1 / (moves @ np.linalg.solve(whole, moves)), rel=1e-9)
+    by_hand = zwidth.largest_stiffness(zwidth.Loop(plant, arm.controller)).stiffness
+    assert reached == pytest.approx(by_hand, rel=1e-6)
+
+
+def test_how_the_serial_arms_mass_changes_over_the_directions(names):
+    said = re.search(r"from −([\d.]+) to \+([\d.]+) % over the directions", PAGE)
+    assert said
+    posture = names["arm"].at().posture
+    plants = [serial_arm_by_hand(names["arm"].document, 10.0, way) for way in (0.0, 1.0)]
+    together = np.vstack([np.eye(2), np.eye(2)])
+    plain, riding = (np.linalg.inv(together.T @ plant.mass @ together) for plant in plants)
+    angle = np.linspace(0.0, np.pi, 721)
+    h = np.column_stack([np.cos(angle), np.sin(angle)]) @ posture.jacobian[:2]
+    change = np.einsum("ki,ij,kj->k", h, plain, h) / np.einsum("ki,ij,kj->k", h, riding, h) - 1.0
+    assert [f"{-100 * change.min():.1f}", f"{100 * change.max():.1f}"] == list(said.groups())
+    # along y it is the table's
+    along_y = names["serial"][10.0, 1.0][0] / names["serial"][10.0, 0.0][0] - 1.0
+    assert change[360] == pytest.approx(along_y, rel=1e-6)
