@@ -6,7 +6,7 @@ import ast
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import pytest
@@ -174,13 +174,82 @@ def test_modules_stay_short():
     assert {relative_path(path): n for path, n in lengths.items() if n > LONGEST_MODULE} == {}
 
 
+# Kinds of `zwidth new`, one of which a bundled device is called by too: what declares and wants them.
+SAYS_KINDS = {
+    "src/zwidth/device/new_device.py": ("KINDS", "new_device"),
+    "src/zwidth/show/cli/compile_group.py": ("DEVICES",),
+}
+
+
+def without_kinds(source: str, owners: Collection[str]) -> str:
+    """Python source without the quoted kinds of `zwidth new` inside the named constants, and in the docstrings of
+    the named functions."""
+    lines = source.splitlines()
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.FunctionDef) and node.name in owners and ast.get_docstring(node):
+            node = node.body[0]
+        elif not (isinstance(node, ast.AnnAssign) and getattr(node.target, "id", None) in owners):
+            continue
+        for number in range(node.lineno - 1, node.end_lineno or node.lineno):
+            for kind in KINDS:
+                lines[number] = lines[number].replace(f'"{kind}"', '""')
+    return "\n".join(lines)
+
+
+def devices_named(source: str, names: Collection[str], *, python: bool) -> set[str]:
+    """Those names that stand whole between quotes; in Python also as a word of a text that code may use, such as a
+    command, or with _ for - as an identifier."""
+    whole = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
+    found = set(re.findall(rf"""(?<=["'`])(?:{whole})(?:\.toml)?(?=["'`])""", source, re.IGNORECASE))
+    if python:
+        tree = ast.parse(source)
+        prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
+                found |= set(re.findall(rf"(?<![\w-])(?:{whole})(?!\w|-\w)", node.value, re.IGNORECASE))
+            elif isinstance(node, ast.Name | ast.FunctionDef | ast.ClassDef | ast.Attribute | ast.arg):
+                written = next(getattr(node, key) for key in ("id", "name", "attr", "arg") if hasattr(node, key))
+                found |= {name for name in names if re.sub(r"[-.]", "_", name) == written.lower()}
+    return {name.lower().removesuffix(".toml") for name in found}
+
+
 def test_no_device_is_known_outside_the_zoo():
-    assert DEVICES, "the zoo is empty"
-    known = re.compile("|".join(name.replace("-", "[-_]") for name in DEVICES), re.IGNORECASE)
+    assert len(DEVICES) > 10, "the zoo has lost its devices"
     sources = [path for path in PACKAGE.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     outside = [path for path in sources if PACKAGE / "device" / "zoo" not in path.parents]
-    named = {relative_path(path): set(known.findall(path.read_text(encoding="utf-8"))) for path in outside}
-    # a linkage of five bars is a kind of device before it is a bundled one: these files declare and want the kinds
-    for path in ("src/zwidth/device/new_device.py", "src/zwidth/show/cli/compile_group.py"):
-        named[path] -= set(KINDS)
+    assert MODULES[0] in outside
+    named = {}
+    for path in outside:
+        text, name = path.read_text(encoding="utf-8"), relative_path(path)
+        text = without_kinds(text, SAYS_KINDS[name]) if name in SAYS_KINDS else text
+        named[name] = devices_named(text, DEVICES, python=path.suffix in (".py", ".pyi"))
     assert {path: names for path, names in named.items() if names} == {}
+
+
+@pytest.mark.parametrize("name", DEVICES)
+def test_a_device_that_code_names_is_found(name):
+    """Whatever the quotes, in code and in other files; and each by its own name, not by one that begins alike."""
+    for source in (
+        f'if device.name == "{name}":\n    pass\n',
+        f"load('{name}')",
+        f'f"chart {name} --at {{x}}"',
+        f'read("{name}.toml")',
+        f'def f():\n    """As in\n\n    >>> load("{name}")\n    """\n',
+        f'COUNT = {{"{name.upper()}": 1}}',
+    ):
+        assert devices_named(source, DEVICES, python=True) == {name}, source
+    assert devices_named(f'extends = "{name}"', DEVICES, python=False) == {name}
+    if "-" in name:
+        identifier = re.sub(r"[-.]", "_", name)
+        assert devices_named(f"def {identifier}(): pass", DEVICES, python=True) == {name}
+    for source in (f'"{name}s"', f'"my-{name}"', f'"{name}-of-mine"', f"# a {name} or another\n", "five_bars = 1"):
+        assert devices_named(source, [name], python=True) == set(), source
+
+
+def test_the_kinds_of_new_devices_are_overlooked_where_they_are_declared_only():
+    for path, owners in SAYS_KINDS.items():
+        source = (ROOT / path).read_text(encoding="utf-8")
+        assert devices_named(source, DEVICES, python=True) == {"five-bar"}, path
+        assert devices_named(without_kinds(source, owners), DEVICES, python=True) == set()
+        for more in ('\nload("five-bar")\n', '\nDEFAULT: str = "five-bar"\n'):
+            assert devices_named(without_kinds(source + more, owners), DEVICES, python=True) == {"five-bar"}
