@@ -202,14 +202,16 @@ def devices_named(source: str, names: Collection[str], *, python: bool) -> set[s
     whole = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
     found = set(re.findall(rf"""(?<=["'`])(?:{whole})(?:\.toml)?(?=["'`])""", source, re.IGNORECASE))
     if python:
-        tree = ast.parse(source)
-        prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-        for node in ast.walk(tree):
+        nodes = list(ast.walk(ast.parse(source)))
+        prose = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        word = re.compile(rf"(?<![\w-])(?:{whole})(?!\w|-\w)", re.IGNORECASE)
+        identifiers = {re.sub(r"[-.]", "_", name): name for name in names}
+        for node in nodes:
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
-                found |= set(re.findall(rf"(?<![\w-])(?:{whole})(?!\w|-\w)", node.value, re.IGNORECASE))
+                found |= set(word.findall(node.value))
             elif isinstance(node, ast.Name | ast.FunctionDef | ast.ClassDef | ast.Attribute | ast.arg):
                 written = next(getattr(node, key) for key in ("id", "name", "attr", "arg") if hasattr(node, key))
-                found |= {name for name in names if re.sub(r"[-.]", "_", name) == written.lower()}
+                found |= {identifiers.get(written.lower(), "")} - {""}
     return {name.lower().removesuffix(".toml") for name in found}
 
 
