@@ -25,11 +25,16 @@ from zwidth.chart.several_directions.wall_equation import WallEquation
 from zwidth.loop.multi_loop import MultiLoop
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Whole = NDArray[np.int64]
 
 # Steps of a curve of real roots across a box, before its chords are looked at.
 STEPS: Final = 48
 # Rounds in which chords are halved; those are looked at that come as close to the box as this share of its size.
-HALVINGS, BESIDE = 14, 0.1
+HALVINGS, BESIDE = 24, 0.1
+# Where a curve turns so much from point to point (the cosine of the angle), chords are halved down to this share
+# of the box: it may cross itself in a small loop.
+STRAIGHT, SMALLEST = 0.95, 1e-9
 # A point between two others is no further from their chord's middle than this share of the chord.
 NEAR_CHORD: Final = 0.5
 
@@ -124,7 +129,7 @@ def _followed(
         along *= np.where(np.einsum("ni,ni->n", along, chord / scale) < 0.0, -1.0, 1.0)[:, None] * scale
         off = np.abs(middles - points[k] - 0.5 * chord)[:, 1:] / box.size
         use = settled & (np.linalg.norm(off, axis=1) <= NEAR_CHORD * np.linalg.norm(chord / scale, axis=1))
-        more = use & (off > tolerance).any(axis=1)
+        more = use & ((off > tolerance).any(axis=1) | _turns(traced, k, box))
         at = np.concatenate([np.arange(len(points)), k[more] + 0.5])
         order = np.argsort(at)
         traced = CurvePoints(
@@ -134,6 +139,15 @@ def _followed(
         loose = np.zeros(len(at) - 1, dtype=bool)
         loose[new], loose[new - 1] = True, True
     return traced
+
+
+def _turns(traced: CurvePoints, k: Whole, box: Box) -> Flags:
+    """Which steps from points k turn so much that a loop may hide there, and are no rounding."""
+    ahead = traced.directions[:, 1:] / box.size
+    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+    cosine = np.einsum("ni,ni->n", ahead[k], ahead[k + 1])
+    step = np.abs(traced.points[k + 1, 1:] - traced.points[k, 1:]) / box.size
+    return np.asarray((cosine < STRAIGHT) & (step.max(axis=1) > SMALLEST))
 
 
 def _steps_across(real: RealRootEquation, box: Box) -> Floats:

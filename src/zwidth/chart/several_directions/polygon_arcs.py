@@ -174,6 +174,11 @@ def _wall(curve: WallCurve, place: float) -> tuple[Floats, Floats]:
     return np.array([K * curve.period, B]), np.array([dK * curve.period, dB])
 
 
+def _on(curve: WallCurve, place: float) -> float:
+    """A place on a curve, which may end there."""
+    return float(np.clip(place, curve.parameters[0], curve.parameters[-1]))
+
+
 def _foot(curve: WallCurve, wall: Floats, place: float) -> float:
     """The parameter, near another one, at which a curve passes a wall that lies on it but for rounding."""
     for _ in range(5):
@@ -188,7 +193,10 @@ def _foot(curve: WallCurve, wall: Floats, place: float) -> float:
 def _meet(
     a: WallCurve, b: WallCurve, start_a: float, start_b: float, size: float
 ) -> tuple[Floats, float, float] | None:
-    """Newton for the wall [K T, B] that two curves, or two places of one, share; None if it wanders off."""
+    """Newton for the wall [K T, B] that two curves, or two places of one, share; None if it wanders off.
+
+    On one curve p(s) = p(t) holds wherever s = t, too: what must vanish there is (p(s) - p(t)) / (s - t).
+    """
     s, t, last = start_a, start_b, np.inf
     if a is b and abs(s - t) <= ONE_PLACE * abs(s):
         return None
@@ -196,15 +204,18 @@ def _meet(
         (p, dp), (q, dq) = _wall(a, s), _wall(b, t)
         if np.abs(p - q).max() <= SETTLED * size:
             break
-        matrix = np.stack([dp, -dq], axis=1)
+        slope = (p - q) / (s - t) if a is b and s != t else np.zeros(2)
+        matrix = np.stack([dp - slope, slope - dq], axis=1)
         if not np.isfinite(matrix).all() or np.linalg.det(matrix) == 0.0:
             return None
         step = -np.linalg.solve(matrix, p - q)
         if not (abs(step[0]) < a.reach(s) and abs(step[1]) < b.reach(t)):
             return None
-        s, t = s + float(step[0]), t + float(step[1])
+        s, t = _on(a, s + float(step[0])), _on(b, t + float(step[1]))
         moved = max(np.abs(dp * step[0]).max(), np.abs(dq * step[1]).max())
         if moved <= SETTLED * size or (moved > 0.5 * last and moved < NEARLY * size):
             break
         last = moved
+    if a is b and (s - t) * (start_a - start_b) < 0.0:
+        s, t = t, s
     return 0.5 * (_wall(a, s)[0] + _wall(b, t)[0]), s, t

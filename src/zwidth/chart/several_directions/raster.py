@@ -23,6 +23,11 @@ Flags = NDArray[np.bool_]
 SIDE, CELL_SIDE, MOST_CELLS = 24, 7, 8
 # The same where no edge is known: on a logarithmic scale, over these shares of the samples.
 ORDER_SIDE, ORDERS = 20, (0.02, 0.98)
+# Where there are none: walls in units of what the plant answers at a quarter of the sampling rate.
+WITHOUT_SAMPLES = (1e-5, 1e2)
+# Walls on each side of a cell's edge, how far from it in shares of the box, and over which share of it its
+# direction is taken.
+ALONG, OFF_EDGE, AHEAD = 60, 1e-3, 1e-4
 # Spectral radii this close to 1, and walls this close to an edge in shares of the box, are not compared.
 ON_CIRCLE, ON_EDGE = 1e-9, 3e-5
 # Walls from which crossings are looked for, to how many others each, and how often the way is halved.
@@ -46,10 +51,11 @@ class Raster:
 
 
 def try_walls(loop: MultiLoop, polygons: list[shapely.Polygon], box: Box) -> Raster:
-    """Compare stable polygons (K T, B) with eigenvalues at walls all over a box, and over single cells."""
-    cells = sorted(polygons, key=lambda cell: -cell.area)[:MOST_CELLS] if len(polygons) > 1 else []
-    bounds = [np.array(cell.bounds).reshape(2, 2) for cell in cells]
-    walls = np.vstack([_grid(box.low, box.high, SIDE), *(_grid(low, high, CELL_SIDE) for low, high in bounds)])
+    """Compare stable polygons [K T, B] with eigenvalues at walls all over a box and on both sides of their edges."""
+    cells = sorted(polygons, key=lambda cell: -cell.area)[:MOST_CELLS]
+    bounds = [np.array(cell.bounds).reshape(2, 2) for cell in cells if len(polygons) > 1]
+    grids = [_grid(low, high, CELL_SIDE) for low, high in bounds]
+    walls = np.vstack([_grid(box.low, box.high, SIDE), *grids, *(_beside(cell, box) for cell in cells)])
     radius = _radii(loop, walls)
     union = shapely.MultiPolygon(polygons)
     inside = shapely.contains_xy(union, *walls.T)
@@ -67,8 +73,10 @@ def try_orders(loop: MultiLoop, samples: Floats) -> Raster:
     None of the samples is on an edge of the stable set: walls that are stable differ from that.
     """
     size = np.abs(samples[(samples != 0.0).all(axis=1)])
-    if not len(size):
-        return Raster(np.empty((0, 2)), np.empty(0, dtype=bool), np.empty(0, dtype=bool))
+    if not len(size):  # lines only
+        P, w = loop.plant_response(1j), loop.velocity_response(1j)
+        kappa = 1.0 / np.linalg.norm(P)
+        size = np.outer(WITHOUT_SAMPLES, [kappa * loop.period, kappa / abs(w)])
     low, high = np.log10(np.quantile(size, ORDERS, axis=0))
     x, y = np.meshgrid(*np.logspace(low, high, ORDER_SIDE).T)
     walls = np.vstack([np.column_stack([u * x.ravel(), v * y.ravel()]) for u in (1.0, -1.0) for v in (1.0, -1.0)])
@@ -104,6 +112,21 @@ def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygo
     nearest = np.take_along_axis(z, np.abs(np.abs(z) - 1.0).argmin(axis=-1)[:, None], axis=-1)
     thetas = np.abs(np.angle(nearest))
     return np.unique(thetas * (1.0 + BESIDE))
+
+
+def _beside(cell: shapely.Polygon, box: Box) -> Floats:
+    """Walls (n, 2) on both sides of a cell's outer edge."""
+    edge = shapely.transform(cell.exterior, lambda points: points / box.size)
+    share = (np.arange(ALONG) + 0.5) / ALONG
+    ends = [
+        shapely.get_coordinates(shapely.line_interpolate_point(edge, share + side, normalized=True))
+        for side in (-AHEAD, AHEAD)
+    ]
+    along = ends[1] - ends[0]
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    across *= OFF_EDGE / np.linalg.norm(along, axis=1)[:, None]
+    middle = 0.5 * (ends[0] + ends[1])
+    return np.vstack([middle + across, middle - across]) * box.size
 
 
 def _grid(low: Floats, high: Floats, side: int) -> Floats:

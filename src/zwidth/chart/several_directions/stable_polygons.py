@@ -46,9 +46,9 @@ def box_of_edges(loop: MultiLoop, samples: Floats, lines: Sequence[StraightLine]
     walls = np.vstack([samples[(np.abs(samples) < FAR).all(axis=-1)], *crossings])
     walls = walls[:: max(1, len(walls) // MOST_JUDGED)]
     edges = np.abs(walls[_radii(loop, walls) < 1.0 + ON_CIRCLE])
-    if not len(edges):
+    far = ROOM * edges.max(axis=0, initial=0.0)
+    if not far.any():  # none, or the origin alone
         return None
-    far = ROOM * edges.max(axis=0)
     far = np.where(far > 0.0, far, max(far))
     return Box(-far, far)
 

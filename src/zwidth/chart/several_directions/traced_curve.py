@@ -28,6 +28,8 @@ SETTLED, ROUNDING = 1e-14, 1e-16
 NEARLY, FARTHEST = 1e-9, 10.0
 # Least cosine of the angle between a curve and its chord for the cubic between two points to be of use.
 ALONG: Final = 0.3
+# Points that a step of Newton's method may pass.
+REACH: Final = 20.0
 # A place within so many points of a limit belongs to it; the roots that meet there have this angle but for
 # rounding.
 LIMIT_NEAR, SAME_ANGLE = 2.0, 1e-9
@@ -199,7 +201,7 @@ class TracedCurve:
 
     def reach(self, parameter: float) -> float:
         """How far a step of Newton's method may go from here."""
-        return 2.0
+        return REACH
 
     def at(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """K, B, their slopes and the angles of the roots (k,) at places (k,)."""

@@ -31,8 +31,9 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Matrices = TypeVar("Matrices", Floats, Complexes)
 
-# Imaginary part of a real solution after Newton's method, in shares of the wall's size.
-REAL: Final = 1e-7
+# Imaginary part of a real solution after Newton's method, in shares of the wall's size; how far that may move a
+# solution; and how far apart two are at least.
+REAL, STAYS, TWICE = 1e-7, 0.1, 1e-10
 POLISH: Final = 5
 # Combinations of the three Delta, none of whose zeros a structured loop prefers.
 LEFT: Final = (1.0, 0.31 + 0.42j, -0.53 + 0.27j)
@@ -74,14 +75,18 @@ class WallEquation:
     def solutions(self, thetas: Floats) -> Floats:
         """All real walls (N, r^2, 2) of [k T, b] with a root at each angle (N,); nan for the others."""
         terms = self.terms(thetas)
-        k, b = _common_eigenvalues(*terms)
+        first = k, b = _common_eigenvalues(*terms)
         for _ in range(POLISH):
             k, b = _newton_step(terms, k, b)
-        size = np.linalg.norm(terms[1], axis=(1, 2)) / np.linalg.norm(terms[2], axis=(1, 2))
-        size = size[:, None]  # of b in units of k
-        real = np.abs(k.imag) + np.abs(b.imag) / size <= REAL * (np.abs(k) + np.abs(b) / size)
+        unit = (np.linalg.norm(terms[2], axis=(1, 2)) / np.linalg.norm(terms[1], axis=(1, 2)))[:, None]
+        size = np.abs(k) + unit * np.abs(b)
+        # what was at infinity but for rounding does not stay near where it was
+        found = np.abs(k - first[0]) + unit * np.abs(b - first[1]) <= STAYS * size
+        found &= np.abs(k.imag) + unit * np.abs(b.imag) <= REAL * size
+        apart = np.abs(k[:, :, None] - k[:, None]) + unit[..., None] * np.abs(b[:, :, None] - b[:, None])
+        found &= ~(np.tril(apart <= TWICE * size[..., None], -1) & found[:, None]).any(axis=2)
         walls = np.stack([k.real * self.loop.period, b.real], axis=-1)
-        return np.where((real & np.isfinite(walls).all(axis=-1))[..., None], walls, np.nan)
+        return np.where((found & np.isfinite(walls).all(axis=-1))[..., None], walls, np.nan)
 
     def linear(self, points: Floats) -> tuple[Floats, Floats]:
         """det W (n, 2), real and imaginary part, and its slopes (n, 2, 3) at points (n, 3) of [theta, k T, b]."""
@@ -108,13 +113,14 @@ class WallEquation:
 
     def real_columns(self, z: float) -> tuple[Floats, Floats]:
         """F and Y (r, r) at z = 1 or -1, where both are real; nan where no force moves what is read."""
+        inverse, one = self.inverse(z), np.eye(len(self.directions))
+        if inverse is None:
+            return np.full_like(one, np.nan), one
+        if z > 0.0:  # P has its poles of free motions there
+            return inverse[0], one
         at = np.array([z], dtype=complex)
         P = (self.directions @ self.loop.plant_slope(at, at - 1.0)[0] @ self.directions.T).real
-        inverse = self.inverse(z)
-        if inverse is None:
-            return np.full(P.shape[1:], np.nan), np.full(P.shape[1:], np.nan)
-        H = inverse[0][None]
-        F, Y, _ = _columns(P, H) if np.isfinite(P).all() else (H, np.eye(len(P[0]))[None], None)
+        F, Y, _ = _columns(P, inverse[0][None])
         return F[0], Y[0]
 
     def inverse(self, z: float) -> tuple[Floats, Floats] | None:
