@@ -240,20 +240,20 @@ def test_the_delta_of_the_page_on_device_files_has_the_masses_of_the_symmetric_m
     (program,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     device = zwidth.from_document(tomllib.loads(program))
     point = device.at()
-    base, arm, rod, height = 0.0255, 0.06, 0.1025, 0.11
-    angle = point.describe().joints["arm-a"]
+    base, arm, rod, height = 0.08 - 0.03, 0.08, 0.16, 0.12
+    angle = point.describe().joints["arm-1"]
     out, down = base + arm * np.cos(angle), height - arm * np.sin(angle)
     assert np.hypot(out, down) == pytest.approx(rod, rel=1e-9)
     rate = down / (arm * (out * np.sin(angle) + down * np.cos(angle)))  # of the arms, for 1 m/s
     elbow = arm * rate * np.array([-np.sin(angle), np.cos(angle)])
     tip = np.array([0.0, 1.0])
     turning = np.linalg.norm(elbow - tip) / rod
-    arms = (8e-6 + 0.02 * 0.03**2) * rate**2
-    rods = 0.01 * np.sum(((elbow + tip) / 2) ** 2) + 9e-6 * turning**2
+    arms = (2e-5 + 0.03 * 0.04**2) * rate**2
+    rods = 2 * (0.01 * np.sum(((elbow + tip) / 2) ** 2) + 2.1e-5 * turning**2)
     felt = point.effective
     assert felt.link_side_mass == pytest.approx(3 * (arms + rods) + 0.05, rel=1e-9)
-    assert felt.motor_side_mass == pytest.approx(3 * 7.7**2 * 1e-6 * rate**2, rel=1e-9)
-    assert felt.stiffness == pytest.approx(3 * 7.7**2 * 0.5 * rate**2, rel=1e-9)
+    assert felt.motor_side_mass == pytest.approx(3 * 8**2 * 2e-6 * rate**2, rel=1e-9)
+    assert felt.stiffness == pytest.approx(3 * 8**2 * 0.5 * rate**2, rel=1e-9)
     for shown in (
         f"{felt.link_side_mass:.4g} kg",
         f"{felt.motor_side_mass:.4g} kg",

@@ -131,7 +131,7 @@ LINES = [
     (("chart", "hapkit-course", "--model", "two-mass"), ["model two-mass: nothing flexible lies between"]),
     (("chart", TWO_MASS, "--at", "0,0.2", "--assembly", "x"), ["at: does not apply", "assembly: does not apply"]),
     (("chart", TWO_MASS, "--operator", "student"), ["student: is neither a file nor a bundled operator"]),
-    (("chart", TWO_MASS, "--axis", "0,0,1"), ["moments about an axis are not supported yet"]),
+    (("chart", TWO_MASS, "--axis", "0,0,1"), ["axis: does not apply to a device given by its [plant]"]),
     (("chart", TWO_MASS, "--set", "loop.delay"), ["must be PATH=VALUE"]),
     (("chart", TWO_MASS, "--set", "loop.delay=1"), ["loop.delay: is not a key"]),
     (("chart", TWO_MASS, "--set", "a=1", "--set", "b=2"), ["--set: a: is not a key", "--set: b: is not a key"]),

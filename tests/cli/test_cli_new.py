@@ -23,8 +23,9 @@ def test_a_new_device_answers_at_once_without_a_word(folder, kind):
     document = document_of("new", "mine", "--kind", kind)
     assert document == {"name": "mine", "kind": kind, "file": str(folder / "mine.toml")}
     assert (folder / "mine.toml").read_text() == new_device("mine", kind)
-    assert document_of("chart", "mine.toml")["stiffness_max_N_per_m"] > 500.0
-    assert document_of("show", "mine.toml")["rigid_mass_kg"] > 0.01
+    endings = ("Nm_per_rad", "kg_m2") if kind == "wrist" else ("N_per_m", "kg")
+    assert document_of("chart", "mine.toml")[f"stiffness_max_{endings[0]}"] > 500.0
+    assert document_of("show", "mine.toml")[f"rigid_mass_{endings[1]}"] > 0.001
     assert document_of("report", "mine.toml", "--output", "mine.html")["file"] == str(folder / "mine.html")
     for words in (("chart", "mine.toml"), ("show", "mine.toml")):
         ran = run_command(*words)
@@ -77,7 +78,7 @@ def test_another_file_may_be_named(folder):
         (["no/where", "--kind", "plant"], "there is no folder"),
         (["x", "--kind", "plant", "--output", "x.json"], "x.json: must end in .toml"),
         (["x"], "missing option '--kind'"),
-        (["x", "--kind", "delta"], "'delta' is not one of 'paddle', 'serial-2r', 'five-bar', 'plant'"),
+        (["x", "--kind", "scara"], "'scara' is not one of 'paddle', 'serial-2r', 'five-bar', "),
         (["", "--kind", "plant"], "is empty; give a name"),
         (["two\nlines", "--kind", "plant"], r"name must be a line of text, got 'two\nlines'"),
         (["--kind", "plant"], "missing argument 'NAME'"),

@@ -29,10 +29,14 @@ TABLES = {
     "`[loop.actuator]`": ("loop", "actuator"),
     "`[loop.encoder]`": ("loop", "encoder"),
     "`[loop.saturation]`": ("loop", "saturation"),
+    "`[loop.force_sensor]`": ("loop", "force_sensor"),
+    "`[loop.feedforward]`": ("loop", "feedforward"),
+    "`[loop.local]`": ("loop", "local"),
     "`[friction]`": ("friction",),
     "`[operator]`": ("operator",),
     "`[[mechanism.links]]`": ("mechanism", "links", 0),
     "`[[mechanism.loops]]`": ("mechanism", "loops", 0),
+    "`[[mechanism.legs]]`": ("mechanism", "legs", 0),
     "`[mechanism.handle]`": ("mechanism", "handle"),
     "`[mechanism.assemblies.NAME]`": ("mechanism", "assemblies", "any"),
     "`[mechanism.reference]`": ("mechanism", "reference"),
@@ -87,7 +91,7 @@ def test_the_page_has_an_example_of_either_kind():
 
 def test_the_page_says_what_is_not_supported_yet():
     assert unsupported.VALUES.keys() >= {("mechanism", "links", "*", "joint")}
-    assert "Joints other than `revolute` and `fixed`" in PAGE
+    assert "A cylindrical, planar or screw joint is refused" in PAGE
 
 
 def test_every_key_has_a_meaning_and_every_physical_one_a_unit():

@@ -37,9 +37,9 @@ CASES = [
     (PLANT_FILE, {"loop__velocity__method": "backward"}, "loop.velocity.method", "must be 'backward-difference'"),
     (
         ARM_FILE,
-        {"mechanism__links__0__joint": "prismatic"},
+        {"mechanism__links__0__joint": "screw"},
         "mechanism.links.upper.joint",
-        "'prismatic' is not sup",
+        "'screw' is not sup",
     ),
     # the plant
     (PLANT_FILE, {"plant__mass_kg": REMOVED}, "plant.mass_kg", "is missing"),

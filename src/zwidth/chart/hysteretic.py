@@ -55,6 +55,11 @@ def hysteretic_chart(loop: Loop) -> MeasuredChart:
     require("loop", loop, Loop)
     if loop.plant.hysteresis is None:
         raise HysteresisError("the plant has no loss factor; stability_chart charts it")
+    if loop.has_fixed_feedback:
+        raise HysteresisError(
+            f"a loss factor cannot be charted with {loop.controller.feedback_names[0]}; describe the damping by "
+            "damping_Ns_per_m instead"
+        )
     if np.max(np.abs(loop.plant.hysteresis)) < LEAST_LOSS_FACTOR * (1.0 - 1e-9) * np.max(
         np.abs(loop.plant.stiffness)
     ):

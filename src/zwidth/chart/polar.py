@@ -179,7 +179,9 @@ def largest_stiffness_by_direction(
         rows[key] = none, none, none, OUT_OF_MOTION
         if not off[n]:
             known = together[wanted.index(n)]
-            rows[key] = known if known is not None else _stiffest(plant, units[n], point.controller)
+            rows[key] = (
+                known if known is not None else _stiffest(plant, units[n], point.towards(units[n]).computer)
+            )
         if progress is not None:
             done += keys.count(key)
             progress("directions", done, len(units))

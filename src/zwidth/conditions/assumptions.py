@@ -34,6 +34,7 @@ VELOCITY_UNFILTERED: Final = "The velocity is not filtered."
 FIRST_ORDER: Final = "The velocity passes a first-order filter."
 FORCE_UNFILTERED: Final = "The force is not filtered."
 PROMPT: Final = "The actuator follows at once."
+WALL_ALONE: Final = "The computer commands the wall's force and nothing else."
 RESISTIVE: Final = "No electrical damping lags behind the motion."
 NYQUIST_BELOW_CORNER: Final = "Electrical damping has its corner frequency R/L above half the sampling rate."
 LIGHT: Final = f"Friction is light: b T/m is at most {LIGHT_FRICTION:g}."
@@ -81,6 +82,8 @@ class ConditionCase:
         largest  largest stiffness over B >= 0 and its damping [N/m], [N s/m]; nan: the condition names none
         The other arguments are those of `Bound`.
         """
+        if WALL_ALONE in self.unmet:  # said only where it does not hold: no source has anything else
+            assumptions = (*assumptions, WALL_ALONE)
         lacking = tuple(key for key, value in taken.items() if isnan(value))
         stiffness, damping = (nan, nan) if lacking else (float(largest[0]), float(largest[1]))
         return Bound(
@@ -132,6 +135,7 @@ def _unmet(loop: Loop, t: Traits, wall_damping: float) -> frozenset[str]:
         FIRST_ORDER: t.has_first_order_filter,
         FORCE_UNFILTERED: not t.force_filtered,
         PROMPT: not t.actuator_lags,
+        WALL_ALONE: not loop.has_fixed_feedback,
         RESISTIVE: not t.corner_frequencies,
         NYQUIST_BELOW_CORNER: all(corner * T >= np.pi for corner in t.corner_frequencies),
         # a missing number violates no assumption

@@ -9,7 +9,8 @@ each step of the way is charged with the difference it makes:
     velocity estimate    the estimate from true readings instead of the velocity
     quantiser            counted readings (and their noise) instead of true ones
     passivity controller what it adds
-    actuator             delay, filter, limit and lag, and that the actuator is not where the sensor is
+    actuator             delay, filter, limit and lag, feedback beside the wall (force sensor, feedforward, local
+                         loop), and that the actuator is not where the sensor is
 
 Hand, friction, brakes and bent springs hold their force over a substep, so that their work is force times motion;
 what structural dampers take out is a quadratic form of the states. All of them sum up to what the plant stores.

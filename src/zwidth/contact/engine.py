@@ -30,7 +30,9 @@ from zwidth.contact.energy_ledger import Ledger, energy_of, enter_sample, enter_
 from zwidth.contact.engine_arrays import (
     FORCE,
     HANDLE,
+    LATER,
     READING,
+    SAMPLE,
     TRUTH,
     VELOCITY,
     PlantArrays,
@@ -38,6 +40,14 @@ from zwidth.contact.engine_arrays import (
     RunArrays,
 )
 from zwidth.contact.environments import MEMORY, environment_at
+from zwidth.contact.fixed_feedback import (
+    FeedbackArrays,
+    FeedbackMemory,
+    feedback_memory,
+    measured_force,
+    sample_local_loop,
+    with_feedback,
+)
 from zwidth.contact.hand import hand_force, sample_brakes_and_reflexes, step_brakes_and_reflexes
 from zwidth.contact.passivity_controller import PASSIVITY_MEMORY as PASSIVITY
 from zwidth.contact.passivity_controller import passivity_force
@@ -52,6 +62,8 @@ from zwidth.contact.plant_step import (
 )
 from zwidth.model.mechanism import Floats, Ints
 
+ENCODERS = 64  # numbers of encoders by which two samples of a local loop draw noise apart
+
 
 @compiled_inline
 def dot(a: Floats, row: int, b: Floats, start: int, count: int) -> float:
@@ -63,15 +75,22 @@ def dot(a: Floats, row: int, b: Floats, start: int, count: int) -> float:
 
 
 @compiled_inline
-def read_sensor(devices: PlantArrays, d: int, states: Floats, truth: float, seed: np.uint64, sample: int) -> float:
-    """The reading as the encoders count it; the true one where they have neither steps nor noise."""
+def read_sensor(
+    devices: PlantArrays, d: int, states: Floats, truth: float, seed: np.uint64, sample: int, fast: int
+) -> float:
+    """The reading as the encoders count it; the true one where they have neither steps nor noise.
+
+    fast  number of the local loop's sample within the period: each has noise of its own
+    """
     reading, exact = 0.0, True
     for c in range(devices.weight.shape[1]):
         place, step, noise = 0.0, devices.step[d, c], devices.noise[d, c]
         for k in range(devices.size[d]):
             place += devices.channel[d, c, k] * states[k]
         exact = exact and step == 0.0 and noise == 0.0
-        reading += devices.weight[d, c] * read_encoder(place, step, noise, seed, sample, devices.encoder[d, c])
+        reading += devices.weight[d, c] * read_encoder(
+            place, step, noise, seed, sample, devices.encoder[d, c] + ENCODERS * fast
+        )
     return truth if exact else reading
 
 
@@ -134,15 +153,35 @@ def advance_interval(
     state: PlantState,
     computer: Computer,
     signals: Signals,
+    feedback: FeedbackArrays,
+    memory: FeedbackMemory,
     book: Ledger,
     varies: bool,
 ) -> None:
-    """From sample j to the next: part 0 with the command of one sample more of delay, then part 1."""
+    """From sample j to the next: first with the command of one sample more of delay, then with the new one. The
+    local loop takes its samples in between."""
     d, trail, period = members.device[m], records.handle, computer.period
-    early, late = devices.substeps[d, 0], devices.substeps[d, 1]
-    for part in range(2):
-        begun, command = time + part * early * devices.length[d, 0], arrived_command(computer, signals, 0, part)
-        count, first, h = devices.substeps[d, part], j * (early + late) + part * early, devices.length[d, part]
+    has_local, fast, fast_part = feedback.acts[d, 2] != 0, 0, 0
+    begun, first = time, 0
+    for part in range(devices.substeps.shape[1]):
+        first += devices.substeps[d, part]
+    first *= j
+    for part in range(devices.substeps.shape[1]):
+        count, h = devices.substeps[d, part], devices.length[d, part]
+        if count == 0:
+            continue
+        command = arrived_command(computer, signals, 0, devices.new[d, part])
+        if has_local:
+            if devices.local[d, part] == SAMPLE:
+                truth = dot(devices.sensor, d, state.states, 0, devices.size[d])
+                counted = read_sensor(devices, d, state.states, truth, members.seed[m], j, fast)
+                sample_local_loop(feedback, d, memory, counted)
+                fast, fast_part = fast + 1, 1
+            elif devices.local[d, part] == LATER:
+                fast_part = 0
+            command += memory.queue[feedback.delays[d, 1] + (fast_part if feedback.splits[d] != 0 else 0)]
+            command = clip(command, computer.limit)
+        memory.first[2] = command
         stride = 1 if varies else max(count, 1)
         for k in range(0, count, stride):
             if varies:
@@ -150,12 +189,14 @@ def advance_interval(
             advance_substeps(
                 devices, d, part, k, k + stride, begun, command, members, m, state, trail, first, book
             )
+        begun, first = begun + count * h, first + count
 
 
 @compiled
 def run_member(
     devices: PlantArrays,
     computers: Computers,
+    feedback: FeedbackArrays,
     members: RunArrays,
     m: int,
     samples: int,
@@ -175,14 +216,16 @@ def run_member(
     states, watch, observer = own.states, members.observer[m], np.zeros(PASSIVITY)
     reflex, traces = members.reflex[m], records.traces
     watched, booked = not np.isnan(watch[0]), records.ledger.shape[1] > 0
-    varies = False
+    kept, controls, varies = feedback_memory(feedback, d), False, False
+    for part in range(3):
+        controls = controls or feedback.acts[d, part] != 0
     for element in range(devices.kind.shape[1]):
         varies = varies or devices.kind[d, element] == VARYING
     book, started = new_ledger(devices, booked), energy_of(devices, d, states)
     for j in range(samples):
         time, truth = j * T, dot(devices.sensor, d, states, 0, n)
         # the order of one period: read, estimate, render, filter, limit, send
-        counted = read_sensor(devices, d, states, truth, members.seed[m], j)
+        counted = read_sensor(devices, d, states, truth, members.seed[m], j, 0)
         speed = estimate_velocity(computer, signals, 0, counted, j)
         environment_force = force(counted - wall, speed, time, T, values, memory)
         controlled_force = (
@@ -206,7 +249,12 @@ def run_member(
             )
             for entry in range(book.entries.size):
                 records.ledger[m, j, entry] = book.entries[entry]
-        command = clip(filter_force(computer, signals, 0, controlled_force), computer.limit)
+        total_force = controlled_force
+        if controls:
+            push = hand_force(members.push, m, time)
+            measured = measured_force(feedback, d, states, kept.first[2], push, own.forces)
+            total_force = with_feedback(feedback, d, kept, controlled_force, counted, measured, j, T)
+        command = clip(filter_force(computer, signals, 0, total_force), computer.limit)
         send(signals, 0, command)
         traces[m, j, READING], traces[m, j, TRUTH], traces[m, j, VELOCITY] = counted, truth, speed
         traces[m, j, FORCE], traces[m, j, HANDLE] = command, dot(devices.handle, d, states, 0, n)
@@ -216,13 +264,16 @@ def run_member(
             break
         if varies:
             sample_brakes_and_reflexes(devices, d, reflex, time, T, controlled_force, states, own.memory)
-        advance_interval(devices, members, m, time, j, records, own, computer, signals, book, varies)
+        advance_interval(
+            devices, members, m, time, j, records, own, computer, signals, feedback, kept, book, varies
+        )
 
 
 @compiled
 def run_several(
     devices: PlantArrays,
     computers: Computers,
+    feedback: FeedbackArrays,
     members: RunArrays,
     samples: Ints,
     address: int,
@@ -232,4 +283,4 @@ def run_several(
 ) -> None:
     """Runs first to last - 1: samples (m,), and where the environment's machine code is."""
     for m in range(first, last):
-        run_member(devices, computers, members, m, samples[m], address, records)
+        run_member(devices, computers, feedback, members, m, samples[m], address, records)

@@ -20,16 +20,21 @@ HAND, WALL, HOLD, ESTIMATE, QUANTISER, CONTROLLER, ACTUATOR, FRICTION, BRAKES, S
     12
 )
 ENTRIES = 12
+# Entries of `PlantArrays.local`.
+NOTHING_LOCAL, SAMPLE, LATER = range(3)
 
 
 class PlantArrays(NamedTuple):
-    """D plants between samples. Part 0 of an interval has the old command, part 1 the new one.
+    """D plants between samples. An interval has P parts, at whose beginning a command may begin to act.
 
-    transition  (D, 2, R, N)    what N states become, and then, for each element, place and speed of its motion
-    inputs      (D, 2, F, R)    what a unit of a held force adds to all R: command, hand, elements
-    substeps    (D, 2)          how many in each part
-    length      (D, 2)          of a substep [s]
-    loss, work  (D, 2, M, M)    quadratic forms of the ledger, M = N + F; size 0 without one
+    transition  (D, P, R, N)    what N states become, and then, for each element, place and speed of its motion
+    inputs      (D, P, F, R)    what a unit of a held force adds to all R: command, hand, elements
+    substeps    (D, P)          how many in each part; 0 for a part that is none
+    length      (D, P)          of a substep [s]
+    new         (D, P)          1 once the new command acts, 0 as long as the one before it does
+    local       (D, P)          what the local loop does at a part's beginning: NOTHING_LOCAL, take a SAMPLE, or,
+                                as its delay ends between two of them, let the new command act (LATER)
+    loss, work  (D, P, M, M)    quadratic forms of the ledger, M = N + F; size 0 without one
     energy      (D, N, N)
     size        (D,)            coordinates n: velocities stand n places after them
     kind        (D, E)          of each element;   numbers (D, E, 5)
@@ -44,6 +49,8 @@ class PlantArrays(NamedTuple):
     inputs: Floats
     substeps: Ints
     length: Floats
+    new: Ints
+    local: Ints
     loss: Floats
     work: Floats
     energy: Floats

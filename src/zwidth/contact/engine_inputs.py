@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SPRING, VARYING
-from zwidth.contact.engine_arrays import PlantArrays
+from zwidth.contact.engine_arrays import LATER, NOTHING_LOCAL, SAMPLE, PlantArrays
 from zwidth.contact.hand import ARM, BRAKE, GRASP, Hand
 from zwidth.contact.linear_substep import LinearDynamics, Substep, dynamics, substep
+from zwidth.loop.closed_plant import SAME_INSTANT, measured_force
+from zwidth.loop.controller import split_delay
+from zwidth.loop.fixed_feedback import acts
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import least_deforming_motion, undamped_modes
 from zwidth.model.nonlinear import Counter
@@ -87,6 +92,7 @@ def in_modes(plant: Plant, squared: Floats, shapes: Floats) -> Plant:
             replace(damper, along=damper.along @ shapes) for damper in plant.lagged_dampers if damper.damping > 0.0
         ),
         nonlinear=plant.nonlinear.project(shapes),
+        hand_force=None if plant.hand_force is None else plant.hand_force @ shapes,
     )
 
 
@@ -111,15 +117,19 @@ def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArray
         max(held_device.modal_plant.size for held_device in held_devices),
     )
     own = [_dynamics(held_device) for held_device in held_devices]
+    parts = [interval_parts(held_device.loop, substeps) for held_device in held_devices]
+    P = max(len(each) for each in parts)
     N = max(len(arrays.generator) for arrays in own)
     F, R = 2 + E, N + 2 * E
     arrays = PlantArrays(
-        transition=np.zeros((D, 2, R, N)),
-        inputs=np.zeros((D, 2, F, R)),
-        substeps=np.zeros((D, 2), dtype=np.int64),
-        length=np.zeros((D, 2)),
-        loss=np.zeros((D, 2, N + F, N + F)),
-        work=np.zeros((D, 2, N + F, N + F)),
+        transition=np.zeros((D, P, R, N)),
+        inputs=np.zeros((D, P, F, R)),
+        substeps=np.zeros((D, P), dtype=np.int64),
+        length=np.zeros((D, P)),
+        new=np.zeros((D, P), dtype=np.int64),
+        local=np.zeros((D, P), dtype=np.int64),
+        loss=np.zeros((D, P, N + F, N + F)),
+        work=np.zeros((D, P, N + F, N + F)),
         energy=np.zeros((D, N, N)),
         size=np.array([held_device.modal_plant.size for held_device in held_devices]),
         kind=np.full((D, E), NOTHING),
@@ -138,13 +148,74 @@ def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArray
         m = len(moving.generator)
         arrays.energy[d, :m, :m] = moving.energy
         _fill_motions(arrays, d, held_device)
-        T, f = held_device.loop.period, held_device.loop.fractional_delay
-        early = min(max(1, round(f * substeps)), max(substeps - 1, 1)) if f > 0.0 else 0
-        for part, (share, count) in enumerate(((f, early), (1.0 - f, max(substeps - early, 1)))):
-            if count:
-                arrays.substeps[d, part], arrays.length[d, part] = count, share * T / count
-                _fill_part(arrays, d, part, substep(moving, share * T / count))
+        T, known = held_device.loop.period, dict[float, Substep]()
+        for number, part in enumerate(parts[d]):
+            h = part.share * T / part.substeps
+            key = float(f"{h:.14g}")  # equal parts of a local loop share their exponential
+            if key not in known:
+                known[key] = substep(moving, h)
+            arrays.substeps[d, number], arrays.length[d, number] = part.substeps, h
+            arrays.new[d, number], arrays.local[d, number] = part.new, part.local
+            _fill_part(arrays, d, number, known[key])
     return arrays
+
+
+class IntervalPart(NamedTuple):
+    """A part of an interval, at whose beginning something changes; fields as of `PlantArrays`."""
+
+    share: float
+    substeps: int
+    new: bool
+    local: int
+
+
+def interval_parts(loop: Loop, substeps: int) -> list[IntervalPart]:
+    """The parts of an interval: before and after the new command acts, with a local loop also between its samples.
+
+    substeps  of the interval; a part has at least one
+    """
+    f, local = loop.fractional_delay, loop.controller.local_loop
+    if local is None or not acts(local):
+        early = min(max(1, round(f * substeps)), max(substeps - 1, 1)) if f > 0.0 else 0
+        parts = [IntervalPart(f, early, False, NOTHING_LOCAL)] if early else []
+        return [*parts, IntervalPart(1.0 - f, max(substeps - early, 1), True, NOTHING_LOCAL)]
+    N, waits = local.rate_multiple, split_delay(local.delay)[1]
+    changes = {k / N: SAMPLE for k in range(N)}
+    if waits > 0.0:
+        changes |= {(k + waits) / N: LATER for k in range(N)}
+    if not any(abs(at - f) < SAME_INSTANT for at in changes):
+        changes[f] = NOTHING_LOCAL
+    instants = sorted(changes)
+    return [
+        IntervalPart(end - at, max(1, round((end - at) * substeps)), at > f - SAME_INSTANT, changes[at])
+        for at, end in pairwise([*instants, 1.0])
+    ]
+
+
+def measured_rows(held_devices: Sequence[HeldDevice], plants: PlantArrays) -> Floats:
+    """Weights (D, N + 2 + E) of states, command, push and elements in what each device's force sensor measures:
+    the force of the hand, less what the mass between sensor and hand takes.
+    """
+    N, E = plants.transition.shape[-1], plants.kind.shape[1]
+    rows = np.zeros((len(held_devices), N + 2 + E))
+    for row, held_device in zip(rows, held_devices, strict=True):
+        sensor = held_device.loop.controller.force_sensor
+        if sensor is None:
+            continue
+        moving, plant = _dynamics(held_device), held_device.modal_plant
+        n, m = plant.size, len(moving.generator)
+        by_acceleration, by_velocity, by_place = measured_force(plant, sensor)
+        row[:m] = by_acceleration @ moving.generator[n : 2 * n]
+        row[:n] += by_place
+        row[n : 2 * n] += by_velocity
+        F = moving.inputs.shape[1]
+        row[N : N + F] = by_acceleration @ moving.inputs[n : 2 * n]
+        # what the hand adds to its arm: a push on the handle itself, and what a reflex changes there
+        on_handle = held_device.push is held_device.handle
+        row[N + 1] += on_handle
+        for e, (kind, numbers, _) in enumerate(held_device.elements):
+            row[N + 2 + e] += kind == VARYING and (numbers[0] == GRASP or (numbers[0] == ARM and on_handle))
+    return rows
 
 
 def _dynamics(held_device: HeldDevice) -> LinearDynamics:

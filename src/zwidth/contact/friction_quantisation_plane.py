@@ -21,6 +21,7 @@ from zwidth.conditions.diolaiti import dimensionless_friction
 from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
 from zwidth.conditions.traits import traits
 from zwidth.loop.loop import Loop
+from zwidth.loop.unsupported_feedback import refuse_feedback
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +78,8 @@ def device_plane(
     motion, Delta the step of the reading when all encoders step, unless they are given.
 
     coulomb_friction  f_c [N];  resolution  Delta [m]
-    Raises            ValueError   for a wall that is not positive; where the plant has no free motion, or
+    Raises            FeedbackError  (loop.unsupported_feedback) for a computer with feedback beside the wall law
+                      ValueError   for a wall that is not positive; where the plant has no free motion, or
                                    neither it nor the arguments say what f_c and Delta are
 
     >>> from zwidth.loop.controller import Controller
@@ -91,6 +93,7 @@ def device_plane(
     K = np.atleast_1d(np.asarray(wall_stiffness, dtype=float))
     if not np.all((K > 0.0) & np.isfinite(K)):
         raise ValueError(f"wall_stiffness must be positive and finite, got {wall_stiffness!r}")
+    refuse_feedback(loop.controller, "the plane of friction and resolution is not known", "leave it out")
     own, delay = traits(loop), loop.controller.delay
     if np.isnan(own.ground_damping):
         raise ValueError(

@@ -27,6 +27,7 @@ from zwidth.contact.vibration_kernel import (
 from zwidth.loop.filter_states import FilterStates, filter_states
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
+from zwidth.loop.unsupported_feedback import refuse_feedback
 from zwidth.model.nonlinear import Counter, Nonlinear
 
 Floats = NDArray[np.float64]
@@ -205,7 +206,9 @@ def equivalent_loop(
     """The loop with its nonlinear parts, whose counters make up the sensor (none: read as finely as you like).
 
     force_limit  the smallest limit on the force [N];  offset  see `EquivalentLoop`
+    Raises       FeedbackError  (loop.unsupported_feedback) for a computer with feedback beside the wall law
     """
+    refuse_feedback(loop.controller, "limit cycles are not predicted", "simulate, or leave it out")
     counters = parts.counters
     if any(part.step > 0.0 for part in counters):
         counters = tuple(Counter(part.along, part.step, part.weight) for part in counters)

@@ -14,8 +14,9 @@ from zwidth.conditions.friction_and_resolution import reading_noise, reading_ste
 from zwidth.contact.computer import computers
 from zwidth.contact.engine import run_several
 from zwidth.contact.engine_arrays import ENTRIES, TRACES, PlantArrays, Records, RunArrays
-from zwidth.contact.engine_inputs import HeldDevice, motions_of, pack_plants
+from zwidth.contact.engine_inputs import HeldDevice, measured_rows, motions_of, pack_plants
 from zwidth.contact.environments.environment import Environment
+from zwidth.contact.fixed_feedback import feedback_arrays
 from zwidth.contact.hand import PUSH_NUMBERS, REFLEX_NUMBERS, Hand
 from zwidth.contact.passivity_controller import PassivityController
 from zwidth.contact.time_response import RunSettings, TimeResponse
@@ -124,17 +125,16 @@ def simulate_batch(
     m, S = len(runs), int(samples.max())
     if not trail and not ledger and not any(held_device.elements for held_device in held_devices):
         substeps = 1
-    fine = S * max(substeps, 2) if trail else 0
+    plants = pack_plants(held_devices, substeps)
+    fine = S * int(plants.substeps.sum(axis=1).max()) if trail else 0
     check_memory(
         m * float(S * (TRACES + (ENTRIES if ledger else 0)) + fine),
         f"{m} run{'s' * (m > 1)} of {S} samples",
         "simulate a shorter time, or fewer runs at once",
     )
-    plants = pack_plants(held_devices, substeps)
-    own = computers(
-        [held_device.loop.controller for held_device in held_devices],
-        [held_device.limit for held_device in held_devices],
-    )
+    controllers = [held_device.loop.controller for held_device in held_devices]
+    own = computers(controllers, [held_device.limit for held_device in held_devices])
+    feedback = feedback_arrays(controllers, measured_rows(held_devices, plants))
     records = Records(
         np.zeros(m, dtype=np.int64),
         np.full((m, S, TRACES), np.nan),
@@ -143,7 +143,7 @@ def simulate_batch(
     )
     members = _members(runs, held_devices, index, plants)
     with watched(progress, "simulating", lambda: int(records.samples.sum()), int(samples.sum())):
-        in_chunks(partial(run_several, plants, own, members, samples, environment.address, records), m)
+        in_chunks(partial(run_several, plants, own, feedback, members, samples, environment.address, records), m)
     return [
         TimeResponse.of(
             _plan(run, held_devices[index[i]], plants, index[i], int(samples[i]), environment), records, i
@@ -159,6 +159,7 @@ def _plan(
     counters = held_device.counters
     plain = not held_device.elements and run.passivity is None and isinf(held_device.limit)
     plain = plain and not isinstance(held_device.loop.controller.velocity, Foaw | Levant)
+    plain = plain and not held_device.loop.controller.feeds_friction
     exact = all(counter.step == 0.0 and counter.noise == 0.0 for counter in counters)
     steady = run.hand.tremor is None and run.hand.reach is None
     return RunSettings(
@@ -176,8 +177,11 @@ def _plan(
 
 def _offsets(plants: PlantArrays, d: int) -> Floats:
     """Ends of the substeps after a sample [s]."""
-    (early, late), (first, second) = plants.substeps[d], plants.length[d]
-    return np.concatenate([first * np.arange(1, early + 1), early * first + second * np.arange(1, late + 1)])
+    begun, offsets = 0.0, [np.zeros(0)]
+    for count, h in zip(plants.substeps[d], plants.length[d], strict=True):
+        offsets.append(begun + h * np.arange(1, count + 1))
+        begun += count * h
+    return np.concatenate(offsets)
 
 
 def _check(lengths: Floats, substeps: int) -> None:

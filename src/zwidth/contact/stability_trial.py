@@ -128,7 +128,9 @@ class StabilityTrial:
     def linearised(self) -> StabilityTrial:
         """The same trial with the linear part of the device only, and a two-sided wall."""
         plain = replace(self.loop.plant, nonlinear=Nonlinear())
-        computer = replace(self.loop.controller, force_limit=float("inf"))
+        ahead = self.loop.controller.feedforward
+        smooth = None if ahead is None else replace(ahead, coulomb=0.0)
+        computer = replace(self.loop.controller, force_limit=float("inf"), feedforward=smooth)
         hand = replace(self.hand, push=0.0, reflex=None, tremor=None, reach=None)
         return replace(self, loop=Loop(plain, computer), hand=hand, one_sided=False, speed=0.0, visible=0.0)
 

@@ -23,6 +23,11 @@ EXCLUSIVE: Final[dict[tuple[str, ...], tuple[frozenset[str], ...]]] = {
     ("loop",): (frozenset({"delay_s"}), frozenset({"delay_samples"})),
     ("loop", "velocity", "filter"): FILTERS,
     ("loop", "force", "filter"): FILTERS,
+    ("loop", "force_sensor", "filter"): FILTERS,
+    ("loop", "feedforward"): (frozenset({"inertia_kg"}), frozenset({"inertia_share"})),
+    ("loop", "feedforward", "acceleration_filter"): FILTERS,
+    ("loop", "feedforward", "velocity", "filter"): FILTERS,
+    ("loop", "local", "velocity", "filter"): FILTERS,
     ("operator",): (frozenset({"grasp"}), frozenset({"grasp_stiffness_N_per_m", "grasp_damping_Ns_per_m"})),
     ("mechanism", "damping"): (
         frozenset({"mode_ratio"}),

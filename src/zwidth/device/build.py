@@ -14,24 +14,28 @@ import numpy as np
 
 from zwidth.device import build_nonlinear
 from zwidth.device.build_nonlinear import value_or
+from zwidth.device.schema.feedback import FeedforwardSection, ForceSensorSection, LocalSection
 from zwidth.device.schema.friction import FrictionSection
 from zwidth.device.schema.loop import EncoderSection, LoopSection
 from zwidth.device.schema.mechanism import (
     DampingSection,
-    DriveSection,
-    LinkSection,
-    LoopClosure,
-    MechanismSection,
 )
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.plant import PlantSection
 from zwidth.device.schema.response import ResponseSection
-from zwidth.device.schema.velocity import ButterworthFilter, FirstOrderFilter, FoawSection, KalmanSection
+from zwidth.device.schema.velocity import (
+    ButterworthFilter,
+    FirstOrderFilter,
+    FoawSection,
+    KalmanSection,
+    VelocitySection,
+)
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import METHODS, Foaw, Kalman, VelocityMethod
-from zwidth.model.design_axes import join_designs, stack_numbers
+from zwidth.loop.estimators import METHODS, BackwardDifference, Foaw, Kalman, LinearMethod, VelocityMethod
+from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
+from zwidth.model.design_axes import stack_numbers
 from zwidth.model.electrical_damping import add_dampers
-from zwidth.model.mechanism import FIXED, REVOLUTE, Closures, Drives, Floats, Links, Mechanism
+from zwidth.model.mechanism import Floats
 from zwidth.model.operator import Operator
 from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.response import Response
@@ -42,17 +46,56 @@ if TYPE_CHECKING:
 
 def controller(loop: LoopSection) -> Controller:
     """The sampled wall law; a delay in seconds becomes samples, a filter of no time constant none."""
-    period = loop.sampling_period_s
+    period = math.nan if loop.sampling_period_s is None else loop.sampling_period_s
     delay = loop.delay_s / period if loop.delay_s is not None else value_or(loop.delay_samples, 0.0)
     return Controller(
         sampling_period=period,
         delay=delay,
         velocity_filter=_low_pass(loop.velocity.filter),
-        velocity=_velocity(loop),
+        velocity=_velocity(loop, loop.velocity),
         force_filter=_low_pass(loop.force.filter),
         actuator_time_constant=loop.actuator.time_constant_s,
         force_limit=math.inf if loop.saturation is None else loop.saturation.force_N,
+        force_sensor=None if loop.force_sensor is None else _force_sensor(loop.force_sensor),
+        feedforward=None if loop.feedforward is None else _feedforward(loop, loop.feedforward),
+        local_loop=None if loop.local is None else _local_loop(loop, loop.local),
     )
+
+
+def _force_sensor(section: ForceSensorSection) -> ForceSensor:
+    low_pass = _low_pass(section.filter)
+    return ForceSensor(section.gain, low_pass, section.delay_samples, section.mass_beyond_kg, section.law)
+
+
+def _feedforward(loop: LoopSection, section: FeedforwardSection) -> Feedforward:
+    return Feedforward(
+        inertia=value_or(section.inertia_kg, 0.0),
+        inertia_share=value_or(section.inertia_share, 0.0),
+        damping=section.damping_Ns_per_m,
+        coulomb=section.coulomb_N,
+        dead_band=value_or(section.deadband_m_per_s, 0.0),
+        velocity=_linear_velocity(loop, section.velocity),
+        velocity_filter=None if section.velocity is None else _low_pass(section.velocity.filter),
+        acceleration_filter=_low_pass(section.acceleration_filter),
+    )
+
+
+def _local_loop(loop: LoopSection, section: LocalSection) -> LocalLoop:
+    return LocalLoop(
+        rate_multiple=section.rate_multiple,
+        stiffness=section.stiffness_N_per_m,
+        damping=section.damping_Ns_per_m,
+        velocity=_linear_velocity(loop, section.velocity),
+        velocity_filter=None if section.velocity is None else _low_pass(section.velocity.filter),
+        delay=section.delay_samples,
+    )
+
+
+def _linear_velocity(loop: LoopSection, section: VelocitySection | None) -> LinearMethod:
+    """The estimate of a feedback beside the wall law, which the file's checks have found linear."""
+    method = BackwardDifference() if section is None else _velocity(loop, section)
+    assert isinstance(method, LinearMethod)
+    return method
 
 
 def _low_pass(given: FirstOrderFilter | ButterworthFilter | None) -> FirstOrder | Butterworth | None:
@@ -61,8 +104,8 @@ def _low_pass(given: FirstOrderFilter | ButterworthFilter | None) -> FirstOrder 
     return None if given is None else Butterworth(given.order, given.cutoff_Hz, given.discretisation)
 
 
-def _velocity(loop: LoopSection) -> VelocityMethod:
-    section, own = loop.velocity, loop.velocity.parameters()
+def _velocity(loop: LoopSection, section: VelocitySection) -> VelocityMethod:
+    own = section.parameters()
     step = loop.encoder.resolution_m
     if isinstance(section, KalmanSection) and section.position_noise_m is None and step:
         return Kalman.of_encoder(section.acceleration_noise_m_per_s2, step)
@@ -136,35 +179,12 @@ def damping(section: DampingSection | None) -> Damping:
     return ProportionalDamping(*(value_or(one, 0.0) for one in coefficients))
 
 
-def mechanism(section: MechanismSection) -> Mechanism:
-    """The mechanism, its links sorted so that parents stand before children."""
-    links = _parents_first(section.links)
-    index = {"base": -1} | {link.name: i for i, link in enumerate(links)}
-    tips = {"base": [0.0, 0.0, 0.0]} | {link.name: [link.length_m, 0.0, 0.0] for link in links}
-    handle = section.handle
-    workspace = section.workspace
-    bounds = [(workspace and getattr(workspace, f"{axis}_m")) or (math.nan, math.nan) for axis in "xyz"]
-    return Mechanism(
-        links=_links(links, index, tips),
-        closures=_closures(section.loops, index, tips),
-        drives=_drives(section, index),
-        handle_link=index[handle.link],
-        handle_point=stack_numbers(tips[handle.link] if handle.point_m is None else handle.point_m),
-        assemblies={
-            name: stack_numbers([assembly.joints_rad.get(link.name, 0.0) for link in links])
-            for name, assembly in section.assemblies.items()
-        },
-        reference_position=in_space(section.reference.position_m),
-        workspace=np.array(bounds),
-    )
-
-
 def in_space(vector: Sequence[float]) -> Floats:
     """A vector of up to three components, (..., 3): those left out are 0."""
     return stack_numbers([*vector, 0.0, 0.0, 0.0][:3])
 
 
-def roll_pitch_yaw(angles: Sequence[float]) -> Floats:
+def roll_pitch_yaw(angles: Sequence[float] | Floats) -> Floats:
     """Rotation Rz(yaw) Ry(pitch) Rx(roll): about the parent's fixed x, y, z axes in turn, (..., 3, 3)."""
     turns = np.moveaxis(stack_numbers(angles), -1, 0)
     (cr, cp, cy), (sr, sp, sy) = np.cos(turns), np.sin(turns)
@@ -175,89 +195,6 @@ def roll_pitch_yaw(angles: Sequence[float]) -> Floats:
             [-sp, cp * sr, cp * cr],
         ]
     )
-
-
-def _links(links: Sequence[LinkSection], index: dict[str, int], tips: dict[str, list[float]]) -> Links:
-    axes = stack_numbers([link.axis for link in links])
-    axes = axes / np.abs(axes).max(axis=-1, keepdims=True)  # lengths of 1e-300 have a direction, too
-    axes = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
-    return Links(
-        names=tuple(link.name for link in links),
-        parent=np.array([index[link.parent] for link in links], dtype=np.int64),
-        joint=np.array([FIXED if link.joint == "fixed" else REVOLUTE for link in links], dtype=np.int64),
-        origin=stack_numbers([tips[link.parent] if link.origin_m is None else link.origin_m for link in links]),
-        rotation=join_designs([roll_pitch_yaw(link.orientation_rad) for link in links], 2),
-        axis=axes,
-        mass=stack_numbers([link.mass_kg for link in links]),
-        center_of_mass=join_designs([in_space(link.center_of_mass_m) for link in links], 1),
-        inertia=join_designs([_inertia(link, axes[..., i, :]) for i, link in enumerate(links)], 2),
-        tip=stack_numbers([tips[link.name] for link in links]),
-    )
-
-
-def _inertia(link: LinkSection, axis: Floats) -> Floats:
-    """(..., 3, 3); one number is the moment about the joint axis and leaves the others open: I a a^T."""
-    rows = stack_numbers(link.inertia_kg_m2)
-    return rows * axis[..., :, None] * axis[..., None, :] if rows.shape[-1] == 1 else _even(rows)
-
-
-def _closures(loops: Sequence[LoopClosure], index: dict[str, int], tips: dict[str, list[float]]) -> Closures:
-    ends = [loop.points_m or [tips[name] for name in loop.links] for loop in loops]
-    points = stack_numbers(ends) if ends else np.zeros((0, 2, 3))
-    return Closures(
-        names=tuple(loop.name for loop in loops),
-        a=np.array([index[loop.links[0]] for loop in loops], dtype=np.int64),
-        b=np.array([index[loop.links[1]] for loop in loops], dtype=np.int64),
-        point_a=points[..., 0, :],
-        point_b=points[..., 1, :],
-    )
-
-
-def _drives(section: MechanismSection, index: dict[str, int]) -> Drives:
-    drives = section.drives
-
-    def column(key: str, omitted: float) -> Floats:
-        return build_nonlinear.per_drive(drives, key, omitted)
-
-    windings = [_winding(drive) for drive in drives]
-    return Drives(
-        names=tuple(drive.name for drive in drives),
-        joint=np.array([index[drive.joint] for drive in drives], dtype=np.int64),
-        motor_inertia=column("motor_inertia_kg_m2", math.nan),
-        transmission=column("transmission_ratio", math.nan),
-        stiffness=column("stiffness_Nm_per_rad", math.inf),
-        damping=column("damping_Nms_per_rad", 0.0),
-        torque_constant=column("torque_constant_Nm_per_A", math.nan),
-        torque_limit=column("torque_limit_Nm", math.inf),
-        encoder_counts=column("encoder_counts_per_rev", math.nan),
-        continuous_torque=column("continuous_torque_Nm", math.nan),
-        winding_damping=stack_numbers([damping for damping, _ in windings]),
-        winding_time_constant=stack_numbers([lag for _, lag in windings]),
-        nonlinearity=build_nonlinear.drive_nonlinearity(drives, section.friction),
-    )
-
-
-def _winding(drive: DriveSection) -> tuple[float, float]:
-    """Damping k^2/R [N m s/rad] and lag L/R [s] at the motor of a winding closed through a resistor; else 0."""
-    if drive.damping_resistance_ohm is None:
-        return 0.0, 0.0
-    keys = drive.winding_resistance_ohm, drive.torque_constant_Nm_per_A, drive.winding_inductance_H
-    inside, constant, inductance = (value_or(one, 0.0) for one in keys)
-    R = inside + drive.damping_resistance_ohm
-    return constant**2 / R, inductance / R
-
-
-def _parents_first(links: Sequence[LinkSection]) -> list[LinkSection]:
-    """Sorted so that every parent stands before its children; otherwise in the file's order."""
-    ordered: list[LinkSection] = []
-    placed, waiting = {"base"}, list(links)
-    while waiting:
-        for link in waiting:
-            if link.parent in placed:
-                ordered.append(link)
-                placed.add(link.name)
-        waiting = [link for link in waiting if link.name not in placed]
-    return ordered
 
 
 def _even(matrix: Floats) -> Floats:

@@ -24,7 +24,7 @@ def assembles(mechanism: Mechanism, assembly: str | None) -> bool:
 
 def masses_moved(posture: Posture) -> NDArray[np.bool_]:
     """Marks (...) of the postures in which every motion has a mass, and of those that are not OK."""
-    known = posture.status == OK
+    known = (posture.status == OK) & ~np.isnan(posture.mass_matrix).any(axis=(-2, -1))
     M = np.where(known[..., None, None], posture.mass_matrix, np.eye(posture.mass_matrix.shape[-1]))
     eigenvalues = np.linalg.eigvalsh(M)
     least = M.shape[-1] * np.finfo(float).eps * eigenvalues[..., -1]

@@ -12,9 +12,12 @@ from typing import Any, Final
 
 from zwidth.device.address import exists, in_schema
 from zwidth.device.faults import KeyPath, comma_list, plural, quote, suggestion
+from zwidth.device.feedback_consistency import feedback_inconsistencies
+from zwidth.device.legs import spread_tables, written_path
 from zwidth.device.loop_consistency import electrical_inconsistencies, loop_inconsistencies
+from zwidth.device.missing import partly_missing
 from zwidth.device.nonlinear_consistency import nonlinear_inconsistencies
-from zwidth.device.schema.device_file import flat_sources
+from zwidth.device.schema.device_file import flat_sources, keys
 from zwidth.device.toml_access import is_number, row_count, table, tables
 
 KeyMessages = Iterator[tuple[KeyPath, str]]
@@ -23,24 +26,56 @@ KINDS: Final = ("mechanism", "plant", "response")
 # Tables that only device files have, and keys that only studies have: they tell which of the two a file is.
 DEVICE_KEYS: Final = frozenset({*KINDS, "loop"})
 STUDY_KEYS: Final = frozenset({"measures", "axis"})
+# Joints with several coordinates; how many angles and ways each joint has; the joints that have a key.
+SEVERAL: Final = frozenset({"universal", "spherical", "free"})
+ANGLES: Final = {"revolute": 1, "universal": 2, "spherical": 3, "free": 3}
+WAYS: Final = {"prismatic": 1, "free": 3}
+TURNING: Final = ("revolute", "universal", "spherical", "free")
+MOVING: Final = ("revolute", "prismatic", "universal", "spherical", "free")
+JOINT_KEYS: Final[dict[str, tuple[str, ...]]] = {
+    "second_axis": ("universal",),
+    "limits_rad": ("revolute",),
+    "limits_m": ("prismatic",),
+    "free": MOVING,
+    **{f"joint_{key}": TURNING for key in ("stiffness_Nm_per_rad", "damping_Nms_per_rad", "coulomb_Nm")},
+    **{f"joint_{key}": ("prismatic",) for key in ("stiffness_N_per_m", "damping_Ns_per_m", "coulomb_N")},
+}
 
 
 def inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMessages:
-    """Path and sentence of every disagreement; `original` still has the sections not supported yet."""
-    yield from _one_kind(original)
+    """Path and sentence of every disagreement; `original` still has the sections not supported yet.
+
+    Legs are checked as the copies that a mechanism has of them; a fault is reported where the leg is written.
+    """
+    spread, paths = spread_tables(table(document, "mechanism"))
+    flat = {**document, "mechanism": spread} if spread else document
+    for path, message in _inconsistencies(flat, original):
+        yield written_path(path, paths), message
     yield from _sources(document)
+    yield from _legs(table(document, "mechanism"))
+    for path in partly_missing(table(document, "mechanism")):
+        yield path, "is missing; give it here, or nowhere if it is not known"
+
+
+def _inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMessages:
+    yield from _one_kind(original)
     yield from _plant(table(document, "plant"))
     yield from loop_inconsistencies(document)
+    yield from feedback_inconsistencies(document)
     yield from nonlinear_inconsistencies(document)
     yield from _response(original)
     yield from electrical_inconsistencies(document)
     yield from operator_inconsistencies(document)
+    yield from _sampling(document)
     mechanism = table(document, "mechanism")
     if mechanism:
         yield from _tree(mechanism)
         if _joints(mechanism):
             yield from _references(mechanism)
             yield from _assemblies(mechanism)
+        yield from _joint_keys(mechanism)
+        yield from _loop_keys(mechanism)
+        yield from _place_of_handle(mechanism)
         yield from _workspace(mechanism)
         yield from _damping(mechanism)
 
@@ -51,6 +86,16 @@ def _one_kind(document: dict[str, Any]) -> KeyMessages:
         yield (), "has neither [mechanism] nor [plant] nor [response]; give one of them"
     elif len(given) > 1:
         yield (), f"has {' and '.join(given)}; only one of them is allowed: remove the other"
+
+
+def _sampling(document: dict[str, Any]) -> KeyMessages:
+    """Only a mechanism has answers without a computer."""
+    loop = document.get("loop")
+    misspelt = isinstance(loop, dict) and not set(loop) <= keys(("loop",))
+    if isinstance(loop, dict) and "sampling_period_s" not in loop and "mechanism" not in document and not misspelt:
+        yield ("loop", "sampling_period_s"), "is missing; give a number"
+    if isinstance(loop, dict) and "delay_s" in loop and "sampling_period_s" not in loop:
+        yield ("loop", "delay_s"), "needs sampling_period_s; give that, or delay_samples"
 
 
 def _sources(document: dict[str, Any]) -> KeyMessages:
@@ -224,31 +269,150 @@ def _references(mechanism: dict[str, Any]) -> KeyMessages:
         if joint not in links:
             yield path, f"'{joint}' is not a link; {suggestion(joint, links, 'links')}"
         elif links[joint] == "fixed":
-            yield path, f"'{joint}' is fixed to its parent; a drive needs a revolute joint"
+            yield path, f"'{joint}' is fixed to its parent; a drive needs a revolute or prismatic joint"
+        elif links[joint] in SEVERAL:
+            yield (
+                path,
+                (
+                    f"'{joint}' has a {links[joint]} joint; a drive needs a revolute or prismatic one: make it "
+                    "of several, with links of no mass between them"
+                ),
+            )
         elif joint in driven:
             yield path, f"'{joint}' has a drive already; one joint takes one drive"
         driven.add(joint)
+    yield from _couplings(mechanism, links, driven)
+
+
+def _couplings(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str]) -> KeyMessages:
+    """Drives that turn with other joints, which are driven or free; motors on links that exist."""
+    free = {link["name"] for _, link in tables(mechanism, "links") if link.get("free") is True and "name" in link}
+    for index, drive in tables(mechanism, "drives"):
+        if table(drive, "coupling") and "transmission_ratio" not in drive:
+            yield ("mechanism", "drives", index, "transmission_ratio"), "is missing; coupling needs it"
+        for name in table(drive, "coupling"):
+            path: KeyPath = ("mechanism", "drives", index, "coupling", name)
+            if name not in links:
+                yield path, f"'{name}' is not a link; {suggestion(name, set(links), 'links')}"
+            elif name == drive.get("joint"):
+                yield path, "is the drive's own joint, whose ratio is transmission_ratio; remove it"
+            elif name not in driven | free or links[name] in SEVERAL:
+                yield path, f"'{name}' has no joint that is driven or free; a motor can turn with such joints only"
+        link = drive.get("motor_link")
+        if isinstance(link, str) and link not in links and link != "base":
+            yield (
+                ("mechanism", "drives", index, "motor_link"),
+                f"'{link}' is not a link; {suggestion(link, {*links, 'base'}, 'links')}",
+            )
+        for key, other in (("motor_link", "motor_axis"), ("motor_axis", "motor_link")):
+            if key in drive and other not in drive:
+                yield ("mechanism", "drives", index, other), f"is missing; {key} needs it"
 
 
 def _assemblies(mechanism: dict[str, Any]) -> KeyMessages:
-    turning = {name for name, joint in _joints(mechanism).items() if joint != "fixed"}
+    """Coordinates of the joints that have some, in the right table, as many as the joint has."""
+    joints = _joints(mechanism)
+    turning = {name: count for name, joint in joints.items() if (count := ANGLES.get(joint, 0))}
+    sliding = {name: count for name, joint in joints.items() if (count := WAYS.get(joint, 0))}
     assemblies = table(mechanism, "assemblies")
     for name, assembly in assemblies.items():
-        angles = assembly.get("joints_rad") if isinstance(assembly, dict) else None
-        if not isinstance(angles, dict):
-            continue
-        path = ("mechanism", "assemblies", name, "joints_rad")
-        for joint in angles:
-            if joint not in turning:
-                yield (*path, joint), f"names no revolute joint; {suggestion(joint, turning, 'joints')}"
-        for joint in sorted(turning - set(angles)):
-            yield (*path, joint), "is missing; give an approximate angle for every revolute joint"
+        for key, counts, moves in (("joints_rad", turning, "turns"), ("joints_m", sliding, "slides")):
+            given = assembly.get(key, {}) if isinstance(assembly, dict) else None
+            if isinstance(given, dict):
+                path = ("mechanism", "assemblies", name, key)
+                yield from _coordinates(path, given, counts, moves)
+                needed = {joint for joint in counts if joints[joint] not in ("spherical", "free")}
+                for joint in sorted(needed - set(given)):
+                    kind = (
+                        "angle for every revolute joint"
+                        if key == "joints_rad"
+                        else "way for every prismatic joint"
+                    )
+                    yield (*path, joint), f"is missing; give an approximate {kind}"
     reference = table(mechanism, "reference")
     wanted, place = reference.get("assembly"), ("mechanism", "reference", "assembly")
     if isinstance(wanted, str) and assemblies and wanted not in assemblies:
         yield place, f"'{wanted}' is not an assembly; {suggestion(wanted, set(assemblies), 'assemblies')}"
     elif wanted is None and reference and len(assemblies) > 1:
         yield place, f"is missing; choose one of {comma_list(sorted(assemblies))}"
+
+
+def _coordinates(path: KeyPath, given: dict[str, Any], counts: dict[str, int], moves: str) -> KeyMessages:
+    for joint, value in given.items():
+        if joint not in counts:
+            yield (*path, joint), f"names no joint that {moves}; {suggestion(joint, set(counts), 'joints')}"
+            continue
+        length = len(value) if isinstance(value, list) else 1
+        if length != counts[joint]:
+            yield (
+                (*path, joint),
+                f"has {plural(length, 'number')}, but the joint has {counts[joint]}; give {counts[joint]}",
+            )
+
+
+def _joint_keys(mechanism: dict[str, Any]) -> KeyMessages:
+    """Keys of a link that only some joints have."""
+    for index, link in tables(mechanism, "links"):
+        joint = link.get("joint")
+        if not isinstance(joint, str):
+            continue
+        for key, kinds in JOINT_KEYS.items():
+            if key in link and joint not in kinds and link[key] is not False:
+                yield (
+                    ("mechanism", "links", index, key),
+                    f"is of a {' or '.join(kinds)} joint, and this one is {joint}; remove it",
+                )
+
+
+def _loop_keys(mechanism: dict[str, Any]) -> KeyMessages:
+    for index, loop in tables(mechanism, "loops"):
+        for key, kind in (("axes", "axis"), ("orientation_rad", "frame")):
+            if key in loop and loop.get("closes", "point") != kind:
+                yield (
+                    ("mechanism", "loops", index, key),
+                    f'is used only with closes = "{kind}"; set that or remove this',
+                )
+
+
+def _place_of_handle(mechanism: dict[str, Any]) -> KeyMessages:
+    """The reference gives what the drives control of the handle."""
+    controls, reference = table(mechanism, "handle").get("controls", "position"), table(mechanism, "reference")
+    path, given = ("mechanism", "reference"), isinstance(mechanism.get("reference"), dict)
+    if given and "position_m" not in reference and controls != "orientation":
+        yield (*path, "position_m"), "is missing; give the position of the handle"
+    if "orientation_rad" in reference and controls == "position":
+        yield (
+            (*path, "orientation_rad"),
+            "does not apply, as the drives control the handle's position alone; remove it, or say otherwise by "
+            "mechanism.handle.controls",
+        )
+    if "position_m" in reference and controls == "orientation":
+        yield (
+            (*path, "position_m"),
+            "does not apply, as the drives control the handle's orientation alone; remove it",
+        )
+    if given and "direction" not in reference and "axis" not in reference:
+        yield (*path, "direction"), "is missing; give a rendered direction, or an axis for moments"
+    screw = "direction" in reference and "axis" in reference
+    if screw != ("characteristic_length_m" in reference):
+        fault = (
+            "is missing; direction and axis together need it" if screw else "is used only with direction and axis"
+        )
+        yield (*path, "characteristic_length_m"), fault
+
+
+def _legs(mechanism: dict[str, Any]) -> KeyMessages:
+    """Each leg says how many copies there are, one way."""
+    for index, leg in tables(mechanism, "legs"):
+        if ("angles_rad" in leg) == ("count" in leg):
+            fault = "has angles_rad and count" if "count" in leg else "has neither angles_rad nor count"
+            yield (
+                ("mechanism", "legs", index),
+                f"{fault}; give one of them: by what its copies are turned, or how many",
+            )
+    owners = [mechanism, *(leg for _, leg in tables(mechanism, "legs"))]
+    if mechanism and mechanism.get("drives", []) == [] and not any(tables(owner, "drives") for owner in owners):
+        yield ("mechanism", "drives"), "are missing; give one for each degree of freedom"
 
 
 def _workspace(mechanism: dict[str, Any]) -> KeyMessages:
@@ -298,7 +462,7 @@ def _damping(mechanism: dict[str, Any]) -> KeyMessages:
 
 def _joints(mechanism: dict[str, Any]) -> dict[str, Any]:
     return {
-        link["name"]: link.get("joint")
+        link["name"]: link["joint"] if isinstance(link.get("joint"), str) else None
         for _, link in tables(mechanism, "links")
         if isinstance(link.get("name"), str)
     }

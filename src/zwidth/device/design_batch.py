@@ -42,7 +42,9 @@ _DRIVE: Final = [
     "encoder_noise_rad",
 ]
 _LINK: Final = ["origin_m", "orientation_rad", "axis", "length_m", "mass_kg", "center_of_mass_m", "inertia_kg_m2"]
+_OWNERS: Final[tuple[KeyPath, ...]] = (("mechanism",), ("mechanism", "legs", "*"))
 _FILTER: Final = ("time_constant_s", "cutoff_Hz")
+_FEEDFORWARD: Final = ("inertia_kg", "inertia_share", "damping_Ns_per_m", "coulomb_N", "deadband_m_per_s")
 _PLANT: Final = ["mass_kg", "damping_Ns_per_m", "stiffness_N_per_m", "actuator", "sensor", "handle"]
 _OPERATOR: Final = [
     "arm_mass_kg",
@@ -52,9 +54,9 @@ _OPERATOR: Final = [
     "grasp_damping_Ns_per_m",
 ]
 ARRAYS: Final[tuple[KeyPath, ...]] = (
-    *(("mechanism", "links", "*", key) for key in _LINK),
-    *(("mechanism", "drives", "*", key) for key in _DRIVE),
-    ("mechanism", "loops", "*", "points_m"),
+    *((*owner, "links", "*", key) for owner in _OWNERS for key in _LINK),
+    *((*owner, "drives", "*", key) for owner in _OWNERS for key in _DRIVE),
+    *((*owner, "loops", "*", "points_m") for owner in _OWNERS),
     ("mechanism", "handle", "point_m"),
     ("mechanism", "assemblies", "*", "joints_rad"),
     ("mechanism", "reference", "position_m"),
@@ -63,7 +65,12 @@ ARRAYS: Final[tuple[KeyPath, ...]] = (
         for key in ("mode_ratio", "mass_coefficient_1_per_s", "stiffness_coefficient_s")
     ),
     *(("loop", key) for key in ("sampling_period_s", "delay_samples", "delay_s")),
-    *(("loop", path, "filter", key) for path in ("velocity", "force") for key in _FILTER),
+    *(("loop", path, "filter", key) for path in ("velocity", "force", "force_sensor") for key in _FILTER),
+    *(("loop", "force_sensor", key) for key in ("gain", "mass_beyond_kg")),
+    *(("loop", "feedforward", key) for key in _FEEDFORWARD),
+    *(("loop", "feedforward", "acceleration_filter", key) for key in _FILTER),
+    *(("loop", path, "velocity", "filter", key) for path in ("feedforward", "local") for key in _FILTER),
+    *(("loop", "local", key) for key in ("stiffness_N_per_m", "damping_Ns_per_m")),
     ("loop", "actuator", "time_constant_s"),
     *(("plant", key) for key in _PLANT),
     *(("operator", key) for key in _OPERATOR),
@@ -183,7 +190,8 @@ class DesignBatch:
 
     def _with_posture(self, posture: Posture, direction: Any, model: str | None) -> OperatingPoint:
         shape = posture.status.shape
-        rendered = np.broadcast_to(self.device.direction(direction), (*shape, 3))
+        vector = self.device.direction(direction)
+        rendered = np.broadcast_to(vector, (*shape, vector.shape[-1]))
         point = OperatingPoint(
             controller=self.device.controller,
             mechanism=self.device.mechanism,
@@ -238,7 +246,8 @@ def design_batch(
         used = np.where(valid.reshape(-1, *(1,) * (numbers.ndim - 1)), numbers, numbers[first])
         with_arrays = _substitute(with_arrays, document, steps, used)
     device = build_device(checked, cleaned, label)
-    parts = build_device(with_arrays, cleaned, label) if valid.any() else device
+    surplus = device.mechanism.drives.surplus if device.mechanism is not None else ()
+    parts = build_device(with_arrays, cleaned, label, surplus) if valid.any() else device
     return DesignBatch(device, parts, count), valid
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from zwidth.device.faults import KeyPath
+from zwidth.device.legs import written
 from zwidth.device.loop_consistency import lags_wrongly, reaches_nyquist
 from zwidth.device.schema import magnitudes
 from zwidth.device.schema.device_file import DeviceFile
@@ -29,6 +30,11 @@ from zwidth.model.design_axes import join_designs
 Marks = NDArray[np.bool_]
 Values = dict[KeyPath, NDArray[np.float64]]
 
+_LOW_PASSES: Final = (
+    *((path, "filter") for path in ("velocity", "force", "force_sensor")),
+    ("feedforward", "acceleration_filter"),
+    *((path, "velocity", "filter") for path in ("feedforward", "local")),
+)
 PLANT_MATRICES: Final = ("mass_kg", "damping_Ns_per_m", "stiffness_N_per_m")
 PLANT_VECTORS: Final = ("actuator", "sensor", "handle")
 
@@ -142,10 +148,11 @@ Broken = Iterator[Any]
 def _loop(document: dict[str, Any], read: Read) -> Broken:
     """Delays, lags and cutoffs against the sampling period."""
     T = read("loop", "sampling_period_s")
-    for path in ("velocity", "force"):
-        cutoff = read("loop", path, "filter", "cutoff_Hz")
+    for path in _LOW_PASSES:
+        cutoff = read("loop", *path, "cutoff_Hz")
         if cutoff is not None:
-            yield reaches_nyquist(cutoff, T)
+            times = read("loop", "local", "rate_multiple") if path[0] == "local" else 1
+            yield reaches_nyquist(cutoff, T / times)
     lag, delay, late = (
         read("loop", *steps) for steps in (("actuator", "time_constant_s"), ("delay_samples",), ("delay_s",))
     )
@@ -158,25 +165,23 @@ def _loop(document: dict[str, Any], read: Read) -> Broken:
 
 
 def _kalman(document: dict[str, Any], read: Read) -> Broken:
-    """The tracking index of a Kalman filter."""
-    velocity = table(table(document, "loop"), "velocity")
-    if velocity.get("method") != "kalman":
-        return
-    noise, step = read("loop", "velocity", "position_noise_m"), read("loop", "encoder", "resolution_m")
-    if noise is None:
-        noise = quantisation_noise(step)
-    index = (
-        read("loop", "velocity", "acceleration_noise_m_per_s2") * read("loop", "sampling_period_s") ** 2 / noise
-    )
-    yield (index < INDEX[0]) | (index > INDEX[1])
+    """The tracking index of a Kalman filter, at its own rate."""
+    T, step = read("loop", "sampling_period_s"), read("loop", "encoder", "resolution_m")
+    for path in (("loop",), ("loop", "feedforward"), ("loop", "local")):
+        if read(*path, "velocity", "method") != "kalman":
+            continue
+        noise = read(*path, "velocity", "position_noise_m")
+        if noise is None:
+            noise = quantisation_noise(step)
+        own = T / read(*path, "rate_multiple") if path[-1] == "local" else T
+        index = read(*path, "velocity", "acceleration_noise_m_per_s2") * own**2 / noise
+        yield (index < INDEX[0]) | (index > INDEX[1])
 
 
 def _drives(document: dict[str, Any], read: Read) -> Broken:
     """Torques of a motor."""
-    for i, _ in tables(table(document, "mechanism"), "drives"):
-        continuous, limit = (
-            read("mechanism", "drives", i, key) for key in ("continuous_torque_Nm", "torque_limit_Nm")
-        )
+    for path, _ in written(table(document, "mechanism"), "drives"):
+        continuous, limit = (read("mechanism", *path, key) for key in ("continuous_torque_Nm", "torque_limit_Nm"))
         if continuous is not None and limit is not None:
             yield continuous > limit
 
@@ -185,10 +190,10 @@ def _windings(document: dict[str, Any], read: Read) -> Broken:
     """Electrical damping and its lag."""
     T = read("loop", "sampling_period_s")
     windings = []
-    for i, drive in tables(table(document, "mechanism"), "drives"):
+    for path, drive in written(table(document, "mechanism"), "drives"):
         if "damping_resistance_ohm" in drive:
             n, k, inside, outside, L = (
-                read("mechanism", "drives", i, key)
+                read("mechanism", *path, key)
                 for key in (
                     "transmission_ratio",
                     "torque_constant_Nm_per_A",
@@ -211,7 +216,7 @@ def _brakes(document: dict[str, Any], read: Read) -> Broken:
     """Lags of programmable brakes against the sampling period."""
     T = read("loop", "sampling_period_s")
     places: list[KeyPath] = [("plant", "brake", i) for i, _ in tables(table(document, "plant"), "brake")]
-    places += [("mechanism", "drives", i) for i, _ in tables(table(document, "mechanism"), "drives")]
+    places += [("mechanism", *path) for path, _ in written(table(document, "mechanism"), "drives")]
     for place in places:
         lag = read(*place, "time_constant_s" if place[0] == "plant" else "brake_time_constant_s")
         if lag is not None:
@@ -229,18 +234,18 @@ def _workspace(document: dict[str, Any], read: Read) -> Broken:
 
 def _axes(document: dict[str, Any], read: Read) -> Broken:
     """Joint axes with a length."""
-    for i, link in tables(table(document, "mechanism"), "links"):
+    for path, link in written(table(document, "mechanism"), "links"):
         if "axis" in link:
-            axis = read("mechanism", "links", i, "axis")
+            axis = read("mechanism", *path, "axis")
             yield (np.abs(axis).max(axis=-1) == 0.0) | (np.abs(axis).max(axis=-1) > LARGEST)
 
 
 def _inertias(document: dict[str, Any], read: Read) -> Broken:
     """Moments of inertia that a body can have: by the file's rules, the eigenvalues well inside them."""
-    for i, link in tables(table(document, "mechanism"), "links"):
+    for path, link in written(table(document, "mechanism"), "links"):
         if not isinstance(link.get("inertia_kg_m2"), list) or len(link["inertia_kg_m2"]) != 3:
             continue
-        inertia = read("mechanism", "links", i, "inertia_kg_m2")
+        inertia = read("mechanism", *path, "inertia_kg_m2")
         nested = isinstance(link["inertia_kg_m2"][0], list)
         if nested:
             yield _asymmetric(inertia)

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -13,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from zwidth import _verbs
 from zwidth.device.faults import DeviceError, fail, quote, suggestion
-from zwidth.device.posture_arguments import joint_angles, positions, unit_vectors
+from zwidth.device.missing import missing_numbers
+from zwidth.device.posture_arguments import joint_angles, positions, rotations, screws, unit_vectors
 from zwidth.loop.controller import Controller
 from zwidth.loop.linear_omissions import linear_omissions
 from zwidth.model.mechanism import Floats, Mechanism
@@ -47,7 +49,8 @@ class Device:
     controller          sampling, delay, velocity filter
     damping             how the mechanism's flexible modes are damped
     reference_position  (3,) handle position meant where none is given [m]; None for a plant
-    reference_direction (3,) rendered direction meant where none is given, any length; None for a plant
+    reference_direction (3,) rendered direction meant where none is given, any length, or a screw (6,); None for a
+                        plant
     reference_assembly  assembly meant where none is given; None for a plant
     operator            the arm and grasp at the handle; None: nobody
     operator_name       what he is called; None: nobody
@@ -94,6 +97,11 @@ class Device:
             return bool(np.isfinite(self.mechanism.drives.encoder_counts).all())
         return self.document.get("loop", {}).get("encoder", {}).get("resolution_m") is not None
 
+    @cached_property
+    def missing(self) -> dict[str, tuple[str, ...]]:
+        """Keys that the file leaves out as not known, by what needs them: "dynamics", "sampling"."""
+        return missing_numbers(self.document)
+
     @property
     def linear_omissions(self) -> tuple[str, ...]:
         """Parts of the device that a linear answer leaves out, in words; () if there are none."""
@@ -104,7 +112,10 @@ class Device:
         position: Position | ArrayLike | Posture | None = None,
         direction: ArrayLike | None = None,
         *,
+        axis: ArrayLike | None = None,
+        characteristic_length: float | None = None,
         directions: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
         assembly: str | None = None,
         model: str | None = None,
         operator: Operator | str | os.PathLike[str] | None = None,
@@ -122,7 +133,13 @@ class Device:
                     posture solved before. Left out: the file's reference
         direction   (..., 2) or (..., 3) of any length but zero; its leading axes broadcast with those of the
                     position. Left out: the file's
-        directions  (..., m, 2) or (..., m, 3) instead: directions rendered together, under one wall law
+        axis        (..., 3) of any length instead: the axis about which moments are rendered; walls then are in
+                    N m/rad. With a direction: a screw, as much of either as the vectors are long
+        characteristic_length  by which angles count as ways on a screw [m]
+        directions  (..., m, 2) or (..., m, 3) instead: directions rendered together, under one wall law; or
+                    (..., m, 6) screws, see `model.effective_parameters.screw`
+        orientation (..., 3) roll, pitch, yaw [rad] or (..., 3, 3) axes of the handle, where the drives control it;
+                    left out: the file's
         assembly    name of the way the mechanism is assembled; left out: the file's
         model       "full", "two-mass", "motor-mass" or "rigid"; left out: full for a mechanism, and a given plant
                     as it is. "motor-mass" holds the link side, and so the operator, fixed: he does nothing to it
@@ -136,7 +153,16 @@ class Device:
 
         if operator is not None:
             held = self.held_by(operator)
-            return held.at(position, direction, directions=directions, assembly=assembly, model=model)
+            return held.at(
+                position,
+                direction,
+                axis=axis,
+                characteristic_length=characteristic_length,
+                directions=directions,
+                orientation=orientation,
+                assembly=assembly,
+                model=model,
+            )
         if model is not None and model not in MODELS:
             raise fail(self.label, "model", f"must be one of {', '.join(MODELS)}, got {quote(model)}")
         if direction is not None and directions is not None:
@@ -144,10 +170,18 @@ class Device:
         posture = rendered = requested_position = None
         if self.mechanism is None:
             refused = {} if self.response is None else {"model": model}
-            self._refuse(at=position, direction=direction, directions=directions, assembly=assembly, **refused)
+            self._refuse(
+                at=position,
+                direction=direction,
+                axis=axis,
+                directions=directions,
+                orientation=orientation,
+                assembly=assembly,
+                **refused,
+            )
         else:
-            rendered = self._unit_directions(direction, directions)
-            posture = self._posture(position, assembly)
+            rendered = self._unit_directions(direction, axis, characteristic_length, directions)
+            posture = self._posture(position, orientation, assembly)
             shape = np.broadcast_shapes(posture.status.shape, rendered.shape[:-2])
             posture = posture.broadcast_to(shape)
             rendered = np.broadcast_to(rendered, (*shape, *rendered.shape[-2:]))
@@ -168,6 +202,7 @@ class Device:
             resolution_known=self.resolution_known,
             name=self.name,
             requested_position=requested_position,
+            missing=self.missing,
         )
 
     def plant(self, *arguments: Any, **options: Any) -> Any:
@@ -186,6 +221,7 @@ class Device:
         return self.at(
             point.requested_position,
             directions=point.directions,
+            orientation=None if isinstance(point.requested_position, Mapping) else point.posture.rotation,
             assembly=point.posture.assembly,
             model=point.model,
         )
@@ -262,17 +298,30 @@ class Device:
         if position is None:
             return self.reference_position
         if isinstance(position, Mapping):
-            from zwidth.model.posture import joint_position
+            from zwidth.model.posture import place_of_joints
 
             angles = joint_angles(self.label, mechanism, position)
             with self.solving(assembly) as name:
-                return joint_position(mechanism, angles, name)
+                return place_of_joints(mechanism, angles, name)[0]
         return positions(self.label, position, float(self.reference_position[2]))
 
-    def direction(self, direction: ArrayLike | None = None) -> Floats:
-        """The rendered direction as a unit vector, (..., 3); left out: that of the file. Raises DeviceError."""
-        self._mechanism(direction=direction)
-        return unit_vectors(self.label, "direction", self.reference_direction if direction is None else direction)
+    def direction(
+        self,
+        direction: ArrayLike | None = None,
+        axis: ArrayLike | None = None,
+        characteristic_length: float | None = None,
+    ) -> Floats:
+        """The rendered direction as a unit vector, (..., 3), or with an axis as a screw, (..., 6); left out: that
+        of the file. Arguments as for `at`. Raises DeviceError."""
+        self._mechanism(direction=direction, axis=axis)
+        if axis is not None:
+            return screws(self.label, direction, axis, characteristic_length)
+        if characteristic_length is not None:
+            raise fail(self.label, "characteristic_length", "is of a direction and an axis together; leave it out")
+        given = self.reference_direction if direction is None else direction
+        if isinstance(given, np.ndarray) and given.shape[-1:] == (6,):  # a screw, made before
+            return given
+        return unit_vectors(self.label, "direction", given)
 
     def _requested_position(self, position: Position | ArrayLike | Posture | None) -> Position | Floats | None:
         """The requested position that a point keeps, so that another device can be put there."""
@@ -282,25 +331,56 @@ class Device:
             return position
         return position.position if isinstance(position, Posture) else self.position(position)
 
-    def _unit_directions(self, direction: ArrayLike | None, directions: ArrayLike | None) -> Floats:
-        """Unit vectors (..., m, 3) of the directions rendered together."""
+    def _unit_directions(
+        self,
+        direction: ArrayLike | None,
+        axis: ArrayLike | None,
+        characteristic_length: float | None,
+        directions: ArrayLike | None,
+    ) -> Floats:
+        """Unit vectors (..., m, 3), or screws (..., m, 6), of the directions rendered together."""
         if directions is None:
-            return self.direction(direction)[..., None, :]
+            return self.direction(direction, axis, characteristic_length)[..., None, :]
+        if axis is not None:
+            raise fail(self.label, "directions", "are given beside an axis; give screws of six numbers instead")
+        if isinstance(directions, np.ndarray) and directions.shape[-1:] == (6,):
+            return np.atleast_2d(directions)
         together = unit_vectors(self.label, "directions", directions)
         if together.ndim < 2 or not together.size:
             raise fail(self.label, "directions", "must be a list of directions, such as [(1, 0), (0, 1)]")
         return together
 
-    def _posture(self, position: Position | ArrayLike | Posture | None, assembly: str | None) -> Posture:
+    def _posture(
+        self, position: Position | ArrayLike | Posture | None, orientation: ArrayLike | None, assembly: str | None
+    ) -> Posture:
         from zwidth.loop.operating_point import PROJECTION_TOLERANCE
-        from zwidth.model.posture import Posture, solve_posture
+        from zwidth.model.mechanism import POSITION
+        from zwidth.model.posture import Posture, place_of_joints, solve_posture
 
         if isinstance(position, Posture):
             return position
-        mechanism, goal = self._mechanism(), self.position(position, assembly)
-        single = goal.ndim == 1 and not mechanism.design_shape
+        mechanism = self._mechanism()
+        if orientation is not None and mechanism.controls == POSITION:
+            message = (
+                "does not apply: the drives of this device control the position of its handle alone; leave it out"
+            )
+            raise fail(self.label, "orientation", message)
+        axes = None if orientation is None else rotations(self.label, orientation)
+        if isinstance(position, Mapping) and mechanism.controls != POSITION:
+            if orientation is not None:
+                raise fail(
+                    self.label, "orientation", "is given beside joint angles, which determine it; leave it out"
+                )
+            angles = joint_angles(self.label, mechanism, position)
+            with self.solving(assembly) as name:
+                goal, axes = place_of_joints(mechanism, angles, name)
+        else:
+            goal = self.position(position, assembly)
+        single = goal.ndim == 1 and (axes is None or axes.ndim == 2) and not mechanism.design_shape
         with self.solving(assembly) as name:
-            return solve_posture(mechanism, goal, name, tolerance=PROJECTION_TOLERANCE if single else 0.0)
+            return solve_posture(
+                mechanism, goal, name, orientation=axes, tolerance=PROJECTION_TOLERANCE if single else 0.0
+            )
 
     @contextmanager
     def solving(self, assembly: str | None) -> Iterator[str | None]:

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
 from pydantic import ValidationError
 
-from zwidth.device import address, build, mechanism_check, unsupported
+from zwidth.device import address, build, unsupported
 from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS, inconsistencies
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
 from zwidth.device.format_version import refuse_newer, without_version
 from zwidth.device.operator_choice import document_held_by
 from zwidth.device.plausibility import warn_of_implausible
+from zwidth.device.posture_arguments import screws
 from zwidth.device.read import bundled, read
 from zwidth.device.schema.device_file import DeviceFile, schema
+from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
 from zwidth.device.validation_messages import validation_messages
 from zwidth.model.argument_checks import wrong_type
+from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.operator import Operator
 
 UNNAMED_OPERATOR: Final = "as given"  # an operator without a name
@@ -95,7 +99,9 @@ def from_document(
     device = build_device(checked, document, label)
     if device.mechanism is not None and checked.mechanism is not None and not skip_assembly_check:
         assembled = compiled and _assembled(device)
-        faults = list(mechanism_check.mechanism_faults(device.mechanism, checked.mechanism, assembled=assembled))
+        from zwidth.device.mechanism_check import mechanism_faults
+
+        faults = list(mechanism_faults(device.mechanism, checked.mechanism, assembled=assembled))
         if faults:
             raise DeviceError(in_order(faults, document, label))
     return device
@@ -133,9 +139,15 @@ def _assembled(device: Device) -> bool:
     return assembles(device.mechanism, device.reference_assembly)
 
 
-def build_device(checked: DeviceFile, document: dict[str, Any], label: str) -> Device:
-    """The device of checked sections; their numbers may be arrays over designs (`design_batch`)."""
+def build_device(
+    checked: DeviceFile, document: dict[str, Any], label: str, surplus: tuple[int, ...] | None = None
+) -> Device:
+    """The device of checked sections; their numbers may be arrays over designs (`design_batch`).
+
+    surplus  its drives beyond the mechanism's freedom; None: to be found, of one design
+    """
     section, controller = checked.mechanism, build.controller(checked.loop)
+    mechanism = _mechanism(section, surplus) if section else None
     reference = section.reference if section else None
     return Device(
         name=checked.name,
@@ -143,13 +155,13 @@ def build_device(checked: DeviceFile, document: dict[str, Any], label: str) -> D
         source=checked.source,
         sources=dict(checked.sources),
         label=label,
-        mechanism=build.mechanism(section) if section else None,
+        mechanism=mechanism,
         given_plant=build.plant(checked.plant, checked.friction, checked.loop.encoder) if checked.plant else None,
         response=build.response(checked.response, label, controller.sampling_period) if checked.response else None,
         controller=controller,
         damping=build.damping(section.damping if section else None),
-        reference_position=build.in_space(reference.position_m) if reference else None,
-        reference_direction=build.in_space(reference.direction) if reference else None,
+        reference_position=None if mechanism is None else mechanism.reference_position,
+        reference_direction=_reference_direction(reference) if reference else None,
         reference_assembly=(reference.assembly or next(iter(section.assemblies)))
         if reference and section
         else None,
@@ -158,6 +170,23 @@ def build_device(checked: DeviceFile, document: dict[str, Any], label: str) -> D
         encoders="motor" if checked.loop.encoder.at in (None, "motor") else "link",
         document=document,
     )
+
+
+def _reference_direction(reference: ReferenceSection) -> Floats:
+    """(3,) of any length, or a screw (6,)."""
+    if reference.axis is None:
+        return build.in_space(reference.direction or ())
+    direction = None if reference.direction is None else build.in_space(reference.direction)
+    return screws("", direction, reference.axis, reference.characteristic_length_m)
+
+
+def _mechanism(section: MechanismSection, surplus: tuple[int, ...] | None) -> Mechanism:
+    from zwidth.device.build_mechanism import mechanism  # compiled code, which a plant does without
+    from zwidth.device.mechanism_check import surplus_drives
+
+    made = mechanism(section)
+    beyond = surplus_drives(made) if surplus is None else surplus
+    return replace(made, drives=replace(made.drives, surplus=beyond)) if beyond else made
 
 
 def in_order(faults: Iterable[tuple[KeyPath, str]], document: dict[str, Any], label: str) -> list[Fault]:

@@ -24,19 +24,18 @@ LONGEST_LAG: Final = 1e6
 def loop_inconsistencies(document: dict[str, Any]) -> KeyMessages:
     """Path and sentence of every disagreement in [loop]."""
     loop = table(document, "loop")
-    T = _period(loop)
+    T = sampling_period(loop)
     yield from _delay(loop, T)
     for section in ("velocity", "force"):
-        yield from _cutoff((section, "filter"), table(table(loop, section), "filter"), T)
+        yield from cutoff_fault(("loop", section, "filter"), table(table(loop, section), "filter"), T)
     yield from lag_fault(
         ("loop", "actuator", "time_constant_s"), table(loop, "actuator").get("time_constant_s"), T
     )
     yield from _encoder(document, loop)
-    yield from _noise(loop)
-    yield from _kalman(loop, T)
+    yield from estimate_faults(("loop", "velocity"), table(loop, "velocity"), table(loop, "encoder"), T)
 
 
-def _period(loop: dict[str, Any]) -> float:
+def sampling_period(loop: dict[str, Any]) -> float:
     """The sampling period; nan, with which every comparison is false, where there is none."""
     period = loop.get("sampling_period_s")
     return period if is_number(period) and 0 < period <= 1 else math.nan
@@ -85,11 +84,12 @@ def _delay(loop: dict[str, Any], T: float) -> KeyMessages:
             )
 
 
-def _cutoff(place: KeyPath, low_pass: dict[str, Any], T: float) -> KeyMessages:
+def cutoff_fault(place: KeyPath, low_pass: dict[str, Any], T: float) -> KeyMessages:
+    """A low pass at a place has its cutoff below half the rate of its sampling period [s]."""
     cutoff = low_pass.get("cutoff_Hz")
     if is_number(cutoff) and math.isfinite(cutoff) and reaches_nyquist(cutoff, T):
         yield (
-            ("loop", *place, "cutoff_Hz"),
+            (*place, "cutoff_Hz"),
             f"must be below half the sampling frequency, {0.5 / T:.10g} Hz, got {cutoff:.10g}; "
             "lower it or sample faster",
         )
@@ -102,21 +102,25 @@ def _encoder(document: dict[str, Any], loop: dict[str, Any]) -> KeyMessages:
         yield ("loop", "encoder", "at"), f"does not apply to a device given by its {kind} and remove this"
 
 
-def _noise(loop: dict[str, Any]) -> KeyMessages:
+def estimate_faults(place: KeyPath, velocity: dict[str, Any], encoder: dict[str, Any], T: float) -> KeyMessages:
+    """Noise figures of the velocity estimate at a place, with a sampling period [s] of its own."""
+    yield from _noise(place, velocity, encoder)
+    yield from _kalman(place, velocity, encoder, T)
+
+
+def _noise(place: KeyPath, velocity: dict[str, Any], encoder: dict[str, Any]) -> KeyMessages:
     """A method that uses the encoder's error needs its size."""
-    velocity, encoder = table(loop, "velocity"), table(loop, "encoder")
     named = {"kalman": "the standard deviation of the encoder's error", "foaw": "the encoder's largest error"}
     method = next((name for name in named if name == velocity.get("method")), None)
     if method and velocity.get("position_noise_m") is None and not encoder.get("resolution_m"):
         yield (
-            ("loop", "velocity", "position_noise_m"),
+            (*place, "position_noise_m"),
             f"is missing; give {named[method]}, or for a [plant] loop.encoder.resolution_m",
         )
 
 
-def _kalman(loop: dict[str, Any], T: float) -> KeyMessages:
+def _kalman(place: KeyPath, velocity: dict[str, Any], encoder: dict[str, Any], T: float) -> KeyMessages:
     """Noise figures that make a filter at this sampling period."""
-    velocity, encoder = table(loop, "velocity"), table(loop, "encoder")
     if velocity.get("method") != "kalman":
         return
     motion, noise, step = (
@@ -131,7 +135,7 @@ def _kalman(loop: dict[str, Any], T: float) -> KeyMessages:
         method = Kalman(motion, noise) if noise is not None else Kalman.of_encoder(motion, step or 0.0)
         method.alpha_beta(T)
     except ValueError as error:
-        yield ("loop", "velocity"), str(error)
+        yield place, str(error)
 
 
 def along_fault(place: KeyPath, along: Any, size: int | None) -> KeyMessages:
@@ -146,7 +150,7 @@ def along_fault(place: KeyPath, along: Any, size: int | None) -> KeyMessages:
 
 def electrical_inconsistencies(document: dict[str, Any]) -> KeyMessages:
     """Path and sentence of every disagreement about windings: of a plant's motors, of a mechanism's drives."""
-    T = _period(table(document, "loop"))
+    T = sampling_period(table(document, "loop"))
     plant = table(document, "plant")
     size = row_count(plant.get("mass_kg"))
     for index, damper in tables(plant, "electrical_damping"):

@@ -1,26 +1,28 @@
-"""Whether a mechanism can be put together: loops that close, drives that move it, motions that carry mass.
-
-Plain NumPy, for one mechanism at a time: a file is checked before anything is compiled.
-"""
+"""Whether a mechanism can be put together: loops that close, drives that move it, motions that carry mass."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
-from zwidth.device.faults import KeyPath
+from zwidth.device.faults import KeyPath, comma_list, plural
+from zwidth.device.legs import members
 from zwidth.device.schema.mechanism import MechanismSection
-from zwidth.model.mechanism import REVOLUTE, Floats, Ints, Mechanism
+from zwidth.model.continuation import assemble_batch
+from zwidth.model.joint_space import joint_axes, joint_mass_matrix
+from zwidth.model.mechanism import FIXED, POSE, PRISMATIC, Floats, Mechanism
+from zwidth.model.mechanism_arrays import MechanismArrays, pack
+from zwidth.model.mobility import constraints
 
 CLOSED: Final = 1e-9  # gap of a closed loop, relative to the mechanism's size
 RANK_TOLERANCE: Final = 1e-7  # of singular values, relative to the largest
 RESTARTS: Final = 30  # random postures tried before a loop is said not to close
 NEARBY: Final = 0.05  # how far joints turn to a posture that is not special [rad]
-SLOW: Final = 1e-6  # part of the squared gap won by a step, below which it is as small as it gets
+INDEPENDENT: Final = 1e-6  # share of the largest motion, below which a joint follows from others
 PARALLEL: Final = 1e-9  # sine of the angle below which two axes are parallel
+MOVING: Final = 1e-6  # share of the largest part of a motion, below which a joint rests in it
 
 KeyMessages = Iterator[tuple[KeyPath, str]]
 
@@ -30,38 +32,69 @@ def mechanism_faults(mechanism: Mechanism, section: MechanismSection, *, assembl
 
     assembled  True: it is known to close and to move mass (`compiled_mechanism_check.assembles`)
     """
-    yield from _moments_left_open(mechanism, section)
+    mech = pack(mechanism)
+    yield from _moments_left_open(mechanism, mech, section)
     if assembled:
         return
-    angles, gaps = _close_loops(mechanism)
-    size = _size(mechanism)
-    open_loops = [k for k, gap in enumerate(gaps) if gap > CLOSED * size]
+    angles, gaps = _close_loops(mechanism, mech)
+    loops = members(section, "loops")
+    open_loops = [k for k, gap in enumerate(gaps) if gap > CLOSED * mech.size[0]]
     for k in open_loops:
-        index = [loop.name for loop in section.loops].index(mechanism.closures.names[k])
+        parts = "points stay" if loops[k].entry.closes == "point" else f"{loops[k].entry.closes}s stay"
         yield (
-            ("mechanism", "loops", index),
-            f"cannot close: its two points stay at least {gaps[k]:.3g} m apart; check lengths, origins and axes",
+            ("mechanism", *loops[k].path),
+            f"cannot close: its two {parts} at least {gaps[k]:.3g} m apart; check lengths, origins and axes",
         )
     if not open_loops:
-        yield from _freedom(mechanism, angles)
+        yield from _freedom(mechanism, mech, angles)
 
 
-def _freedom(mechanism: Mechanism, angles: Floats) -> KeyMessages:
-    """As many drives as degrees of freedom, and a mass behind every motion."""
-    turning = np.flatnonzero(mechanism.links.joint == REVOLUTE)
-    angles, motions = _least_free(mechanism, angles, turning)
-    freedom, drives = motions.shape[1], len(mechanism.drives.names)
-    if freedom != drives:
+def surplus_drives(mechanism: Mechanism) -> tuple[int, ...]:
+    """The drives beyond the freedom that loops leave a mechanism: of its drives in their order, those whose joints
+    the ones before them and the free joints determine. () where the loops do not close."""
+    mech = pack(mechanism)
+    if not mech.a.size or mech.driven < 2:
+        return ()
+    angles, gaps = _close_loops(mechanism, mech)
+    if gaps.max() > CLOSED * mech.size[0]:
+        return ()
+    _, _, motions = _least_free(mech, angles)
+    if motions.shape[1] >= mech.driven + mech.free:
+        return ()
+    scaled = motions / mech.unit[0][:, None]
+    first = mech.joint.size - mech.driven - mech.free
+    kept = [first + mech.driven + i for i in range(mech.free)]
+    surplus = []
+    for i in range(mech.driven):
+        values = np.linalg.svd(scaled[[*kept, first + i]], compute_uv=False)
+        if len(values) > len(kept) and values[-1] > INDEPENDENT * values[0]:
+            kept.append(first + i)
+        else:
+            surplus.append(i)
+    return tuple(surplus)
+
+
+def _freedom(mechanism: Mechanism, mech: MechanismArrays, angles: Floats) -> KeyMessages:
+    """A drive for each degree of freedom that is not declared free, and a mass behind every motion."""
+    angles, rows, motions = _least_free(mech, angles)
+    m, freedom, drives = mech.joint.size, motions.shape[1], mech.driven
+    if freedom != drives + mech.free:
+        free = f", and {mech.free} declared free" if mech.free else ""
+        held = _move_although_held(mechanism, mech, rows)
+        advice = "give each of them one drive"
+        if freedom > drives + mech.free and held:
+            advice += (
+                f", or declare free what nobody drives: with the drives held, {comma_list(held, 6)} can still move"
+            )
         yield (
             ("mechanism", "drives"),
-            f"are {drives}, but the mechanism has {freedom} degree{'s' * (freedom != 1)} of freedom "
-            f"({len(turning)} revolute joints less {len(turning) - freedom} held by loops); "
-            "give each of them one drive",
+            f"are {drives}{free}, but the mechanism has {plural(freedom, 'degree')} of freedom "
+            f"({plural(m, 'joint coordinate')} less {m - freedom} held by loops); {advice}",
         )
         return
-    full = np.zeros((len(mechanism.links.names), freedom))
-    full[turning] = motions
-    M = _mass_matrix(mechanism, angles, full)
+    if np.isnan(mech.mass).any() or np.isnan(mech.inertia).any():
+        return
+    M = motions.T @ joint_mass_matrix(mechanism, angles) @ motions
     eigenvalues = np.linalg.eigvalsh(M)
     if not eigenvalues[0] > freedom * np.finfo(float).eps * eigenvalues[-1]:
         yield (
@@ -71,154 +104,83 @@ def _freedom(mechanism: Mechanism, angles: Floats) -> KeyMessages:
         )
 
 
-def _least_free(mechanism: Mechanism, angles: Floats, turning: Ints) -> tuple[Floats, Floats]:
-    """Closed joint angles here or nearby, and the motions the loops leave there, (turning, f).
+def _move_although_held(mechanism: Mechanism, mech: MechanismArrays, rows: Floats) -> list[str]:
+    """The links whose joints can move while the drives and the free joints rest."""
+    passive = mech.joint.size - mech.driven - mech.free
+    motions = _null_space(rows[:passive].T)
+    if not motions.size:
+        return []
+    parts = np.abs(motions).max(axis=1)
+    moving = [mech.joint[u] for u in np.flatnonzero(parts > MOVING * parts.max())]
+    return list(dict.fromkeys(mechanism.links.names[i].partition("/")[0] for i in moving))
+
+
+def _least_free(mech: MechanismArrays, angles: Floats) -> tuple[Floats, Floats, Floats]:
+    """Closed joint coordinates here or nearby, the loops' derivative (m, 3k) there and the motions that it leaves,
+    (m, f), joints in the order of the unknowns.
 
     Where links happen to be in line the loops leave more than elsewhere: the fewest count.
     """
     random = np.random.default_rng(1)
-    nearby = angles + random.uniform(-NEARBY, NEARBY, (2, len(angles)))
-    postures = [angles, *(_least_gap(mechanism, start) for start in nearby)]
-    freedoms = [_null_space(_loops(mechanism, place)[1][:, turning]) for place in postures]
-    fewest = min(range(len(postures)), key=lambda i: freedoms[i].shape[1])
-    return postures[fewest], freedoms[fewest]
+    unit = np.where(mech.kind == PRISMATIC, mech.size[0], 1.0)
+    starts = angles + unit * random.uniform(-NEARBY, NEARBY, (2, len(angles)))
+    places = [angles, *_closed(mech, starts)[0]]
+    goal, loops = np.zeros(6 if mech.controls == POSE else 3), int(mech.first_row[-1])
+    each = [constraints(mech, 0, place, goal)[0][:, :loops] * mech.unit[0][:, None] for place in places]
+    freedoms = [_null_space(rows.T) for rows in each]
+    fewest = min(range(len(each)), key=lambda i: freedoms[i].shape[1])
+    return places[fewest], each[fewest], mech.unit[0][:, None] * freedoms[fewest]
 
 
-def _moments_left_open(mechanism: Mechanism, section: MechanismSection) -> KeyMessages:
+def _moments_left_open(mechanism: Mechanism, mech: MechanismArrays, section: MechanismSection) -> KeyMessages:
     """A single moment of inertia serves only a link that turns about no other direction."""
     links = mechanism.links
     order = {name: i for i, name in enumerate(links.names)}
-    _, rotation, axis = _place(mechanism, np.zeros(len(links.names)))
-    for index, given in enumerate(section.links):
-        i = order[given.name]
-        own = rotation[i] @ links.axis[i]
-        if len(given.inertia_kg_m2) != 1 or given.inertia_kg_m2[0][0] == 0:
+    axis = joint_axes(mechanism, np.zeros(len(links.names)))
+    reported = set()
+    for member in members(section, "links"):
+        given, i = member.entry, order[member.entry.name]
+        if (
+            given.inertia_kg_m2 is None
+            or len(given.inertia_kg_m2) != 1
+            or given.inertia_kg_m2[0][0] == 0
+            or member.path in reported
+        ):
             continue
         for j in _ancestors(mechanism, i):
-            if links.joint[j] == REVOLUTE and _across(axis[j], own) > PARALLEL:
+            if links.joint[j] not in (FIXED, PRISMATIC) and np.linalg.norm(np.cross(axis[j], axis[i])) > PARALLEL:
+                reported.add(member.path)
+                turner = links.names[j].partition("/")[0]
                 yield (
-                    ("mechanism", "links", index, "inertia_kg_m2"),
-                    f"is one number, the moment about the link's axis, but '{links.names[j]}' turns the link "
+                    ("mechanism", *member.path, "inertia_kg_m2"),
+                    f"is one number, the moment about the link's axis, but '{turner}' turns the link "
                     "about another; give three moments [Ixx, Iyy, Izz] or a 3 x 3 matrix",
                 )
                 break
 
 
-def _across(a: Floats, b: Floats) -> float:
-    """Sine of the angle between two unit vectors; numpy's cross is for many."""
-    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
-    return math.hypot(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
-
-
-def _close_loops(mechanism: Mechanism) -> tuple[Floats, Floats]:
-    """Joint angles that close the loops as well as may be, (n,), and the gap left in each loop, (k,)."""
+def _close_loops(mechanism: Mechanism, mech: MechanismArrays) -> tuple[Floats, Floats]:
+    """Joint coordinates that close the loops as well as may be, (n,), and the gap left in each loop, (k,) [m]."""
     n = len(mechanism.links.names)
     random = np.random.default_rng(0)
-    starts = [*mechanism.assemblies.values(), *random.uniform(-np.pi, np.pi, (RESTARTS, n))]
-    best, least = starts[0], np.inf
-    for start in starts:
-        angles = _least_gap(mechanism, start)
-        worst = float(np.max(_gaps(mechanism, angles), initial=0.0))
-        if worst < least:
-            best, least = angles, worst
-        if least <= 1e-3 * CLOSED * _size(mechanism):
+    scale = np.where(mech.kind == PRISMATIC, mech.size[0] / np.pi, np.where(mech.kind == FIXED, 0.0, 1.0))
+    starts = np.array(list(mechanism.assemblies.values()))
+    for batch in (starts, scale * random.uniform(-np.pi, np.pi, (RESTARTS, n))):
+        angles, gaps = _closed(mech, batch)
+        worst = gaps.max(axis=1, initial=0.0)
+        closed = np.flatnonzero(worst <= CLOSED * mech.size[0])
+        best = int(closed[0]) if len(closed) else int(np.argmin(worst))
+        if len(closed):  # the first assembly that closes: a later one may be singular throughout
             break
-    return best, _gaps(mechanism, best)
+    return angles[best], gaps[best]
 
 
-def _least_gap(mechanism: Mechanism, angles: Floats, most: int = 100) -> Floats:
-    """Levenberg-Marquardt on the loops' gaps, from one start."""
-    turning = mechanism.links.joint == REVOLUTE
-    angles, caution = angles.copy(), 1e-3
-    gap, J = _loops(mechanism, angles)
-    for _ in range(most if gap.any() else 0):
-        size = float(np.sum(J**2)) or 1.0
-        step = np.zeros_like(angles)
-        A = J[:, turning]
-        step[turning] = np.linalg.solve(A.T @ A + caution * size * np.eye(A.shape[1]), -A.T @ gap)
-        new_gap, new_J = _loops(mechanism, angles + step)
-        gain = 1 - new_gap @ new_gap / (gap @ gap)
-        if gain > 0:
-            angles, gap, J, caution = angles + step, new_gap, new_J, max(caution / 10, 1e-13)
-        else:
-            caution *= 10
-        if gap @ gap == 0 or caution > 1e6 or 0 < gain < SLOW:
-            break
-    return angles
-
-
-def _loops(mechanism: Mechanism, angles: Floats) -> tuple[Floats, Floats]:
-    """Gaps of all loops in the base frame, (3k,) [m], and their derivatives by the joint angles, (3k, n)."""
-    closures, n = mechanism.closures, len(mechanism.links.names)
-    placed = _place(mechanism, angles)
-    gaps, rows = [np.zeros(0)], [np.zeros((0, n))]
-    for a, b, in_a, in_b in zip(closures.a, closures.b, closures.point_a, closures.point_b, strict=True):
-        (point_a, J_a), (point_b, J_b) = (_point(mechanism, placed, i, p) for i, p in ((a, in_a), (b, in_b)))
-        gaps.append(point_a - point_b)
-        rows.append(J_a - J_b)
-    return np.concatenate(gaps), np.concatenate(rows)
-
-
-def _gaps(mechanism: Mechanism, angles: Floats) -> Floats:
-    gap, _ = _loops(mechanism, angles)
-    return np.asarray(np.linalg.norm(gap.reshape(-1, 3), axis=1))
-
-
-def _place(mechanism: Mechanism, angles: Floats) -> tuple[Floats, Floats, Floats]:
-    """Joint origins (n, 3), link axes (n, 3, 3) and joint axes (n, 3) in the base frame."""
-    links, n = mechanism.links, len(mechanism.links.names)
-    origin, rotation, axis = np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 3))
-    for i, parent in enumerate(links.parent):
-        R, o = (np.eye(3), np.zeros(3)) if parent < 0 else (rotation[parent], origin[parent])
-        origin[i] = o + R @ links.origin[i]
-        rotation[i] = R @ links.rotation[i] @ _turn(links.axis[i], angles[i] * (links.joint[i] == REVOLUTE))
-        axis[i] = rotation[i] @ links.axis[i]
-    return origin, rotation, axis
-
-
-def _turn(axis: Floats, angle: float) -> Floats:
-    """Rotation by an angle about a unit axis (Rodrigues), (3, 3)."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross))
-
-
-def _point(
-    mechanism: Mechanism, placed: tuple[Floats, Floats, Floats], link: int, local: Floats
-) -> tuple[Floats, Floats]:
-    """A link's point in the base frame, (3,) [m], and its derivative by the joint angles, (3, n)."""
-    origin, rotation, axis = placed
-    J = np.zeros((3, len(origin)))
-    if link < 0:
-        return local, J
-    point = origin[link] + rotation[link] @ local
-    for j in _ancestors(mechanism, link):
-        if mechanism.links.joint[j] == REVOLUTE:
-            (ax, ay, az), (x, y, z) = axis[j], point - origin[j]
-            J[:, j] = ay * z - az * y, az * x - ax * z, ax * y - ay * x  # numpy's cross is for many
-    return point, J
-
-
-def _mass_matrix(mechanism: Mechanism, angles: Floats, motions: Floats) -> Floats:
-    """Mass matrix of the links (and the rotors of rigid drives) in a basis of motions (n, f) -> (f, f)."""
-    links, drives = mechanism.links, mechanism.drives
-    placed = _place(mechanism, angles)
-    _, rotation, axis = placed
-    M = np.zeros((motions.shape[1], motions.shape[1]))
-    for i in range(len(links.names)):
-        _, J = _point(mechanism, placed, i, links.center_of_mass[i])
-        spin = np.zeros_like(J)
-        for j in _ancestors(mechanism, i):
-            if links.joint[j] == REVOLUTE:
-                spin[:, j] = axis[j]
-        J, spin = J @ motions, rotation[i].T @ spin @ motions
-        M += links.mass[i] * J.T @ J + spin.T @ links.inertia[i] @ spin
-    for joint, inertia, ratio, stiffness in zip(
-        drives.joint, drives.motor_inertia, drives.transmission, drives.stiffness, strict=True
-    ):
-        if np.isinf(stiffness):
-            M += inertia * ratio**2 * np.outer(motions[joint], motions[joint])
-    return M
+def _closed(mech: MechanismArrays, starts: Floats) -> tuple[Floats, Floats]:
+    """Joint coordinates (N, n) closed from starts, and the gaps left (N, k) [m]."""
+    angles = np.array(starts, order="C")
+    gaps = np.zeros((len(angles), mech.a.size))
+    assemble_batch(mech, np.zeros(len(angles), dtype=np.int64), angles, gaps)
+    return angles, gaps
 
 
 def _ancestors(mechanism: Mechanism, link: int) -> Iterator[int]:
@@ -235,14 +197,3 @@ def _null_space(A: Floats) -> Floats:
     _, values, rows = np.linalg.svd(A)
     rank = int(np.sum(values > RANK_TOLERANCE * max(values[0], np.finfo(float).tiny)))
     return np.asarray(rows[rank:].T)
-
-
-def _size(mechanism: Mechanism) -> float:
-    """A length to judge gaps by: the largest offset of anything from the joint that carries it [m]."""
-    lengths = [
-        mechanism.links.origin,
-        mechanism.links.tip,
-        mechanism.closures.point_a,
-        mechanism.closures.point_b,
-    ]
-    return max((float(np.abs(length).max(initial=0.0)) for length in lengths), default=0.0) or 1.0

@@ -13,6 +13,9 @@ KINDS: Final = {
     "paddle": "one-link.toml",
     "serial-2r": "two-links.toml",
     "five-bar": "two-arms.toml",
+    "delta": "three-legs.toml",
+    "stewart": "six-legs.toml",
+    "wrist": "three-axes.toml",
     "plant": "masses.toml",
 }
 PLACEHOLDER: Final = '"NAME"'
@@ -24,7 +27,8 @@ def new_device(name: str, kind: str) -> str:
 
     name    the device's name
     kind    "paddle", one link on a drive; "serial-2r", a planar arm of two links; "five-bar", a planar linkage of
-            two arms; "plant", masses along the rendered direction
+            two arms; "delta", a platform on three legs; "stewart", a platform on six sliding legs; "wrist", three
+            axes that meet; "plant", masses along the rendered direction
     Raises  ValueError  for another kind, and for a name that is not one line of text
 
     >>> new_device("My paddle", "paddle").splitlines()[2].split("#")[0].strip()

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from zwidth.device.faults import Fault, KeyPath, dotted
-from zwidth.device.toml_access import table, tables
+from zwidth.device.legs import written
+from zwidth.device.toml_access import table
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
@@ -107,11 +108,11 @@ def _lengths(mechanism: dict[str, Any]) -> KeyMessages:
 
 
 def _length_keys(mechanism: dict[str, Any]) -> Iterator[tuple[KeyPath, Any]]:
-    for n, link in tables(mechanism, "links"):
+    for path, link in written(mechanism, "links"):
         for key in ("length_m", "origin_m", "center_of_mass_m"):
-            yield ("links", n, key), link.get(key)
-    for n, loop in tables(mechanism, "loops"):
-        yield ("loops", n, "points_m"), loop.get("points_m")
+            yield (*path, key), link.get(key)
+    for path, loop in written(mechanism, "loops"):
+        yield (*path, "points_m"), loop.get("points_m")
     yield ("handle", "point_m"), table(mechanism, "handle").get("point_m")
     yield ("reference", "position_m"), table(mechanism, "reference").get("position_m")
     for key, value in table(mechanism, "workspace").items():
@@ -125,23 +126,27 @@ def _flat(value: Any) -> list[float]:
 def _size(mechanism: dict[str, Any]) -> float:
     """How large the device is: the longest of its lengths, and how far its handle is from the origin [m]."""
     given = [(path, _flat(value)) for path, value in _length_keys(mechanism) if path[0] != "workspace"]
-    sizes = [math.hypot(*numbers) if path[0] != "loops" else max(numbers) for path, numbers in given if numbers]
+    sizes = [
+        math.hypot(*numbers) if path[-1] != "points_m" or path[0] == "handle" else max(numbers)
+        for path, numbers in given
+        if numbers
+    ]
     return max(sizes, default=0.0)
 
 
 def _angles(mechanism: dict[str, Any]) -> KeyMessages:
     angles: list[tuple[KeyPath, Any]] = [
-        (("mechanism", "links", n, "orientation_rad"), link.get("orientation_rad"))
-        for n, link in tables(mechanism, "links")
+        (("mechanism", *path, "orientation_rad"), link.get("orientation_rad"))
+        for path, link in written(mechanism, "links")
     ]
     for name, assembly in table(mechanism, "assemblies").items():
-        path = ("mechanism", "assemblies", name, "joints_rad")
-        angles += [((*path, joint), angle) for joint, angle in assembly["joints_rad"].items()]
-    for place, value in angles:
+        place: KeyPath = ("mechanism", "assemblies", name, "joints_rad")
+        angles += [((*place, joint), angle) for joint, angle in assembly.get("joints_rad", {}).items()]
+    for key, value in angles:
         largest = max(_flat(value), key=abs, default=0.0)
         if abs(largest) > FULL_TURN:
             yield (
-                place,
+                key,
                 f"{largest:g} rad looks wrong, more than a full turn; if it is in degrees, write "
                 f"{math.radians(largest):.4g}",
             )
@@ -149,25 +154,26 @@ def _angles(mechanism: dict[str, Any]) -> KeyMessages:
 
 def _links(mechanism: dict[str, Any], size: float) -> KeyMessages:
     """A mass too large for the device or for its own inertia, an inertia too large for the device."""
-    for n, link in tables(mechanism, "links"):
-        mass, inertia = float(link["mass_kg"]), _largest_moment(link["inertia_kg_m2"])
+    wrist = table(mechanism, "handle").get("controls") == "orientation"  # which may give no lengths at all
+    for path, link in written(mechanism, "links"):
+        mass, inertia = float(link.get("mass_kg", 0.0)), _largest_moment(link.get("inertia_kg_m2", 0.0))
         gyration = math.sqrt(inertia / mass) if mass > 0.0 else 0.0
         dense = mass > HEAVY and _least_density(mass, gyration) > DENSEST
         if dense:
             yield (
-                ("mechanism", "links", n, "mass_kg"),
+                ("mechanism", *path, "mass_kg"),
                 f"{mass:g} kg looks wrong beside a moment of inertia of {inertia:g} kg m^2, a radius of gyration "
                 f"of {_length(gyration)}: no metal is so dense; {_thousandth(mass, 'g')}",
             )
         too_heavy = mass > max(MASSIVE, SOLID * size**3)
         if too_heavy and not dense:
             yield (
-                ("mechanism", "links", n, "mass_kg"),
+                ("mechanism", *path, "mass_kg"),
                 f"{mass:g} kg looks wrong for a link of a device of {_length(size)}; {_thousandth(mass, 'g')}",
             )
-        if size > 0.0 and gyration > GYRATION * size:
+        if size > 0.0 and gyration > GYRATION * size and not wrist:
             yield (
-                ("mechanism", "links", n, "inertia_kg_m2"),
+                ("mechanism", *path, "inertia_kg_m2"),
                 f"{inertia:g} kg m^2 looks wrong for {mass:g} kg, a radius of gyration of {_length(gyration)} on "
                 f"a device of {_length(size)}; {_inertia_units(inertia, mass / 1e3 if too_heavy else mass, size)}",
             )
@@ -196,9 +202,9 @@ def _inertia_units(inertia: float, mass: float, size: float) -> str:
 
 
 def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
-    for n, drive in tables(mechanism, "drives"):
-        path = ("mechanism", "drives", n)
-        ratio, rotor = float(drive["transmission_ratio"]), float(drive["motor_inertia_kg_m2"])
+    for below, drive in written(mechanism, "drives"):
+        path = ("mechanism", *below)
+        ratio, rotor = float(drive.get("transmission_ratio", 1.0)), float(drive.get("motor_inertia_kg_m2", 0.0))
         if rotor > HEAVIEST_ROTOR:
             yield (
                 (*path, "motor_inertia_kg_m2"),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import nan, pi
+from math import inf, nan, pi
 from numbers import Real
 from typing import Any, Final
 
 import numpy as np
 
+from zwidth.device.build import roll_pitch_yaw
 from zwidth.device.faults import fail, quote
 from zwidth.model.mechanism import Floats, Mechanism
 
@@ -55,6 +56,51 @@ def unit_vectors(label: str, name: str, value: Any) -> Floats:
     # what is a unit vector already stays as it is, to the last digit
     units = scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
     return np.where(np.abs(length - 1.0) <= UNIT, given, units)
+
+
+def screws(label: str, direction: Any, axis: Any, length: Any) -> Floats:
+    """Screws (..., 6) of a motion about an axis, and along a direction at once: [u, L w]/sqrt(|u|^2 + |w|^2).
+
+    direction  (..., 2) or (..., 3) u; None: a turn alone, [0, w/|w|]
+    axis       (..., 3) w;   length  L by which angles count as ways [m]; None without a direction
+    Raises     DeviceError  for vectors without length, and a length that is missing, beside nothing or not
+               positive
+    """
+    w = vectors(label, "axis", axis)
+    w = w if w.shape[-1] == 3 else _completed(w, 0.0)
+    if direction is None:
+        if length is not None:
+            raise fail(label, "characteristic_length", "is of a direction and an axis together; leave it out")
+        return np.concatenate([np.zeros_like(w), unit_vectors(label, "axis", w)], axis=-1)
+    u = vectors(label, "direction", direction)
+    u = u if u.shape[-1] == 3 else _completed(u, 0.0)
+    unit_vectors(label, "axis", w), unit_vectors(label, "direction", u)  # which refuse vectors without length
+    L = float(length) if isinstance(length, Real) else nan
+    if not 0.0 < L < inf:
+        raise fail(label, "characteristic_length", f"must be a positive length in metres, got {quote(length)}")
+    both = np.concatenate(np.broadcast_arrays(u, w), axis=-1)
+    return np.asarray(both / np.linalg.norm(both, axis=-1, keepdims=True) * np.repeat([1.0, L], 3))
+
+
+def rotations(label: str, orientation: Any) -> Floats:
+    """Rotation matrices (..., 3, 3) of roll, pitch, yaw (..., 3) [rad], or such matrices themselves.
+
+    Raises  DeviceError  for anything else
+    """
+    try:
+        given = np.asarray(orientation, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise fail(label, "orientation", f"must be roll, pitch, yaw in rad, got {quote(orientation)}") from None
+    if given.shape[-2:] == (3, 3):
+        if np.allclose(given @ np.swapaxes(given, -1, -2), np.eye(3), atol=1e-9):
+            return given
+        raise fail(label, "orientation", "must be rotation matrices, and some rows are not at right angles")
+    if given.ndim == 0 or given.shape[-1] != 3 or not np.isfinite(given).all():
+        raise fail(label, "orientation", f"must be roll, pitch, yaw in rad, got {quote(orientation)}")
+    if np.abs(given).max() > 2.0 * pi:
+        message = f"must be angles from -2 pi to 2 pi rad, got {quote(given.tolist())}; are they in degrees?"
+        raise fail(label, "orientation", message)
+    return roll_pitch_yaw(given)
 
 
 def joint_angles(label: str, mechanism: Mechanism, at: Mapping[str, float]) -> dict[str, float]:

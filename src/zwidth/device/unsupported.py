@@ -8,29 +8,15 @@ from typing import Any, Final
 from zwidth.device.faults import KeyPath
 from zwidth.device.toml_access import deep_copy
 
+COMPOSED: Final = frozenset({"cylindrical", "planar", "screw", "helical"})
 VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str, frozenset[str] | None]]] = {
     ("loop", "velocity", "method"): (
         frozenset({"measured"}),
         "backward-difference",
         frozenset({"filter"}),
     ),
-    ("mechanism", "links", "*", "joint"): (
-        frozenset(
-            {
-                "prismatic",
-                "spherical",
-                "universal",
-                "cylindrical",
-                "planar",
-                "screw",
-                "helical",
-                "free",
-                "ball",
-            }
-        ),
-        "revolute",
-        None,
-    ),
+    ("mechanism", "links", "*", "joint"): (COMPOSED, "revolute", None),
+    ("mechanism", "legs", "*", "links", "*", "joint"): (COMPOSED, "revolute", None),
 }
 """Key -> the values to refuse so, the supported one that stands for them while the rest is checked, and the keys
 beside it that are checked with it (None: all); what is left out are parameters of the refused value."""

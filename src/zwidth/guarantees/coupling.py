@@ -116,10 +116,10 @@ def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None)
     )
 
 
-def without_handle() -> Couplings:
-    """The result for a plant without a handle: no couplings, and the reason."""
-    none = empty_region(NO_HANDLE)
-    return Couplings(none, none, none, None, NO_HANDLE)
+def no_couplings(reason: str = NO_HANDLE) -> Couplings:
+    """The result where no coupling is known, and the reason."""
+    none = empty_region(reason)
+    return Couplings(none, none, none, None, reason)
 
 
 def coupling_angles(loop: Loop, held: Floats) -> Floats:

@@ -26,6 +26,7 @@ from scipy.special import gamma, roots_genlaguerre, zeta
 
 from zwidth.guarantees.port import Floats, Port, port_response
 from zwidth.loop.factor_response import factor_response
+from zwidth.loop.feedback_response import feedforward_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
 
@@ -114,9 +115,35 @@ class Aliases:
             r = np.abs(swing)[:, others].sum(axis=1) + _interpolated(self.radius, at).real
             centre, radius = common * (p - q + c), np.abs(common) * (np.abs(q) + r)
             power = np.abs(common) ** 2 * _power(p, q, c, r)
+            if self.loop.has_fixed_feedback:
+                centre, radius, power = _closed(self.loop, theta, centre, radius, power)
         unbounded = ~np.isfinite(radius)
         centre, radius = np.where(unbounded, 0.0, centre), np.where(unbounded, np.inf, radius)
         return Disks(theta, centre, radius, np.where(unbounded, -np.inf, power))
+
+
+def _closed(
+    loop: Loop, theta: Floats, centre: Complexes, radius: Floats, power: Floats
+) -> tuple[Complexes, Floats, Floats]:
+    """The disks (k,) of P/(1 - q P) for the P of disks |P - c| <= r, q the feedforward's response:
+
+        c' = (c - X conj q)/a,   r' = r/a,   X' = X/a,        a = 1 - 2 Re(c q) + X |q|^2,   X = |c|^2 - r^2
+
+    Radius inf where some passive operator makes a part of q vibrate, so that no wall is stable with all of them.
+    """
+    ahead = loop.controller.feedforward
+    if ahead is None or len(loop.controller.fixed_feedback) > 1:
+        raise ValueError("the sampled response fills a disk with feedforward alone; leave out the other feedback")
+    d = np.exp(1j * theta) * one_less_z_inverse(theta)
+    q = feedforward_response(ahead, loop.period, 1.0 + d, d)
+    along, square = -np.real(centre * q), power * np.abs(q) ** 2
+    # 1/mu is the part of q at which it fails first, as for walls (`gauge`)
+    root = np.sqrt(np.maximum(along**2 - square, 0.0))
+    mu = np.where(along > 0.0, -square / np.maximum(along + root, 1e-300), root - along)
+    fails = (np.abs(q) ** 2 * radius**2 >= np.imag(centre * q) ** 2) & ~(mu < 1.0)
+    scale = 1.0 + 2.0 * along + square
+    closed = (centre - power * q.conj()) / scale, radius / scale, power / scale
+    return np.where(fails, 0.0, closed[0]), np.where(fails, np.inf, closed[1]), np.where(fails, -np.inf, closed[2])
 
 
 def _power(p: Complexes, q: Complexes, c: Complexes, r: Floats) -> Floats:

@@ -11,11 +11,12 @@ import numpy as np
 
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.guarantees.coupling import Couplings, couplings, without_handle
+from zwidth.guarantees.coupling import Couplings, couplings, no_couplings
 from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import Floats
 from zwidth.guarantees.region import Region, empty_region, outline_columns, stiffest_corner, stiffness_text
 from zwidth.guarantees.spring_stable import nyquist_region, spring_stable_region
+from zwidth.loop.fixed_feedback import acts, describe_feedback
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_number, require, wrong_type
@@ -136,9 +137,7 @@ def find_guarantees(
         Guarantee(
             "spring-stable",
             "stable whatever spring holds the handle, from none to one that holds it fixed",
-            _region_or_undecided(partial(spring_stable_region, progress=progress), loop)
-            if has_handle
-            else empty_region(NO_HANDLE),
+            _of_springs(partial(spring_stable_region, progress=progress), loop),
             SPRINGS,
         )
     )
@@ -146,7 +145,7 @@ def find_guarantees(
         Guarantee(
             "nyquist-spring",
             "stable with the one spring that puts a mode at the Nyquist frequency",
-            _region_or_undecided(nyquist_region, loop) if has_handle else empty_region(NO_HANDLE),
+            _of_springs(nyquist_region, loop),
             SPRINGS,
         )
     )
@@ -183,7 +182,10 @@ def guarantees_of(
     if not coupling and wall is None:
         return guarantees
     handle = loop.plant.handle
-    return replace(guarantees, couplings=without_handle() if handle is None else couplings(loop, handle, wall))
+    if loop.has_fixed_feedback:
+        reason = f"no coupling is known with {', '.join(loop.controller.feedback_names)}"
+        return replace(guarantees, couplings=no_couplings(reason))
+    return replace(guarantees, couplings=no_couplings() if handle is None else couplings(loop, handle, wall))
 
 
 def _check_wall(wall: object) -> None:
@@ -193,8 +195,14 @@ def _check_wall(wall: object) -> None:
     check_number("the wall's damping", wall[1], "N s/m")
 
 
-def _region_or_undecided(find_region: Callable[[Loop], Region], loop: Loop) -> Region:
-    """A region made of charts; empty, and undecided, where one of them cannot be closed."""
+def _of_springs(find_region: Callable[[Loop], Region], loop: Loop) -> Region:
+    """A region made of charts with springs at the handle; empty where there is no handle or a force sensor reads
+    these springs, and, as undecided, where one of the charts cannot be closed."""
+    if loop.plant.handle is None:
+        return empty_region(NO_HANDLE)
+    sensor = loop.controller.force_sensor
+    if sensor is not None and acts(sensor):
+        return empty_region(f"this is not known with {describe_feedback(sensor)}")
     try:
         return find_region(loop)
     except ChartError as error:

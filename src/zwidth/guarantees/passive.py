@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from zwidth.guarantees.gauge import Gauge, gauge
 from zwidth.guarantees.port import Floats
 from zwidth.guarantees.region import Region, empty_region
+from zwidth.loop.fixed_feedback import Feedforward, describe_feedback
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
 
@@ -35,6 +36,7 @@ LEVEL = 1e-12
 # A stiffness below this share of the largest counts as 0.
 SHORT = 1e-9
 NOTHING = "no wall at all is stable with every passive operator"
+ACTIVE = "some passive operator vibrates with the feedforward even without a wall"
 NO_SPRING = "no wall with K > 0 and B >= 0 is stable with every passive operator"
 
 
@@ -56,7 +58,12 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     held = loop.plant.handle if held is None else held
     if held is None:
         raise ValueError("the plant has no handle; give `held`, the coordinate at which the operator holds it")
+    obstacle = feedback_obstacle(loop)
+    if obstacle:
+        return empty_region(obstacle)
     loop_gauge = gauge(loop, held)
+    if loop_gauge.conics is None and loop.has_fixed_feedback:
+        return empty_region(ACTIVE)
     directions, ends = _outline(loop_gauge, loop.period)
     if not np.any(ends):
         return empty_region(NOTHING)
@@ -70,6 +77,16 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     best = int(np.argmax(np.where(usable, K, -np.inf)))
     low, high = max(directions[best - 1], 0.0), min(directions[best + 1], np.pi / 2.0)
     return Region((ring,), *_stiffest(loop_gauge, loop.period, low, high))
+
+
+def feedback_obstacle(loop: Loop) -> str:
+    """Why nothing is known of all passive operators with a computer's feedback; "" where it is known.
+
+    What a force sensor reads depends on the operator itself, and a local loop samples at another rate: then the
+    response of all operators together fills no disk.
+    """
+    unlike = [part for part in loop.controller.fixed_feedback if not isinstance(part, Feedforward)]
+    return f"this is not known with {describe_feedback(unlike[0])}" if unlike else ""
 
 
 def _walls(directions: Floats, reach: Floats, period: float) -> tuple[Floats, Floats]:

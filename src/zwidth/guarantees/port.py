@@ -205,4 +205,5 @@ def _within(plant: Plant, V: Floats, handle: Floats | None) -> Plant:
         handle=None if handle is None else V.T @ handle,
         names=(),
         lagged_dampers=tuple(replace(d, along=V.T @ d.along) for d in plant.lagged_dampers),
+        hand_force=None if plant.hand_force is None else plant.hand_force @ V,
     )

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from math import floor, inf
-from typing import Final, Literal, get_args
+from dataclasses import dataclass, field, replace
+from math import floor, inf, isnan
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.estimators import BackwardDifference, VelocityMethod
-from zwidth.model.argument_checks import check_choice, check_number, describe_value, wrong_type
+from zwidth.loop.fixed_feedback import (
+    Feedforward,
+    FixedFeedback,
+    ForceSensor,
+    LocalLoop,
+    acts,
+    describe_feedback,
+    low_passes,
+)
+from zwidth.loop.low_pass import Butterworth as Butterworth
+from zwidth.loop.low_pass import FirstOrder as FirstOrder
+from zwidth.loop.low_pass import LowPass, check_cutoff
+from zwidth.model.argument_checks import check_number, wrong_type
 from zwidth.model.design_axes import Number
-
-Discretisation = Literal["tustin", "tustin-prewarped"]
-
 
 ROUNDING: Final = 1e-12  # samples by which a delay may fall short of a whole number by rounding
 
@@ -24,60 +33,46 @@ def whole_samples(delay: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.floor(delay + ROUNDING).astype(np.int64)
 
 
-@dataclass(frozen=True)
-class FirstOrder:
-    """First-order low pass by backward Euler: y_j = a y_{j-1} + (1 - a) x_j, a = tau / (tau + T)."""
-
-    time_constant: Number  # tau [s]
-
-    def __post_init__(self) -> None:
-        check_number("time_constant", self.time_constant, "s", least=0.0)
-
-
-@dataclass(frozen=True)
-class Butterworth:
-    """Butterworth low pass of any order by the bilinear (Tustin) rule, plain or prewarped at the cutoff."""
-
-    order: int
-    cutoff_Hz: Number
-    discretisation: Discretisation = "tustin"
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.order, int | np.integer) or self.order < 1:
-            raise ValueError(f"order must be a whole number from 1 on, got {describe_value(self.order)}")
-        check_number("cutoff_Hz", self.cutoff_Hz, "Hz", above=0.0)
-        check_choice("discretisation", self.discretisation, get_args(Discretisation))
+def split_delay(delay: float) -> tuple[int, float]:
+    """Whole samples of a delay, and the part that remains, 0 <= f < 1 [samples]."""
+    whole = floor(delay + ROUNDING)
+    return whole, max(delay - whole, 0.0)
 
 
 @dataclass(frozen=True)
 class Controller:
     """The sampled wall law: f = -F (K y + B v), v estimated from samples of y.
 
-    sampling_period         T [s]
+    sampling_period         T [s]; nan: not known, of which no loop is made
     delay                   from reading to force, in samples, any real >= 0
     velocity_filter         acts on the velocity only; None: none
     velocity                how the velocity is estimated
-    force_filter            F, acts on the whole force; None: none
+    force_filter            F, acts on the whole force, that of force sensor and feedforward included; None: none
     actuator_time_constant  tau of the actuator, tau a' + a = held force [s]; 0: none
     force_limit             largest force that is commanded [N]; charts leave it out
+    force_sensor, feedforward, local_loop   fixed feedback beside the wall law (`fixed_feedback`); None: none
 
     Numbers may be arrays over designs: such controllers have no delays of their own, and are sampled together
     (`loop_table`).
-    Raises  TypeError   for a velocity estimate or a filter of another type
+    Raises  TypeError   for a velocity estimate, a filter or a feedback of another type
             ValueError  for a number out of range, or a prewarped cutoff at or above half the sampling frequency
     """
 
     sampling_period: Number
     delay: Number = 0.0
-    velocity_filter: FirstOrder | Butterworth | None = None
+    velocity_filter: LowPass | None = None
     velocity: VelocityMethod = field(default_factory=BackwardDifference)
-    force_filter: FirstOrder | Butterworth | None = None
+    force_filter: LowPass | None = None
     actuator_time_constant: Number = 0.0
     force_limit: Number = inf
+    force_sensor: ForceSensor | None = None
+    feedforward: Feedforward | None = None
+    local_loop: LocalLoop | None = None
 
     def __post_init__(self) -> None:
         T = self.sampling_period
-        check_number("sampling_period", T, "s", above=0.0, hint="is it a frequency?")
+        if not (isinstance(T, float) and isnan(T)):
+            check_number("sampling_period", T, "s", above=0.0, hint="is it a frequency?")
         check_number("delay", self.delay, "samples", least=0.0)
         check_number("actuator_time_constant", self.actuator_time_constant, "s", least=0.0)
         check_number("force_limit", self.force_limit, "N", above=0.0, infinite=True)
@@ -85,22 +80,54 @@ class Controller:
             raise wrong_type("velocity", "an estimate such as WindowedDifference(4)", self.velocity)
         for name in ("velocity_filter", "force_filter"):
             low_pass = getattr(self, name)
-            if not isinstance(low_pass, FirstOrder | Butterworth | None):
+            if not isinstance(low_pass, LowPass | None):
                 raise wrong_type(name, "a FirstOrder, a Butterworth or None", low_pass)
-            if not isinstance(low_pass, Butterworth) or low_pass.discretisation == "tustin":
-                continue
-            if np.any(low_pass.cutoff_Hz >= 0.5 / T):  # tan(pi cutoff T) is infinite or negative there
-                raise ValueError(
-                    f"{name}: cutoff_Hz must be below half the sampling frequency, {0.5 / np.max(T):.10g} Hz, got "
-                    f"{np.max(low_pass.cutoff_Hz):.10g}"
-                )
+            check_cutoff(name, low_pass, T)
+        self._check_feedback()
+
+    def _check_feedback(self) -> None:
+        parts: dict[str, tuple[FixedFeedback | None, type[FixedFeedback]]] = {
+            "force_sensor": (self.force_sensor, ForceSensor),
+            "feedforward": (self.feedforward, Feedforward),
+            "local_loop": (self.local_loop, LocalLoop),
+        }
+        for part, (feedback, kind) in parts.items():
+            if not isinstance(feedback, kind | None):
+                raise wrong_type(part, f"a {kind.__name__} or None", feedback)
+            times = feedback.rate_multiple if isinstance(feedback, LocalLoop) else 1
+            for name, low_pass in low_passes(feedback):
+                check_cutoff(f"{part}.{name}", low_pass, self.sampling_period / times)
 
     @property
     def whole_delay(self) -> int:
         """Whole samples l of the delay."""
-        return floor(self.delay + ROUNDING)
+        return split_delay(self.delay)[0]
 
     @property
     def fractional_delay(self) -> float:
         """Remaining part f of the delay, 0 <= f < 1 [samples]."""
-        return max(self.delay - self.whole_delay, 0.0)
+        return split_delay(self.delay)[1]
+
+    @property
+    def fixed_feedback(self) -> tuple[FixedFeedback, ...]:
+        """The feedback beside the wall law that changes the linear loop; () for none."""
+        every = (self.force_sensor, self.feedforward, self.local_loop)
+        return tuple(feedback for feedback in every if feedback is not None and acts(feedback))
+
+    @property
+    def feeds_friction(self) -> bool:
+        """Whether dry friction is fed forward, which is not linear."""
+        return self.feedforward is not None and bool(np.any(self.feedforward.coulomb))
+
+    @property
+    def feedback_names(self) -> tuple[str, ...]:
+        """What is added to the wall law, in words: "force feedback (gain 0.5)"; () for nothing."""
+        every = (self.force_sensor, self.feedforward, self.local_loop)
+        return tuple(describe_feedback(feedback) for feedback in every if feedback is not None)
+
+    @property
+    def wall_alone(self) -> Controller:
+        """The computer with nothing beside the wall law."""
+        if self.force_sensor is None and self.feedforward is None and self.local_loop is None:
+            return self
+        return replace(self, force_sensor=None, feedforward=None, local_loop=None)

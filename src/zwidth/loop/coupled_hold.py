@@ -48,8 +48,8 @@ def sample_form(form: FirstOrderForm, period: float, fraction: float = 0.0, lag:
         (d + s) y = output Q + output (d - E)^-1 [ s_in P + (s + E) Q ]
     """
     T, rest = period, (1.0 - fraction) * period
-    E, P, Q = _step(form, T, lag)
-    Q_new = _step(form, rest, lag)[2] if fraction > 0.0 else Q
+    E, P, Q = step_growth(form, T, lag)
+    Q_new = step_growth(form, rest, lag)[2] if fraction > 0.0 else Q
     s, s_new = lag_share(T, lag), lag_share(rest, lag)
     if lag > 0.0:
         new = s_new * P + s * Q_new + E @ Q_new
@@ -151,7 +151,7 @@ def _without_subspace(G: Floats, right: Floats, left: Floats) -> Floats:
     return G - np.where(np.abs(part) > rounding, part, 0.0)
 
 
-def _step(form: FirstOrderForm, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
+def step_growth(form: FirstOrderForm, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
     """exp(A t) - 1 without cancellation, and the states from a unit lagged force and from a unit command."""
     from scipy.linalg import expm
 

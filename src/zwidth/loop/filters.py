@@ -28,6 +28,9 @@ class Filter:
     denominator: Floats
 
 
+NO_FILTER = Filter(np.zeros((0, 3)), np.zeros((0, 3)))
+
+
 def first_order_factors(low_pass: FirstOrder, period: float) -> tuple[Rows, Rows]:
     """Backward Euler of 1/(tau s + 1):  (1 - a) z / (z - a),  a = tau / (tau + T)."""
     share = period / (low_pass.time_constant + period)
@@ -67,6 +70,22 @@ def low_pass_factors(low_pass: FirstOrder | Butterworth | None, period: float) -
             return butterworth_factors(low_pass, period)
         case None:
             return [], []
+
+
+def factor_roots(rows: Rows) -> list[complex]:
+    """Roots in d of factors c2 d^2 + c1 d + c0 of one design, both real ones without cancellation."""
+    roots = list[complex]()
+    for c2, c1, c0 in rows:
+        if c2 == 0.0:
+            roots += [-c0 / c1] if c1 != 0.0 else []
+            continue
+        mean, gap = -0.5 * c1 / c2, (0.5 * c1 / c2) ** 2 - c0 / c2
+        if gap < 0.0:
+            roots += [complex(mean, side * (-gap) ** 0.5) for side in (1.0, -1.0)]
+        else:
+            large = mean - gap**0.5 if mean <= 0.0 else mean + gap**0.5
+            roots += [large, c0 / (c2 * large) if large != 0.0 else 0.0]
+    return roots
 
 
 def _factor_array(rows: Rows) -> Floats:

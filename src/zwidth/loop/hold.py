@@ -144,8 +144,8 @@ def lagged_row(
         n1, n0, o1, o0 = row[3], row[4], row[6], row[7]
         return d1, d0, n1, n1 + n0, n0, o1, o1 + o0, o0
     g, dg = step_response(decay, squared, period)
-    p, whole = _lagged_responses(decay, squared, period, lag)
-    _, new = _lagged_responses(decay, squared, (1.0 - fraction) * period, lag)
+    p, whole = lagged_responses(decay, squared, period, lag)
+    _, new = lagged_responses(decay, squared, (1.0 - fraction) * period, lag)
     late, late_new = -expm1(-period / lag), -expm1(-(1.0 - fraction) * period / lag)
     n2, n1, n0 = _lagged_numerator(decay, squared, (g, dg), p, new, late, late_new, position, velocity)
     a2, a1, a0 = _lagged_numerator(decay, squared, (g, dg), p, whole, late, late, position, velocity)
@@ -178,7 +178,7 @@ def _lagged_numerator(
 
 
 @compiled_lean
-def _lagged_responses(decay: float, squared: float, time: float, lag: float) -> tuple[Pair, Pair]:
+def lagged_responses(decay: float, squared: float, time: float, lag: float) -> tuple[Pair, Pair]:
     """Position and velocity of a mode after `time`: from a unit lagged force without command, and from rest under
     a unit command through the lag.
 
@@ -239,3 +239,27 @@ def _fill_row(decay: float, squared: float, period: float, fraction: float, lag:
         values = held_row(decay, squared, 1.0, 0.0, period, fraction)
     for k in range(8):
         row[k] = values[k]
+
+
+def mode_growth(
+    decay: float, squared: float, rate: float, time: float, lag: float
+) -> tuple[Floats, Floats, Floats]:
+    """A mode on its states [xi, xi'/rate] over a time: growth exp(A t) - 1 (2, 2), and the states (2,) that a unit
+    lagged force without command leaves, and a unit command from rest."""
+    out = np.empty(6)
+    _fill_growth(decay, squared, time, lag, out)
+    g, dg = out[:2]
+    back = 2.0 * decay * dg + squared * g
+    scale = np.array([1.0, 1.0 / rate])
+    growth = np.array([[-squared * g, rate * dg], [-squared * dg / rate, -back]])
+    return growth, scale * out[2:4], scale * out[4:6]
+
+
+@compiled
+def _fill_growth(decay: float, squared: float, time: float, lag: float, out: Floats) -> None:
+    """The step response, and both of `lagged_responses`, in memory of the caller."""
+    out[0], out[1] = step_response(decay, squared, time)
+    if lag > 0.0:
+        (out[2], out[3]), (out[4], out[5]) = lagged_responses(decay, squared, time, lag)
+    else:
+        out[2], out[3], out[4], out[5] = 0.0, 0.0, out[0], out[1]

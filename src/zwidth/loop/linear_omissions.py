@@ -22,4 +22,11 @@ def linear_omissions(mechanism: Mechanism | None, plant: Plant | None, controlle
     if mechanism is not None:
         each = np.eye(len(mechanism.drives.names))
         parts = nonlinear_of_drives(mechanism.drives, np.ones(len(each)), 0.0 * each, each, each)
-    return replace(parts, force_limit=min(parts.force_limit, controller.force_limit)).kinds
+    return with_computer(parts, controller).kinds
+
+
+def with_computer(parts: Nonlinear, controller: Controller) -> Nonlinear:
+    """The nonlinear parts of a plant with those of its computer, except a nonlinear velocity estimate; the force
+    limit is the smaller of the actuator's and the computer's."""
+    limit = min(parts.force_limit, controller.force_limit)
+    return replace(parts, force_limit=limit, fed_friction=controller.feeds_friction)

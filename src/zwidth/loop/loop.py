@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -10,10 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth import _verbs
+from zwidth.loop.closed_sections import ClosedSections, closed_sections, closed_table
 from zwidth.loop.controller import Controller
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.factor_response import factor_response, rows_response, window_response
-from zwidth.loop.filters import Filter, force_path, velocity_estimator
+from zwidth.loop.filters import NO_FILTER, Filter, force_path, velocity_estimator
+from zwidth.loop.inertia_share import has_inertia_share
+from zwidth.loop.linear_omissions import with_computer
 from zwidth.loop.loop_table import LoopTable, loop_table
 from zwidth.loop.plant_rows import plant_rows
 from zwidth.loop.realisation import StateSpace, realise
@@ -73,7 +76,14 @@ class Loop:
                 "write Controller(sampling_period, delay)"
             )
         require("controller", controller, Controller)
+        if has_inertia_share(controller):
+            raise ValueError(
+                "feedforward.inertia_share is a share of a device's mass, which a loop does not know; write "
+                "device.at().loop, or give Feedforward(inertia=...)"
+            )
         plant.check_numbers()
+        if np.any(np.isnan(controller.sampling_period)):
+            raise ValueError("controller.sampling_period is not known; a loop needs it")
         object.__setattr__(self, "plant", plant)
         object.__setattr__(self, "controller", controller)
         object.__setattr__(self, "results", {})
@@ -81,6 +91,7 @@ class Loop:
     def __repr__(self) -> str:
         names = ", ".join(self.plant.names) or f"{self.plant.size} coordinates"
         computer = f"sampled every {self.period:g} s, {self.controller.delay:g} samples of delay"
+        computer += "".join(f", with {part}" for part in self.controller.feedback_names)
         return f"Loop of a plant ({names}), {computer}"
 
     def chart(self, radius: float = 1.0, *, decay: bool = True) -> StabilityChart:
@@ -97,6 +108,11 @@ class Loop:
         return self.controller.sampling_period
 
     @property
+    def has_fixed_feedback(self) -> bool:
+        """Whether the computer adds feedback to the wall law (`Controller.fixed_feedback`)."""
+        return bool(self.controller.fixed_feedback)
+
+    @property
     def whole_delay(self) -> int:
         """Whole samples l of the delay."""
         return self.controller.whole_delay
@@ -110,18 +126,26 @@ class Loop:
     def nonlinear(self) -> Nonlinear:
         """The nonlinear parts of plant and computer, except a nonlinear velocity estimate; the force limit is
         the smaller of the actuator's and the computer's."""
-        parts = self.plant.nonlinear
-        return replace(parts, force_limit=min(parts.force_limit, self.controller.force_limit))
+        return with_computer(self.plant.nonlinear, self.controller)
+
+    @cached_property
+    def closed(self) -> ClosedSections | None:
+        """The plant with the fixed feedback closed; None without such feedback."""
+        return closed_sections(self.plant, self.controller) if self.has_fixed_feedback else None
 
     @cached_property
     def sections(self) -> Sections:
-        """The plant between samples, one row per observed pair of poles."""
+        """The plant between samples, one row per observed pair of poles; with fixed feedback closed, one row."""
+        if self.closed is not None:
+            return self.closed.sections
         lag = self.controller.actuator_time_constant
         return sampled_sections(self.plant, self.period, self.fractional_delay, lag)
 
     @cached_property
     def table(self) -> LoopTable:
         """The loop in the form in which kernels take it. Raises what `sections.sampled_sections` raises."""
+        if self.closed is not None:
+            return closed_table(self.closed, self.controller)
         rows = plant_rows(self.plant, self.controller)
         if rows is None:
             rows = self.sections.rows
@@ -129,8 +153,16 @@ class Loop:
 
     @cached_property
     def force_path(self) -> Filter:
-        """The force's filter and the actuator's lag in series."""
-        return force_path(self.controller)
+        """What stands behind the sections on the force's way: its filter and the actuator's lag in series, or the
+        rest of a closed plant."""
+        return force_path(self.controller) if self.closed is None else self.closed.factors
+
+    @property
+    def path_delay(self) -> tuple[int, bool]:
+        """Whole samples of delay behind the sections, and whether a part of one splits their hold."""
+        if self.closed is not None:
+            return self.closed.delay, False
+        return self.whole_delay, self.fractional_delay > 0.0
 
     @cached_property
     def estimator(self) -> Estimator:
@@ -140,12 +172,14 @@ class Loop:
     def plant_response(self, z: ArrayLike, z_minus_1: ArrayLike | None = None) -> Complexes:
         """P(z) (...) from force command to reading [m/N], at complex z (...), with hold, delay, filter and lag.
 
+        Fixed feedback is closed.
+
         z_minus_1  (...)  z - 1, where it is known to more digits than the difference has
         """
         at: Complexes = np.asarray(z, dtype=complex)
         d = at - 1.0 if z_minus_1 is None else np.asarray(z_minus_1, dtype=complex)
-        force, split = self.force_path, self.fractional_delay > 0.0
-        passed = factor_response(force.numerator, force.denominator, d) / at**self.whole_delay
+        force, (whole, split) = self.force_path, self.path_delay
+        passed = factor_response(force.numerator, force.denominator, d) / at**whole
         return np.asarray(rows_response(self.sections.rows, split, at, d) * passed)
 
     def velocity_response(self, z: ArrayLike, z_minus_1: ArrayLike | None = None) -> Complexes:
@@ -163,9 +197,9 @@ class Loop:
     @cached_property
     def state_space(self) -> StateSpace:
         """The loop's transition matrix as L0 + K LK + B LB."""
-        return realise(
-            self.sections, self.whole_delay, self.fractional_delay > 0.0, self.force_path, self.estimator
-        )
+        if self.closed is not None:
+            return realise(self.sections, 0, False, NO_FILTER, self.estimator)
+        return realise(self.sections, *self.path_delay, self.force_path, self.estimator)
 
     def transition_matrix(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
         """The map Z_{j+1} = L Z_j (thesis eq. 2.38) for walls K, B of any shape (...): (..., N, N).

@@ -54,7 +54,9 @@ def table_of_loops(*loops: Loop) -> LoopTable:
     rows = np.zeros((len(each), count.max(), 9))
     for line, table in zip(rows, each, strict=True):
         line[: table.rows.shape[1]] = table.rows[0]
-    columns = [computer_columns(loop.controller) for loop in loops]
+    columns = [
+        ComputerColumns(**{name: getattr(table, name) for name in ComputerColumns._fields}) for table in each
+    ]
     return _table(rows, count, np.arange(len(each)), columns)
 
 

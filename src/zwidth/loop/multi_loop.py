@@ -21,6 +21,7 @@ from zwidth.loop.filter_states import FilterStates, filter_states
 from zwidth.loop.filters import force_filter, velocity_estimator
 from zwidth.loop.motion_names import motion_name
 from zwidth.loop.multi_hold import ContinuousPlant, SampledPlant, continuous_plant, sample_plant
+from zwidth.loop.point_errors import SeveralDirectionsError
 from zwidth.loop.sections import UnmovedError
 from zwidth.loop.wall_matrices import PrincipalDirections, WallMatrices
 from zwidth.model.argument_checks import require
@@ -52,11 +53,14 @@ class MultiLoop:
     def __post_init__(self) -> None:
         """Raise TypeError for anything but a plant of several directions, a controller and matrices.
 
-        Raises ValueError for matrices of another number of directions, too.
+        Also ValueError for matrices of another number of directions, and SeveralDirectionsError (loop.point_errors)
+        for a controller with fixed feedback.
         """
         hint = "write Loop(plant, controller) for one direction" if isinstance(self.plant, Plant) else ""
         require("plant", self.plant, MultiPlant, hint)
         require("controller", self.controller, Controller)
+        if self.controller.fixed_feedback:
+            raise SeveralDirectionsError(self.controller.feedback_names)
         if self.matrices is not None:
             require("matrices", self.matrices, WallMatrices, "write wall_matrices(relative_stiffness, ...)")
             if self.matrices.count != self.plant.count:

@@ -13,14 +13,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth import _verbs
 from zwidth.loop.controller import Controller
+from zwidth.loop.inertia_share import has_inertia_share, with_inertia_of
 from zwidth.loop.linear_omissions import linear_omissions
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
-from zwidth.loop.point_errors import NoMechanismError, OperatingPointError, check_several_directions
+from zwidth.loop.point_errors import (
+    MissingNumbersError,
+    NoMechanismError,
+    OperatingPointError,
+    check_several_directions,
+)
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.damping import Damping, GivenDamping
 from zwidth.model.design_axes import change_designs, design_shape
-from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters
+from zwidth.model.drive_side import DriveSide, drive_side
+from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, lever_arms, screw
 from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import Operator, attach
@@ -71,8 +78,8 @@ class OperatingPoint:
     controller          the computer that closes the loop
     mechanism           links, joints, loops and drives
     posture             (...) solved postures
-    directions          (..., m, 3) unit vectors; the m directions of one posture are rendered together, under one
-                        law
+    directions          (..., m, 3) unit vectors, or (..., m, 6) screws (`model.effective_parameters.screw`) of
+                        moments about an axis; the m directions of one posture are rendered together, under one law
     given_plant         dynamics of the rendered direction, as given
     response            measured response from force command to reading
     model               "full", "two-mass", "motor-mass" or "rigid"; None: full, or the plant as given
@@ -83,6 +90,8 @@ class OperatingPoint:
     friction_known, resolution_known   whether the dry friction, and the encoders' step, are given, 0 included
     name                the device's name in results and figures
     requested_position  position as requested, before it was projected; None: the device's reference
+    missing             keys that the device file leaves out as not known, by what needs them: "dynamics",
+                        "sampling"
     results             what several measures of these points share, once it is computed
     """
 
@@ -101,6 +110,7 @@ class OperatingPoint:
     resolution_known: bool = True
     name: str = ""
     requested_position: Position | Floats | None = None
+    missing: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     results: dict[Any, Any] = field(init=False, default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
@@ -165,8 +175,8 @@ class OperatingPoint:
 
     @property
     def direction(self) -> Floats:
-        """(..., 3) unit vector. Raises OperatingPointError where several directions are rendered together, and
-        NoMechanismError for a device without a mechanism."""
+        """(..., 3) unit vector, or (..., 6) screw. Raises OperatingPointError where several directions are
+        rendered together, and NoMechanismError for a device without a mechanism."""
         if self.directions is None:
             raise NoMechanismError
         if self.direction_count > 1:
@@ -197,9 +207,18 @@ class OperatingPoint:
             parts |= {"posture": self.posture.with_axes(change), "directions": change(self.directions)}
         return replace(self, **parts)
 
+    @property
+    def turns(self) -> bool:
+        """Whether moments about an axis are rendered, and walls are in N m/rad; a screw with a way along it is in
+        N/m."""
+        return (
+            self.directions is not None and self.directions.shape[-1] == 6 and not self.directions[..., :3].any()
+        )
+
     def towards(self, direction: Floats) -> OperatingPoint:
-        """The same postures rendering another direction, unit vectors (..., 3)."""
-        directions = np.broadcast_to(np.asarray(direction, dtype=np.float64), (*self.shape, 3))
+        """The same postures rendering another direction, unit vectors (..., 3) or screws (..., 6)."""
+        given = np.asarray(direction, dtype=np.float64)
+        directions = np.broadcast_to(given, (*self.shape, given.shape[-1]))
         return replace(self, directions=directions[..., None, :])
 
     def in_model(self, model: Model | None) -> OperatingPoint:
@@ -228,32 +247,49 @@ class OperatingPoint:
 
     @property
     def jacobian(self) -> Floats:
-        """J (..., 3, d) in the driven coordinates [m/rad]; nan where the posture is not OK.
+        """J (..., 3, c) in the independent coordinates, those of the drives and then of free joints [m/rad]; nan
+        where the posture is not OK.
 
         Raises  NoMechanismError  for a device without a mechanism
         """
         return self._posture.jacobian
 
+    def require(self, *kinds: Literal["dynamics", "sampling"]) -> None:
+        """Raise MissingNumbersError where the device file leaves out numbers that these kinds of answers need."""
+        keys = [key for kind in kinds for key in self.missing.get(kind, ())]
+        if keys:
+            raise MissingNumbersError(keys)
+
     @property
     def mass_matrix(self) -> Floats:
-        """M (..., d, d) of the links in the driven coordinates [kg m^2]. Raises NoMechanismError as `jacobian`."""
+        """M (..., c, c) of the links in the independent coordinates [kg m^2]. Raises NoMechanismError as
+        `jacobian`, MissingNumbersError where masses are not known."""
+        self.require("dynamics")
         return self._posture.mass_matrix
+
+    @cached_property
+    def drive_side(self) -> DriveSide:
+        """How the drives and the joints' own springs, dampers and friction act on the coordinates. Raises
+        NoMechanismError as `jacobian`."""
+        posture = self._posture
+        assert self.mechanism is not None
+        return drive_side(self.mechanism, posture)
 
     @property
     def whole_mass_matrix(self) -> Floats:
-        """M (..., d, d) of links and rotors in the driven coordinates [kg m^2]. Raises NoMechanismError as
-        `jacobian`."""
-        drives = self.drives
-        rotors = drives.transmission**2 * drives.motor_inertia
-        return self.mass_matrix + rotors[..., None] * np.eye(rotors.shape[-1])
+        """M (..., c, c) of links and rotors, all drives rigid, in the independent coordinates [kg m^2]. Raises
+        NoMechanismError as `jacobian`."""
+        return self.drive_side.with_rotors(self.mass_matrix, self.drives)
 
     @property
     def lever_arms(self) -> Floats:
-        """h = J^T u (..., d): handle motion along the direction by each driven joint [m/rad].
+        """h = J^T u (..., c): handle motion along the direction by each independent coordinate [m/rad].
 
         Raises  NoMechanismError  for a device without a mechanism
         """
-        return np.asarray(np.einsum("...i,...id->...d", self.direction, self.jacobian))
+        self._posture  # noqa: B018  raises for a device without a mechanism
+        assert self.posture is not None
+        return lever_arms(self.posture, screw(self.direction))
 
     @cached_property
     def effective(self) -> EffectiveParameters:
@@ -261,6 +297,7 @@ class OperatingPoint:
 
         Raises  OperatingPointError  for several directions, and for a measured response
         """
+        self.require("dynamics")
         if self.mechanism is not None:
             return effective_parameters(self.mechanism, self._posture, self.direction)
         if self.given_plant is None:
@@ -271,9 +308,10 @@ class OperatingPoint:
     def handle_range(self) -> tuple[float, float] | None:
         """Range of the handle from its posture along the direction [m]: backwards (not positive), forwards.
 
-        None for a device without a mechanism. Raises OperatingPointError for several points.
+        None for a device without a mechanism, and for moments about an axis. Raises OperatingPointError for
+        several points.
         """
-        if self.mechanism is None:
+        if self.mechanism is None or self.direction.shape[-1] == 6:
             return None
         self._check_single("handle_range")
         return handle_range(self.mechanism, self._posture, self.direction)
@@ -284,10 +322,10 @@ class OperatingPoint:
         The linear plant moves along the tangent, the handle along a curve if it has few drives.
 
         displacement  from the posture, along the direction [m]
-        Returns  None for a device without a mechanism
+        Returns  None for a device without a mechanism, and for moments about an axis
         Raises   PostureError  (model.posture) where the handle cannot be moved so far
         """
-        if self.mechanism is None:
+        if self.mechanism is None or self.direction.shape[-1] == 6:
             return None
         self._check_single("distance_from_path")
         if displacement == 0.0:
@@ -318,6 +356,7 @@ class OperatingPoint:
         if self.given_plant is not None:
             return self.given_plant if self.model is None else reduce_plant(self.given_plant, self.model)
         self._check_single("plant")
+        self.require("dynamics")
         assert self.mechanism is not None
         return reduce_mechanism(
             self.mechanism, self._posture, self.direction, self.model or "full", self.damping, self.encoders
@@ -344,18 +383,30 @@ class OperatingPoint:
         posture = self._posture
         self._check_single("plant")
         check_several_directions(self.mechanism, self.operator, self.encoders)
+        self.require("dynamics")
         assert self.mechanism is not None
         assert self.directions is not None
         return reduce_directions(self.mechanism, posture, self.directions, self.model or "full", self.damping)
 
     @cached_property
+    def computer(self) -> Controller:
+        """The controller at this point: of a feedforward that is given as a share of the device's rigid mass, with
+        that mass [kg]. Raises OperatingPointError where the device has none, or for several points."""
+        if not has_inertia_share(self.controller):
+            return self.controller
+        self._check_single("computer")
+        return with_inertia_of(self.controller, float(self.effective.rigid_mass))
+
+    @cached_property
     def loop(self) -> Loop:
-        """The plant under the sampled wall law. Raises what `plant` raises."""
-        return Loop(self.plant, self.controller)
+        """The plant under the sampled wall law. Raises what `plant` and `computer` raise."""
+        self.require("dynamics", "sampling")
+        return Loop(self.plant, self.computer)
 
     @cached_property
     def loop_of_directions(self) -> MultiLoop:
-        """All directions under one sampled wall law. Raises what `plant_of_directions` raises."""
+        """All directions under one sampled wall law. Raises what `plant_of_directions` and `MultiLoop` raise."""
+        self.require("dynamics", "sampling")
         return MultiLoop(self.plant_of_directions, self.controller)
 
     def _check_single(self, what: str) -> None:

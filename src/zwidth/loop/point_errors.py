@@ -20,6 +20,18 @@ class NoMechanismError(OperatingPointError):
         super().__init__("the device has no mechanism, and so neither postures nor directions")
 
 
+class MissingNumbersError(OperatingPointError):
+    """The answer needs numbers that the device file leaves out as not known.
+
+    keys  their dotted paths
+    """
+
+    def __init__(self, keys: Sequence[str]) -> None:
+        self.keys = tuple(keys)
+        shown = ", ".join(keys[:4]) + (f" and {len(keys) - 4} more" if len(keys) > 4 else "")
+        super().__init__(f"needs {shown}, which the device file does not give")
+
+
 class SeveralDirectionsError(OperatingPointError):
     """The device has something that several directions rendered together cannot include.
 

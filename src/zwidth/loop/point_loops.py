@@ -12,6 +12,9 @@ from zwidth.loop.loop_table import LoopTable, loop_table
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.sections_batch import section_rows
 from zwidth.model.coupled_pairs import coupled_pairs
+from zwidth.model.drive_side import is_plain
+from zwidth.model.general_modes import has_general_modes, modes_in_general
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.plant_modes import plant_modes
 from zwidth.model.pole_pairs import PolePairs
 from zwidth.model.reduction import Model
@@ -41,14 +44,18 @@ def table_of_points(point: OperatingPoint, coupled: bool = True) -> LoopTable | 
     coupled  False: to rounding. Loops whose dampers couple their modes, which are known to some ten digits here,
              have no sections then either
     Returns  None where that holds of every point: a measured response, a given plant of a single design or one
-             that is reduced, encoders on the links in a reduced model
+             that is reduced, encoders on the links in a reduced model, a computer with fixed feedback, a mechanism
+             that is not plain (`drive_side.is_plain`) in a reduced model
     """
+    point.require("dynamics", "sampling")
     model = point.model or "full"
-    if point.response is not None:
+    if point.response is not None or point.controller.fixed_feedback:
         return None
     if point.mechanism is None and (model != "full" or not point.shape):
         return None
     if point.mechanism is not None and point.encoders != "motor" and model != "full":
+        return None
+    if point.mechanism is not None and not _known_together(point.mechanism, model):
         return None
     if _is_held(point, model) and not coupled:
         return None
@@ -73,6 +80,11 @@ def pole_pairs_of_points(point: OperatingPoint, model: Model, coupled: bool = Tr
     return modes.pairs.with_rows(rows, coupled_pairs(modes.rows(rows), None, own))
 
 
+def _known_together(mechanism: Mechanism, model: Model) -> bool:
+    """Whether the modes of many postures are computed together."""
+    return is_plain(mechanism) or (model == "full" and has_general_modes(mechanism))
+
+
 def _is_held(point: OperatingPoint, model: Model) -> bool:
     """Whether an operator moves with the plants; the motor's mass alone has him fixed."""
     return point.operator is not None and model != "motor-mass"
@@ -83,6 +95,8 @@ def _modes(point: OperatingPoint, model: Model) -> RenderedModes:
         return plant_modes(point.given_plant, point.shape)
     assert point.mechanism is not None
     assert point.posture is not None
+    if not is_plain(point.mechanism):
+        return modes_in_general(point.mechanism, point.posture, point.direction, point.damping, point.encoders)
     modes = rendered_modes(point.mechanism, point.posture, point.direction, model, point.damping, point.encoders)
     assert modes is not None  # `table_of_points` has looked at the encoders
     return modes

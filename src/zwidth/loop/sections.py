@@ -59,11 +59,7 @@ def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: fl
     Raises UnmovedError where no mode is both moved by the wall force and read by the sensor; UnresolvedError where
     dampers couple modes and rounding hides what is read; HysteresisError for a plant with a loss factor.
     """
-    if plant.hysteresis is not None:
-        raise HysteresisError(
-            "a loss factor describes steady vibration, not motion in time: only the chart and verdicts on walls "
-            "can be computed with it; describe the damping by damping_Ns_per_m instead"
-        )
+    refuse_loss_factor(plant)
     modes = real_modes(plant)
     # each free motion with damping has a pole at z = 1, for the place where it comes to rest: two share this pole
     if modes is not None and np.count_nonzero((modes.frequency_squared == 0.0) & (modes.decay != 0.0)) < 2:
@@ -75,12 +71,21 @@ def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: fl
     return sections
 
 
+def refuse_loss_factor(plant: Plant) -> None:
+    """Raise HysteresisError for a plant with a loss factor."""
+    if plant.hysteresis is not None:
+        raise HysteresisError(
+            "a loss factor describes steady vibration, not motion in time: only the chart and verdicts on walls "
+            "can be computed with it; describe the damping by damping_Ns_per_m instead"
+        )
+
+
 def _modal_sections(modes: RealModes, period: float, fraction: float, lag: float) -> Sections:
     """Rows of classically damped modes; equal modes are one pair of poles with the sum of their residues."""
     residue = modes.input * modes.output
     total = float(np.sum(np.abs(modes.input)) * np.sum(np.abs(modes.output)))
     rows, unobserved = [], []
-    for group in _equal_modes(modes):
+    for group in equal_modes(modes):
         decay, squared = float(modes.decay[group[0]]), float(modes.frequency_squared[group[0]])
         row = modal_row(decay, squared, period, fraction, lag)
         row[2:] *= float(np.sum(residue[group]))
@@ -93,7 +98,7 @@ def _modal_sections(modes: RealModes, period: float, fraction: float, lag: float
     return Sections(np.array(rows).reshape(-1, 9), tuple(unobserved))
 
 
-def _equal_modes(modes: RealModes) -> list[list[int]]:
+def equal_modes(modes: RealModes) -> list[list[int]]:
     """Modes of one frequency and one damping, to rounding."""
     scale = max(float(np.max(np.abs(modes.frequency_squared))), np.finfo(float).tiny)
     drag = max(float(np.max(np.abs(modes.decay))), np.finfo(float).tiny)

@@ -23,6 +23,8 @@ def unobserved_instability(loop: Loop) -> bool:
     """
     if not loop.unobserved_modes:
         return False
+    if loop.closed is not None:
+        return bool(np.any(np.exp(2.0 * loop.closed.hidden * loop.period) - 1.0 > GROWS))
     observed_poles = _section_poles(loop.sections.rows[:, :2])
     return _unstable_count(_poles(loop.plant, loop.period)) > _unstable_count(observed_poles)
 

@@ -18,14 +18,16 @@ if TYPE_CHECKING:
 
 Better = Literal["higher", "lower"]
 
-# Status of an operating point. The first three are those of a posture.
+# Status of an operating point. OK, OUT_OF_REACH, SINGULAR and BEYOND_LIMIT are those of a posture.
 OK: Final = 0
 OUT_OF_REACH: Final = 1
 SINGULAR: Final = 2
 NO_VALUE: Final = 3
 UNDECIDED: Final = 4
 FAILED: Final = 5
+BEYOND_LIMIT: Final = 6
 MISSING: Final = 255
+UNREACHED: Final = (OUT_OF_REACH, SINGULAR, BEYOND_LIMIT)
 STATUS: Final = {
     OK: "ok",
     OUT_OF_REACH: "out of reach",
@@ -33,6 +35,7 @@ STATUS: Final = {
     NO_VALUE: "no value",
     UNDECIDED: "undecided",
     FAILED: "failed",
+    BEYOND_LIMIT: "beyond a joint limit",
     MISSING: "not computed",
 }
 
@@ -107,7 +110,7 @@ class MeasureValues(Result):
     """A measure's values at operating points of shape (...).
 
     values  (...)  nan where the status is not OK
-    status  (...)  OK, OUT_OF_REACH, SINGULAR, NO_VALUE, UNDECIDED or FAILED
+    status  (...)  OK, OUT_OF_REACH, SINGULAR, BEYOND_LIMIT, NO_VALUE, UNDECIDED or FAILED
     notes   reasons of NO_VALUE, UNDECIDED and FAILED
     """
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.dexterity import dynamic_manipulability, isotropy, manipulability
+from zwidth.measures.bindings import dexterity
 from zwidth.model.argument_checks import require
 from zwidth.model.effective_parameters import EffectiveParameters
-from zwidth.model.mechanism import Floats
+from zwidth.model.mechanism import FIXED, Floats, Mechanism
 from zwidth.model.modes import natural_frequencies, real_modes
 from zwidth.model.plant import Plant
 from zwidth.result import Result
@@ -23,17 +23,19 @@ class Description(Result):
     """Masses and stiffness felt along the direction, frequencies, and the mechanism's dexterity.
 
     effective            masses [kg] and stiffness [N/m]; nan where inapplicable
-    natural_frequencies  (n,)  of the device without its operator [Hz]; rigid modes exactly 0
+    natural_frequencies  (n,)  of the device without its operator [Hz]; rigid modes exactly 0; none where the
+                         file gives no masses, as of which all that needs them is nan or None
     damping_ratios       of each frequency, None for rigid ones; None where damping couples the modes
-    joints               angle of each joint by its link [rad]; None for a device without a mechanism, as all below
-    jacobian             (3, d)  [m/rad];   mass_matrix  (d, d)  of the links [kg m^2]
+    joints               angle of each joint by its link [rad], of a prismatic one the way [m], a list of those of
+                         a joint with several; None for a device without a mechanism, as all below
+    jacobian             (3, c)  [m/rad];   mass_matrix  (c, c)  of the links [kg m^2]
     manipulability, dynamic_manipulability, isotropy   see `measures.dexterity`
     """
 
     effective: EffectiveParameters
     natural_frequencies: Floats
     damping_ratios: list[float | None] | None
-    joints: dict[str, float] | None = None
+    joints: dict[str, Any] | None = None
     jacobian: Floats | None = None
     mass_matrix: Floats | None = None
     manipulability: float | None = None
@@ -64,6 +66,10 @@ class Description(Result):
 
     def __repr__(self) -> str:
         felt = self.effective
+        if not self.natural_frequencies.size:
+            return (
+                f"Description: no masses; manipulability {self.manipulability:.4g}, isotropy {self.isotropy:.4g}"
+            )
         masses = f"{felt.link_side_mass:.4g} kg link side, {felt.motor_side_mass:.4g} kg motor side"
         frequencies = ", ".join(f"{f:.4g}" for f in self.natural_frequencies[:8])
         more = ", ..." if len(self.natural_frequencies) > 8 else ""
@@ -79,23 +85,46 @@ class Description(Result):
 def describe(point: OperatingPoint) -> Description:
     """Describe the device at one operating point, without its operator.
 
+    A file that gives no masses leaves the kinematic part.
+
     Raises  what `OperatingPoint.plant` raises
     """
     require("point", point, OperatingPoint)
-    plant = point.ungripped_plant
-    common = point.effective, natural_frequencies(plant), damping_ratios(plant)
+    massless = "dynamics" in point.missing
+    if massless:
+        unknown = np.asarray(np.nan)
+        common: tuple[EffectiveParameters, Floats, list[float | None] | None]
+        common = EffectiveParameters(unknown, unknown, unknown, unknown), np.zeros(0), None
+    else:
+        plant = point.ungripped_plant
+        common = point.effective, natural_frequencies(plant), damping_ratios(plant)
     if point.mechanism is None or point.posture is None:
         return Description(*common)
-    J, names = point.jacobian, point.mechanism.links.names
     return Description(
         *common,
-        joints=dict(zip(names, point.posture.angles.tolist(), strict=True)),
-        jacobian=J,
-        mass_matrix=point.mass_matrix,
-        manipulability=float(manipulability(J)),
-        dynamic_manipulability=float(dynamic_manipulability(J, point.whole_mass_matrix)),
-        isotropy=float(isotropy(J)),
+        joints=joint_coordinates(point.mechanism, point.posture.angles),
+        jacobian=point.jacobian,
+        mass_matrix=None if massless else point.mass_matrix,
+        manipulability=float(dexterity.manipulability(point)),
+        dynamic_manipulability=None if massless else float(dexterity.dynamic_manipulability(point)),
+        isotropy=float(dexterity.isotropy(point)),
     )
+
+
+def joint_coordinates(mechanism: Mechanism, coordinates: Floats) -> dict[str, Any]:
+    """Joint coordinates (n,) by the links that have some: one number, or a list of those of a joint with
+    several."""
+    joints: dict[str, Any] = {}
+    for name, kind, value in zip(mechanism.links.names, mechanism.links.joint, coordinates.tolist(), strict=True):
+        joint = name.partition("/")[0]
+        if kind == FIXED:
+            joints[joint] = 0.0
+        elif joint in joints:
+            earlier = joints[joint] if isinstance(joints[joint], list) else [joints[joint]]
+            joints[joint] = [*earlier, value]
+        else:
+            joints[joint] = value
+    return joints
 
 
 def damping_ratios(plant: Plant) -> list[float | None] | None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_errors import NoMechanismError
+from zwidth.loop.point_errors import MissingNumbersError, NoMechanismError
 from zwidth.loop.sections import HysteresisError, UnmovedError
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import (
@@ -56,6 +56,8 @@ def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
         raise
     except NoMechanismError:
         raise MeasureError(NO_MECHANISM) from None
+    except MissingNumbersError as error:
+        raise MeasureError(str(error)) from None
     except FAILURES as error:
         return _same_status(point, FAILED, _error_text(error))
     if isinstance(result, MeasureValues):
@@ -159,6 +161,8 @@ def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
         raise
     except NoMechanismError:
         raise MeasureError(NO_MECHANISM) from None
+    except MissingNumbersError as error:
+        raise MeasureError(str(error)) from None
     except NO_VALUE_ERRORS as error:
         return float("nan"), NO_VALUE, str(error)
     except ChartError as error:

@@ -88,6 +88,7 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
     plant = device or chart.loop.plant
     walls = np.vstack(chart.regions) if chart.regions else np.zeros((1, 2))
     (_, low), (right, high) = walls.min(axis=0), walls.max(axis=0)
+    computer = chart.loop.controller
     half_plane = shapely.box(0.0, low - 1.0, max(right, 0.0) + 1.0, high + 1.0)
     rings = []
     for region in chart.regions:
@@ -97,17 +98,17 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
                 ring = np.array(
                     shapely.segmentize(part, PIECE * float(np.hypot(right, high - low))).exterior.coords
                 )
-                ring[:, 0] = static_stiffness(plant, np.maximum(ring[:, 0], 0.0))
+                ring[:, 0] = static_stiffness(plant, np.maximum(ring[:, 0], 0.0), computer)
                 rings.append(ring if shapely.LinearRing(ring).is_ccw else ring[::-1])
     arcs = []
     for arc in chart.boundary:
         for run in _runs(arc.stiffness >= 0.0):
-            stiffness = static_stiffness(plant, arc.stiffness[run])
+            stiffness = static_stiffness(plant, arc.stiffness[run], computer)
             arcs.append(BoundaryArc(stiffness, arc.damping[run], arc.frequency[run]))
     felt = FeltChart(
         regions=tuple(rings),
         boundary=tuple(arcs),
-        stiffness_max=float(static_stiffness(plant, chart.stiffness_max))
+        stiffness_max=float(static_stiffness(plant, chart.stiffness_max, computer))
         if chart.stiffness_max > 0.0
         else float("nan"),
         limit=static_stiffness_limit(plant),

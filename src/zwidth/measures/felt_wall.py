@@ -15,9 +15,10 @@ from zwidth.measures.handle_impedance import (
     Floats,
     commanded_impedance,
     felt_impedance,
-    free_motion_impedance,
+    free_impedance,
     free_motion_mass,
     handle_of,
+    refuse_local_loop,
     static_stiffness,
     static_stiffness_limit,
 )
@@ -44,7 +45,8 @@ class FeltWall(Result):
     frequency                            (k,)  [Hz]
     felt_impedance                       (k,)  at the handle [N s/m]; None where the wall is not stable
     commanded_impedance                  (k,)  that of an ideal wall, B + K/(jw) [N s/m]
-    free_motion_impedance                (k,)  at the handle without any wall [N s/m]
+    free_motion_impedance                (k,)  at the handle without any wall, with the computer's fixed feedback
+                                         [N s/m]
     """
 
     wall_stiffness: float
@@ -152,19 +154,23 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
     verdict = judge(point.loop, [K], [B]).names[0]
     peak = largest_stiffness(point.loop)
     loop = point.without_operator.loop
+    computer = loop.controller
+    refuse_local_loop(computer)
     frequency = np.geomspace(LOWEST, HIGHEST, COUNT) * 0.5 / loop.period
     stable = verdict == "stable"
     return FeltWall(
         wall_stiffness=K,
         wall_damping=B,
         verdict=verdict,
-        static_stiffness=float(static_stiffness(plant, K)) if stable else None,
-        free_motion_mass=free_motion_mass(plant),
+        static_stiffness=float(static_stiffness(plant, K, computer)) if stable else None,
+        free_motion_mass=free_motion_mass(plant, computer),
         stiffness_max=peak.stiffness if peak else None,
-        static_stiffness_at_stiffness_max=float(static_stiffness(plant, peak.stiffness)) if peak else None,
+        static_stiffness_at_stiffness_max=float(static_stiffness(plant, peak.stiffness, computer))
+        if peak
+        else None,
         static_stiffness_limit=static_stiffness_limit(plant),
         frequency=frequency,
         felt_impedance=felt_impedance(loop, K, B, frequency) if stable else None,
         commanded_impedance=commanded_impedance(K, B, frequency),
-        free_motion_impedance=free_motion_impedance(plant, frequency),
+        free_motion_impedance=free_impedance(loop, frequency),
     )

@@ -2,7 +2,8 @@
 
 In the driven coordinates p with the handle's velocity v = J p', a force f at the handle is the torques J^T f of
 the drives, in whatever posture, at rest, without gravity. Numbers of the drives are taken at the joint: a torque
-limit is n tau, an encoder's step 2 pi/(N n), dry friction n C, with n motor turns per joint turn.
+limit is n tau, an encoder's step 2 pi/(N n), dry friction n C, with n motor turns per joint turn. A moment about
+an axis takes the place of the force where a screw (..., 6) is given as direction, and a Jacobian of six rows.
 
 All are invariant to the base frame (with the direction turned alike), the order of the drives and the ratio by
 which a coordinate turns faster than another; lengths in other units give the same force, acceleration and step
@@ -16,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.model.effective_parameters import unit_directions
+from zwidth.model.effective_parameters import screw, unit_directions
 
 Floats = NDArray[np.float64]
 
@@ -156,7 +157,7 @@ def joint_rates(jacobian: ArrayLike, direction: ArrayLike) -> tuple[Floats, NDAr
     >>> joint_rates([[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [0.0, 1.0, 0.0])[0].round(9) + 0.0
     array([2.5, 0. ])
     """
-    J, u = np.asarray(jacobian, dtype=np.float64), unit_directions(direction)
+    J, u = np.asarray(jacobian, dtype=np.float64), _directions(direction)
     unknown: NDArray[np.bool_] = np.asarray(np.isnan(J).any(axis=(-2, -1)))
     known = np.where(unknown[..., None, None], 0.0, J)
     q = (np.linalg.pinv(known) @ u[..., None])[..., 0]
@@ -166,8 +167,13 @@ def joint_rates(jacobian: ArrayLike, direction: ArrayLike) -> tuple[Floats, NDAr
 
 def _torques_per_force(jacobian: ArrayLike, direction: ArrayLike) -> Floats:
     """h = J^T u (..., d)."""
-    J, u = np.asarray(jacobian, dtype=np.float64), unit_directions(direction)
+    J, u = np.asarray(jacobian, dtype=np.float64), _directions(direction)
     return np.asarray(np.einsum("...i,...id->...d", u, J))
+
+
+def _directions(direction: ArrayLike) -> Floats:
+    """Unit vectors (..., 3), checked; or screws (..., 6), with a Jacobian of six rows."""
+    return screw(direction) if np.shape(direction)[-1:] == (6,) else unit_directions(direction)
 
 
 def _total(each: Floats, rates: Floats) -> Floats:

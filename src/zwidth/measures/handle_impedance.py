@@ -18,20 +18,31 @@ with P the sampled plant, in which all of the staircase is. So the motion x at w
 
     [ D + H C/(1 + S C) a s^T ] x = h f,      Z = f / (jw h^T x)
 
-which is exact. The motion at w + 2 pi n/T that goes with it is not part of an impedance and is not computed; a
+which is exact. With feedforward and a force sensor of gain G, which measures f + m w^2 h^T x for a mass m between
+sensor and hand, the commands are U = -A Y + G (f + m w^2 h^T x + S_f U), A = C (1 or, of a force error, 1 + G)
+less the feedforward, and
+
+    [ D + H/N a (A s - G m w^2 h)^T ] x = (h + H G/N a) f,      N = 1 + S A - S_f G
+
+The motion at w + 2 pi n/T that goes with it is not part of an impedance and is not computed; a
 plant with mass hardly follows at these frequencies.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.loop.closed_plant import path_responses
+from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import factor_response
+from zwidth.loop.feedback_response import feedforward_response, sensor_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
+from zwidth.loop.unsupported_feedback import refuse_feedback
 from zwidth.model.argument_checks import broadcast_walls, require
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
@@ -47,6 +58,12 @@ class HandleError(ValueError):
     """The plant has no handle at which an impedance could be felt."""
 
 
+def refuse_local_loop(controller: Controller) -> None:
+    """Raise FeedbackError for a computer of two rates."""
+    two_rates = replace(controller, force_sensor=None, feedforward=None)
+    refuse_feedback(two_rates, "the impedance at the handle is not known", "leave local_loop out")
+
+
 def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complex:
     """Force over velocity at the handle, Z = f/(jw x_h) (see the derivation above).
 
@@ -56,6 +73,7 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
     Returns    (...)  complex [N s/m]
     Raises     HandleError  where the plant has no handle
                ValueError   for a frequency out of range
+               FeedbackError  (loop.unsupported_feedback) with a local loop
 
     A mass of 0.1 kg at 1 Hz feels like its wall, of 1000 N/m and 1 N s/m, less its inertia (and the delay of hold
     and backward difference, one sample):
@@ -75,6 +93,11 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
         raise ValueError(f"frequencies must lie between 0 and half the sampling frequency, {nyquist:.6g} Hz")
     plant, T = loop.plant, loop.period
     s = 2j * np.pi * f
+    if loop.has_fixed_feedback:
+        refuse_local_loop(loop.controller)
+        handle_of(plant)
+        w = loop.velocity_response(np.exp(s * T), np.expm1(s * T))
+        return _controlled_impedance(loop, wall_stiffness + wall_damping * w, s)
     dynamic, act, read, h = _dynamic_stiffness(plant, s)
     hold = _hold_response(loop, s)
     P, w = _sampled(loop, s * T)
@@ -83,6 +106,32 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
     wall = hold * C / (1.0 + alias_response * C)
     closed = dynamic + wall[..., None, None] * np.outer(act, read)
     return np.asarray(1.0 / (s * (_solve(closed, h) @ h)))
+
+
+def _controlled_impedance(loop: Loop, wall: Complex, s: Complex) -> Complex:
+    """`felt_impedance` with feedforward and a force sensor, at s = jw (...) for a wall C (...)."""
+    plant, T, computer = loop.plant, loop.period, loop.controller
+    dynamic, act, read, h = _dynamic_stiffness(plant, s)
+    z, d, hold = np.exp(s * T), np.expm1(s * T), _hold_response(loop, s)
+    sensor, ahead = computer.force_sensor, computer.feedforward
+    P, P_f = path_responses(plant, computer, d)
+    pushed = _solve(dynamic, act)
+    G, lost = np.zeros_like(s), np.zeros_like(s)  # G, and m w^2
+    law = wall
+    if sensor is not None:
+        G = sensor_response(sensor, T, d)
+        law = wall * (1.0 + G) if sensor.law == "force-error" else wall
+        G, lost = G / z**sensor.delay, -sensor.mass_beyond * s**2
+    if ahead is not None:
+        law = law - feedforward_response(ahead, T, z, d)
+    alias = P - hold * (pushed @ read)
+    alias_f = P_f - hold * lost * (pushed @ h)
+    share = hold / (1.0 + alias * law - alias_f * G)
+    reads = law[..., None] * read - (G * lost)[..., None] * h
+    closed = dynamic + share[..., None, None] * act[:, None] * reads[..., None, :]
+    pushes = h + (share * G)[..., None] * act
+    x = np.linalg.solve(closed, pushes[..., None])[..., 0]
+    return np.asarray(1.0 / (s * (x @ h)))
 
 
 def free_motion_impedance(plant: Plant, frequency: ArrayLike) -> Complex:
@@ -96,20 +145,28 @@ def free_motion_impedance(plant: Plant, frequency: ArrayLike) -> Complex:
     return np.asarray(1.0 / (s * (_solve(dynamic, h) @ h)))
 
 
+def free_impedance(loop: Loop, frequency: ArrayLike) -> Complex:
+    """The same of a loop, with its computer's fixed feedback. Raises FeedbackError with a local loop."""
+    if loop.has_fixed_feedback:
+        return felt_impedance(loop, 0.0, 0.0, frequency)
+    return free_motion_impedance(loop.plant, frequency)
+
+
 def commanded_impedance(wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complex:
     """K/(jw) + B, what the hand would feel of an ideal wall [N s/m]."""
     return np.asarray(wall_stiffness / (2j * np.pi * np.asarray(frequency, dtype=float)) + wall_damping)
 
 
-def static_stiffness(plant: Plant, wall_stiffness: ArrayLike) -> Floats:
+def static_stiffness(plant: Plant, wall_stiffness: ArrayLike, controller: Controller | None = None) -> Floats:
     """Stiffness of a wall as felt at the handle at rest.
 
         1 / (h^T (K_plant + K a s^T)^-1 h)          two masses and a spring k: K k/(K + k)
 
     At rest the velocity estimate is 0 and the hold keeps a constant force, so that neither sampling
-    nor delay nor damping counts.
+    nor delay nor damping counts. A force sensor lets the motors help the hand, and a local loop adds its spring.
 
     wall_stiffness  (...)  K [N/m]
+    controller      with the fixed feedback that acts at rest, too; None: there is none
     Returns         (...)  [N/m]; 0 where the handle is free to move away, inf where it cannot move
     Raises          HandleError  where the plant has no handle
 
@@ -122,7 +179,17 @@ def static_stiffness(plant: Plant, wall_stiffness: ArrayLike) -> Floats:
     require("plant", plant, Plant)
     K = np.asarray(wall_stiffness, dtype=float)
     plant_stiffness, act, read, h = _dynamic_stiffness(plant, np.zeros(()))
-    return _stiffness(plant_stiffness + K[..., None, None] * np.outer(act, read), h)
+    gain, error, spring = _static_gains(controller)
+    commanded = K * (1.0 + gain * error) + spring
+    return _stiffness(plant_stiffness + commanded[..., None, None] * np.outer(act, read), h, h + gain * act)
+
+
+def _static_gains(controller: Controller | None) -> tuple[float, bool, float]:
+    """Force commanded per hand force at rest, whether it is of the force error, and the local loop's spring."""
+    sensor = None if controller is None else controller.force_sensor
+    local = None if controller is None else controller.local_loop
+    gain, error = (0.0, False) if sensor is None else (float(sensor.gain), sensor.law == "force-error")
+    return gain, error, 0.0 if local is None else float(local.stiffness)
 
 
 def static_stiffness_limit(plant: Plant) -> float:
@@ -135,18 +202,31 @@ def static_stiffness_limit(plant: Plant) -> float:
     own, act, read, h = _dynamic_stiffness(plant, np.zeros(()))
     size = max(float(np.abs(own).max()), np.finfo(float).tiny)
     constrained = np.block([[own / size, act[:, None]], [read[None, :], np.zeros((1, 1))]])
-    return float(_stiffness(constrained, np.append(h, 0.0))) * size
+    held = np.append(h, 0.0)
+    return float(_stiffness(constrained, held, held)) * size
 
 
-def free_motion_mass(plant: Plant) -> float:
+def free_motion_mass(plant: Plant, controller: Controller | None = None) -> float:
     """Mass felt at the handle in slow free motion: 1/(h^T Z Z^T h) of the mass-normalised rigid modes Z [kg].
 
-    nan where a spring ties the handle to the ground, since a stiffness is felt then.
+    controller  whose feedforward and force sensor take part of it, all friction left out; None: there is none
+    Returns     nan where a spring ties the handle to the ground, since a stiffness is felt then
     """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    rigid = squared == 0.0
     modal_handle = shapes.T @ handle_of(plant)
-    mobility = float(np.sum(modal_handle[squared == 0.0] ** 2))
-    return 1.0 / mobility if mobility > FREE * float(modal_handle @ modal_handle) else float("nan")
+    h, act, read = modal_handle[rigid], (shapes.T @ plant.actuator)[rigid], (shapes.T @ plant.sensor)[rigid]
+    if not float(h @ h) > FREE * float(modal_handle @ modal_handle):
+        return float("nan")
+    sensor = None if controller is None else controller.force_sensor
+    ahead = None if controller is None else controller.feedforward
+    # x'' = push f + act (inertia read x'' - gain mass_beyond h x''), in the rigid modes
+    gain, beyond = (0.0, 0.0) if sensor is None else (sensor.gain, sensor.mass_beyond)
+    inertia = 0.0 if ahead is None else ahead.inertia
+    if not (gain or inertia):
+        return 1.0 / float(h @ h)
+    own = np.eye(len(h)) - np.outer(act, inertia * read - gain * beyond * h)
+    return 1.0 / float(h @ np.linalg.solve(own, h + gain * act))
 
 
 def handle_of(plant: Plant) -> Floats:
@@ -194,13 +274,13 @@ def _sampled(loop: Loop, log_z: Complex) -> tuple[Complex, Complex]:
     return loop.plant_response(z, d), loop.velocity_response(z, d)
 
 
-def _stiffness(A: Floats, h: Floats) -> Floats:
-    """1/(h^T A^-1 h) for A (..., n, n), also where A is singular along motions that do not concern h."""
+def _stiffness(A: Floats, h: Floats, push: Floats) -> Floats:
+    """1/(h^T A^-1 push) for A (..., n, n), also where A is singular along motions that do not concern h."""
     left, size, right = np.linalg.svd(A)
     small = size <= FREE * np.maximum(size[..., :1], np.finfo(float).tiny)
-    into = np.einsum("...ij,i->...j", left, h)  # components of h along the left singular vectors
+    into = np.einsum("...ij,i->...j", left, push)  # its components along the left singular vectors
     out = np.einsum("...ji,i->...j", right, h)
-    scale = np.linalg.norm(h)
+    scale = max(float(np.linalg.norm(h)), float(np.linalg.norm(push)))
     is_free = np.any(small & ((np.abs(into) > 1e-6 * scale) | (np.abs(out) > 1e-6 * scale)), axis=-1)
     compliance = np.sum(np.where(small, 0.0, into * out / np.where(small, 1.0, size)), axis=-1)
     # a compliance that is only rounding is 0: the handle is held still

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.measures.definition import MISSING, OK, OUT_OF_REACH, SINGULAR, Better
+from zwidth.measures.definition import MISSING, OK, UNREACHED, Better
 from zwidth.measures.dexterity import singular_values
 
 Floats = NDArray[np.float64]
@@ -162,7 +162,7 @@ def _cells(
     if wrong.any():
         raise ValueError(f"weights are areas or volumes, at least 0 and finite, got {float(w[wrong][0]):.6g}")
     x, s = x.ravel(), s.ravel()
-    nowhere = (s == OUT_OF_REACH) | (s == SINGULAR) | (s == MISSING)
+    nowhere = np.isin(s, (*UNREACHED, MISSING))
     return x, w, np.asarray((s == OK) & ~np.isnan(x) & (w > 0.0)), np.asarray(~nowhere)
 
 

@@ -1,4 +1,4 @@
-"""Forces of velocity and gravity in the driven coordinates, compiled and without allocation."""
+"""Forces of velocity and gravity in the independent coordinates, compiled and without allocation."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.closure import closure_step, equations, passive_rates
-from zwidth.model.forward_kinematics import WorkingMemory, link_point, place_links, working_memory
+from zwidth.model.forward_kinematics import WorkingMemory, link_point, link_vector, place_links, working_memory
 from zwidth.model.inertia import unit_motions
-from zwidth.model.mechanism import Floats, Ints
+from zwidth.model.mechanism import AXIS, POINT, PRISMATIC, Floats, Ints
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 
@@ -44,6 +44,9 @@ def fill_accelerations(
 
     w_i = w_p + z_i q',   alpha_i = alpha_p + z_i q'' + w_p x z_i q',
     a_i = a_p + alpha_p x r + w_p x (w_p x r),   r = o_i - o_p;   the base falls upwards, a = -gravity
+
+    A prismatic joint adds z_i q'' + 2 w_p x z_i q' to a_i instead. The three rates of a ball joint are one angular
+    velocity about axes that turn with the link: w_p is that of the link that carries the joint, for each of them.
     """
     w, alpha, a, rates, turning = (
         flow.angular_velocity,
@@ -52,18 +55,21 @@ def fill_accelerations(
         flow.rates,
         flow.joint_accelerations,
     )
-    o, z, parent, column = work.origin, work.axis, mech.parent, mech.column
+    o, z, parent, column, kind, carrier = work.origin, work.axis, mech.parent, mech.column, mech.kind, mech.carrier
     gx, gy, gz = gravity[0], gravity[1], gravity[2]
     for i in range(parent.size):
         p, u = parent[i], column[i]
         rate, change = 0.0, 0.0
         if u >= 0:
             rate, change = rates[u], turning[u]
+        slide, slip = 0.0, 0.0
+        if kind[i] == PRISMATIC:
+            rate, change, slide, slip = 0.0, 0.0, rate, change
         zx, zy, zz = z[i, 0], z[i, 1], z[i, 2]
         if p < 0:
             w[i, 0], w[i, 1], w[i, 2] = rate * zx, rate * zy, rate * zz
             alpha[i, 0], alpha[i, 1], alpha[i, 2] = change * zx, change * zy, change * zz
-            a[i, 0], a[i, 1], a[i, 2] = -gx, -gy, -gz
+            a[i, 0], a[i, 1], a[i, 2] = slip * zx - gx, slip * zy - gy, slip * zz - gz
             continue
         wx, wy, wz = w[p, 0], w[p, 1], w[p, 2]
         bx, by, bz = alpha[p, 0], alpha[p, 1], alpha[p, 2]
@@ -73,9 +79,16 @@ def fill_accelerations(
         a[i, 0] = a[p, 0] + by * rz - bz * ry + wx * along - rx * square
         a[i, 1] = a[p, 1] + bz * rx - bx * rz + wy * along - ry * square
         a[i, 2] = a[p, 2] + bx * ry - by * rx + wz * along - rz * square
-        alpha[i, 0] = bx + change * zx + rate * (wy * zz - wz * zy)
-        alpha[i, 1] = by + change * zy + rate * (wz * zx - wx * zz)
-        alpha[i, 2] = bz + change * zz + rate * (wx * zy - wy * zx)
+        if kind[i] == PRISMATIC:
+            a[i, 0] += slip * zx + 2.0 * slide * (wy * zz - wz * zy)
+            a[i, 1] += slip * zy + 2.0 * slide * (wz * zx - wx * zz)
+            a[i, 2] += slip * zz + 2.0 * slide * (wx * zy - wy * zx)
+        cx, cy, cz = 0.0, 0.0, 0.0
+        if carrier[i] >= 0:
+            cx, cy, cz = w[carrier[i], 0], w[carrier[i], 1], w[carrier[i], 2]
+        alpha[i, 0] = bx + change * zx + rate * (cy * zz - cz * zy)
+        alpha[i, 1] = by + change * zy + rate * (cz * zx - cx * zz)
+        alpha[i, 2] = bz + change * zz + rate * (cx * zy - cy * zx)
         w[i, 0], w[i, 1], w[i, 2] = wx + rate * zx, wy + rate * zy, wz + rate * zz
 
 
@@ -106,46 +119,82 @@ def point_acceleration(
 
 
 @compiled_lean
+def closing_accelerations(
+    mech: MechanismArrays, design: int, work: WorkingMemory, flow: LinkAccelerations, gravity: Floats
+) -> None:
+    """Fill the closures' rows of `gaps` with what the joints' accelerations must make up for.
+
+    point  a_b - a_a;   frame  alpha_b - alpha_a, times the size
+    axis   s w_a x z + P (alpha_b - alpha_a), times the size: with z the common axis and P = 1 - z z^T, as the link
+           turns by s about an axis that itself turns, alpha_a - alpha_b = s' z + s w_a x z
+    """
+    gaps, R, size, w, alpha = (
+        work.gaps,
+        work.rotation,
+        mech.size[design],
+        flow.angular_velocity,
+        flow.angular_acceleration,
+    )
+    for c in range(mech.a.size):
+        a, b, r = mech.a[c], mech.b[c], mech.first_row[c]
+        pa = point_acceleration(work, flow, gravity, a, mech.point_a, design, c)
+        pb = point_acceleration(work, flow, gravity, b, mech.point_b, design, c)
+        for x in range(3):
+            gaps[r + x] = pb[x] - pa[x]
+        if mech.closing[c] == POINT:
+            continue
+        turn, z = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if mech.closing[c] == AXIS:
+            z = link_vector(R, a, mech.axis_a, design, c)
+        s, along = 0.0, 0.0
+        for x in range(3):
+            s += z[x] * ((w[a, x] if a >= 0 else 0.0) - (w[b, x] if b >= 0 else 0.0))
+            gaps[r + 3 + x] = (alpha[b, x] if b >= 0 else 0.0) - (alpha[a, x] if a >= 0 else 0.0)
+            along += z[x] * gaps[r + 3 + x]
+        if a >= 0:
+            turn = (
+                w[a, 1] * z[2] - w[a, 2] * z[1],
+                w[a, 2] * z[0] - w[a, 0] * z[2],
+                w[a, 0] * z[1] - w[a, 1] * z[0],
+            )
+        for x in range(3):
+            gaps[r + 3 + x] = size * (gaps[r + 3 + x] - along * z[x] + s * turn[x])
+
+
+@compiled_lean
 def bias(
     mech: MechanismArrays,
     design: int,
     work: WorkingMemory,
     flow: LinkAccelerations,
-    driven_rates: Floats,
+    independent_rates: Floats,
     gravity: Floats,
     out: Floats,
 ) -> None:
-    """c(q, p') - B^T g_q in the driven coordinates, (d,) into `out` [N m]: what is left of M p'' at p'' = 0.
+    """c(q, p') - B^T g_q in the independent coordinates, (c,) into `out` [N m]: what is left of M p'' at p'' = 0.
 
         c = B^T (c_q + M B' p')                                            (thesis eq. B.19)
 
     The links are placed, `passive_rates` is what was solved last, and `unit_motions` is done; `gaps` are
     overwritten. The passive joints' q'' at p'' = 0 follow from the closures' accelerations,
     A_p q_p'' = -(a_a - a_b); then every link's inertia force and moment is projected on the unit motions of the
-    drives. Gravity is the base falling upwards.
+    independent coordinates. Gravity is the base falling upwards.
     """
-    rates, turning, per_drive = flow.rates, flow.joint_accelerations, work.rates
-    m, d, k = rates.size, mech.driven, mech.a.size
-    passive = m - d
+    rates, turning, per_unit = flow.rates, flow.joint_accelerations, work.rates
+    m, independent = rates.size, per_unit.shape[0]
     for u in range(m):
         total = 0.0
-        for s in range(d):
-            total += driven_rates[s] * per_drive[s, u]
+        for s in range(independent):
+            total += independent_rates[s] * per_unit[s, u]
         rates[u] = total
         turning[u] = 0.0
     # first with passive joints that do not accelerate: the closures then open by what these must make up for
     fill_accelerations(mech, work, gravity, flow)
-    if k > 0:
-        gaps, solution = work.gaps, work.solution
-        a, b, point_a, point_b = mech.a, mech.b, mech.point_a, mech.point_b
-        for c in range(k):
-            pa = point_acceleration(work, flow, gravity, a[c], point_a, design, c)
-            pb = point_acceleration(work, flow, gravity, b[c], point_b, design, c)
-            for x in range(3):
-                gaps[3 * c + x] = pb[x] - pa[x]
+    if mech.a.size > 0:
+        closing_accelerations(mech, design, work, flow, gravity)
         closure_step(mech, work)
-        for u in range(passive):
-            turning[u] = solution[0, u]
+        for u in range(m - independent):
+            turning[u] = mech.unit[design, u] * work.solution[0, u]
         fill_accelerations(mech, work, gravity, flow)
     _project(mech, design, work, flow, gravity, out)
 
@@ -154,13 +203,15 @@ def bias(
 def _project(
     mech: MechanismArrays, design: int, work: WorkingMemory, flow: LinkAccelerations, gravity: Floats, out: Floats
 ) -> None:
-    """Each link's inertia force m a and moment I alpha + w x I w on the unit motions of the drives."""
+    """Each link's inertia force m a and moment I alpha + w x I w on the unit motions of the independent
+    coordinates."""
     R, o, spin, speed = work.rotation, work.origin, work.spin, work.speed
     w, b = flow.angular_velocity, flow.angular_acceleration
     mass, center, I, k = mech.mass, mech.center_of_mass, mech.inertia, design
     for s in range(out.size):
         out[s] = 0.0
-    for i in range(mass.shape[1]):
+    for body in range(mech.bodies.size):
+        i = mech.bodies[body]
         p = link_point(R, o, i, center, k, i)
         a = point_acceleration(work, flow, gravity, i, center, k, i)
         rx, ry, rz = p[0] - o[i, 0], p[1] - o[i, 1], p[2] - o[i, 2]
@@ -188,13 +239,13 @@ def _project(
 
 @compiled
 def bias_batch(
-    mech: MechanismArrays, design: Ints, angles: Floats, driven_rates: Floats, gravity: Floats, out: Floats
+    mech: MechanismArrays, design: Ints, angles: Floats, independent_rates: Floats, gravity: Floats, out: Floats
 ) -> None:
-    """`bias` for each posture: design (N,), angles (N, n), driven_rates and out (N, d)."""
+    """`bias` for each posture: design (N,), angles (N, n), independent_rates and out (N, c)."""
     work, flow = working_memory(mech), new_link_accelerations(mech)
     for i in range(design.size):
         place_links(mech, design[i], angles[i], work)
-        equations(mech, design[i], work.goal, work)
-        passive_rates(mech, work)
+        equations(mech, design[i], work)
+        passive_rates(mech, design[i], work)
         unit_motions(mech, work)
-        bias(mech, design[i], work, flow, driven_rates[i], gravity, out[i])
+        bias(mech, design[i], work, flow, independent_rates[i], gravity, out[i])

@@ -1,9 +1,13 @@
 """Loop closures and the handle as one set of equations, and what follows from them: the passive rates.
 
-All three equations of every point closure are kept, and all three of the handle, and every system is solved
-by least squares. A planar loop then uses two of its three rows, a paddle with one drive one of the handle's,
-in any orientation of the base and without a choice of rows that could go bad elsewhere in the workspace;
-where the equations agree (a closed loop, a goal within reach) the least-squares solution is the exact one.
+All equations of every closure are kept, three of a point and six of an axis or a frame, and all of the handle, and
+every system is solved by least squares. A planar loop then uses two of its three rows, a paddle with one drive one
+of the handle's, in any orientation of the base and without a choice of rows that could go bad elsewhere in the
+workspace; where the equations agree (a closed loop, a goal within reach) the least-squares solution is the exact
+one.
+
+Rows and gaps of rotations are angles times the mechanism's size, so that all are lengths. Unknowns are solved for
+in their units (`MechanismArrays.unit`), so that all are of the size of angles.
 """
 
 from __future__ import annotations
@@ -11,28 +15,27 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.compiled import compiled_lean
-from zwidth.model.forward_kinematics import WorkingMemory, link_point
-from zwidth.model.mechanism import Floats, Ints
+from zwidth.model.forward_kinematics import WorkingMemory, fill_handle_axes, link_point, link_vector, move_joints
+from zwidth.model.mechanism import AXIS, ORIENTATION, POINT, POSITION, PRISMATIC, Floats, Ints
 from zwidth.model.mechanism_arrays import MechanismArrays
+from zwidth.model.rotations import vector_between, vector_between_axes
+
+Vector = tuple[float, float, float]
 
 
 @compiled_lean
-def chain_columns(
-    parent: Ints,
-    column: Ints,
-    axis: Floats,
-    origin: Floats,
-    rows: Floats,
-    link: int,
-    p: tuple[float, float, float],
-    row: int,
-    sign: float,
-) -> None:
-    """Add sign * z_j x (p - o_j) to the rows of point p for every unknown j between the base and the link."""
+def chain_columns(mech: MechanismArrays, work: WorkingMemory, link: int, p: Vector, row: int, sign: float) -> None:
+    """Add sign * d(point p of the link)/dq_j to three rows for every unknown j between the base and the link:
+    z_j x (p - o_j), of a prismatic joint z_j."""
+    parent, column, kind = mech.parent, mech.column, mech.kind
+    axis, origin, rows = work.axis, work.origin, work.rows
     i = link
     while i >= 0:
         u = column[i]
-        if u >= 0:
+        if u >= 0 and kind[i] == PRISMATIC:
+            for x in range(3):
+                rows[u, row + x] += sign * axis[i, x]
+        elif u >= 0:
             x, y, w = p[0] - origin[i, 0], p[1] - origin[i, 1], p[2] - origin[i, 2]
             rows[u, row] += sign * (axis[i, 1] * w - axis[i, 2] * y)
             rows[u, row + 1] += sign * (axis[i, 2] * x - axis[i, 0] * w)
@@ -41,36 +44,92 @@ def chain_columns(
 
 
 @compiled_lean
-def equations(mech: MechanismArrays, design: int, goal: Floats, work: WorkingMemory) -> None:
-    """Fill `rows` and `gaps` at the present place of the links: rows^T dq = gaps is Newton's step."""
-    R, o, z, rows, gaps = work.rotation, work.origin, work.axis, work.rows, work.gaps
-    parent, column, a, b, point_a, point_b = (
-        mech.parent,
-        mech.column,
-        mech.a,
-        mech.b,
-        mech.point_a,
-        mech.point_b,
-    )
-    k, end = a.size, gaps.size
-    for u in range(rows.shape[0]):
-        for r in range(end):
-            rows[u, r] = 0.0
-    for c in range(k):
-        pa = link_point(R, o, a[c], point_a, design, c)
-        pb = link_point(R, o, b[c], point_b, design, c)
-        gaps[3 * c], gaps[3 * c + 1], gaps[3 * c + 2] = pb[0] - pa[0], pb[1] - pa[1], pb[2] - pa[2]
-        chain_columns(parent, column, z, o, rows, a[c], pa, 3 * c, 1.0)
-        chain_columns(parent, column, z, o, rows, b[c], pb, 3 * c, -1.0)
-    h = link_point(R, o, mech.handle_link, mech.handle, design, 0)
-    gaps[3 * k], gaps[3 * k + 1], gaps[3 * k + 2] = goal[0] - h[0], goal[1] - h[1], goal[2] - h[2]
-    chain_columns(parent, column, z, o, rows, mech.handle_link, h, 3 * k, 1.0)
+def chain_turns(mech: MechanismArrays, work: WorkingMemory, link: int, row: int, scale: float, a: Vector) -> None:
+    """Add scale times the link's angular velocity per unit rate of every unknown to three rows, without its part
+    along a, a unit vector or 0."""
+    parent, column, kind, axis, rows = mech.parent, mech.column, mech.kind, work.axis, work.rows
+    i = link
+    while i >= 0:
+        u = column[i]
+        if u >= 0 and kind[i] != PRISMATIC:
+            along = axis[i, 0] * a[0] + axis[i, 1] * a[1] + axis[i, 2] * a[2]
+            for x in range(3):
+                rows[u, row + x] += scale * (axis[i, x] - along * a[x])
+        i = parent[i]
 
 
 @compiled_lean
-def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, rows: int, sides: int) -> float:
+def equations(mech: MechanismArrays, design: int, work: WorkingMemory) -> None:
+    """Fill `rows` and `gaps` at the present place of the links: rows^T dq = gaps is Newton's step to the goal."""
+    R, o, rows, gaps = work.rotation, work.origin, work.rows, work.gaps
+    a, b, point_a, point_b, first_row = mech.a, mech.b, mech.point_a, mech.point_b, mech.first_row
+    for u in range(rows.shape[0]):
+        for r in range(gaps.size):
+            rows[u, r] = 0.0
+    for c in range(a.size):
+        r = first_row[c]
+        pa = link_point(R, o, a[c], point_a, design, c)
+        pb = link_point(R, o, b[c], point_b, design, c)
+        gaps[r], gaps[r + 1], gaps[r + 2] = pb[0] - pa[0], pb[1] - pa[1], pb[2] - pa[2]
+        chain_columns(mech, work, a[c], pa, r, 1.0)
+        chain_columns(mech, work, b[c], pb, r, -1.0)
+        if mech.closing[c] != POINT:
+            closing_turn(mech, design, c, work)
+    _handle_equations(mech, design, first_row[a.size], work)
+
+
+@compiled_lean
+def closing_turn(mech: MechanismArrays, design: int, c: int, work: WorkingMemory) -> None:
+    """Fill three more rows of closure c: the turn of link a after which its axis is parallel to that of b, or its
+    frame stands to that of b as it should."""
+    R, gaps, size, r = work.rotation, work.gaps, mech.size[design], mech.first_row[c] + 3
+    a, b = mech.a[c], mech.b[c]
+    along = (0.0, 0.0, 0.0)
+    if mech.closing[c] == AXIS:
+        along = link_vector(R, a, mech.axis_a, design, c)
+        turn = vector_between_axes(along, link_vector(R, b, mech.axis_b, design, c))
+    else:
+        A, B, Q = work.turn, work.other, mech.closing_rotation
+        for x in range(3):
+            for y in range(3):
+                A[x, y], B[x, y] = Q[design, c, x, y], 1.0 if x == y else 0.0
+                if a >= 0:
+                    A[x, y] = R[a, x, 0] * Q[design, c, 0, y] + R[a, x, 1] * Q[design, c, 1, y]
+                    A[x, y] += R[a, x, 2] * Q[design, c, 2, y]
+                if b >= 0:
+                    B[x, y] = R[b, x, y]
+        turn = vector_between(A, B)
+    for x in range(3):
+        gaps[r + x] = size * turn[x]
+    chain_turns(mech, work, a, r, size, along)
+    chain_turns(mech, work, b, r, -size, along)
+
+
+@compiled_lean
+def _handle_equations(mech: MechanismArrays, design: int, r: int, work: WorkingMemory) -> None:
+    """The handle's rows from r on: its position, its orientation, or both."""
+    gaps, goal, link = work.gaps, work.goal, mech.handle_link
+    if mech.controls != ORIENTATION:
+        h = link_point(work.rotation, work.origin, link, mech.handle, design, 0)
+        gaps[r], gaps[r + 1], gaps[r + 2] = goal[0] - h[0], goal[1] - h[1], goal[2] - h[2]
+        chain_columns(mech, work, link, h, r, 1.0)
+        r += 3
+    if mech.controls != POSITION:
+        fill_handle_axes(mech, design, work, work.turn)
+        turn = vector_between(work.turn, work.goal_rotation)
+        for x in range(3):
+            gaps[r + x] = mech.size[design] * turn[x]
+        chain_turns(mech, work, link, r, mech.size[design], (0.0, 0.0, 0.0))
+
+
+@compiled_lean
+def least_squares(
+    Q: Floats, R: Floats, b: Floats, x: Floats, spans: Ints, unknowns: int, rows: int, sides: int
+) -> float:
     """Minimise |Q^T x_s - b_s| for each of the first right-hand sides s, by modified Gram-Schmidt.
 
+    spans (m, 2)  first row and end of the rows of each line of Q that are not 0, also after lines before it are
+                  taken away; beyond `rows` they do not count
     Q  (m, ...)  the first `unknowns` lines hold the columns of the matrix; left orthogonal, not normalised
     R  (m, m)    filled: R_jj the squared length of line j, R_ji the part of column i along it
     b  (s, ...)  right-hand sides, overwritten;   x  (s, m)  solutions, filled
@@ -80,7 +139,8 @@ def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, row
     shortest, longest = np.inf, 0.0
     for j in range(unknowns):
         left, taken = 0.0, 0.0
-        for r in range(rows):
+        first, end = spans[j, 0], min(spans[j, 1], rows)
+        for r in range(first, end):
             left += Q[j, r] * Q[j, r]
         for i in range(j):
             # with what columns before have taken away, this is the column's original length
@@ -91,19 +151,19 @@ def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, row
         R[j, j] = left
         for i in range(j + 1, unknowns):
             part = 0.0
-            for r in range(rows):
+            for r in range(first, end):
                 part += Q[j, r] * Q[i, r]
             part *= scale
             R[j, i] = part
-            for r in range(rows):
+            for r in range(first, end):
                 Q[i, r] -= part * Q[j, r]
         for s in range(sides):
             part = 0.0
-            for r in range(rows):
+            for r in range(first, end):
                 part += Q[j, r] * b[s, r]
             part *= scale
             x[s, j] = part
-            for r in range(rows):
+            for r in range(first, end):
                 b[s, r] -= part * Q[j, r]
     for s in range(sides):
         for j in range(unknowns - 1, -1, -1):
@@ -115,67 +175,110 @@ def least_squares(Q: Floats, R: Floats, b: Floats, x: Floats, unknowns: int, row
 
 
 @compiled_lean
-def newton_step(mech: MechanismArrays, work: WorkingMemory) -> float:
-    """The step of all unknowns towards the goal, in `work.solution[0]`; returns the reciprocal condition."""
-    basis, rows, sides, gaps = work.basis, work.rows, work.sides, work.gaps
+def newton_step(mech: MechanismArrays, design: int, work: WorkingMemory) -> float:
+    """The step towards the goal of all unknowns but the free ones, in their units, in `work.solution[0]`; returns
+    the reciprocal condition."""
+    basis, rows, sides, gaps, unit = work.basis, work.rows, work.sides, work.gaps, mech.unit
     m, count = rows.shape[0], gaps.size
-    for u in range(m):
+    moved = m - mech.free
+    for u in range(moved):
         for r in range(count):
-            basis[u, r] = rows[u, r]
+            basis[u, r] = unit[design, u] * rows[u, r]
     for r in range(count):
         sides[0, r] = gaps[r]
-    return least_squares(basis, work.triangle, sides, work.solution, m, count, 1)
-
-
-@compiled_lean
-def passive_rates(mech: MechanismArrays, work: WorkingMemory) -> float:
-    """Fill `rates`: dq/dp of all unknowns with respect to the drives; returns the reciprocal condition.
-
-    A_p q_p' = -A_d p'   with the closure rows A = [A_p | A_d]   (thesis eq. B.6 and B.18, for any loops)
-    """
-    basis, rows, sides, solution, rates = work.basis, work.rows, work.sides, work.solution, work.rates
-    d, count = mech.driven, 3 * mech.a.size
-    passive = rows.shape[0] - d
-    for u in range(passive):
-        for r in range(count):
-            basis[u, r] = rows[u, r]
-    for s in range(d):
-        for r in range(count):
-            sides[s, r] = -rows[passive + s, r]
-    condition = least_squares(basis, work.triangle, sides, solution, passive, count, d)
-    for s in range(d):
-        for u in range(passive):
-            rates[s, u] = solution[s, u]
-        for u in range(d):
-            rates[s, passive + u] = 1.0 if u == s else 0.0
+    condition = least_squares(basis, work.triangle, sides, work.solution, mech.filled, moved, count, 1)
+    for u in range(moved, m):
+        work.solution[0, u] = 0.0
     return condition
 
 
 @compiled_lean
+def apply_step(mech: MechanismArrays, design: int, angles: Floats, work: WorkingMemory) -> None:
+    """Add the step in `work.solution[0]`, which is in the unknowns' units, to the joint coordinates."""
+    step = work.solution[0]
+    for u in range(step.size):
+        step[u] *= mech.unit[design, u]
+    move_joints(mech, angles, step)
+
+
+@compiled_lean
+def passive_rates(mech: MechanismArrays, design: int, work: WorkingMemory) -> float:
+    """Fill `rates`: dq/dp of all unknowns per coordinate of the drives and free joints; returns the reciprocal
+    condition.
+
+    A_p q_p' = -A_i p'   with the closure rows A = [A_p | A_i]   (thesis eq. B.6 and B.18, for any loops)
+    """
+    basis, rows, sides, solution, rates, unit = (
+        work.basis,
+        work.rows,
+        work.sides,
+        work.solution,
+        work.rates,
+        mech.unit,
+    )
+    c, count = rates.shape[0], mech.first_row[mech.a.size]
+    passive = rows.shape[0] - c
+    for u in range(passive):
+        for r in range(count):
+            basis[u, r] = unit[design, u] * rows[u, r]
+    for s in range(c):
+        for r in range(count):
+            sides[s, r] = -rows[passive + s, r]
+    condition = least_squares(basis, work.triangle, sides, solution, mech.filled, passive, count, c)
+    for s in range(c):
+        for u in range(passive):
+            rates[s, u] = unit[design, u] * solution[s, u]
+        for u in range(c):
+            rates[s, passive + u] = 1.0 if u == s else 0.0
+    if mech.coupled:
+        _rates_per_drive(mech, design, work)
+    return condition
+
+
+@compiled_lean
+def _rates_per_drive(mech: MechanismArrays, design: int, work: WorkingMemory) -> None:
+    """Turn rates per independent joint into those per drive and free joint."""
+    rates, before, G = work.rates, work.solution, mech.to_joint
+    for s in range(rates.shape[0]):
+        for u in range(rates.shape[1]):
+            before[s, u] = rates[s, u]
+    for s in range(rates.shape[0]):
+        for u in range(rates.shape[1]):
+            rates[s, u] = 0.0
+            for t in range(rates.shape[0]):
+                rates[s, u] += G[design, t, s] * before[t, u]
+
+
+@compiled_lean
 def closure_step(mech: MechanismArrays, work: WorkingMemory) -> float:
-    """Step of the passive joints alone that closes the loops, from the basis `passive_rates` left; its
-    largest turn.
+    """Step of the passive unknowns alone that closes the loops, in their units, from the basis `passive_rates`
+    left; its largest part.
 
     The orthogonal basis and the triangle still stand, so that only the new right-hand side is worked through.
     """
-    passive, rows = mech.joint.size - mech.driven, 3 * mech.a.size
-    Q, R, x = work.basis, work.triangle, work.solution
+    m, rows = mech.joint.size, mech.first_row[mech.a.size]
+    passive = m - work.rates.shape[0]
+    Q, R, x, spans = work.basis, work.triangle, work.solution, mech.filled
     for j in range(passive):
         x[0, j] = 0.0
-        for r in range(rows):
+        for r in range(spans[j, 0], min(spans[j, 1], rows)):
             x[0, j] += Q[j, r] * work.gaps[r] / R[j, j]
     most = 0.0
     for j in range(passive - 1, -1, -1):
         for i in range(j + 1, passive):
             x[0, j] -= R[j, i] * x[0, i]
         most = max(most, abs(x[0, j]))
+    for j in range(passive, m):
+        x[0, j] = 0.0
     return most
 
 
 @compiled_lean
-def orientation(start: Floats, rows: Floats, G: Floats, unknowns: int, count: int) -> float:
+def orientation(start: Floats, rows: Floats, G: Floats, spans: Ints, unknowns: int, count: int) -> float:
     """det(start^T rows) over the first unknowns and `count` equations, G (m, m) being scratch: it changes
     sign across a singularity.
+
+    spans (m, 2)  first row and end of the rows of each line that are not 0
 
     For square systems it is the product of the two determinants; products of rectangular ones stay positive
     while the column space turns by less than a right angle.
@@ -183,7 +286,7 @@ def orientation(start: Floats, rows: Floats, G: Floats, unknowns: int, count: in
     for i in range(unknowns):
         for j in range(unknowns):
             part = 0.0
-            for r in range(count):
+            for r in range(max(spans[i, 0], spans[j, 0]), min(spans[i, 1], spans[j, 1], count)):
                 part += start[i, r] * rows[j, r]
             G[i, j] = part
     # Gauss with row exchanges, each of which turns the sign
@@ -201,6 +304,8 @@ def orientation(start: Floats, rows: Floats, G: Floats, unknowns: int, count: in
                 G[j, c], G[pivot, c] = G[pivot, c], G[j, c]
         determinant *= G[j, j]
         for i in range(j + 1, unknowns):
+            if G[i, j] == 0.0:  # unknowns of different loops have nothing to do with each other
+                continue
             factor = G[i, j] / G[j, j]
             for c in range(j + 1, unknowns):
                 G[i, c] -= factor * G[j, c]

@@ -14,21 +14,37 @@ from typing import Final
 import numpy as np
 
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.model.closure import equations, least_squares, newton_step, orientation, passive_rates
-from zwidth.model.forward_kinematics import WorkingMemory, link_point, place_links, working_memory
-from zwidth.model.mechanism import Floats, Ints
+from zwidth.model.closure import (
+    apply_step,
+    equations,
+    least_squares,
+    newton_step,
+    orientation,
+    passive_rates,
+)
+from zwidth.model.forward_kinematics import (
+    WorkingMemory,
+    fill_handle_axes,
+    link_point,
+    place_links,
+    working_memory,
+)
+from zwidth.model.mechanism import ORIENTATION, POSITION, PRISMATIC, REVOLUTE, Floats, Ints
 from zwidth.model.mechanism_arrays import MechanismArrays
+from zwidth.model.rotations import fill_rotation, vector_between
 
 OK: Final = 0
 OUT_OF_REACH: Final = 1
 SINGULAR: Final = 2
+BEYOND_LIMIT: Final = 6  # there is a posture, but in it a joint is beyond its limit
 
 CONTRACTION: Final = 0.55  # of one correction by the next; on the edge of the workspace Newton gains a half each
-LARGEST_TURN: Final = 0.5  # of one joint in one step [rad]
+LARGEST_TURN: Final = 0.5  # of one joint in one step, in its unit [rad]
 SMALLEST_STEP: Final = 2.0**-7  # of the straight way to the goal
 SINGULAR_CONDITION: Final = 1e-6  # below it the numbers of a posture lose their last ten digits
 CLOSURE_TOLERANCE: Final = 1e-11  # a gap is closed below this part of the mechanism's size
 ASSEMBLY_TOLERANCE: Final = 1e-9  # the same, for postures to start from
+LIMIT_TOLERANCE: Final = 1e-12  # beyond which a joint is beyond its limit [rad], or of the mechanism's size
 ROUNDING: Final = 1e-15
 
 
@@ -44,17 +60,19 @@ def largest_magnitude(values: Floats, count: int) -> float:
 
 
 @compiled_lean
-def apply_step(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> None:
-    """Add the step in `work.solution[0]` to the joint angles."""
-    joint, solution = mech.joint, work.solution
-    for u in range(joint.size):
-        angles[joint[u]] += solution[0, u]
+def set_goal(mech: MechanismArrays, goals: Floats, i: int, work: WorkingMemory) -> None:
+    """Goal i of (N, g): the handle's position [m], the vector of its orientation [rad], or one after the other."""
+    g = 0
+    if mech.controls != ORIENTATION:
+        for x in range(3):
+            work.goal[x] = goals[i, x]
+        g = 3
+    if mech.controls != POSITION:
+        fill_rotation(goals[i, g], goals[i, g + 1], goals[i, g + 2], work.goal_rotation)
 
 
 @compiled_lean
-def correct(
-    mech: MechanismArrays, design: int, goal: Floats, angles: Floats, tolerance: float, work: WorkingMemory
-) -> float:
+def correct(mech: MechanismArrays, design: int, angles: Floats, tolerance: float, work: WorkingMemory) -> float:
     """Newton from `angles` (in place) to the goal; the last reciprocal condition, or -1 where it left the
     branch.
 
@@ -66,23 +84,23 @@ def correct(
     last, moved, condition = 0.0, 0.0, 0.0
     for iteration in range(60):
         place_links(mech, design, angles, work)
-        equations(mech, design, goal, work)
+        equations(mech, design, work)
         if iteration == 0:
             keep_rows(work)
-        condition = newton_step(mech, work)
+        condition = newton_step(mech, design, work)
         size = largest_magnitude(solution[0], m)
         moved += size
         settled = largest_magnitude(gaps, count) < rounding
         if not settled and (not moved < LARGEST_TURN or (iteration > 0 and size > CONTRACTION * last)):
             return -1.0
         if not settled or size < last:
-            apply_step(mech, angles, work)
+            apply_step(mech, design, angles, work)
         ratio = size / last if last > 0.0 else 1.0
         if settled or size * ratio * ratio < tolerance:
             break
         last = size
     place_links(mech, design, angles, work)
-    equations(mech, design, goal, work)
+    equations(mech, design, work)
     # Newton may pass a singularity without slowing down: it knows nothing of the drives, and an arm that goes
     # straight over its back does not feel the direction it has lost
     return -1.0 if has_turned(mech, work) else condition
@@ -92,10 +110,11 @@ def correct(
 def has_turned(mech: MechanismArrays, work: WorkingMemory) -> bool:
     """Whether the drives or the handle act the other way round in `rows` than in `start`: a singularity lies
     between."""
-    start, rows, count, m = work.start, work.rows, work.gaps.size, work.rows.shape[0]
-    if orientation(start, rows, work.triangle, m - mech.driven, count - 3) < 0.0:
+    start, rows, count, moved = work.start, work.rows, work.gaps.size, work.rows.shape[0] - mech.free
+    loops = mech.first_row[mech.a.size]
+    if orientation(start, rows, work.triangle, mech.spans, moved - mech.driven, loops) < 0.0:
         return True
-    return bool(orientation(start, rows, work.triangle, m, count) < 0.0)
+    return bool(orientation(start, rows, work.triangle, mech.spans, moved, count) < 0.0)
 
 
 @compiled_lean
@@ -108,30 +127,31 @@ def keep_rows(work: WorkingMemory) -> None:
 
 
 @compiled_lean
-def follow(mech: MechanismArrays, design: int, target: Floats, angles: Floats, work: WorkingMemory) -> int:
-    """Take the mechanism from its posture `angles` (in place) straight to the target; OK, OUT_OF_REACH or
-    SINGULAR.
+def follow(
+    mech: MechanismArrays, design: int, targets: Floats, target: int, angles: Floats, work: WorkingMemory
+) -> int:
+    """Take the mechanism from its posture `angles` (in place) straight to a target; OK, OUT_OF_REACH or SINGULAR.
 
-    Where all goes well this is one call of `correct`, as from a neighbouring posture. The links stand at the
-    target afterwards and `rows`, `gaps` and `rates` belong to it.
+    Straight: the position on a line, the orientation about one axis. Where all goes well this is one call of
+    `correct`, as from a neighbouring posture. The links stand at the target afterwards and `rows`, `gaps` and
+    `rates` belong to it.
     """
-    goal, trial = work.goal, work.trial
-    n = trial.size
-    begin = (0.0, 0.0, 0.0)
+    trial, n = work.trial, work.trial.size
+    begin, turn = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     done, step, condition = 0.0, 1.0, 1.0
     while done < 1.0:
         step = min(step, 1.0 - done)
         # positions on the way need less accuracy than the target
         final = done + step >= 1.0
-        for x in range(3):
-            goal[x] = target[x] if final else begin[x] + (done + step) * (target[x] - begin[x])
+        set_goal(mech, targets, target, work)
+        if not final:
+            _step_back(work, begin, turn, 1.0 - (done + step))
         for i in range(n):
             trial[i] = angles[i]
-        condition = correct(mech, design, goal, trial, 1e-13 if final else 1e-6, work)
+        condition = correct(mech, design, trial, 1e-13 if final else 1e-6, work)
         if condition < 0.0:
             if done == 0.0 and step == 1.0:
-                place_links(mech, design, angles, work)
-                begin = link_point(work.rotation, work.origin, mech.handle_link, mech.handle, design, 0)
+                begin, turn = _way_from(mech, design, targets, target, angles, work)
             # Newton's method has left the branch or not converged: a nearer goal on the straight line is tried
             step *= 0.5
             if step < SMALLEST_STEP:
@@ -144,14 +164,61 @@ def follow(mech: MechanismArrays, design: int, target: Floats, angles: Floats, w
     # written so that nan counts as out of reach
     if not largest_magnitude(work.gaps, work.gaps.size) <= CLOSURE_TOLERANCE * mech.size[design]:
         return OUT_OF_REACH
-    condition = min(condition, passive_rates(mech, work))
+    condition = min(condition, passive_rates(mech, design, work))
     return SINGULAR if condition < SINGULAR_CONDITION else OK
+
+
+@compiled_lean
+def _way_from(
+    mech: MechanismArrays, design: int, targets: Floats, target: int, angles: Floats, work: WorkingMemory
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Where the handle is at joint coordinates [m], and the turn from there to the target's orientation [rad]."""
+    place_links(mech, design, angles, work)
+    fill_handle_axes(mech, design, work, work.turn)
+    set_goal(mech, targets, target, work)
+    here = link_point(work.rotation, work.origin, mech.handle_link, mech.handle, design, 0)
+    return here, vector_between(work.turn, work.goal_rotation)
+
+
+@compiled_lean
+def _step_back(
+    work: WorkingMemory, begin: tuple[float, float, float], turn: tuple[float, float, float], share: float
+) -> None:
+    """Move the goal back by a share of the way that led to it from `begin`, by `turn`."""
+    goal, axes, back, old = work.goal, work.goal_rotation, work.turn, work.other
+    for x in range(3):
+        goal[x] += share * (begin[x] - goal[x])
+    fill_rotation(-share * turn[0], -share * turn[1], -share * turn[2], back)
+    for x in range(3):
+        for y in range(3):
+            old[x, y] = axes[x, y]
+    for x in range(3):
+        for y in range(3):
+            axes[x, y] = back[x, 0] * old[0, y] + back[x, 1] * old[1, y] + back[x, 2] * old[2, y]
+
+
+@compiled_lean
+def joint_beyond_limit(mech: MechanismArrays, design: int, angles: Floats) -> int:
+    """The first link whose joint is beyond its limits at joint coordinates (n,); -1 if there is none. Of an angle,
+    a turn more or less is the same."""
+    lower, upper, kind = mech.lower, mech.upper, mech.kind
+    for i in range(kind.size):
+        low, high = lower[design, i], upper[design, i]
+        if low == -np.inf and high == np.inf:
+            continue
+        beyond = max(low - angles[i], angles[i] - high)
+        if kind[i] == REVOLUTE and beyond > 0.0:
+            turns = np.ceil((low - angles[i]) / (2.0 * np.pi) - ROUNDING)
+            beyond = angles[i] + 2.0 * np.pi * turns - high
+        if beyond > LIMIT_TOLERANCE * (mech.size[design] if kind[i] == PRISMATIC else 1.0):
+            return i
+    return -1
 
 
 @compiled
 def reference_batch(mech: MechanismArrays, goals: Floats, angles: Floats, gaps: Floats) -> None:
     """The posture of each design that an assembly's rough angles (P, n) stand for (in place): with the handle at
-    goals (P, 3), or wherever the loops close first.
+    goals (P, g), see `set_goal`, or wherever the loops close first.
 
     That is not at the goal where it cannot be, nor where a singularity lies between: there an arm whose elbow is
     on its right would get one on its left.
@@ -163,20 +230,21 @@ def reference_batch(mech: MechanismArrays, goals: Floats, angles: Floats, gaps: 
         for j in range(present.size):
             present[j] = rough[j] = angles[i, j]
         place_links(mech, i, present, work)
-        equations(mech, i, goals[i], work)
+        set_goal(mech, goals, i, work)
+        equations(mech, i, work)
         keep_rows(work)
-        assemble(mech, i, goals[i], True, present, work)
+        assemble(mech, i, True, present, work)
         held = _is_closed(mech, i, work, work.gaps.size)
         if held:
-            _keep_posture(work, angles[i], gaps[i])
+            _keep_posture(mech, work, angles[i], gaps[i])
             if not has_turned(mech, work):
                 continue
             keep_rows(work)
         for j in range(present.size):
             present[j] = rough[j]
-        assemble(mech, i, goals[i], False, present, work)
-        if not held or (_is_closed(mech, i, work, work.gaps.size - 3) and has_turned(mech, work)):
-            _keep_posture(work, angles[i], gaps[i])
+        assemble(mech, i, False, present, work)
+        if not held or (_is_closed(mech, i, work, mech.first_row[mech.a.size]) and has_turned(mech, work)):
+            _keep_posture(mech, work, angles[i], gaps[i])
 
 
 @compiled
@@ -190,8 +258,8 @@ def assemble_batch(mech: MechanismArrays, design: Ints, angles: Floats, gaps: Fl
     for i in range(design.size):
         for j in range(present.size):
             present[j] = angles[i, j]
-        assemble(mech, design[i], work.goal, False, present, work)
-        _keep_posture(work, angles[i], gaps[i])
+        assemble(mech, design[i], False, present, work)
+        _keep_posture(mech, work, angles[i], gaps[i])
 
 
 @compiled_lean
@@ -201,34 +269,34 @@ def _is_closed(mech: MechanismArrays, design: int, work: WorkingMemory, count: i
 
 
 @compiled_lean
-def _keep_posture(work: WorkingMemory, angles: Floats, gaps: Floats) -> None:
+def _keep_posture(mech: MechanismArrays, work: WorkingMemory, angles: Floats, gaps: Floats) -> None:
     """Copy the angles (n,), and what remains open of each loop (k,) [m]."""
-    present, left = work.angles, work.gaps
+    present, left, first = work.angles, work.gaps, mech.first_row
     for j in range(present.size):
         angles[j] = present[j]
     for c in range(gaps.size):
-        x, y, z = left[3 * c], left[3 * c + 1], left[3 * c + 2]
-        gaps[c] = np.sqrt(x * x + y * y + z * z)
+        square = 0.0
+        for r in range(first[c], first[c + 1]):
+            square += left[r] * left[r]
+        gaps[c] = np.sqrt(square)
 
 
 @compiled_lean
-def assemble(
-    mech: MechanismArrays, design: int, goal: Floats, hold: bool, angles: Floats, work: WorkingMemory
-) -> None:
-    """Close one design's loops, by Levenberg-Marquardt.
+def assemble(mech: MechanismArrays, design: int, hold: bool, angles: Floats, work: WorkingMemory) -> None:
+    """Close one design's loops, by Levenberg-Marquardt; with `hold` the handle at the goal, too.
 
     The damping rows keep the step small while the start is rough, and let the handle go where it must when
     only the loops count.
     """
-    rows, gaps, basis, sides, trial = work.rows, work.gaps, work.basis, work.sides, work.trial
-    m = rows.shape[0]
-    count = gaps.size if hold else gaps.size - 3
+    rows, gaps, basis, sides, trial, unit = work.rows, work.gaps, work.basis, work.sides, work.trial, mech.unit
+    m = rows.shape[0] - mech.free
+    count = gaps.size if hold else mech.first_row[mech.a.size]
     damping, error = 1e-3, np.inf
     for j in range(trial.size):
         trial[j] = angles[j]
     for _ in range(300):
         place_links(mech, design, trial, work)
-        equations(mech, design, goal, work)
+        equations(mech, design, work)
         trial_error = 0.0
         for r in range(count):
             trial_error += gaps[r] * gaps[r]
@@ -243,20 +311,22 @@ def assemble(
             if damping > 1e3:
                 break
             place_links(mech, design, angles, work)
-            equations(mech, design, goal, work)
+            equations(mech, design, work)
         for u in range(m):
             for r in range(count):
-                basis[u, r] = rows[u, r]
+                basis[u, r] = unit[design, u] * rows[u, r]
             for r in range(m):
                 # angles are damped in units of the device's size, as the gaps are lengths
                 basis[u, count + r] = np.sqrt(damping) * mech.size[design] if r == u else 0.0
         for r in range(count + m):
             sides[0, r] = gaps[r] if r < count else 0.0
-        least_squares(basis, work.triangle, sides, work.solution, m, count + m, 1)
+        least_squares(basis, work.triangle, sides, work.solution, mech.whole, m, count + m, 1)
         if largest_magnitude(work.solution[0], m) < 1e-15:
             break
+        for u in range(m, rows.shape[0]):
+            work.solution[0, u] = 0.0
         for j in range(trial.size):
             trial[j] = angles[j]
-        apply_step(mech, trial, work)
+        apply_step(mech, design, trial, work)
     place_links(mech, design, angles, work)
-    equations(mech, design, goal, work)
+    equations(mech, design, work)

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from zwidth.compiled import compiled
+from zwidth.model.drive_side import DriveSide, drive_side, is_plain
 from zwidth.model.mechanism import Floats, Ints, Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.posture import Posture
+
+Marks = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -32,33 +35,107 @@ class EffectiveParameters:
 
 
 def effective_parameters(mechanism: Mechanism, posture: Posture, direction: ArrayLike) -> EffectiveParameters:
-    """Effective masses and stiffness of a mechanism along a direction.
+    """Effective masses and stiffness of a mechanism along a direction, or about an axis (then inertias [kg m^2]
+    and N m/rad).
 
-    direction  (..., 3)  unit vectors in the base frame, broadcasting with the posture
+    With drives that are no coordinates of their own (`drive_side`): motor_side_mass 1 / (t^T M_theta^-1 t);
+    rigid_mass with M_phi + T^T M_theta T + C T + T^T C^T; stiffness 1 / (h^T (T^T K T)^-1 h) on the drives'
+    coordinates.
+
+    direction  (..., 3)  unit vectors in the base frame, broadcasting with the posture; or (..., 6), see `screw`
     Raises     ValueError  if a direction is not of unit length
     """
-    u = unit_directions(direction)
+    u = screw(direction)
     drives = mechanism.drives
     ratio = per_design(mechanism, drives.transmission, 1)
     rotor = ratio**2 * per_design(mechanism, drives.motor_inertia, 1)
     spring = ratio**2 * per_design(mechanism, drives.stiffness, 1)
     shape = np.broadcast_shapes(posture.status.shape, u.shape[:-1])
-    design = design_of_each(mechanism, shape)
-    d = rotor.shape[1]
-    M = np.array(np.broadcast_to(posture.mass_matrix, (*shape, d, d)).reshape(-1, d, d), order="C")
-    J = np.array(np.broadcast_to(posture.jacobian, (*shape, 3, d)).reshape(-1, 3, d), order="C")
-    along = np.array(np.broadcast_to(u, (*shape, 3)).reshape(-1, 3), order="C")
+    design, c = design_of_each(mechanism, shape), posture.mass_matrix.shape[-1]
+    M = np.array(np.broadcast_to(posture.mass_matrix, (*shape, c, c)).reshape(-1, c, c), order="C")
+    h = np.array(np.broadcast_to(lever_arms(posture, u), (*shape, c)).reshape(-1, c), order="C")
+    if not is_plain(mechanism):
+        side = drive_side(mechanism, posture)
+        spun = None if side.spin is None else (ratio * per_design(mechanism, drives.motor_inertia, 1))[design]
+        return _effective_in_general(side, M, h, rotor[design], spring[design], spun, shape)
     out = np.empty((4, len(M)))
-    _effective_batch(design, M, J, along, np.ascontiguousarray(rotor), np.ascontiguousarray(spring), out)
+    _effective_batch(design, M, h, np.ascontiguousarray(rotor), np.ascontiguousarray(spring), out)
     return EffectiveParameters(*(row.reshape(shape) for row in out))
 
 
-def unit_direction(direction: ArrayLike) -> Floats:
-    """The direction as an array (3,), checked to be of unit length."""
+def lever_arms(posture: Posture, screws: Floats) -> Floats:
+    """h (..., c): motion along screws (..., 6) per unit rate of each independent coordinate, J^T u + J_w^T w."""
+    h = np.einsum("...i,...id->...d", screws[..., :3], posture.jacobian)
+    if np.any(screws[..., 3:]):
+        h = h + np.einsum("...i,...id->...d", screws[..., 3:], posture.angular_jacobian)
+    return np.asarray(h)
+
+
+def screw(direction: ArrayLike) -> Floats:
+    """A direction as the screw (..., 6) along which forces act: [u, w] is the force u f and the moment w f.
+
+    direction  (..., 3)  a unit vector u, w being 0; or (..., 6) such a screw: [0, w] with a unit vector w is the
+                         axis of a moment, and a mixed screw has |u|^2 + |w|^2/L^2 = 1 with a characteristic length
+                         L
+    Raises     ValueError  for a direction of three components that is not of unit length, or one without length
+    """
+    given = np.asarray(direction, dtype=np.float64)
+    if given.ndim and given.shape[-1] == 6:
+        if not np.all(np.abs(given).max(axis=-1) > 0.0) or not np.isfinite(given).all():
+            raise ValueError(f"a screw needs a finite component that is not 0, got {given.tolist()}")
+        return given
     u = unit_directions(direction)
-    if u.shape != (3,):
-        raise ValueError(f"a rendered direction has three components, got an array of shape {u.shape}")
-    return u
+    return np.concatenate([u, np.zeros_like(u)], axis=-1)
+
+
+def _effective_in_general(
+    side: DriveSide,
+    M: Floats,
+    h: Floats,
+    rotor: Floats,
+    spring: Floats,
+    spun: Floats | None,
+    shape: tuple[int, ...],
+) -> EffectiveParameters:
+    """The four numbers where drives are not the coordinates: N postures, rotors and springs (N, d) at the joints,
+    spun (N, d) J_m n of rotors whose turning with their links counts."""
+    N, c = h.shape
+    T = np.broadcast_to(side.motion, (*shape, *side.motion.shape[-2:])).reshape(N, -1, c)
+    t = side.shares(np.reshape(h, (*shape, c))).reshape(N, -1)
+    whole = M + np.swapaxes(T, 1, 2) @ (rotor[..., None] * T)
+    if side.spin is not None and spun is not None:
+        cross = np.swapaxes(T, 1, 2) @ (
+            spun[..., None] * np.broadcast_to(side.spin, (*shape, *T.shape[1:])).reshape(T.shape)
+        )
+        whole = whole + cross + np.swapaxes(cross, 1, 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        link, rigid = (1.0 / np.einsum("ki,ki->k", h, _solve(A, h)) for A in (M, whole))
+        motor = 1.0 / (t**2 / rotor).sum(axis=1)
+        stiffness = 1.0 / _compliance(T[..., : side.driven], spring, h[:, : side.driven])
+    return EffectiveParameters(*(np.asarray(x).reshape(shape) for x in (link, motor, rigid, stiffness)))
+
+
+def _solve(A: Floats, h: Floats) -> Floats:
+    """A^-1 h of each (N, c); nan where A holds nan."""
+    unknown: Marks = np.asarray(np.isnan(A).any(axis=(1, 2)))
+    known: Floats = np.where(unknown[:, None, None], np.eye(A.shape[1]), A)
+    solved = np.linalg.solve(known, h[..., None])[..., 0]
+    return np.asarray(np.where(unknown[:, None], np.nan, solved))
+
+
+def _compliance(T: Floats, spring: Floats, h: Floats) -> Floats:
+    """h^T (T^T K T)^-1 h (N,) with rigid drives in the limit: they leave the motions N of T_r N = 0."""
+    out = np.full(len(h), np.nan)
+    for k in np.flatnonzero(~np.isnan(T).any(axis=(1, 2))):
+        flexible = np.isfinite(spring[k])
+        motions = np.eye(T.shape[2])
+        if not flexible.all():
+            _, values, rows = np.linalg.svd(T[k][~flexible])
+            motions = rows[int(np.sum(values > 1e-12 * values[0])) :].T
+        moved = T[k][flexible] @ motions
+        A, b = moved.T @ (spring[k][flexible, None] * moved), motions.T @ h[k]
+        out[k] = b @ np.linalg.solve(A, b) if len(b) else 0.0
+    return out
 
 
 def unit_directions(directions: ArrayLike) -> Floats:
@@ -92,22 +169,19 @@ def inverse_form(A: Floats, h: Floats, d: int) -> float:
 
 
 @compiled
-def _effective_batch(
-    design: Ints, M: Floats, J: Floats, u: Floats, rotor: Floats, spring: Floats, out: Floats
-) -> None:
-    """The four numbers of `EffectiveParameters` for each posture, out (4, N)."""
+def _effective_batch(design: Ints, M: Floats, along: Floats, rotor: Floats, spring: Floats, out: Floats) -> None:
+    """The four numbers of `EffectiveParameters` for each posture, of lever arms (N, d), out (4, N)."""
     d = rotor.shape[1]
-    h, left, A = np.zeros(d), np.zeros(d), np.zeros((d, d))
+    left, A = np.zeros(d), np.zeros((d, d))
     for i in range(design.size):
         p = design[i]
         motor, compliance = 0.0, 0.0
         for s in range(d):
-            h[s] = u[i, 0] * J[i, 0, s] + u[i, 1] * J[i, 1, s] + u[i, 2] * J[i, 2, s]
-            motor += h[s] * h[s] / rotor[p, s]
-            compliance += h[s] * h[s] / spring[p, s]
+            motor += along[i, s] * along[i, s] / rotor[p, s]
+            compliance += along[i, s] * along[i, s] / spring[p, s]
         for both in range(2):
             for s in range(d):
-                left[s] = h[s]
+                left[s] = along[i, s]
                 for t in range(d):
                     A[s, t] = M[i, s, t]
                 if both == 1:

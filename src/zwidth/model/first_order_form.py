@@ -17,6 +17,7 @@ Complexes = NDArray[np.complex128]
 SHARED = 1e-3
 ZERO = 1e-13  # a pole below this share of the largest is a rounded zero
 UNREAD = 1e-12  # share of a sensor's reading that is rounding
+SECOND_UNREAD = 1e-10  # what a second reading, of a force per force, may show of an undamped motion that is hidden
 ROUNDING = 1e-13  # of a residue, in shares of the terms that it is summed from
 
 
@@ -32,6 +33,7 @@ class FirstOrderForm:
     free_residue  residue of the rigid, undamped motion [1/kg]; 0 where the force does not move it or the sensor
                   does not read it
     free_count    how many such motions there are
+    second_output, second_direct   a second reading per state (k,) and per unit of force; None: there is none
     """
 
     dynamics: Floats
@@ -41,15 +43,20 @@ class FirstOrderForm:
     hidden_poles: Complexes
     free_residue: float
     free_count: int
+    second_output: Floats | None = None
+    second_direct: float = 0.0
 
 
-def first_order_form(plant: Plant, period: float) -> FirstOrderForm:
+def first_order_form(plant: Plant, period: float, second_reading: Floats | None = None) -> FirstOrderForm:
     """The plant's first-order form on coordinates, velocities [m per period] and forces of lagged dampers.
 
     Motions with neither stiffness nor damping are split off: they are M-orthogonal to the rest, and their double
     pole at 0 is known exactly. Where motions that are braked only have come to is told by what of it the sensor
     reads, one state for all of them. Hidden is a pole that moves the reading within a period T [s] by no more than
     rounding.
+
+    second_reading  (3, n)  weights of x'', x' and x in a force; a pole is hidden only if it moves this neither. Of
+                            motions without springs it must read no place, of those without dampers no velocity
     """
     free, braked, elastic = _motions(plant)
     damped_or_elastic = np.hstack([braked, elastic])
@@ -60,9 +67,33 @@ def first_order_form(plant: Plant, period: float) -> FirstOrderForm:
     inertia = float((free.T @ plant.sensor) @ (free.T @ plant.actuator))
     if abs(inertia) <= UNOBSERVED_UNDAMPED * together:
         inertia = 0.0
+    second, direct = None, 0.0
+    if second_reading is not None:
+        second = _second_output(A, elastic, damped_or_elastic, len(plant.lagged_dampers), period, second_reading)
+        direct = float(second_reading[0] @ np.linalg.solve(plant.mass, plant.actuator))
+        if np.any(second):
+            # a feedback of it moves poles by what it reads of them: here that counts itself, not a share of all
+            hidden &= _poles(A, source, second, period, SECOND_UNREAD / UNOBSERVED_UNDAMPED)[1]
     unread = np.zeros(2 * damped_or_elastic.shape[1] + len(plant.lagged_dampers) - len(A), dtype=complex)
     hidden_poles = np.concatenate([poles[hidden], unread])
-    return FirstOrderForm(A, source, reading, poles[~hidden], hidden_poles, inertia, int(free.shape[1]))
+    free_count = int(free.shape[1])
+    return FirstOrderForm(A, source, reading, poles[~hidden], hidden_poles, inertia, free_count, second, direct)
+
+
+def _second_output(
+    A: Floats, elastic: Floats, basis: Floats, lag_count: int, period: float, rows: Floats
+) -> Floats:
+    """Weights (k,) of a form's states in a reading rows . [x'', x', x], without what the force adds to x''.
+
+    elastic, basis  (n, e), (n, k)  motions of the form's places, the last of them, and of its velocities
+    rows            (3, n)
+    """
+    k, e = basis.shape[1], elastic.shape[1]
+    x = len(A) - k - lag_count
+    out = np.asarray(rows[0] @ basis @ A[x : x + k] / period)
+    out[x : x + k] += rows[1] @ basis / period
+    out[x - e : x] += rows[2] @ elastic
+    return out
 
 
 def _drag(plant: Plant) -> Floats:
@@ -158,6 +189,7 @@ def without_hidden_poles(form: FirstOrderForm) -> FirstOrderForm:
         input=left.T @ form.input,
         output=form.output @ right,
         hidden_poles=form.hidden_poles[:0],
+        second_output=None if form.second_output is None else form.second_output @ right,
     )
 
 

@@ -1,4 +1,4 @@
-"""The position that a handle can have nearest to one that it cannot, and postures given by their driven joints.
+"""The place that a handle can have nearest to one that it cannot, and postures given by their driven joints.
 
 A handle with fewer drives than the space it lies in moves on a curve or a surface, which a typed position meets by
 chance only. The nearest one is found by descent: the driven joints p are turned so that the handle h comes nearer
@@ -6,7 +6,8 @@ to the goal g, with the loops held closed,
 
     minimise |g - h(p)|^2,      dp = (N^T J^T J N + mu)^-1 N^T J^T (g - h)        (Levenberg-Marquardt)
 
-with J = dh/dq of all joints and N = dq/dp, what the loops leave to the drives. What is found counts only where
+with J = dh/dq of all joints and N = dq/dp, what the loops leave to the drives. A handle that is to have an
+orientation is taken there likewise, angles counting times the mechanism's size. What is found counts only where
 the posture solver gets there, too: it knows assemblies, and that the edge of a workspace is singular.
 """
 
@@ -18,12 +19,19 @@ import numpy as np
 
 from zwidth.compiled import compiled
 from zwidth.model.continuation import OK, SINGULAR_CONDITION
-from zwidth.model.forward_kinematics import working_memory
-from zwidth.model.mechanism import Floats
+from zwidth.model.forward_kinematics import (
+    fill_handle_axes,
+    link_point,
+    move_joints,
+    place_links,
+    working_memory,
+)
+from zwidth.model.mechanism import ORIENTATION, POSITION, REVOLUTE, Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.mobility import constraints
 from zwidth.model.posture_batch import solve_batch
 from zwidth.model.roadmap import roadmap, turn_drive
+from zwidth.model.rotations import rotation_matrix, rotation_vector
 
 STARTS: Final = 4  # nodes of the roadmap nearest to the goal, from which it is approached
 COARSE: Final = 2  # drives up to which a roadmap is quickly made; with more the reference is the only start
@@ -35,9 +43,9 @@ RETREAT: Final = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.3, 1.0])
 TURN: Final = 0.02  # of a drive in one step to a posture given by its joints [rad]
 
 
-def nearest_position(mech: MechanismArrays, design: int, references: Floats, goal: Floats) -> Floats | None:
-    """The handle position (3,) [m] nearest to a goal (3,) that the assembly of the references (P, n) has; a little
-    within the edge of its workspace. None where none is found, or the goal is not finite."""
+def nearest_goal(mech: MechanismArrays, design: int, references: Floats, goal: Floats) -> Floats | None:
+    """The goal (g,) nearest to a goal (g,) of the handle that the assembly of the references (P, n) can have; a
+    little within the edge of its workspace. None where none is found, or the goal is not finite."""
     if not np.isfinite(goal).all():
         return None
     starts = references[design][None]
@@ -45,7 +53,7 @@ def nearest_position(mech: MechanismArrays, design: int, references: Floats, goa
         road = roadmap(mech, design, references[design])
         starts = road.angles[road.nearest_nodes(goal[None], STARTS)[0]]
     descents = [_descend(mech, design, start, goal) for start in starts]
-    begin, end = min(descents, key=lambda way: float(np.linalg.norm(goal - way[1])))
+    begin, end, _ = min(descents, key=lambda way: way[2])
     candidates = end + RETREAT[:, None] * (begin - end)
     reachable = (
         solve_batch(mech, np.full(len(candidates), design, dtype=np.int64), references, candidates).status == OK
@@ -53,36 +61,50 @@ def nearest_position(mech: MechanismArrays, design: int, references: Floats, goa
     return candidates[np.argmax(reachable)] if reachable.any() else None
 
 
-def _descend(mech: MechanismArrays, design: int, start: Floats, goal: Floats) -> tuple[Floats, Floats]:
-    """Handle positions where a descent begins and where it ends, from joint angles (n,)."""
+def goal_distance(mech: MechanismArrays, design: int, a: Floats, b: Floats) -> float:
+    """How far two goals (g,) are apart [m]; angles count times the mechanism's size."""
+    square = 0.0 if mech.controls == ORIENTATION else float(np.sum((a[:3] - b[:3]) ** 2))
+    if mech.controls != POSITION:
+        turn = rotation_matrix(a[-3:]) @ rotation_matrix(b[-3:]).T
+        square += float(np.sum((float(mech.size[design]) * rotation_vector(turn)) ** 2))
+    return float(np.sqrt(square))
+
+
+def _descend(mech: MechanismArrays, design: int, start: Floats, goal: Floats) -> tuple[Floats, Floats, float]:
+    """The handle's goals (g,) where a descent begins and where it ends, from joint coordinates (n,), and how far
+    the end is from what is wanted [m]."""
     angles, d = start.copy(), mech.driven
-    rows, gaps = constraints(mech, design, angles)
-    loops = gaps.size - 3
-    begin = -gaps[loops:]
+    rows, gaps = constraints(mech, design, angles, goal)
+    loops = int(mech.first_row[-1])
+    moved = len(rows) - mech.free
+    unit = mech.unit[design, moved - d : moved]
+    begin = handle_goal(mech, design, angles)
     damping, scale = 1e-3, float(mech.size[design]) ** 2
     for _ in range(DESCENTS):
-        missing = goal + gaps[loops:]
-        motions = _motions(rows, loops, d)
-        J = rows[:, loops:].T @ motions
+        missing = gaps[loops:]
+        motions = _motions(rows[:moved], loops, d) * unit
+        J = rows[:moved, loops:].T @ motions
         turn = np.linalg.solve(J.T @ J + damping * scale * np.eye(d), J.T @ missing)
         largest = float(np.max(np.abs(turn)))
         if largest < SETTLED:
             break
         turn *= min(1.0, LARGEST_TURN / largest)
         trial = angles.copy()
-        trial[mech.joint] += motions @ turn
-        new = _close_loops(mech, design, trial)
-        if np.linalg.norm(goal + new[1][loops:]) < np.linalg.norm(missing):
+        step = np.zeros(len(rows))
+        step[:moved] = motions @ turn
+        move_joints(mech, trial, step)
+        new = _close_loops(mech, design, trial, goal)
+        if np.linalg.norm(new[1][loops:]) < np.linalg.norm(missing):
             angles, (rows, gaps), damping = trial, new, max(0.1 * damping, 1e-15)
         else:
             damping *= 10.0
             if damping > 1e6:
                 break
-    return begin, -gaps[loops:]
+    return begin, handle_goal(mech, design, angles), float(np.linalg.norm(gaps[loops:]))
 
 
 def _motions(rows: Floats, loops: int, driven: int) -> Floats:
-    """N (m, d): what all unknowns do for a unit turn of each drive, so that no loop opens."""
+    """N (m, d): what all unknowns but the free ones do for a unit of each drive, so that no loop opens."""
     passive = len(rows) - driven
     motions = np.zeros((len(rows), driven))
     motions[passive:] = np.eye(driven)
@@ -91,31 +113,54 @@ def _motions(rows: Floats, loops: int, driven: int) -> Floats:
     return motions
 
 
-def _close_loops(mech: MechanismArrays, design: int, angles: Floats) -> tuple[Floats, Floats]:
+def _close_loops(mech: MechanismArrays, design: int, angles: Floats, goal: Floats) -> tuple[Floats, Floats]:
     """Close the loops with the drives at rest, the angles in place; the constraints there."""
-    passive, loops = mech.joint.size - mech.driven, 3 * mech.a.size
-    rows, gaps = constraints(mech, design, angles)
+    passive, loops = mech.joint.size - mech.driven - mech.free, int(mech.first_row[-1])
+    rows, gaps = constraints(mech, design, angles, goal)
     for _ in range(8 if passive else 0):
-        turn = np.linalg.lstsq(rows[:passive, :loops].T, gaps[:loops], rcond=None)[0]
-        angles[mech.joint[:passive]] += turn
-        rows, gaps = constraints(mech, design, angles)
-        if np.max(np.abs(turn)) < SETTLED:
+        step = np.zeros(len(rows))
+        step[:passive] = np.linalg.lstsq(rows[:passive, :loops].T, gaps[:loops], rcond=None)[0]
+        move_joints(mech, angles, step)
+        rows, gaps = constraints(mech, design, angles, goal)
+        if np.max(np.abs(step)) < SETTLED:
             break
     return rows, gaps
 
 
-def position_of_angles(mech: MechanismArrays, reference: Floats, driven: Floats) -> Floats | None:
-    """The handle position (3,) [m] of one design with its driven joints at given angles (d,) [rad], reached from
-    the reference (n,) by turning them all at once; None where that leads to, or past, a singularity."""
-    joints = mech.joint[mech.joint.size - mech.driven :]
+def handle_goal(mech: MechanismArrays, design: int, angles: Floats) -> Floats:
+    """The goal (g,) that the handle has at joint coordinates (n,): position, vector of the orientation, or
+    both."""
+    position, axes = np.empty(3), np.empty((3, 3))
+    _fill_handle(mech, design, np.ascontiguousarray(angles), position, axes)
+    if mech.controls == POSITION:
+        return position
+    turned = rotation_vector(axes)
+    return turned if mech.controls == ORIENTATION else np.concatenate([position, turned])
+
+
+@compiled
+def _fill_handle(mech: MechanismArrays, design: int, angles: Floats, position: Floats, axes: Floats) -> None:
+    work = working_memory(mech)
+    place_links(mech, design, angles, work)
+    h = link_point(work.rotation, work.origin, mech.handle_link, mech.handle, design, 0)
+    position[0], position[1], position[2] = h[0], h[1], h[2]
+    fill_handle_axes(mech, design, work, axes)
+
+
+def goal_of_angles(mech: MechanismArrays, reference: Floats, driven: Floats) -> Floats | None:
+    """The goal (g,) of the handle of one design with its driven joints at given coordinates (d,) [rad], [m],
+    reached from the reference (n,) by moving them all at once; None where that leads to, or past, a
+    singularity."""
+    moved = mech.joint.size - mech.free
+    joints = mech.joint[moved - mech.driven : moved]
     angles = reference.copy()
     turn = np.asarray(driven, dtype=np.float64) - angles[joints]
-    turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+    turn -= np.where(mech.kind[joints] == REVOLUTE, 2.0 * np.pi * np.round(turn / (2.0 * np.pi)), 0.0)
+    turn = mech.to_drive[0, : mech.driven, : mech.driven] @ turn / mech.unit[0, moved - mech.driven : moved]
     count = int(np.ceil(np.max(np.abs(turn)) / TURN))
     if not _turn_drives(mech, angles, turn / max(count, 1), count):
         return None
-    _, gaps = constraints(mech, 0, angles)
-    return np.asarray(-gaps[-3:])
+    return handle_goal(mech, 0, angles)
 
 
 @compiled

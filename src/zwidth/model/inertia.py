@@ -1,61 +1,77 @@
-"""Mass matrix and handle Jacobian in the driven coordinates, compiled."""
+"""Mass matrix and handle Jacobians in the independent coordinates, compiled."""
 
 from __future__ import annotations
 
+from typing import Final
+
 from zwidth.compiled import compiled_lean
 from zwidth.model.forward_kinematics import WorkingMemory, link_point
-from zwidth.model.mechanism import Floats
+from zwidth.model.mechanism import PRISMATIC, Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
+
+NO_TURN: Final = 1e-12  # share of the fastest link's angular velocity that is rounding
 
 
 @compiled_lean
 def unit_motions(mech: MechanismArrays, work: WorkingMemory) -> None:
     """Fill spin and speed: angular velocity of each link and velocity of its origin per unit rate of each
-    drive.
+    independent coordinate.
 
-    w_i = w_parent + z_i q_i',   v_i = v_parent + w_parent x (o_i - o_parent)
+    w_i = w_parent + z_i q_i',   v_i = v_parent + w_parent x (o_i - o_parent);   a prismatic joint adds to v
+                                 instead
     """
     w, v, o, z, rates = work.spin, work.speed, work.origin, work.axis, work.rates
-    parent, column = mech.parent, mech.column
+    parent, column, kind = mech.parent, mech.column, mech.kind
     for s in range(rates.shape[0]):
         for i in range(parent.size):
             p, u = parent[i], column[i]
             rate = rates[s, u] if u >= 0 else 0.0
+            slides = kind[i] == PRISMATIC
             for x in range(3):
-                w[s, i, x] = rate * z[i, x]
-                v[s, i, x] = 0.0
+                w[s, i, x] = 0.0 if slides else rate * z[i, x]
+                v[s, i, x] = rate * z[i, x] if slides else 0.0
             if p >= 0:
                 rx, ry, rz = o[i, 0] - o[p, 0], o[i, 1] - o[p, 1], o[i, 2] - o[p, 2]
                 wx, wy, wz = w[s, p, 0], w[s, p, 1], w[s, p, 2]
-                v[s, i, 0] = v[s, p, 0] + wy * rz - wz * ry
-                v[s, i, 1] = v[s, p, 1] + wz * rx - wx * rz
-                v[s, i, 2] = v[s, p, 2] + wx * ry - wy * rx
+                v[s, i, 0] += v[s, p, 0] + wy * rz - wz * ry
+                v[s, i, 1] += v[s, p, 1] + wz * rx - wx * rz
+                v[s, i, 2] += v[s, p, 2] + wx * ry - wy * rx
                 w[s, i, 0] += wx
                 w[s, i, 1] += wy
                 w[s, i, 2] += wz
 
 
 @compiled_lean
-def handle_jacobian(work: WorkingMemory, out: Floats, index: int) -> None:
-    """J = dh/dp, the handle's rows times the rates, into out[index] (3, d)."""
-    rows, rates = work.rows, work.rates
-    first = work.gaps.size - 3
-    for s in range(rates.shape[0]):
+def handle_jacobian(
+    mech: MechanismArrays, design: int, work: WorkingMemory, out: Floats, angular: Floats, index: int
+) -> None:
+    """dh/dp and the handle's angular velocity per unit rate, from the unit motions, into [index] (3, c) of each.
+
+    A platform that its legs keep from turning turns by rounding, which is set to 0.
+    """
+    w, v, o, link = work.spin, work.speed, work.origin, mech.handle_link
+    h = link_point(work.rotation, o, link, mech.handle, design, 0)
+    rx, ry, rz = h[0] - o[link, 0], h[1] - o[link, 1], h[2] - o[link, 2]
+    for s in range(w.shape[0]):
+        fastest = 0.0
+        for i in range(w.shape[1]):
+            fastest = max(fastest, abs(w[s, i, 0]), abs(w[s, i, 1]), abs(w[s, i, 2]))
+        wx, wy, wz = w[s, link, 0], w[s, link, 1], w[s, link, 2]
+        out[index, 0, s] = v[s, link, 0] + wy * rz - wz * ry
+        out[index, 1, s] = v[s, link, 1] + wz * rx - wx * rz
+        out[index, 2, s] = v[s, link, 2] + wx * ry - wy * rx
         for x in range(3):
-            total = 0.0
-            for u in range(rows.shape[0]):
-                total += rows[u, first + x] * rates[s, u]
-            out[index, x, s] = total
+            angular[index, x, s] = w[s, link, x] if abs(w[s, link, x]) > NO_TURN * fastest else 0.0
 
 
 @compiled_lean
 def mass_matrix(mech: MechanismArrays, design: int, work: WorkingMemory, out: Floats, index: int) -> None:
-    """Mass matrix of the links in the driven coordinates, B^T M B of thesis eq. B.19, into out[index] (d, d).
+    """Mass matrix of the links in the independent coordinates, B^T M B of thesis eq. B.19, into out[index] (c, c).
 
         M_st = sum_i m v_s . v_t + w_s . I w_t         with v at the centre of mass
 
-    Angular velocities are turned into the link's frame, where the inertia is constant. The momenta of drive
-    s are taken about the link's origin, against the motions of the drives up to s.
+    Angular velocities are turned into the link's frame, where the inertia is constant. The momenta of coordinate
+    s are taken about the link's origin, against the motions of the coordinates up to s.
     """
     R, o, w, v = work.rotation, work.origin, work.spin, work.speed
     mass, center, I, k = mech.mass, mech.center_of_mass, mech.inertia, design
@@ -63,8 +79,9 @@ def mass_matrix(mech: MechanismArrays, design: int, work: WorkingMemory, out: Fl
     for s in range(d):
         for t in range(d):
             out[index, s, t] = 0.0
-    # p the link's momentum, l its moment about the link's origin, for a unit rate of drive s
-    for i in range(mass.shape[1]):
+    # p the link's momentum, l its moment about the link's origin, for a unit rate of coordinate s
+    for body in range(mech.bodies.size):
+        i = mech.bodies[body]
         c = link_point(R, o, i, center, k, i)
         rx, ry, rz = c[0] - o[i, 0], c[1] - o[i, 1], c[2] - o[i, 2]
         for s in range(d):

@@ -1,7 +1,13 @@
-"""A mechanism as arrays: rigid links in a tree, loops closed by points, drives on some joints.
+"""A mechanism as arrays: rigid links in a tree, loops closed by points, axes or frames, drives on some joints.
 
 Every number may carry leading batch axes (a set of designs that share one topology); the topology itself
 (parents, joint types, which joints are driven, what closes on what) is the same for the whole batch.
+
+Every entry of `Links` has at most one joint coordinate. A universal joint is two entries, of which the first is a
+link without mass; a ball joint is three, BALL_X, BALL_Y and BALL_Z, one behind the other, of which the last is the
+body. The three coordinates of a ball joint are its rotation vector v [rad], the link standing at Exp(v) against
+its parent, and their rates are its angular velocity about its own axes: there is no posture in which they fail, as
+three successive angles do when two of their axes meet.
 """
 
 from __future__ import annotations
@@ -21,6 +27,20 @@ Ints = NDArray[np.int64]
 
 FIXED: Final = 0
 REVOLUTE: Final = 1
+PRISMATIC: Final = 2
+BALL_X: Final = 3
+BALL_Y: Final = 4
+BALL_Z: Final = 5
+
+# What of two links a closure holds together.
+POINT: Final = 0
+AXIS: Final = 1
+FRAME: Final = 2
+
+# What of its handle a mechanism controls, and a posture is asked by.
+POSITION: Final = 0
+POSE: Final = 1
+ORIENTATION: Final = 2
 
 
 @dataclass(frozen=True)
@@ -29,14 +49,19 @@ class Links:
 
     names      (n,)         unique
     parent     (n,)         index of the parent link, -1 for the base
-    joint      (n,)         FIXED or REVOLUTE: how the link moves against its parent
+    joint      (n,)         FIXED, REVOLUTE, PRISMATIC, or BALL_X, BALL_Y and BALL_Z in this order
     origin     (..., n, 3)  joint origin in the parent's frame [m]
-    rotation   (..., n, 3, 3)  link axes in the parent's frame at joint angle 0
-    axis       (..., n, 3)  unit joint axis in the link's frame
+    rotation   (..., n, 3, 3)  link axes in the parent's frame at joint coordinate 0
+    axis       (..., n, 3)  unit joint axis in the link's frame; of a ball joint x, y and z
     mass       (..., n)     [kg]
     center_of_mass (..., n, 3)  in the link's frame [m]
     inertia    (..., n, 3, 3)  about the centre of mass, link axes [kg m^2]
     tip        (..., n, 3)  the link's tip in its own frame, (length, 0, 0) [m]; drawn, and default for points
+    lower, upper  (..., n)  limits of each revolute joint [rad] and prismatic one [m], infinite where there is
+                            none; None: no limits
+    joint_stiffness, joint_damping, joint_coulomb  (..., n)  spring at rest where the joint stands, damper and dry
+                            friction of each joint by itself [N m/rad], [N m s/rad], [N m], of a prismatic one
+                            [N/m], [N s/m], [N]; None: of none
     """
 
     names: tuple[str, ...]
@@ -49,14 +74,23 @@ class Links:
     center_of_mass: Array2
     inertia: Array3
     tip: Array2
+    lower: Array1 | None = None
+    upper: Array1 | None = None
+    joint_stiffness: Array1 | None = None
+    joint_damping: Array1 | None = None
+    joint_coulomb: Array1 | None = None
 
 
 @dataclass(frozen=True)
 class Closures:
-    """The k loop closures: a point of link a stays on a point of link b (both in link frames) [m].
+    """The k loop closures: a point of link a stays on a point of link b; of some, an axis or a frame too.
 
     a, b       (k,)         link indices, -1 for the base
-    point_a, point_b  (..., k, 3)
+    point_a, point_b  (..., k, 3)  in the frames of the links [m]
+    kind       (k,)         POINT; AXIS: the axes also stay parallel, as in a hinge; FRAME: the links also keep
+                            their orientation, as if welded. None: all are points
+    axis_a, axis_b    (..., k, 3)  unit vectors in the frames of the links, of AXIS; None: of none
+    rotation   (..., k, 3, 3)  axes of link b in the frame of link a, of FRAME; None: of none
     """
 
     names: tuple[str, ...]
@@ -64,6 +98,10 @@ class Closures:
     b: Ints
     point_a: Array2
     point_b: Array2
+    kind: Ints | None = None
+    axis_a: Array2 | None = None
+    axis_b: Array2 | None = None
+    rotation: Array3 | None = None
 
 
 @dataclass(frozen=True)
@@ -98,7 +136,10 @@ class DriveNonlinearity:
 
 @dataclass(frozen=True)
 class Drives:
-    """The d drives, each on one revolute joint; their order is the order of the driven coordinates.
+    """The d drives, each on one revolute or prismatic joint; their order is the order of the driven coordinates.
+
+    The coordinate of a drive is its motor's angle over `transmission`, at its joint: the joint's own coordinate,
+    or that and what other joints add to it (`coupling`).
 
     joint            (d,)      index of the driven link (its joint)
     motor_inertia    (..., d)  rotor [kg m^2], at the motor
@@ -112,6 +153,13 @@ class Drives:
     winding_damping  (..., d)  k_t^2/R of a winding closed through a resistor, at the motor [N m s/rad]; None: none
     winding_time_constant  (..., d)  its L/R [s]
     nonlinearity     friction, springs that are not straight, brakes; None: none
+    coupling         (..., d, n)  motor turns per joint turn of other joints that turn the motor too, over
+                     `transmission`; 0 for the drive's own joint. None: of none
+    surplus          (s,)  drives beyond the mechanism's freedom, whose coordinates the others determine
+    motor_link       (d,)  link that carries the motor, -1 for the base, for the full kinetic energy of its rotor;
+                     None: the rotors' turning with their links is neglected, as in thesis eq. 2.21
+    motor_axis       (..., d, 3)  the rotor's spin axis in that link's frame, in the sense in which the motor's
+                     angle counts; of length 0 for a drive of which it is neglected
     """
 
     names: tuple[str, ...]
@@ -127,6 +175,10 @@ class Drives:
     winding_damping: Array1 | None = None
     winding_time_constant: Array1 | None = None
     nonlinearity: DriveNonlinearity | None = None
+    coupling: Array2 | None = None
+    surplus: tuple[int, ...] = ()
+    motor_link: Ints | None = None
+    motor_axis: Array2 | None = None
 
 
 @dataclass(frozen=True)
@@ -134,9 +186,15 @@ class Mechanism:
     """Links, closures and drives, with the handle and the named ways of assembling it.
 
     handle_link, handle_point  the handle: a point (..., 3) of that link [m]
-    assemblies    name -> approximate joint angles (n,) near the reference posture (0 for fixed joints) [rad]
+    assemblies    name -> approximate joint coordinates (n,) near the reference posture (0 for fixed joints) [rad],
+                  of a prismatic joint [m]
     reference_position (3,)    handle position the assemblies are given at [m]
     workspace     (3, 2)       bounds of the handle's position, nan where not given [m]
+    handle_rotation  (..., 3, 3)  axes of the handle in the frame of its link; None: those of the link
+    controls      POSITION, POSE or ORIENTATION: what of its handle the drives control
+    reference_rotation  (..., 3, 3)  axes of the handle in the base frame at the reference; None: where the
+                  assembly has them, which only a mechanism that controls the position alone may leave open
+    free          (f,)         links whose joint coordinate nobody drives and no loop determines
     """
 
     links: Links
@@ -147,6 +205,16 @@ class Mechanism:
     assemblies: dict[str, Array1]
     reference_position: Array1
     workspace: Floats
+    handle_rotation: Array2 | None = None
+    controls: int = POSITION
+    reference_rotation: Array2 | None = None
+    free: tuple[int, ...] = ()
+
+    @cached_property
+    def driven(self) -> Ints:
+        """The links whose joints are the driven coordinates: those of all drives but the surplus ones."""
+        kept = [i for i in range(len(self.drives.joint)) if i not in self.drives.surplus]
+        return np.asarray(self.drives.joint)[kept]
 
     @cached_property
     def design_shape(self) -> tuple[int, ...]:

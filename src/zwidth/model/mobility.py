@@ -1,4 +1,4 @@
-"""Check that there is one drive for each degree of freedom, and that the handle shows them all."""
+"""Check that each degree of freedom has a drive or is said to be free, and that the handle shows the drives."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from zwidth.compiled import compiled
 from zwidth.model.closure import equations
-from zwidth.model.continuation import ASSEMBLY_TOLERANCE, assemble_batch
+from zwidth.model.continuation import ASSEMBLY_TOLERANCE, assemble_batch, set_goal
 from zwidth.model.forward_kinematics import place_links, working_memory
-from zwidth.model.mechanism import Floats, Ints, Mechanism
+from zwidth.model.mechanism import POSE, PRISMATIC, Floats, Ints, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 NEGLIGIBLE: Final = 1e-6  # singular values below this part of the mechanism's size count as zero
@@ -42,7 +42,7 @@ def check_mobility(mechanism: Mechanism, mech: MechanismArrays, design: int, ref
     if misfit is None:
         return None
     rng = np.random.default_rng(1)
-    far = rng.uniform(-np.pi, np.pi, (ELSEWHERE, reference.size))
+    far = rng.uniform(-np.pi, np.pi, (ELSEWHERE, reference.size)) * _unit_of_links(mech, design)
     designs = np.full(ELSEWHERE, design)
     angles, closed = _closed_configurations(mech, designs, far)
     elsewhere = _ranks(mech, designs[closed], angles[closed])
@@ -63,9 +63,14 @@ def _ranks_near(mech: MechanismArrays, designs: Ints, references: Floats) -> Int
     ranks = _ranks(mech, designs, references)
     rng = np.random.default_rng(0)
     for turn in NEARBY * rng.uniform(-1.0, 1.0, (2, mech.parent.size)):
-        angles, closed = _closed_configurations(mech, designs, references + turn)
+        angles, closed = _closed_configurations(mech, designs, references + turn * _unit_of_links(mech, designs))
         ranks[closed] = np.maximum(ranks[closed], _ranks(mech, designs[closed], angles[closed]))
     return ranks
+
+
+def _unit_of_links(mech: MechanismArrays, designs: int | Ints) -> Floats:
+    """The unit of each link's joint coordinate, (..., n): 1 rad, or the size of the mechanism [m]."""
+    return np.asarray(np.where(mech.kind == PRISMATIC, mech.size[designs, None], 1.0))
 
 
 def _closed_configurations(mech: MechanismArrays, designs: Ints, rough: Floats) -> tuple[Floats, Marks]:
@@ -79,18 +84,19 @@ def _closed_configurations(mech: MechanismArrays, designs: Ints, rough: Floats) 
 
 
 def _misfit(mechanism: Mechanism, mech: MechanismArrays, ranks: Ints) -> Misfit | None:
-    m, d = mech.joint.size, mech.driven
+    m, independent = mech.joint.size, mech.driven + mech.free
     of_loops, of_passive, of_all = ranks
     freedom = m - of_loops
-    if freedom != d:
+    if freedom != independent:
+        free = f" and {mech.free} free coordinate{'s' * (mech.free != 1)}" if mech.free else ""
         return Misfit(
-            f"the mechanism has {freedom} degrees of freedom but {d} drives",
-            "give it as many drives, or check its joints and loops",
+            f"the mechanism has {freedom} degrees of freedom but {mech.driven} drives{free}",
+            "give it as many drives, declare the joints that nobody drives free, or check its joints and loops",
         )
-    if of_passive < m - d:
+    if of_passive < m - independent:
         driven = ", ".join(mechanism.drives.names)
         return Misfit(f"the driven joints {driven} do not determine the other joints", "drive other joints")
-    if of_all < m:
+    if of_all < m - mech.free:
         return Misfit(
             f"the handle on link {mechanism.links.names[mech.handle_link]!r} can rest while the drives move: "
             "its position does not determine the posture",
@@ -100,23 +106,25 @@ def _misfit(mechanism: Mechanism, mech: MechanismArrays, ranks: Ints) -> Misfit 
 
 
 def _ranks(mech: MechanismArrays, designs: Ints, angles: Floats) -> Ints:
-    """Ranks (N, 3) of the `constraints` of N designs at joint angles (N, n): of all joints on the loops, of the
-    passive joints on the loops, of all joints on loops and handle."""
-    m, loops, passive = mech.joint.size, 3 * mech.a.size, mech.joint.size - mech.driven
-    rows = np.empty((len(designs), m, loops + 3))
+    """Ranks (N, 3) of the `constraints` of N designs at joint coordinates (N, n): of all joints on the loops, of
+    the passive joints on the loops, of all joints but the free ones on loops and handle."""
+    m, loops, moved = mech.joint.size, int(mech.first_row[-1]), mech.joint.size - mech.free
+    passive, goal = moved - mech.driven, np.zeros(6 if mech.controls == POSE else 3)
+    rows = np.empty((len(designs), m, loops + len(goal)))
     for i, design in enumerate(designs):
-        rows[i] = constraints(mech, design, angles[i])[0]
-    parts = rows[:, :, :loops], rows[:, :passive, :loops], rows
+        rows[i] = constraints(mech, design, angles[i], goal)[0] * mech.unit[design, :, None]
+    parts = rows[:, :, :loops], rows[:, :passive, :loops], rows[:, :moved]
     return np.stack([_rank(part, mech.size[designs]) for part in parts], axis=1)
 
 
 @compiled
-def constraints(mech: MechanismArrays, design: int, angles: Floats) -> tuple[Floats, Floats]:
-    """d(closure gaps, handle)/d(unknowns), (m, 3k+3), passive joints first; and the gaps of the loops, then the
-    handle's position, both negated, (3k+3,) [m]."""
+def constraints(mech: MechanismArrays, design: int, angles: Floats, goal: Floats) -> tuple[Floats, Floats]:
+    """d(closure gaps, handle)/d(unknowns), (m, r), passive joints first; and the gaps of the loops, then those of
+    the handle to a goal (g,), all negated, (r,) [m]."""
     work = working_memory(mech)
+    set_goal(mech, goal.reshape((1, -1)), 0, work)
     place_links(mech, design, angles, work)
-    equations(mech, design, work.goal, work)
+    equations(mech, design, work)
     return work.rows, work.gaps
 
 

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
-from zwidth.model.effective_parameters import unit_direction
+from zwidth.model.drive_side import drive_side, is_plain
+from zwidth.model.effective_parameters import lever_arms, screw
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.plant import Plant
 from zwidth.model.posture import Posture
-from zwidth.model.reduction import MODELS, DirectionError, Model, ModelError, reduce_mechanism
+from zwidth.model.reduction import MODELS, DirectionError, Model, ModelError, full_matrices, reduce_mechanism
 
 # Directions whose least independent combination is below this share of the largest are dependent.
 DEPENDENT = 1e-9
@@ -129,22 +130,30 @@ def reduce_directions(
                 DirectionError  (a ModelError) where the handle cannot move along the directions independently
                 ValueError      for a batch of postures, a posture that is not OK, a direction not of unit length
     """
-    U = np.array([unit_direction(u) for u in np.atleast_2d(np.asarray(directions, dtype=float))])
+    U = screw(np.atleast_2d(np.asarray(directions, dtype=float)))
     # checks the posture and the model, and holds what does not depend on the direction
     first = reduce_mechanism(mechanism, posture, U[0], "full", damping)
     if model not in MODELS:
         raise ValueError(f"there is no model {model!r}; choose one of {', '.join(MODELS)}")
-    H = U @ posture.jacobian
-    _check_independent(H)
+    H, side = lever_arms(posture, U), drive_side(mechanism, posture)
+    _check_independent(H[:, : side.driven])
     drives = mechanism.drives
     n2 = drives.transmission**2
     rotor, spring, damper = n2 * drives.motor_inertia, n2 * drives.stiffness, n2 * drives.damping
     if model == "full":
-        flexible = np.isfinite(spring)
-        actuators = np.concatenate([np.where(flexible, 0.0, H), H[:, flexible]], axis=1)
-        handles = np.concatenate([H, np.zeros((len(H), int(flexible.sum())))], axis=1)
+        _, _, _, flexible = full_matrices(drives, side, posture.mass_matrix)
+        c, f, shares = H.shape[1], len(flexible), np.stack([side.shares(h) for h in H])
+        motors = np.concatenate([side.motion, np.zeros((len(drives.names), f))], axis=1)
+        motors[flexible] = np.eye(c + f)[c:]
+        actuators = shares @ motors
+        handles = np.concatenate([H, np.zeros((len(H), f))], axis=1)
         return MultiPlant(
             first.mass, first.damping, first.stiffness, actuators, actuators.copy(), handles, first.names
+        )
+    if not is_plain(mechanism):
+        raise ModelError(
+            f"model {model!r} of several directions needs as many drives as degrees of freedom, without springs, "
+            "dampers or friction of joints, free joints or rotors that turn with their links; use 'full'"
         )
     if model == "rigid":
         slip = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0

@@ -114,6 +114,7 @@ class Nonlinear:
     friction, counters, springs, brakes  the parts, of any number
     counters     whose weighted sum is the sensor; none: the sensor is read as finely as you like
     force_limit  largest force of the actuator [N]
+    fed_friction  the computer feeds dry friction forward
     """
 
     friction: tuple[Friction, ...] = ()
@@ -121,9 +122,11 @@ class Nonlinear:
     springs: tuple[Spring, ...] = ()
     brakes: tuple[Brake, ...] = ()
     force_limit: float = inf
+    fed_friction: bool = False
 
     def __bool__(self) -> bool:
-        return bool(self.friction or self.counters or self.springs or self.brakes or isfinite(self.force_limit))
+        elements = self.friction or self.counters or self.springs or self.brakes
+        return bool(elements or isfinite(self.force_limit) or self.fed_friction)
 
     def project(self, motions: Floats) -> Nonlinear:
         """The parts as they act on motions (n, m), one in each column, without those that act on none of them."""
@@ -155,6 +158,7 @@ class Nonlinear:
             "nonlinear springs": bool(self.springs),
             "programmable brakes": bool(self.brakes),
             "the force limit": isfinite(self.force_limit),
+            "Coulomb feedforward": self.fed_friction,
         }
         return tuple(name for name, there in present.items() if there)
 

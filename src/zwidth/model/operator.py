@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from zwidth.model.argument_checks import check_number, require
-from zwidth.model.design_axes import Number
-from zwidth.model.plant import Plant
+from zwidth.model.design_axes import Number, stack_numbers
+from zwidth.model.plant import Floats, Plant
 
 
 class OperatorError(ValueError):
@@ -71,6 +71,7 @@ def attach(plant: Plant, operator: Operator) -> Plant:
             mass=plant.mass + operator.arm_mass * held,
             damping=plant.damping + operator.arm_damping * held,
             stiffness=plant.stiffness + operator.arm_stiffness * held,
+            hand_force=_hand_force(plant, -h, (operator.arm_mass, operator.arm_damping, operator.arm_stiffness)),
         )
     if not operator.arm_mass > 0.0:
         raise OperatorError(f"an arm held by an elastic grasp needs a mass, got {operator.arm_mass:g} kg")
@@ -91,4 +92,14 @@ def attach(plant: Plant, operator: Operator) -> Plant:
         lagged_dampers=tuple(replace(d, along=np.append(d.along, 0.0)) for d in plant.lagged_dampers),
         hysteresis=None if plant.hysteresis is None else np.pad(plant.hysteresis, (0, 1)),
         nonlinear=plant.nonlinear.padded(1),
+        hand_force=_hand_force(plant, -slip, (0.0, operator.grasp_damping or 0.0, operator.grasp_stiffness)),
     )
+
+
+def _hand_force(plant: Plant, along: Floats, impedance: tuple[Number, Number, Number]) -> Floats:
+    """Rows (..., 3, n) of `Plant.hand_force`: of a mass, a damper and a spring that push along a motion (n,)."""
+    rows = stack_numbers(impedance)[..., None] * along[..., None, :]
+    if plant.hand_force is None:
+        return np.asarray(rows)
+    grown = along.shape[-1] - plant.hand_force.shape[-1]
+    return np.asarray(rows + np.pad(plant.hand_force, [(0, 0)] * (plant.hand_force.ndim - 1) + [(0, grown)]))

@@ -49,6 +49,8 @@ class Plant:
                        [N/m]; it describes steady vibration only, so that such a plant has no transition matrix
                        (see `chart.hysteretic`); None: none
     nonlinear          friction, encoder steps and the like: what only `contact` knows of
+    hand_force (3, n)  force of the operator on the handle per x'', x' and x, as he is in the matrices already;
+                       None: nobody holds it
 
     Arrays may have leading axes of designs (`model.design_axes`); such plants are computed together, see
     `plant_modes`.
@@ -64,10 +66,11 @@ class Plant:
     lagged_dampers: tuple[LaggedDamper, ...] = ()
     hysteresis: Array2 | None = None
     nonlinear: Nonlinear = field(default_factory=Nonlinear)
+    hand_force: Array2 | None = None
 
     def __post_init__(self) -> None:
         """Make lists arrays. Raise ValueError for shapes that do not go together."""
-        for name in ("mass", "damping", "stiffness", "actuator", "sensor", "handle", "hysteresis"):
+        for name in ("mass", "damping", "stiffness", "actuator", "sensor", "handle", "hysteresis", "hand_force"):
             value = getattr(self, name)
             if value is not None and not isinstance(value, np.ndarray):
                 object.__setattr__(self, name, np.asarray(value, dtype=np.float64))

@@ -12,21 +12,47 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.compiled import compiled
 from zwidth.model.argument_checks import require
 from zwidth.model.bias import bias_batch
-from zwidth.model.continuation import ASSEMBLY_TOLERANCE, OK, OUT_OF_REACH, SINGULAR, reference_batch
+from zwidth.model.continuation import (
+    ASSEMBLY_TOLERANCE,
+    BEYOND_LIMIT,
+    OK,
+    OUT_OF_REACH,
+    SINGULAR,
+    reference_batch,
+)
 from zwidth.model.forward_kinematics import place_links, working_memory
-from zwidth.model.handle_position import nearest_position, position_of_angles
-from zwidth.model.mechanism import Floats, Ints, Mechanism
+from zwidth.model.handle_position import goal_distance, goal_of_angles, nearest_goal
+from zwidth.model.mechanism import (
+    ORIENTATION,
+    POSITION,
+    PRISMATIC,
+    Floats,
+    Ints,
+    Mechanism,
+)
 from zwidth.model.mechanism_arrays import MechanismArrays, design_of_each, pack, per_design
 from zwidth.model.mobility import check_mobility, drives_fit
 from zwidth.model.posture_batch import PostureBatch, failed_batch, solve_batch, solve_from_starts
+from zwidth.model.posture_failure import (
+    BeyondLimit,
+    LoopOpen,
+    OutOfReach,
+    PostureError,
+    Singular,
+    posture_failure,
+    singular_throughout,
+)
 from zwidth.model.reach_shells import arm_length, far_outside_shells, shells
 from zwidth.model.roadmap import roadmap
+from zwidth.model.rotations import rotation_matrix, rotation_vector
 
 __all__ = [
+    "BEYOND_LIMIT",
     "OK",
     "OUT_OF_REACH",
     "SINGULAR",
     "UNSOLVED",
+    "BeyondLimit",
     "LinkPoints",
     "LoopOpen",
     "OutOfReach",
@@ -39,27 +65,12 @@ __all__ = [
     "join_postures",
     "joint_position",
     "link_points",
+    "place_of_joints",
     "reachable_positions",
     "solve_posture",
 ]
 
 UNSOLVED: Final = 255  # status where no straight way leads: the design is to be asked for alone
-
-
-class PostureError(ValueError):
-    """The mechanism has no posture that answers the question."""
-
-
-class OutOfReach(PostureError):
-    """The handle cannot get there in this assembly without passing a singularity."""
-
-
-class Singular(PostureError):
-    """At this position the drives lose, or do not have, control of the handle."""
-
-
-class LoopOpen(PostureError):
-    """A loop of the mechanism cannot be closed near the assembly's joint angles."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +80,15 @@ class Posture:
     assembly          name of the assembly
     position          (..., 3)     handle [m]; where not OK the requested one
     projected         (...)        distance from the requested position [m]; 0 unless it was projected
-    status            (...)        OK, OUT_OF_REACH or SINGULAR; where not OK the numbers below are nan
-    angles            (..., n)     joint angles, 0 for fixed joints [rad]
-    mass_matrix       (..., d, d)  M of the links in the driven coordinates [kg m^2]
-    jacobian          (..., 3, d)  J: handle velocity = J p' with the driven joints' rates p' [m/rad]
-    closure_residual  (...)        largest gap left in any loop [m]
+    status            (...)        OK, OUT_OF_REACH, SINGULAR or BEYOND_LIMIT; where not OK the numbers below are
+                      nan
+    angles            (..., n)     joint coordinates, 0 for fixed joints [rad], of prismatic joints [m]
+    mass_matrix       (..., c, c)  M of the links in the independent coordinates [kg m^2]: the driven joints, then
+                                   the free ones
+    jacobian          (..., 3, c)  J: handle velocity = J p' with the rates p' of these coordinates [m/rad]
+    angular_jacobian  (..., 3, c)  the same of the handle's angular velocity [1]
+    closure_residual  (...)        largest gap left in any loop [m]; of angles, times the mechanism's size
+    rotation          (..., 3, 3)  axes of the handle in the base frame, as `position`; None: not controlled
     """
 
     assembly: str
@@ -82,12 +97,14 @@ class Posture:
     angles: Floats
     mass_matrix: Floats
     jacobian: Floats
+    angular_jacobian: Floats
     closure_residual: Floats
     projected: Floats
+    rotation: Floats | None = None
 
     def with_axes(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Posture:
         """The postures with a change of the leading axes made to each of their arrays, such as an index."""
-        arrays = {one.name: np.asarray(getattr(self, one.name)) for one in fields(self) if one.name != "assembly"}
+        arrays = _arrays(self)
         return Posture(self.assembly, **{name: np.asarray(change(array)) for name, array in arrays.items()})
 
     def broadcast_to(self, shape: tuple[int, ...]) -> Posture:
@@ -97,6 +114,12 @@ class Posture:
             return self
         # copies: what cannot be written to is another type for the kernels, compiled anew
         return self.with_axes(lambda array: np.array(np.broadcast_to(array, shape + array.shape[own:])))
+
+
+def _arrays(posture: Posture) -> dict[str, NDArray[Any]]:
+    """The arrays of a posture by their names."""
+    values = {one.name: getattr(posture, one.name) for one in fields(posture) if one.name != "assembly"}
+    return {name: np.asarray(value) for name, value in values.items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -121,39 +144,45 @@ class LinkPoints:
 
 def solve_posture(
     mechanism: Mechanism,
-    position: ArrayLike,
+    position: ArrayLike | None = None,
     assembly: str | None = None,
     *,
+    orientation: ArrayLike | None = None,
     tolerance: float = 0.0,
     straight: bool = False,
 ) -> Posture:
-    """The posture with the handle at a position, in a named assembly (None: the first).
+    """The posture with the handle at a position, in an orientation, or both, in a named assembly (None: the
+    first).
 
-    The assembly's approximate joint angles are closed onto the reference position; from there Newton is
-    continued to the position without passing a singularity (`continuation`), along the straight line or by
-    the roadmap of all postures of the assembly (`roadmap`). A position that the handle cannot have is projected
-    onto the nearest that it has (`handle_position`).
+    The assembly's approximate joint coordinates are closed onto the reference; from there Newton is continued to
+    the goal without passing a singularity (`continuation`), along the straight way or by the roadmap of all
+    postures of the assembly (`roadmap`). A goal that the handle cannot have is projected onto the nearest that it
+    has (`handle_position`). Free coordinates stay where the assembly has them.
 
     position  (..., 3), or (..., 2) in the plane of the reference position [m]; it broadcasts with the leading
-              axes of the mechanism's numbers
-    tolerance how far a position may be projected, as a share of the arm's length from base to handle
-    straight  True, for one position of each of several designs: take only the straight way from the reference,
+              axes of the mechanism's numbers. None: the reference's
+    orientation  (..., 3, 3)  axes of the handle in the base frame, of a mechanism that controls them. None: the
+              reference's
+    tolerance how far a goal may be projected, as a share of the arm's length from base to handle
+    straight  True, for one goal of each of several designs: take only the straight way from the reference,
               which makes each posture hang on its own design alone, and takes a microsecond. Where there is none,
-              the status is OUT_OF_REACH if the handle cannot be there nor where the position would be projected
+              the status is OUT_OF_REACH if the handle cannot be there nor where the goal would be projected
               to, and UNSOLVED otherwise
-    Returns   Posture; in a batch a position that cannot be had is marked by its status
-    Raises    OutOfReach, Singular  where a single posture is requested and does not exist; an assembly may be
-                          singular throughout
+    Returns   Posture; in a batch a goal that cannot be had is marked by its status
+    Raises    OutOfReach, Singular, BeyondLimit  where a single posture is requested and does not exist; an
+                          assembly may be singular throughout
               LoopOpen    if the loops of a single mechanism do not close near the assembly's angles
-              ValueError  for an unknown assembly, or drives that do not fit the mechanism's freedom
+              ValueError  for an unknown assembly, an orientation that the mechanism does not control or that is no
+                          rotation, or drives that do not fit the mechanism's freedom
     """
     require("mechanism", mechanism, Mechanism)
     name = _assembly_name(mechanism, assembly)
     mech, designs = pack(mechanism), mechanism.design_shape
-    target = _in_space(mechanism, position)
+    target = _goals(mechanism, position, orientation)
     shape = np.broadcast_shapes(designs, target.shape[:-1])
     # a copy that can be written to, as all that is solved for: one that cannot is another type, compiled anew
-    goals = np.array(np.broadcast_to(target, (*shape, 3)).reshape(-1, 3), dtype=np.float64, order="C")
+    goals = np.array(np.broadcast_to(target, (*shape, target.shape[-1])), dtype=np.float64, order="C")
+    goals = goals.reshape(-1, target.shape[-1])
     design = design_of_each(mechanism, shape)
 
     reference, gaps = _references(mechanism, mech, name)
@@ -171,20 +200,23 @@ def solve_posture(
     first = int(np.argmax(closed))
     uncontrolled = check_mobility(mechanism, mech, first, reference[first]) if closed.any() else None
     if uncontrolled and not shape:
-        raise _throughout(name, uncontrolled)
+        raise singular_throughout(name, uncontrolled)
     singular = uncontrolled and not designs  # of several designs another may be in control
     solved = failed_batch(mech, len(goals)) if singular else solve_batch(mech, design, reference, goals)
     near, projected = None, np.where(solved.status == OK, 0.0, np.nan)
     wanted = np.flatnonzero(solved.status == OUT_OF_REACH) if tolerance > 0.0 or not shape else ()
     for i in wanted:
-        near = nearest_position(mech, int(design[i]), reference, goals[i])
-        if near is None or np.linalg.norm(near - goals[i]) > tolerance * arm_length(shells(mech, int(design[i]))):
+        near, own_design = nearest_goal(mech, int(design[i]), reference, goals[i]), int(design[i])
+        if near is None:
+            continue
+        away = goal_distance(mech, own_design, near, goals[i])
+        if away > tolerance * float(arm_length(mech, shells(mech, own_design), own_design)):
             continue
         solved.overwrite(np.array([i]), solve_batch(mech, design[i : i + 1], reference, near[None]))
-        goals[i], projected[i] = near, np.linalg.norm(near - goals[i])
+        goals[i], projected[i] = near, away
     posture = _posture(name, mech, goals, solved, projected, shape)
-    if not shape:
-        _check_single(posture, mechanism.reference_position, near)
+    if not shape and posture.status != OK:
+        raise posture_failure(mechanism, mech, int(posture.status), name, reference[0], goals[0], near)
     return posture
 
 
@@ -196,27 +228,29 @@ def _posture(
     projected: Floats,
     shape: tuple[int, ...],
 ) -> Posture:
-    n, d = mech.parent.size, mech.driven
+    n, c = mech.parent.size, mech.driven + mech.free
+    # the position that was requested, to the last digit; of an orientation, where the handle happens to be
+    position, rotation = solved.position if mech.controls == ORIENTATION else goals[:, :3], None
+    if mech.controls != POSITION:
+        rotation = rotation_matrix(goals[:, -3:]).reshape(*shape, 3, 3)
     return Posture(
         assembly=name,
-        position=goals.reshape(*shape, 3),
+        position=position.reshape(*shape, 3),
         status=solved.status.reshape(shape),
         angles=solved.angles.reshape(*shape, n),
-        mass_matrix=solved.mass.reshape(*shape, d, d),
-        jacobian=solved.jacobian.reshape(*shape, 3, d),
+        mass_matrix=solved.mass.reshape(*shape, c, c),
+        jacobian=solved.jacobian.reshape(*shape, 3, c),
+        angular_jacobian=solved.angular_jacobian.reshape(*shape, 3, c),
         closure_residual=solved.residual.reshape(shape),
         projected=projected.reshape(shape),
+        rotation=rotation,
     )
 
 
 def join_postures(postures: Sequence[Posture]) -> Posture:
     """Postures of several designs, all of one shape (...), as one of shape (P, ...)."""
-    arrays = {
-        one.name: np.stack([getattr(posture, one.name) for posture in postures])
-        for one in fields(Posture)
-        if one.name != "assembly"
-    }
-    return Posture(postures[0].assembly, **arrays)
+    each = [_arrays(posture) for posture in postures]
+    return Posture(postures[0].assembly, **{name: np.stack([one[name] for one in each]) for name in each[0]})
 
 
 def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Floats:
@@ -241,35 +275,58 @@ def _single(mechanism: Mechanism, name: str, otherwise: str) -> tuple[MechanismA
     _check_loops(mechanism, mech, name, gaps[0])
     uncontrolled = check_mobility(mechanism, mech, 0, reference[0])
     if uncontrolled:
-        raise _throughout(name, uncontrolled)
+        raise singular_throughout(name, uncontrolled)
     return mech, reference[0]
 
 
-def joint_position(mechanism: Mechanism, angles: Mapping[str, float], assembly: str | None = None) -> Floats:
-    """The handle's position with the driven joints at given angles, (3,) [m].
+def _has_limits(mech: MechanismArrays) -> bool:
+    return bool(np.isfinite(mech.lower).any() or np.isfinite(mech.upper).any())
 
-    angles    of every driven joint, by the name of its link [rad]; turns of 2 pi do not count
-    Raises    OutOfReach  where the joints cannot be turned there from the reference without passing a singularity
+
+def place_of_joints(
+    mechanism: Mechanism, coordinates: Mapping[str, float], assembly: str | None = None
+) -> tuple[Floats, Floats | None]:
+    """The handle's position (3,) [m] with the driven joints at given coordinates, and its axes (3, 3) where the
+    mechanism controls them: what `solve_posture` takes.
+
+    coordinates  of every driven joint, by the name of its link [rad], of a prismatic one [m]; turns of 2 pi do not
+                 count
+    Raises    OutOfReach  where the joints cannot be moved there from the reference without passing a singularity
+                          or a limit
               LoopOpen, Singular  as `reachable_positions`
               ValueError  for other joints than the driven ones, an unknown assembly, or a batch of designs
     """
     name = _assembly_name(mechanism, assembly)
     driven = [mechanism.links.names[joint] for joint in mechanism.drives.joint]
-    if set(angles) != set(driven):
-        raise ValueError(f"give the angle of every driven joint, {', '.join(driven)}; got {', '.join(angles)}")
-    mech, reference = _single(mechanism, name, "postures are given by their joints for one design at a time")
-    position = position_of_angles(mech, reference, np.array([angles[joint] for joint in driven]))
-    if position is None:
-        requested = ", ".join(f"{joint} = {angles[joint]:.6g} rad" for joint in driven)
-        raise OutOfReach(
-            f"the joints cannot be turned to {requested} in assembly {name!r} without passing a singularity; "
-            "ask for angles nearer to those of the reference"
+    if set(coordinates) != set(driven):
+        raise ValueError(
+            f"give the angle of every driven joint, {', '.join(driven)}; got {', '.join(coordinates)}"
         )
-    return position
+    mech, reference = _single(mechanism, name, "postures are given by their joints for one design at a time")
+    goal = goal_of_angles(mech, reference, np.array([coordinates[joint] for joint in driven]))
+    if goal is None:
+        units = ["m" if mech.kind[joint] == PRISMATIC else "rad" for joint in mechanism.drives.joint]
+        requested = ", ".join(
+            f"{joint} = {coordinates[joint]:.6g} {unit}" for joint, unit in zip(driven, units, strict=True)
+        )
+        raise OutOfReach(
+            f"the joints cannot be turned to {requested} in assembly {name!r} without passing a singularity"
+            f"{' or a limit' if _has_limits(mech) else ''}; ask for angles nearer to those of the reference"
+        )
+    if mechanism.controls == POSITION:
+        return goal, None
+    return (np.zeros(3) if mechanism.controls == ORIENTATION else goal[:3]), rotation_matrix(goal[-3:])
+
+
+def joint_position(mechanism: Mechanism, coordinates: Mapping[str, float], assembly: str | None = None) -> Floats:
+    """The handle's position with the driven joints at given coordinates, (3,) [m]; arguments and errors are those
+    of `place_of_joints`."""
+    return place_of_joints(mechanism, coordinates, assembly)[0]
 
 
 def handle_motions(posture: Posture) -> Floats:
-    """Orthonormal directions (3, r) in which the handle can move, at a single posture."""
+    """Orthonormal directions (3, r) in which the drives and free joints can move the handle, at a single
+    posture."""
     left, singular, _ = np.linalg.svd(posture.jacobian, full_matrices=False)
     return np.asarray(left[:, singular > 1e-9 * singular[0]])
 
@@ -287,24 +344,25 @@ def handle_range(mechanism: Mechanism, posture: Posture, direction: ArrayLike) -
     return min(float(offsets.min()), 0.0), max(float(offsets.max()), 0.0)
 
 
-def inertia_terms(mechanism: Mechanism, posture: Posture, driven_rates: ArrayLike) -> Floats:
-    """Velocity-dependent generalised forces of the links, in the driven coordinates [N m].
+def inertia_terms(mechanism: Mechanism, posture: Posture, rates: ArrayLike) -> Floats:
+    """Velocity-dependent generalised forces of the links, in the independent coordinates [N m].
 
         M p'' + c(p, p') = Q,    c = B^T (c_q + M_q B' p')             (thesis eq. B.19)
 
-    driven_rates  (..., d)  p' [rad/s], broadcasting with the posture
-    Returns       (..., d); nan where the posture is not OK
+    rates     (..., c)  p' [rad/s], broadcasting with the posture: those of the driven joints, then of the free
+              ones
+    Returns   (..., c); nan where the posture is not OK
     """
     mech, designs = pack(mechanism), mechanism.design_shape
-    rates = np.asarray(driven_rates, dtype=np.float64)
-    shape = np.broadcast_shapes(designs, posture.status.shape, rates.shape[:-1])
+    given, independent = np.asarray(rates, dtype=np.float64), mech.driven + mech.free
+    shape = np.broadcast_shapes(designs, posture.status.shape, given.shape[:-1])
     angles = np.broadcast_to(posture.angles, (*shape, mech.parent.size)).reshape(-1, mech.parent.size)
-    flat = np.broadcast_to(rates, (*shape, mech.driven)).reshape(-1, mech.driven)
+    flat = np.broadcast_to(given, (*shape, independent)).reshape(-1, independent)
     design = design_of_each(mechanism, shape)
     out = np.empty(flat.shape)
     still = np.zeros(3)
     bias_batch(mech, design, np.array(angles, order="C"), np.array(flat, order="C"), still, out)
-    return out.reshape(*shape, mech.driven)
+    return out.reshape(*shape, independent)
 
 
 def link_points(mechanism: Mechanism, posture: Posture) -> LinkPoints:
@@ -332,21 +390,10 @@ def _place_batch(mech: MechanismArrays, design: Ints, angles: Floats, rotation: 
 def _references(mechanism: Mechanism, mech: MechanismArrays, name: str) -> tuple[Floats, Floats]:
     """Reference posture (P, n) of each design, and the gaps (P, k) left in its loops [m]."""
     angles = per_design(mechanism, np.asarray(mechanism.assemblies[name], dtype=np.float64), 1)
-    goals = per_design(mechanism, mechanism.reference_position, 1)
+    goals = per_design(mechanism, _goals(mechanism, None, None), 1)
     gaps = np.zeros((len(angles), mech.a.size))
     reference_batch(mech, goals, angles, gaps)
     return angles, gaps
-
-
-def _throughout(name: str, uncontrolled: str) -> Singular:
-    return Singular(
-        f"assembly {name!r} of the mechanism is singular wherever its handle is: {uncontrolled}; choose "
-        "another assembly, or change the places of joints that make it so"
-    )
-
-
-def _vector(position: Floats) -> str:
-    return "(" + ", ".join(f"{x + 0.0:.6g}" for x in np.round(position, 12)) + ") m"
 
 
 def _assembly_name(mechanism: Mechanism, assembly: str | None) -> str:
@@ -357,8 +404,29 @@ def _assembly_name(mechanism: Mechanism, assembly: str | None) -> str:
     return name
 
 
-def _in_space(mechanism: Mechanism, position: ArrayLike) -> Floats:
-    """Positions (..., 3); two coordinates are completed with the reference position's third."""
+def _goals(mechanism: Mechanism, position: ArrayLike | None, orientation: ArrayLike | None) -> Floats:
+    """Goals (..., g) of the handle: its position, the vector of its orientation, or one after the other."""
+    if mechanism.controls == POSITION:
+        if orientation is not None:
+            raise ValueError("the drives do not control the orientation of the handle; leave orientation out")
+        return _in_space(mechanism, position)
+    axes = mechanism.reference_rotation if orientation is None else np.asarray(orientation, dtype=np.float64)
+    if axes is None:
+        raise ValueError("reference_rotation is missing; a mechanism that controls an orientation needs it")
+    if axes.shape[-2:] != (3, 3) or not np.allclose(axes @ np.swapaxes(axes, -1, -2), np.eye(3), atol=1e-9):
+        raise ValueError(f"orientation must be rotation matrices (..., 3, 3), got an array of shape {axes.shape}")
+    turned = rotation_vector(axes)
+    if mechanism.controls == ORIENTATION:
+        return turned
+    place = _in_space(mechanism, position)
+    shape = np.broadcast_shapes(place.shape[:-1], turned.shape[:-1])
+    return np.concatenate([np.broadcast_to(part, (*shape, 3)) for part in (place, turned)], axis=-1)
+
+
+def _in_space(mechanism: Mechanism, position: ArrayLike | None) -> Floats:
+    """Positions (..., 3), None being the reference's; two coordinates are completed with its third."""
+    if position is None:
+        return np.asarray(mechanism.reference_position)
     given = np.asarray(position, dtype=np.float64)
     if given.ndim == 0 or given.shape[-1] not in (2, 3):
         raise ValueError(
@@ -379,27 +447,4 @@ def _check_loops(mechanism: Mechanism, mech: MechanismArrays, name: str, gaps: F
         raise LoopOpen(
             f"loop {mechanism.closures.names[worst]!r} does not close near the joint angles of assembly "
             f"{name!r}: a gap of {gaps[worst]:.3g} m remains; check the lengths of its links and these angles"
-        )
-
-
-def _check_single(posture: Posture, reference: Floats, near: Floats | None) -> None:
-    where, instead = _vector(posture.position), "ask for a position nearer to the reference"
-    if near is not None:
-        away = float(np.linalg.norm(near - posture.position))
-        distance = f"{away:.4g} m" if away >= 1.0 else f"{1e3 * away:.4g} mm"
-        instead = f"the nearest position it reaches is {_vector(near)}, {distance} away"
-    if posture.status == OUT_OF_REACH and np.array_equal(posture.position, reference):
-        raise OutOfReach(
-            f"the handle cannot reach its own reference position {where} in assembly {posture.assembly!r}; "
-            f"check the lengths of the links, or ask for another position; {instead}"
-        )
-    if posture.status == OUT_OF_REACH:
-        raise OutOfReach(
-            f"the handle cannot reach {where} in assembly {posture.assembly!r} without passing a "
-            f"singularity; {instead}"
-        )
-    if posture.status == SINGULAR:
-        raise Singular(
-            f"the mechanism is singular with its handle at {where} in assembly {posture.assembly!r}: "
-            "the drives do not control it there; move the position off the edge of the workspace"
         )

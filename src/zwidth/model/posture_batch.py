@@ -11,10 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.compiled import compiled
-from zwidth.model.continuation import OK, OUT_OF_REACH, SINGULAR, follow, largest_magnitude
-from zwidth.model.forward_kinematics import working_memory
+from zwidth.model.continuation import (
+    BEYOND_LIMIT,
+    OK,
+    OUT_OF_REACH,
+    SINGULAR,
+    follow,
+    joint_beyond_limit,
+    largest_magnitude,
+)
+from zwidth.model.forward_kinematics import link_point, working_memory
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
-from zwidth.model.mechanism import Floats, Ints
+from zwidth.model.mechanism import REVOLUTE, Floats, Ints
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.reach_shells import outside_shells
 from zwidth.model.roadmap import roadmap
@@ -32,6 +40,8 @@ class PostureBatch:
     angles: Floats
     mass: Floats
     jacobian: Floats
+    angular_jacobian: Floats
+    position: Floats
     residual: Floats
 
     def overwrite(self, where: NDArray[np.bool_] | Ints, other: PostureBatch) -> None:
@@ -84,18 +94,21 @@ def by_roadmap(mech: MechanismArrays, design: int, reference: Floats, goals: Flo
     if len(missed):
         for nodes in road.nearest_nodes(goals[missed], 4).T:
             retry = solve_from_starts(mech, designs[missed], road.angles, nodes, goals[missed])
-            better = (retry.status == OK) | ((retry.status == SINGULAR) & (solved.status[missed] == OUT_OF_REACH))
+            better = retry.status == OK
+            better |= (retry.status != OUT_OF_REACH) & (solved.status[missed] == OUT_OF_REACH)
             solved.overwrite(missed[better], PostureBatch(*(values[better] for values in vars(retry).values())))
     return solved
 
 
 def empty_batch(mech: MechanismArrays, count: int) -> PostureBatch:
-    n, d = mech.parent.size, mech.driven
+    n, c = mech.parent.size, mech.driven + mech.free
     return PostureBatch(
         np.empty(count, np.uint8),
         np.empty((count, n)),
-        np.empty((count, d, d)),
-        np.empty((count, 3, d)),
+        np.empty((count, c, c)),
+        np.empty((count, 3, c)),
+        np.empty((count, 3, c)),
+        np.empty((count, 3)),
         np.empty(count),
     )
 
@@ -133,28 +146,37 @@ def _postures(
     angles: Floats,
     mass: Floats,
     jacobian: Floats,
+    angular_jacobian: Floats,
+    position: Floats,
     residual: Floats,
     first: int,
     last: int,
 ) -> None:
     """Postures first to last - 1 of a batch, one after the other in one working memory."""
     work = working_memory(mech)
-    present, gaps = work.angles, work.gaps
-    n, loops = present.size, gaps.size - 3
+    present, gaps, kind = work.angles, work.gaps, mech.kind
+    n, loops = present.size, mech.first_row[mech.a.size]
     for i in range(first, last):
         for j in range(n):
             present[j] = starts[which[i], j]
-        status[i] = follow(mech, design[i], goals[i], present, work)
+        status[i] = follow(mech, design[i], goals, i, present, work)
+        if status[i] == OK and joint_beyond_limit(mech, design[i], present) >= 0:
+            status[i] = BEYOND_LIMIT
         if status[i] != OK:
             angles[i] = np.nan
             mass[i] = np.nan
             jacobian[i] = np.nan
+            angular_jacobian[i] = np.nan
+            position[i] = np.nan
             residual[i] = np.nan
             continue
         for j in range(n):
-            # one turn more or less is the same posture
-            angles[i, j] = present[j] - 2.0 * np.pi * np.floor(present[j] / (2.0 * np.pi) + 0.5)
+            angles[i, j] = present[j]
+            if kind[j] == REVOLUTE:  # one turn more or less is the same posture
+                angles[i, j] -= 2.0 * np.pi * np.floor(present[j] / (2.0 * np.pi) + 0.5)
+        h = link_point(work.rotation, work.origin, mech.handle_link, mech.handle, design[i], 0)
+        position[i, 0], position[i, 1], position[i, 2] = h[0], h[1], h[2]
         residual[i] = largest_magnitude(gaps, loops)
-        handle_jacobian(work, jacobian, i)
         unit_motions(mech, work)
+        handle_jacobian(mech, design[i], work, jacobian, angular_jacobian, i)
         mass_matrix(mech, design[i], work, mass, i)

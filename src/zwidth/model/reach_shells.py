@@ -3,6 +3,7 @@
 Every way from the base to the handle through links and closures is a chain of segments of fixed length. A chain of
 lengths l_1 ... l_n reaches from max(0, 2 max l - sum l) to sum l of where it begins, and no farther. A goal
 outside any chain's shell is out of reach, which is found at once; inside all of them it may still be out of reach.
+A chain with a prismatic joint, whose segment changes its length, has no shell; nor has an orientation.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.model.mechanism import Floats, Ints
+from zwidth.model.mechanism import ORIENTATION, PRISMATIC, Floats, Ints
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 BASE: Final = -1
@@ -39,25 +40,31 @@ class Shell(NamedTuple):
 
 
 def outside_shells(mech: MechanismArrays, design: int, goals: Floats) -> NDArray[np.bool_]:
-    """Which handle positions (N, 3) lie outside of a chain's shell, (N,), by more than rounding; nan does not."""
+    """Which goals (N, g) lie outside of a chain's shell, (N,), by more than rounding; nan does not."""
     out = np.zeros(len(goals), dtype=np.bool_)
     for shell in shells(mech, design):
-        out |= shell.misses(goals) > ROUNDING * mech.size[design]
+        out |= shell.misses(goals[:, :3]) > ROUNDING * mech.size[design]
     return out
 
 
 def far_outside_shells(mech: MechanismArrays, designs: Ints, goals: Floats, tolerance: float) -> NDArray[np.bool_]:
-    """Which of N designs have their goal (N, 3) outside of a chain's shell by more than they project it, (N,).
+    """Which of N designs have their goal (N, g) outside of a chain's shell by more than they project it, (N,).
 
     tolerance  how far a position is projected, as a share of the arm's length
     """
     found = shells(mech, designs)
-    slack = tolerance * arm_length(found) + ROUNDING * mech.size[designs]
-    return np.asarray(np.any([shell.misses(goals) > slack for shell in found], axis=0))
+    slack = tolerance * arm_length(mech, found, designs) + ROUNDING * mech.size[designs]
+    out = np.zeros(len(goals), dtype=np.bool_)
+    for shell in found:
+        out |= shell.misses(goals[:, :3]) > slack
+    return out
 
 
-def arm_length(found: Sequence[Shell]) -> Floats:
-    """From the base to the handle through the shortest of all chains, stretched out [m]."""
+def arm_length(mech: MechanismArrays, found: Sequence[Shell], design: int | Ints) -> Floats:
+    """From the base to the handle through the shortest of all chains, stretched out [m]; where no chain has a
+    length, the mechanism's size."""
+    if not found:
+        return np.asarray(mech.size[design])
     return np.asarray(np.min([shell.most for shell in found], axis=0))
 
 
@@ -66,7 +73,9 @@ def shells(mech: MechanismArrays, design: int | Ints) -> list[Shell]:
 
     design  one, or several (N,), whose shells then have N centres and ranges
     """
-    all_shells = []
+    all_shells: list[Shell] = []
+    if mech.controls == ORIENTATION:
+        return all_shells
     for centre, segments in _chains(_shared_points(mech, design), mech.handle_link, mech.handle[design, 0]):
         lengths = np.array(segments)
         total = lengths.sum(axis=0)
@@ -76,7 +85,11 @@ def shells(mech: MechanismArrays, design: int | Ints) -> list[Shell]:
 
 def _shared_points(mech: MechanismArrays, design: int | Ints) -> list[SharedPoint]:
     tip = np.zeros_like(mech.handle[design, 0])
-    joints = [(int(mech.parent[i]), mech.origin[design, i], i, tip) for i in range(len(mech.parent))]
+    joints = [
+        (int(mech.parent[i]), mech.origin[design, i], i, tip)
+        for i in range(len(mech.parent))
+        if mech.kind[i] != PRISMATIC
+    ]
     loops = [
         (int(mech.a[k]), mech.point_a[design, k], int(mech.b[k]), mech.point_b[design, k])
         for k in range(len(mech.a))

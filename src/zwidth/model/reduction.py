@@ -22,12 +22,13 @@ from numpy.typing import ArrayLike
 from zwidth.model.argument_checks import require
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
 from zwidth.model.drive_nonlinearity import nonlinear_of_drives
-from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, unit_direction
+from zwidth.model.drive_side import DriveSide, drive_side, is_plain
+from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, lever_arms, screw
 from zwidth.model.electrical_damping import add_dampers, project_dampers, winding_dampers
-from zwidth.model.mechanism import Drives, Floats, Mechanism
+from zwidth.model.mechanism import Drives, Floats, Ints, Mechanism
 from zwidth.model.modes import undamped_modes
 from zwidth.model.motion_projection import project_onto_motions
-from zwidth.model.nonlinear import Nonlinear
+from zwidth.model.nonlinear import Friction, Nonlinear
 from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.posture import OK, Posture
 
@@ -61,7 +62,7 @@ def reduce_mechanism(
     rigid       links and rotors as one mass                                         (thesis eq. 2.42)
 
     posture    a single one, OK
-    direction  (3,)  unit vector in the base frame
+    direction  (3,)  unit vector in the base frame; or (6,), a screw: see `effective_parameters.screw`
     encoders   what they read: the motors, or the links behind the drives
     Returns    Plant; a drive of infinite stiffness has no theta of its own, its rotor moves with its link
     Raises     ModelError  where the model does not apply: no flexible drive in this direction
@@ -73,14 +74,14 @@ def reduce_mechanism(
     if posture.status != OK:
         raise ValueError("the posture is out of reach or singular and has no model; ask for another position")
     _check_model(model)
-    u = unit_direction(direction)
-    h = posture.jacobian.T @ u
-    if not np.linalg.norm(h) > 1e-12 * np.linalg.norm(posture.jacobian):
-        along = ", ".join(f"{component:.6g}" for component in u)
-        raise DirectionError(f"the handle cannot move along the direction ({along}); choose one it can move along")
-    full, electrical = _full(mechanism, posture.mass_matrix, h, damping, encoders)
+    u = screw(direction)
+    h, side = lever_arms(posture, u), drive_side(mechanism, posture)
+    check_moves_along(posture, side, h, u)
+    full, electrical = _full(mechanism, posture.mass_matrix, h, side, damping, encoders)
     if model == "full":
         return add_dampers(full, electrical)
+    if not is_plain(mechanism):  # the shares of its drives and joints are read off the matrices
+        return reduce_plant(add_dampers(full, electrical), model)
     numbers = effective_parameters(mechanism, posture, u)
     if model == "rigid":
         slip = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0
@@ -96,6 +97,19 @@ def reduce_mechanism(
     motions = _motions(full, model)
     with_sensor = replace(_with_sensor(reduced, full, motions), nonlinear=full.nonlinear.project(motions))
     return add_dampers(with_sensor, project_dampers(electrical, motions))
+
+
+def check_moves_along(posture: Posture, side: DriveSide, h: Floats, u: Floats) -> None:
+    """Raise DirectionError where the drives cannot move the handle along a screw u of lever arms h."""
+    reach = float(np.linalg.norm(posture.jacobian)) if np.any(u[:3]) else 0.0
+    if np.any(u[3:]):
+        reach = max(reach, float(np.linalg.norm(posture.angular_jacobian) * np.linalg.norm(u[3:])))
+    if np.linalg.norm(h[: side.driven]) > 1e-12 * reach:  # and not where nothing moves
+        return
+    along = ", ".join(f"{component:.6g}" for component in (u[:3] if np.any(u[:3]) else u[3:]))
+    if np.any(u[:3]):
+        raise DirectionError(f"the handle cannot move along the direction ({along}); choose one it can move along")
+    raise DirectionError(f"the handle cannot turn about the axis ({along}); choose one it can turn about")
 
 
 def reduce_plant(plant: Plant, model: Model) -> Plant:
@@ -173,31 +187,67 @@ def _at_joint(drives: Drives) -> tuple[Floats, Floats, Floats]:
 
 
 def _full(
-    mechanism: Mechanism, link_mass: Floats, h: Floats, damping: Damping, encoders: Encoders
+    mechanism: Mechanism,
+    link_mass: Floats,
+    h: Floats,
+    side: DriveSide,
+    damping: Damping,
+    encoders: Encoders,
 ) -> tuple[Plant, list[LaggedDamper]]:
-    """M = [M_phi, 0; 0, M_theta], K = [k, -k; -k, k] on the links and the motors of the flexible drives; and the
-    electrical dampers beside the structural ones."""
+    """M = [M_phi, C; C^T, M_theta], K = D^T k D on the coordinates of the links and the motors of the flexible
+    drives, D their deflections T phi - theta and C = J_m n S^T; and the electrical dampers beside the structural
+    ones."""
     drives = mechanism.drives
-    rotor, spring, damper = _at_joint(drives)
-    flexible = np.flatnonzero(np.isfinite(spring))
-    d, f = len(h), len(flexible)
-    M = np.zeros((d + f, d + f))
-    M[:d, :d] = link_mass + np.diag(np.where(np.isfinite(spring), 0.0, rotor))
-    M[d:, d:] = np.diag(rotor[flexible])
-    # deflection of each flexible drive: phi - theta
-    D = np.concatenate([np.eye(d)[flexible], -np.eye(f)], axis=1)
-    K = D.T @ (spring[flexible, None] * D)
-    actuator = np.concatenate([np.where(np.isfinite(spring), 0.0, h), h[flexible]])
-    B = _full_damping(M, K, D, damper[flexible], damping)
-    names = [f"{name} link" for name in drives.names] + [f"{drives.names[i]} motor" for i in flexible]
-    handle = np.concatenate([h, np.zeros(f)])
-    sensor = actuator.copy() if encoders == "motor" else handle.copy()
-    motors = np.eye(d, d + f)
-    motors[flexible] = np.eye(d + f)[d:]
-    links = np.eye(d, d + f)
-    parts = nonlinear_of_drives(drives, h, links, motors, motors if encoders == "motor" else links)
-    plant = Plant(M, B, K, actuator, sensor, handle, tuple(names), nonlinear=parts)
+    M, K, D, flexible = full_matrices(drives, side, link_mass)
+    n, c = len(M), len(h)
+    t, (d, f) = side.shares(h), (len(drives.names), len(flexible))
+    links = np.concatenate([side.motion, np.zeros((d, f))], axis=1)
+    motors = links.copy()
+    motors[flexible] = np.eye(n)[c:]
+    actuator, handle = t @ motors, np.concatenate([h, np.zeros(f)])
+    encoded = motors if encoders == "motor" else links
+    B = _full_damping(M, K, D, _at_joint(drives)[2][flexible], damping)
+    if side.damping is not None:
+        B = B + _padded(side.damping, f)
+    names = [f"{drives.names[i]} link" for i in range(d) if i not in drives.surplus]
+    names += [f"{mechanism.links.names[i]} joint" for i in mechanism.free]
+    names += [f"{drives.names[i]} motor" for i in flexible]
+    parts = nonlinear_of_drives(drives, t, links, motors, encoded)
+    rubbing = tuple(
+        Friction(np.concatenate([along, np.zeros(f)]), float(level))
+        for along, level in zip(side.rubbing, side.coulomb, strict=True)
+    )
+    parts = replace(parts, friction=parts.friction + rubbing)
+    plant = Plant(M, B, K, actuator, t @ encoded, handle, tuple(names), nonlinear=parts)
     return plant, winding_dampers(drives, motors)
+
+
+def full_matrices(drives: Drives, side: DriveSide, link_mass: Floats) -> tuple[Floats, Floats, Floats, Ints]:
+    """M and K (n, n) of one posture's full model, the deflections D (f, n) of its flexible drives, and which these
+    are (f,)."""
+    rotor, spring, _ = _at_joint(drives)
+    flexible = np.flatnonzero(np.isfinite(spring))
+    rigid = np.flatnonzero(~np.isfinite(spring))
+    c, f, T = link_mass.shape[-1], len(flexible), side.motion
+    M = np.zeros((c + f, c + f))
+    # rotors behind rigid drives move with the links
+    M[:c, :c] = link_mass + T[rigid].T @ (rotor[rigid, None] * T[rigid])
+    M[c:, c:] = np.diag(rotor[flexible])
+    if side.spin is not None:
+        spun = (drives.transmission * drives.motor_inertia)[:, None] * side.spin
+        M[:c, :c] += T[rigid].T @ spun[rigid] + spun[rigid].T @ T[rigid]
+        M[:c, c:] = spun[flexible].T
+        M[c:, :c] = spun[flexible]
+    D = np.concatenate([T[flexible], -np.eye(f)], axis=1)
+    K = D.T @ (spring[flexible, None] * D)
+    if side.stiffness is not None:
+        K = K + _padded(side.stiffness, f)
+    return M, K, D, flexible
+
+
+def _padded(matrix: Floats, more: int) -> Floats:
+    """The matrix with so many more rows and columns of zeros."""
+    return np.pad(matrix, ((0, more), (0, more)))
 
 
 def _full_damping(M: Floats, K: Floats, D: Floats, damper: Floats, damping: Damping) -> Floats:

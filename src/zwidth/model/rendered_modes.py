@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
-from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, inverse_form
+from zwidth.model.effective_parameters import (
+    EffectiveParameters,
+    effective_parameters,
+    inverse_form,
+    lever_arms,
+    screw,
+)
 from zwidth.model.mechanism import Ints, Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.pole_pairs import PolePairs
@@ -73,11 +79,11 @@ def rendered_modes(
     damping: Damping,
     encoders: Encoders = "motor",
 ) -> RenderedModes | None:
-    """The modes of each posture's model along its direction, of one design or of many; None for readings behind
-    the drives in a reduced model.
+    """The modes of each posture's model along its direction, of one design or of many, of a plain mechanism
+    (`drive_side.is_plain`); None for readings behind the drives in a reduced model.
 
     posture    (...), flattened to N; the designs of the mechanism broadcast with it
-    direction  (..., 3)  unit vectors
+    direction  (..., 3)  unit vectors, or (..., 6) screws (`effective_parameters.screw`)
     Returns    nan as input where there are no such modes: given dampers that couple them, windings closed through
                resistors, rigid drives in a model that needs flexible ones
     """
@@ -169,10 +175,9 @@ def _of_full(
     """Undamped modes of the full model; rotor inertias and springs (P, d) at the joints."""
     d = rotor.shape[1]
     N, m = len(design), int(np.isfinite(spring).sum(axis=1).max(initial=0)) + 1
-    J = np.broadcast_to(posture.jacobian, (*shape, 3, d)).reshape(N, 3, d)
-    u = np.broadcast_to(direction, (*shape, 3)).reshape(N, 3)
+    along = np.broadcast_to(lever_arms(posture, screw(direction)), (*shape, d))
     # own arrays, in the order of rows: kernels are compiled once for these
-    h, design = np.ascontiguousarray(np.einsum("ni,nid->nd", u, J)), design.copy()
+    h, design = np.array(along.reshape(N, d), order="C"), design.copy()
     mass = np.array(np.broadcast_to(posture.mass_matrix, (*shape, d, d)).reshape(N, d, d), order="C")
     squared, enter, leave, held = (np.empty((N, m)) for _ in range(4))
 

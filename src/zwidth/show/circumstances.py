@@ -53,6 +53,7 @@ def computer_text(controller: Controller) -> str:
         parts.append(f"force through {_filter(controller.force_filter)}")
     if controller.actuator_time_constant:
         parts.append(f"force lagging by {_given(controller.actuator_time_constant, 's')}")
+    parts += [f"with {name}" for name in controller.feedback_names]
     return ", ".join(parts)
 
 

@@ -15,10 +15,16 @@ from collections.abc import Iterable
 from math import floor, isfinite, isnan, log10
 from typing import Final
 
+from zwidth.show.moment_units import spoken_unit
+
 PREFIXES: Final = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Prefixes, as powers of ten, that a unit may take; one that is not named takes none: kg has a prefix already, one
 # before a square would be squared with it, and mNs/m reads as a metre-newton.
-_TAKES: Final = {"N/m": (0, 3, 6), **dict.fromkeys(("Hz", "s", "m", "N", "J"), tuple(PREFIXES))}
+_TAKES: Final = {
+    "N/m": (0, 3, 6),
+    "Nm/rad": (0, 3, 6),
+    **dict.fromkeys(("Hz", "s", "m", "N", "J"), tuple(PREFIXES)),
+}
 DIGITS: Final = 4  # of whatever is computed
 OF_ERRORS: Final = 2
 OF_RADII: Final = range(4, 11)  # decimals of a spectral radius
@@ -44,6 +50,7 @@ def scaled(exponent: int, unit: str) -> str:
     >>> scaled(3, "N/m"), scaled(3, "Ns/m"), scaled(0, "Ns/m")
     ('kN/m', '10³\xa0Ns/m', 'Ns/m')
     """
+    unit = spoken_unit(unit)
     if exponent == 0 or exponent in _TAKES.get(unit, ()):
         return f"{PREFIXES[exponent]}{unit}"
     return f"10{str(exponent).translate(_RAISED)}{SPACE}{unit}"
@@ -126,6 +133,7 @@ def quantity(value: float, unit: str) -> str:
     >>> quantity(7849.44, "N/m"), quantity(0.02, "Ns/m"), quantity(0.2616, "kg")
     ('7.849\xa0kN/m', '0.02000\xa0Ns/m', '0.2616\xa0kg')
     """
+    unit = spoken_unit(unit)
     if isnan(value):
         return UNKNOWN
     if not isfinite(value):
@@ -141,6 +149,7 @@ def as_written(value: float, unit: str = "") -> str:
     >>> as_written(0.00125, "s"), as_written(0.03, "kg"), as_written(1000.0, "Hz")
     ('1.25\xa0ms', '0.03\xa0kg', '1\xa0kHz')
     """
+    unit = spoken_unit(unit)
     exponent = _prefixed(value, unit)
     shown = f"{value / 10.0**exponent:.6g}"
     if "e" in shown:
@@ -155,6 +164,7 @@ def printed(unit: str) -> str:
     >>> printed("N^2 s/m^2"), printed("m^2/rad^2")
     ('N²s/m²', 'm²/rad²')
     """
+    unit = spoken_unit(unit)
     for power, raised in (("^1", ""), ("^2", "²"), ("^3", "³")):
         unit = unit.replace(power, raised)
     return unit.replace(" s", "s")
@@ -183,6 +193,19 @@ def point(coordinates: Iterable[float], unit: str = "m") -> str:
         values.pop()
     inside = ", ".join(f"{round(v, 12) + 0.0:.{DIGITS}g}".replace("-", MINUS) for v in values)
     return f"({inside}){SPACE}{unit}".rstrip(SPACE)
+
+
+def way(direction: Iterable[float]) -> str:
+    """A rendered direction, or the axis of moments, or both of a screw.
+
+    >>> way([0.0, 1.0, 0.0]), way([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    ('along (0, 1)', 'about (0, 0, 1)')
+    """
+    numbers = [float(c) for c in direction]
+    linear, angular = numbers[:3], numbers[3:]
+    along = [f"along {point(linear, '')}"] if any(linear) else []
+    about = ["about (" + ", ".join(f"{round(c, 12) + 0.0:.{DIGITS}g}".replace("-", MINUS) for c in angular) + ")"]
+    return " and ".join(along + (about if any(angular) else []))
 
 
 def amount(value: float | None, unit: str = "") -> str:

@@ -59,15 +59,7 @@ def axes_of(document: dict[str, Any], device: Device | None, faults_of_axes: Fau
 
 def unit_of(document: dict[str, Any], key: str) -> str:
     """The unit that the device file's schema states for a number, or for the list that it stands in."""
-    steps = address.resolve(document, key)
-    while steps:
-        units = [place["unit"] for place in schema.subschemas(steps) if "unit" in place]
-        if units:
-            return "" if units[0] == "1" else str(units[0])
-        if isinstance(steps[-1], str):
-            return ""
-        steps = steps[:-1]
-    return ""
+    return schema.key_unit(address.resolve(document, key))
 
 
 def _pairing_faults(document: dict[str, Any]) -> Iterator[Fault]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from zwidth.device.device import Device
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
-from zwidth.measures.definition import OUT_OF_REACH, SINGULAR, STATUS, Measure, MeasureError, Note, WantedWall
+from zwidth.measures.definition import STATUS, UNREACHED, Measure, MeasureError, Note, WantedWall
 from zwidth.measures.evaluate import evaluate
 from zwidth.model.argument_checks import require
 from zwidth.processors import Processor
@@ -267,7 +267,7 @@ def measures_of(dataset: xr.Dataset) -> list[str]:
 def reachable(dataset: xr.Dataset, name: str) -> NDArray[np.bool_]:
     """Whether each cell (ny, nx) has a posture; the measure `name` may still have no value in it."""
     status = dataset[f"{name}_status"].values
-    return np.asarray((status != OUT_OF_REACH) & (status != SINGULAR))
+    return np.asarray(~np.isin(status, UNREACHED))
 
 
 def _flags() -> dict[str, Any]:
@@ -285,7 +285,7 @@ def _sentence(note: Note, plane: PlaneGrid) -> str:
 
 
 def _check_reached(job: MapJob, cells: CellValues) -> None:
-    if not np.isin(cells.status, (OUT_OF_REACH, SINGULAR)).all():
+    if not np.isin(cells.status, UNREACHED).all():
         return
     mechanism = job.device.mechanism
     assert mechanism is not None

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from zwidth.device.device import Device
 from zwidth.measures.definition import Spelling, as_argument
 from zwidth.model.argument_checks import require
-from zwidth.model.mechanism import Mechanism
+from zwidth.model.mechanism import ORIENTATION, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture import reachable_positions
 from zwidth.model.reach_shells import Shell, shells
@@ -115,6 +115,11 @@ def plane_of(
     point = device.position(through)
     mechanism = device.mechanism
     assert mechanism is not None
+    if mechanism.controls == ORIENTATION:
+        raise PlaneError(
+            "the drives control the orientation of the handle, and a map needs a handle that they move; ask for "
+            "single orientations, or sweep a study"
+        )
     reach = reachable_set(mechanism, assembly or device.reference_assembly)
     if len(mechanism.drives.names) < 2:
         raise PlaneError("the handle has one drive and moves along a curve; a map needs a device with two drives")

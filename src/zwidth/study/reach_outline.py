@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.measures.definition import OUT_OF_REACH, SINGULAR
+from zwidth.measures.definition import BEYOND_LIMIT, OUT_OF_REACH, SINGULAR, UNREACHED
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.reach_shells import shells
@@ -71,7 +71,7 @@ def _decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
         distance = np.linalg.norm(at - np.array(centre), axis=-1)
         inside &= (distance >= least) & (distance <= most)
         unsure |= np.minimum(np.abs(distance - least), np.abs(distance - most)) < NEAR * most
-    return bool(np.all(unsure | (inside == (status != OUT_OF_REACH))))
+    return bool(np.all(unsure | (inside == ~np.isin(status, (OUT_OF_REACH, BEYOND_LIMIT)))))
 
 
 def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
@@ -82,7 +82,7 @@ def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
     at the true edge, not at the last cell.
     """
     known = np.array(values, dtype=np.float64)
-    beyond = np.isin(status, (OUT_OF_REACH, SINGULAR))
+    beyond = np.isin(status, UNREACHED)
     finite = known[np.isfinite(known)]
     if not len(finite):
         return known

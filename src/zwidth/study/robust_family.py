@@ -198,7 +198,7 @@ class Family:
         if self._ungripped_plant is not None:
             held = self._point_with_operator(document)
             if held is not None:
-                return Loop(held.attach_operator(self._ungripped_plant), self.device.controller)
+                return Loop(held.attach_operator(self._ungripped_plant), held.computer)
         return from_document(document, self.device.label).at_point(self.operating_point).loop
 
     def _point_with_operator(self, document: dict[str, Any]) -> OperatingPoint | None:

@@ -21,6 +21,7 @@ from zwidth.device.faults import DeviceError, plural
 from zwidth.device.load import from_document
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import (
+    BEYOND_LIMIT,
     FAILED,
     MISSING,
     NO_VALUE,
@@ -36,7 +37,7 @@ from zwidth.measures.definition import (
     WantedWalls,
 )
 from zwidth.measures.evaluate import evaluate, evaluate_safely, measured_together
-from zwidth.model.posture import OutOfReach, PostureError, Singular
+from zwidth.model.posture import BeyondLimit, OutOfReach, PostureError, Singular
 from zwidth.study.column import Column
 from zwidth.study.design_groups import DesignColumn, DesignGroup, DesignGrouping
 from zwidth.study.job import CellValues
@@ -165,7 +166,7 @@ class SweepJob:
                 at = chosen.get("at") if group.positions is None else group.positions[piece]
                 try:
                     point, alone = group.batch[piece].at(self.positions if over_workspace else at, *circumstances)
-                except (OutOfReach, Singular) as error:  # of the one mechanism that all of them have
+                except (OutOfReach, Singular, BeyondLimit) as error:  # of the one mechanism that all of them have
                     status = _status_of(error)
                     missed = group.rows[piece][group.valid[piece]]
                     yield from ((int(row), column, (np.nan, status, "")) for row in missed for column in columns)
@@ -320,7 +321,7 @@ class Design:
                 if point.posture is not None and not masses_moved(point.posture).all():
                     from_document(device.document, device.label)  # says what is wrong
                 self.job._cache[name] = same, point.posture
-        except (OutOfReach, Singular) as error:
+        except (OutOfReach, Singular, BeyondLimit) as error:
             none = _NoPoint(_status_of(error))
             self.job._cache[name] = same, none
             raise none from error
@@ -334,7 +335,9 @@ class Design:
         return self.settings.get(key, self.job.fixed_circumstances.get(key))
 
 
-def _status_of(error: OutOfReach | Singular) -> int:
+def _status_of(error: OutOfReach | Singular | BeyondLimit) -> int:
+    if isinstance(error, BeyondLimit):
+        return BEYOND_LIMIT
     return OUT_OF_REACH if isinstance(error, OutOfReach) else SINGULAR
 
 

@@ -147,7 +147,7 @@ def validity(point: OperatingPoint, tolerance: float = TOLERANCE) -> Validity:
     natural = natural_frequencies(full.ungripped_plant)
     flexible = natural[natural > 0.0]
     edge = _Edge(chart)
-    fits = [_fit(edge, point.controller, *model, tolerance) for model in _models(full)]
+    fits = [_fit(edge, point.computer, *model, tolerance) for model in _models(full)]
     return Validity(
         tolerance=tolerance,
         first_natural=float(flexible[0]) if len(flexible) else nan,
@@ -257,7 +257,7 @@ def _fit(
     try:
         model = Loop(plant, controller)
         chart, tracer = stability_chart(model, decay=False), Tracer(model)
-    except ChartError as problem:
+    except (ChartError, ModelError) as problem:
         return Fit(key, label, none, none, (), str(problem))
 
     def fits(frequency: float) -> bool:

@@ -122,7 +122,7 @@ def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
 
 def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     """One change at a time of the device or its computer."""
-    controller, plant = point.controller, point.plant
+    controller, plant = point.computer, point.plant
     alone = point.ungripped_plant  # the device's own damping, without the operator's
 
     def computed(**changes: Any) -> Callable[[], Loop]:
@@ -141,7 +141,7 @@ def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     )
     name = "rigid drives" if point.mechanism is not None else "rigid structure"
     yield "rigid-drives", name, obstacle, lambda: point.in_model("rigid").loop
-    faster = half_period(device)
+    faster = half_period(device, point)
     yield "half-period", "half the sampling period", _no_estimate(faster), lambda: Loop(plant, faster)
     yield "no-delay", "no delay", only(delay != 0.0, "the device has no delay"), computed(delay=0.0)
     obstacle = only(delay != 1.0, "the device has one sample of delay")
@@ -189,7 +189,7 @@ def _models(point: OperatingPoint) -> Iterator[Change]:
                 return reduced.loop
             plant = reduced.ungripped_plant
             undamped = replace(plant, damping=0.0 * plant.damping, lagged_dampers=())
-            return Loop(point.attach_operator(undamped), point.controller)
+            return Loop(point.attach_operator(undamped), point.computer)
 
         return make
 
@@ -211,10 +211,10 @@ def _no_estimate(controller: Controller) -> str:
     return ""
 
 
-def half_period(device: Device) -> Controller:
+def half_period(device: Device, point: OperatingPoint | None = None) -> Controller:
     """The device's computer at twice the rate: a delay given in seconds stays the same in seconds, one given
     in samples the same in samples."""
-    controller = device.controller
+    controller = device.controller if point is None else point.computer
     in_seconds = "delay_s" in device.document.get("loop", {})
     delay = controller.delay * (2.0 if in_seconds else 1.0)
     return replace(controller, sampling_period=controller.sampling_period / 2.0, delay=delay)

@@ -36,6 +36,11 @@ class MeasuredLoop:
     usable: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
+        if self.controller.fixed_feedback:
+            raise ResponseError(
+                f"a measured response has no model from which {self.controller.feedback_names[0]} could be "
+                "computed; measure it with that switched on, and leave it out of the file"
+            )
         delay, f = self.controller.delay, self.response.frequency
         if abs(delay - round(delay)) > 1e-9:
             raise ResponseError(

@@ -51,7 +51,7 @@ class Raster:
 
 
 def try_walls(loop: MultiLoop, polygons: list[shapely.Polygon], box: Box) -> Raster:
-    """Compare stable polygons [K T, B] with eigenvalues at walls all over a box and on both sides of their edges."""
+    """Compare stable polygons [K T, B] with eigenvalues at walls all over a box and beside their edges."""
     cells = sorted(polygons, key=lambda cell: -cell.area)[:MOST_CELLS]
     bounds = [np.array(cell.bounds).reshape(2, 2) for cell in cells if len(polygons) > 1]
     grids = [_grid(low, high, CELL_SIDE) for low, high in bounds]

@@ -9,9 +9,9 @@ import numpy as np
 from zwidth.compiled import compiled_lean
 from zwidth.contact.mechanism.system import Memory, System
 from zwidth.model.bias import bias
-from zwidth.model.closure import closure_step, equations, passive_rates
+from zwidth.model.closure import apply_step, closure_step, equations, passive_rates
 from zwidth.model.continuation import CONTRACTION, LARGEST_TURN, largest_magnitude
-from zwidth.model.forward_kinematics import WorkingMemory, place_links
+from zwidth.model.forward_kinematics import WorkingMemory, move_joints, place_links
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
 from zwidth.model.mechanism import Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
@@ -22,27 +22,34 @@ SURE: Final = 1e-7  # turn whose square is rounding: the next iteration would no
 
 
 @compiled_lean
-def close_at(mech: MechanismArrays, driven: Floats, angles: Floats, work: WorkingMemory) -> float:
-    """Turn the drives to `driven` (d,) and close the loops, angles (links,) in place; their reciprocal condition.
+def close_at(mech: MechanismArrays, independent: Floats, angles: Floats, work: WorkingMemory) -> float:
+    """Move the independent joints to coordinates (c,) and close the loops, the joints' (links,) in place; their
+    reciprocal condition.
 
     Newton starts from where the passive joints' rates would take them. NOT_CLOSED where it leaves the branch.
     Links, `rows` and `rates` belong to the closed posture afterwards.
     """
-    joint, rates = mech.joint, work.rates
-    d, m, loops = mech.driven, mech.joint.size, 3 * mech.a.size
-    passive = m - d
-    for u in range(passive):
-        ahead = 0.0
-        for s in range(d):
-            ahead += rates[s, u] * (driven[s] - angles[joint[passive + s]])
-        angles[joint[u]] += ahead
-    for s in range(d):
-        angles[joint[passive + s]] = driven[s]
+    joint, rates, step, ahead = mech.joint, work.rates, work.solution[0], work.solution[1]
+    m, loops, c = mech.joint.size, mech.first_row[mech.a.size], work.rates.shape[0]
+    passive = m - c
+    for s in range(c):
+        ahead[s] = independent[s]
+        for t in range(c):
+            ahead[s] -= mech.to_drive[0, s, t] * angles[joint[passive + t]]
+    for u in range(m):
+        step[u] = 0.0
+        for s in range(c if u < passive else 0):
+            step[u] += rates[s, u] * ahead[s]
+    move_joints(mech, angles, step)
+    for s in range(c):
+        angles[joint[passive + s]] = 0.0
+        for t in range(c):
+            angles[joint[passive + s]] += mech.to_joint[0, s, t] * independent[t]
     last, moved, sure = 0.0, 0.0, loops == 0
     for iteration in range(12):
         place_links(mech, 0, angles, work)
-        equations(mech, 0, work.goal, work)
-        condition = passive_rates(mech, work)
+        equations(mech, 0, work)
+        condition = passive_rates(mech, 0, work)
         if sure:
             return condition
         size = closure_step(mech, work)
@@ -54,8 +61,7 @@ def close_at(mech: MechanismArrays, driven: Floats, angles: Floats, work: Workin
         if iteration > 0 and size > CONTRACTION * last:
             # rounding moves it to and fro, or there is no closed posture here
             return condition if largest_magnitude(work.gaps, loops) < 1e-13 * mech.size[0] else NOT_CLOSED
-        for u in range(passive):
-            angles[joint[u]] += work.solution[0, u]
+        apply_step(mech, 0, angles, work)
         sure = size < SURE
         last = size
     return NOT_CLOSED
@@ -75,7 +81,7 @@ def configure(system: System, memory: Memory, x: Floats) -> float:
         return NOT_CLOSED
     unit_motions(mech, work)
     mass_matrix(mech, 0, work, mass, 0)
-    handle_jacobian(work, memory.jacobian, 0)
+    handle_jacobian(mech, 0, work, memory.jacobian, memory.angular_jacobian, 0)
     for i in range(d):
         for j in range(i + 1):
             total = mass[0, i, j]

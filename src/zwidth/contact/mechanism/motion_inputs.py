@@ -59,6 +59,7 @@ def motion_inputs(
         f"{samples} samples of a motion of {duration:g} s",
         "simulate a shorter one",
     )
+    _check_drives(mechanism)
     _check_friction(mechanism)
     return MotionInputs(samples, _push(push, samples), _gravity(gravity))
 
@@ -81,6 +82,24 @@ def start_rates(posture: Posture, velocity: ArrayLike | None) -> tuple[Floats, F
             argument="start_velocity",
         )
     return given, np.asarray(rates)
+
+
+def _check_drives(mechanism: Mechanism) -> None:
+    """Raise MotionError for what the motion of a whole mechanism leaves out."""
+    drives, links = mechanism.drives, mechanism.links
+    present = {
+        "joints that nobody drives or holds": bool(mechanism.free),
+        "more drives than degrees of freedom": bool(drives.surplus),
+        "rotors that turn with their links": drives.motor_link is not None,
+        "springs of the joints themselves": links.joint_stiffness is not None,
+        "dry friction of the joints themselves": links.joint_coulomb is not None,
+    }
+    named = [name for name, there in present.items() if there]
+    if named:
+        raise MotionError(
+            f"the motion of a whole mechanism is not simulated with {' and '.join(named)}; simulate the plant of "
+            "one direction instead"
+        )
 
 
 def _check_friction(mechanism: Mechanism) -> None:

@@ -15,6 +15,7 @@ from zwidth.contact.mechanism.stepping import linearise, prepare, step, turned
 from zwidth.contact.mechanism.surfaces import penetration
 from zwidth.contact.mechanism.system import Memory, System, memory_of
 from zwidth.model.closure import equations, orientation, passive_rates
+from zwidth.model.continuation import joint_beyond_limit, keep_rows
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, place_links
 from zwidth.model.mechanism import Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
@@ -24,6 +25,7 @@ SINGULAR: Final = 1
 LOOP_LOST: Final = 2
 DIVERGED: Final = 3
 NO_FORCE: Final = 4
+AT_LIMIT: Final = 100  # and the number of the link whose joint is at its limit
 NEAR_SINGULAR: Final = (
     1e-3  # reciprocal condition of the loops below which the drives hardly hold the other joints
 )
@@ -125,17 +127,9 @@ def run_motion(
 def ready(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> None:
     """The passive joints' rates at the first posture, from which Newton starts, and its side of singularities."""
     place_links(mech, 0, angles, work)
-    equations(mech, 0, work.goal, work)
-    passive_rates(mech, work)
-    _remember(work)
-
-
-@compiled_lean
-def _remember(work: WorkingMemory) -> None:
-    start, rows = work.start, work.rows
-    for u in range(rows.shape[0]):
-        for r in range(rows.shape[1]):
-            start[u, r] = rows[u, r]
+    equations(mech, 0, work)
+    passive_rates(mech, 0, work)
+    keep_rows(work)
 
 
 @compiled_lean
@@ -149,11 +143,14 @@ def check_state(system: System, memory: Memory, x: Floats, condition: float) -> 
         return LOOP_LOST
     if condition < NEAR_SINGULAR:
         return SINGULAR
-    passive, loops = mech.joint.size - mech.driven, 3 * mech.a.size
+    passive, loops = mech.joint.size - work.rates.shape[0], mech.first_row[mech.a.size]
     # in its own memory: the factors of the closures stand in `work` until the accelerations are known
-    if passive > 0 and not orientation(work.start, work.rows, memory.square, passive, loops) > 0.0:
+    if passive > 0 and not orientation(work.start, work.rows, memory.square, mech.spans, passive, loops) > 0.0:
         return SINGULAR
-    _remember(work)
+    keep_rows(work)
+    link = joint_beyond_limit(mech, 0, memory.angles)
+    if link >= 0:
+        return AT_LIMIT + link
     return DONE
 
 

@@ -26,7 +26,7 @@ from zwidth.contact.mechanism.rendering_inputs import RenderingInputs
 from zwidth.contact.mechanism.surfaces import NONE, penetration
 from zwidth.contact.mechanism.system import System
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, working_memory
-from zwidth.model.inertia import handle_jacobian
+from zwidth.model.inertia import handle_jacobian, unit_motions
 from zwidth.model.mechanism import Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
 
@@ -35,7 +35,7 @@ class RenderingMemory(NamedTuple):
     """Working memory of the computer of a mechanism.
 
     signals               of the handle's three coordinates, and of the d motors' torques
-    work, angles (links,), counted (d,), jacobian (1, 3, d)  the posture that is counted
+    work, angles (links,), counted_angles (d,), jacobian, angular_jacobian (1, 3, d)  the posture that is counted
     counted_position, speed, force  (3,)  handle [m], its velocity [m/s], force on it [N]
     environment (8,)      what the environment remembers
     """
@@ -45,6 +45,7 @@ class RenderingMemory(NamedTuple):
     angles: Floats
     counted_angles: Floats
     jacobian: Floats
+    angular_jacobian: Floats
     counted_position: Floats
     speed: Floats
     force: Floats
@@ -59,6 +60,7 @@ def rendering_memory_of(mech: MechanismArrays, computer: Computer) -> RenderingM
         working_memory(mech),
         np.zeros(mech.parent.size),
         np.zeros(mech.driven),
+        np.zeros((1, 3, mech.driven)),
         np.zeros((1, 3, mech.driven)),
         np.zeros(3),
         np.zeros(3),
@@ -85,7 +87,8 @@ def locate_handle(
     seen[0], seen[1], seen[2] = link_point(
         rendering.work.rotation, rendering.work.origin, mech.handle_link, mech.handle, 0, 0
     )
-    handle_jacobian(rendering.work, rendering.jacobian, 0)
+    unit_motions(mech, rendering.work)
+    handle_jacobian(mech, 0, rendering.work, rendering.jacobian, rendering.angular_jacobian, 0)
     return True
 
 

@@ -21,6 +21,7 @@ from zwidth.contact.mechanism.system import System, system_of
 from zwidth.contact.mechanism.walls import SurfaceRendering, rendered_environment
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import NoMechanismError
+from zwidth.loop.unsupported_feedback import refuse_feedback
 from zwidth.model.argument_checks import check_choice, require
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.mechanism_arrays import pack
@@ -97,6 +98,7 @@ def simulate_mechanism(
     mechanism, posture = point.mechanism, point.posture
     if mechanism is None or posture is None:
         raise NoMechanismError
+    point.require("dynamics", "sampling")
     if point.shape:
         raise MotionError(f"one posture is moved at a time, got {point.shape}; take one of them by its index")
     if posture.status != OK:
@@ -112,6 +114,11 @@ def simulate_mechanism(
     if wall is not None and surface is not None:
         environment, values = rendered_environment(wall, surface)
     controller = point.controller
+    refuse_feedback(
+        controller,
+        "the large motion of a mechanism is not simulated",
+        "simulate one rendered direction, or leave it out",
+    )
     inputs = motion_inputs(mechanism, controller, duration, push, gravity, substeps, len(posture.jacobian[0]))
     velocity, rates = start_rates(posture, start_velocity)
     shape, mech = packed(surface), pack(mechanism)
@@ -146,7 +153,7 @@ def simulate_mechanism(
         seed=seed,
         counted=counted,
         torque_limits=torque_limits,
-        status=REASONS[status][0],
+        status="at a joint limit" if status >= kernel.AT_LIMIT else REASONS[status][0],
         reason=_reason(status, mechanism, max(reached - 1, 0) * controller.sampling_period),
         **_course(system, trace, reached, controller.sampling_period),
     )
@@ -159,7 +166,7 @@ def _start(mechanism: Mechanism, posture: Posture, system: System, rates: Floats
     """The first state: joints and motors together, no drive bent."""
     d, n = len(system.motor), len(system.damping)
     start = np.zeros(2 * n + len(system.lag_time))
-    start[:d], start[n : n + d] = posture.angles[mechanism.drives.joint], rates
+    start[:d], start[n : n + d] = system.mech.to_drive[0] @ posture.angles[mechanism.drives.joint], rates
     start[system.motor], start[n + system.motor] = start[:d], rates
     return start
 
@@ -186,7 +193,7 @@ def _empty_trace(samples: int, states: int, drives: int) -> kernel.Trace:
 
 def _course(system: System, trace: kernel.Trace, reached: int, period: float) -> dict[str, Floats]:
     """The records of each sample, by their names in `MechanismMotion`."""
-    d, n, motor = len(system.motor), len(system.damping), system.motor
+    d, n, motor, to_joint = len(system.motor), len(system.damping), system.motor, system.mech.to_joint[0]
     state, energy, work = trace.state[:reached], trace.energy[:reached], trace.work[:reached]
     lagging = np.any(system.lag_command >= 0)
     return {
@@ -195,9 +202,9 @@ def _course(system: System, trace: kernel.Trace, reached: int, period: float) ->
         "counted_position": trace.counted_position[:reached],
         "velocity": trace.velocity[:reached],
         "depth": trace.depth[:reached],
-        "joints": state[:, :d].copy(),
+        "joints": state[:, :d] @ to_joint.T,
         "motors": state[:, motor].copy(),
-        "joint_rates": state[:, n : n + d].copy(),
+        "joint_rates": state[:, n : n + d] @ to_joint.T,
         "motor_rates": state[:, n + motor].copy(),
         "force": trace.force[:reached],
         "torque": trace.torque[:reached],
@@ -212,6 +219,9 @@ def _course(system: System, trace: kernel.Trace, reached: int, period: float) ->
 
 def _reason(status: int, mechanism: Mechanism, seconds: float) -> str:
     """Why a motion ends before its time; "" where it does not."""
+    if status >= kernel.AT_LIMIT:
+        joint = mechanism.links.names[status - kernel.AT_LIMIT].partition("/")[0]
+        return f"after {seconds:.6g} s joint {joint!r} is at its limit, beyond which nothing is known of the stop"
     reason = REASONS[status][1]
     if status == kernel.LOOP_LOST and not len(mechanism.closures.names):  # an open chain has no loops to close
         reason = "it moves farther between two steps than can be followed; push less hard, or take more substeps"

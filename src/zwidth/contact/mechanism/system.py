@@ -61,7 +61,8 @@ class Memory(NamedTuple):
     """Working memory of the kernels.
 
     work, flow        of the links;   angles (links,)  their present joint angles
-    mass (1, d, d), jacobian (1, 3, d), bias (d,), factor (d, d)  at the present place; factor: Cholesky's of M
+    mass (1, d, d), jacobian and angular_jacobian (1, 3, d), bias (d,), factor (d, d)  at the present place;
+                      factor: Cholesky's of M
     speeds            (d,)     the driven joints' rates
     hold              (n,)     generalised forces held over a substep: motors and friction
     command           (l,)     what the lagged torques follow
@@ -80,6 +81,7 @@ class Memory(NamedTuple):
     angles: Floats
     mass: Floats
     jacobian: Floats
+    angular_jacobian: Floats
     bias: Floats
     factor: Floats
     speeds: Floats
@@ -155,6 +157,7 @@ def memory_of(system: System) -> Memory:
         new_link_accelerations(mech),
         np.zeros(mech.parent.size),
         np.zeros((1, d, d)),
+        np.zeros((1, 3, d)),
         np.zeros((1, 3, d)),
         np.zeros(d),
         np.zeros((d, d)),

@@ -106,6 +106,18 @@ def key_description(path: tuple[str | int, ...]) -> str:
     return ""
 
 
+def key_unit(path: tuple[str | int, ...]) -> str:
+    """The unit of the number at a path, or of the list that it stands in; "" if the schema states none."""
+    for end in range(len(path), 0, -1):
+        outer = [step for subschema in subschemas(path[: end - 1]) for step in _step(subschema, path[end - 1])]
+        units = [str(subschema["unit"]) for subschema in outer if "unit" in subschema]
+        if units:
+            return "" if units[0] == "1" else units[0]
+        if isinstance(path[end - 1], str):
+            break
+    return ""
+
+
 def _step(subschema: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
     if isinstance(part, int):
         if isinstance(subschema.get("items"), dict):

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BeforeValidator
 
 from zwidth.device.faults import quote
+from zwidth.device.schema.feedback import FeedforwardSection, ForceSensorSection, LocalSection
 from zwidth.device.schema.value_types import Number, NumberOrInfinity, Section, Step, documented_key
 from zwidth.device.schema.velocity import BackwardDifferenceSection, LowPass, VelocitySection
 
@@ -71,8 +72,13 @@ class SaturationSection(Section):
 class LoopSection(Section):
     """The sampled wall law, f = -F (K y + B v)."""
 
-    sampling_period_s: Annotated[Number, BeforeValidator(_a_period)] = documented_key(
-        "sampling period T, 1e-7 <= T <= 1", "s", ge=SHORTEST_PERIOD, le=LONGEST_PERIOD
+    sampling_period_s: Annotated[Number, BeforeValidator(_a_period)] | None = documented_key(
+        "sampling period T, 1e-7 <= T <= 1; omitted, of a [mechanism]: not known, which leaves answers without a "
+        "computer",
+        "s",
+        ge=SHORTEST_PERIOD,
+        le=LONGEST_PERIOD,
+        default=None,
     )
     delay_samples: Number | None = documented_key(
         "time from reading the encoder to setting the force, in samples, whole or not; or delay_s",
@@ -95,3 +101,10 @@ class LoopSection(Section):
         "where the encoder sits, and its step", default=EncoderSection(at=None, resolution_m=None, noise_m=None)
     )
     saturation: SaturationSection | None = documented_key("the largest force; omitted: no limit", default=None)
+    force_sensor: ForceSensorSection | None = documented_key(
+        "a force sensor at the handle, fed back; omitted: none", default=None
+    )
+    feedforward: FeedforwardSection | None = documented_key(
+        "feedforward of the device's own inertia and friction; omitted: none", default=None
+    )
+    local: LocalSection | None = documented_key("a fast loop under the wall's; omitted: none", default=None)

@@ -1,4 +1,4 @@
-"""[mechanism]: links, loops, drives, handle, and the posture everything is referred to."""
+"""[mechanism]: links, loops, legs, drives, handle, and the posture everything is referred to."""
 
 from __future__ import annotations
 
@@ -25,11 +25,13 @@ from zwidth.device.schema.value_types import (
     Resistance,
     RotorInertia,
     Section,
+    Several,
     Spring,
     Step,
     Stiffness,
     Torque,
     Triple,
+    WholeNumber,
     documented_key,
 )
 
@@ -39,10 +41,30 @@ class LinkSection(Section):
 
     name: Name = documented_key("the link's name: letters, digits, - and _")
     parent: Name = documented_key('the link that carries it, or "base"', default="base")
-    joint: Literal["revolute", "fixed"] = documented_key('how it moves against its parent: "revolute" or "fixed"')
+    joint: Literal["revolute", "prismatic", "universal", "spherical", "free", "fixed"] = documented_key(
+        'how it moves against its parent: "revolute" about axis; "prismatic" along axis; "universal" about axis, '
+        'then about second_axis, which turns with it; "spherical"; "free" in all six ways, as a platform that '
+        'only its legs hold; or "fixed"'
+    )
     axis: Axis = documented_key("joint axis in the link's own frame, any length", "1", default=(0.0, 0.0, 1.0))
+    second_axis: Axis | None = documented_key(
+        "second axis of a universal joint in the link's own frame, any length; omitted: y", "1", default=None
+    )
+    limits_rad: Bounds | None = documented_key(
+        "least and largest angle of a revolute joint; omitted: none", "rad", default=None
+    )
+    limits_m: Bounds | None = documented_key(
+        "least and largest way of a prismatic joint; omitted: none", "m", default=None
+    )
+    free: bool = documented_key(
+        "true: nobody drives this joint and no loop determines it, as of a gimbal that nobody holds; of a "
+        "spherical joint in a loop the turn about the link's own x axis, as a rod with a ball at either end may "
+        "do",
+        default=False,
+    )
     origin_m: Triple | None = documented_key(
-        "joint origin in the parent's frame; omitted: the parent's tip (of the base: its origin)",
+        "joint origin in the parent's frame, of a prismatic joint at way 0; omitted: the parent's tip (of the "
+        "base: its origin)",
         "m",
         default=None,
     )
@@ -52,22 +74,52 @@ class LinkSection(Section):
         "rad",
         default=(0.0, 0.0, 0.0),
     )
+    joint_stiffness_Nm_per_rad: Stiffness | None = documented_key(
+        "spring of the joint itself, about each of its axes, at rest in the posture asked about; omitted: none",
+        "N m/rad",
+        gt=0,
+        default=None,
+    )
+    joint_damping_Nms_per_rad: Damper | None = documented_key(
+        "viscous friction of the joint itself, about each of its axes; omitted: none",
+        "N m s/rad",
+        ge=0,
+        default=None,
+    )
+    joint_coulomb_Nm: DryFriction | None = documented_key(
+        "dry friction of the joint itself, about each of its axes; omitted: none", "N m", default=None
+    )
+    joint_stiffness_N_per_m: Stiffness | None = documented_key(
+        "spring along a prismatic joint; omitted: none", "N/m", gt=0, default=None
+    )
+    joint_damping_Ns_per_m: Damper | None = documented_key(
+        "viscous friction along a prismatic joint; omitted: none", "N s/m", ge=0, default=None
+    )
+    joint_coulomb_N: DryFriction | None = documented_key(
+        "dry friction along a prismatic joint; omitted: none", "N", default=None
+    )
     length_m: Number = documented_key(
         "length along the link's x axis; its tip is at (length, 0, 0)", "m", ge=0, default=0.0
     )
-    mass_kg: Mass = documented_key("mass; 0 for a massless link", "kg", ge=0)
+    mass_kg: Mass | None = documented_key(
+        "mass; 0 for a massless link; omitted, of all links: not known",
+        "kg",
+        ge=0,
+        default=None,
+    )
     center_of_mass_m: Offset = documented_key(
         "centre of mass in the link's frame, x or x, y or x, y, z", "m", default=(0.0, 0.0, 0.0)
     )
-    inertia_kg_m2: Inertia = documented_key(
+    inertia_kg_m2: Inertia | None = documented_key(
         "moments of inertia about the centre of mass, link axes: one number (about the joint axis; enough "
-        "for planar motion), three moments [Ixx, Iyy, Izz], or a 3 x 3 matrix",
+        "for planar motion), three moments [Ixx, Iyy, Izz], or a 3 x 3 matrix; omitted, of all links: not known",
         "kg m^2",
+        default=None,
     )
 
 
 class LoopClosure(Section):
-    """A closed loop: a point of one link stays on a point of another."""
+    """A closed loop: a point of one link stays on a point of another; or an axis, or the whole link, too."""
 
     name: Name = documented_key("the loop's name: letters, digits, - and _")
     links: tuple[Name, ...] = documented_key(
@@ -80,6 +132,23 @@ class LoopClosure(Section):
         max_length=2,
         default=None,
     )
+    closes: Literal["point", "axis", "frame"] = documented_key(
+        'what meets: "point", as in a ball joint; "axis", as in a hinge: the points meet and the axes are '
+        'parallel; "frame": the links are welded to each other',
+        default="point",
+    )
+    axes: tuple[Axis, ...] | None = documented_key(
+        'the hinge\'s axis in the frame of each of the two, any length; with closes = "axis"; omitted: z of each',
+        "1",
+        min_length=2,
+        max_length=2,
+        default=None,
+    )
+    orientation_rad: Triple | None = documented_key(
+        'roll, pitch, yaw of the second link\'s axes in the frame of the first; with closes = "frame"; omitted: 0',
+        "rad",
+        default=None,
+    )
 
 
 class HandleSection(Section):
@@ -87,21 +156,61 @@ class HandleSection(Section):
 
     link: Name = documented_key("the link that carries the handle")
     point_m: Triple | None = documented_key("the handle in that link's frame; omitted: its tip", "m", default=None)
+    orientation_rad: Triple = documented_key(
+        "roll, pitch, yaw of the handle's axes in that link's frame", "rad", default=(0.0, 0.0, 0.0)
+    )
+    controls: Literal["position", "orientation", "pose"] = documented_key(
+        'what of the handle the drives control: its "position"; its "orientation", as a wrist does; or its '
+        '"pose", both',
+        default="position",
+    )
 
 
 class AssemblySection(Section):
     """One way of assembling the mechanism at the reference posture."""
 
-    joints_rad: dict[str, Number] = documented_key(
-        "approximate angle of every revolute joint, by link name, at the reference position", "rad"
+    joints_rad: dict[str, Number | Several] = documented_key(
+        "approximate angle of every revolute joint, by link name, at the reference position; two angles of a "
+        "universal joint; of a spherical or free one its rotation vector, axis times angle, three numbers; "
+        "omitted: 0, of all but revolute and universal joints; of a leg's joint the name without number stands "
+        "for that of every copy",
+        "rad",
+        default={},
+    )
+    joints_m: dict[str, Number | Several] = documented_key(
+        "approximate way of every prismatic joint, by link name, at the reference position; of a free joint x, "
+        "y, z",
+        "m",
+        default={},
     )
 
 
 class ReferenceSection(Section):
     """The posture and the direction that are used where none is given."""
 
-    position_m: Position = documented_key("position of the handle, x, y or x, y, z", "m")
-    direction: Direction = documented_key("rendered direction, any length", "1")
+    position_m: Position | None = documented_key(
+        "position of the handle, x, y or x, y, z; omitted only where the drives control its orientation alone",
+        "m",
+        default=None,
+    )
+    orientation_rad: Triple | None = documented_key(
+        "roll, pitch, yaw of the handle's axes in the base's frame, where the drives control its orientation; "
+        "omitted: 0",
+        "rad",
+        default=None,
+    )
+    direction: Direction | None = documented_key(
+        "rendered direction, any length; or axis, or both", "1", default=None
+    )
+    axis: Axis | None = documented_key(
+        "axis about which moments are rendered, any length; with direction: a screw, as much of either as the "
+        "vectors are long",
+        "1",
+        default=None,
+    )
+    characteristic_length_m: Number | None = documented_key(
+        "length by which angles count as ways on a screw, of direction and axis together", "m", gt=0, default=None
+    )
     assembly: Name | None = documented_key(
         "the assembly used by default; omitted only where one is named", default=None
     )
@@ -116,12 +225,40 @@ class WorkspaceSection(Section):
 
 
 class DriveSection(Section):
-    """A motor and its transmission, on one revolute joint."""
+    """A motor and its transmission, on one revolute or prismatic joint."""
 
     name: Name = documented_key("the drive's name: letters, digits, - and _")
     joint: Name = documented_key("the link whose joint it drives")
-    motor_inertia_kg_m2: RotorInertia = documented_key("inertia of the rotor, at the motor", "kg m^2", ge=0)
-    transmission_ratio: Ratio = documented_key("motor turns per joint turn", "1", gt=0)
+    motor_inertia_kg_m2: RotorInertia | None = documented_key(
+        "inertia of the rotor, at the motor; omitted, of all drives: not known", "kg m^2", ge=0, default=None
+    )
+    transmission_ratio: Ratio | None = documented_key(
+        "motor turns per joint turn; on a prismatic joint radians of the motor per metre; omitted, of all "
+        "drives: not known",
+        "1",
+        gt=0,
+        default=None,
+    )
+    coupling: dict[Name, Number] = documented_key(
+        "motor turns per turn of other driven or free joints, by link name, that turn this motor too: of a drive "
+        "that holds the forearm's angle against the base, as a parallelogram does, the upper arm's joint with "
+        "the same ratio",
+        "1",
+        default={},
+    )
+    motor_link: Name | None = documented_key(
+        'the link that carries the motor, or "base", with motor_axis: the whole kinetic energy of a rotor that '
+        "turns "
+        "with it; that link's inertia holds the rotor as if it were locked. Omitted: the turning of rotors with "
+        "their links is neglected",
+        default=None,
+    )
+    motor_axis: Axis | None = documented_key(
+        "the rotor's axis in the frame of motor_link, any length, in the sense in which its angle grows with the "
+        "joint's",
+        "1",
+        default=None,
+    )
     stiffness_Nm_per_rad: Spring | None = documented_key(
         "stiffness of the transmission at the motor shaft; omitted or inf: rigid",
         "N m/rad",
@@ -212,11 +349,37 @@ class DampingSection(Section):
     given: Literal[True] | None = documented_key("true: the drives' own damping_Nms_per_rad", default=None)
 
 
+class LegSection(Section):
+    """Links, loops and drives that a mechanism has several times, turned about an axis; each is written once.
+
+    A copy's names end in its number, arm-1, arm-2 and so on. Names within the leg mean its own copy; others mean
+    the links that all legs share, whose frames are turned with the copy where a leg's link or loop is fixed to
+    them.
+    """
+
+    name: Name = documented_key("the leg's name: letters, digits, - and _")
+    angles_rad: tuple[Number, ...] | None = documented_key(
+        "by what each copy is turned; or count", "rad", min_length=1, max_length=24, default=None
+    )
+    count: WholeNumber | None = documented_key(
+        "how many copies, evenly round the axis, the first as written; or angles_rad", ge=2, le=24, default=None
+    )
+    axis: Axis = documented_key(
+        "axis through the origin, of the base and of each shared link, about which the copies are turned",
+        "1",
+        default=(0.0, 0.0, 1.0),
+    )
+    links: tuple[LinkSection, ...] = documented_key("its links", min_length=1)
+    loops: tuple[LoopClosure, ...] = documented_key("its loop closures", default=())
+    drives: tuple[DriveSection, ...] = documented_key("its drives", default=())
+
+
 class MechanismSection(Section):
     """A mechanism of rigid links, drives and loop closures."""
 
     links: tuple[LinkSection, ...] = documented_key("the moving links", min_length=1)
     loops: tuple[LoopClosure, ...] = documented_key("the loop closures", default=())
+    legs: tuple[LegSection, ...] = documented_key("legs that are alike", default=())
     handle: HandleSection = documented_key("where the operator holds the device")
     assemblies: dict[Name, AssemblySection] = documented_key("named ways of assembling it", min_length=1)
     reference: ReferenceSection = documented_key("the posture and direction meant where none is given")
@@ -224,9 +387,11 @@ class MechanismSection(Section):
         "bounds of the handle's position; omitted: none", default=None
     )
     drives: tuple[DriveSection, ...] = documented_key(
-        "the drives, in the order of the driven coordinates", min_length=1
+        "the drives, in the order of the driven coordinates; those of legs follow", default=()
     )
-    damping: DampingSection = documented_key("structural damping, one of the three ways")
+    damping: DampingSection | None = documented_key(
+        "structural damping, one of the three ways; omitted only where no drive is flexible", default=None
+    )
     friction: DriveFrictionSection = documented_key(
         "how the dry friction of the drives, coulomb_Nm, grips",
         default=DriveFrictionSection(

@@ -225,6 +225,7 @@ Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=NAME_PATTERN)]
 
 Triple = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
+Several = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
 Position = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
 Offset = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3)]
 Direction = Annotated[Position, AfterValidator(_has_length)]

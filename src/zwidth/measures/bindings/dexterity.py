@@ -6,39 +6,41 @@ counts: in a singular posture, too, and in whatever frame.
 
 from __future__ import annotations
 
+import numpy as np
+
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures import dexterity
-from zwidth.model.mechanism import Floats
+from zwidth.model.mechanism import ORIENTATION, Floats
 
 
 def manipulability(point: OperatingPoint) -> Floats:
     """Thesis eq. 5.1."""
-    return dexterity.manipulability(point.jacobian, _freedoms(point))
+    return dexterity.manipulability(_by_drives(point), _freedoms(point))
 
 
 def isotropy(point: OperatingPoint) -> Floats:
     """Thesis eq. 5.2, 2-norm."""
-    return dexterity.isotropy(point.jacobian, _freedoms(point))
+    return dexterity.isotropy(_by_drives(point), _freedoms(point))
 
 
 def isotropy_frobenius(point: OperatingPoint) -> Floats:
     """Thesis eq. 5.2, Frobenius norm, 1 where isotropic."""
-    return dexterity.isotropy_frobenius(point.jacobian, _freedoms(point))
+    return dexterity.isotropy_frobenius(_by_drives(point), _freedoms(point))
 
 
 def dynamic_manipulability(point: OperatingPoint) -> Floats:
     """Thesis eq. 5.3, links and rotors."""
-    return dexterity.dynamic_manipulability(point.jacobian, point.whole_mass_matrix, _freedoms(point))
+    return dexterity.dynamic_manipulability(_by_drives(point), _driven_mass(point), _freedoms(point))
 
 
 def dynamic_isotropy(point: OperatingPoint) -> Floats:
     """Condition number of the mass matrix of links and rotors, in the driven joints' angles."""
-    return dexterity.dynamic_isotropy(point.whole_mass_matrix)
+    return dexterity.dynamic_isotropy(_driven_mass(point))
 
 
 def handle_mass_isotropy(point: OperatingPoint) -> Floats:
     """Largest over smallest mass of links and rotors felt at the handle."""
-    return dexterity.handle_mass_isotropy(point.jacobian, point.whole_mass_matrix, _freedoms(point))
+    return dexterity.handle_mass_isotropy(_by_drives(point), _driven_mass(point), _freedoms(point))
 
 
 def link_side_mass(point: OperatingPoint) -> Floats:
@@ -61,5 +63,23 @@ def stiffness(point: OperatingPoint) -> Floats:
     return point.effective.stiffness
 
 
+def _by_drives(point: OperatingPoint) -> Floats:
+    """Jacobian (..., 3, d) of what the drives move, free joints at rest; of the orientation where they control
+    that alone."""
+    turns = point.mechanism is not None and point.mechanism.controls == ORIENTATION
+    J = point.posture.angular_jacobian if turns and point.posture is not None else point.jacobian
+    return J[..., : point.drive_side.driven]
+
+
+def _driven_mass(point: OperatingPoint) -> Floats:
+    """Mass matrix (..., d, d) of links and rotors that the drives feel while nobody holds the free joints: the
+    Schur complement M_dd - M_df M_ff^-1 M_fd, the inverse of the drives' block of M^-1."""
+    M, d = point.whole_mass_matrix, point.drive_side.driven
+    if M.shape[-1] == d:
+        return M
+    across = M[..., :d, d:]
+    return np.asarray(M[..., :d, :d] - across @ np.linalg.solve(M[..., d:, d:], np.swapaxes(across, -1, -2)))
+
+
 def _freedoms(point: OperatingPoint) -> int:
-    return min(3, len(point.drives.names))
+    return min(3, point.drive_side.driven)

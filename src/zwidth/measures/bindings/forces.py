@@ -16,12 +16,12 @@ from zwidth.model.mechanism import Floats
 
 def peak_force(point: OperatingPoint) -> Floats:
     """Largest force exactly along the rendered direction within the torque limits [N]."""
-    return forces.force_along(point.jacobian, point.direction, _torques(point, "torque_limit_Nm"))
+    return forces.force_along(_jacobian(point), point.direction, _torques(point, "torque_limit_Nm"))
 
 
 def continuous_force(point: OperatingPoint) -> Floats:
     """Largest force exactly along the rendered direction within the continuous torques [N]."""
-    return forces.force_along(point.jacobian, point.direction, _torques(point, "continuous_torque_Nm"))
+    return forces.force_along(_jacobian(point), point.direction, _torques(point, "continuous_torque_Nm"))
 
 
 def acceleration_max(point: OperatingPoint) -> Floats:
@@ -30,7 +30,7 @@ def acceleration_max(point: OperatingPoint) -> Floats:
     Drives count as rigid.
     """
     torques = _torques(point, "torque_limit_Nm")
-    return forces.acceleration_along(point.jacobian, point.whole_mass_matrix, point.direction, torques)
+    return forces.acceleration_along(_jacobian(point), point.whole_mass_matrix, point.direction, torques)
 
 
 def position_resolution(point: OperatingPoint) -> Floats:
@@ -41,7 +41,7 @@ def position_resolution(point: OperatingPoint) -> Floats:
         )
     counts = _require_finite(point, "encoder_counts_per_rev", point.drives.encoder_counts)
     return forces.resolution_along(
-        point.jacobian, point.direction, 2.0 * np.pi / (counts * point.drives.transmission)
+        _jacobian(point), point.direction, 2.0 * np.pi / (counts * point.drives.transmission)
     )
 
 
@@ -52,7 +52,20 @@ def friction_force(point: OperatingPoint) -> Floats:
     dry = point.drives.nonlinearity
     if dry is None or not np.any(dry.coulomb > 0.0):
         raise MeasureError(f"needs dry friction; give {_key(point, 0, 'coulomb_Nm')}, or that of another drive")
-    return forces.friction_along(point.jacobian, point.direction, point.drives.transmission * dry.coulomb)
+    return forces.friction_along(_jacobian(point), point.direction, point.drives.transmission * dry.coulomb)
+
+
+def _jacobian(point: OperatingPoint) -> Floats:
+    """J (..., 3, d) of the drives, or with the angular one (..., 6, d) where a screw is rendered.
+
+    Raises  MeasureError  where drives are not coordinates of their own
+    """
+    side = point.drive_side
+    if side.motion.shape[-2:] != (side.driven, point.jacobian.shape[-1]):
+        raise MeasureError("needs as many drives as degrees of freedom, and no free joints")
+    if point.direction.shape[-1] == 3 or point.posture is None:
+        return point.jacobian
+    return np.concatenate([point.jacobian, point.posture.angular_jacobian], axis=-2)
 
 
 def _torques(point: OperatingPoint, key: str) -> Floats:

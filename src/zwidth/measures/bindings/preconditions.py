@@ -7,8 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.conditions.assumptions import COLLOCATED, PLAIN, ConditionCase, case_of
+from zwidth.conditions.assumptions import COLLOCATED, PLAIN, WALL_ALONE, ConditionCase, case_of
 from zwidth.loop.estimator import NonlinearError
+from zwidth.loop.inertia_share import with_inertia_of
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
@@ -63,7 +64,8 @@ def loop_case(point: OperatingPoint) -> ConditionCase:
     """
     try:
         plant = UNIT if point.mechanism is not None else point.ungripped_plant
-        return case_of(Loop(plant, point.controller))
+        # only whether there is a feedforward matters, not how large it is
+        return case_of(Loop(plant, with_inertia_of(point.controller, 1.0)))
     except (ModelError, NonlinearError) as error:
         raise MeasureError(f"has no closed form here: {error}") from None
 
@@ -74,7 +76,7 @@ def require_assumptions(case: ConditionCase, *more: str) -> None:
     Closed forms assume the velocity by backward difference and the force as computed; their assumption that
     nothing is damped is not checked.
     """
-    broken = [sentence for sentence in (COLLOCATED, *more, *PLAIN) if sentence in case.unmet]
+    broken = [sentence for sentence in (COLLOCATED, *more, *PLAIN, WALL_ALONE) if sentence in case.unmet]
     if broken:
         raise MeasureError(f"has no closed form for this loop, which breaks what it assumes: {' '.join(broken)}")
 

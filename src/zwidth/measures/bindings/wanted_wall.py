@@ -12,6 +12,7 @@ from zwidth.chart.verdict import STABLE, Verdicts, judge
 from zwidth.conditions.assumptions import SPRUNG, UNDELAYED
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.unsupported_feedback import FeedbackError
 from zwidth.measures import deformation, handle_impedance, vibration_decay
 from zwidth.measures.bindings.preconditions import (
     frequency_of,
@@ -56,19 +57,29 @@ def felt_stiffness(point: OperatingPoint, wanted: WantedWall) -> float:
         raise MeasureError(
             f"needs a frequency below half the sampling frequency, {nyquist:g} Hz, got {frequency:g} Hz"
         )
-    plant, verdicts = plant_with_handle(point), _wall_verdicts(point, wanted)
+    loop, verdicts = _free_loop(point), _wall_verdicts(point, wanted)
     if verdicts.verdict[0] != STABLE:
         raise NoValueError(
             f"the wanted wall is {verdicts.names[0]} here, so that there is no steady motion to feel"
         )
-    Z = handle_impedance.felt_impedance(Loop(plant, point.controller), *wall, frequency)
+    Z = handle_impedance.felt_impedance(loop, *wall, frequency)
     return float((2j * np.pi * frequency * Z).real)
 
 
 def free_motion_force(point: OperatingPoint, wanted: WantedWall) -> float:
     """Size of force per velocity at the handle without any wall, at the wanted frequency [N s/m]."""
     frequency = frequency_of(wanted)
-    return float(np.abs(handle_impedance.free_motion_impedance(plant_with_handle(point), frequency)))
+    return float(np.abs(handle_impedance.free_impedance(_free_loop(point), frequency)))
+
+
+def _free_loop(point: OperatingPoint) -> Loop:
+    """The loop without operator. Raises MeasureError where it has no handle, or a local loop."""
+    loop = Loop(plant_with_handle(point), point.computer)
+    try:
+        handle_impedance.refuse_local_loop(loop.controller)
+    except FeedbackError as error:
+        raise MeasureError(f"is not known here: {error}") from None
+    return loop
 
 
 def _wall_verdicts(point: OperatingPoint, wanted: WantedWall) -> Verdicts:

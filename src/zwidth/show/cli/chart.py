@@ -92,8 +92,13 @@ class ChartCommand(Command):
                 f"{question.name}: has no [mechanism], and so one direction only; leave out --with-direction"
             )
         question.refuse_unsupported(device)
-        circumstances = {"assembly": question.assembly, "model": question.model}
-        return device.at(question.at, directions=_directions(case), **circumstances).chart()
+        return device.at(
+            question.at,
+            directions=_directions(case),
+            orientation=question.orientation,
+            assembly=question.assembly,
+            model=question.model,
+        ).chart()
 
     def document(self, case: CommandLine, result: Chart) -> dict[str, Any]:
         from zwidth.chart.measured.chart import MeasuredChart
@@ -127,7 +132,10 @@ class ChartCommand(Command):
 
 def _directions(case: CommandLine) -> list[Any]:
     """All directions rendered together, the first of them that of every question."""
-    return [case.device.direction(direction) for direction in (case.question.direction, *case["others"])]
+    question, device = case.question, case.device
+    if question.axis is not None:
+        raise BadInput(f"{question.name}: --axis and --with-direction do not go together; leave out one of them")
+    return [device.direction(direction) for direction in (question.direction, *case["others"])]
 
 
 def _rows(chart: Chart) -> Iterator[tuple[str, str]]:

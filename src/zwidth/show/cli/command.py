@@ -22,6 +22,7 @@ from zwidth.show.cli.first_use import announce_compiling
 from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.progress import show_progress
+from zwidth.show.moment_units import keys_of_moments, speaking_of_moments
 from zwidth.show.output import DATA, FIGURES, destination, printable, write_data
 
 if TYPE_CHECKING:
@@ -68,6 +69,13 @@ class CommandLine:
     def writes(self, endings: Sequence[str]) -> bool:
         """Whether the output file has one of these endings."""
         return self.path is not None and self.path.suffix.lower() in endings
+
+
+def _differs(value: Any, other: Any) -> bool:
+    """Whether two values of a document are not the same; arrays are compared element by element."""
+    import numpy as np
+
+    return not np.array_equal(np.asarray(value, dtype=object), np.asarray(other, dtype=object))
 
 
 class Command:
@@ -172,7 +180,10 @@ class Command:
         assert case.path is not None
         if case.writes(DATA):
             stated = document | ({} if reason is None else {"reason": reason})
-            write_data(case.path, stated, self.table(case, result, document) if case.writes([".csv"]) else {})
+            columns = self.table(case, result, document) if case.writes([".csv"]) else {}
+            if self.is_about_moments(case):
+                columns = keys_of_moments(dict(columns))
+            write_data(case.path, self.spoken(case, stated), columns)
             return reason
         self.save_figure(case, lambda: self.draw(case, result), case.path, document)
         return reason
@@ -204,10 +215,29 @@ class Command:
     def unanswered(self, case: CommandLine, none: NoAnswer) -> Answer:
         """The answer where there is none: every key null, and why."""
         decided = {"decided": none.decided} if self.may_be_undecided else {}
-        return Answer(self.circumstances(case) | dict.fromkeys(self.keys) | decided, reason=str(none))
+        return Answer(
+            self.spoken(case, self.circumstances(case) | dict.fromkeys(self.keys) | decided), reason=str(none)
+        )
+
+    def spoken(self, case: CommandLine, document: dict[str, Any]) -> dict[str, Any]:
+        """An answer's document with the units of what is rendered in the keys; the circumstances keep theirs."""
+        if not self.is_about_moments(case):
+            return document
+        stated = self.circumstances(case)
+        own = {key: value for key, value in document.items() if key not in stated or _differs(value, stated[key])}
+        spoken: dict[str, Any] = keys_of_moments(own)
+        return stated | spoken
 
     def answer(self, case: CommandLine) -> Answer:
         """Compute, and write the output file where one is named. Raises BadInput."""
+        with speaking_of_moments(self.is_about_moments(case)):
+            return self._answer(case)
+
+    def is_about_moments(self, case: CommandLine) -> bool:
+        """Whether the answer is about moments about an axis, in N m/rad."""
+        return case.question.is_about_moments(case.device)
+
+    def _answer(self, case: CommandLine) -> Answer:
         if not self.takes_responses and case.device.response is not None:
             case.question.point(case.device)  # refuses options that need a model for a [response]
             none = self.unanswered(case, NoAnswer(NO_MODEL))
@@ -227,13 +257,19 @@ class Command:
         others = {key: str(path) for key, path in self.write_others(case, result).items()}
         document |= others
 
+        spoken = self.spoken(case, document)
+
         def pages() -> Iterator[Any]:
             if first := self.heading(case):
                 yield first
             yield from self.pages(case, result, document)
             yield from (f"written: {document[key]}" for key in ("file", *others) if key in document)
 
-        return Answer(document, lambda: list(pages()), reason)
+        return Answer(spoken, lambda: self._list_pages(case, pages), reason)
+
+    def _list_pages(self, case: CommandLine, pages: Callable[[], Iterable[Any]]) -> list[Any]:
+        with speaking_of_moments(self.is_about_moments(case)):
+            return list(pages())
 
     def run(self, question: Question, as_json: bool, output: str | None = None, **options: Any) -> int:
         """Carry out one command line; returns the exit code."""

@@ -83,14 +83,15 @@ def compile_environments() -> None:
 
 
 def run_estimators() -> None:
-    """Velocity estimates of recorded positions, and modes one at a time: from Python only."""
+    """Velocity estimates of recorded positions and single modes, from Python only; modes with fixed feedback."""
     from zwidth.loop.estimators import BackwardDifference, Foaw, Levant
     from zwidth.loop.estimators.run_estimator import velocity_of
-    from zwidth.loop.hold import modal_row
+    from zwidth.loop.hold import modal_row, mode_growth
 
     for method in (BackwardDifference(), Foaw(4, 1e-6), Levant(10.0)):
         velocity_of(method, [0.0, 1e-3, 3e-3], 0.001)
     modal_row(1.0, 1e4, 0.001)
+    mode_growth(1.0, 1e4, 100.0, 0.001, 0.0)
 
 
 # What no short command line reaches, by group.

@@ -55,6 +55,7 @@ def translate_errors(question: Question) -> Iterator[None]:
     """
     from zwidth.chart.edge_by_eigenvalues import ChartError
     from zwidth.loop.estimator import NonlinearError
+    from zwidth.loop.point_errors import MissingNumbersError
     from zwidth.loop.sections import HysteresisError, UnmovedError
     from zwidth.model.posture import PostureError
     from zwidth.model.reduction import DirectionError, ModelError
@@ -64,6 +65,8 @@ def translate_errors(question: Question) -> Iterator[None]:
         yield
     except PostureError as error:
         raise NoAnswer(str(error)) from None
+    except MissingNumbersError as error:
+        raise NoAnswer(f"this {error}") from None
     except ChartError as error:
         raise NoAnswer(f"this is undecided: {error}", decided=False) from None
     except DirectionError as error:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from zwidth.show.circumstances import computer_text, omission_text, operator_text
+from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.output import printable
-from zwidth.show.units import amount, vector
+from zwidth.show.units import amount, typed, vector, way
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
@@ -25,9 +26,10 @@ def heading(question: Question, device: Device, *, linear: bool = True) -> str:
     kind = "[response]" if device.response is not None else "[plant]"
     place = f"model {facts['model']}" if device.mechanism else f"{kind} {facts['model']}"
     if device.mechanism:
-        where = f"along {vector(facts['direction'])} at {vector(facts['position_m'], 'm')}"
+        where = f"{typed(way(question.screw(device)))} at {vector(facts['position_m'], 'm')}"
         if (facts["projected_m"] or 0.0) > ROUNDING:
-            where += f" ({amount(facts['projected_m'], 'm')} from the requested position)"
+            with speaking_of_moments(False):
+                where += f" ({amount(facts['projected_m'], 'm')} from the requested position)"
         place = f"{where}, assembly {facts['assembly']}, {place}"
     held = f", held by {operator_text(facts['operator'])}" if facts["operator"] else ""
     lines = [f"{printable(device.name)}: {place}{held}", computer_text(device.controller)]

@@ -35,8 +35,9 @@ class NewCommand(Command):
             "--kind",
             type=click.Choice(tuple(KINDS)),
             required=True,
-            help="One link on a drive; a planar arm of two links; a planar linkage of two arms; or masses along "
-            "the rendered direction, where you know its dynamics.",
+            help="One link on a drive; a planar arm of two links; a planar linkage of two arms; a platform on "
+            "three legs; one on six sliding legs; three axes that meet; or masses along the rendered direction, "
+            "where you know its dynamics.",
         ),
     )
     outputs = (ENDING,)
@@ -49,6 +50,9 @@ class NewCommand(Command):
             return command(Question(device), **more)
 
         return click.argument("device", metavar="NAME", callback=refuse_empty)(with_name)
+
+    def is_about_moments(self, case: CommandLine) -> bool:
+        return False  # there is no device yet
 
     def default_output(self, question: Question) -> str:
         return question.name if question.name.lower().endswith(ENDING) else question.name + ENDING

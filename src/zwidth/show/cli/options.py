@@ -40,6 +40,9 @@ class Question:
     settings: tuple[str, ...] = ()
     at: tuple[float, ...] | dict[str, float] | None = None
     direction: tuple[float, ...] | None = None
+    axis: tuple[float, ...] | None = None
+    characteristic_length: float | None = None
+    orientation: tuple[float, ...] | None = None
     assembly: str | None = None
     model: str | None = None
     operator: str | None = None
@@ -52,7 +55,26 @@ class Question:
 
     def point(self, device: Device) -> OperatingPoint:
         """The device's operating point. Raises what `Device.at` raises."""
-        return device.at(self.at, self.direction, assembly=self.assembly, model=self.model)
+        return device.at(
+            self.at,
+            self.direction,
+            axis=self.axis,
+            characteristic_length=self.characteristic_length,
+            orientation=self.orientation,
+            assembly=self.assembly,
+            model=self.model,
+        )
+
+    def screw(self, device: Device) -> Floats:
+        """The rendered direction, (3,), or with an axis a screw (6,), of a device with a mechanism."""
+        return device.direction(self.direction, self.axis, self.characteristic_length)
+
+    def is_about_moments(self, device: Device) -> bool:
+        """Whether moments about an axis are rendered, so that the answer is in N m/rad."""
+        if device.mechanism is None:
+            return False
+        rendered = self.screw(device)
+        return rendered.shape[-1] == 6 and not rendered[:3].any()
 
     def refuse_unsupported(self, device: Device) -> None:
         """Raises BadInput for what directions computed together leave out."""
@@ -91,7 +113,7 @@ class Question:
         from zwidth.model.posture import PostureError
 
         try:
-            posture = device.at(self.at, assembly=self.assembly).posture
+            posture = device.at(self.at, orientation=self.orientation, assembly=self.assembly).posture
         except PostureError:
             return (None if isinstance(self.at, dict) else device.position(self.at)), None
         assert posture is not None
@@ -106,13 +128,22 @@ class Question:
             "device": self.name,
             "position_m": position,
             "projected_m": projected,
-            "direction": device.direction(self.direction) if mechanism else None,
+            **self._rendered(device),
             "assembly": self.assembly or device.reference_assembly,
             "model": self.model_of(device),
             "operator": self.operator_of(device),
             "sampling_period_s": device.controller.sampling_period,
             "delay_samples": device.controller.delay,
         }
+
+    def _rendered(self, device: Device) -> dict[str, Any]:
+        """Direction and axis as a result states them; null where there is none."""
+        if device.mechanism is None:
+            return {"direction": None}
+        rendered = self.screw(device)
+        if rendered.shape[-1] == 3:
+            return {"direction": rendered}
+        return {"direction": rendered[:3] if rendered[:3].any() else None, "axis": rendered[3:]}
 
 
 class PostureType(ParamType):
@@ -179,11 +210,6 @@ class Finite(ParamType):
         return number
 
 
-def _axis(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
-    if value is not None:
-        raise click.BadParameter("moments about an axis are not supported yet; use --direction")
-
-
 def refuse_empty(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     """A callback that refuses an empty name."""
     if value == "":
@@ -211,6 +237,23 @@ def about_a_device(command: Callback) -> Callback:
             "--direction",
             type=Numbers("DX,DY[,DZ]", (2, 3), "0,1"),
             help="Rendered direction, a vector of any length.",
+        ),
+        click.option(
+            "--axis",
+            type=Numbers("AX,AY,AZ", (3,), "0,0,1"),
+            help="Axis about which moments are rendered, of any length; walls then are in N m/rad. With "
+            "--direction: a screw.",
+        ),
+        click.option(
+            "--characteristic-length",
+            type=float,
+            metavar="METRES",
+            help="Length by which angles count as ways on a screw [m].",
+        ),
+        click.option(
+            "--orientation",
+            type=Numbers("ROLL,PITCH,YAW", (3,), "0,0,1.57"),
+            help="Orientation of the handle [rad], where the drives control it.",
         ),
     )
 
@@ -263,7 +306,6 @@ def _with_device_options(command: Callback, *where: Any) -> Callback:
             help="Who holds the handle: a bundled operator, a file with an [operator], or nobody. Default: the "
             "[operator] of DEVICE.",
         ),
-        click.option("--axis", hidden=True, callback=_axis, expose_value=False),
         click.option(
             "--set",
             "settings",
@@ -282,9 +324,13 @@ def _with_device_options(command: Callback, *where: Any) -> Callback:
         operator: Any,
         settings: Any,
         at: Any = None,
+        axis: Any = None,
+        characteristic_length: Any = None,
+        orientation: Any = None,
         **more: Any,
     ) -> int:
-        return command(Question(device, settings, at, direction, assembly, model, operator), **more)
+        screw = axis, characteristic_length, orientation
+        return command(Question(device, settings, at, direction, *screw, assembly, model, operator), **more)
 
     for decorate in reversed(decorators):
         with_arguments = decorate(with_arguments)

@@ -52,28 +52,42 @@ class ShowCommand(Command):
 
     def pages(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> Iterator[Any]:
         values = json_value(document)
-        yield two_columns(
-            [
-                ("link side", amount(values["link_side_mass_kg"], "kg")),
-                ("motor side", amount(values["motor_side_mass_kg"], "kg")),
-                ("both, rigid", amount(values["rigid_mass_kg"], "kg")),
-                ("stiffness between", amount(values["stiffness_N_per_m"], "N/m")),
-                ("natural frequencies", ", ".join(_modes(values))),
-            ]
-        )
+        massless = case.point.missing.get("dynamics", ())
+        if massless:
+            more = f" and {len(massless) - 2} more" if len(massless) > 2 else ""
+            yield f"  kinematics only: the file does not give {', '.join(massless[:2])}{more}\n"
+        else:
+            yield two_columns(_felt(values))
         if result.jacobian is not None:
             units = _dexterity_units(result.jacobian)
+            dynamic = ("dynamic manipulability", amount(values["dynamic_manipulability"], units[1]))
             yield two_columns(
                 [
                     ("manipulability", amount(values["manipulability"], units[0])),
-                    ("dynamic manipulability", amount(values["dynamic_manipulability"], units[1])),
+                    *([] if massless else [dynamic]),
                     ("isotropy (1 is best)", amount(values["isotropy"])),
                 ]
             )
-            angles = [(name, amount(angle)) for name, angle in values["joints_rad"].items()]
+            angles = [(name, _coordinates(value)) for name, value in values["joints_rad"].items()]
             yield table(["joint", "angle [rad]"], angles)
         if values["sources"]:
             yield table(["numbers", "source"], list(values["sources"].items()))
+
+
+def _felt(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Masses and stiffness felt along the direction, and frequencies."""
+    return [
+        ("link side", amount(values["link_side_mass_kg"], "kg")),
+        ("motor side", amount(values["motor_side_mass_kg"], "kg")),
+        ("both, rigid", amount(values["rigid_mass_kg"], "kg")),
+        ("stiffness between", amount(values["stiffness_N_per_m"], "N/m")),
+        ("natural frequencies", ", ".join(_modes(values))),
+    ]
+
+
+def _coordinates(value: Any) -> str:
+    """A joint's coordinate, or those of a joint with several."""
+    return ", ".join(amount(one) for one in value) if isinstance(value, list) else amount(value)
 
 
 def _dexterity_units(jacobian: Floats) -> tuple[str, str]:

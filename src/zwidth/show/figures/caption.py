@@ -16,7 +16,7 @@ from matplotlib.font_manager import FontProperties, findfont, get_font
 from zwidth.show.circumstances import AS_GIVEN, computer_text, omission_text, operator_text
 from zwidth.show.figures.style import FAMILY, context, wrapped
 from zwidth.show.output import printable
-from zwidth.show.units import as_written, point
+from zwidth.show.units import as_written, point, way
 
 if TYPE_CHECKING:
     from zwidth.loop.controller import Controller
@@ -170,7 +170,10 @@ def _direction(facts: Mapping[str, Any]) -> str:
     if together is None:
         return ""
     law = ", under one wall law" if len(together) > 1 else ""
-    return f"along {' and '.join(point(one, '') for one in together)}{law}"
+    ways = [way(one) for one in together]
+    if all(one.startswith("along ") for one in ways[1:]):
+        ways[1:] = [one.removeprefix("along ") for one in ways[1:]]
+    return f"{' and '.join(ways)}{law}"
 
 
 def _environment(facts: Mapping[str, Any]) -> str:

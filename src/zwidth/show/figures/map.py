@@ -14,9 +14,9 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from zwidth.measures.definition import FAILED, NO_VALUE, SINGULAR, UNDECIDED
+from zwidth.measures.definition import BEYOND_LIMIT, FAILED, NO_VALUE, SINGULAR, UNDECIDED
 from zwidth.show.figures.colour_bands import LARGEST, bands_of, colour_bar
-from zwidth.show.figures.mechanism import joint_points, link_stroke
+from zwidth.show.figures.mechanism import drawn_links, joint_points, link_stroke
 from zwidth.show.figures.style import BLACK, GREY, LINES, VERMILION, figure, label
 from zwidth.show.units import area_text, as_written, percent, printed
 from zwidth.study.reach_outline import continued, reach_outline
@@ -32,6 +32,7 @@ ProjectedMechanism = tuple[list[Floats], Floats, Floats]  # strokes of the links
 
 MARKS: Final = {
     SINGULAR: ("singular", "xxxx"),
+    BEYOND_LIMIT: ("beyond a joint limit", "----"),
     NO_VALUE: ("no value", "////"),
     UNDECIDED: ("undecided", "...."),
     FAILED: ("failed", "\\\\\\\\"),
@@ -249,7 +250,7 @@ def _mechanism(dataset: xr.Dataset, device: Device | None) -> ProjectedMechanism
     assert posture is not None
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=float).reshape(2, 3)
     placed = link_points(mechanism, posture)
-    strokes = [link_stroke(mechanism, placed, i) @ axes.T for i in range(len(mechanism.links.names))]
+    strokes = [link_stroke(mechanism, placed, i) @ axes.T for i in drawn_links(mechanism)]
     return strokes, joint_points(mechanism, placed) @ axes.T, posture.position @ axes.T
 
 

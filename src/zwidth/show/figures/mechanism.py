@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from typing import Any
 
@@ -12,43 +13,107 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.device.device import Device
-from zwidth.model.mechanism import REVOLUTE, Mechanism
+from zwidth.model.mechanism import FIXED, Mechanism
 from zwidth.model.posture import LinkPoints, Posture, link_points
 from zwidth.show.figures.style import BLACK, BLUE, GREY, LINES, VERMILION, label, legend_beside
+from zwidth.show.units import quantity
 
 Floats = NDArray[np.float64]
 # Points closer than this share of the mechanism's size are one.
 SAME_POINT = 1e-6
 AXES = "xyz"
+AXIS_LENGTH = 0.05  # m, to either side, of joint axes that are drawn alone
+# Where x, y and z go in the picture of a spatial mechanism, (2, 3): it is looked at from the right and above.
+TURNED, TILTED = np.radians(35.0), np.radians(22.0)
+OBLIQUE = np.array(
+    [
+        [np.cos(TURNED), np.sin(TURNED), 0.0],
+        [-np.sin(TURNED) * np.sin(TILTED), np.cos(TURNED) * np.sin(TILTED), np.cos(TILTED)],
+    ]
+)
 
 
 def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayLike) -> None:
-    """The mechanism seen along the axis in which it is flattest, in metres, with equal scales.
+    """The mechanism in metres with equal scales: a planar one seen along the axis in which it is flat, another one
+    from the front right and above, with its axes beside it.
 
     posture    a single one that is OK
-    direction  (3,)  rendered direction, any length
+    direction  (3,)  rendered direction, any length; or (6,), a screw, of which the axis is drawn where it has one
     Raises     ValueError  for a device without a mechanism
     """
     if device.mechanism is None:
         raise ValueError(f"{device.label} is given by its [plant] and has no mechanism to draw")
     mechanism = device.mechanism
     placed = link_points(mechanism, posture)
-    strokes = [link_stroke(mechanism, placed, i) for i in range(len(mechanism.links.names))]
+    bodies = drawn_links(mechanism)
+    strokes = [link_stroke(mechanism, placed, i) for i in bodies]
+    if not np.ptp(np.vstack(strokes), axis=0).any():  # a wrist, of which nothing has a length
+        strokes = [_axis_stroke(mechanism, placed, i) for i in bodies]
     everything = np.vstack([np.zeros((1, 3)), *strokes, posture.position[None]])
     flat = projection_axes(everything)
-    size = max(float(np.max(np.ptp(everything[:, flat], axis=0))), 1e-9)
-    for n, stroke in enumerate(strokes):
-        _link(ax, stroke[:, flat], mechanism.links.names[n], n)
-    _joints(ax, mechanism, placed, flat, size, [stroke[:, flat] for stroke in strokes])
-    _handle(ax, posture.position[flat], np.asarray(direction, dtype=float)[flat], size)
+    planar = np.ptp(np.delete(everything, flat, axis=1)) <= SAME_POINT * max(float(np.ptp(everything)), 1e-9)
+    view = np.eye(3)[flat] if planar else OBLIQUE
+    size = max(float(np.max(np.ptp(everything @ view.T, axis=0))), 1e-9)
+    groups = _groups([mechanism.links.names[i] for i in bodies])
+    for stroke, (name, n, first) in zip(strokes, groups, strict=True):
+        _link(ax, stroke @ view.T, name if first else "", n)
+    _joints(ax, mechanism, placed, view, size, [stroke @ view.T for stroke in strokes])
+    _handle(ax, view @ posture.position, np.asarray(direction, dtype=float), view, size)
     ax.set_aspect("equal")
     ax.margins(0.12, 0.06)
     ax.autoscale_view()
-    ax.grid(color="#E4E4E4", linewidth=0.5)
     ax.set_axisbelow(True)
-    for axis, k in zip((ax.xaxis, ax.yaxis), flat, strict=True):
-        label(axis, AXES[k], "m", plain=True)
+    if planar:
+        ax.grid(color="#E4E4E4", linewidth=0.5)
+        for axis, k in zip((ax.xaxis, ax.yaxis), flat, strict=True):
+            label(axis, AXES[k], "m", plain=True)
+    else:
+        _base_axes(ax, everything @ view.T, size)
     legend_beside(ax)
+
+
+def _axis_stroke(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> Floats:
+    """The joint's axis through its origin, (2, 3), where there is nothing else to draw."""
+    axis = points_of_links.rotation[link] @ mechanism.links.axis[link]
+    return np.asarray(points_of_links.origin[link] + AXIS_LENGTH * np.array([-axis, axis]))
+
+
+def drawn_links(mechanism: Mechanism) -> list[int]:
+    """The entries of the links that are bodies, not the crosses and balls between two joint coordinates."""
+    return [i for i, name in enumerate(mechanism.links.names) if "/" not in name]
+
+
+def _groups(names: list[str]) -> list[tuple[str, int, bool]]:
+    """Of each link its name, or that of all copies of a leg's link; the number of its style; whether it is the
+    first of that name."""
+    kinds = [re.sub(r"-\d+$", "", name) for name in names]
+    shown, known = [], list(dict.fromkeys(kinds))
+    for name, kind in zip(names, kinds, strict=True):
+        copies = kinds.count(kind)
+        shown.append((f"{kind} ({copies})" if copies > 1 else name, known.index(kind)))
+    return [(name, n, shown.index((name, n)) == i) for i, (name, n) in enumerate(shown)]
+
+
+def _base_axes(ax: Axes, points: Floats, size: float) -> None:
+    """The directions of x, y and z in a corner, and a length to measure by; an oblique view has no scales."""
+    length = 10.0 ** np.floor(np.log10(0.4 * size))
+    length *= next(step for step in (5.0, 2.0, 1.0) if step * length <= 0.4 * size)
+    corner = points.min(axis=0) - np.array([0.2, 0.12]) * size
+    for k, name in enumerate(AXES):
+        tip = corner + length * OBLIQUE[:, k]
+        ax.plot(*np.array([corner, tip]).T, color=GREY, linewidth=1.2, solid_capstyle="round")
+        ax.annotate(name, (float(tip[0]), float(tip[1])), ha="center", va="bottom", fontsize=8.0, color=BLACK)
+    ax.annotate(
+        f"axes: {quantity(length, 'm')} each",
+        (float(corner[0]), float(corner[1])),
+        xytext=(0.0, -20.0),
+        textcoords="offset points",
+        va="top",
+        fontsize=8.0,
+        color=BLACK,
+    )
+    ax.plot(*(corner - np.array([0.0, 0.12 * size]))[:, None], linestyle="none", marker=None)
+    ax.axis("off")
 
 
 def projection_axes(points: Floats) -> list[int]:
@@ -85,27 +150,28 @@ def _joints(
     ax: Axes,
     mechanism: Mechanism,
     points_of_links: LinkPoints,
-    flat: list[int],
+    view: Floats,
     size: float,
     strokes: list[Floats],
 ) -> None:
     """Base, joints and loop closures; driven joints filled, with the names of their drives."""
     links, closures, drives = mechanism.links, mechanism.closures, mechanism.drives
-    base = points_of_links.origin[links.parent < 0][:, flat]
+    based = [i for i in np.flatnonzero(links.parent < 0) if not _is_free(mechanism, int(i))]
+    base = points_of_links.origin[based] @ view.T
     grounded = [p for a, p in zip(closures.a, closures.point_a, strict=True) if a < 0]
     grounded += [p for b, p in zip(closures.b, closures.point_b, strict=True) if b < 0]
-    base = np.vstack([base, np.array(grounded).reshape(-1, 3)[:, flat]])
+    base = np.vstack([base, np.array(grounded).reshape(-1, 3) @ view.T])
     below = base - np.array([0.0, 0.035 * size])
     ax.plot(*below.T, marker="^", markersize=13.0, color="#B8B8B8", linestyle="none", zorder=1.5, label="base")
     circle: dict[str, Any] = {"marker": "o", "markersize": 7.0, "linestyle": "none", "markeredgecolor": BLACK}
     ax.plot(
-        *joint_points(mechanism, points_of_links)[:, flat].T,
+        *(joint_points(mechanism, points_of_links) @ view.T).T,
         markerfacecolor="white",
         zorder=3.0,
         label="joint",
         **circle,
     )
-    driven = points_of_links.origin[drives.joint][:, flat]
+    driven = points_of_links.origin[drives.joint] @ view.T
     if len(driven):
         ax.plot(*driven.T, markerfacecolor=BLUE, zorder=3.1, label="driven joint", **circle)
     for place, names in _labels_by_position(driven, drives.names, SAME_POINT * max(size, 1.0)):
@@ -127,13 +193,19 @@ def _joints(
 
 
 def joint_points(mechanism: Mechanism, points_of_links: LinkPoints) -> Floats:
-    """Where joints turn and loops meet, (k, 3)."""
-    closures = mechanism.closures
-    turning = np.flatnonzero(mechanism.links.joint == REVOLUTE)
+    """Where joints move and loops meet, (k, 3); a free link has no such place."""
+    closures, joint = mechanism.closures, mechanism.links.joint
+    moving = [i for i in np.flatnonzero(joint != FIXED) if not _is_free(mechanism, int(i))]
     meeting = [
         points_of_links.of(int(a), p) if a >= 0 else p for a, p in zip(closures.a, closures.point_a, strict=True)
     ]
-    return np.array([*points_of_links.origin[turning], *meeting]).reshape(-1, 3)
+    return np.array([*points_of_links.origin[moving], *meeting]).reshape(-1, 3)
+
+
+def _is_free(mechanism: Mechanism, entry: int) -> bool:
+    """Whether an entry belongs to a free link, which has six of them and no joint that holds it."""
+    names = [name.partition("/")[0] for name in mechanism.links.names]
+    return names.count(names[entry]) > 3
 
 
 def _free_side(place: Floats, strokes: list[Floats], near: float) -> Floats:
@@ -166,8 +238,11 @@ def _labels_by_position(points: Floats, names: tuple[str, ...], near: float) -> 
     return groups
 
 
-def _handle(ax: Axes, handle: Floats, direction: Floats, size: float) -> None:
-    """The handle, and an arrow along the rendered direction (a ring where it points at the viewer)."""
+def _handle(ax: Axes, handle: Floats, direction: Floats, view: Floats, size: float) -> None:
+    """The handle, and an arrow along the rendered direction or the axis of moments (a ring where it points at the
+    viewer)."""
+    turns = len(direction) == 6 and not direction[:3].any()
+    along = view @ (direction[3:] if turns else direction[:3])
     ax.plot(
         *handle[:, None],
         marker="D",
@@ -176,12 +251,12 @@ def _handle(ax: Axes, handle: Floats, direction: Floats, size: float) -> None:
         markeredgecolor="white",
         linestyle="none",
         zorder=4.0,
-        label="handle and\nrendered direction",
+        label=f"handle and\n{'axis of moments' if turns else 'rendered direction'}",
     )
-    if not np.linalg.norm(direction) > SAME_POINT:
+    if not np.linalg.norm(along) > SAME_POINT * np.linalg.norm(direction):
         ax.plot(*handle[:, None], marker="o", markersize=15.0, fillstyle="none", color=VERMILION)
         return
-    tip = handle + 0.28 * size * direction / np.linalg.norm(direction)
+    tip = handle + 0.28 * size * along / np.linalg.norm(along)
     arrow = FancyArrowPatch(
         tuple(handle),
         tuple(tip),

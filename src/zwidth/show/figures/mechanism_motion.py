@@ -17,7 +17,7 @@ from zwidth.contact.mechanism.surfaces import Box, Sphere, Surface, depth_and_no
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import Posture, PostureError, link_points, solve_posture
 from zwidth.show.figures.contact_response import LONGEST_LINE, draw_envelope, draw_line
-from zwidth.show.figures.mechanism import AXES, joint_points, link_stroke, projection_axes
+from zwidth.show.figures.mechanism import AXES, drawn_links, joint_points, link_stroke, projection_axes
 from zwidth.show.figures.style import BLACK, BLUE, GREY, LINES, VERMILION, context, figure, label, legend_above
 from zwidth.show.units import quantity
 
@@ -122,7 +122,7 @@ def _last(motion: MechanismMotion) -> Posture | None:
 
 def _strokes(mechanism: Mechanism, posture: Posture) -> list[Floats]:
     placed = link_points(mechanism, posture)
-    return [link_stroke(mechanism, placed, i) for i in range(len(mechanism.links.names))]
+    return [link_stroke(mechanism, placed, i) for i in drawn_links(mechanism)]
 
 
 def _draw_posture(

@@ -21,7 +21,7 @@ from zwidth.loop.motion_names import group_names
 from zwidth.model.mechanism import Floats
 from zwidth.show.figures.decay import tenfold_time
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity
+from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity, way
 from zwidth.study.validity import Fit, Interval, Validity
 from zwidth.study.what_if import LEAST_GAIN, REMEDIES, Variant, find_variant, limiting_change
 
@@ -74,6 +74,8 @@ def where(facts: Facts) -> str:
     """Direction and position: "Along y at (0, 0.25) m "; "" for a plant."""
     if facts.posture is None or facts.direction is None:
         return ""
+    if facts.direction.shape[-1] == 6:
+        return f"{way(facts.direction).capitalize()} at {point(facts.posture.position)} "
     return f"Along {direction_name(facts.direction)} at {point(facts.posture.position)} "
 
 
@@ -469,7 +471,7 @@ def delay_name(controller: Controller) -> str:
 
 
 def velocity_and_force_text(controller: Controller) -> str:
-    """Velocity estimator and filters: "velocity by kalman, force lagging by 2 ms"."""
+    """Velocity estimator, filters and other feedback: "velocity by kalman, force lagging by 2 ms"."""
     plain = isinstance(controller.velocity, BackwardDifference)
     method = next(name for name, kind in METHODS.items() if isinstance(controller.velocity, kind))
     estimate = "velocity" if plain else f"velocity by {method}"
@@ -480,6 +482,7 @@ def velocity_and_force_text(controller: Controller) -> str:
         parts.append(f"force through {filter_name(controller.force_filter)}")
     if controller.actuator_time_constant:
         parts.append(f"force lagging by {as_written(controller.actuator_time_constant, 's')}")
+    parts += [f"with {name}" for name in controller.feedback_names]
     return ", ".join(parts)
 
 

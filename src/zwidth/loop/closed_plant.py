@@ -1,0 +1,329 @@
+"""The sampled plant with the computer's fixed feedback closed, from the wall's force to the reading.
+
+All of it is linear, and it repeats itself every sampling period T, at two rates, too. So one period is gone
+through once, in order: readings, estimates and commands at the samples, the plant's exact growth in between. Every
+signal on the way is a row: what the states at the beginning of the period, and the wall's force, contribute to it.
+What the period adds to the states is the closed plant,
+
+    X_{j+1} = (1 + E) X_j + g u_j,        y_j = c X_j.
+
+Rows are kept of what has been added to each state, so that E is known to all digits where X hardly changes.
+
+At a sample everything is read first: the measured force is the one just before the new command acts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.loop.controller import Controller, split_delay
+from zwidth.loop.coupled_hold import SampledForm
+from zwidth.loop.estimators import LinearMethod
+from zwidth.loop.filter_states import FilterStates, filter_states
+from zwidth.loop.filters import low_pass_factors
+from zwidth.loop.fixed_feedback import ForceSensor, acts
+from zwidth.loop.hold import lag_share
+from zwidth.loop.low_pass import LowPass
+from zwidth.loop.plant_states import PlantStates, plant_states
+from zwidth.model.plant import Plant
+from zwidth.model.reduction import ModelError
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+SAMPLE, SLOW, FAST, END = range(4)  # what happens in a period, in this order at one instant
+SAME_INSTANT = 1e-12  # shares of the period within which two instants are one
+
+
+class ForceSensorError(ModelError):
+    """A force sensor that cannot be where it is said to be."""
+
+
+def measured_force(plant: Plant, sensor: ForceSensor) -> Floats:
+    """What a sensor between device and hand reads per x'', x' and x (3, n): the hand's force, less what the mass
+    between them takes,  f = f_hand - mass_beyond h . x''.
+
+    Raises  ForceSensorError  for a plant without a handle, or with less mass there than beyond the sensor
+    """
+    h = plant.handle
+    if h is None:
+        raise ForceSensorError(
+            "a force sensor sits at the handle, and the plant has none; give plant.handle, choose a model with a "
+            "handle, or leave force_sensor out"
+        )
+    rows = np.zeros((3, plant.size)) if plant.hand_force is None else plant.hand_force.copy()
+    device = plant.mass + np.outer(h, rows[0])  # without the arm of a rigid grasp
+    at_handle = 1.0 / float(h @ np.linalg.solve(device, h))
+    if not sensor.mass_beyond < at_handle:
+        raise ForceSensorError(
+            f"mass_beyond is {sensor.mass_beyond:.6g} kg, and must be less than the device's mass at the handle, "
+            f"{at_handle:.6g} kg, of which it is a part"
+        )
+    rows[0] -= sensor.mass_beyond * h
+    return np.asarray(rows)
+
+
+def close_plant(plant: Plant, controller: Controller) -> tuple[SampledForm, PlantStates]:
+    """The sampled plant with all fixed feedback of a computer closed, and the plant's own states.
+
+    Returns  a form without states where the force moves nothing that shows in a reading
+    Raises   ForceSensorError  for a force sensor where none can be
+    """
+    local, sensor = controller.local_loop, controller.force_sensor
+    fast = local.rate_multiple if local is not None and acts(local) else 1
+    rows = measured_force(plant, sensor) if sensor is not None and acts(sensor) else None
+    states = plant_states(plant, controller.sampling_period / fast, rows)
+    return closed_form(states, controller), states
+
+
+def closed_form(states: PlantStates, controller: Controller) -> SampledForm:
+    """The same for the states of a plant."""
+    if not len(states.output):
+        none = np.zeros(0)
+        return SampledForm(np.zeros((0, 0)), none, none, none, 0.0, 0.0)
+    return _Period(states, controller).closed()
+
+
+def path_responses(plant: Plant, controller: Controller, d: Complexes) -> tuple[Complexes, Complexes]:
+    """Responses (...) of the reading, and of the measured force without a hand, to a command in front of the force
+    filter, nothing closed but the local loop, at z = 1 + d (...)."""
+    sensor = controller.force_sensor
+    rows = None if sensor is None else measured_force(plant, sensor)
+    states = plant_states(plant, controller.sampling_period, rows)
+    period = _Period(states, replace(controller, feedforward=None, force_sensor=None), measures=rows is not None)
+    form = period.closed()
+    resolvent = d[..., None, None] * np.eye(len(form.new)) - form.growth
+    moved = np.linalg.solve(resolvent, np.broadcast_to(form.new[:, None], (*d.shape, len(form.new), 1)))[..., 0]
+    measured = period.measured if period.measured is not None else np.zeros(len(form.new))
+    return np.asarray(moved @ form.output), np.asarray(moved @ measured)
+
+
+class _Rows:
+    """The states of a loop as rows: what those at the beginning of a period, and the wall's force, contribute.
+
+    change  (N, N + 1)  what has been added to each state so far; the last column is of the wall's force
+    """
+
+    def __init__(self) -> None:
+        self.size = 0
+
+    def add(self, count: int) -> slice:
+        """Room for some more states."""
+        self.size += count
+        return slice(self.size - count, self.size)
+
+    def begin(self) -> Floats:
+        """All states at the beginning of a period; returns the row of the wall's force."""
+        self.change, self.start = np.zeros((self.size, self.size + 1)), np.eye(self.size, self.size + 1)
+        return np.asarray(np.eye(1, self.size + 1, self.size)[0])
+
+    def now(self, at: slice) -> Floats:
+        """Rows of some states as they are by now."""
+        return np.asarray(self.start[at] + self.change[at])
+
+
+class _FilterRows:
+    """A discrete filter among the rows."""
+
+    def __init__(self, rows: _Rows, states: FilterStates) -> None:
+        self.rows, self.states, self.at = rows, states, rows.add(len(states.A))
+
+    def output(self, signal: Floats) -> Floats:
+        """A signal behind the filter, whose states go on by one sample."""
+        own, now = self.states, self.rows.now(self.at)
+        self.rows.change[self.at] += own.A @ now + np.outer(own.input, signal)
+        return np.asarray(own.output @ now + own.direct * signal)
+
+
+class _QueueRows:
+    """Past values of a signal among the rows, the newest first."""
+
+    def __init__(self, rows: _Rows, count: int) -> None:
+        self.rows, self.at = rows, rows.add(count)
+
+    def push(self, signal: Floats) -> Floats:
+        """Put a value at the head; returns it and those before it."""
+        values = np.vstack([signal, self.rows.now(self.at)])
+        self.rows.change[self.at] = values[:-1] - self.rows.start[self.at]
+        return values
+
+    def past(self) -> Floats:
+        """The values before the next one."""
+        return self.rows.now(self.at)
+
+
+class _HeldRows:
+    """Commands that wait for a delay of whole samples and a part of one, and are then held.
+
+    last  whether the one that acts at the end of a sample is kept even if none waits
+    """
+
+    def __init__(self, rows: _Rows, delay: float, last: bool) -> None:
+        self.whole, self.part = split_delay(delay)
+        self.queue = _QueueRows(rows, self.whole + (last or self.part > 0.0))
+
+    def before(self) -> Floats:
+        """The command that acts just before the next sample."""
+        return np.asarray(self.queue.past()[self.whole])
+
+    def push(self, command: Floats) -> tuple[Floats, Floats]:
+        """Put in a command; returns what acts until the part of the sample has passed, and from then on."""
+        values = self.queue.push(command)
+        return values[self.whole + (self.part > 0.0)], values[self.whole]
+
+
+class _SlowCommand:
+    """The command of the wall's loop: wall, force feedback and feedforward, through the force filter."""
+
+    def __init__(self, rows: _Rows, controller: Controller) -> None:
+        T, self.sensor, self.ahead = controller.sampling_period, controller.force_sensor, controller.feedforward
+        self.on_force = _FilterRows(rows, low_pass_states(controller.force_filter, T))
+        self.period = T
+        if self.sensor is not None and acts(self.sensor):
+            self.late = _QueueRows(rows, self.sensor.delay)
+            self.on_sensor = _FilterRows(rows, low_pass_states(self.sensor.filter, T))
+        if self.ahead is not None and acts(self.ahead):
+            self.velocity = _FilterRows(rows, estimate_states(self.ahead.velocity, self.ahead.velocity_filter, T))
+            if self.ahead.inertia:
+                self.before = _QueueRows(rows, 1)
+                self.acceleration = _FilterRows(rows, low_pass_states(self.ahead.acceleration_filter, T))
+
+    def of(self, wall: Floats, reading: Floats, measured: Floats | None) -> Floats:
+        """The command of a sample, from the wall's force, the reading and the measured force."""
+        command = wall
+        if self.sensor is not None and measured is not None:
+            known = self.late.push(measured)[-1]
+            if self.sensor.law == "force-error":
+                known = known + wall
+            command = command + self.sensor.gain * self.on_sensor.output(known)
+        if self.ahead is not None and acts(self.ahead):
+            velocity = self.velocity.output(reading)
+            command = command + self.ahead.damping * velocity
+            if self.ahead.inertia:
+                change = (velocity - self.before.push(velocity)[1]) / self.period
+                command = command + self.ahead.inertia * self.acceleration.output(change)
+        return self.on_force.output(command)
+
+
+class _Period:
+    """One sampling period of a loop with its fixed feedback.
+
+    measures  whether the force at the handle is measured, with or without a feedback of it
+    measured  its weights of the states at the beginning, once the period is closed
+    """
+
+    def __init__(self, states: PlantStates, controller: Controller, measures: bool = False) -> None:
+        self.states, self.controller = states, controller
+        lag, sensor, local = controller.actuator_time_constant, controller.force_sensor, controller.local_loop
+        self.measures = measures or (sensor is not None and acts(sensor))
+        self.measured: Floats | None = None
+        # the force just before a sample is an older command, which then has to be kept
+        keeps = self.measures and lag == 0.0 and states.force_direct != 0.0
+        self.rows = _Rows()
+        self.at = self.rows.add(len(states.output))
+        self.force_at = self.rows.add(1 if lag > 0.0 else 0)
+        self.command = _SlowCommand(self.rows, controller)
+        self.slow = _HeldRows(self.rows, controller.delay, keeps)
+        self.local = local if local is not None and acts(local) else None
+        if self.local is not None:
+            T = controller.sampling_period / self.local.rate_multiple
+            if self.local.damping:
+                states_of_it = estimate_states(self.local.velocity, self.local.velocity_filter, T)
+                self.fast_velocity = _FilterRows(self.rows, states_of_it)
+            self.fast = _HeldRows(self.rows, self.local.delay, keeps)
+
+    def closed(self) -> SampledForm:
+        """Go through the period."""
+        wall = self.rows.begin()
+        reading = self._reading()
+        measured = self._measured_force() if self.measures else None
+        if measured is not None:
+            self.measured = measured[: self.rows.size].copy()
+        slow, later = self.slow.push(self.command.of(wall, reading, measured))
+        fast = fast_later = np.zeros_like(wall)
+        at = 0.0
+        for share, what in self._instants():
+            if share - at > SAME_INSTANT:
+                self._advance((share - at) * self.controller.sampling_period, slow + fast)
+                at = share
+            if what == SAMPLE:
+                fast, fast_later = self.fast.push(self._fast_command())
+            elif what == SLOW:
+                slow = later
+            elif what == FAST:
+                fast = fast_later
+        N = self.rows.size
+        nothing = np.zeros(N)
+        return SampledForm(
+            self.rows.change[:, :N].copy(), self.rows.change[:, N].copy(), nothing, reading[:N], 0.0, 0.0
+        )
+
+    def _instants(self) -> list[tuple[float, int]]:
+        """What happens when, in shares of the period and in order: samples before commands that begin to act."""
+        instants = [(self.slow.part, SLOW), (1.0, END)]
+        if self.local is not None:
+            N = self.local.rate_multiple
+            instants += [(k / N, SAMPLE) for k in range(N)]
+            instants += [((k + self.fast.part) / N, FAST) for k in range(N)]
+        return sorted(instants)
+
+    def _reading(self) -> Floats:
+        return np.asarray(self.states.output @ self.rows.now(self.at))
+
+    def _measured_force(self) -> Floats:
+        """What the sensor measures, with the force that acts just before the sample."""
+        force = self.states.force_output @ self.rows.now(self.at)
+        if self.states.force_direct == 0.0:
+            return np.asarray(force)
+        if self.controller.actuator_time_constant > 0.0:
+            acting = self.rows.now(self.force_at)[0]
+        else:
+            acting = self.slow.before() + (0.0 if self.local is None else self.fast.before())
+        return np.asarray(force + self.states.force_direct * acting)
+
+    def _fast_command(self) -> Floats:
+        """The local loop's own command at one of its samples."""
+        assert self.local is not None
+        reading = self._reading()
+        command = -self.local.stiffness * reading
+        if self.local.damping:
+            command = command - self.local.damping * self.fast_velocity.output(reading)
+        return np.asarray(command)
+
+    def _advance(self, time: float, command: Floats) -> None:
+        """Let the plant move for a time under a held command."""
+        lag, rows = self.controller.actuator_time_constant, self.rows
+        growth, lagged, pushed = self._growth(time)
+        states, force = rows.now(self.at), rows.now(self.force_at)
+        rows.change[self.at] += growth @ states + np.outer(pushed, command)
+        if lag > 0.0:
+            rows.change[self.at] += np.outer(lagged, force[0])
+            rows.change[self.force_at] += lag_share(time, lag) * (command - force)
+
+    @cached_property
+    def _known_growths(self) -> dict[float, tuple[Floats, Floats, Floats]]:
+        return {}
+
+    def _growth(self, time: float) -> tuple[Floats, Floats, Floats]:
+        """The plant's growth over a time; equal parts of a period are computed once."""
+        key = round(time / self.controller.sampling_period, 13)
+        if key not in self._known_growths:
+            self._known_growths[key] = self.states.growth(time, self.controller.actuator_time_constant)
+        return self._known_growths[key]
+
+
+def low_pass_states(low_pass: LowPass | None, period: float) -> FilterStates:
+    """A low pass in states."""
+    top, bottom = (np.array(rows, dtype=float).reshape(-1, 3) for rows in low_pass_factors(low_pass, period))
+    return filter_states(top, bottom, np.ones(1))
+
+
+def estimate_states(method: LinearMethod, low_pass: LowPass | None, period: float) -> FilterStates:
+    """A velocity estimate and the low pass behind it in states."""
+    own = method.estimator(period)
+    top, bottom = (np.array(rows, dtype=float).reshape(-1, 3) for rows in low_pass_factors(low_pass, period))
+    return filter_states(np.vstack([own.numerator, top]), np.vstack([own.denominator, bottom]), own.window)

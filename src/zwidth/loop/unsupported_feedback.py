@@ -1,0 +1,21 @@
+"""The refusal of answers that are not known with feedback beside the wall law."""
+
+from __future__ import annotations
+
+from zwidth.loop.controller import Controller
+from zwidth.model.reduction import ModelError
+
+
+class FeedbackError(ModelError):
+    """An answer is not known with the feedback that a computer adds to the wall law."""
+
+
+def refuse_feedback(controller: Controller, what: str, instead: str) -> None:
+    """Raise FeedbackError for a computer with feedback beside the wall law, Coulomb feedforward included.
+
+    what     the answer, such as "limit cycles are not predicted"
+    instead  what to do, such as "simulate"
+    """
+    names = controller.feedback_names if controller.fixed_feedback or controller.feeds_friction else ()
+    if names:
+        raise FeedbackError(f"{what} with {' and '.join(names)}; {instead}")

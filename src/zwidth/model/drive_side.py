@@ -1,0 +1,171 @@
+"""How drives and joints of their own act on a mechanism's independent coordinates, posture by posture.
+
+With p the coordinates of the drives and the free joints, the coordinate of drive i at its joint moves by T_i p':
+by p_i' alone, unless it is a surplus drive, which moves with all. A force f along the rendered direction is the
+generalised forces h f. The computer shares it among the drives as torques t f with the least sum of squares,
+
+    T_d^T t = h_d,     t = (T_d^+)^T h_d                 T_d, h_d: without the free joints, which no drive moves
+
+and reads the handle's motion as t . theta, which is the least-squares estimate by all encoders. With as many
+drives as degrees of freedom T is 1 and t = h.
+
+A rotor's whole kinetic energy is J_m (S p' + n theta')^2 / 2, with S p' the part of its motor's angular velocity
+along its axis. Thesis eq. 2.21 takes n theta' alone; the link's inertia holds the rotor as if it were locked, so
+that
+
+    J_m (n theta' S p' + n^2 theta'^2 / 2)
+
+comes to that of the links.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from zwidth.compiled import compiled
+from zwidth.model.closure import equations, passive_rates
+from zwidth.model.forward_kinematics import place_links, working_memory
+from zwidth.model.inertia import unit_motions
+from zwidth.model.mechanism import FIXED, Drives, Floats, Ints, Mechanism
+from zwidth.model.mechanism_arrays import MechanismArrays, design_of_each, pack, per_design
+from zwidth.model.posture import Posture
+
+
+@dataclass(frozen=True)
+class DriveSide:
+    """Of each posture (...), with d drives and c independent coordinates; nan where a posture is not OK.
+
+    motion     (..., d, c)  T [1]
+    spin       (..., d, c)  S [1]; None: neglected
+    stiffness  (..., c, c)  of the joints' own springs [N m/rad]; None: none
+    damping    (..., c, c)  of their dampers [N m s/rad]; None: none
+    rubbing    (..., r, c)  motion of each joint with dry friction of its own, and coulomb (..., r) its level [N m]
+    driven     number of coordinates that drives move, the first ones
+    """
+
+    motion: Floats
+    spin: Floats | None
+    stiffness: Floats | None
+    damping: Floats | None
+    rubbing: Floats
+    coulomb: Floats
+    driven: int
+
+    def shares(self, lever_arms: Floats) -> Floats:
+        """t (..., d): torques at the joints per force along the direction, of lever arms h (..., c)."""
+        h, T = lever_arms[..., : self.driven], self.motion[..., : self.driven]
+        if T.shape[-2] == self.driven:  # as many drives as coordinates, which are theirs
+            return h
+        return np.asarray((np.swapaxes(np.linalg.pinv(T), -1, -2) @ h[..., None])[..., 0])
+
+    def with_rotors(self, mass_matrix: Floats, drives: Drives) -> Floats:
+        """Mass matrix (..., c, c) of the links and all rotors, every drive taken as rigid, from that of the
+        links."""
+        rotor = drives.transmission**2 * drives.motor_inertia
+        T = self.motion
+        whole = mass_matrix + np.swapaxes(T, -1, -2) @ (rotor[..., None] * T)
+        if self.spin is None:
+            return whole
+        spun = (drives.transmission * drives.motor_inertia)[..., None] * self.spin
+        cross = np.swapaxes(T, -1, -2) @ spun
+        return whole + cross + np.swapaxes(cross, -1, -2)
+
+
+def is_plain(mechanism: Mechanism) -> bool:
+    """Whether there is a drive for each coordinate and nothing else that acts on them: T = 1, t = h."""
+    drives, links = mechanism.drives, mechanism.links
+    own = links.joint_stiffness, links.joint_damping, links.joint_coulomb
+    return not (
+        mechanism.free or drives.surplus or drives.motor_link is not None or any(x is not None for x in own)
+    )
+
+
+def drive_side(mechanism: Mechanism, posture: Posture) -> DriveSide:
+    """The drives' side of each posture, broadcast with the designs of the mechanism."""
+    drives, links = mechanism.drives, mechanism.links
+    mech, shape = pack(mechanism), np.broadcast_shapes(posture.status.shape, mechanism.design_shape)
+    d, c, n = len(drives.names), mech.driven + mech.free, mech.parent.size
+    if is_plain(mechanism):
+        T = np.broadcast_to(np.eye(d), (*shape, d, d))
+        return DriveSide(T, None, None, None, np.zeros((*shape, 0, c)), np.zeros((*shape, 0)), d)
+    design = design_of_each(mechanism, shape).copy()
+    angles = np.array(np.broadcast_to(posture.angles, (*shape, n)).reshape(-1, n), order="C")
+    rates, spins = np.full((len(design), c, n), np.nan), np.full((len(design), c, n, 3), np.nan)
+    rotation = np.full((len(design), n, 3, 3), np.nan)
+    known = np.flatnonzero(~np.isnan(angles).any(axis=1))
+    _motions(mech, design, angles, known, rates, spins, rotation)
+    per_joint = np.swapaxes(rates, 1, 2)  # (N, n, c)
+    T = per_joint[:, drives.joint]
+    if drives.coupling is not None:
+        T = T + per_design(mechanism, drives.coupling, 2)[design] @ np.nan_to_num(per_joint)
+    level = np.zeros((1, n)) if links.joint_coulomb is None else per_design(mechanism, links.joint_coulomb, 1)
+    rubbing = np.flatnonzero(level.any(axis=0))
+    return DriveSide(
+        motion=T.reshape(*shape, d, c),
+        spin=_spin(mechanism, design, spins, rotation, shape),
+        stiffness=_of_joints(mechanism, links.joint_stiffness, per_joint, design, shape),
+        damping=_of_joints(mechanism, links.joint_damping, per_joint, design, shape),
+        rubbing=per_joint[:, rubbing].reshape(*shape, len(rubbing), c),
+        coulomb=np.broadcast_to(level, (int(design.max(initial=0)) + 1, n))[design][:, rubbing].reshape(
+            *shape, -1
+        ),
+        driven=mech.driven,
+    )
+
+
+def _of_joints(
+    mechanism: Mechanism, numbers: Floats | None, per_joint: Floats, design: Ints, shape: tuple[int, ...]
+) -> Floats | None:
+    """sum_j k_j B_j^T B_j of the joints' numbers k, with B_j the rate of joint j, (..., c, c)."""
+    if numbers is None:
+        return None
+    k = per_design(mechanism, numbers, 1)[design]
+    moving = mechanism.links.joint != FIXED
+    B = per_joint[:, moving]
+    return np.asarray((np.swapaxes(B, 1, 2) @ (k[:, moving, None] * B)).reshape(*shape, B.shape[2], B.shape[2]))
+
+
+def _spin(
+    mechanism: Mechanism, design: Ints, spins: Floats, rotation: Floats, shape: tuple[int, ...]
+) -> Floats | None:
+    """S (..., d, c): angular velocity of each motor's link along its axis per unit rate."""
+    drives = mechanism.drives
+    if drives.motor_link is None or drives.motor_axis is None:
+        return None
+    axis = per_design(mechanism, drives.motor_axis, 2)[design]
+    S = np.zeros((len(design), len(drives.names), spins.shape[1]))
+    for i, link in enumerate(drives.motor_link):
+        if link >= 0:
+            along = (rotation[:, link] @ axis[:, i, :, None])[..., 0]
+            S[:, i] = np.einsum("kcx,kx->kc", spins[:, :, link], along)
+    return S.reshape(*shape, *S.shape[1:])
+
+
+@compiled
+def _motions(
+    mech: MechanismArrays,
+    design: Ints,
+    angles: Floats,
+    known: Ints,
+    rates: Floats,
+    spins: Floats,
+    rotation: Floats,
+) -> None:
+    """Rates of the joints (N, c, n) and angular velocities of the links (N, c, n, 3) per unit rate of each
+    independent coordinate, and the links' axes (N, n, 3, 3), of the known postures."""
+    work = working_memory(mech)
+    for k in range(known.size):
+        i = known[k]
+        place_links(mech, design[i], angles[i], work)
+        equations(mech, design[i], work)
+        passive_rates(mech, design[i], work)
+        unit_motions(mech, work)
+        for s in range(rates.shape[1]):
+            for j in range(rates.shape[2]):
+                u = mech.column[j]
+                rates[i, s, j] = work.rates[s, u] if u >= 0 else 0.0
+                for x in range(3):
+                    spins[i, s, j, x] = work.spin[s, j, x]
+        rotation[i] = work.rotation

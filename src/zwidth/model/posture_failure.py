@@ -1,0 +1,126 @@
+"""Why a mechanism has no posture, in words: what, where, and what to ask for instead."""
+
+from __future__ import annotations
+
+from math import degrees
+
+import numpy as np
+
+from zwidth.compiled import compiled
+from zwidth.model.continuation import (
+    BEYOND_LIMIT,
+    OUT_OF_REACH,
+    follow,
+    joint_beyond_limit,
+)
+from zwidth.model.forward_kinematics import working_memory
+from zwidth.model.handle_position import goal_distance
+from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Floats, Mechanism
+from zwidth.model.mechanism_arrays import MechanismArrays
+
+
+class PostureError(ValueError):
+    """The mechanism has no posture that answers the question."""
+
+
+class OutOfReach(PostureError):
+    """The handle cannot get there in this assembly without passing a singularity."""
+
+
+class Singular(PostureError):
+    """At this position the drives lose, or do not have, control of the handle."""
+
+
+class BeyondLimit(PostureError):
+    """In the posture a joint is beyond its limit."""
+
+
+class LoopOpen(PostureError):
+    """A loop of the mechanism cannot be closed near the assembly's joint angles."""
+
+
+def singular_throughout(assembly: str, uncontrolled: str) -> Singular:
+    """An assembly in which the drives control the handle nowhere, for the reason given."""
+    return Singular(
+        f"assembly {assembly!r} of the mechanism is singular wherever its handle is: {uncontrolled}; choose "
+        "another assembly, or change the places of joints that make it so"
+    )
+
+
+def posture_failure(
+    mechanism: Mechanism,
+    mech: MechanismArrays,
+    status: int,
+    assembly: str,
+    reference: Floats,
+    goal: Floats,
+    near: Floats | None,
+) -> PostureError:
+    """Why there is no posture of one design at a goal (g,), by its status.
+
+    reference  (n,) joint coordinates;   near  (g,) the nearest goal that the handle can have, None where unknown
+    """
+    what = {POSITION: "position", POSE: "pose", ORIENTATION: "orientation"}[mech.controls]
+    where, instead = describe_goal(mech, goal), f"ask for a{'n' * (what[0] == 'o')} {what} nearer to the reference"
+    if near is not None:
+        away = _distance(mech, near, goal)
+        instead = f"the nearest {what} it reaches is {describe_goal(mech, near)}, {away} away"
+    if status == BEYOND_LIMIT:
+        return BeyondLimit(
+            f"with its handle at {where} in assembly {assembly!r} {_limit(mechanism, mech, reference, goal)}"
+        )
+    if status == OUT_OF_REACH and mech.controls == POSITION and np.array_equal(goal, mechanism.reference_position):
+        return OutOfReach(
+            f"the handle cannot reach its own reference position {where} in assembly {assembly!r}; "
+            f"check the lengths of the links, or ask for another position; {instead}"
+        )
+    if status == OUT_OF_REACH:
+        return OutOfReach(
+            f"the handle cannot reach {where} in assembly {assembly!r} without passing a singularity; {instead}"
+        )
+    return Singular(
+        f"the mechanism is singular with its handle at {where} in assembly {assembly!r}: "
+        f"the drives do not control it there; move the {what} off the edge of the workspace"
+    )
+
+
+def describe_goal(mech: MechanismArrays, goal: Floats) -> str:
+    """A goal (g,) in words: the position in metres, the orientation as its rotation vector in radians."""
+    position, vector = _numbers(goal[:3]) + " m", _numbers(goal[-3:]) + " rad"
+    if mech.controls == POSITION:
+        return position
+    return f"the rotation {vector}" if mech.controls == ORIENTATION else f"{position}, turned by {vector},"
+
+
+def _numbers(values: Floats) -> str:
+    return "(" + ", ".join(f"{x + 0.0:.6g}" for x in np.round(values, 12)) + ")"
+
+
+def _distance(mech: MechanismArrays, near: Floats, goal: Floats) -> str:
+    away = goal_distance(mech, 0, near, goal)
+    if mech.controls == ORIENTATION:
+        return f"{degrees(away / float(mech.size[0])):.4g} degrees"
+    return f"{away:.4g} m" if away >= 1.0 else f"{1e3 * away:.4g} mm"
+
+
+def _limit(mechanism: Mechanism, mech: MechanismArrays, reference: Floats, goal: Floats) -> str:
+    """Which joint is beyond which limit, and by how much."""
+    angles = reference.copy()
+    link = _joint_beyond(mech, angles, goal[None].copy())
+    if link < 0:  # the straight way does not lead there
+        return "a joint is beyond its limits; ask for a place nearer to the reference, or widen the limits"
+    name = mechanism.links.names[link].partition("/")[0]
+    value, low, high = angles[link], float(mech.lower[0, link]), float(mech.upper[0, link])
+    unit = "m" if mech.kind[link] == PRISMATIC else "rad"
+    return (
+        f"joint {name!r} is at {value:.4g} {unit}, beyond its limits, {low:.4g} to {high:.4g} {unit}; ask for a "
+        "place nearer to the reference, or widen the limits"
+    )
+
+
+@compiled
+def _joint_beyond(mech: MechanismArrays, angles: Floats, goals: Floats) -> int:
+    """The joint that is beyond its limit at the goal, reached straight from joint coordinates (in place)."""
+    work = working_memory(mech)
+    follow(mech, 0, goals, 0, angles, work)
+    return joint_beyond_limit(mech, 0, angles)

@@ -1,0 +1,88 @@
+"""Units and keys of answers about moments: newtons become newton metres and metres radians.
+
+Everything is computed alike for a force along a direction and a moment about an axis, in the same fields; only
+what is printed says which of the two it is.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any, Final
+
+UNITS: Final = {
+    "N/m": "Nm/rad",
+    "Ns/m": "Nms/rad",
+    "N s/m": "N m s/rad",
+    "kg": "kg m^2",
+    "m": "rad",
+    "N": "Nm",
+    "m/s": "rad/s",
+    "m/s^2": "rad/s^2",
+    "m/s²": "rad/s²",
+    "N²s/m²": "N²m²s/rad²",
+    "N^2 s/m^2": "N^2 m^2 s/rad^2",
+    "m/N": "rad/Nm",
+}
+"""Unit of a force along a direction -> that of a moment about an axis."""
+
+NAMES: Final = {"position_m": "angle_rad", "force_N": "moment_Nm"}
+ENDINGS: Final = (
+    ("_N2s_per_m2", "_N2m2s_per_rad2"),
+    ("_Ns_per_m", "_Nms_per_rad"),
+    ("_N_per_m", "_Nm_per_rad"),
+    ("_m_per_s2", "_rad_per_s2"),
+    ("_m_per_s", "_rad_per_s"),
+    ("_kg", "_kg_m2"),
+    ("_m", "_rad"),
+    ("_N", "_Nm"),
+)
+KEPT: Final = re.compile(r"[xyz]_m|plane_through_m|characteristic_length_m")
+"""Keys that are lengths whatever is rendered."""
+
+_moments: ContextVar[bool] = ContextVar("moments", default=False)
+
+
+def unit_of_moments(unit: str) -> str:
+    """The unit of a moment, an angle or an inertia where that of a force, a way or a mass is given; others stay.
+
+    >>> unit_of_moments("N/m"), unit_of_moments("Hz")
+    ('Nm/rad', 'Hz')
+    """
+    return UNITS.get(unit, unit)
+
+
+def keys_of_moments(value: Any) -> Any:
+    """A document, or columns, with the keys of moments about an axis.
+
+    >>> keys_of_moments({"stiffness_max_N_per_m": 2.0, "x_m": [0.1], "inner": [{"rigid_mass_kg": 1.0}]})
+    {'stiffness_max_Nm_per_rad': 2.0, 'x_m': [0.1], 'inner': [{'rigid_mass_kg_m2': 1.0}]}
+    """
+    if isinstance(value, Mapping):
+        return {_key(key): keys_of_moments(inner) for key, inner in value.items()}
+    return [keys_of_moments(inner) for inner in value] if isinstance(value, list | tuple) else value
+
+
+def _key(key: Any) -> Any:
+    if not isinstance(key, str) or "." in key or KEPT.fullmatch(key):  # a dotted path is of the device file
+        return key
+    if key in NAMES:
+        return NAMES[key]
+    return next((key[: -len(old)] + new for old, new in ENDINGS if key.endswith(old)), key)
+
+
+@contextmanager
+def speaking_of_moments(moments: bool) -> Iterator[None]:
+    """Within this block texts and figures have the units of moments, or those of forces."""
+    token = _moments.set(moments)
+    try:
+        yield
+    finally:
+        _moments.reset(token)
+
+
+def spoken_unit(unit: str) -> str:
+    """A unit as texts and figures write it now."""
+    return unit_of_moments(unit) if _moments.get() else unit

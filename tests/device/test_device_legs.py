@@ -1,0 +1,242 @@
+"""Legs written once: the same mechanism as written out, faults where the leg is written, numbers that change all
+copies; joint limits, free joints, closings by axes and frames in files."""
+
+from __future__ import annotations
+
+import tomllib
+from copy import deepcopy
+
+import numpy as np
+import pytest
+
+import zwidth
+from tests.device.device_cases import faults
+from zwidth.device.load import from_document
+from zwidth.device.new_device import new_device
+from zwidth.measures.definition import BEYOND_LIMIT, OUT_OF_REACH
+from zwidth.model.posture import BeyondLimit, OutOfReach, solve_posture
+
+DELTA = tomllib.loads(new_device("Delta", "delta"))
+PLACES = np.array([[0.0, 0.0, -0.12], [0.01, 0.02, -0.13], [-0.02, 0.01, -0.115]])
+
+
+def written_out(document):
+    """The delta with each leg for itself: names, frames and points turned by hand."""
+    flat = deepcopy(document)
+    (leg,) = flat["mechanism"].pop("legs")
+    own = [link["name"] for link in leg["links"]]
+    for k in range(3):
+        angle = 2 * np.pi * k / 3
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+
+        def copy(name, k=k):
+            return f"{name}-{k + 1}" if name in own else name
+
+        for link in deepcopy(leg["links"]):
+            if "parent" not in link:
+                link["origin_m"] = (turn @ link["origin_m"]).tolist()
+                link["orientation_rad"] = [0, 0, angle]
+            else:
+                link["parent"] = copy(link["parent"])
+            flat["mechanism"]["links"].append(link | {"name": copy(link["name"])})
+        for loop in deepcopy(leg["loops"]):
+            at_rod, at_platform = loop["points_m"]
+            loop |= {"name": f"{loop['name']}-{k + 1}", "links": [copy(name) for name in loop["links"]]}
+            loop["points_m"] = [at_rod, (turn @ at_platform).tolist()]
+            flat["mechanism"].setdefault("loops", []).append(loop)
+        for drive in deepcopy(leg["drives"]):
+            flat["mechanism"].setdefault("drives", []).append(
+                drive | {"name": f"{drive['name']}-{k + 1}", "joint": copy(drive["joint"])}
+            )
+    for assembly in flat["mechanism"]["assemblies"].values():
+        rough = assembly["joints_rad"]
+        assembly["joints_rad"] = {f"{name}-{k}": value for name, value in rough.items() for k in (1, 2, 3)}
+    return flat
+
+
+def test_legs_are_the_mechanism_that_is_written_out():
+    once, out = from_document(DELTA), from_document(written_out(DELTA))
+    assert once.mechanism.links.names == out.mechanism.links.names
+    one, other = once.at(PLACES).posture, out.at(PLACES).posture
+    assert one.mass_matrix == pytest.approx(other.mass_matrix, rel=1e-9)
+    assert one.jacobian == pytest.approx(other.jacobian, rel=1e-9)
+
+
+def test_a_number_of_a_leg_is_that_of_all_its_copies():
+    longer = from_document(DELTA).with_({"legs.leg.links.arm.length_m": 0.09})
+    document = deepcopy(DELTA)
+    document["mechanism"]["legs"][0]["links"][0]["length_m"] = 0.09
+    assert (
+        longer.at().chart(decay=False).stiffness_max
+        == from_document(document).at().chart(decay=False).stiffness_max
+    )
+    masses = [0.02, 0.03, 0.05]
+    results = zwidth.sweep(from_document(DELTA), {"legs.leg.links.arm.mass_kg": masses}, ["rigid_mass"])
+    alone = [
+        float(from_document(DELTA).with_({"legs.leg.links.arm.mass_kg": m}).at().effective.rigid_mass)
+        for m in masses
+    ]
+    assert results["rigid_mass"].values == pytest.approx(alone, rel=1e-12)
+
+
+def test_angles_in_place_of_a_count():
+    document = deepcopy(DELTA)
+    leg = document["mechanism"]["legs"][0]
+    del leg["count"]
+    leg["angles_rad"] = [0.0, 2 * np.pi / 3, 4 * np.pi / 3]
+    assert from_document(document).at().posture.angles == pytest.approx(
+        from_document(DELTA).at().posture.angles, abs=1e-12
+    )
+
+
+def in_leg(group, number, **changes):
+    document = deepcopy(DELTA)
+    document["mechanism"]["legs"][0][group][number] |= changes
+    return document
+
+
+@pytest.mark.parametrize(
+    ("document", "key", "words"),
+    [
+        (in_leg("links", 1, parent="amr"), "mechanism.legs.leg.links.rod-left.parent", "'amr' is not a link"),
+        (in_leg("links", 0, mass_kg=-1.0), "mechanism.legs.leg.links.arm.mass_kg", "at least 0"),
+        (
+            in_leg("loops", 0, links=["rod-left", "plate"]),
+            "mechanism.legs.leg.loops.ball-left.links.1",
+            "not a link",
+        ),
+        (in_leg("drives", 0, joint="rod-left"), "mechanism.legs.leg.drives.motor.joint", "has a universal joint"),
+        (in_leg("links", 0, limits_m=[0, 1]), "mechanism.legs.leg.links.arm.limits_m", "is of a prismatic joint"),
+        (
+            in_leg("links", 0, second_axis=[1, 0, 0]),
+            "mechanism.legs.leg.links.arm.second_axis",
+            "a universal joint",
+        ),
+        (in_leg("loops", 0, axes=[[0, 0, 1]] * 2), "mechanism.legs.leg.loops.ball-left.axes", 'closes = "axis"'),
+        (
+            in_leg("loops", 1, points_m=[[0.16, 0, 0], [0.9, 0, 0]]),
+            "mechanism.legs.leg.loops.ball-",
+            "cannot close: its two points stay at least",
+        ),
+        (
+            in_leg("links", 1, joint="spherical", second_axis=None),
+            "mechanism.legs.leg.links.rod-left.second_axis",
+            "",
+        ),
+    ],
+)
+def test_a_fault_is_reported_where_the_leg_is_written(document, key, words):
+    found = faults(document)
+    assert any(fault.key.startswith(key) and words in fault.message for fault in found), [str(f) for f in found]
+    assert len({str(fault) for fault in found}) == len(found)
+
+
+def test_a_rod_with_a_ball_at_either_end_spins_freely():
+    """Without the word the drives are too few, and the message names what can still move."""
+    document, given = deepcopy(DELTA), deepcopy(DELTA)
+    for number in (1, 2):
+        for one in (document, given):
+            rod = one["mechanism"]["legs"][0]["links"][number]
+            rod |= {"joint": "spherical"}
+            del rod["axis"], rod["second_axis"]
+            rod["orientation_rad"] = [0.0, 2.2, 0.0]
+        given["mechanism"]["legs"][0]["links"][number]["free"] = True
+    for one in (document, given):
+        rough = one["mechanism"]["assemblies"]["down"]["joints_rad"]
+        del rough["rod-left"], rough["rod-right"]
+    (fault,) = faults(document)
+    assert "9 degrees of freedom" in fault.message
+    assert "rod-left-1" in fault.message
+    device = from_document(given)
+    assert len(device.mechanism.free) == 6
+    plain = from_document(DELTA).at()
+    point = device.at()
+    assert point.jacobian[:, :3] == pytest.approx(plain.jacobian, abs=1e-9)
+    # the spin moves nothing but the rod: the wall is that of crossed pins, to the rod's own thin inertia
+    assert point.chart(decay=False).stiffness_max == pytest.approx(
+        plain.chart(decay=False).stiffness_max, rel=1e-4
+    )
+
+
+def limited(low, high):
+    document = deepcopy(DELTA)
+    document["mechanism"]["legs"][0]["links"][0]["limits_rad"] = [low, high]
+    return from_document(document)
+
+
+def test_a_joint_limit_is_named_and_marked():
+    device = limited(0.2, 0.4)
+    assert device.at().posture.status == 0
+    with pytest.raises(BeyondLimit, match=r"joint 'arm-\d' is at .* beyond its limits, 0.2 to 0.4 rad"):
+        device.at((0.0, 0.0, -0.14))
+    heights = np.linspace(-0.17, -0.1, 15)
+    goals = np.stack([0 * heights, 0 * heights, heights], axis=-1)
+    free, held = solve_posture(from_document(DELTA).mechanism, goals), solve_posture(device.mechanism, goals)
+    arms = free.angles[:, device.mechanism.driven]
+    inside = ((arms >= 0.2) & (arms <= 0.4)).all(axis=1)
+    assert (held.status == np.where(inside, 0, BEYOND_LIMIT)).all()
+    many = solve_posture(device.mechanism, np.repeat(goals, 10, axis=0))  # by its roadmap
+    assert np.isin(many.status[~np.repeat(inside, 10)], (BEYOND_LIMIT, OUT_OF_REACH)).all()
+    assert (many.status[np.repeat(inside, 10)] == 0).all()
+
+
+def test_a_turn_more_or_less_is_the_same_angle():
+    device = limited(2 * np.pi + 0.2, 2 * np.pi + 0.4)
+    assert device.at().posture.status == 0
+
+
+@pytest.mark.parametrize("closes", ["axis", "frame"])
+def test_a_four_bar_closed_by_its_hinge_or_by_a_weld_is_the_same(closes):
+    """Planar, so that a hinge holds what the plane holds anyway; welded, the last joint is part of the tree."""
+    links = [
+        {"name": "crank", "joint": "revolute", "length_m": 0.05, "mass_kg": 0.02,
+         "inertia_kg_m2": [1e-6, 8e-6, 8e-6]},
+        {"name": "rod", "parent": "crank", "joint": "revolute", "length_m": 0.12, "mass_kg": 0.03,
+         "inertia_kg_m2": [1e-6, 4e-5, 4e-5]},
+        {"name": "rocker", "joint": "revolute", "origin_m": [0.13, 0, 0], "length_m": 0.08, "mass_kg": 0.03,
+         "inertia_kg_m2": [1e-6, 2e-5, 2e-5]},
+    ]  # fmt: skip
+    document = {
+        "name": "Four-bar",
+        "mechanism": {
+            "links": links,
+            "loops": [{"name": "hinge", "links": ["rod", "rocker"]}],
+            "handle": {"link": "rod", "point_m": [0.06, 0.02, 0]},
+            "assemblies": {"open": {"joints_rad": {"crank": 1.0, "rod": -0.7, "rocker": 1.8}}},
+            "reference": {"position_m": [0.0766, 0.0798], "direction": [1, 0]},
+            "drives": [
+                {"name": "motor", "joint": "crank", "motor_inertia_kg_m2": 1e-6, "transmission_ratio": 5,
+                 "stiffness_Nm_per_rad": 0.4}
+            ],
+            "damping": {"mode_ratio": 0.03},
+        },
+        "loop": {"sampling_period_s": 0.001},
+    }  # fmt: skip
+    pointwise = from_document(document)
+    other = deepcopy(document)
+    if closes == "axis":
+        other["mechanism"]["loops"][0] |= {"closes": "axis"}
+    else:
+        other["mechanism"]["links"].append(
+            {"name": "pin", "parent": "rod", "joint": "revolute", "mass_kg": 0.0, "inertia_kg_m2": [0, 0, 0]}
+        )
+        other["mechanism"]["loops"] = [
+            {"name": "hinge", "links": ["pin", "rocker"], "points_m": [[0, 0, 0], [0.08, 0, 0]], "closes": "frame"}
+        ]
+        other["mechanism"]["assemblies"]["open"]["joints_rad"]["pin"] = 1.5
+    one, same = pointwise.at().posture, from_document(other).at().posture
+    assert same.mass_matrix == pytest.approx(one.mass_matrix, rel=1e-9)
+    assert same.jacobian == pytest.approx(one.jacobian, rel=1e-9, abs=1e-12)
+
+
+def test_an_orientation_that_cannot_be_reached_is_said_with_the_nearest():
+    wrist = tomllib.loads(new_device("Wrist", "wrist"))
+    wrist["mechanism"]["links"][2] |= {"joint": "fixed"}
+    wrist["mechanism"]["drives"] = wrist["mechanism"]["drives"][:2]
+    del wrist["mechanism"]["assemblies"]["upright"]["joints_rad"]["roll"]
+    device = from_document(wrist)
+    with pytest.raises(
+        OutOfReach, match=r"cannot reach the rotation .* the nearest orientation it reaches is .* degrees"
+    ):
+        device.at(orientation=[0.8, 0.0, 0.0])
+    assert device.at(orientation=[0.0, 0.3, 0.2]).posture.status == 0
