@@ -12,10 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth import _verbs
 from zwidth.loop.controller import Controller
 from zwidth.loop.filter_states import FilterStates, filter_states
 from zwidth.loop.filters import force_filter, velocity_estimator
@@ -28,6 +30,10 @@ from zwidth.model.argument_checks import require
 from zwidth.model.multi_plant import MultiPlant
 from zwidth.model.plant import Plant
 
+if TYPE_CHECKING:
+    from zwidth.chart.several_directions.chart import MultiChart
+    from zwidth.chart.verdict import Verdicts
+
 # A state moves and is read by less than this share of the others: no wall sees it.
 UNSEEN = 1e-10
 
@@ -39,7 +45,7 @@ Complexes = NDArray[np.complex128]
 class MultiLoop:
     """A plant with m rendered directions under f = -(k K0 y + b B0 v), one computer for all.
 
-    matrices  K0 and B0 (m, m); None: identities, the same law along each direction
+    matrices  K0 and B0 (m, m), see `WallMatrices.of`; None: identities, the same law along each direction
 
     >>> free = MultiPlant(np.diag([0.3, 0.1]), *np.zeros((2, 2, 2)), np.eye(2), np.eye(2))
     >>> MultiLoop(free, Controller(sampling_period=0.001)).transition_matrix(1000.0, 1.0).shape
@@ -53,7 +59,7 @@ class MultiLoop:
     def __post_init__(self) -> None:
         """Raise TypeError for anything but a plant of several directions, a controller and matrices.
 
-        Also ValueError for matrices of another number of directions, and SeveralDirectionsError (loop.point_errors)
+        Also ValueError for matrices of another number of directions, SeveralDirectionsError (loop.point_errors)
         for a controller with fixed feedback.
         """
         hint = "write Loop(plant, controller) for one direction" if isinstance(self.plant, Plant) else ""
@@ -62,12 +68,25 @@ class MultiLoop:
         if self.controller.fixed_feedback:
             raise SeveralDirectionsError(self.controller.feedback_names)
         if self.matrices is not None:
-            require("matrices", self.matrices, WallMatrices, "write wall_matrices(relative_stiffness, ...)")
+            require(
+                "matrices",
+                self.matrices,
+                WallMatrices,
+                "write WallMatrices.of(relative_stiffness, relative_damping)",
+            )
             if self.matrices.count != self.plant.count:
                 raise ValueError(
                     f"matrices must be those of {self.plant.count} directions, as many as the plant has, got "
                     f"{self.matrices.count}"
                 )
+
+    def chart(self) -> MultiChart:
+        """The stable walls k, b, exactly; see `chart.several_directions.chart.multi_chart`."""
+        return _verbs.multi_chart(self)
+
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
+        """Verdicts on walls k [N/m], b [N s/m] of any shape (...) that broadcast, by eigenvalues."""
+        return _verbs.multi_check(self, wall_stiffness, wall_damping)
 
     @cached_property
     def principal(self) -> PrincipalDirections:
@@ -76,11 +95,6 @@ class MultiLoop:
             m = self.plant.count
             return PrincipalDirections(np.eye(m), np.ones(m), np.ones(m))
         return self.matrices.principal
-
-    @property
-    def alike(self) -> bool:
-        """Whether stiffness and damping have the same ratios between directions: all is one number k + b w."""
-        return bool((self.principal.stiffness == 1.0).all() and (self.principal.damping == 1.0).all())
 
     @cached_property
     def principal_plant(self) -> MultiPlant:

@@ -16,10 +16,27 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.model.argument_checks import describe_value
+
 Floats = NDArray[np.float64]
 
 # Entries are symmetric, and eigenvalues not negative, to this share of the largest entry.
 ROUNDING: Final = 1e-12
+
+
+class MatrixError(ValueError):
+    """A matrix that is none of a wall law.
+
+    name     of the argument that gave it
+    problem  what is wrong with it
+    """
+
+    def __init__(self, name: str, problem: str) -> None:
+        super().__init__(name, problem)
+        self.name, self.problem = name, problem
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.problem}"
 
 
 @dataclass(frozen=True)
@@ -40,14 +57,50 @@ class PrincipalDirections:
 
 @dataclass(frozen=True)
 class WallMatrices:
-    """The matrices K0 and B0 of a wall law over m directions; `wall_matrices` checks and scales them.
+    """The matrices K0 and B0 of a wall law over m directions.
 
     stiffness  K0 (m, m) symmetric, positive semidefinite, its largest entry 1
     damping    B0 (m, m) the same
+
+    >>> WallMatrices.of([5.0, 1.0], [1.0, 1.0]).stiffness
+    array([[1. , 0. ],
+           [0. , 0.2]])
     """
 
     stiffness: Floats
     damping: Floats
+
+    @classmethod
+    def of(
+        cls,
+        relative_stiffness: ArrayLike | None,
+        relative_damping: ArrayLike | None = None,
+        count: int | None = None,
+    ) -> WallMatrices:
+        """The matrices of a law from what is given for each; only the ratios of their entries count.
+
+        relative_stiffness  (m,) along each direction, or a matrix (m, m), symmetric, positive semidefinite and not
+                            all 0; None: the same along each direction
+        relative_damping    the same; None: as relative_stiffness
+        count               number of directions m; None: as many as are given
+        Raises  MatrixError  for what is no such matrix
+
+        >>> print(WallMatrices.of([5.0, 1.0]))
+        stiffness and damping 1 : 0.2
+        """
+        given = relative_damping if relative_stiffness is None else relative_stiffness
+        m = len(np.atleast_1d(np.asarray(given, dtype=object))) if count is None else count
+        alike = np.ones(m) if relative_stiffness is None else relative_stiffness
+        stiffness = _scaled_matrix("relative_stiffness", alike, m)
+        if relative_damping is None:
+            return cls(stiffness, stiffness.copy())
+        return cls(stiffness, _scaled_matrix("relative_damping", relative_damping, m))
+
+    def __str__(self) -> str:
+        stiffness, damping = ratios_text(self.stiffness), ratios_text(self.damping)
+        if stiffness == damping:
+            return f"stiffness and damping {stiffness}"
+        return f"stiffness {stiffness}, damping {damping}"
 
     @property
     def count(self) -> int:
@@ -78,51 +131,34 @@ class WallMatrices:
         return PrincipalDirections(np.sqrt(larger)[:, None] * S, s / larger, v / larger)
 
 
-def wall_matrices(relative_stiffness: ArrayLike, relative_damping: ArrayLike | None, count: int) -> WallMatrices:
-    """The matrices of a law from what was given for each; only their entries' ratios count.
-
-    relative_stiffness  (m,) along each direction, or a matrix (m, m); symmetric, positive semidefinite, not all 0
-    relative_damping    the same; None: as relative_stiffness
-    count               number of directions m
-    Raises  ValueError  for what is no such matrix
-
-    >>> law = wall_matrices([5.0, 1.0], None, 2)
-    >>> law.stiffness.tolist(), law.damping.tolist()
-    ([[1.0, 0.0], [0.0, 0.2]], [[1.0, 0.0], [0.0, 0.2]])
-    """
-    stiffness = _scaled_matrix("relative_stiffness", relative_stiffness, count)
-    if relative_damping is None:
-        return WallMatrices(stiffness, stiffness.copy())
-    return WallMatrices(stiffness, _scaled_matrix("relative_damping", relative_damping, count))
-
-
 def _scaled_matrix(name: str, given: ArrayLike, count: int) -> Floats:
-    """One matrix, its largest entry 1. Raises ValueError for what is no matrix of a law."""
+    """One matrix, its largest entry 1. Raises MatrixError for what is no matrix of a law."""
+    wanted = f"must be {count} numbers, one for each direction, or a matrix of {count} rows and columns"
     try:
         entries = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} must be {_shapes(count)}, got {given!r}") from None
+        raise MatrixError(name, f"{wanted}, got {describe_value(given)}") from None
     if entries.shape not in ((count,), (count, count)):
-        raise ValueError(f"{name} must be {_shapes(count)}, got {_shape_text(entries)}")
+        raise MatrixError(name, f"{wanted}, got {_shape_text(entries.shape)}")
     if not np.isfinite(entries).all():
-        raise ValueError(f"{name} must be finite numbers, got {entries[~np.isfinite(entries)][0]:g}")
+        raise MatrixError(name, f"must be finite numbers, got {entries[~np.isfinite(entries)][0]:g}")
+    if entries.ndim == 1 and (entries < 0.0).any():
+        raise MatrixError(name, f"must not be negative, got {entries[entries < 0.0][0]:g}")
     matrix = np.diag(entries) if entries.ndim == 1 else entries
     largest = float(np.max(np.abs(matrix)))
     if largest == 0.0:
-        raise ValueError(f"{name} must not be 0 along all directions")
+        raise MatrixError(name, "must not be 0 along all directions")
     off = np.abs(matrix - matrix.T)
     if not np.max(off) <= ROUNDING * largest:
         i, j = (int(k) for k in np.unravel_index(np.argmax(off), off.shape))
-        raise ValueError(
-            f"{name} must be symmetric, got {matrix[i, j]:g} in row {i + 1}, column {j + 1} and {matrix[j, i]:g} "
-            f"in row {j + 1}, column {i + 1}"
+        pair = (
+            f"{matrix[i, j]:g} in row {i + 1}, column {j + 1} and {matrix[j, i]:g} in row {j + 1}, column {i + 1}"
         )
+        raise MatrixError(name, f"must be symmetric, got {pair}")
     matrix = (matrix + matrix.T) / 2.0
     least = float(np.linalg.eigvalsh(matrix)[0])
     if least < -ROUNDING * largest:
-        raise ValueError(
-            f"{name} must have no negative eigenvalue, got one of {least:g}: a wall must not push the hand along"
-        )
+        raise MatrixError(name, f"must have no negative eigenvalue, got one of {least:g}")
     return np.asarray(matrix / float(np.max(matrix)))
 
 
@@ -130,11 +166,19 @@ def _is_diagonal(matrix: Floats) -> bool:
     return bool(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)))
 
 
-def _shapes(count: int) -> str:
-    return f"{count} numbers, one for each direction, or a matrix of {count} rows and columns"
+def _shape_text(shape: tuple[int, ...]) -> str:
+    """A shape in words: 3 numbers, 2 rows of 3 numbers."""
+    if len(shape) < 2:
+        return f"{shape[0]} numbers" if shape and shape[0] != 1 else "1 number"
+    return f"{shape[0]} rows of {shape[1]} numbers" if len(shape) == 2 else f"an array of shape {shape}"
 
 
-def _shape_text(entries: Floats) -> str:
-    if entries.ndim == 1:
-        return f"{len(entries)} numbers" if len(entries) != 1 else "1 number"
-    return "1 number" if entries.ndim == 0 else f"an array of shape {entries.shape}"
+def ratios_text(matrix: Floats) -> str:
+    """A matrix in words: the ratios along the directions, 1 : 0.2, or all of it, (1, 0.1; 0.1, 0.5).
+
+    >>> ratios_text(np.diag([1.0, 0.2])), ratios_text(np.array([[1.0, 0.1], [0.1, 0.5]]))
+    ('1 : 0.2', '(1, 0.1; 0.1, 0.5)')
+    """
+    if _is_diagonal(matrix):
+        return " : ".join(f"{entry:.4g}" for entry in np.diag(matrix))
+    return "(" + "; ".join(", ".join(f"{entry:.4g}" for entry in row) for row in matrix) + ")"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
@@ -41,7 +42,7 @@ class MultiChart(DrawnChart):
     """The stable walls of several directions under one law.
 
     judged    number of walls all over the chart that were tried by eigenvalues
-    doubtful  (k, 2) [K, B] of those of them on which the regions say otherwise: none, or the chart is in doubt
+    doubtful  (k, 2) [k, b] of those of them on which the regions say otherwise: none, or the chart is in doubt
     """
 
     loop: MultiLoop
@@ -52,6 +53,34 @@ class MultiChart(DrawnChart):
     def status(self) -> str:
         """ "confirmed" where eigenvalues agree with the regions at all walls tried; else "in doubt"."""
         return "in doubt" if len(self.doubtful) else "confirmed"
+
+    def document(self) -> dict[str, Any]:
+        """The chart under the keys of every chart, the law's matrices, and what was tried by eigenvalues."""
+        matrices = self.loop.matrices
+        law = (
+            {}
+            if matrices is None
+            else {
+                "relative_stiffness": matrices.stiffness.tolist(),
+                "relative_damping": matrices.damping.tolist(),
+            }
+        )
+        return super().document() | law | {"walls_judged": self.judged, "walls_in_doubt": self.doubtful.tolist()}
+
+    def _numbers(self) -> list[str]:
+        doubt = [f"IN DOUBT           {self.doubt}"] if self.doubt else []
+        return [*super()._numbers(), *doubt]
+
+    @property
+    def doubt(self) -> str:
+        """What is in doubt, in a sentence; "" where eigenvalues agree with the regions at all walls tried."""
+        if not len(self.doubtful):
+            return ""
+        K, B = self.doubtful[0]
+        return (
+            f"at {len(self.doubtful)} of {self.judged} walls tried, such as {K:.6g} N/m and {B:.6g} N s/m, "
+            "eigenvalues say otherwise than the regions"
+        )
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:

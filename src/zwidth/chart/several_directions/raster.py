@@ -76,7 +76,7 @@ def try_orders(loop: MultiLoop, samples: Floats) -> Raster:
     if not len(size):  # lines only
         P, w = loop.plant_response(1j), loop.velocity_response(1j)
         kappa = 1.0 / np.linalg.norm(P)
-        size = np.outer(WITHOUT_SAMPLES, [kappa * loop.period, kappa / abs(w)])
+        size = np.outer(np.array(WITHOUT_SAMPLES), [kappa * loop.period, kappa / abs(w)])
     low, high = np.log10(np.quantile(size, ORDERS, axis=0))
     x, y = np.meshgrid(*np.logspace(low, high, ORDER_SIDE).T)
     walls = np.vstack([np.column_stack([u * x.ravel(), v * y.ravel()]) for u in (1.0, -1.0) for v in (1.0, -1.0)])
