@@ -34,8 +34,9 @@ if TYPE_CHECKING:
     from zwidth.chart.several_directions.chart import MultiChart
     from zwidth.chart.verdict import Verdicts
 
-# A state moves and is read by less than this share of the others: no wall sees it.
-UNSEEN = 1e-10
+# A state moves from sample to sample, and is read, by less than this share of what others are: no wall
+# sees it.
+UNSEEN = 1e-12
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -222,9 +223,9 @@ class MultiLoop:
         sprung = self.principal.stiffness > 0.0
         if sprung.all():
             return open_, enters, position, velocity
-        seen = np.vstack([open_ - np.eye(len(open_)), position[sprung], velocity * self.period])
-        _, size, axes = np.linalg.svd(seen)
-        rest = axes[size > UNSEEN * size[0]].T
+        readings = [rows / np.abs(rows).max(initial=np.finfo(float).tiny) for rows in (position[sprung], velocity)]
+        _, size, axes = np.linalg.svd(np.vstack([open_ - np.eye(len(open_)), *readings]))
+        rest = axes[size > UNSEEN].T
         return rest.T @ open_ @ rest, rest.T @ enters, position @ rest, velocity @ rest
 
     @cached_property

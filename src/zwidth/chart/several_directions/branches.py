@@ -27,12 +27,12 @@ CLEAR, UNRIVALLED = 0.3, 0.25
 # Walls closer than this share of the box are joined whatever their slopes, which rounding turns beside z = 1 and
 # -1.
 SAME: Final = 1e-6
-# A point between two walls that meet is no further from their chord's middle than this share of it, and its curve
-# runs along the chord: the least cosine.
+# A point between two walls that meet is no further from their chord's middle than this share of it, and the curve
+# runs along the chord at all three: the least cosine.
 NEAR_CHORD, ALONG = 0.25, 0.8
 # Steps are halved down to this share of the parameter.
-NARROWEST: Final = 1e-10
-ROUNDS: Final = 40
+NARROWEST: Final = 1e-14
+ROUNDS: Final = 50
 # Walls this far around the box, in shares of it, are followed, too.
 AROUND: Final = 1.0
 # Number of parameters beyond which no more are added.
@@ -141,8 +141,14 @@ def _continuations(samples: Samples, box: Box) -> Whole:
     others = np.where(np.eye(q, dtype=bool)[None, :, :, None], np.inf, miss[:, None, :, :]).min(axis=2)
     rival = np.minimum(rivals.min(axis=2, keepdims=True), np.take_along_axis(others, best, axis=2))
     mutual = np.take_along_axis(miss.argmin(axis=1), best[..., 0], axis=1) == np.arange(q)
-    clear = (own <= UNRIVALLED * rival) & ((own <= CLEAR * length) | (length <= SAME)) & np.isfinite(own)
-    return np.where(clear[..., 0] & mutual, best[..., 0], -1)
+    best, own, rival, length = (array[..., 0] for array in (best, own, rival, length))
+    first = np.isfinite(own) & mutual & (own <= UNRIVALLED * rival)
+    n, k = np.nonzero(first & (own <= CLEAR * length))
+    forwards = np.zeros_like(first)
+    # both slopes lead there: those of two walls that turn back miss nothing in their mean
+    step = chord[n, k, best[n, k]]
+    forwards[n, k] = (_cosine(slopes[n, k], step) > CLEAR) & (_cosine(slopes[n + 1, best[n, k]], step) > CLEAR)
+    return np.where(forwards | (first & (length <= SAME)), best, -1)
 
 
 def _folds(equation: RootEquation, samples: Samples, box: Box, open_: Flags, way: int) -> list[_Fold]:
@@ -155,8 +161,8 @@ def _folds(equation: RootEquation, samples: Samples, box: Box, open_: Flags, way
     both = np.triu(open_[:, :, None] & open_[:, None, :], 1)
     n, a, b = np.nonzero(both)
     chord = (x[n, b] - x[n, a]) / box.size
-    along = [way * np.einsum("ni,ni->n", samples.slopes[n, k] / box.size, chord) for k in (a, b)]
-    towards = (along[0] > 0.0) & (along[1] < 0.0)
+    towards = _cosine(way * samples.slopes[n, a] / box.size, chord) > ALONG
+    towards &= _cosine(way * samples.slopes[n, b] / box.size, chord) < -ALONG
     n, a, b, chord = n[towards], a[towards], b[towards], chord[towards]
     if not len(n):
         return []
@@ -166,8 +172,7 @@ def _folds(equation: RootEquation, samples: Samples, box: Box, open_: Flags, way
     points, tangents, settled = correct(equation, middles, normals, scale)
     length = np.linalg.norm(chord, axis=1)
     off = np.linalg.norm((points - middles)[:, 1:] / box.size, axis=1)
-    T = tangents[:, 1:]
-    straight = np.abs(np.einsum("ni,ni->n", T, chord)) > ALONG * np.linalg.norm(T, axis=1) * length
+    straight = np.abs(_cosine(tangents[:, 1:], chord)) > ALONG
     beyond = way * (points[:, 0] - u[n])
     within = (beyond > 0.0) & (beyond < way * (u[np.clip(n + way, 0, len(u) - 1)] - u[n]))
     good = np.flatnonzero(settled & straight & within & (off < NEAR_CHORD * length))
@@ -179,6 +184,12 @@ def _folds(equation: RootEquation, samples: Samples, box: Box, open_: Flags, way
             taken |= ends
             folds.append(_Fold(int(n[k]), int(a[k]), int(b[k]), way, points[k], tangents[k] * scale))
     return folds
+
+
+def _cosine(one: Floats, other: Floats) -> Floats:
+    """Of the angles (n,) between vectors (n, 2)."""
+    length = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
+    return np.asarray(np.einsum("ni,ni->n", one, other) / length)
 
 
 def _walks(samples: Samples, forward: Whole, folds: list[_Fold]) -> list[CurvePoints]:

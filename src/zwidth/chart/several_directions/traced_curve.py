@@ -78,7 +78,10 @@ class CurvePoints(NamedTuple):
         return CurvePoints(self.points, np.nan_to_num(own * scale, posinf=0.0, neginf=0.0))
 
     def guess(self, j: Whole, share: Floats, scale: Floats) -> Floats:
-        """Points (k, 3) at shares (k,) of the way from points j to j + 1, by the cubic with their directions."""
+        """Points (k, 3) at shares (k,) of the way from points j to j + 1, by the cubic with their directions.
+
+        Where that bulges so far that the parameter leaves its interval by more than its length, it ends there.
+        """
         chord = (self.points[j + 1] - self.points[j]) / scale
         length = np.linalg.norm(chord, axis=1)[:, None]
         off = []
@@ -88,7 +91,10 @@ class CurvePoints(NamedTuple):
             off.append(np.where(use, length * direction / np.where(use, along, 1.0) - chord, 0.0))
         s = share[:, None]
         bulge = s * (1.0 - s) ** 2 * off[0] - s**2 * (1.0 - s) * off[1]
-        return np.asarray(self.points[j] + (s * chord + bulge) * scale)
+        out = self.points[j] + (s * chord + bulge) * scale
+        first, last = np.sort([self.points[j, 0], self.points[j + 1, 0]], axis=0)
+        out[:, 0] = np.clip(out[:, 0], 2.0 * first - last, 2.0 * last - first)
+        return np.asarray(out)
 
 
 @np.errstate(all="ignore")

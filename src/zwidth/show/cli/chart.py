@@ -85,12 +85,14 @@ class ChartCommand(Command):
         from zwidth.chart.measured.chart import MeasuredChart
         from zwidth.chart.several_directions.chart import MultiChart
 
-        warning = {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
-        if isinstance(result, MultiChart) and result.doubt:
-            warning = {"warning": result.doubt}
-        return result.document() | warning
+        more: dict[str, Any] = {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
+        if isinstance(result, MultiChart):
+            more = {"decided": not result.doubt}
+        return result.document() | more
 
     def reason(self, case: CommandLine, result: Chart) -> str | None:
+        if doubt := getattr(result, "doubt", ""):
+            return f"this is undecided: {doubt}"
         if result.stiffness_max == result.stiffness_max:
             return None
         return OPEN_EDGE if getattr(result, "open", False) else NO_WALL
