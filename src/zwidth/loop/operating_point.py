@@ -23,6 +23,7 @@ from zwidth.loop.point_errors import (
     OperatingPointError,
     check_several_directions,
 )
+from zwidth.loop.point_text import point_text, points_text
 from zwidth.loop.wall_matrices import WallMatrices
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.damping import Damping, GivenDamping
@@ -128,29 +129,12 @@ class OperatingPoint:
         if (self.mechanism is None) != (self.posture is None) or (self.posture is None) != (
             self.directions is None
         ):
-            raise ValueError(
-                "postures and directions must both be given with a mechanism, and left out without one"
-            )
+            raise ValueError("postures and directions come together, with a mechanism and not without one")
         if self.wall_matrices is not None and self.wall_matrices.count != self.direction_count:
             raise ValueError(f"wall_matrices must be those of {self.direction_count} directions")
 
     def __repr__(self) -> str:
-        held = f", held by {self.operator_name or 'an operator'}" if self.operator is not None else ""
-        if self.differing:
-            return f"OperatingPoint of {self.name or 'a device'}: designs and postures of shape {self.shape}{held}"
-        computer = self.controller.timing_text
-        if self.posture is None or self.directions is None:
-            kind = "measured response" if self.response is not None else f"plant, model {self.model or 'as given'}"
-            return f"OperatingPoint of {self.name or 'a device'}: {kind}{held}\n  {computer}"
-        if self.shape:
-            where = f"{int(np.prod(self.shape))} postures of shape {self.shape}"
-        else:
-            position = ", ".join(f"{x:.6g}" for x in np.round(self.posture.position, 12) + 0.0)
-            ways = [", ".join(f"{x:.4g}" for x in np.round(u, 12) + 0.0) for u in self.directions]
-            law = f", {self.wall_matrices}" if self.wall_matrices is not None else ""
-            where = f"handle at ({position}) m, along " + " and ".join(f"({way})" for way in ways) + law
-        model = f"assembly {self.posture.assembly}, model {self.model or 'full'}{held}"
-        return f"OperatingPoint of {self.name or 'a device'}: {where}\n  {model}\n  {computer}"
+        return point_text(self)
 
     # --- which postures and directions ----------------------------------------------------------------
 
@@ -417,7 +401,7 @@ class OperatingPoint:
         """Raise OperatingPointError for several points. what: the attribute that only a single point has."""
         if self.shape:
             raise OperatingPointError(
-                f"{_describe_points(self.shape)} have no .{what} in common; take one of them, such as "
+                f"{points_text(self.shape)} have no .{what} in common; take one of them, such as "
                 f"point[{', '.join('0' for _ in self.shape)}], or call .measure(name), which computes all"
             )
 
@@ -614,8 +598,3 @@ class OperatingPoint:
 
 
 _NO_MODEL: Final = "the device has a measured response and no model; call .chart() or .check(...)"
-
-
-def _describe_points(shape: tuple[int, ...]) -> str:
-    """Operating points by their number: 12 operating points of shape (3, 4)."""
-    return f"{int(np.prod(shape))} operating points of shape {shape}"
