@@ -334,6 +334,18 @@ class Device:
             return given
         return unit_vectors(self.label, "direction", given)
 
+    def renders_moments(
+        self,
+        direction: ArrayLike | None = None,
+        axis: ArrayLike | None = None,
+        characteristic_length: float | None = None,
+    ) -> bool:
+        """Whether moments about an axis are rendered, so that stiffness is in N m/rad; arguments as for `at`."""
+        if self.mechanism is None:
+            return False
+        rendered = self.direction(direction, axis, characteristic_length)
+        return rendered.shape[-1] == 6 and not rendered[..., :3].any()
+
     def _requested_position(self, position: Position | ArrayLike | Posture | None) -> Position | Floats | None:
         """The requested position that a point keeps, so that another device can be put there."""
         from zwidth.model.posture import Posture
