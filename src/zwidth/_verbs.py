@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
     from zwidth.chart.chart_base import Chart
     from zwidth.chart.polar import ByDirection
+    from zwidth.chart.several_directions.chart import MultiChart
     from zwidth.chart.verdict import Verdicts, WallVerdicts
     from zwidth.conditions.comparison import BoundsComparison
     from zwidth.contact.contact_simulation import ContactSimulation
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from zwidth.device.load import Settings
     from zwidth.guarantees.loop_guarantees import Guarantees
     from zwidth.loop.loop import Loop
+    from zwidth.loop.multi_loop import MultiLoop
     from zwidth.loop.operating_point import OperatingPoint
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
@@ -75,6 +77,18 @@ def loop_check(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -
     from zwidth.chart.verdict import judge
 
     return judge(loop, wall_stiffness, wall_damping)
+
+
+def multi_chart(loop: MultiLoop) -> MultiChart:
+    from zwidth.chart.several_directions.chart import multi_chart
+
+    return multi_chart(loop)
+
+
+def multi_check(loop: MultiLoop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
+    from zwidth.chart.verdict import verdicts
+
+    return verdicts(loop, wall_stiffness, wall_damping)
 
 
 def chart(point: OperatingPoint, radius: float, decay: bool) -> Chart:

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
+from scipy.optimize import brentq
 
 from tests.systems import published, random_loop
 from zwidth.chart.arcs import CHORD, DAMPING, MINUS, PAIR, PLUS, SLOPE, STIFFNESS, Arc, Arcs
@@ -12,8 +13,9 @@ from zwidth.chart.area import quadrant_area
 from zwidth.chart.loop_edge import trace_edge
 from zwidth.chart.peak import find_peak, largest_damping, stiffest_index
 from zwidth.chart.rings import cut_at_holes
+from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.branch import Branch
-from zwidth.chart.several_directions.eigenloci import trace_loci
+from zwidth.chart.several_directions.curve_set import trace_curves
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
 from zwidth.loop.multi_loop import MultiLoop
@@ -192,10 +194,34 @@ def test_zeros_and_integrals_along_a_curve_are_those_of_its_points(seed):
             assert tracer.integral(arc) == pytest.approx(trapezoids, abs=1e-5 * np.ptp(B) * np.ptp(K))
 
 
-def branch_of_one_direction(loop, size):
+def branch_of_one_direction(loop, edge):
+    """The loop's curve of walls as that of a loop of several directions, in a box about its edge."""
     p = loop.plant
     plant = MultiPlant(p.mass, p.damping, p.stiffness, p.actuator[None], p.sensor[None])
-    return Branch(trace_loci(MultiLoop(plant, loop.controller)), 0, size)
+    walls = np.vstack(edge.outlines)
+    box = Box(walls.min(axis=0) * (loop.period, 1.0), walls.max(axis=0) * (loop.period, 1.0))
+    with np.errstate(all="ignore"):  # walls at infinity are data
+        _, curves = trace_curves(MultiLoop(plant, loop.controller)).within(box.with_margin(0.1), 1e-5)
+    return [Branch(curve, np.ptp(walls, axis=0)) for curve in curves if curve.kind == PAIR]
+
+
+def along(branches, arc):
+    """The branch on which an arc lies, and the same arc by the branch's own parameter."""
+    for branch in branches:
+        angles, places = branch.curve.traced.points[:, 0], branch.curve.parameters
+        ends = np.sort([arc.start, arc.end])
+        if (np.diff(angles) > 0.0).all() and angles[0] <= ends[0] and ends[1] <= angles[-1]:
+            break
+
+    def place(theta):
+        k = int(np.clip(np.searchsorted(angles, theta), 1, len(angles) - 1))
+        if theta in angles[k - 1 : k + 1]:
+            return float(places[k - 1 : k + 1][angles[k - 1 : k + 1] == theta][0])
+        return brentq(lambda p: branch.angles(np.array([p]))[0] - theta, places[k - 1], places[k], xtol=1e-13)
+
+    start, end = place(arc.start), place(arc.end)
+    inner = places[(places > min(start, end)) & (places < max(start, end))]
+    return branch, arc._replace(start=start, end=end, thetas=inner if start < end else inner[::-1])
 
 
 @pytest.mark.parametrize("seed", [0, 3, 9, 12])
@@ -204,19 +230,23 @@ def test_a_branch_of_one_direction_is_the_curve_of_the_single_loop(seed):
     tracer = Tracer(loop)
     edge = trace_edge(tracer)
     size = np.ptp(np.vstack(edge.outlines), axis=0)
-    branch = branch_of_one_direction(loop, size)
+    branches = branch_of_one_direction(loop, edge)
     curved = [edge.arcs[k] for k in edge.arcs.curved]
     assert curved
     for arc in curved:
-        assert np.column_stack(branch.walls(arc.thetas)) == pytest.approx(
-            np.column_stack(tracer.walls(arc.thetas)), rel=1e-6, abs=1e-7 * size.max()
+        branch, own = along(branches, arc)
+        K, B, _, _, angles = branch.curve.at(own.thetas[:-1] + 0.5 * np.diff(own.thetas))
+        assert np.column_stack([K, B]) == pytest.approx(
+            np.column_stack(tracer.walls(angles)), rel=1e-6, abs=1e-7 * size.max()
         )
         for component in (STIFFNESS, DAMPING, SLOPE):
             # a corner can lie on an axis: whether K is 0 just before it is rounding
-            zeros = [np.sort(each.zeros(arc, component)) for each in (branch, tracer)]
-            inner, wanted = (each[np.abs(each - arc.end) > 1e-9] for each in zeros)
+            zeros = [np.sort(branch.angles(branch.zeros(own, component))), np.sort(tracer.zeros(arc, component))]
+            inner, wanted = (
+                each[(np.abs(each - arc.end) > 1e-9) & (np.abs(each - arc.start) > 1e-9)] for each in zeros
+            )
             assert inner == pytest.approx(wanted, rel=1e-7)
-        assert branch.integral(arc) == pytest.approx(tracer.integral(arc), rel=1e-6, abs=1e-9 * size.prod())
+        assert branch.integral(own) == pytest.approx(tracer.integral(arc), rel=1e-6, abs=1e-9 * size.prod())
 
 
 def test_a_branch_is_straight_beside_its_end():
@@ -225,8 +255,8 @@ def test_a_branch_is_straight_beside_its_end():
     edge = trace_edge(tracer)
     size = np.ptp(np.vstack(edge.outlines), axis=0)
     (arc,) = (edge.arcs[k] for k in edge.arcs.curved if edge.arcs[k].start == 0.0)
-    branch = branch_of_one_direction(published(), size)
-    assert branch.integral(arc) == pytest.approx(tracer.integral(arc), rel=0.0, abs=1e-14 * size.prod())
+    branch, own = along(branch_of_one_direction(published(), edge), arc)
+    assert branch.integral(own) == pytest.approx(tracer.integral(arc), rel=0.0, abs=1e-12 * size.prod())
 
 
 def test_holes_that_rounding_left_are_no_holes():

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.chart.several_directions.test_eigenloci import random_multi, side_by_side
 from tests.measured_cases import measured_response
+from tests.multi_loops import random_multi, side_by_side
 from tests.systems import mass, published, two_mass
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.chart_base import BoundaryArc, Chart

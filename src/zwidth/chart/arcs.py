@@ -6,7 +6,8 @@ with a pair of roots on the circle. Charts differ in where their curves come fro
 
     one direction         the loop's factors                     (`tracer.Tracer`)
     many loops            those of each member                   (`tracer.Tracer`)
-    several directions    an eigenvalue of the plant's response  (`several_directions.branch.Branch`)
+    several directions    eigenvalues of the plant's response, or walls followed from angle to angle
+                                                                 (`several_directions.branch.Branch`)
     measured              none: its edge is chords between interpolated points
 """
 
@@ -27,8 +28,9 @@ Wall = tuple[float, float]
 ArcPoints = tuple[Floats, Floats, Floats]  # angles, K and B along an arc
 
 # Kinds: a pair of roots at rho exp(+-i theta); a real root at +rho, at -rho; a chord of a curve, where rounding
-# hides a pair or where the curve was measured.
-PAIR, PLUS, MINUS, CHORD = range(4)
+# hides a pair or where the curve was measured; a real root along a curve, of several directions with unlike laws.
+PAIR, PLUS, MINUS, CHORD, REAL = range(5)
+CURVED: Final = (PAIR, REAL)
 # Components of walls, and dK/dtheta along a curve.
 STIFFNESS, DAMPING, SLOPE = range(3)
 # Sign changes are looked for between an arc's ends, moved inwards by this share of a step: they may touch an axis.
@@ -39,8 +41,10 @@ class Arc(NamedTuple):
     """One arc.
 
     first, last  its walls (K, B)
-    start, end   their angles, falling where the estimate runs backwards; 0 or pi for a real root
-    thetas       angles of the samples that found it, strictly between and in order; empty if it is straight
+    start, end   their angles, falling where the estimate runs backwards; 0 or pi for a real root. Of a curve along
+                 which angles turn back or stand still (`Curve.angles`): its own parameter
+    thetas       angles, or parameters, of the samples that found it, strictly between and in order; empty if it is
+                 straight
     member       number of the curve or the loop that it belongs to
     """
 
@@ -55,7 +59,7 @@ class Arc(NamedTuple):
     @property
     def curved(self) -> bool:
         """Whether it is a piece of a curve; else it is straight."""
-        return self.kind == PAIR
+        return self.kind in CURVED
 
     @property
     def angles(self) -> Floats:
@@ -64,7 +68,10 @@ class Arc(NamedTuple):
 
 
 class Curve(Protocol):
-    """A curve of walls with a pair of roots on the circle, by the pair's angle in (0, pi)."""
+    """A curve of walls with roots on the circle, by the angle of a pair in (0, pi) or a parameter of its own."""
+
+    def angles(self, parameters: Floats) -> Floats:
+        """Angles (k,) of the roots at parameters (k,): these themselves where they are angles."""
 
     def walls(self, thetas: Floats) -> tuple[Floats, Floats]:
         """K and B (k,) at angles (k,)."""
@@ -163,12 +170,12 @@ class Arcs:
     @property
     def curved(self) -> list[int]:
         """Numbers of the arcs that are pieces of curves."""
-        return np.flatnonzero(self.kind == PAIR).tolist()
+        return np.flatnonzero(np.isin(self.kind, CURVED)).tolist()
 
     def crossings(self, component: int, level: float = 0.0) -> tuple[Whole, Floats]:
         """Numbers (k,) of the straight arcs whose K or B passes a level, and the walls (k, 2) where they do."""
         a, b = self.first[:, component] - level, self.last[:, component] - level
-        crossed = np.flatnonzero((self.kind != PAIR) & (a * b < 0.0))
+        crossed = np.flatnonzero(~np.isin(self.kind, CURVED) & (a * b < 0.0))
         share = a[crossed] / (a[crossed] - b[crossed])
         first, last = self.first[crossed], self.last[crossed]
         return crossed, first + share[:, None] * (last - first)
@@ -188,8 +195,12 @@ def sample_arcs(arcs: Arcs, curves: Curves) -> list[ArcPoints]:
     walks = []
     for arc in arcs:
         (K0, B0), (K1, B1) = arc.first, arc.last
-        thetas, K, B = curves[arc.member].dense_points(arc) if arc.curved else 3 * (np.empty(0),)
-        walks.append((_with_ends(arc.start, thetas, arc.end), _with_ends(K0, K, K1), _with_ends(B0, B, B1)))
+        start, end, (thetas, K, B) = arc.start, arc.end, 3 * (np.empty(0),)
+        if arc.curved:
+            curve = curves[arc.member]
+            start, end = curve.angles(np.array([start, end])).tolist()
+            thetas, K, B = curve.dense_points(arc)
+        walks.append((_with_ends(start, thetas, end), _with_ends(K0, K, K1), _with_ends(B0, B, B1)))
     return walks
 
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import DAMPING, SLOPE, STIFFNESS, Arcs, Curves
+from zwidth.chart.arcs import DAMPING, SLOPE, STIFFNESS, Arc, Arcs, Curves
 from zwidth.compiled import compiled
 
 Floats = NDArray[np.float64]
@@ -63,7 +63,7 @@ def find_peak(arcs: Arcs, curves: Curves, stiffness_scale: float) -> Peak | None
     crossed, crossings = arcs.crossings(DAMPING)
     crossings[:, DAMPING] = 0.0
     walls = [arcs.last, arcs.first[arcs.next_arc], crossings]
-    # number of the arc and angle of each wall that is no corner
+    # number of the arc, and the place on it, of each wall that is no corner
     along = list(zip(crossed.tolist(), arcs.start[crossed].tolist(), strict=True))
     for k in arcs.curved:
         arc = arcs[k]
@@ -80,13 +80,18 @@ def find_peak(arcs: Arcs, curves: Curves, stiffness_scale: float) -> Peak | None
         return None
     if best < corners:
         last = best % len(arcs)
-        after = arcs.next_arc[last]
-        roots = {(float(arcs.end[last]), last), (float(arcs.start[after]), after)}
+        after = int(arcs.next_arc[last])
+        places = [(last, float(arcs.end[last])), (after, float(arcs.start[after]))]
     else:
-        last, angle = along[best - corners]
-        roots = {(angle, last)}
-    angles, members = zip(*sorted({(angle, int(arcs.member[k])) for angle, k in roots}), strict=True)
+        places = [along[best - corners]]
+    roots = {(_angle(arcs[k], curves, place), int(arcs.member[k])) for k, place in places}
+    angles, members = zip(*sorted(roots), strict=True)
     return Peak(float(K[best]), float(B[best]), angles, members)
+
+
+def _angle(arc: Arc, curves: Curves, place: float) -> float:
+    """Angle of the root at a place on an arc: its start, its end, or a parameter of its curve."""
+    return float(curves[arc.member].angles(np.array([place]))[0]) if arc.curved else place
 
 
 def largest_damping(

@@ -193,7 +193,7 @@ def _together(point: OperatingPoint, units: Floats) -> list[tuple[float, float, 
     """Stiffness, damping, frequency and status along each unit vector (k, 3); None for one to be traced alone."""
     assert point.posture is not None
     posture = point.posture.broadcast_to((len(units),))
-    along = replace(point, posture=posture, directions=units[:, None, :])
+    along = replace(point, posture=posture, directions=units[:, None, :], wall_matrices=None)
     numbers = numbers_of_points(along, STIFFEST) if len(units) else None
     if numbers is None:
         return [None] * len(units)
@@ -230,7 +230,7 @@ def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
     if point.model != "full":
         return lambda unit: point.towards(unit).plant
     axes = _motions(point.jacobian)
-    everywhere = replace(point, directions=axes).plant_of_directions
+    everywhere = replace(point, directions=axes, wall_matrices=None).plant_of_directions
     return lambda unit: everywhere.along(axes @ unit)
 
 

@@ -103,6 +103,10 @@ class Tracer:
         """K and B (k,) at angles (k,) in (0, pi)."""
         return walls(self.circle, thetas)
 
+    def angles(self, parameters: Floats) -> Floats:
+        """The angles themselves."""
+        return parameters
+
     def zeros(self, arc: Arc, component: int) -> Floats:
         """Ascending angles on an arc at which K, B or dK/dtheta changes sign, to rounding."""
         t, ends = np.tan(0.5 * arc.angles), np.array([arc.first, arc.last])

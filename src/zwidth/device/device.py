@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from zwidth.chart.chart_base import Chart
     from zwidth.chart.verdict import WallVerdicts
     from zwidth.loop.operating_point import OperatingPoint, Position
+    from zwidth.loop.wall_matrices import WallMatrices
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
     from zwidth.model.damping import Damping
@@ -113,6 +114,8 @@ class Device:
         axis: ArrayLike | None = None,
         characteristic_length: float | None = None,
         directions: ArrayLike | None = None,
+        relative_stiffness: ArrayLike | None = None,
+        relative_damping: ArrayLike | None = None,
         orientation: ArrayLike | None = None,
         assembly: str | None = None,
         model: str | None = None,
@@ -136,6 +139,10 @@ class Device:
         characteristic_length  by which angles count as ways on a screw [m]
         directions  (..., m, 2) or (..., m, 3) instead: directions rendered together, under one wall law; or
                     (..., m, 6) screws, see `model.effective_parameters.screw`
+        relative_stiffness, relative_damping   of that law along each of these directions (m,), or as a matrix
+                    (m, m), symmetric and positive semidefinite: f = -(k K0 y + b B0 v). Only ratios count, so that
+                    k and b are those of the stiffest, and of the most damped direction. Stiffness left out: the
+                    same along each; damping left out: as the stiffness
         orientation (..., 3) roll, pitch, yaw [rad] or (..., 3, 3) axes of the handle, where the drives control it;
                     left out: the file's
         assembly    name of the way the mechanism is assembled; left out: the file's
@@ -144,6 +151,7 @@ class Device:
         operator    who holds the handle: an Operator, a bundled name or a file, "none"; left out: as the file says
         Raises  DeviceError   with what cannot be meant for this device, or a mechanism that cannot be assembled or
                               driven as the file says
+                MatrixError   (loop.wall_matrices) for what is no matrix of a wall law
                 PostureError  (model.posture) where a single position has no posture: out of reach, or singular
         """
         from zwidth.loop.operating_point import OperatingPoint
@@ -157,6 +165,8 @@ class Device:
                 axis=axis,
                 characteristic_length=characteristic_length,
                 directions=directions,
+                relative_stiffness=relative_stiffness,
+                relative_damping=relative_damping,
                 orientation=orientation,
                 assembly=assembly,
                 model=model,
@@ -189,6 +199,7 @@ class Device:
             mechanism=self.mechanism,
             posture=posture,
             directions=rendered,
+            wall_matrices=self._wall_matrices(directions, rendered, relative_stiffness, relative_damping),
             given_plant=self.given_plant,
             response=self.response,
             model=cast("Model | None", model or ("full" if self.mechanism is not None else None)),
@@ -219,6 +230,8 @@ class Device:
         return self.at(
             point.requested_position,
             directions=point.directions,
+            relative_stiffness=None if point.wall_matrices is None else point.wall_matrices.stiffness,
+            relative_damping=None if point.wall_matrices is None else point.wall_matrices.damping,
             orientation=None if isinstance(point.requested_position, Mapping) else point.posture.rotation,
             assembly=point.posture.assembly,
             model=point.model,
@@ -321,6 +334,18 @@ class Device:
             return given
         return unit_vectors(self.label, "direction", given)
 
+    def renders_moments(
+        self,
+        direction: ArrayLike | None = None,
+        axis: ArrayLike | None = None,
+        characteristic_length: float | None = None,
+    ) -> bool:
+        """Whether moments about an axis are rendered, so that stiffness is in N m/rad; arguments as for `at`."""
+        if self.mechanism is None:
+            return False
+        rendered = self.direction(direction, axis, characteristic_length)
+        return rendered.shape[-1] == 6 and not rendered[..., :3].any()
+
     def _requested_position(self, position: Position | ArrayLike | Posture | None) -> Position | Floats | None:
         """The requested position that a point keeps, so that another device can be put there."""
         from zwidth.model.posture import Posture
@@ -328,6 +353,24 @@ class Device:
         if position is None or isinstance(position, Mapping):
             return position
         return position.position if isinstance(position, Posture) else self.position(position)
+
+    def _wall_matrices(
+        self,
+        directions: ArrayLike | None,
+        rendered: Floats | None,
+        relative_stiffness: ArrayLike | None,
+        relative_damping: ArrayLike | None,
+    ) -> WallMatrices | None:
+        """The matrices of the law along rendered directions (..., m, 3); None where it is the same along each."""
+        from zwidth.loop.wall_matrices import WallMatrices
+
+        given = {"relative_stiffness": relative_stiffness, "relative_damping": relative_damping}
+        for name, value in given.items():
+            if value is not None and (directions is None or rendered is None):
+                raise fail(self.label, name, "is for directions rendered together; give directions, too")
+        if (relative_stiffness is None and relative_damping is None) or rendered is None:
+            return None
+        return WallMatrices.of(relative_stiffness, relative_damping, rendered.shape[-2])
 
     def _unit_directions(
         self,

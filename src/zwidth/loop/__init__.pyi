@@ -17,3 +17,5 @@ from .operating_point import OperatingPoint as OperatingPoint
 from .point_errors import NoMechanismError as NoMechanismError
 from .point_errors import OperatingPointError as OperatingPointError
 from .point_errors import SeveralDirectionsError as SeveralDirectionsError
+from .wall_matrices import MatrixError as MatrixError
+from .wall_matrices import WallMatrices as WallMatrices

@@ -1,23 +1,42 @@
-"""The sampled loop of m rendered directions under one wall law:  det(1 + P(z) (K + B w(z))) = 0, P (m, m)."""
+"""The sampled loop of m rendered directions under one wall law:  det(1 + P(z) (K + B w(z))) = 0, P (m, m).
+
+A law may differ from direction to direction, f = -(k K0 y + b B0 v). In directions S in which both matrices are
+diagonal (`wall_matrices.PrincipalDirections`) it is one number per direction, and with the plant P of these r
+directions
+
+    det(1 + P(z) (k diag(s) + b w(z) diag(v))) = 0.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth import _verbs
 from zwidth.loop.controller import Controller
 from zwidth.loop.filter_states import FilterStates, filter_states
 from zwidth.loop.filters import force_filter, velocity_estimator
+from zwidth.loop.motion_names import motion_name
 from zwidth.loop.multi_hold import ContinuousPlant, SampledPlant, continuous_plant, sample_plant
 from zwidth.loop.point_errors import SeveralDirectionsError
 from zwidth.loop.sections import UnmovedError
+from zwidth.loop.wall_matrices import PrincipalDirections, WallMatrices
 from zwidth.model.argument_checks import require
 from zwidth.model.multi_plant import MultiPlant
 from zwidth.model.plant import Plant
+
+if TYPE_CHECKING:
+    from zwidth.chart.several_directions.chart import MultiChart
+    from zwidth.chart.verdict import Verdicts
+
+# A state moves from sample to sample, and is read, by less than this share of what others are: no wall
+# sees it.
+UNSEEN = 1e-12
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -25,7 +44,9 @@ Complexes = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class MultiLoop:
-    """A plant with m rendered directions under f_i = -(K y_i + B v_i), the same K and B along each.
+    """A plant with m rendered directions under f = -(k K0 y + b B0 v), one computer for all.
+
+    matrices  K0 and B0 (m, m), see `WallMatrices.of`; None: identities, the same law along each direction
 
     >>> free = MultiPlant(np.diag([0.3, 0.1]), *np.zeros((2, 2, 2)), np.eye(2), np.eye(2))
     >>> MultiLoop(free, Controller(sampling_period=0.001)).transition_matrix(1000.0, 1.0).shape
@@ -34,15 +55,57 @@ class MultiLoop:
 
     plant: MultiPlant
     controller: Controller
+    matrices: WallMatrices | None = None
 
     def __post_init__(self) -> None:
-        """Raise TypeError for anything but a plant of several directions and a controller, SeveralDirectionsError
-        (loop.point_errors) for a controller with fixed feedback."""
+        """Raise TypeError for anything but a plant of several directions, a controller and matrices.
+
+        Also ValueError for matrices of another number of directions, SeveralDirectionsError (loop.point_errors)
+        for a controller with fixed feedback.
+        """
         hint = "write Loop(plant, controller) for one direction" if isinstance(self.plant, Plant) else ""
         require("plant", self.plant, MultiPlant, hint)
         require("controller", self.controller, Controller)
         if self.controller.fixed_feedback:
             raise SeveralDirectionsError(self.controller.feedback_names)
+        if self.matrices is not None:
+            require(
+                "matrices",
+                self.matrices,
+                WallMatrices,
+                "write WallMatrices.of(relative_stiffness, relative_damping)",
+            )
+            if self.matrices.count != self.plant.count:
+                raise ValueError(
+                    f"matrices must be those of {self.plant.count} directions, as many as the plant has, got "
+                    f"{self.matrices.count}"
+                )
+
+    def chart(self) -> MultiChart:
+        """The stable walls k, b, exactly; see `chart.several_directions.chart.multi_chart`."""
+        return _verbs.multi_chart(self)
+
+    def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
+        """Verdicts on walls k [N/m], b [N s/m] of any shape (...) that broadcast, by eigenvalues."""
+        return _verbs.multi_check(self, wall_stiffness, wall_damping)
+
+    @cached_property
+    def principal(self) -> PrincipalDirections:
+        """Directions in which both matrices of the law are diagonal: the rendered ones where all are alike."""
+        if self.matrices is None:
+            m = self.plant.count
+            return PrincipalDirections(np.eye(m), np.ones(m), np.ones(m))
+        return self.matrices.principal
+
+    @cached_property
+    def principal_plant(self) -> MultiPlant:
+        """The plant along the law's principal directions."""
+        if self.matrices is None:
+            return self.plant
+        S = self.principal.combinations
+        return replace(
+            self.plant, actuators=S @ self.plant.actuators, sensors=S @ self.plant.sensors, handles=None
+        )
 
     @property
     def period(self) -> float:
@@ -51,8 +114,8 @@ class MultiLoop:
 
     @property
     def count(self) -> int:
-        """Number of rendered directions m."""
-        return self.plant.count
+        """Number of the law's principal directions: m, or fewer where it pushes along fewer."""
+        return len(self.principal.stiffness)
 
     @property
     def whole_delay(self) -> int:
@@ -67,15 +130,16 @@ class MultiLoop:
     @cached_property
     def continuous_plant(self) -> ContinuousPlant:
         """The part of the plant that walls move, in continuous time. Raises UnmovedError where there is none."""
-        plant = continuous_plant(self.plant, self.period, self.fractional_delay)
+        plant = continuous_plant(self.principal_plant, self.period, self.fractional_delay)
         if not len(plant.A):
             raise UnmovedError("the wall forces move nothing that the sensors read; check actuators and sensors")
         return plant
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
-        """Motions that no wall moves, by name; they are left out and do not count for stability."""
-        return self.continuous_plant.unobserved
+        """Motions that no wall moves, or sees, by name; they are left out and do not count for stability."""
+        sliding = len(self._whole_affine[0]) - len(self.affine[0])
+        return self.continuous_plant.unobserved + sliding * (motion_name(0.0, 0.0),)
 
     @cached_property
     def sampled_plant(self) -> SampledPlant:
@@ -96,7 +160,10 @@ class MultiLoop:
         return filter_states(F.numerator, F.denominator, np.ones(1))
 
     def plant_response(self, z: ArrayLike) -> Complexes:
-        """P(z) (..., m, m) from force commands to readings [m/N] at complex z (...), hold to filter included."""
+        """P(z) (..., r, r) from force commands to readings [m/N] at complex z (...), hold to filter included.
+
+        Along the law's principal directions.
+        """
         return self.plant_slope(z)[0]
 
     def velocity_response(self, z: ArrayLike) -> Complexes:
@@ -146,7 +213,24 @@ class MultiLoop:
 
     @cached_property
     def affine(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """L = open - input (K position + B velocity): (N, N), (N, m), (m, N), (m, N)."""
+        """L = open - input (K position + B velocity): (N, N), (N, m), (m, N), (m, N).
+
+        Where the law has no stiffness along a direction that nothing else holds, it damps a sliding motion and
+        does not see how far that went: a root at z = 1 whatever the wall, which is left out as unobserved motions
+        are.
+        """
+        open_, enters, position, velocity = self._whole_affine
+        sprung = self.principal.stiffness > 0.0
+        if sprung.all():
+            return open_, enters, position, velocity
+        readings = [rows / np.abs(rows).max(initial=np.finfo(float).tiny) for rows in (position[sprung], velocity)]
+        _, size, axes = np.linalg.svd(np.vstack([open_ - np.eye(len(open_)), *readings]))
+        rest = axes[size > UNSEEN].T
+        return rest.T @ open_ @ rest, rest.T @ enters, position @ rest, velocity @ rest
+
+    @cached_property
+    def _whole_affine(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """`affine` with what slides unseen."""
         held, w, F = self.sampled_plant, self.estimator, self.force_filter
         m, l = self.count, self.whole_delay
         queue = l + (self.fractional_delay > 0.0)
@@ -174,12 +258,14 @@ class MultiLoop:
         return open_, enters, position, velocity
 
     def transition_matrix(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
-        """The map Z_{j+1} = L Z_j (thesis eq. 2.38) for walls K, B of any shape (...): (..., N, N).
+        """The map Z_{j+1} = L Z_j (thesis eq. 2.38) for walls k, b of any shape (...): (..., N, N).
 
         N = states that walls move + m (delayed forces + states of estimator and filter). Unobserved motions are
         left out.
         """
         K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
         open_, enters, position, velocity = self.affine
-        feedback = K[..., None, None] * position + B[..., None, None] * velocity
+        along = self.principal
+        feedback = K[..., None, None] * (along.stiffness[:, None] * position)
+        feedback = feedback + B[..., None, None] * (along.damping[:, None] * velocity)
         return np.asarray(open_ - enters @ feedback)

@@ -23,6 +23,8 @@ from zwidth.loop.point_errors import (
     OperatingPointError,
     check_several_directions,
 )
+from zwidth.loop.point_text import point_text, points_text
+from zwidth.loop.wall_matrices import WallMatrices
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.damping import Damping, GivenDamping
 from zwidth.model.design_axes import change_designs, design_shape
@@ -79,7 +81,8 @@ class OperatingPoint:
     mechanism           links, joints, loops and drives
     posture             (...) solved postures
     directions          (..., m, 3) unit vectors, or (..., m, 6) screws (`model.effective_parameters.screw`) of
-                        moments about an axis; the m directions of one posture are rendered together, under one law
+                        moments about an axis; the m directions of one posture are rendered together
+    wall_matrices       of the law along directions rendered together; None: the same law along each
     given_plant         dynamics of the rendered direction, as given
     response            measured response from force command to reading
     model               "full", "two-mass", "motor-mass" or "rigid"; None: full, or the plant as given
@@ -99,6 +102,7 @@ class OperatingPoint:
     mechanism: Mechanism | None = None
     posture: Posture | None = None
     directions: Floats | None = None
+    wall_matrices: WallMatrices | None = None
     given_plant: Plant | None = None
     response: Response | None = None
     model: Model | None = None
@@ -125,26 +129,12 @@ class OperatingPoint:
         if (self.mechanism is None) != (self.posture is None) or (self.posture is None) != (
             self.directions is None
         ):
-            raise ValueError(
-                "postures and directions must both be given with a mechanism, and left out without one"
-            )
+            raise ValueError("postures and directions come together, with a mechanism and not without one")
+        if self.wall_matrices is not None and self.wall_matrices.count != self.direction_count:
+            raise ValueError(f"wall_matrices must be those of {self.direction_count} directions")
 
     def __repr__(self) -> str:
-        held = f", held by {self.operator_name or 'an operator'}" if self.operator is not None else ""
-        if self.differing:
-            return f"OperatingPoint of {self.name or 'a device'}: designs and postures of shape {self.shape}{held}"
-        computer = self.controller.timing_text
-        if self.posture is None or self.directions is None:
-            kind = "measured response" if self.response is not None else f"plant, model {self.model or 'as given'}"
-            return f"OperatingPoint of {self.name or 'a device'}: {kind}{held}\n  {computer}"
-        if self.shape:
-            where = f"{int(np.prod(self.shape))} postures of shape {self.shape}"
-        else:
-            position = ", ".join(f"{x:.6g}" for x in np.round(self.posture.position, 12) + 0.0)
-            ways = [", ".join(f"{x:.4g}" for x in np.round(u, 12) + 0.0) for u in self.directions]
-            where = f"handle at ({position}) m, along " + " and ".join(f"({way})" for way in ways)
-        model = f"assembly {self.posture.assembly}, model {self.model or 'full'}{held}"
-        return f"OperatingPoint of {self.name or 'a device'}: {where}\n  {model}\n  {computer}"
+        return point_text(self)
 
     # --- which postures and directions ----------------------------------------------------------------
 
@@ -217,7 +207,7 @@ class OperatingPoint:
         """The same postures rendering another direction, unit vectors (..., 3) or screws (..., 6)."""
         given = np.asarray(direction, dtype=np.float64)
         directions = np.broadcast_to(given, (*self.shape, given.shape[-1]))
-        return replace(self, directions=directions[..., None, :])
+        return replace(self, directions=directions[..., None, :], wall_matrices=None)
 
     def in_model(self, model: Model | None) -> OperatingPoint:
         """The same device, reduced to another model."""
@@ -403,15 +393,15 @@ class OperatingPoint:
 
     @cached_property
     def loop_of_directions(self) -> MultiLoop:
-        """All directions under one sampled wall law. Raises what `plant_of_directions` and `MultiLoop` raise."""
+        """All directions under one computer. Raises what `plant_of_directions` and `MultiLoop` raise."""
         self.require("dynamics", "sampling")
-        return MultiLoop(self.plant_of_directions, self.controller)
+        return MultiLoop(self.plant_of_directions, self.controller, self.wall_matrices)
 
     def _check_single(self, what: str) -> None:
         """Raise OperatingPointError for several points. what: the attribute that only a single point has."""
         if self.shape:
             raise OperatingPointError(
-                f"{_describe_points(self.shape)} have no .{what} in common; take one of them, such as "
+                f"{points_text(self.shape)} have no .{what} in common; take one of them, such as "
                 f"point[{', '.join('0' for _ in self.shape)}], or call .measure(name), which computes all"
             )
 
@@ -608,8 +598,3 @@ class OperatingPoint:
 
 
 _NO_MODEL: Final = "the device has a measured response and no model; call .chart() or .check(...)"
-
-
-def _describe_points(shape: tuple[int, ...]) -> str:
-    """Operating points by their number: 12 operating points of shape (3, 4)."""
-    return f"{int(np.prod(shape))} operating points of shape {shape}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Literal
 
+from zwidth.measures.moment_units import unit_of_moments
 from zwidth.result import Result
 
 if TYPE_CHECKING:
@@ -209,10 +210,14 @@ class Measure:
         >>> Measure("stable_area", "", "N^2 s/m^2", None, "", "").key
         'stable_area_N2s_per_m2'
         """
-        over, _, under = self.unit.replace(" ", "").replace("^", "").partition("/")
+        over, _, under = self.unit.replace("kg m", "kg_m").replace(" ", "").replace("^", "").partition("/")
         written = over + (f"_per_{under}" if under else "")
         plain = re.fullmatch(r"[A-Za-z0-9_]+", written) and "^r" not in self.unit
         return f"{self.name}_{written}" if plain else self.name
+
+    def about_moments(self) -> Measure:
+        """The same measure of moments about an axis; itself if it does not depend on what is rendered."""
+        return replace(self, unit=unit_of_moments(self.unit)) if self.along else self
 
     def at_wall(self, wall: WantedWall | WantedWalls) -> Measure:
         """The same measure for a wanted wall; itself if it needs none."""

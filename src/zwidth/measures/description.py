@@ -28,7 +28,8 @@ class Description(Result):
     damping_ratios       of each frequency, None for rigid ones; None where damping couples the modes
     joints               angle of each joint by its link [rad], of a prismatic one the way [m], a list of those of
                          a joint with several; None for a device without a mechanism, as all below
-    jacobian             (3, c)  [m/rad];   mass_matrix  (c, c)  of the links [kg m^2]
+    jacobian             (3, c)  [m/rad];   angular_jacobian  (3, c)  of the handle's orientation [rad/rad]
+    mass_matrix          (c, c)  of the links [kg m^2]
     manipulability, dynamic_manipulability, isotropy   see `measures.dexterity`
     """
 
@@ -37,6 +38,7 @@ class Description(Result):
     damping_ratios: list[float | None] | None
     joints: dict[str, Any] | None = None
     jacobian: Floats | None = None
+    angular_jacobian: Floats | None = None
     mass_matrix: Floats | None = None
     manipulability: float | None = None
     dynamic_manipulability: float | None = None
@@ -54,6 +56,7 @@ class Description(Result):
             "damping_ratios": self.damping_ratios,
             "joints_rad": self.joints,
             "jacobian": self.jacobian,
+            "angular_jacobian": self.angular_jacobian,
             "mass_matrix": self.mass_matrix,
             "manipulability": self.manipulability,
             "dynamic_manipulability": self.dynamic_manipulability,
@@ -102,6 +105,7 @@ def describe(point: OperatingPoint) -> Description:
         ratios,
         joints=joint_coordinates(point.mechanism, point.posture.angles),
         jacobian=point.jacobian,
+        angular_jacobian=point.posture.angular_jacobian,
         mass_matrix=point.mass_matrix if known else None,
         manipulability=float(dexterity.manipulability(point)),
         dynamic_manipulability=float(dexterity.dynamic_manipulability(point)) if known else None,

@@ -12,21 +12,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, Final
 
-UNITS: Final = {
-    "N/m": "Nm/rad",
-    "Ns/m": "Nms/rad",
-    "N s/m": "N m s/rad",
-    "kg": "kg m^2",
-    "m": "rad",
-    "N": "Nm",
-    "m/s": "rad/s",
-    "m/s^2": "rad/s^2",
-    "m/s²": "rad/s²",
-    "N²s/m²": "N²m²s/rad²",
-    "N^2 s/m^2": "N^2 m^2 s/rad^2",
-    "m/N": "rad/Nm",
-}
-"""Unit of a force along a direction -> that of a moment about an axis."""
+from zwidth.measures.moment_units import unit_of_moments
 
 NAMES: Final = {"position_m": "angle_rad", "force_N": "moment_Nm"}
 ENDINGS: Final = (
@@ -43,15 +29,6 @@ KEPT: Final = re.compile(r"[xyz]_m|plane_through_m|characteristic_length_m")
 """Keys that are lengths whatever is rendered."""
 
 _moments: ContextVar[bool] = ContextVar("moments", default=False)
-
-
-def unit_of_moments(unit: str) -> str:
-    """The unit of a moment, an angle or an inertia where that of a force, a way or a mass is given; others stay.
-
-    >>> unit_of_moments("N/m"), unit_of_moments("Hz")
-    ('Nm/rad', 'Hz')
-    """
-    return UNITS.get(unit, unit)
 
 
 def keys_of_moments(value: Any) -> Any:

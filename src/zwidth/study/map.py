@@ -211,6 +211,8 @@ def map_job(
                     raise error.with_name(one.name) from None
     else:
         device.direction(direction)  # raises what is wrong with it
+    if not isinstance(direction, str) and device.renders_moments(direction):
+        requested_measures = tuple(one.about_moments() for one in requested_measures)
     plane = plane or plane_of(device, assembly=assembly)
     wanted = wall or WantedWall()
     requested_measures = tuple(one.at_wall(wanted) for one in requested_measures)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import prod
 from typing import Any, Final
 
@@ -122,6 +122,8 @@ def check_study(
         return None
     hypercube = checked.sampling == "latin-hypercube"
     _check_size(checked, hypercube)
+    if "direction" not in [axis.key for axis in axes] and device.renders_moments(checked.direction):
+        columns = tuple(replace(one, measure=one.measure.about_moments()) for one in columns)
     return Study(
         label=label,
         document=document,

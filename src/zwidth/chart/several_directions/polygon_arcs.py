@@ -1,4 +1,4 @@
-"""The edge of the stable set as arcs of eigenloci and pieces of lines, between corners solved for exactly.
+"""The edge of the stable set as arcs of curves and pieces of lines, between corners solved for exactly.
 
 Polygons tell which curve makes each of their sides; here each run of sides on one curve becomes an arc, and the
 walls where two curves meet are found by Newton's method on the curves themselves.
@@ -6,6 +6,7 @@ walls where two curves meet are found by Newton's method on the curves themselve
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,9 +14,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from zwidth.chart.arcs import CHORD, MINUS, PAIR, PLUS, Arc, Wall
-from zwidth.chart.several_directions.eigenloci import Loci
-from zwidth.chart.several_directions.stable_polygons import Line
+from zwidth.chart.arcs import CHORD, CURVED, Arc, Wall
+from zwidth.chart.several_directions.box import Box
+from zwidth.chart.several_directions.wall_curves import WallCurve
 
 Floats = NDArray[np.float64]
 
@@ -23,13 +24,20 @@ Floats = NDArray[np.float64]
 SHORT = 1e-7
 # A corner solved for lies within this share of the ring's size of the polygon's.
 STRAY = 1e-2
-# Sides on steps of a branch no further apart than this belong together.
+# Sides on steps of a curve no further apart than this belong together.
 NEIGHBOURS = 3
+# Steps of curves are looked at within this share of a ring's size.
+AROUND = 0.5
+# Two places on one curve closer than this share of their parameter are one.
+ONE_PLACE = 1e-6
+# A step that moves a wall by less than this share of the ring's size is rounding; so is one of less than the other
+# that grows no smaller.
+SETTLED, NEARLY = 1e-16, 1e-10
 
 
 @dataclass(frozen=True)
 class _CurveRun:
-    """Sides of a ring on one curve: its number (branches first, then lines), and the angles of their two ends."""
+    """Sides of a ring on one curve: its number, and the parameters of their two ends."""
 
     curve: int
     start: float
@@ -39,41 +47,40 @@ class _CurveRun:
     length: float
 
 
-def ring_arcs(loci: Loci, lines: list[Line], ring: Floats) -> list[Arc]:
-    """A closed ring (k, 2) of walls [K T, B] as arcs in its order."""
+def ring_arcs(curves: Sequence[WallCurve], ring: Floats, period: float) -> list[Arc]:
+    """A closed ring (k, 2) of walls [K T, B] as arcs in its order.
+
+    period  T [s]
+    """
     size = float(np.max(np.ptp(ring, axis=0)))
-    runs = _long_runs(_runs(loci, lines, ring), SHORT * size)
-    corners = [
-        _corner(loci, lines, one, other, STRAY * size)
-        for one, other in zip(runs, [*runs[1:], runs[0]], strict=True)
-    ]
+    runs = _long_runs(_runs(curves, ring), SHORT * size)
+    corners = [_corner(curves, one, other, size) for one, other in zip(runs, [*runs[1:], runs[0]], strict=True)]
     arcs = []
-    m = loci.g.shape[1]
     for run, before, after in zip(runs, [corners[-1], *corners[:-1]], corners, strict=True):
-        (first, _, start), (last, end, _) = before, after
-        if run.curve >= m:
-            angle = lines[run.curve - m].angle
-            arcs.append(Arc(MINUS if angle > 0.0 else PLUS, first, last, angle, angle, np.empty(0)))
-            continue
-        inner = loci.thetas[(loci.thetas > min(start, end)) & (loci.thetas < max(start, end))]
-        inner = inner if start < end else inner[::-1]
-        arcs.append(Arc(PAIR if start != end else CHORD, first, last, start, end, inner, run.curve))
+        (first, _, start), (last, end, _), curve = before, after, curves[run.curve]
+        one, other = ((float(x / period), float(y)) for x, y in (first, last))
+        inner = curve.parameters[(curve.parameters > min(start, end)) & (curve.parameters < max(start, end))]
+        kind = curve.kind
+        if kind not in CURVED or start == end:
+            angle = float(curve.at(np.array([start]))[4][0])
+            kind, inner, start, end = CHORD if kind in CURVED else kind, inner[:0], angle, angle
+        arcs.append(Arc(kind, one, other, start, end, inner if start < end else inner[::-1], run.curve))
     return arcs
 
 
-def _runs(loci: Loci, lines: list[Line], ring: Floats) -> list[_CurveRun]:
-    """Consecutive sides on one curve and, on a branch, at neighbouring angles."""
+def _runs(curves: Sequence[WallCurve], ring: Floats) -> list[_CurveRun]:
+    """Consecutive sides on one curve at neighbouring parameters."""
     sides = np.diff(ring, axis=0)
     length = np.hypot(sides[:, 0], sides[:, 1])
-    segments = _segments(loci, lines, ring)
-    tree = shapely.STRtree(shapely.linestrings(np.stack([segments.first, segments.last], axis=1)))
+    steps = _steps(curves, ring)
+    tree = shapely.STRtree(shapely.linestrings(np.stack([steps.first, steps.last], axis=1)))
     nearest = tree.nearest(shapely.points(0.5 * (ring[1:] + ring[:-1])))
-    curve, sample = segments.curve[nearest], segments.sample[nearest]
+    curve, sample = steps.curve[nearest], steps.sample[nearest]
     breaks = (curve[1:] != curve[:-1]) | (np.abs(sample[1:] - sample[:-1]) > NEIGHBOURS)
     cuts = [0, *(np.flatnonzero(breaks) + 1).tolist(), len(curve)]
     runs = []
     for a, b in pairwise(cuts):
-        start, end = segments.angle(nearest[a], ring[a]), segments.angle(nearest[b - 1], ring[b])
+        start, end = steps.parameter(nearest[a], ring[a]), steps.parameter(nearest[b - 1], ring[b])
         between = int(sample[a]), int(sample[b - 1])
         runs.append(_CurveRun(int(curve[a]), start, end, between, ring[b], float(length[a:b].sum())))
     return runs
@@ -106,11 +113,11 @@ def _join(one: _CurveRun, other: _CurveRun) -> _CurveRun:
 
 @dataclass(frozen=True)
 class _CurveSteps:
-    """Steps between samples of each branch, and the lines.
+    """Steps between samples of curves.
 
-    first, last  (k, 2)  ends [K T, B];  start, end  (k,)  angles there
-    curve        (k,)    number of the branch, or of the line after all branches
-    sample       (k,)    number of the step on its branch; 0 for a line
+    first, last  (k, 2)  ends [K T, B];  start, end  (k,)  parameters there
+    curve        (k,)    number of the curve
+    sample       (k,)    number of the step on its curve
     """
 
     first: Floats
@@ -120,104 +127,95 @@ class _CurveSteps:
     start: Floats
     end: Floats
 
-    def angle(self, k: int, point: Floats) -> float:
-        """The angle at the point's foot on step k."""
+    def parameter(self, k: int, point: Floats) -> float:
+        """The parameter at the point's foot on step k."""
         step = self.last[k] - self.first[k]
         share = float(np.clip((point - self.first[k]) @ step / (step @ step), 0.0, 1.0))
         return float(self.start[k] + share * (self.end[k] - self.start[k]))
 
 
-def _segments(loci: Loci, lines: list[Line], ring: Floats) -> _CurveSteps:
-    """Steps of branches, and lines, on which a side of the ring can lie."""
-    walls, thetas = loci.walls, loci.thetas
-    m, size = walls.shape[1], np.ptp(ring, axis=0)
-    centre = 0.5 * (ring.max(axis=0) + ring.min(axis=0))
+def _steps(curves: Sequence[WallCurve], ring: Floats) -> _CurveSteps:
+    """Steps of curves on which a side of the ring can lie."""
+    around = Box(ring.min(axis=0), ring.max(axis=0)).with_margin(AROUND)
     parts: list[tuple[Floats, Floats, NDArray[np.int64], NDArray[np.int64], Floats, Floats]] = []
-    for i in range(m):
-        with np.errstate(invalid="ignore", over="ignore"):
-            sound: NDArray[np.bool_] = np.asarray(np.isfinite(walls[:, i]).all(axis=-1))
-            near = sound & (np.abs(walls[:, i] - centre) <= size).all(axis=-1)
-            use = (near[1:] & sound[:-1]) | (near[:-1] & sound[1:])
-            for j in range(i):  # two branches that are the same curve
-                use &= ~(np.abs(walls[1:, i] - walls[1:, j]) <= 1e-9 * size).all(axis=-1)
-        k = np.flatnonzero(use)
-        parts.append((walls[k, i], walls[k + 1, i], np.full(len(k), i), k, thetas[k], thetas[k + 1]))
-    reach = 4.0 * float(np.hypot(*size))
-    for n, line in enumerate(lines):
-        foot = (centre + (line.offset - line.across @ centre) * line.across)[None]
-        own, angle = np.array([m + n]), np.array([line.angle])
-        parts.append((foot - reach * line.along, foot + reach * line.along, own, np.zeros(1, int), angle, angle))
+    for i, curve in enumerate(curves):
+        walls, places = curve.walls, curve.parameters
+        k = np.flatnonzero(around.meets(walls))
+        parts.append((walls[k], walls[k + 1], np.full(len(k), i), k, places[k], places[k + 1]))
     return _CurveSteps(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _corner(
-    loci: Loci, lines: list[Line], one: _CurveRun, other: _CurveRun, stray: float
+    curves: Sequence[WallCurve], one: _CurveRun, other: _CurveRun, size: float
 ) -> tuple[Wall, float, float]:
-    """The wall where a run ends and another begins, and the angles of both there."""
-    m, T = loci.g.shape[1], loci.loop.period
+    """The wall [K T, B] where a run ends and another begins, and the parameters of both there.
+
+    size  of the ring
+    """
+    a, b = curves[one.curve], curves[other.curve]
     solution: tuple[Floats, float, float] | None = None
-    if one.curve >= m and other.curve >= m:
-        L = [lines[run.curve - m] for run in (one, other)]
-        across = np.stack([line.across for line in L])
-        if abs(np.linalg.det(across)) > 1e-12:
-            solution = np.linalg.solve(across, [line.offset for line in L]), L[0].angle, L[1].angle
-    elif one.curve >= m:
-        line = lines[one.curve - m]
-        crossing = _meet_line(loci, line, other.curve, other.start)
-        solution = None if crossing is None else (crossing[0], line.angle, crossing[1])
-    elif other.curve >= m:
-        line = lines[other.curve - m]
-        crossing = _meet_line(loci, line, one.curve, one.end)
-        solution = None if crossing is None else (crossing[0], crossing[1], line.angle)
-    else:
-        solution = _meet(loci, one, other)
-    if solution is None or not np.max(np.abs(solution[0] - one.corner)) <= stray:
+    for curve, line, run, beside in ((a, b, one.end, other.start), (b, a, other.start, one.end)):
+        end = curve.limit(run, line.real_angle) if line.real_angle is not None else None
+        if end is not None:
+            foot = _foot(line, end[0], beside)
+            wall = _wall(line, foot)[0]  # to rounding, which a limit is not
+            solution = (wall, end[1], foot) if curve is a else (wall, foot, end[1])
+    if solution is None:
+        solution = _meet(a, b, one.end, other.start, size)
+    if solution is None or not np.max(np.abs(solution[0] - one.corner)) <= STRAY * size:
         solution = one.corner, one.end, other.start
-    (x, y), end, start = solution
-    return (float(x / T), float(y)), float(end), float(start)
+    (x, y), end_, start = solution
+    return (float(x), float(y)), float(end_), float(start)
 
 
-def _walls(loci: Loci, curve: int, theta: float) -> tuple[Floats, Floats]:
-    """[K T, B] and its slope on a branch."""
-    K, B, dK, dB = (float(value[0]) for value in loci.at(curve, np.array([theta])))
-    T = loci.loop.period
-    return np.array([K * T, B]), np.array([dK * T, dB])
+def _wall(curve: WallCurve, place: float) -> tuple[Floats, Floats]:
+    """[K T, B] and its slope on a curve."""
+    K, B, dK, dB = (float(value[0]) for value in curve.at(np.array([place]))[:4])
+    return np.array([K * curve.period, B]), np.array([dK * curve.period, dB])
 
 
-def _meet_line(loci: Loci, line: Line, curve: int, theta: float) -> tuple[Floats, float] | None:
-    """Where a branch crosses a line of real roots, or ends on it with a double root."""
-    low, high = loci.thetas[0], loci.thetas[-1]
-    if line.angle == 0.0 and theta < 2.0 * low:
-        near, far = _walls(loci, curve, low)[0], _walls(loci, curve, 2.0 * low)[0]
-        return (4.0 * near - far) / 3.0, 0.0
-    if line.angle > 0.0 and np.pi - theta < 2.0 * (np.pi - high):
-        near, far = _walls(loci, curve, high)[0], _walls(loci, curve, 2.0 * high - np.pi)[0]
-        return (4.0 * near - far) / 3.0, np.pi
-    for _ in range(50):
-        wall, slope = _walls(loci, curve, theta)
-        step = -float(line.across @ wall - line.offset) / float(line.across @ slope)
-        if not abs(step) < 0.1 * min(theta, np.pi - theta):
-            return None
-        theta += step
-        if abs(step) <= 1e-14 * theta:
+def _on(curve: WallCurve, place: float) -> float:
+    """A place on a curve, which may end there."""
+    return float(np.clip(place, curve.parameters[0], curve.parameters[-1]))
+
+
+def _foot(curve: WallCurve, wall: Floats, place: float) -> float:
+    """The parameter, near another one, at which a curve passes a wall that lies on it but for rounding."""
+    for _ in range(5):
+        p, dp = _wall(curve, place)
+        step = float((wall - p) @ dp / (dp @ dp))
+        if not abs(step) < curve.reach(place):
             break
-    return _walls(loci, curve, theta)[0], theta
+        place += step
+    return place
 
 
-def _meet(loci: Loci, one: _CurveRun, other: _CurveRun) -> tuple[Floats, float, float] | None:
-    """Newton for the wall that two branches, or two places of one, share; None if it wanders off."""
-    a, b = one.end, other.start
-    if one.curve == other.curve and abs(a - b) <= 1e-6 * a:
+def _meet(
+    a: WallCurve, b: WallCurve, start_a: float, start_b: float, size: float
+) -> tuple[Floats, float, float] | None:
+    """Newton for the wall [K T, B] that two curves, or two places of one, share; None if it wanders off.
+
+    On one curve p(s) = p(t) holds wherever s = t, too: what must vanish there is (p(s) - p(t)) / (s - t).
+    """
+    s, t, last = start_a, start_b, np.inf
+    if a is b and abs(s - t) <= ONE_PLACE * abs(s):
         return None
     for _ in range(40):
-        (p, dp), (q, dq) = _walls(loci, one.curve, a), _walls(loci, other.curve, b)
-        matrix = np.stack([dp, -dq], axis=1)
+        (p, dp), (q, dq) = _wall(a, s), _wall(b, t)
+        if np.abs(p - q).max() <= SETTLED * size:
+            break
+        slope = (p - q) / (s - t) if a is b and s != t else np.zeros(2)
+        matrix = np.stack([dp - slope, slope - dq], axis=1)
         if not np.isfinite(matrix).all() or np.linalg.det(matrix) == 0.0:
             return None
         step = -np.linalg.solve(matrix, p - q)
-        if not (abs(step[0]) < 0.1 * min(a, np.pi - a) and abs(step[1]) < 0.1 * min(b, np.pi - b)):
+        if not (abs(step[0]) < a.reach(s) and abs(step[1]) < b.reach(t)):
             return None
-        a, b = a + float(step[0]), b + float(step[1])
-        if abs(step[0]) <= 4e-15 * a and abs(step[1]) <= 4e-15 * b:
+        s, t = _on(a, s + float(step[0])), _on(b, t + float(step[1]))
+        moved = max(np.abs(dp * step[0]).max(), np.abs(dq * step[1]).max())
+        if moved <= SETTLED * size or (moved > 0.5 * last and moved < NEARLY * size):
             break
-    return 0.5 * (_walls(loci, one.curve, a)[0] + _walls(loci, other.curve, b)[0]), a, b
+        last = moved
+    if a is b and (s - t) * (start_a - start_b) < 0.0:
+        s, t = t, s
+    return 0.5 * (_wall(a, s)[0] + _wall(b, t)[0]), s, t

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.loop.motion_names import group_names
+from zwidth.show.cli import wall_law
 from zwidth.show.cli.answer import two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Numbers
-from zwidth.show.units import amount, percent, radius, typed, vector
+from zwidth.show.units import amount, percent, radius, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,6 +47,7 @@ class ChartCommand(Command):
     examples = (
         "zwidth chart my-device.toml --at 0.1,0.2 --direction 0,1",
         "zwidth chart my-device.toml --set loop.delay_samples=1 --output chart.svg",
+        "zwidth chart my-device.toml --direction 0,1 --with-direction 1,0 --relative-stiffness 1,0.2",
     )
     options = (
         click.option(
@@ -55,13 +56,7 @@ class ChartCommand(Command):
             callback=_check_window,
             help="Part of the chart that a figure shows; results are never clipped.",
         ),
-        click.option(
-            "--with-direction",
-            "others",
-            type=Numbers("DX,DY[,DZ]", (2, 3), "1,0"),
-            multiple=True,
-            help="Another direction under the same wall law, as in a corner; repeatable.",
-        ),
+        *wall_law.OPTIONS,
     )
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: the boundary, .json)."
     keys = (
@@ -81,32 +76,23 @@ class ChartCommand(Command):
     takes_responses = True
 
     def repeated_options(self, case: CommandLine) -> dict[str, Any]:
-        return {"directions": _directions(case)} if case["others"] else {}
+        return wall_law.circumstances(case)
 
     def compute(self, case: CommandLine) -> Chart:
-        question, device = case.question, case.device
-        if not case["others"]:
-            return case.point.chart()
-        if device.mechanism is None:
-            raise BadInput(
-                f"{question.name}: has no [mechanism], and so one direction only; leave out --with-direction"
-            )
-        question.refuse_unsupported(device)
-        return device.at(
-            question.at,
-            directions=_directions(case),
-            orientation=question.orientation,
-            assembly=question.assembly,
-            model=question.model,
-        ).chart()
+        return wall_law.operating_point(case).chart()
 
     def document(self, case: CommandLine, result: Chart) -> dict[str, Any]:
         from zwidth.chart.measured.chart import MeasuredChart
+        from zwidth.chart.several_directions.chart import MultiChart
 
-        warning = {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
-        return result.document() | warning
+        more: dict[str, Any] = {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
+        if isinstance(result, MultiChart):
+            more = {"decided": not result.doubt}
+        return result.document() | more
 
     def reason(self, case: CommandLine, result: Chart) -> str | None:
+        if doubt := getattr(result, "doubt", ""):
+            return f"this is undecided: {doubt}"
         if result.stiffness_max == result.stiffness_max:
             return None
         return OPEN_EDGE if getattr(result, "open", False) else NO_WALL
@@ -116,10 +102,8 @@ class ChartCommand(Command):
             yield f"warning: {document['warning']}"
         from zwidth.chart.measured.chart import MeasuredChart
 
-        together = " and ".join(map(vector, document.get("directions", ())))
-        first = [("same wall along", together)] if together else []
         last = measured_rows(result) if isinstance(result, MeasuredChart) else ()
-        yield two_columns([*first, *_rows(result), *last])
+        yield two_columns([*wall_law.rows(wall_law.circumstances(case)), *_rows(result), *last])
 
     def draw(self, case: CommandLine, result: Chart) -> Figure:
         from zwidth.show.figures.plots import draw_any_chart
@@ -128,14 +112,6 @@ class ChartCommand(Command):
         drawing, ax = figure()
         draw_any_chart(ax, result, case["window"])
         return drawing
-
-
-def _directions(case: CommandLine) -> list[Any]:
-    """All directions rendered together, the first of them that of every question."""
-    question, device = case.question, case.device
-    if question.axis is not None:
-        raise BadInput(f"{question.name}: --axis and --with-direction do not go together; leave out one of them")
-    return [device.direction(direction) for direction in (question.direction, *case["others"])]
 
 
 def _rows(chart: Chart) -> Iterator[tuple[str, str]]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import table
+from zwidth.show.cli import wall_law
+from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite, refuse_empty
 from zwidth.show.output import DATA
@@ -38,6 +39,7 @@ class CheckCommand(Command):
         ),
         click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of one wall [N/m]."),
         click.option("--damping", metavar="B", type=Finite(), help="Damping of one wall [Ns/m]."),
+        *wall_law.OPTIONS,
     )
     outputs = DATA
     output_help = "Write the verdicts (.csv .json)."
@@ -47,9 +49,12 @@ class CheckCommand(Command):
     def parse(self, case: CommandLine) -> dict[str, Any]:
         return {"walls": _walls(case["points"], case["stiffness"], case["damping"])}
 
+    def repeated_options(self, case: CommandLine) -> dict[str, Any]:
+        return wall_law.circumstances(case)
+
     def compute(self, case: CommandLine) -> WallVerdicts:
         stiffness, damping = zip(*case["walls"], strict=True)
-        return case.point.check(stiffness, damping, progress=case.progress)
+        return wall_law.operating_point(case).check(stiffness, damping, progress=case.progress)
 
     def pages(self, case: CommandLine, result: WallVerdicts, document: Mapping[str, Any]) -> Iterator[Any]:
         points = document["points"]
@@ -63,6 +68,8 @@ class CheckCommand(Command):
             )
             for point in points[:SHOWN]
         ]
+        if law := list(wall_law.rows(wall_law.circumstances(case))):
+            yield two_columns(law)
         frequency = "nearest edge at" if case.point.charted_by_response else "its frequency"
         yield table(["stiffness", "damping", "verdict", "spectral radius", frequency], rows)
         if len(points) > SHOWN:

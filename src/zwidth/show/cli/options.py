@@ -71,10 +71,7 @@ class Question:
 
     def is_about_moments(self, device: Device) -> bool:
         """Whether moments about an axis are rendered, so that the answer is in N m/rad."""
-        if device.mechanism is None:
-            return False
-        rendered = self.screw(device)
-        return rendered.shape[-1] == 6 and not rendered[:3].any()
+        return device.renders_moments(self.direction, self.axis, self.characteristic_length)
 
     def refuse_unsupported(self, device: Device) -> None:
         """Raises BadInput for what directions computed together leave out."""

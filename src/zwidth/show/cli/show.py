@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.output import DATA, json_value
 from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
     from zwidth.measures.description import Description
-    from zwidth.model.mechanism import Floats
+    from zwidth.model.mechanism import Mechanism
+
+SMALLEST: Final = 1e-12
+"""Joint coordinates below it are shown as 0 [rad], [m]."""
 
 
 class ShowCommand(Command):
@@ -33,6 +37,7 @@ class ShowCommand(Command):
         "damping_ratios",
         "joints_rad",
         "jacobian",
+        "angular_jacobian",
         "mass_matrix",
         "manipulability",
         "dynamic_manipulability",
@@ -60,21 +65,26 @@ class ShowCommand(Command):
         values = json_value(document)
         if result.effective is not None:
             yield two_columns(_felt(values))
-        if result.jacobian is not None:
-            units = _dexterity_units(result.jacobian)
-            dynamic = ("dynamic manipulability", amount(values["dynamic_manipulability"], units[1]))
-            yield two_columns(
-                [
-                    ("manipulability", amount(values["manipulability"], units[0])),
-                    *([dynamic] if result.effective is not None else []),
-                    ("isotropy (1 is best)", amount(values["isotropy"])),
-                ]
-            )
-            angles = [(name, _coordinates(value)) for name, value in values["joints_rad"].items()]
-            yield table(["joint", "angle [rad]"], angles)
+        if case.device.mechanism is not None:
+            with speaking_of_moments(False):  # the mechanism's own lengths are none of the rendered axis
+                yield from _mechanism_pages(case.device.mechanism, result, values)
         yield from _missing(case.device)
         if values["sources"]:
             yield table(["numbers", "source"], list(values["sources"].items()))
+
+
+def _mechanism_pages(mechanism: Mechanism, result: Description, values: Mapping[str, Any]) -> Iterator[Any]:
+    """Dexterity and joints."""
+    units = _dexterity_units(mechanism, result)
+    dynamic = ("dynamic manipulability", amount(values["dynamic_manipulability"], units[1]))
+    yield two_columns(
+        [
+            ("manipulability", amount(values["manipulability"], units[0])),
+            *([dynamic] if result.effective is not None else []),
+            ("isotropy (1 is best)", amount(values["isotropy"])),
+        ]
+    )
+    yield _joint_table(mechanism, values["joints_rad"])
 
 
 def _felt(values: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -88,9 +98,23 @@ def _felt(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def _coordinates(value: Any) -> str:
-    """A joint's coordinate, or those of a joint with several."""
-    return ", ".join(amount(one) for one in value) if isinstance(value, list) else amount(value)
+def _joint_table(mechanism: Mechanism, joints: Mapping[str, Any]) -> Any:
+    """The joints' coordinates: angles, or each with its unit where joints slide. What is rounding of 0 is shown
+    as 0."""
+    from zwidth.model.mechanism import PRISMATIC
+
+    units: dict[str, list[str]] = {}
+    for name, kind in zip(mechanism.links.names, mechanism.links.joint, strict=True):
+        units.setdefault(name.partition("/")[0], []).append("m" if kind == PRISMATIC else "rad")
+    slides = any("m" in of_joint for of_joint in units.values())
+    rows = []
+    for name, value in joints.items():
+        numbers = [0.0 if abs(one) < SMALLEST else one for one in (value if isinstance(value, list) else [value])]
+        shown = [
+            amount(one, unit) if slides else amount(one) for one, unit in zip(numbers, units[name], strict=True)
+        ]
+        rows.append((name, ", ".join(shown)))
+    return table(["joint", "coordinate" if slides else "angle [rad]"], rows)
 
 
 def _missing(device: Device) -> Iterator[Any]:
@@ -102,19 +126,21 @@ def _missing(device: Device) -> Iterator[Any]:
         yield table(["missing", "of", ""], [(one.group, one.names, one.needed_for) for one in unknown])
 
 
-def _dexterity_units(jacobian: Floats) -> tuple[str, str]:
-    """Units of both manipulabilities, products of as many singular values as there are directions to move in.
-
-    jacobian  (3, d)  [m/rad]
-    """
+def _dexterity_units(mechanism: Mechanism, result: Description) -> tuple[str, str]:
+    """Units of both manipulabilities, products of as many singular values as there are directions to move in, or
+    to turn about where the drives control the orientation alone."""
     import numpy as np
 
     from zwidth.measures.dexterity import ZERO_ROW
+    from zwidth.model.mechanism import ORIENTATION
 
+    turns = mechanism.controls == ORIENTATION
+    jacobian = result.angular_jacobian if turns else result.jacobian
+    assert jacobian is not None
     rows = np.max(np.abs(jacobian), axis=1)
     r = min(jacobian.shape[1], int(np.sum(rows > ZERO_ROW * np.max(rows))))
     power = {2: "²", 3: "³"}.get(r, "")
-    return f"m{power}", f"1/(kg m){power}"
+    return ("", f"1/(kg m²){power}") if turns else (f"m{power}", f"1/(kg m){power}")
 
 
 def _modes(document: Mapping[str, Any]) -> Iterator[str]:

@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
+from zwidth.loop.wall_matrices import WallMatrices
 from zwidth.show.circumstances import AS_GIVEN, computer_text, omission_text, operator_text
 from zwidth.show.figures.style import FAMILY, context, wrapped
 from zwidth.show.output import printable
@@ -104,6 +105,8 @@ def facts_of_point(at: OperatingPoint, *, linear: bool = True) -> dict[str, Any]
         facts["assembly"] = at.posture.assembly
         if not at.shape:
             facts |= {"position_m": at.posture.position, "directions": at.directions}
+            if (law := at.wall_matrices) is not None:
+                facts |= {"relative_stiffness": law.stiffness, "relative_damping": law.damping}
     return facts
 
 
@@ -170,6 +173,8 @@ def _direction(facts: Mapping[str, Any]) -> str:
     if together is None:
         return ""
     law = ", under one wall law" if len(together) > 1 else ""
+    if facts.get("relative_stiffness") is not None:
+        law = f", {WallMatrices(facts['relative_stiffness'], facts['relative_damping'])}"
     ways = [way(one) for one in together]
     if all(one.startswith("along ") for one in ways[1:]):
         ways[1:] = [one.removeprefix("along ") for one in ways[1:]]

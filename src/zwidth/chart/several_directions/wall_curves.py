@@ -1,0 +1,126 @@
+"""What cuts the plane of walls of several directions: curves and lines of walls with a root on the circle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.arcs import CHORD, MINUS, PLUS
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class WallCurve(Protocol):
+    """A curve of walls by a parameter of its own, such as the angle of the roots. Walls are [K T, B].
+
+    kind        of its arcs (`arcs.Arc`)
+    period      T [s]
+    real_angle  0 or pi where the root is real; None for a pair of roots
+    parameters  (n,)    ascending, of samples so dense that chords follow the curve
+    walls       (n, 2)  there
+    drawn       (k, 2)  what cuts the plane: the samples, continued across the lines on which the curve ends
+    """
+
+    @property
+    def kind(self) -> int: ...
+
+    @property
+    def period(self) -> float: ...
+
+    @property
+    def real_angle(self) -> float | None: ...
+
+    @property
+    def parameters(self) -> Floats: ...
+
+    @property
+    def walls(self) -> Floats: ...
+
+    @property
+    def drawn(self) -> Floats: ...
+
+    def at(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """K [N/m], B [N s/m], their slopes and the angles of the roots (k,) at parameters (k,)."""
+
+    def regular(self, parameters: Floats) -> Flags:
+        """At which parameters the curve can be evaluated: not at its very ends."""
+
+    def limit(self, parameter: float, angle: float) -> tuple[Floats, float] | None:
+        """The wall and parameter at which the curve ends with a double root at this angle, if that is near."""
+
+    def reach(self, parameter: float) -> float:
+        """How far a step of Newton's method may go from a parameter."""
+
+
+@dataclass(frozen=True)
+class StraightLine:
+    """Walls with a root at one angle: across . [K T, B] = offset.
+
+    across  (2,) unit vector
+    angle   of the root
+    period  T [s]
+    size    how far it is drawn on both sides of its foot
+    """
+
+    across: Floats
+    offset: float
+    angle: float
+    period: float
+    size: float = 1.0
+
+    @property
+    def kind(self) -> int:
+        """Of its arcs."""
+        return PLUS if self.angle == 0.0 else MINUS if self.angle == np.pi else CHORD
+
+    @property
+    def real_angle(self) -> float | None:
+        """0 or pi where the root is real."""
+        return self.angle if self.kind in (PLUS, MINUS) else None
+
+    @property
+    def along(self) -> Floats:
+        """Unit vector."""
+        return np.array([-self.across[1], self.across[0]])
+
+    @property
+    def parameters(self) -> Floats:
+        """Distances of both ends from the foot."""
+        return np.array([-self.size, self.size])
+
+    @property
+    def walls(self) -> Floats:
+        """Both ends (2, 2)."""
+        return self.offset * self.across + self.parameters[:, None] * self.along
+
+    @property
+    def drawn(self) -> Floats:
+        """Both ends."""
+        return self.walls
+
+    def at(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """K, B, their slopes and the angle (k,) at distances (k,) from the foot."""
+        x, y = (self.offset * self.across + parameters[:, None] * self.along).T
+        dx, dy = self.along
+        return (
+            x / self.period,
+            y,
+            np.full_like(x, dx / self.period),
+            np.full_like(y, dy),
+            np.full_like(x, self.angle),
+        )
+
+    def regular(self, parameters: Floats) -> Flags:
+        """Everywhere."""
+        return np.ones(len(parameters), dtype=bool)
+
+    def limit(self, parameter: float, angle: float) -> None:
+        """It has no end."""
+
+    def reach(self, parameter: float) -> float:
+        """A step is exact."""
+        return np.inf

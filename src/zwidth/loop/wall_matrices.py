@@ -1,0 +1,184 @@
+"""Wall laws that differ from direction to direction: constant matrices K0 and B0, each scaled by one number.
+
+    f = -(k K0 y + b B0 v)
+
+y and v are the readings along m rendered directions and their estimated velocities. K0 and B0 have 1 as their
+largest entry, so that k is the stiffness along the stiffest direction, and b the damping along the most damped
+one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.model.argument_checks import describe_value
+
+Floats = NDArray[np.float64]
+
+# Entries are symmetric, and eigenvalues not negative, to this share of the largest entry.
+ROUNDING: Final = 1e-12
+
+
+class MatrixError(ValueError):
+    """A matrix that is none of a wall law.
+
+    name     of the argument that gave it
+    problem  what is wrong with it
+    """
+
+    def __init__(self, name: str, problem: str) -> None:
+        super().__init__(name, problem)
+        self.name, self.problem = name, problem
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.problem}"
+
+
+@dataclass(frozen=True)
+class PrincipalDirections:
+    """Combinations of the rendered directions in which both matrices of a law are diagonal.
+
+        K0 = S^T diag(stiffness) S,     B0 = S^T diag(damping) S
+
+    combinations  (r, m)  S, r of them: those in which the law pushes at all
+    stiffness     (r,)    from 0 to 1; in each direction the larger of the two is 1
+    damping       (r,)
+    """
+
+    combinations: Floats
+    stiffness: Floats
+    damping: Floats
+
+
+@dataclass(frozen=True)
+class WallMatrices:
+    """The matrices K0 and B0 of a wall law over m directions.
+
+    stiffness  K0 (m, m) symmetric, positive semidefinite, its largest entry 1
+    damping    B0 (m, m) the same
+
+    >>> WallMatrices.of([5.0, 1.0], [1.0, 1.0]).stiffness
+    array([[1. , 0. ],
+           [0. , 0.2]])
+    """
+
+    stiffness: Floats
+    damping: Floats
+
+    @classmethod
+    def of(
+        cls,
+        relative_stiffness: ArrayLike | None,
+        relative_damping: ArrayLike | None = None,
+        count: int | None = None,
+    ) -> WallMatrices:
+        """The matrices of a law from what is given for each; only the ratios of their entries count.
+
+        relative_stiffness  (m,) along each direction, or a matrix (m, m), symmetric, positive semidefinite and not
+                            all 0; None: the same along each direction
+        relative_damping    the same; None: as relative_stiffness
+        count               number of directions m; None: as many as are given
+        Raises  MatrixError  for what is no such matrix
+
+        >>> print(WallMatrices.of([5.0, 1.0]))
+        stiffness and damping 1 : 0.2
+        """
+        given = relative_damping if relative_stiffness is None else relative_stiffness
+        m = len(np.atleast_1d(np.asarray(given, dtype=object))) if count is None else count
+        alike = np.ones(m) if relative_stiffness is None else relative_stiffness
+        stiffness = _scaled_matrix("relative_stiffness", alike, m)
+        if relative_damping is None:
+            return cls(stiffness, stiffness.copy())
+        return cls(stiffness, _scaled_matrix("relative_damping", relative_damping, m))
+
+    def __str__(self) -> str:
+        stiffness, damping = ratios_text(self.stiffness), ratios_text(self.damping)
+        if stiffness == damping:
+            return f"stiffness and damping {stiffness}"
+        return f"stiffness {stiffness}, damping {damping}"
+
+    @property
+    def count(self) -> int:
+        """Number of directions m."""
+        return len(self.stiffness)
+
+    @cached_property
+    def principal(self) -> PrincipalDirections:
+        """The law in directions in which both matrices are diagonal.
+
+        Two positive semidefinite matrices always have such: with K0 + B0 = R^T R of rank r and the eigenvectors Q
+        of R^-T K0 R^-1, S = Q^T R. Diagonal matrices keep their own directions, to the last digit.
+        """
+        total = self.stiffness + self.damping
+        if _is_diagonal(self.stiffness) and _is_diagonal(self.damping):
+            moved = np.diag(total) > 0.0
+            S, s, v = np.eye(self.count)[moved], np.diag(self.stiffness)[moved], np.diag(self.damping)[moved]
+        else:
+            size, axes = np.linalg.eigh(total)
+            kept = size > ROUNDING * size[-1]
+            root = np.sqrt(size[kept])
+            inverse = axes[:, kept] / root
+            s, Q = np.linalg.eigh(inverse.T @ self.stiffness @ inverse)
+            for exact in (0.0, 0.5, 1.0):
+                s[np.abs(s - exact) <= ROUNDING] = exact
+            S, v = Q.T @ (axes[:, kept] * root).T, 1.0 - s
+        larger = np.maximum(s, v)
+        return PrincipalDirections(np.sqrt(larger)[:, None] * S, s / larger, v / larger)
+
+
+def _scaled_matrix(name: str, given: ArrayLike, count: int) -> Floats:
+    """One matrix, its largest entry 1. Raises MatrixError for what is no matrix of a law."""
+    wanted = f"must be {count} numbers, one for each direction, or a matrix of {count} rows and columns"
+    try:
+        entries = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise MatrixError(name, f"{wanted}, got {describe_value(given)}") from None
+    if entries.shape not in ((count,), (count, count)):
+        raise MatrixError(name, f"{wanted}, got {_shape_text(entries.shape)}")
+    if not np.isfinite(entries).all():
+        raise MatrixError(name, f"must be finite numbers, got {entries[~np.isfinite(entries)][0]:g}")
+    if entries.ndim == 1 and (entries < 0.0).any():
+        raise MatrixError(name, f"must not be negative, got {entries[entries < 0.0][0]:g}")
+    matrix = np.diag(entries) if entries.ndim == 1 else entries
+    largest = float(np.max(np.abs(matrix)))
+    if largest == 0.0:
+        raise MatrixError(name, "must not be 0 along all directions")
+    off = np.abs(matrix - matrix.T)
+    if not np.max(off) <= ROUNDING * largest:
+        i, j = (int(k) for k in np.unravel_index(np.argmax(off), off.shape))
+        pair = (
+            f"{matrix[i, j]:g} in row {i + 1}, column {j + 1} and {matrix[j, i]:g} in row {j + 1}, column {i + 1}"
+        )
+        raise MatrixError(name, f"must be symmetric, got {pair}")
+    matrix = (matrix + matrix.T) / 2.0
+    least = float(np.linalg.eigvalsh(matrix)[0])
+    if least < -ROUNDING * largest:
+        raise MatrixError(name, f"must have no negative eigenvalue, got one of {least:g}")
+    return np.asarray(matrix / float(np.max(matrix)))
+
+
+def _is_diagonal(matrix: Floats) -> bool:
+    return bool(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)))
+
+
+def _shape_text(shape: tuple[int, ...]) -> str:
+    """A shape in words: 3 numbers, 2 rows of 3 numbers."""
+    if len(shape) < 2:
+        return f"{shape[0]} numbers" if shape and shape[0] != 1 else "1 number"
+    return f"{shape[0]} rows of {shape[1]} numbers" if len(shape) == 2 else f"an array of shape {shape}"
+
+
+def ratios_text(matrix: Floats) -> str:
+    """A matrix in words: the ratios along the directions, 1 : 0.2, or all of it, (1, 0.1; 0.1, 0.5).
+
+    >>> ratios_text(np.diag([1.0, 0.2])), ratios_text(np.array([[1.0, 0.1], [0.1, 0.5]]))
+    ('1 : 0.2', '(1, 0.1; 0.1, 0.5)')
+    """
+    if _is_diagonal(matrix):
+        return " : ".join(f"{entry:.4g}" for entry in np.diag(matrix))
+    return "(" + "; ".join(", ".join(f"{entry:.4g}" for entry in row) for row in matrix) + ")"
