@@ -12,9 +12,11 @@ in their units (`MechanismArrays.unit`), so that all are of the size of angles.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from zwidth.compiled import compiled_lean
+from zwidth.compiled import compiled_inline, compiled_lean
 from zwidth.model.forward_kinematics import WorkingMemory, fill_handle_axes, link_point, link_vector, move_joints
 from zwidth.model.mechanism import AXIS, ORIENTATION, POINT, POSITION, PRISMATIC, Floats, Ints
 from zwidth.model.mechanism_arrays import MechanismArrays
@@ -122,6 +124,14 @@ def _handle_equations(mech: MechanismArrays, design: int, r: int, work: WorkingM
         chain_turns(mech, work, link, r, mech.size[design], (0.0, 0.0, 0.0))
 
 
+@compiled_inline
+def _row_range(spans: Ints, line: int, rows: int) -> tuple[Any, Any]:
+    """First row and end of a line, up to `rows`; without a sign, since compiled code checks each signed index for
+    one that counts from the end, which takes a third of the time of a least-squares solve."""
+    end = max(0, min(spans[line, 1], rows))
+    return np.uint64(min(spans[line, 0], end)), np.uint64(end)
+
+
 @compiled_lean
 def least_squares(
     Q: Floats, R: Floats, b: Floats, x: Floats, spans: Ints, unknowns: int, rows: int, sides: int
@@ -139,7 +149,7 @@ def least_squares(
     shortest, longest = np.inf, 0.0
     for j in range(unknowns):
         left, taken = 0.0, 0.0
-        first, end = spans[j, 0], min(spans[j, 1], rows)
+        first, end = _row_range(spans, j, rows)
         for r in range(first, end):
             left += Q[j, r] * Q[j, r]
         for i in range(j):
@@ -166,8 +176,9 @@ def least_squares(
             for r in range(first, end):
                 b[s, r] -= part * Q[j, r]
     for s in range(sides):
-        for j in range(unknowns - 1, -1, -1):
-            for i in range(j + 1, unknowns):
+        # column by column, so that no difference waits for the one before
+        for i in range(unknowns - 1, 0, -1):
+            for j in range(i):
                 x[s, j] -= R[j, i] * x[s, i]
     if unknowns == 0:
         return 1.0
@@ -252,23 +263,34 @@ def _rates_per_drive(mech: MechanismArrays, design: int, work: WorkingMemory) ->
 @compiled_lean
 def closure_step(mech: MechanismArrays, work: WorkingMemory) -> float:
     """Step of the passive unknowns alone that closes the loops, in their units, from the basis `passive_rates`
-    left; its largest part.
+    left; its largest part."""
+    passive = mech.joint.size - work.rates.shape[0]
+    return step_again(mech, work, passive, mech.first_row[mech.a.size])
+
+
+@compiled_lean
+def step_again(mech: MechanismArrays, work: WorkingMemory, unknowns: int, rows: int) -> float:
+    """Step of the first unknowns, in their units, for the present gaps in the first `rows` equations, by the
+    factors of the last least-squares solve of these; its largest part.
 
     The orthogonal basis and the triangle still stand, so that only the new right-hand side is worked through.
     """
-    m, rows = mech.joint.size, mech.first_row[mech.a.size]
-    passive = m - work.rates.shape[0]
-    Q, R, x, spans = work.basis, work.triangle, work.solution, mech.filled
-    for j in range(passive):
-        x[0, j] = 0.0
-        for r in range(spans[j, 0], min(spans[j, 1], rows)):
-            x[0, j] += Q[j, r] * work.gaps[r] / R[j, j]
-    most = 0.0
-    for j in range(passive - 1, -1, -1):
-        for i in range(j + 1, passive):
+    Q, R, x, spans, gaps = work.basis, work.triangle, work.solution, mech.filled, work.gaps
+    for j in range(unknowns):
+        along = 0.0
+        first, end = _row_range(spans, j, rows)
+        for r in range(first, end):
+            along += Q[j, r] * gaps[r]
+        x[0, j] = along / R[j, j]
+    for i in range(unknowns - 1, 0, -1):
+        for j in range(i):
             x[0, j] -= R[j, i] * x[0, i]
-        most = max(most, abs(x[0, j]))
-    for j in range(passive, m):
+    most = 0.0
+    for j in range(unknowns):
+        size = abs(x[0, j])
+        if size > most or size != size:
+            most = size
+    for j in range(unknowns, mech.joint.size):
         x[0, j] = 0.0
     return most
 
@@ -285,11 +307,55 @@ def orientation(start: Floats, rows: Floats, G: Floats, spans: Ints, unknowns: i
     """
     for i in range(unknowns):
         for j in range(unknowns):
-            part = 0.0
-            for r in range(max(spans[i, 0], spans[j, 0]), min(spans[i, 1], spans[j, 1], count)):
+            G[i, j] = 0.0
+    _add_products(start, rows, G, spans, unknowns, 0, count)
+    return _determinant(G, unknowns)
+
+
+@compiled_lean
+def orientations(mech: MechanismArrays, work: WorkingMemory) -> tuple[float, float]:
+    """The orientation of `rows` against `start` of the passive unknowns in the closures, and of all but the free
+    ones in all equations.
+
+    The products over the closures' rows serve both. `triangle` and `basis` are overwritten.
+    """
+    start, rows, G, first_of_both, spans = work.start, work.rows, work.triangle, work.basis, mech.spans
+    moved, loops = rows.shape[0] - mech.free, mech.first_row[mech.a.size]
+    passive = moved - mech.driven
+    for i in range(moved):
+        for j in range(moved):
+            G[i, j] = 0.0
+    _add_products(start, rows, G, spans, moved, 0, loops)
+    for i in range(passive):
+        for j in range(passive):
+            first_of_both[i, j] = G[i, j]
+    _add_products(start, rows, G, spans, moved, loops, work.gaps.size)
+    return _determinant(first_of_both, passive), _determinant(G, moved)
+
+
+@compiled_lean
+def _add_products(
+    start: Floats, rows: Floats, G: Floats, spans: Ints, unknowns: int, first_row: int, end_row: int
+) -> None:
+    """Add start^T rows over the equations from first_row to end_row - 1 to G."""
+    for i in range(unknowns):
+        low, high = max(spans[i, 0], first_row), min(spans[i, 1], end_row)
+        if low >= high:
+            continue
+        for j in range(unknowns):
+            first, end = max(low, spans[j, 0]), min(high, spans[j, 1])
+            if first >= end:  # unknowns of different loops have nothing to do with each other
+                continue
+            part = G[i, j]
+            for r in range(np.uint64(first), np.uint64(end)):
                 part += start[i, r] * rows[j, r]
             G[i, j] = part
-    # Gauss with row exchanges, each of which turns the sign
+
+
+@compiled_lean
+def _determinant(G: Floats, unknowns: int) -> float:
+    """Of the first lines and columns of G, which is overwritten: Gauss with row exchanges, each of which turns the
+    sign."""
     determinant = 1.0
     for j in range(unknowns):
         pivot = j
@@ -304,7 +370,7 @@ def orientation(start: Floats, rows: Floats, G: Floats, spans: Ints, unknowns: i
                 G[j, c], G[pivot, c] = G[pivot, c], G[j, c]
         determinant *= G[j, j]
         for i in range(j + 1, unknowns):
-            if G[i, j] == 0.0:  # unknowns of different loops have nothing to do with each other
+            if G[i, j] == 0.0:
                 continue
             factor = G[i, j] / G[j, j]
             for c in range(j + 1, unknowns):

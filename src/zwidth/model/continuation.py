@@ -19,8 +19,9 @@ from zwidth.model.closure import (
     equations,
     least_squares,
     newton_step,
-    orientation,
+    orientations,
     passive_rates,
+    step_again,
 )
 from zwidth.model.forward_kinematics import (
     WorkingMemory,
@@ -98,6 +99,9 @@ def correct(mech: MechanismArrays, design: int, angles: Floats, tolerance: float
         ratio = size / last if last > 0.0 else 1.0
         if settled or size * ratio * ratio < tolerance:
             break
+        # what is left is about size ratio^2, of which a step by the same factors leaves a share of ratio^2
+        if size * ratio**4 < tolerance and _settles_again(mech, design, angles, size, tolerance, work):
+            break
         last = size
     place_links(mech, design, angles, work)
     equations(mech, design, work)
@@ -107,14 +111,26 @@ def correct(mech: MechanismArrays, design: int, angles: Floats, tolerance: float
 
 
 @compiled_lean
+def _settles_again(
+    mech: MechanismArrays, design: int, angles: Floats, last: float, tolerance: float, work: WorkingMemory
+) -> bool:
+    """Whether one more step by the factors of the last one, which was of size `last`, ends within the tolerance;
+    it is taken then. Nan does not."""
+    place_links(mech, design, angles, work)
+    equations(mech, design, work)
+    size = step_again(mech, work, work.rows.shape[0] - mech.free, work.gaps.size)
+    if not size * size < tolerance * last:
+        return False
+    apply_step(mech, design, angles, work)
+    return True
+
+
+@compiled_lean
 def has_turned(mech: MechanismArrays, work: WorkingMemory) -> bool:
     """Whether the drives or the handle act the other way round in `rows` than in `start`: a singularity lies
     between."""
-    start, rows, count, moved = work.start, work.rows, work.gaps.size, work.rows.shape[0] - mech.free
-    loops = mech.first_row[mech.a.size]
-    if orientation(start, rows, work.triangle, mech.spans, moved - mech.driven, loops) < 0.0:
-        return True
-    return bool(orientation(start, rows, work.triangle, mech.spans, moved, count) < 0.0)
+    of_drives, of_handle = orientations(mech, work)
+    return of_drives < 0.0 or of_handle < 0.0
 
 
 @compiled_lean

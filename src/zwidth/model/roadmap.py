@@ -20,7 +20,7 @@ from zwidth.model.closure import (
     closure_step,
     equations,
     newton_step,
-    orientation,
+    orientations,
     passive_rates,
 )
 from zwidth.model.continuation import (
@@ -172,8 +172,7 @@ def turn_drive(
 ) -> bool:
     """Turn one drive a little, in its unit, and close the loops (in place); False where that leads to or past a
     singularity, or beyond a joint's limit."""
-    rows, start, rates, step = work.rows, work.start, work.rates, work.solution[0]
-    m, loops = rows.shape[0], mech.first_row[mech.a.size]
+    rates, step, m = work.rates, work.solution[0], work.rows.shape[0]
     moved = m - mech.free
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)
@@ -186,9 +185,8 @@ def turn_drive(
         return False
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)
-    if orientation(start, rows, work.triangle, mech.spans, moved, work.gaps.size) <= 0.0:
-        return False
-    if orientation(start, rows, work.triangle, mech.spans, moved - mech.driven, loops) <= 0.0:
+    of_drives, of_handle = orientations(mech, work)
+    if of_drives <= 0.0 or of_handle <= 0.0:
         return False
     return bool(min(passive_rates(mech, 0, work), newton_step(mech, 0, work)) >= margin)
 
