@@ -55,7 +55,8 @@ def simple_rings(outlines: Sequence[Floats], simple: Sequence[bool] | None = Non
 
     simple  which outlines are known not to cross themselves; None: not known
     """
-    areas = [signed_area(outline) for outline in outlines]
+    # two chords that run to and fro are a cell thinner than chords show
+    areas = [signed_area(outline) if len(outline) > 3 else 0.0 for outline in outlines]
     holes = [outline for outline, area in zip(outlines, areas, strict=True) if area < 0.0]
     rings: list[Floats] = []
     for n, outline in enumerate(outlines):

@@ -58,7 +58,7 @@ class TracedEdge:
     @cached_property
     def simple(self) -> list[bool]:
         """Whether each outline does not cross itself."""
-        return [bool(shapely.Polygon(outline).is_valid) for outline in self.outlines]
+        return [len(outline) > 3 and bool(shapely.Polygon(outline).is_valid) for outline in self.outlines]
 
     @cached_property
     def stiffness_scale(self) -> float:

@@ -89,7 +89,7 @@ class WallMatrices:
         stiffness and damping 1 : 0.2
         """
         given = relative_damping if relative_stiffness is None else relative_stiffness
-        m = len(np.atleast_1d(np.asarray(given, dtype=object))) if count is None else count
+        m = max(1, len(np.atleast_1d(np.asarray(given, dtype=object)))) if count is None else count
         alike = np.ones(m) if relative_stiffness is None else relative_stiffness
         stiffness = _scaled_matrix("relative_stiffness", alike, m)
         if relative_damping is None:
@@ -133,7 +133,13 @@ class WallMatrices:
 
 def _scaled_matrix(name: str, given: ArrayLike, count: int) -> Floats:
     """One matrix, its largest entry 1. Raises MatrixError for what is no matrix of a law."""
-    wanted = f"must be {count} numbers, one for each direction, or a matrix of {count} rows and columns"
+    wanted = (
+        f"must be {count} numbers, one for each direction, or a matrix of {count} rows and columns"
+        if count != 1
+        else "must be 1 number, or a matrix of 1 row and column"
+    )
+    if isinstance(given, np.ndarray) and np.iscomplexobj(given):  # NumPy would drop the imaginary parts
+        raise MatrixError(name, f"{wanted}, got complex numbers")
     try:
         entries = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
@@ -144,21 +150,23 @@ def _scaled_matrix(name: str, given: ArrayLike, count: int) -> Floats:
         raise MatrixError(name, f"must be finite numbers, got {entries[~np.isfinite(entries)][0]:g}")
     if entries.ndim == 1 and (entries < 0.0).any():
         raise MatrixError(name, f"must not be negative, got {entries[entries < 0.0][0]:g}")
-    matrix = np.diag(entries) if entries.ndim == 1 else entries
-    largest = float(np.max(np.abs(matrix)))
+    largest = float(np.max(np.abs(entries)))
     if largest == 0.0:
         raise MatrixError(name, "must not be 0 along all directions")
+    # scaled before anything is added, so that no sum is infinite
+    matrix = (np.diag(entries) if entries.ndim == 1 else entries) / largest
     off = np.abs(matrix - matrix.T)
-    if not np.max(off) <= ROUNDING * largest:
+    if not np.max(off) <= ROUNDING:
         i, j = (int(k) for k in np.unravel_index(np.argmax(off), off.shape))
         pair = (
-            f"{matrix[i, j]:g} in row {i + 1}, column {j + 1} and {matrix[j, i]:g} in row {j + 1}, column {i + 1}"
+            f"{entries[i, j]:g} in row {i + 1}, column {j + 1} and "
+            f"{entries[j, i]:g} in row {j + 1}, column {i + 1}"
         )
         raise MatrixError(name, f"must be symmetric, got {pair}")
     matrix = (matrix + matrix.T) / 2.0
     least = float(np.linalg.eigvalsh(matrix)[0])
-    if least < -ROUNDING * largest:
-        raise MatrixError(name, f"must have no negative eigenvalue, got one of {least:g}")
+    if least < -ROUNDING:
+        raise MatrixError(name, f"must have no negative eigenvalue, got one of {least * largest:g}")
     return np.asarray(matrix / float(np.max(matrix)))
 
 
@@ -170,7 +178,8 @@ def _shape_text(shape: tuple[int, ...]) -> str:
     """A shape in words: 3 numbers, 2 rows of 3 numbers."""
     if len(shape) < 2:
         return f"{shape[0]} numbers" if shape and shape[0] != 1 else "1 number"
-    return f"{shape[0]} rows of {shape[1]} numbers" if len(shape) == 2 else f"an array of shape {shape}"
+    rows = "1 row" if shape[0] == 1 else f"{shape[0]} rows"
+    return f"{rows} of {shape[1]} numbers" if len(shape) == 2 else f"an array of shape {shape}"
 
 
 def ratios_text(matrix: Floats) -> str:

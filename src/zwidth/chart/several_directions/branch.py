@@ -88,11 +88,14 @@ class Branch:
 
 
 def sign_changes(curve: WallCurve, places: Floats, component: int) -> Floats:
-    """Parameters between neighbours of `places` (n,) at which K, B or dK changes sign, to rounding."""
+    """Parameters between neighbours of `places` (n,) at which K, B or dK changes sign, to rounding.
+
+    Where rounding hides the curve, as beside the wall 0, 0 of an undamped motion, there is nothing closer to find.
+    """
     values = curve.at(places)[component]
 
     def value(place: float) -> float:
-        return float(curve.at(np.array([place]))[component][0])
+        return float(np.nan_to_num(curve.at(np.array([place]))[component][0], posinf=0.0, neginf=0.0))
 
     turns = np.flatnonzero(values[1:] * values[:-1] < 0.0)
     return np.array([brentq(value, places[k], places[k + 1], xtol=1e-300, rtol=1e-14) for k in turns])

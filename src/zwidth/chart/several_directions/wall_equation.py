@@ -205,8 +205,14 @@ def adjugate(W: Matrices) -> Matrices:
 def _common_eigenvalues(A: Complexes, B: Complexes, C: Complexes) -> tuple[Complexes, Complexes]:
     """k and b (N, r^2) at which A + k B + b C and its conjugate are singular, as exact as eigenvalues are.
 
-    Solutions at infinity are eigenvalues as well if combinations of all three Delta are taken.
+    Solutions at infinity are eigenvalues as well if combinations of all three Delta are taken. Where B or C is 0
+    there are lines of walls, and nan: C is, beside z = -1 behind a low pass, once w is 0 in rounding.
     """
+    sized = np.all([np.linalg.norm(X, axis=(1, 2)) > 0.0 for X in (A, B, C)], axis=0)
+    if not sized.all():
+        k, b = np.full((2, len(A), A.shape[-1] ** 2), np.nan, dtype=np.complex128)
+        k[sized], b[sized] = _common_eigenvalues(A[sized], B[sized], C[sized])
+        return k, b
     size = np.linalg.norm(A, axis=(1, 2))
     unit_k, unit_b = size / np.linalg.norm(B, axis=(1, 2)), size / np.linalg.norm(C, axis=(1, 2))
     B, C = B * unit_k[:, None, None], C * unit_b[:, None, None]
