@@ -50,7 +50,8 @@ def tried_walls(chart, stable, scale, rng):
 
 
 def walls_that_differ(chart, seed):
-    """Walls on which the regions say otherwise than eigenvalues of the matrix built apart; (0, 2) where they agree."""
+    """Walls on which the regions say otherwise than eigenvalues of the matrix built apart; (0, 2) where they
+    agree."""
     K0, K1, B0, B1 = chart.box
     scale = np.array([K1 - K0, B1 - B0])
     stable = set_of(chart.regions, scale)
