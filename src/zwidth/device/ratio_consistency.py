@@ -6,11 +6,12 @@ import math
 from collections.abc import Iterator
 from typing import Any, Final
 
-from zwidth.device.faults import KeyPath, plural, quote
+from zwidth.device.faults import KeyPath, plural
 from zwidth.device.toml_access import is_number, table, tables
 
 # Joint of a drive -> the key of the table's coordinates, the key of the link's limits, the unit.
 OF_JOINT: Final = {"revolute": ("joint_rad", "limits_rad", "rad"), "prismatic": ("joint_m", "limits_m", "m")}
+KEYS: Final = {"joint_rad", "joint_m", "ratio"}
 FULL_TURN: Final = 2.0 * math.pi * (1.0 + 1e-9)
 
 KeyMessages = Iterator[tuple[KeyPath, str]]
@@ -39,14 +40,15 @@ def ratio_inconsistencies(mechanism: dict[str, Any]) -> KeyMessages:
 
 def _table(place: KeyPath, given: dict[str, Any], link: dict[str, Any]) -> KeyMessages:
     """Coordinates of the joint's kind, a ratio at each of them, no limits of the joint beyond them."""
-    joint, name = link["joint"], link["name"]
-    key, limits_key, unit = OF_JOINT[joint]
+    joint = link["joint"]
+    key, limits_key, unit = OF_JOINT[joint]  # no names in the sentences: the copies of a leg have the same fault
     for other, *_ in OF_JOINT.values():
         if other != key and other in given:
-            yield (*place, other), f"is not for joint '{name}', which is {joint}; give {key}"
+            yield (*place, other), f"is not for the joint of this drive, which is {joint}; give {key}"
             return
     if key not in given:
-        yield (*place, key), f"is missing; give the coordinates of joint '{name}' at which the ratios are"
+        if given.keys() <= KEYS:  # or else one of them is misspelt
+            yield (*place, key), "is missing; give the coordinates of the drive's joint at which the ratios are"
         return
     coordinates, ratios = given[key], given.get("ratio")
     if not isinstance(coordinates, list) or not isinstance(ratios, list):
@@ -70,7 +72,7 @@ def _table(place: KeyPath, given: dict[str, Any], link: dict[str, Any]) -> KeyMe
         if limits[0] < low or limits[1] > high:
             yield (
                 (*place, key),
-                f"goes from {low:.10g} to {high:.10g} {unit}, but {limits_key} of '{name}' are {quote(limits)}; "
+                f"goes from {low:.10g} to {high:.10g} {unit}, but {limits_key} of the joint are [{limits[0]:.10g}, {limits[1]:.10g}]; "
                 "extend the table over them, or narrow the limits",
             )
 

@@ -231,14 +231,16 @@ class RatioTableSection(Section):
     shape."""
 
     joint_rad: Increasing | None = documented_key(
-        "angles of the drive's revolute joint, at least two, increasing, over a full turn at most", "rad", default=None
+        "angles of the drive's revolute joint, each above the one before, over a full turn at most",
+        "rad",
+        default=None,
     )
     joint_m: Increasing | None = documented_key(
-        "ways of the drive's prismatic joint instead, at least two, increasing", "m", default=None
+        "ways of the drive's prismatic joint instead, each above the one before", "m", default=None
     )
     ratio: Ratios = documented_key(
-        "the ratio at each of them: change of the motor's angle over that of the joint there; on a prismatic joint "
-        "radians of the motor per metre",
+        "the ratio at each of them, at least two: change of the motor's angle over that of the joint there; on a "
+        "prismatic joint radians of the motor per metre",
         "1",
     )
 

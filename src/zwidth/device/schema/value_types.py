@@ -242,7 +242,7 @@ Offset = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3)]
 Direction = Annotated[Position, AfterValidator(_has_length)]
 Axis = Annotated[Triple, AfterValidator(_has_length)]
 Bounds = Annotated[tuple[Number, ...], Field(min_length=2, max_length=2), AfterValidator(_rising)]
-Increasing = Annotated[tuple[Number, ...], Field(min_length=2), AfterValidator(_increasing)]
+Increasing = Annotated[tuple[Number, ...], AfterValidator(_increasing)]
 
 Vector = Annotated[
     tuple[Number, ...],
