@@ -137,9 +137,11 @@ def test_designs_of_other_parts_keep_the_table():
     document = arm()
     periods = np.array([0.0005, 0.001])
     batch, _ = design_batch(document, {("loop", "sampling_period_s"): periods}, 2, "arm")
-    point, _ = batch.at(np.array([[[0.2, 0.2], [0.25, 0.1]]]))
-    values = point.measure("stiffness_max").values
+    point, _ = batch.at()
+    grid, _ = batch.at(np.array([[[0.2, 0.2], [0.25, 0.1]]]))
+    values, masses = point.measure("stiffness_max").values, grid.measure("motor_side_mass").values
     for i, period in enumerate(periods):
         device = from_document(arm(loop__sampling_period_s=float(period)))
-        assert values[i, 0, 1] == pytest.approx(device.at((0.25, 0.1)).measure("stiffness_max").values, rel=1e-9)
+        assert values[i] == pytest.approx(device.at().measure("stiffness_max").values, rel=1e-9)
+        assert masses[i, 0, 1] == pytest.approx(device.at((0.25, 0.1)).measure("motor_side_mass").values, rel=1e-12)
 

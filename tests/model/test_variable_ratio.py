@@ -17,7 +17,7 @@ from zwidth.model.posture import OK
 from zwidth.model.ratio_table import RatioTable
 
 MEASURES = ("stiffness_max", "damping_max", "motor_side_mass", "rigid_mass", "stiffness", "peak_force")
-GRID = np.stack(np.meshgrid(np.linspace(0.05, 0.35, 7), np.linspace(-0.15, 0.3, 6)), axis=-1)
+GRID = np.stack(np.meshgrid(np.linspace(0.05, 0.35, 5), np.linspace(-0.15, 0.3, 4)), axis=-1)
 
 # Keys that make the two-link arm one of the general mechanisms, whose modes are computed in another way.
 GENERAL = {
@@ -71,13 +71,13 @@ def test_a_map_has_the_numbers_of_its_points(kind, flexible):
     many = device.at(GRID)
     assert {int(status) for status in np.unique(many.status)} > {OK}  # some are outside of the table
     for name in MEASURES:
-        if name == "stiffness" and not flexible:
-            continue
+        if (name == "stiffness" and not flexible) or (kind == "joint damper" and name in ("stiffness_max", "damping_max")):
+            continue  # infinite; no wall is stable
         together = many.measure(name).values
         alone = np.full(many.shape, np.nan)
         for index in zip(*np.nonzero(many.status == OK), strict=True):
             alone[index] = device.at(GRID[index]).measure(name).values
-        assert np.isfinite(alone).sum() > 10, name
+        assert np.isfinite(alone).sum() > 5, name
         assert together == pytest.approx(alone, rel=1e-8, nan_ok=True), name
     assert many.drives.transmission[many.status == OK].std() > 1.0
 
@@ -90,7 +90,7 @@ def test_each_posture_is_the_device_with_its_ratio():
         settings = {f"drives.{n}.transmission_ratio": float(r) for n, r in zip(*_ratios(point), strict=True)}
         constant = device.with_(settings).at(place)
         assert np.array_equal(point.plant.stiffness, constant.plant.stiffness)
-        assert point.chart(decay=False).largest_stiffness == constant.chart(decay=False).largest_stiffness
+        assert point.chart(decay=False).stiffness_max == constant.chart(decay=False).stiffness_max
         assert np.array_equal(point.whole_mass_matrix, constant.whole_mass_matrix)
 
 
@@ -147,9 +147,9 @@ def test_a_turn_more_is_the_same_posture():
 #
 #     dpsi/dq = (A - B) . B' / (A - B) . A',    A = CRANK (cos psi, sin psi), B = (BASE, 0) + ROCKER (cos q, sin q)
 
-CRANK, COUPLER, ROCKER, BASE = 0.04, 0.095, 0.055, 0.1
+CRANK, COUPLER, ROCKER, BASE = 0.05, 0.1, 0.06, 0.1
 ARM, RATIO = 0.12, 8.0
-ANGLES = (0.8, 1.0, 1.2345, 1.5, 1.65)
+ANGLES = (0.92, 1.0, 1.2345, 1.5, 1.65)
 
 SLIDER_FILE = """
 name = "a slide"
@@ -158,6 +158,7 @@ name = "carriage"
 joint = "prismatic"
 axis = [1, 0, 0]
 mass_kg = 0.2
+inertia_kg_m2 = 0
 [mechanism.handle]
 link = "carriage"
 [mechanism.assemblies.only]
@@ -249,7 +250,7 @@ points_m = [[{COUPLER}, 0, 0], [{ROCKER}, 0, 0]]
 
 def tabulated(entries):
     """The arm alone, driven through the ratio that the linkage has."""
-    q = np.linspace(0.7, 1.75, entries)
+    q = np.linspace(0.85, 1.75, entries)
     table = {"joint_rad": q.tolist(), "ratio": (RATIO * crank_turns(q)).tolist()}
     document = tomllib.loads('name = "arm"' + ARM_LINK + REST)
     return _completed(document, 1.2, {"arm": 1.2}, {"joint": "arm", "ratio_table": table})
@@ -276,7 +277,7 @@ def numbers_at(device, q):
             felt.rigid_mass,
             felt.stiffness,
             natural_frequencies(point.plant)[-1],
-            point.chart(decay=False).largest_stiffness.stiffness,
+            point.chart(decay=False).stiffness_max,
             point.measure("peak_force").values,
             point.measure("position_resolution").values,
         ]
