@@ -19,6 +19,7 @@ from zwidth.device.toml_access import deep_copy
 UNSET: Final = object()
 
 FILTERS: Final = (frozenset({"time_constant_s"}), frozenset({"order", "cutoff_Hz", "discretisation"}))
+RATIO: Final = (frozenset({"transmission_ratio"}), frozenset({"ratio_table"}))
 EXCLUSIVE: Final[dict[tuple[str, ...], tuple[frozenset[str], ...]]] = {
     ("loop",): (frozenset({"delay_s"}), frozenset({"delay_samples"})),
     ("loop", "velocity", "filter"): FILTERS,
@@ -34,8 +35,11 @@ EXCLUSIVE: Final[dict[tuple[str, ...], tuple[frozenset[str], ...]]] = {
         frozenset({"mass_coefficient_1_per_s", "stiffness_coefficient_s"}),
         frozenset({"given"}),
     ),
+    ("mechanism", "drives", "*"): RATIO,
+    ("mechanism", "legs", "*", "drives", "*"): RATIO,
 }
-"""Table -> groups of keys of which one may be used: setting a key drops those of the other groups."""
+"""Table, with * for list elements -> groups of keys of which one may be used: setting a key drops those of the
+other groups."""
 
 
 def get(document: dict[str, Any], path: str) -> Any:
@@ -273,7 +277,7 @@ def _children(place: Any, part: str) -> list[Any]:
 
 
 def _exclusive_keys(table: KeyPath, key: str | int) -> list[str]:
-    groups = EXCLUSIVE.get(tuple(str(step) for step in table), ())
+    groups = EXCLUSIVE.get(tuple("*" if isinstance(step, int) else step for step in table), ())
     if not any(key in group for group in groups):
         return []
     return [rival for group in groups if key not in group for rival in sorted(group)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -41,6 +41,7 @@ from zwidth.model.mechanism import (
     Links,
     Mechanism,
 )
+from zwidth.model.ratio_table import RatioTable
 
 SINGLE: Final = {
     "revolute": (REVOLUTE,),
@@ -74,12 +75,13 @@ def mechanism(section: MechanismSection) -> Mechanism:
     """The mechanism; its numbers may be arrays over designs (`design_batch`)."""
     tree = _tree(members(section, "links"))
     loops, drives = members(section, "loops"), [member.entry for member in members(section, "drives")]
+    tables = {drive.joint: _ratio_table(drive) for drive in drives if drive.ratio_table is not None}
     handle, workspace, reference = section.handle, section.workspace, section.reference
     bounds = [(workspace and getattr(workspace, f"{axis}_m")) or (math.nan, math.nan) for axis in "xyz"]
     return Mechanism(
-        links=_links(tree),
+        links=_links(tree, tables),
         closures=_closures(loops, tree),
-        drives=_drives(drives, section, tree),
+        drives=_drives(drives, section, tree, tables),
         handle_link=tree.last[handle.link],
         handle_point=stack_numbers(tree.tips[handle.link] if handle.point_m is None else handle.point_m),
         assemblies={name: _coordinates(section, assembly, tree) for name, assembly in section.assemblies.items()},
@@ -116,8 +118,8 @@ def _tree(links: Sequence[Member]) -> Tree:
     return Tree(ordered, first, last, {"base": [0.0, 0.0, 0.0], **tips})
 
 
-def _links(tree: Tree) -> Links:
-    rows = [row for member in tree.members for row in _entries(member, tree)]
+def _links(tree: Tree, tables: Mapping[str, RatioTable]) -> Links:
+    rows = [row for member in tree.members for row in _entries(member, tree, tables.get(member.entry.name))]
     names, parent, joint, origin, rotation, axis, mass, center, inertia, tip, limits = zip(*rows, strict=True)
     lower, upper = zip(*limits, strict=True)
     limited = np.isfinite([*lower, *upper]).any()
@@ -152,9 +154,9 @@ def _of_joints(tree: Tree, what: str, turning: str, sliding: str) -> Floats | No
     return stack_numbers(rows) if any(np.any(row) for row in rows) else None
 
 
-def _entries(member: Member, tree: Tree) -> list[tuple[Any, ...]]:
+def _entries(member: Member, tree: Tree, table: RatioTable | None) -> list[tuple[Any, ...]]:
     """One row of `Links` for each joint coordinate of a link. Only the last is a body, and only the first is apart
-    from the parent."""
+    from the parent. A joint without limits has those of the ratio table of its drive."""
     link: LinkSection = member.entry
     origin = stack_numbers(tree.tips[link.parent] if link.origin_m is None else link.origin_m)
     rotation = roll_pitch_yaw(link.orientation_rad)
@@ -162,6 +164,7 @@ def _entries(member: Member, tree: Tree) -> list[tuple[Any, ...]]:
     origin, rotation = (turn @ origin[..., None])[..., 0], turn @ rotation
     kinds, axes = SINGLE[link.joint], _axes(link)
     none, tip = np.zeros(3), stack_numbers(tree.tips[link.name])
+    ends = (-math.inf, math.inf) if table is None else (table.coordinate[0], table.coordinate[-1])
     rows = []
     for k, (kind, axis) in enumerate(zip(kinds, axes, strict=True)):
         body = k == len(kinds) - 1
@@ -170,7 +173,7 @@ def _entries(member: Member, tree: Tree) -> list[tuple[Any, ...]]:
         place = (origin, rotation) if k == 0 else (none, np.eye(3))
         mass = math.nan if link.mass_kg is None else link.mass_kg
         own = mass, in_space(link.center_of_mass_m), _inertia(link, axis), tip
-        limits = link.limits_rad or link.limits_m or (-math.inf, math.inf)
+        limits = link.limits_rad or link.limits_m or ends
         rows.append(
             (name, parent, kind, *place, axis, *(own if body else (0.0, none, np.zeros((3, 3)), none)), limits)
         )
@@ -303,7 +306,9 @@ def _way_to_base(name: str, parent: dict[str, str]) -> list[str]:
     return way
 
 
-def _drives(drives: Sequence[DriveSection], section: MechanismSection, tree: Tree) -> Drives:
+def _drives(
+    drives: Sequence[DriveSection], section: MechanismSection, tree: Tree, tables: Mapping[str, RatioTable]
+) -> Drives:
     index = tree.last
 
     def column(key: str, omitted: float) -> Floats:
@@ -327,7 +332,15 @@ def _drives(drives: Sequence[DriveSection], section: MechanismSection, tree: Tre
         coupling=_coupling(drives, index),
         motor_link=_motor_links(drives, index),
         motor_axis=_motor_axes(drives),
+        ratio_tables=tuple(tables.get(drive.joint) for drive in drives) if tables else None,
     )
+
+
+def _ratio_table(drive: DriveSection) -> RatioTable:
+    given = drive.ratio_table
+    assert given is not None
+    coordinate = given.joint_m if given.joint_rad is None else given.joint_rad
+    return RatioTable(np.array(coordinate), np.array(given.ratio), turns=given.joint_rad is not None)
 
 
 def _coupling(drives: Sequence[DriveSection], index: dict[str, int]) -> Floats | None:

@@ -17,6 +17,7 @@ from zwidth.device.legs import spread_tables, written_path
 from zwidth.device.loop_consistency import electrical_inconsistencies, loop_inconsistencies
 from zwidth.device.missing import partly_missing
 from zwidth.device.nonlinear_consistency import nonlinear_inconsistencies
+from zwidth.device.ratio_consistency import ratio_inconsistencies
 from zwidth.device.schema.device_file import flat_sources, keys
 from zwidth.device.toml_access import is_number, row_count, table, tables
 
@@ -72,6 +73,7 @@ def _inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyM
         yield from _tree(mechanism)
         if _joints(mechanism):
             yield from _references(mechanism)
+            yield from ratio_inconsistencies(mechanism)
             yield from _assemblies(mechanism)
         yield from _joint_keys(mechanism)
         yield from _loop_keys(mechanism)
@@ -289,7 +291,7 @@ def _couplings(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str
     of_links = [link for _, link in tables(mechanism, "links") if link.get("free") is True]
     free = {name for link in of_links if isinstance(name := link.get("name"), str)}
     for index, drive in tables(mechanism, "drives"):
-        if table(drive, "coupling") and "transmission_ratio" not in drive:
+        if table(drive, "coupling") and not {"transmission_ratio", "ratio_table"} & drive.keys():
             yield ("mechanism", "drives", index, "transmission_ratio"), "is missing; coupling needs it"
         for name in table(drive, "coupling"):
             path: KeyPath = ("mechanism", "drives", index, "coupling", name)

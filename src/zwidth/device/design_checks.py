@@ -17,6 +17,7 @@ from pydantic import ValidationError
 from zwidth.device.faults import KeyPath
 from zwidth.device.legs import written
 from zwidth.device.loop_consistency import lags_wrongly, reaches_nyquist
+from zwidth.device.ratio_consistency import largest_ratio
 from zwidth.device.schema import magnitudes
 from zwidth.device.schema.device_file import DeviceFile
 from zwidth.device.schema.loop import LONGEST_DELAY
@@ -192,17 +193,17 @@ def _windings(document: dict[str, Any], read: Read) -> Broken:
     windings = []
     for path, drive in written(table(document, "mechanism"), "drives"):
         if "damping_resistance_ohm" in drive:
-            n, k, inside, outside, L = (
+            n = read("mechanism", *path, "transmission_ratio")
+            k, inside, outside, L = (
                 read("mechanism", *path, key)
                 for key in (
-                    "transmission_ratio",
                     "torque_constant_Nm_per_A",
                     "winding_resistance_ohm",
                     "damping_resistance_ohm",
                     "winding_inductance_H",
                 )
             )
-            windings.append((n * k, inside + outside, L))
+            windings.append(((largest_ratio(drive) if n is None else n) * k, inside + outside, L))
     for i, _ in tables(table(document, "plant"), "electrical_damping"):
         keys = ("force_constant_N_per_A", "resistance_ohm", "inductance_H")
         windings.append(tuple(read("plant", "electrical_damping", i, key) for key in keys))

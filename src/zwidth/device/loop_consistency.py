@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from zwidth.device.faults import KeyPath, plural
+from zwidth.device.ratio_consistency import largest_ratio
 from zwidth.device.schema.loop import LONGEST_DELAY
 from zwidth.device.schema.magnitudes import STRONGEST_DAMPING
 from zwidth.device.schema.value_types import LARGEST
@@ -178,7 +179,7 @@ def _drive(place: KeyPath, drive: dict[str, Any], T: float) -> KeyMessages:
             yield (*place, key), "is missing; damping_resistance_ohm needs it"
     inside, outside = drive.get("winding_resistance_ohm"), drive["damping_resistance_ohm"]
     R = inside + outside if is_number(inside) and is_number(outside) else None
-    n, k = drive.get("transmission_ratio"), drive.get("torque_constant_Nm_per_A")
+    n, k = largest_ratio(drive), drive.get("torque_constant_Nm_per_A")
     constant = n * k if is_number(n) and is_number(k) and 0 < n < 1e30 and 0 < k < 1e30 else None
     yield from _winding(place, "winding_inductance_H", constant, R, drive.get("winding_inductance_H"), T)
 

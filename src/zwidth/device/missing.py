@@ -40,7 +40,7 @@ def partly_missing(mechanism: dict[str, Any]) -> Iterator[KeyPath]:
     for group, keys in (("links", LINKS), ("drives", DRIVES)):
         entries = members(mechanism, group)
         for key in keys:
-            without = [member.path for member in entries if key not in member.entry]
+            without = [member.path for member in entries if not _gives(member.entry, key)]
             if 0 < len(without) < len(entries):
                 yield from (("mechanism", *path, key) for path in dict.fromkeys(without))
 
@@ -48,7 +48,12 @@ def partly_missing(mechanism: dict[str, Any]) -> Iterator[KeyPath]:
 def _left_out(mechanism: dict[str, Any]) -> Iterator[KeyPath]:
     for group, keys in (("links", LINKS), ("drives", DRIVES)):
         for member in members(mechanism, group):
-            yield from (("mechanism", *member.path, key) for key in keys if key not in member.entry)
+            yield from (("mechanism", *member.path, key) for key in keys if not _gives(member.entry, key))
+
+
+def _gives(entry: dict[str, Any], key: str) -> bool:
+    """Whether a link or drive has the number of a key; a ratio also as a table."""
+    return key in entry or (key == "transmission_ratio" and "ratio_table" in entry)
 
 
 @dataclass(frozen=True)
@@ -96,7 +101,7 @@ def unknown_numbers(document: dict[str, Any]) -> list[Unknown]:
     for group, keys in (("links", LINKS), ("drives", (*DRIVES, *USEFUL))):
         entries = [*written(mechanism, group)]
         for key in keys:
-            paths = [("mechanism", *path, key) for path, entry in entries if key not in entry]
+            paths = [("mechanism", *path, key) for path, entry in entries if not _gives(entry, key)]
             if paths:
                 named = tuple(dotted(path, document) for path in paths)
                 found.append(Unknown(f"mechanism.{group}.*.{key}", named, NEEDED_FOR[key], len(entries)))

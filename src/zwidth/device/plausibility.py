@@ -17,6 +17,7 @@ import numpy as np
 
 from zwidth.device.faults import Fault, KeyPath, dotted
 from zwidth.device.legs import written
+from zwidth.device.ratio_consistency import largest_ratio
 from zwidth.device.toml_access import table
 
 if TYPE_CHECKING:
@@ -204,7 +205,7 @@ def _inertia_units(inertia: float, mass: float, size: float) -> str:
 def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
     for below, drive in written(mechanism, "drives"):
         path = ("mechanism", *below)
-        ratio, rotor = float(drive.get("transmission_ratio", 1.0)), float(drive.get("motor_inertia_kg_m2", 0.0))
+        ratio, rotor = float(largest_ratio(drive) or 1.0), float(drive.get("motor_inertia_kg_m2", 0.0))
         if rotor > HEAVIEST_ROTOR:
             yield (
                 (*path, "motor_inertia_kg_m2"),
@@ -212,7 +213,7 @@ def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
             )
         if ratio < STEP_UP:
             yield (
-                (*path, "transmission_ratio"),
+                (*path, "ratio_table" if "ratio_table" in drive else "transmission_ratio"),
                 f"{ratio:g} looks wrong, motor turns per joint turn; if it is joint turns per motor turn, write "
                 f"{1.0 / ratio:.4g}",
             )

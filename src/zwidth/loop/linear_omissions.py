@@ -11,6 +11,7 @@ from zwidth.model.drive_nonlinearity import nonlinear_of_drives
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
+from zwidth.model.ratio_table import with_any_ratio
 
 
 def linear_omissions(mechanism: Mechanism | None, plant: Plant | None, controller: Controller) -> tuple[str, ...]:
@@ -21,7 +22,7 @@ def linear_omissions(mechanism: Mechanism | None, plant: Plant | None, controlle
     parts = Nonlinear() if plant is None else plant.nonlinear
     if mechanism is not None:
         each = np.eye(len(mechanism.drives.names))
-        parts = nonlinear_of_drives(mechanism.drives, np.ones(len(each)), 0.0 * each, each, each)
+        parts = nonlinear_of_drives(with_any_ratio(mechanism.drives), np.ones(len(each)), 0.0 * each, each, each)
     return with_computer(parts, controller).kinds
 
 

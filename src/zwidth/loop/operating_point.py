@@ -34,6 +34,7 @@ from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import Operator, attach
 from zwidth.model.plant import Plant
+from zwidth.model.ratio_table import drives_at
 from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solve_posture
 from zwidth.model.reduction import Encoders, Model, plant_effective_parameters, reduce_mechanism, reduce_plant
 from zwidth.model.response import Response
@@ -228,10 +229,10 @@ class OperatingPoint:
 
     @property
     def drives(self) -> Drives:
-        """The mechanism's drives. Raises NoMechanismError for a device without a mechanism."""
+        """The mechanism's drives, a ratio that changes (..., d) at the postures. Raises NoMechanismError."""
         if self.mechanism is None:
             raise NoMechanismError
-        return self.mechanism.drives
+        return drives_at(self.mechanism.drives, self._posture)
 
     @property
     def jacobian(self) -> Floats:
@@ -275,9 +276,7 @@ class OperatingPoint:
 
         Raises  NoMechanismError  for a device without a mechanism
         """
-        self._posture  # noqa: B018  raises for a device without a mechanism
-        assert self.posture is not None
-        return lever_arms(self.posture, screw(self.direction))
+        return lever_arms(self._posture, screw(self.direction))
 
     @cached_property
     def effective(self) -> EffectiveParameters:

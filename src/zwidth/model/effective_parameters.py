@@ -12,6 +12,7 @@ from zwidth.model.drive_side import DriveSide, drive_side, is_plain
 from zwidth.model.mechanism import Floats, Ints, Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.posture import Posture
+from zwidth.model.ratio_table import at_postures
 
 Marks = NDArray[np.bool_]
 
@@ -46,17 +47,18 @@ def effective_parameters(mechanism: Mechanism, posture: Posture, direction: Arra
     Raises     ValueError  if a direction is not of unit length
     """
     u = screw(direction)
-    drives = mechanism.drives
-    ratio = per_design(mechanism, drives.transmission, 1)
-    rotor = ratio**2 * per_design(mechanism, drives.motor_inertia, 1)
-    spring = ratio**2 * per_design(mechanism, drives.stiffness, 1)
+    posed = at_postures(mechanism, posture)
+    drives = posed.drives
+    ratio = per_design(posed, drives.transmission, 1)
+    rotor = ratio**2 * per_design(posed, drives.motor_inertia, 1)
+    spring = ratio**2 * per_design(posed, drives.stiffness, 1)
     shape = np.broadcast_shapes(posture.status.shape, u.shape[:-1])
-    design, c = design_of_each(mechanism, shape), posture.mass_matrix.shape[-1]
+    design, c = design_of_each(posed, shape), posture.mass_matrix.shape[-1]
     M = np.array(np.broadcast_to(posture.mass_matrix, (*shape, c, c)).reshape(-1, c, c), order="C")
     h = np.array(np.broadcast_to(lever_arms(posture, u), (*shape, c)).reshape(-1, c), order="C")
     if not is_plain(mechanism):
         side = drive_side(mechanism, posture)
-        spun = None if side.spin is None else (ratio * per_design(mechanism, drives.motor_inertia, 1))[design]
+        spun = None if side.spin is None else (ratio * per_design(posed, drives.motor_inertia, 1))[design]
         return _effective_in_general(side, M, h, rotor[design], spring[design], spun, shape)
     out = np.empty((4, len(M)))
     _effective_batch(design, M, h, np.ascontiguousarray(rotor), np.ascontiguousarray(spring), out)

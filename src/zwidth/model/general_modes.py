@@ -20,6 +20,7 @@ from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.plant import Plant
 from zwidth.model.plant_modes import plant_modes
 from zwidth.model.posture import OK, Posture
+from zwidth.model.ratio_table import at_postures
 from zwidth.model.reduction import Encoders
 from zwidth.model.rendered_modes import RenderedModes
 
@@ -64,7 +65,8 @@ def modes_in_general(
 
     direction  (..., 3) or (..., 6), as for `rendered_modes.rendered_modes`
     """
-    at = _flat_postures(mechanism, posture, screw(direction))
+    side, mechanism = drive_side(mechanism, posture), at_postures(mechanism, posture)
+    at = _flat_postures(mechanism, posture, side, screw(direction))
     M, K, D = _matrices(at)
     B, ratio = _damping(mechanism, at, damping, M, K, D)
     N, n = M.shape[:2]
@@ -82,7 +84,7 @@ def modes_in_general(
     return _with_ratio(modes, ratio)
 
 
-def _flat_postures(mechanism: Mechanism, posture: Posture, u: Floats) -> Postures:
+def _flat_postures(mechanism: Mechanism, posture: Posture, side: DriveSide, u: Floats) -> Postures:
     drives = mechanism.drives
     shape = np.broadcast_shapes(posture.status.shape, u.shape[:-1], mechanism.design_shape)
     design, known = design_of_each(mechanism, shape), np.broadcast_to(posture.status == OK, shape).ravel()
@@ -93,7 +95,7 @@ def _flat_postures(mechanism: Mechanism, posture: Posture, u: Floats) -> Posture
         full = np.broadcast_to(array, (*shape, *tail)).reshape(-1, *tail)
         return np.asarray(np.where(known.reshape(-1, *(1,) * own), full, full[first]))
 
-    side, ratio = drive_side(mechanism, posture), per_design(mechanism, drives.transmission, 1)[design]
+    ratio = flat(drives.transmission, 1)
     inertia, spring, damper = (
         per_design(mechanism, x, 1)[design] for x in (drives.motor_inertia, drives.stiffness, drives.damping)
     )

@@ -10,6 +10,7 @@ from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.inertia import mass_matrix, unit_motions
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
+from zwidth.model.ratio_table import with_any_ratio
 
 
 def joint_axes(mechanism: Mechanism, coordinates: Floats) -> Floats:
@@ -20,8 +21,9 @@ def joint_axes(mechanism: Mechanism, coordinates: Floats) -> Floats:
 
 def joint_mass_matrix(mechanism: Mechanism, coordinates: Floats) -> Floats:
     """Mass matrix (m, m) of the links and of the rotors behind rigid drives at joint coordinates (n,) of one
-    design, the loops cut open; joints in the order of the unknowns (`MechanismArrays.joint`)."""
-    mech, drives = pack(mechanism), mechanism.drives
+    design, the loops cut open; joints in the order of the unknowns (`MechanismArrays.joint`). A ratio that changes
+    is the first of its table: what is asked is whether every motion has a mass."""
+    mech, drives = pack(mechanism), with_any_ratio(mechanism.drives)
     none = np.zeros(0, dtype=np.int64)
     cut = mech._replace(a=none, b=none, closing=none, first_row=np.zeros(1, dtype=np.int64))
     M = np.empty((1, mech.joint.size, mech.joint.size))

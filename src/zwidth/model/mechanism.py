@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from zwidth.model.design_axes import Array1, Array2, Array3, design_shape
 from zwidth.model.nonlinear import FrictionModel
+from zwidth.model.ratio_table import RatioTable
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -143,7 +144,7 @@ class Drives:
 
     joint            (d,)      index of the driven link (its joint)
     motor_inertia    (..., d)  rotor [kg m^2], at the motor
-    transmission     (..., d)  motor turns per joint turn
+    transmission     (..., d)  motor turns per joint turn; nan of a drive with a table
     stiffness        (..., d)  at the motor shaft [N m/rad]; inf: rigid
     damping          (..., d)  parallel to that stiffness, at the motor shaft [N m s/rad]
     torque_constant  (..., d)  [N m/A], nan if not known
@@ -160,6 +161,8 @@ class Drives:
                      None: the rotors' turning with their links is neglected, as in thesis eq. 2.21
     motor_axis       (..., d, 3)  the rotor's spin axis in that link's frame, in the sense in which the motor's
                      angle counts; of length 0 for a drive of which it is neglected
+    ratio_tables     (d,)  of each drive whose ratio changes with its joint, the others None: `ratio_table.at_postures`
+                     looks them up; None: no ratio changes
     """
 
     names: tuple[str, ...]
@@ -179,6 +182,7 @@ class Drives:
     surplus: tuple[int, ...] = ()
     motor_link: Ints | None = None
     motor_axis: Array2 | None = None
+    ratio_tables: tuple[RatioTable | None, ...] | None = None
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from zwidth.model.effective_parameters import lever_arms, screw
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.plant import Plant
 from zwidth.model.posture import Posture
+from zwidth.model.ratio_table import at_postures
 from zwidth.model.reduction import MODELS, DirectionError, Model, ModelError, full_matrices, reduce_mechanism
 
 # Directions whose least independent combination is below this share of the largest are dependent.
@@ -137,7 +138,7 @@ def reduce_directions(
         raise ValueError(f"there is no model {model!r}; choose one of {', '.join(MODELS)}")
     H, side = lever_arms(posture, U), drive_side(mechanism, posture)
     _check_independent(H[:, : side.driven])
-    drives = mechanism.drives
+    drives = at_postures(mechanism, posture).drives
     n2 = drives.transmission**2
     rotor, spring, damper = n2 * drives.motor_inertia, n2 * drives.stiffness, n2 * drives.damping
     if model == "full":

@@ -17,6 +17,7 @@ from zwidth.model.forward_kinematics import working_memory
 from zwidth.model.handle_position import goal_distance
 from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Floats, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays
+from zwidth.model.ratio_table import RatioTable
 
 
 class PostureError(ValueError):
@@ -112,10 +113,25 @@ def _limit(mechanism: Mechanism, mech: MechanismArrays, reference: Floats, goal:
     name = mechanism.links.names[link].partition("/")[0]
     value, low, high = angles[link], float(mech.lower[0, link]), float(mech.upper[0, link])
     unit = "m" if mech.kind[link] == PRISMATIC else "rad"
+    drive = _drive_with_table(mechanism, link)
+    if drive and (low, high) == (drive[1].coordinate[0], drive[1].coordinate[-1]):
+        return (
+            f"joint {name!r} is at {value:.4g} {unit}, outside of the ratio table of drive {drive[0]!r}, {low:.4g} to "
+            f"{high:.4g} {unit}; ask for a place nearer to the reference, or extend the table"
+        )
     return (
         f"joint {name!r} is at {value:.4g} {unit}, beyond its limits, {low:.4g} to {high:.4g} {unit}; ask for a "
         "place nearer to the reference, or widen the limits"
     )
+
+
+def _drive_with_table(mechanism: Mechanism, link: int) -> tuple[str, RatioTable] | None:
+    """Name and ratio table of the drive of a link's joint; None where it has no table."""
+    drives = mechanism.drives
+    for name, joint, table in zip(drives.names, drives.joint, drives.ratio_tables or (), strict=False):
+        if joint == link and table is not None:
+            return name, table
+    return None
 
 
 @compiled

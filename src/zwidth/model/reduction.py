@@ -31,6 +31,7 @@ from zwidth.model.motion_projection import project_onto_motions
 from zwidth.model.nonlinear import Friction, Nonlinear
 from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.posture import OK, Posture
+from zwidth.model.ratio_table import at_postures
 
 Model = Literal["full", "two-mass", "motor-mass", "rigid"]
 Encoders = Literal["motor", "link"]
@@ -74,7 +75,7 @@ def reduce_mechanism(
     if posture.status != OK:
         raise ValueError("the posture is out of reach or singular and has no model; ask for another position")
     _check_model(model)
-    u = screw(direction)
+    mechanism, u = at_postures(mechanism, posture), screw(direction)
     h, side = lever_arms(posture, u), drive_side(mechanism, posture)
     check_moves_along(posture, side, h, u)
     full, electrical = _full(mechanism, posture.mass_matrix, h, side, damping, encoders)

@@ -31,6 +31,7 @@ from zwidth.model.mechanism import Ints, Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.pole_pairs import PolePairs
 from zwidth.model.posture import Posture
+from zwidth.model.ratio_table import at_postures
 from zwidth.model.reduction import Encoders, Model
 from zwidth.threads import in_chunks
 
@@ -89,6 +90,7 @@ def rendered_modes(
     """
     if encoders != "motor" and model != "full":
         return None
+    mechanism = at_postures(mechanism, posture)
     drives = mechanism.drives
     shape = np.broadcast_shapes(posture.status.shape, direction.shape[:-1], mechanism.design_shape)
     design = design_of_each(mechanism, shape)

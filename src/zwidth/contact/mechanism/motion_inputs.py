@@ -91,6 +91,7 @@ def _check_drives(mechanism: Mechanism) -> None:
         "joints that nobody drives or holds": bool(mechanism.free),
         "more drives than degrees of freedom": bool(drives.surplus),
         "rotors that turn with their links": drives.motor_link is not None,
+        "a transmission whose ratio changes": drives.ratio_tables is not None,
         "springs of the joints themselves": links.joint_stiffness is not None,
         "dry friction of the joints themselves": links.joint_coulomb is not None,
     }

@@ -13,6 +13,7 @@ from zwidth.device.schema.value_types import (
     Direction,
     DryFriction,
     Hardening,
+    Increasing,
     Inductance,
     Inertia,
     Mass,
@@ -22,6 +23,7 @@ from zwidth.device.schema.value_types import (
     Offset,
     Position,
     Ratio,
+    Ratios,
     Resistance,
     RotorInertia,
     Section,
@@ -224,6 +226,25 @@ class WorkspaceSection(Section):
     z_m: Bounds | None = documented_key("lower and upper bound of z", "m", default=None)
 
 
+class RatioTableSection(Section):
+    """The ratio of a transmission over the coordinate of its joint, between its entries a cubic that keeps their
+    shape."""
+
+    joint_rad: Increasing | None = documented_key(
+        "angles of the drive's revolute joint, each above the one before, over a full turn at most",
+        "rad",
+        default=None,
+    )
+    joint_m: Increasing | None = documented_key(
+        "ways of the drive's prismatic joint instead, each above the one before", "m", default=None
+    )
+    ratio: Ratios = documented_key(
+        "the ratio at each of them, at least two: change of the motor's angle over that of the joint there; on a "
+        "prismatic joint radians of the motor per metre",
+        "1",
+    )
+
+
 class DriveSection(Section):
     """A motor and its transmission, on one revolute or prismatic joint."""
 
@@ -237,6 +258,11 @@ class DriveSection(Section):
         "drives: not known",
         "1",
         gt=0,
+        default=None,
+    )
+    ratio_table: RatioTableSection | None = documented_key(
+        "instead of transmission_ratio: a ratio that changes with the joint; its ends limit the joint where the link "
+        "has no limits",
         default=None,
     )
     coupling: dict[Name, Number] = documented_key(

@@ -82,6 +82,16 @@ def _rising(bounds: tuple[float, ...]) -> tuple[float, ...]:
     return bounds
 
 
+def _increasing(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    for i in range(1, len(numbers)):
+        if not numbers[i - 1] < numbers[i]:
+            raise ValueError(
+                f"must increase from each number to the next, but number {i} (counted from 0) is {numbers[i]:.10g}, "
+                f"after {numbers[i - 1]:.10g}"
+            )
+    return numbers
+
+
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
@@ -188,6 +198,7 @@ RotorInertia = Annotated[
 Ratio = Annotated[
     Number, magnitudes.within(magnitudes.LEAST_RATIO, magnitudes.LARGEST_RATIO, "motor turns per joint turn")
 ]
+Ratios = Annotated[tuple[Annotated[Ratio, Field(gt=0.0)], ...], Field(min_length=2)]
 Damper = Annotated[Number, magnitudes.within(0.0, magnitudes.STRONGEST_DAMPING, "N m s/rad")]
 Resistance = Annotated[
     Number, magnitudes.within(magnitudes.LEAST_RESISTANCE, magnitudes.LARGEST_RESISTANCE, "ohm", "0 or ")
@@ -231,6 +242,7 @@ Offset = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3)]
 Direction = Annotated[Position, AfterValidator(_has_length)]
 Axis = Annotated[Triple, AfterValidator(_has_length)]
 Bounds = Annotated[tuple[Number, ...], Field(min_length=2, max_length=2), AfterValidator(_rising)]
+Increasing = Annotated[tuple[Number, ...], AfterValidator(_increasing)]
 
 Vector = Annotated[
     tuple[Number, ...],
