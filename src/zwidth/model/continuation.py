@@ -43,6 +43,7 @@ CONTRACTION: Final = 0.55  # of one correction by the next; on the edge of the w
 LARGEST_TURN: Final = 0.5  # of one joint in one step, in its unit [rad]
 SMALLEST_STEP: Final = 2.0**-7  # of the straight way to the goal
 SINGULAR_CONDITION: Final = 1e-6  # below it the numbers of a posture lose their last ten digits
+FAR: Final = 100.0  # times a change of the condition, beyond which it does not matter
 CLOSURE_TOLERANCE: Final = 1e-11  # a gap is closed below this part of the mechanism's size
 ASSEMBLY_TOLERANCE: Final = 1e-9  # the same, for postures to start from
 LIMIT_TOLERANCE: Final = 1e-12  # beyond which a joint is beyond its limit [rad], or of the mechanism's size
@@ -99,8 +100,10 @@ def correct(mech: MechanismArrays, design: int, angles: Floats, tolerance: float
         ratio = size / last if last > 0.0 else 1.0
         if settled or size * ratio * ratio < tolerance:
             break
-        # what is left is about size ratio^2, of which a step by the same factors leaves a share of ratio^2
-        if size * ratio**4 < tolerance and _settles_again(mech, design, angles, size, tolerance, work):
+        # what is left is about size ratio^2, of which a step by the same factors leaves a share of ratio^2; they
+        # must also tell the goal's condition, which differs from theirs by about the size of the step
+        regular = condition > FAR * (size + SINGULAR_CONDITION)
+        if regular and size * ratio**4 < tolerance and _settles_again(mech, design, angles, size, tolerance, work):
             break
         last = size
     place_links(mech, design, angles, work)

@@ -30,7 +30,7 @@ from zwidth.model.mechanism import ORIENTATION, POSITION, REVOLUTE, Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.mobility import constraints
 from zwidth.model.posture_batch import solve_batch
-from zwidth.model.roadmap import roadmap, turn_drive
+from zwidth.model.roadmap import begin_to_turn, roadmap, turn_drive
 from zwidth.model.rotations import rotation_matrix, rotation_vector
 
 STARTS: Final = 4  # nodes of the roadmap nearest to the goal, from which it is approached
@@ -167,6 +167,7 @@ def goal_of_angles(mech: MechanismArrays, reference: Floats, driven: Floats) -> 
 def _turn_drives(mech: MechanismArrays, angles: Floats, turn: Floats, count: int) -> bool:
     """Turn every drive by its share, so many times (in place); False where that leads to or past a singularity."""
     work = working_memory(mech)
+    begin_to_turn(mech, angles, work)
     for _ in range(count):
         for drive in range(turn.size):
             if not turn_drive(mech, angles, drive, turn[drive], SINGULAR_CONDITION, work):

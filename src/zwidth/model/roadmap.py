@@ -167,16 +167,24 @@ def close_loops(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> b
 
 
 @compiled_lean
+def begin_to_turn(mech: MechanismArrays, angles: Floats, work: WorkingMemory) -> None:
+    """Fill `rows` and `rates` at joint coordinates, from which `turn_drive` starts."""
+    place_links(mech, 0, angles, work)
+    equations(mech, 0, work)
+    passive_rates(mech, 0, work)
+
+
+@compiled_lean
 def turn_drive(
     mech: MechanismArrays, angles: Floats, drive: int, turn: float, margin: float, work: WorkingMemory
 ) -> bool:
     """Turn one drive a little, in its unit, and close the loops (in place); False where that leads to or past a
-    singularity, or beyond a joint's limit."""
+    singularity, or beyond a joint's limit.
+
+    `rows` and `rates` belong to the posture before, as `begin_to_turn` or a turn that succeeded leaves them.
+    """
     rates, step, m = work.rates, work.solution[0], work.rows.shape[0]
     moved = m - mech.free
-    place_links(mech, 0, angles, work)
-    equations(mech, 0, work)
-    passive_rates(mech, 0, work)
     for u in range(m):
         step[u] = turn * mech.unit[0, moved - mech.driven + drive] * rates[drive, u]
     move_joints(mech, angles, step)
@@ -242,6 +250,7 @@ def flood(mech: MechanismArrays, reference: Floats, turned: int, turns: int) -> 
                 if visited[cell]:
                     continue
                 copy_row(angles[head], trial)
+                begin_to_turn(mech, trial, work)
                 free = True
                 for _ in range(substeps):
                     free = free and turn_drive(mech, trial, drive, sign * pitch / substeps, margin, work)
