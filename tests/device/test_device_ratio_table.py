@@ -138,6 +138,25 @@ def test_designs_together_have_the_ratios_of_their_own_postures():
         assert over[i, 0, 1] == pytest.approx(device.at((0.25, 0.1)).measure("stiffness_max").values, rel=1e-9)
 
 
+def test_designs_with_other_ratios_are_built_together():
+    ratios = np.array([9.0, 10.0, 12.0])
+    steps = ("mechanism", "drives", 0, "ratio_table", "ratio", 1)
+    batch, valid = design_batch(arm(), {steps: ratios}, 3, "arm")
+    assert valid.all()
+    points, alone = batch.at()
+    grid, _ = batch.at(np.array([[[0.2, 0.2], [0.25, 0.1]]]))
+    assert not alone.any()
+    together, over = (point.measure("stiffness_max").values for point in (points, grid))
+    for i, ratio in enumerate(ratios):
+        device = from_document(arm({"joint_rad": ANGLES, "ratio": [8.0, float(ratio), 11.0, 15.0]}))
+        assert points.drives.transmission[i] == pytest.approx(device.at().drives.transmission, rel=1e-12)
+        assert points[i].plant.stiffness == pytest.approx(device.at().plant.stiffness, rel=1e-12)
+        assert together[i] == pytest.approx(device.at().measure("stiffness_max").values, rel=1e-9)
+        assert over[i, 0, 1] == pytest.approx(device.at((0.25, 0.1)).measure("stiffness_max").values, rel=1e-9)
+    _, valid = design_batch(arm(), {steps: np.array([9.0, -1.0, 12.0])}, 3, "arm")
+    assert valid.tolist() == [True, False, True]
+
+
 def test_designs_of_other_parts_keep_the_table():
     document = arm()
     periods = np.array([0.0005, 0.001])
