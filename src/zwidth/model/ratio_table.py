@@ -91,14 +91,16 @@ def drives_at(drives: Drives, posture: Posture) -> Drives:
     if drives.ratio_tables is None:
         return drives
     q = posture.angles[..., drives.joint]
-    return _with_ratios(drives, [table and table.at(q[..., i]) for i, table in enumerate(drives.ratio_tables)])
+    return _with_ratios(
+        drives, [table if table is None else table.at(q[..., i]) for i, table in enumerate(drives.ratio_tables)]
+    )
 
 
 def with_any_ratio(drives: Drives) -> Drives:
     """The drives with the first ratio of each table, for what hangs on there being one and not on its size."""
     if drives.ratio_tables is None:
         return drives
-    return _with_ratios(drives, [table and table.ratio[..., 0] for table in drives.ratio_tables])
+    return _with_ratios(drives, [table if table is None else table.ratio[..., 0] for table in drives.ratio_tables])
 
 
 def _with_ratios(drives: Drives, ratios: list[Floats | None]) -> Drives:
