@@ -42,6 +42,7 @@ TABLES = {
     "`[mechanism.reference]`": ("mechanism", "reference"),
     "`[mechanism.workspace]`": ("mechanism", "workspace"),
     "`[[mechanism.drives]]`": ("mechanism", "drives", 0),
+    "`[mechanism.drives.ratio_table]`": ("mechanism", "drives", 0, "ratio_table"),
     "`[mechanism.damping]`": ("mechanism", "damping"),
     "`[mechanism.friction]`": ("mechanism", "friction"),
 }

@@ -1,4 +1,4 @@
-"""Transmissions whose ratio changes with the joint, in device files: what is right, what is refused, what is set."""
+"""Ratios that change with the joint, in device files: what is right, what is refused, what is set."""
 
 from __future__ import annotations
 
@@ -29,7 +29,12 @@ def arm(table=None, **changes):
 CASES = [
     # the table, other changes, the key found at fault, words of the message
     ({"joint_rad": [0, 1, 1], "ratio": [1.0, 2, 3]}, {}, ".joint_rad", "number 2 (counted from 0) is 1, after 1"),
-    ({"joint_rad": [0, 1, 0.5], "ratio": [1.0, 2, 3]}, {}, ".joint_rad", "must increase from each number to the next"),
+    (
+        {"joint_rad": [0, 1, 0.5], "ratio": [1.0, 2, 3]},
+        {},
+        ".joint_rad",
+        "must increase from each number to the next",
+    ),
     ({"joint_rad": [-1, 1], "ratio": [1.0, -2]}, {}, ".ratio.1", "must be greater than 0, got -2"),
     ({"joint_rad": [-1, 1], "ratio": [1.0, 0]}, {}, ".ratio.1", "must be greater than 0, got 0"),
     ({"joint_rad": [-1, 1], "ratio": [1.0, 1e9]}, {}, ".ratio.1", "between 1e-06 and 1e+06"),
@@ -85,7 +90,7 @@ def test_a_posture_outside_of_the_table_says_so():
 def test_narrower_limits_stay():
     device = from_document(arm(**{LIMITS: [-0.5, 1.0]}))
     assert device.mechanism.links.lower.tolist() == [-0.5, -np.inf]
-    with pytest.raises(BeyondLimit, match="beyond its limits, -0.5 to 1 rad"):
+    with pytest.raises(BeyondLimit, match=r"beyond its limits, -0\.5 to 1 rad"):
         device.at((0.25, -0.2))
 
 
@@ -133,6 +138,25 @@ def test_designs_together_have_the_ratios_of_their_own_postures():
         assert over[i, 0, 1] == pytest.approx(device.at((0.25, 0.1)).measure("stiffness_max").values, rel=1e-9)
 
 
+def test_designs_with_other_ratios_are_built_together():
+    ratios = np.array([9.0, 10.0, 12.0])
+    steps = ("mechanism", "drives", 0, "ratio_table", "ratio", 1)
+    batch, valid = design_batch(arm(), {steps: ratios}, 3, "arm")
+    assert valid.all()
+    points, alone = batch.at()
+    grid, _ = batch.at(np.array([[[0.2, 0.2], [0.25, 0.1]]]))
+    assert not alone.any()
+    together, over = (point.measure("stiffness_max").values for point in (points, grid))
+    for i, ratio in enumerate(ratios):
+        device = from_document(arm({"joint_rad": ANGLES, "ratio": [8.0, float(ratio), 11.0, 15.0]}))
+        assert points.drives.transmission[i] == pytest.approx(device.at().drives.transmission, rel=1e-12)
+        assert points[i].plant.stiffness == pytest.approx(device.at().plant.stiffness, rel=1e-12)
+        assert together[i] == pytest.approx(device.at().measure("stiffness_max").values, rel=1e-9)
+        assert over[i, 0, 1] == pytest.approx(device.at((0.25, 0.1)).measure("stiffness_max").values, rel=1e-9)
+    _, valid = design_batch(arm(), {steps: np.array([9.0, -1.0, 12.0])}, 3, "arm")
+    assert valid.tolist() == [True, False, True]
+
+
 def test_designs_of_other_parts_keep_the_table():
     document = arm()
     periods = np.array([0.0005, 0.001])
@@ -143,5 +167,6 @@ def test_designs_of_other_parts_keep_the_table():
     for i, period in enumerate(periods):
         device = from_document(arm(loop__sampling_period_s=float(period)))
         assert values[i] == pytest.approx(device.at().measure("stiffness_max").values, rel=1e-9)
-        assert masses[i, 0, 1] == pytest.approx(device.at((0.25, 0.1)).measure("motor_side_mass").values, rel=1e-12)
-
+        assert masses[i, 0, 1] == pytest.approx(
+            device.at((0.25, 0.1)).measure("motor_side_mass").values, rel=1e-12
+        )

@@ -1,4 +1,4 @@
-"""Transmissions whose ratio changes with the joint: against a constant ratio, and against a linkage that has one."""
+"""Ratios that change with the joint: against a constant ratio, and against a linkage that has one."""
 
 from __future__ import annotations
 
@@ -71,7 +71,9 @@ def test_a_map_has_the_numbers_of_its_points(kind, flexible):
     many = device.at(GRID)
     assert {int(status) for status in np.unique(many.status)} > {OK}  # some are outside of the table
     for name in MEASURES:
-        if (name == "stiffness" and not flexible) or (kind == "joint damper" and name in ("stiffness_max", "damping_max")):
+        if (name == "stiffness" and not flexible) or (
+            kind == "joint damper" and name in ("stiffness_max", "damping_max")
+        ):
             continue  # infinite; no wall is stable
         together = many.measure(name).values
         alone = np.full(many.shape, np.nan)
@@ -117,7 +119,9 @@ def test_the_functions_of_the_model_look_the_ratio_up():
 
 
 def test_the_large_motion_refuses_a_table():
-    with pytest.raises(MotionError, match="not simulated with a transmission whose ratio changes; simulate the plant"):
+    with pytest.raises(
+        MotionError, match="not simulated with a transmission whose ratio changes; simulate the plant"
+    ):
         two_links(CHANGING).at().move()
 
 
@@ -142,8 +146,8 @@ def test_a_turn_more_is_the_same_posture():
 
 # --- a linkage ----------------------------------------------------------------------------------------------
 #
-# A motor's crank of length CRANK at the origin turns an arm about (BASE, 0) by a coupler of length COUPLER, which is
-# held by the arm ROCKER from its joint. The coupler's length gives psi(q), crank angle over arm angle, and
+# A motor's crank of length CRANK at the origin turns an arm about (BASE, 0) by a coupler of length COUPLER, which
+# the arm holds at ROCKER from its joint. The coupler's length gives psi(q), crank angle over arm angle, and
 #
 #     dpsi/dq = (A - B) . B' / (A - B) . A',    A = CRANK (cos psi, sin psi), B = (BASE, 0) + ROCKER (cos q, sin q)
 
@@ -292,7 +296,9 @@ def test_a_table_of_a_linkage_is_the_linkage():
         exact = numbers_at(bars, q)
         assert numbers_at(fine, q) == pytest.approx(exact, rel=1e-6)
         errors.append([np.abs(numbers_at(each, q) / exact - 1.0).max() for each in (coarse, fine)])
-    assert np.max(errors, axis=0)[1] < np.max(errors, axis=0)[0] / 30.0  # what is left is the interpolation's error
+    assert (
+        np.max(errors, axis=0)[1] < np.max(errors, axis=0)[0] / 30.0
+    )  # what is left is the interpolation's error
 
 
 def test_the_linkage_of_this_file_moves_as_its_formulas_say():

@@ -340,7 +340,7 @@ def _ratio_table(drive: DriveSection) -> RatioTable:
     given = drive.ratio_table
     assert given is not None
     coordinate = given.joint_m if given.joint_rad is None else given.joint_rad
-    return RatioTable(np.array(coordinate), np.array(given.ratio), turns=given.joint_rad is not None)
+    return RatioTable(np.array(coordinate), stack_numbers(given.ratio), turns=given.joint_rad is not None)
 
 
 def _coupling(drives: Sequence[DriveSection], index: dict[str, int]) -> Floats | None:

@@ -56,6 +56,7 @@ _OPERATOR: Final = [
 ARRAYS: Final[tuple[KeyPath, ...]] = (
     *((*owner, "links", "*", key) for owner in _OWNERS for key in _LINK),
     *((*owner, "drives", "*", key) for owner in _OWNERS for key in _DRIVE),
+    *((*owner, "drives", "*", "ratio_table", "ratio") for owner in _OWNERS),
     *((*owner, "loops", "*", "points_m") for owner in _OWNERS),
     ("mechanism", "handle", "point_m"),
     ("mechanism", "assemblies", "*", "joints_rad"),

@@ -17,7 +17,6 @@ from pydantic import ValidationError
 from zwidth.device.faults import KeyPath
 from zwidth.device.legs import written
 from zwidth.device.loop_consistency import lags_wrongly, reaches_nyquist
-from zwidth.device.ratio_consistency import largest_ratio
 from zwidth.device.schema import magnitudes
 from zwidth.device.schema.device_file import DeviceFile
 from zwidth.device.schema.loop import LONGEST_DELAY
@@ -193,7 +192,9 @@ def _windings(document: dict[str, Any], read: Read) -> Broken:
     windings = []
     for path, drive in written(table(document, "mechanism"), "drives"):
         if "damping_resistance_ohm" in drive:
-            n = read("mechanism", *path, "transmission_ratio")
+            n, table_of = (
+                read("mechanism", *path, *keys) for keys in (("transmission_ratio",), ("ratio_table", "ratio"))
+            )
             k, inside, outside, L = (
                 read("mechanism", *path, key)
                 for key in (
@@ -203,7 +204,7 @@ def _windings(document: dict[str, Any], read: Read) -> Broken:
                     "winding_inductance_H",
                 )
             )
-            windings.append(((largest_ratio(drive) if n is None else n) * k, inside + outside, L))
+            windings.append(((n if table_of is None else table_of.max(axis=-1)) * k, inside + outside, L))
     for i, _ in tables(table(document, "plant"), "electrical_damping"):
         keys = ("force_constant_N_per_A", "resistance_ohm", "inductance_H")
         windings.append(tuple(read("plant", "electrical_damping", i, key) for key in keys))

@@ -68,13 +68,14 @@ def _table(place: KeyPath, given: dict[str, Any], link: dict[str, Any]) -> KeyMe
             "posture: give one turn, 6.2831853 rad, or less",
         )
     limits = link.get(limits_key)
-    if isinstance(limits, list) and len(limits) == 2 and all(map(is_number, limits)) and low < high:
-        if limits[0] < low or limits[1] > high:
-            yield (
-                (*place, key),
-                f"goes from {low:.10g} to {high:.10g} {unit}, but {limits_key} of the joint are [{limits[0]:.10g}, {limits[1]:.10g}]; "
-                "extend the table over them, or narrow the limits",
-            )
+    if not (isinstance(limits, list) and len(limits) == 2 and all(map(is_number, limits)) and low < high):
+        return
+    if limits[0] < low or limits[1] > high:
+        yield (
+            (*place, key),
+            f"goes from {low:.10g} to {high:.10g} {unit}, but {limits_key} of the joint are [{limits[0]:.10g}, "
+            f"{limits[1]:.10g}]; extend the table over them, or narrow the limits",
+        )
 
 
 def largest_ratio(drive: dict[str, Any]) -> Any:

@@ -34,8 +34,8 @@ from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import Operator, attach
 from zwidth.model.plant import Plant
-from zwidth.model.ratio_table import drives_at
 from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solve_posture
+from zwidth.model.ratio_table import drives_at
 from zwidth.model.reduction import Encoders, Model, plant_effective_parameters, reduce_mechanism, reduce_plant
 from zwidth.model.response import Response
 

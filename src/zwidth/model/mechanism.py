@@ -161,8 +161,8 @@ class Drives:
                      None: the rotors' turning with their links is neglected, as in thesis eq. 2.21
     motor_axis       (..., d, 3)  the rotor's spin axis in that link's frame, in the sense in which the motor's
                      angle counts; of length 0 for a drive of which it is neglected
-    ratio_tables     (d,)  of each drive whose ratio changes with its joint, the others None: `ratio_table.at_postures`
-                     looks them up; None: no ratio changes
+    ratio_tables     (d,)  of each drive whose ratio changes with its joint, the others None:
+                     `ratio_table.at_postures` looks them up; None: no ratio changes
     """
 
     names: tuple[str, ...]

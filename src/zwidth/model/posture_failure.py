@@ -116,8 +116,8 @@ def _limit(mechanism: Mechanism, mech: MechanismArrays, reference: Floats, goal:
     drive = _drive_with_table(mechanism, link)
     if drive and (low, high) == (drive[1].coordinate[0], drive[1].coordinate[-1]):
         return (
-            f"joint {name!r} is at {value:.4g} {unit}, outside of the ratio table of drive {drive[0]!r}, {low:.4g} to "
-            f"{high:.4g} {unit}; ask for a place nearer to the reference, or extend the table"
+            f"joint {name!r} is at {value:.4g} {unit}, outside of the ratio table of drive {drive[0]!r}, "
+            f"{low:.4g} to {high:.4g} {unit}; ask for a place nearer to the reference, or extend the table"
         )
     return (
         f"joint {name!r} is at {value:.4g} {unit}, beyond its limits, {low:.4g} to {high:.4g} {unit}; ask for a "

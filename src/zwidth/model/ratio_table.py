@@ -5,25 +5,28 @@ theta the motor's angle less f(q0), over n(q0), a spring k at the motor gives th
 
     n(q) k (n(q0) theta - f(q) + f(q0)) = n(q0)^2 k (theta - (q - q0)) + second order
 
-so that every linear answer is that of the constant ratio n(q0). With a torque tau at the motor at rest, as of a hand
-that leans on a wall, the joint has the torque n'(q0) tau (q - q0) besides. It is left out, as is the change of the
-Jacobian under such a force.
+so that every linear answer is that of the constant ratio n(q0). With a torque tau at the motor at rest, as of a
+hand that leans on a wall, the joint has the torque n'(q0) tau (q - q0) besides. It is left out, as is the change
+of the Jacobian under such a force.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from zwidth.model.design_axes import Array1
 
 if TYPE_CHECKING:
     from zwidth.model.mechanism import Drives, Mechanism
     from zwidth.model.posture import Posture
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 ROUNDING: Final = 1e-9  # share of a table's length beyond its ends that counts as its end
 TURN: Final = 2.0 * np.pi
@@ -34,22 +37,25 @@ class RatioTable:
     """The ratio of a drive over its joint's coordinate, between its entries a cubic that keeps their shape.
 
     coordinate  (k,)  at least two, strictly increasing [rad], of a prismatic joint [m]
-    ratio       (k,)  motor turns per joint turn, of a prismatic joint radians of the motor per metre
+    ratio       (..., k)  motor turns per joint turn, of a prismatic joint radians of the motor per metre
     turns       whether the joint is revolute: then a turn more or less is the same
     """
 
     coordinate: Floats
-    ratio: Floats
+    ratio: Array1
     turns: bool
 
     @cached_property
-    def _cubic(self) -> Any:
+    def _coefficients(self) -> Floats:
+        """Of the cubics in q less their first coordinate, highest power first, of P designs (4, P, k - 1)."""
         from scipy.interpolate import PchipInterpolator  # which devices without a table do without
 
-        return PchipInterpolator(self.coordinate, self.ratio, extrapolate=False)
+        ratio = self.ratio.reshape(-1, len(self.coordinate))
+        return np.asarray(np.swapaxes(PchipInterpolator(self.coordinate, ratio, axis=1).c, 1, 2))
 
     def at(self, coordinate: Floats) -> Floats:
         """The ratio at coordinates (...), by Fritsch and Butland's monotone cubic; nan outside of the table.
+        Axes of designs broadcast with those of the coordinates.
 
         >>> RatioTable(np.array([0.0, 1.0]), np.array([3.0, 5.0]), True).at(np.array([0.5, 0.5 - TURN, 2.0]))
         array([ 4.,  4., nan])
@@ -60,7 +66,17 @@ class RatioTable:
             outside = (q < low - slack) | (q > high + slack)
             q = np.where(outside, q + TURN * np.ceil((low - slack - q) / TURN), q)
         inside = (q >= low - slack) & (q <= high + slack)
-        return np.asarray(self._cubic(np.where(inside, np.clip(q, low, high), np.nan)))
+        q = np.where(inside, np.clip(q, low, high), low)
+        span = np.clip(np.searchsorted(self.coordinate, q, side="right") - 1, 0, len(self.coordinate) - 2)
+        c = self._coefficients[:, self._design(q.shape), span]
+        x = q - self.coordinate[span]
+        return np.asarray(np.where(inside, ((c[0] * x + c[1]) * x + c[2]) * x + c[3], np.nan))
+
+    def _design(self, shape: tuple[int, ...]) -> Ints:
+        """Which design's numbers are meant at each of coordinates of a shape, with the axes of the designs."""
+        designs = self.ratio.shape[:-1]
+        numbers = np.arange(int(np.prod(designs))).reshape(designs)
+        return np.broadcast_to(numbers, np.broadcast_shapes(designs, shape))
 
 
 def at_postures(mechanism: Mechanism, posture: Posture) -> Mechanism:
@@ -75,20 +91,20 @@ def drives_at(drives: Drives, posture: Posture) -> Drives:
     if drives.ratio_tables is None:
         return drives
     q = posture.angles[..., drives.joint]
-    shape = np.broadcast_shapes(q.shape, drives.transmission.shape)
-    ratio = np.array(np.broadcast_to(drives.transmission, shape))
-    for i, table in enumerate(drives.ratio_tables):
-        if table is not None:
-            ratio[..., i] = table.at(q[..., i])
-    return replace(drives, transmission=ratio, ratio_tables=None)
+    return _with_ratios(
+        drives, [table if table is None else table.at(q[..., i]) for i, table in enumerate(drives.ratio_tables)]
+    )
 
 
 def with_any_ratio(drives: Drives) -> Drives:
     """The drives with the first ratio of each table, for what hangs on there being one and not on its size."""
     if drives.ratio_tables is None:
         return drives
-    ratio = np.array(drives.transmission)
-    for i, table in enumerate(drives.ratio_tables):
-        if table is not None:
-            ratio[..., i] = table.ratio[0]
-    return replace(drives, transmission=ratio, ratio_tables=None)
+    return _with_ratios(drives, [table if table is None else table.ratio[..., 0] for table in drives.ratio_tables])
+
+
+def _with_ratios(drives: Drives, ratios: list[Floats | None]) -> Drives:
+    """The drives with ratios (...) in place of their tables; None: that of the drive."""
+    own = drives.transmission
+    columns = [own[..., i] if ratio is None else ratio for i, ratio in enumerate(ratios)]
+    return replace(drives, transmission=np.stack(np.broadcast_arrays(*columns), axis=-1), ratio_tables=None)

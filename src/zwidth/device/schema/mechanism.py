@@ -261,8 +261,8 @@ class DriveSection(Section):
         default=None,
     )
     ratio_table: RatioTableSection | None = documented_key(
-        "instead of transmission_ratio: a ratio that changes with the joint; its ends limit the joint where the link "
-        "has no limits",
+        "instead of transmission_ratio: a ratio that changes with the joint; its ends limit the joint where the "
+        "link has no limits",
         default=None,
     )
     coupling: dict[Name, Number] = documented_key(

@@ -86,8 +86,8 @@ def _increasing(numbers: tuple[float, ...]) -> tuple[float, ...]:
     for i in range(1, len(numbers)):
         if not numbers[i - 1] < numbers[i]:
             raise ValueError(
-                f"must increase from each number to the next, but number {i} (counted from 0) is {numbers[i]:.10g}, "
-                f"after {numbers[i - 1]:.10g}"
+                f"must increase from each number to the next, but number {i} (counted from 0) is {numbers[i]:.10g}"
+                f", after {numbers[i - 1]:.10g}"
             )
     return numbers
 
