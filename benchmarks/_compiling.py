@@ -27,7 +27,7 @@ from zwidth.show.cli.first_use import GROUPS
 
 TIMES = Path(__file__).parent.parent / "src/zwidth/show/cli/kernel_times.json"
 # Functions compiled for all kernels, numba's own among them, and the combinations of types they are compiled for.
-MOST = (580, 730)
+MOST = (620, 780)
 SECONDS = 30  # of a command
 SECONDS_OF_ALL = 110
 COMMANDS = {

@@ -22,6 +22,9 @@ Floats = NDArray[np.float64]
 
 # Entries are symmetric, and eigenvalues not negative, to this share of the largest entry.
 ROUNDING: Final = 1e-12
+# Along a direction that has the one, stiffness or damping, of the other is at least this much of its largest, or
+# none.
+LEAST: Final = 1e-9
 
 
 class MatrixError(ValueError):
@@ -94,7 +97,15 @@ class WallMatrices:
         stiffness = _scaled_matrix("relative_stiffness", alike, m)
         if relative_damping is None:
             return cls(stiffness, stiffness.copy())
-        return cls(stiffness, _scaled_matrix("relative_damping", relative_damping, m))
+        law = cls(stiffness, _scaled_matrix("relative_damping", relative_damping, m))
+        for name, along in (("stiffness", law.principal.stiffness), ("damping", law.principal.damping)):
+            faint = along[(along > 0.0) & (along < LEAST)]
+            if len(faint):
+                problem = (
+                    f"must be 0 or at least {LEAST:g} times the other along each direction, got {faint[0]:.3g}"
+                )
+                raise MatrixError(f"relative_{name}", f"{problem} times; give 0")
+        return law
 
     def __str__(self) -> str:
         stiffness, damping = ratios_text(self.stiffness), ratios_text(self.damping)

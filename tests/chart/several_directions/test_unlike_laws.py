@@ -337,3 +337,15 @@ def test_matrices_of_another_number_of_directions_are_refused():
         MultiLoop(loop.plant, loop.controller, WallMatrices.of([1.0, 1.0, 1.0]))
     with pytest.raises(TypeError, match=r"matrices .*write WallMatrices\.of"):
         MultiLoop(loop.plant, loop.controller, np.eye(2))
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "damping", "name"),
+    [([1.0, 1e-10], [1.0, 1.0], "relative_stiffness"), ([1.0, 1.0], [1e-11, 1.0], "relative_damping")],
+)
+def test_a_share_too_small_to_tell_from_none_is_refused(stiffness, damping, name):
+    with pytest.raises(MatrixError, match=rf"^{name} must be 0 or at least 1e-09 times the other .* give 0$"):
+        WallMatrices.of(stiffness, damping)
+    given = {"relative_stiffness": stiffness, "relative_damping": damping}
+    least = {key: np.maximum(numbers, 1e-9) for key, numbers in given.items()}
+    assert WallMatrices.of(least["relative_stiffness"], least["relative_damping"]).count == 2
