@@ -151,6 +151,20 @@ def test_over_the_workspace_a_design_has_what_its_map_has():
     assert {one.name: one.better for one in made.columns}["variation(isotropy)"] == "lower"
 
 
+def test_over_the_workspace_computers_differ_too():
+    """One plant at every cell, and computers along an axis of their own."""
+    space = {"x_m": [-0.15, 0.15], "y_m": [0.1, 0.4], "count": [5, 4]}
+    periods = axis("loop.sampling_period_s", values=[1e-3, 2e-3])
+    made = study(periods, measures=["average(stiffness_max)"], workspace=space)
+    found = run_study(made, workers=1)
+    assert made.plane is not None
+    for n in (0, 1):
+        device = load(FIVE_BAR, list(found.design(n).items()))
+        mapped = workspace_map(device, ["stiffness_max"], made.plane, workers=1)
+        expected = over_the_workspace(mapped, "stiffness_max", device)["average"]
+        assert found.cells.values[n, 0] == pytest.approx(expected, rel=1e-9)
+
+
 def test_a_workspace_out_of_reach_has_no_value_and_says_so():
     space = {"x_m": [0.6, 0.7], "y_m": [0.6, 0.7], "count": 2}
     found = run_axes(LENGTHS, measures=["average(isotropy)", "share(isotropy)"], workspace=space)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -105,7 +106,7 @@ def _columns(controller: Controller) -> ComputerColumns:
     )
     whole_delay, C = whole_samples(delay), len(period)
     path, estimate = force_path(controller), velocity_estimator(controller)
-    force, velocity = (_factors(each.numerator, each.denominator, C) for each in (path, estimate))
+    force, velocity = (_factors(each.numerator, each.denominator, designs) for each in (path, estimate))
     return ComputerColumns(
         period.copy(),
         whole_delay,
@@ -119,11 +120,12 @@ def _columns(controller: Controller) -> ComputerColumns:
     )
 
 
-def _factors(top: Floats, bottom: Floats, computers: int) -> Floats:
-    """Numerators and denominators (..., k, 3) of several computers side by side, (C, k, 6)."""
-    out = np.zeros((computers, bottom.shape[-2], 6))
+def _factors(top: Floats, bottom: Floats, designs: tuple[int, ...]) -> Floats:
+    """Numerators and denominators (..., k, 3) of several computers side by side, (C, k, 6), C of all axes of
+    designs."""
+    out = np.zeros((*designs, bottom.shape[-2], 6))
     out[..., :3], out[..., 3:] = top, bottom
-    return out
+    return out.reshape(math.prod(designs), *out.shape[-2:])
 
 
 def _table(rows: Floats, section_count: Whole, computer: Whole, columns: Sequence[ComputerColumns]) -> LoopTable:
