@@ -12,6 +12,7 @@ from tests.device.device_cases import ARM_FILE
 from zwidth.contact.mechanism.motion_inputs import MotionError
 from zwidth.device.load import from_document
 from zwidth.model.effective_parameters import effective_parameters
+from zwidth.model.general_modes import modes_in_general
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import OK
 from zwidth.model.ratio_table import RatioTable
@@ -310,3 +311,16 @@ def test_the_linkage_of_this_file_moves_as_its_formulas_say():
         assert turned["arm"] == pytest.approx(q, abs=1e-9)
         assert turned["crank"] == pytest.approx(float(crank_angle(q)), abs=1e-9)
         assert np.linalg.norm(posture.jacobian) == pytest.approx(ARM / float(crank_turns(q)), rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["joint spring", "turning rotor"])
+def test_the_modes_of_many_postures_are_those_of_each(kind):
+    """Those of a mechanism that is not plain are put together for all postures at once."""
+    device = two_links(CHANGING, kind)
+    many = device.at(GRID)
+    modes = modes_in_general(many.mechanism, many.posture, many.direction, many.damping, many.encoders)
+    found = np.sort(np.sqrt(np.abs(modes.frequency_squared)).reshape(*many.shape, -1), axis=-1)
+    for index in zip(*np.nonzero(many.status == OK), strict=True):
+        alone = 2.0 * np.pi * natural_frequencies(device.at(GRID[index]).plant)
+        assert found[index][-2:] == pytest.approx(np.sort(alone)[-2:], rel=1e-10)
+    assert np.isnan(modes.input.reshape(*many.shape, -1)[many.status != OK]).all()
